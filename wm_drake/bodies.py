@@ -1,0 +1,153 @@
+"""The bodies: SDF model -> MultibodyPlant, and what the machine file changes in it, set in a Context."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame, RotationalInertia, RpyFloatingJoint, SpatialInertia, UnitInertia
+
+from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.parameters import BodyOverride, Load, MachineParameters
+from wm_drake.systems.speed_source import REFLECTED_INERTIA
+
+_PACKAGE = Path(__file__).parent
+SDF_FOLDER = _PACKAGE / "sdf" if (_PACKAGE / "sdf").is_dir() else _PACKAGE.parent / "sdf"
+"""The SDF models: inside an installed package, beside it in a checkout."""
+
+
+def sdf_path(model: str) -> Path:
+    """The file of a shipped model's name or of a path."""
+    path = Path(model) if Path(model).is_absolute() else SDF_FOLDER / model
+    if not path.is_file():
+        known = [shipped.name for shipped in SDF_FOLDER.glob("*.sdf")]
+        raise input_error(f"no SDF file '{model}'{nearest_names(model, known)}", key="model")
+    return path
+
+
+def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
+    """Parses the SDF strictly into `plant`, lets the tub float, couples the drive to the drum, finalizes.
+
+    The tub gets an RpyFloatingJoint (7 positions and 7 velocities with the drum), which SDF cannot say. The drive's reflected
+    inertia makes the drum follow its speed source (`wm_drake.systems.speed_source`).
+
+    Raises:
+        InputError: no such file, not valid SDF, or not the bodies this machine needs.
+    """
+    parser = Parser(plant)
+    parser.SetStrictParsing()
+    try:
+        parser.AddModels(str(sdf_path(parameters.model)))
+    except RuntimeError as error:
+        raise input_error(f"SDF '{parameters.model}' cannot be read: {error}", key="model") from None
+    missing = [f"link '{name}'" for name in ("housing", "tub", "drum") if not plant.HasBodyNamed(name)]
+    if not plant.HasJointNamed(parameters.drive.joint):
+        joints = [plant.get_joint(index).name() for index in plant.GetJointIndices()]
+        raise input_error(f"no joint '{parameters.drive.joint}'{nearest_names(parameters.drive.joint, joints)}", key="drive.joint")
+    if missing:
+        raise input_error(f"SDF '{parameters.model}' has no {' and no '.join(missing)}", key="model")
+    tub = plant.GetBodyByName("tub")
+    plant.AddJoint(RpyFloatingJoint("tub_floating", plant.world_frame(), tub.body_frame()))
+    actuator = plant.get_joint_actuator(plant.GetJointActuatorIndices()[0])
+    actuator.set_default_rotor_inertia(REFLECTED_INERTIA)
+    actuator.set_default_gear_ratio(1.0)
+    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -parameters.gravity])
+    plant.Finalize()
+    _check_freedoms(plant, parameters)
+
+
+def _check_freedoms(plant: MultibodyPlant, parameters: MachineParameters) -> None:
+    floating, drive = plant.GetJointByName("tub_floating"), plant.GetJointByName(parameters.drive.joint)
+    if plant.num_velocities() != 7 or floating.velocity_start() != 0 or drive.velocity_start() != 6:
+        raise input_error(
+            f"SDF '{parameters.model}' has {plant.num_velocities()} freedoms; a machine has the tub's six and the drum's one, "
+            "all else on fixed joints",
+            key="model",
+        )
+
+
+def frame_names(plant: MultibodyPlant) -> list[str]:
+    """Names of the frames and links of the model, by which elements attach."""
+    frames = map(plant.get_frame, plant.GetFrameIndices(plant.GetBodyByName("tub").model_instance()))
+    return sorted({frame.name() for frame in frames} - {"__model__"})
+
+
+def fixed_to(plant: MultibodyPlant, body_name: str, frame_name: str) -> bool:
+    """Whether a frame moves with a body (on it, or on one welded to it)."""
+    body = plant.GetFrameByName(frame_name).body()
+    return any(body.index() == other.index() for other in plant.GetBodiesWeldedTo(plant.GetBodyByName(body_name)))
+
+
+def frame_problems(plant: MultibodyPlant, parameters: MachineParameters) -> list[Problem]:
+    """What is wrong with the names of frames and bodies in a machine."""
+    wanted = [
+        (f"{table}.{name}.{end}_frame" if name else f"{table}.{end}_frame", end, getattr(element, f"{end}_frame"))
+        for table, name, element in _placed_elements(parameters)
+        for end in ("tub", "housing")
+    ]
+    wanted += [(f"sensors.{name}.frame", "tub", sensor.frame) for name, sensor in parameters.sensors.items()]
+    wanted.append(("clearance.detergent_frame", "tub", parameters.clearance.detergent_frame))
+    known = frame_names(plant)
+    problems = []
+    for key, body, frame in wanted:
+        if frame not in known:
+            problems.append(Problem("", key, f"no frame '{frame}' in the SDF{nearest_names(frame, known)}"))
+        elif not fixed_to(plant, body, frame):
+            problems.append(Problem("", key, f"frame '{frame}' is not fixed to the {body}"))
+    links = [plant.get_body(index).name() for index in plant.GetBodyIndices(plant.GetBodyByName("tub").model_instance())]
+    for name in parameters.bodies:
+        if name not in links:
+            problems.append(Problem("", f"bodies.{name}", f"no link '{name}' in the SDF{nearest_names(name, links)}"))
+    for name in parameters.frames:
+        if name not in known or not isinstance(plant.GetFrameByName(name), FixedOffsetFrame):
+            movable = [frame for frame in known if isinstance(plant.GetFrameByName(frame), FixedOffsetFrame)]
+            problems.append(Problem("", f"frames.{name}", f"no frame '{name}' in the SDF{nearest_names(name, movable)}"))
+    return problems
+
+
+def _placed_elements(parameters: MachineParameters) -> Iterable[tuple[str, str, Any]]:
+    for table in ("springs", "dampers", "bushings"):
+        for name, element in getattr(parameters, table).items():
+            yield table, name, element
+    if parameters.gasket:
+        yield "gasket", "", parameters.gasket
+
+
+def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameters, load: Load | None) -> None:
+    """Puts the overrides of the machine file, and the load on the drum, into a plant Context.
+
+    Raises:
+        InputError: names the SDF does not have.
+    """
+    problems = frame_problems(plant, parameters)
+    if problems:
+        raise InputError(problems)
+    for name, override in parameters.bodies.items():
+        body = plant.GetBodyByName(name)
+        body.SetSpatialInertiaInBodyFrame(context, _overridden(body.default_spatial_inertia(), override))
+    for name, frame_override in parameters.frames.items():
+        frame = plant.GetFrameByName(name)
+        rotation = frame.GetFixedPoseInBodyFrame().rotation()
+        frame.SetPoseInParentFrame(context, RigidTransform(rotation, frame_override.position))
+    if load is not None:
+        drum = plant.GetBodyByName("drum")
+        loaded = drum.CalcSpatialInertiaInBodyFrame(context)
+        for unbalance in load.unbalances:
+            p_DoU_D = unbalance.position()
+            loaded += SpatialInertia(unbalance.mass, p_DoU_D, UnitInertia.PointMass(p_DoU_D))
+        drum.SetSpatialInertiaInBodyFrame(context, loaded)
+
+
+def _overridden(inertia: SpatialInertia, override: BodyOverride) -> SpatialInertia:
+    mass = inertia.get_mass() if override.mass is None else override.mass
+    centre = inertia.get_com() if override.centre_of_mass is None else np.array(override.centre_of_mass)
+    if override.inertia is None:
+        central = inertia.Shift(inertia.get_com()).CalcRotationalInertia()
+        about_centre = central * (mass / inertia.get_mass())
+    else:
+        matrix = override.inertia
+        about_centre = RotationalInertia(matrix.xx, matrix.yy, matrix.zz, matrix.xy, matrix.xz, matrix.yz)
+    return SpatialInertia.MakeFromCentralInertia(mass, centre, about_centre)

@@ -1,0 +1,60 @@
+"""One source for each law, run two ways: compiled for floats, interpreted for any other scalar.
+
+A law is a plain function of scalars (or short tuples and arrays of scalars). ``@law`` compiles it with numba for floats.
+``generic(law)`` runs the very same source in Python, so that automatic differentiation sees every operation; a law that
+calls other laws calls their generic forms then. Rules for the source: numpy functions that exist on scalars (``np.sin``,
+``np.sqrt``), comparisons and ``abs`` are fine; ``np.sign`` drops derivatives, a square root of zero has none.
+"""
+
+import functools
+import hashlib
+import os
+import types
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core.dispatcher import Dispatcher
+
+_ROOM = Path(__file__).parents[1]
+
+
+def _cache_folder() -> str:
+    """A folder of compiled code that belongs to exactly this source.
+
+    numba looks only at the file of the function it compiles: after an edit of a called law, its cached callers would go on
+    with the old one. A folder named by the hash of all sources cannot go stale.
+    """
+    digest = hashlib.sha256()
+    for source in sorted(_ROOM.rglob("*.py")):
+        if "numba" in source.read_text() or source.parent.name == "laws":
+            digest.update(source.read_bytes())
+    home = os.environ.get("NUMBA_CACHE_DIR") or Path.home() / ".cache" / "wm_drake"
+    return str(Path(home) / digest.hexdigest()[:16])
+
+
+def law(function: Callable[..., Any]) -> Any:
+    """Compiles a law for floats, with a cache on disk."""
+    chosen_by_user = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = _CACHE_FOLDER
+    try:
+        return numba.njit(cache=True, error_model="numpy")(function)
+    except RuntimeError:  # no folder to write to: compile anew in each process
+        return numba.njit(error_model="numpy")(function)
+    finally:
+        numba.config.CACHE_DIR = chosen_by_user
+
+
+@functools.cache
+def generic(compiled: Any) -> Callable[..., Any]:
+    """The same source as `compiled`, interpreted, for scalars such as Drake's AutoDiffXd."""
+    source = compiled.py_func
+    names = dict(source.__globals__)
+    for name in source.__code__.co_names:  # the laws it calls
+        if isinstance(names.get(name), Dispatcher):
+            names[name] = generic(names[name])
+    return types.FunctionType(source.__code__, names, source.__name__, source.__defaults__, source.__closure__)
+
+
+_CACHE_FOLDER = _cache_folder()

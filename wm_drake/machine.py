@@ -1,0 +1,306 @@
+"""The machine: SDF bodies and force systems as one Drake diagram, and the Contexts in which its numbers are set."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import Adder, LogVectorOutput, VectorLogSink
+from scipy.optimize import root
+
+from wm_drake.bodies import add_bodies, set_bodies
+from wm_drake.errors import InputError, Problem, WmDrakeError, input_error, nearest_names
+from wm_drake.parameters import Load, MachineParameters, Sensor, packed_stiffness
+from wm_drake.parameters.elements import FloatArray
+from wm_drake.systems.element import GENERALIZED_FORCE_SIZE
+from wm_drake.systems.friction_damper import FrictionDamper, FrictionDamperParameters, packed_damper_law
+from wm_drake.systems.six_component_bushing import SixComponentBushing, SixComponentBushingParameters, packed_bushing_law
+from wm_drake.systems.speed_source import SpeedSource
+from wm_drake.systems.spring_strut import SpringStrut, SpringStrutParameters
+
+OUTPUT_PERIOD = 5e-3
+"""Time between samples of a record, as the measurements of [B]. [s]"""
+
+EQUILIBRIUM_TOLERANCE = 1e-9
+"""Largest force [N] or moment [N m] that may remain at the rest pose."""
+
+_FARTHEST_REST_POSITION = 0.02
+_FARTHEST_REST_ANGLE = np.deg2rad(3.0)
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A machine set up in a Context: numbers chosen, preloads solved, at rest at its rest pose.
+
+    Attributes:
+        machine: The built machine.
+        parameters: The numbers in force.
+        context: Root Context of the diagram.
+        springs, dampers, bushings: The elements in their places, by name.
+        sensor_points: By sensor name, the point in T. [m]
+        detergent_point: Tub point nearest the detergent box, in T. [m]
+        rest_pose: Equilibrium of the empty machine: roll, pitch, yaw, x, y, z. [rad, m]
+        residual: What remains there of moment about To and force, in W. [N m, N]
+    """
+
+    machine: "Machine"
+    parameters: MachineParameters
+    context: Context
+    springs: dict[str, SpringStrutParameters]
+    dampers: dict[str, FrictionDamperParameters]
+    bushings: dict[str, SixComponentBushingParameters]
+    sensor_points: dict[str, FloatArray]
+    detergent_point: FloatArray
+    rest_pose: FloatArray
+    residual: FloatArray
+
+    @property
+    def plant_context(self) -> Context:
+        """The plant's part of the Context."""
+        return self.machine.plant.GetMyContextFromRoot(self.context)
+
+    @property
+    def sensors(self) -> dict[str, Sensor]:
+        """Sensors by name."""
+        return self.parameters.sensors
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A built machine: diagram, plant and handles to every system in it. Numbers live in a Context: see `set_up`."""
+
+    parameters: MachineParameters
+    diagram: Diagram
+    plant: MultibodyPlant
+    source: SpeedSource
+    springs: dict[str, SpringStrut]
+    dampers: dict[str, FrictionDamper]
+    bushings: dict[str, SixComponentBushing]
+    logs: dict[str, VectorLogSink]
+
+    def set_up(
+        self,
+        load: Load | None = None,
+        *,
+        parameters: MachineParameters | None = None,
+        gasket: bool = True,
+        dampers: bool = True,
+    ) -> Setup:
+        """A fresh Context at the rest pose, with these numbers.
+
+        Setting numbers in a Context of one built machine gives, bit for bit, what a machine built from them gives.
+
+        Args:
+            load: Point masses in the drum; None for the empty machine. The rest pose is that of the empty machine.
+            parameters: Numbers to use; those it was built from if None. Same elements, same laws, tables of the same length.
+            gasket, dampers: False takes them out of the machine.
+
+        Raises:
+            InputError: other elements than were built, names unknown to the SDF, or no static equilibrium.
+        """
+        parameters = parameters or self.parameters
+        _check_same_elements(self.parameters, parameters)
+        context = self.diagram.CreateDefaultContext()
+        plant_context = self.plant.GetMyContextFromRoot(context)
+        set_bodies(self.plant, plant_context, parameters, None)
+        bushings = _placed_bushings(self.plant, plant_context, parameters)
+        placed_dampers = _placed_dampers(self.plant, plant_context, parameters)
+        self._set(context, self.bushings, bushings)
+        self._set(context, self.dampers, placed_dampers)
+        springs = self._preloaded_springs(context, parameters)
+        self._set(context, self.springs, springs)
+        rest_pose, residual = self._rest_pose(context)
+        set_bodies(self.plant, plant_context, parameters, load)
+        if not gasket and "gasket" in bushings:
+            bushings["gasket"] = _disengaged(bushings["gasket"])
+        if not dampers:
+            placed_dampers = {name: _disengaged(damper) for name, damper in placed_dampers.items()}
+        self._set(context, self.bushings, bushings)
+        self._set(context, self.dampers, placed_dampers)
+        self.plant.SetPositions(plant_context, np.append(rest_pose, 0.0))
+        points = {
+            name: _point(self.plant, plant_context, "tub", sensor.frame) for name, sensor in parameters.sensors.items()
+        }
+        detergent_point = _point(self.plant, plant_context, "tub", parameters.clearance.detergent_frame)
+        return Setup(
+            self, parameters, context, springs, placed_dampers, bushings, points, detergent_point, rest_pose, residual
+        )
+
+    def _set(self, context: Context, systems: dict[str, Any], placed: dict[str, Any]) -> None:
+        for name, system in systems.items():
+            system.set_parameters(system.GetMyContextFromRoot(context), placed[name].packed())
+
+    def elastic_and_gravity_force(self, context: Context) -> FloatArray:
+        """Moment about To and force on the tub in W at the Context's pose: all elements and gravity. [N m, N]"""
+        plant_context = self.plant.GetMyContextFromRoot(context)
+        elements = self.plant.get_applied_generalized_force_input_port().Eval(plant_context)
+        return np.asarray((elements + self.plant.CalcGravityGeneralizedForces(plant_context))[:6])
+
+    def _preloaded_springs(self, context: Context, parameters: MachineParameters) -> dict[str, SpringStrutParameters]:
+        """Springs with the preloads that balance the empty machine when T coincides with W, as well as they can."""
+        plant_context = self.plant.GetMyContextFromRoot(context)
+        unloaded = _placed_springs(self.plant, plant_context, parameters, dict.fromkeys(parameters.springs, 0.0))
+        self._set(context, self.springs, unloaded)
+        wrenches = []
+        for spring in unloaded.values():
+            pull = (spring.p_WH - spring.p_ToA_T) / spring.rest_length
+            wrenches.append(np.concatenate([np.cross(spring.p_ToA_T, pull), pull]))
+        solution = np.linalg.lstsq(np.column_stack(wrenches), -self.elastic_and_gravity_force(context), rcond=None)[0]
+        preloads = dict(zip(unloaded, map(float, solution), strict=True))
+        slack = [name for name, preload in preloads.items() if preload <= 0.0 and parameters.gravity > 0.0]
+        if slack:
+            raise InputError(
+                Problem("", f"springs.{name}", f"would be pushed, not pulled, at rest (preload {preloads[name]:.1f} N); "
+                        "move its hooks or the centre of mass")
+                for name in slack
+            )  # fmt: skip
+        return _placed_springs(self.plant, plant_context, parameters, preloads)
+
+    def _rest_pose(self, context: Context) -> tuple[FloatArray, FloatArray]:
+        """Equilibrium of the machine in the Context near T = W, where springs alone may not quite balance it."""
+        plant_context = self.plant.GetMyContextFromRoot(context)
+
+        def residual(pose: FloatArray) -> FloatArray:
+            self.plant.SetPositions(plant_context, np.append(pose, 0.0))
+            return self.elastic_and_gravity_force(context)
+
+        pose = np.zeros(6)
+        if np.max(np.abs(residual(pose))) > EQUILIBRIUM_TOLERANCE:
+            pose = np.asarray(root(residual, pose, tol=1e-15).x)
+        remains = residual(pose)
+        far = np.max(np.abs(pose[:3])) > _FARTHEST_REST_ANGLE or np.max(np.abs(pose[3:])) > _FARTHEST_REST_POSITION
+        if not np.max(np.abs(remains)) <= EQUILIBRIUM_TOLERANCE or far:
+            self.plant.SetPositions(plant_context, np.zeros(7))
+            m_x, m_y, m_z, f_x, f_y, f_z = self.elastic_and_gravity_force(context)
+            raise input_error(
+                "the springs cannot hold the empty machine near its drawn pose: there remain force "
+                f"({f_x:.3g}, {f_y:.3g}, {f_z:.3g}) N and moment ({m_x:.3g}, {m_y:.3g}, {m_z:.3g}) N m; "
+                "move hooks or masses so that they balance",
+                key="springs",
+            )
+        return pose, remains
+
+
+def build_machine(parameters: MachineParameters) -> Machine:
+    """Builds the diagram of a machine.
+
+    Build once and reuse: a Drake diagram with Python systems is never freed. Everything numeric can be changed afterwards in
+    a Context (`Machine.set_up`).
+
+    Raises:
+        InputError: SDF or machine file at fault.
+    """
+    builder = DiagramBuilder()
+    plant = builder.AddNamedSystem("bodies", MultibodyPlant(time_step=0.0))
+    add_bodies(plant, parameters)
+    context = plant.CreateDefaultContext()
+    set_bodies(plant, context, parameters, None)  # reports unknown names before anything is placed by them
+    springs = {
+        name: SpringStrut(placed.packed())
+        for name, placed in _placed_springs(plant, context, parameters, dict.fromkeys(parameters.springs, 0.0)).items()
+    }
+    dampers = {
+        name: FrictionDamper(placed.packed(), int(placed.has_sponge))
+        for name, placed in _placed_dampers(plant, context, parameters).items()
+    }
+    bushings = {
+        name: SixComponentBushing(placed.packed())
+        for name, placed in _placed_bushings(plant, context, parameters).items()
+    }
+    source = builder.AddNamedSystem("speed_source", SpeedSource())
+    elements = {"spring": springs, "damper": dampers, "bushing": bushings}
+    labels = [(_label(kind, name), system) for kind, systems in elements.items() for name, system in systems.items()]
+    total = builder.AddNamedSystem("total_force", Adder(len(labels), GENERALIZED_FORCE_SIZE))
+    logs = {"state": plant.get_state_output_port(), "acceleration": plant.get_generalized_acceleration_output_port()}
+    for index, (label, system) in enumerate(labels):
+        builder.AddNamedSystem(label, system)
+        builder.Connect(plant.get_state_output_port(), system.GetInputPort("plant_state"))
+        builder.Connect(system.GetOutputPort("generalized_force"), total.get_input_port(index))
+        logs[label] = system.GetOutputPort("force")
+    builder.Connect(total.get_output_port(), plant.get_applied_generalized_force_input_port())
+    builder.Connect(source.get_output_port(), plant.get_actuation_input_port())
+    sinks = {name: LogVectorOutput(port, builder, publish_period=OUTPUT_PERIOD) for name, port in logs.items()}
+    for name, sink in sinks.items():
+        sink.set_name(f"log_{name}")
+    diagram = builder.Build()
+    diagram.set_name(parameters.name)
+    return Machine(parameters, diagram, plant, source, springs, dampers, bushings, sinks)
+
+
+def _label(kind: str, name: str) -> str:
+    return "gasket" if (kind, name) == ("bushing", "gasket") else f"{kind}_{name}"
+
+
+def _check_same_elements(built: MachineParameters, wanted: MachineParameters) -> None:
+    """Refuses numbers for another machine than the built one."""
+    for key in ("model", "gravity"):
+        if getattr(wanted, key) != getattr(built, key):
+            raise input_error(f"{getattr(wanted, key)} is not the built machine's {getattr(built, key)}; build a new one", key=key)
+    for table in ("springs", "dampers", "all_bushings"):
+        names = [set(t() if callable(t := getattr(p, table)) else t) for p in (built, wanted)]
+        if names[0] != names[1]:
+            other = sorted(names[0] ^ names[1])[0]
+            raise input_error(
+                f"'{other}' is not in both machines{nearest_names(other, names[0])}; build a new machine", key=table.removeprefix("all_")
+            )
+    for name, damper in wanted.dampers.items():
+        law, built_law = wanted.damper_types[damper.type].law, built.damper_types[built.dampers[name].type].law
+        if law != built_law:
+            raise input_error(f"law '{law}' is not the built machine's '{built_law}'; build a new machine", key=f"dampers.{name}")
+
+
+def _point(plant: MultibodyPlant, context: Context, body: str, frame: str) -> FloatArray:
+    """Origin of a frame in a body's frame."""
+    pose = plant.CalcRelativeTransform(context, plant.GetBodyByName(body).body_frame(), plant.GetFrameByName(frame))
+    return np.asarray(pose.translation())
+
+
+def _rotation(plant: MultibodyPlant, context: Context, body: str, frame: str) -> FloatArray:
+    pose = plant.CalcRelativeTransform(context, plant.GetBodyByName(body).body_frame(), plant.GetFrameByName(frame))
+    return np.asarray(pose.rotation().matrix())
+
+
+def _ends(plant: MultibodyPlant, context: Context, element: Any) -> tuple[FloatArray, FloatArray]:
+    """Tub end in T and housing end in W of an element."""
+    return _point(plant, context, "tub", element.tub_frame), _point(plant, context, "world", element.housing_frame)
+
+
+def _placed_springs(
+    plant: MultibodyPlant, context: Context, parameters: MachineParameters, preloads: dict[str, float]
+) -> dict[str, SpringStrutParameters]:
+    return {
+        name: SpringStrutParameters(
+            *_ends(plant, context, spring), preloads[name], packed_stiffness(parameters.spring_types[spring.type].stiffness)
+        )
+        for name, spring in parameters.springs.items()
+    }
+
+
+def _placed_dampers(
+    plant: MultibodyPlant, context: Context, parameters: MachineParameters
+) -> dict[str, FrictionDamperParameters]:
+    placed = {}
+    for name, damper in parameters.dampers.items():
+        kind = parameters.damper_types[damper.type]
+        placed[name] = FrictionDamperParameters(*_ends(plant, context, damper), kind.end_bushing, packed_damper_law(kind))
+    return placed
+
+
+def _placed_bushings(
+    plant: MultibodyPlant, context: Context, parameters: MachineParameters
+) -> dict[str, SixComponentBushingParameters]:
+    placed = {}
+    for name, bushing in parameters.all_bushings().items():
+        tub_point, housing_point = _ends(plant, context, bushing)
+        r_tub = _rotation(plant, context, "tub", bushing.tub_frame)
+        r_housing = _rotation(plant, context, "world", bushing.housing_frame)
+        placed[name] = SixComponentBushingParameters(tub_point, r_tub, housing_point, r_housing, packed_bushing_law(bushing))
+    return placed
+
+
+def _disengaged(placed: Any) -> Any:
+    return replace(placed, engaged=0.0)
+
+
+__all__ = ["OUTPUT_PERIOD", "Machine", "Setup", "WmDrakeError", "build_machine"]

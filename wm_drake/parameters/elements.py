@@ -1,0 +1,212 @@
+"""Force elements of a machine: springs, dampers, bushings. Frozen, SI; field names are the key paths of the machine file."""
+
+from typing import Annotated, Any, Literal, TypeAlias
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
+from scipy.interpolate import PchipInterpolator
+
+from wm_drake.parameters import units as u
+
+FloatArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+
+
+class Frozen(BaseModel):
+    """A frozen record that refuses unknown fields."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class ForceTable(Frozen):
+    """Force over displacement: a monotone cubic through the points, straight lines beyond them."""
+
+    displacement: u.Lengths
+    force: u.Forces
+
+    @model_validator(mode="after")
+    def _monotone(self) -> "ForceTable":
+        check_curve("displacement", self.displacement, "force", self.force)
+        return self
+
+    def packed(self) -> FloatArray:
+        """For `wm_drake.laws.table`."""
+        return packed_curve(self.displacement, self.force)
+
+
+class TorqueTable(Frozen):
+    """Torque over angle: a monotone cubic through the points, straight lines beyond them."""
+
+    angle: u.Angles
+    torque: u.Torques
+
+    @model_validator(mode="after")
+    def _monotone(self) -> "TorqueTable":
+        check_curve("angle", self.angle, "torque", self.torque)
+        return self
+
+    def packed(self) -> FloatArray:
+        """For `wm_drake.laws.table`."""
+        return packed_curve(self.angle, self.torque)
+
+
+def check_curve(x_name: str, x: tuple[float, ...], y_name: str, y: tuple[float, ...]) -> None:
+    """Refuses curves that are not functions of rising abscissa with never falling ordinate."""
+    if len(x) != len(y) or len(x) < 2:
+        raise ValueError(f"needs as many values of {x_name} as of {y_name}, at least two; has {len(x)} and {len(y)}")
+    if np.any(np.diff(x) <= 0.0):
+        raise ValueError(f"{x_name} must rise from point to point")
+    if np.any(np.diff(y) < 0.0):
+        raise ValueError(f"{y_name} must not fall from point to point")
+
+
+def packed_curve(x: tuple[float, ...], y: tuple[float, ...]) -> FloatArray:
+    """[n, x, y, slopes] of the monotone cubic (scipy's PCHIP) through the points."""
+    slopes = PchipInterpolator(x, y).derivative()(x)
+    return np.concatenate([[len(x)], x, y, slopes])
+
+
+def packed_stiffness(stiffness: "float | ForceTable | TorqueTable") -> FloatArray:
+    """A stiffness in the packed form of `wm_drake.laws.table`."""
+    if isinstance(stiffness, ForceTable | TorqueTable):
+        return stiffness.packed()
+    return np.array([0.0, stiffness])
+
+
+def _form(value: Any) -> str:
+    return "table" if isinstance(value, dict | Frozen) else "number"
+
+
+Stiffness: TypeAlias = Annotated[
+    Annotated[u.LinearStiffness, Field(ge=0.0), Tag("number")] | Annotated[ForceTable, Tag("table")], Discriminator(_form)
+]
+RotationalStiffness: TypeAlias = Annotated[
+    Annotated[u.RotationalStiffness, Field(ge=0.0), Tag("number")] | Annotated[TorqueTable, Tag("table")],
+    Discriminator(_form),
+]
+_NonNegativeForce: TypeAlias = Annotated[u.Force, Field(ge=0.0)]
+_NonNegativeTorque: TypeAlias = Annotated[u.Torque, Field(ge=0.0)]
+_NonNegativeDamping: TypeAlias = Annotated[u.LinearDamping, Field(ge=0.0)]
+_NonNegativeRotationalDamping: TypeAlias = Annotated[u.RotationalDamping, Field(ge=0.0)]
+_PositiveVelocity: TypeAlias = Annotated[u.Velocity, Field(gt=0.0)]
+_PositiveRate: TypeAlias = Annotated[u.AngularVelocity, Field(gt=0.0)]
+
+
+class SpringType(Frozen):
+    """A suspension spring as bought. Its preload follows from static equilibrium, so it is not written."""
+
+    stiffness: Stiffness
+
+
+class Spring(Frozen):
+    """A suspension spring in its place."""
+
+    type: str
+    tub_frame: str
+    housing_frame: str
+
+
+class EndBushing(Frozen):
+    """Bushing at each end of a damper, where it bends against tub and housing (Hooke joints of [B]). Zero is legal."""
+
+    stiffness: Annotated[u.RotationalStiffness, Field(ge=0.0)] = 0.0
+    damping: _NonNegativeRotationalDamping = 0.0
+    friction_torque: _NonNegativeTorque = 0.0
+    full_friction_rate: _PositiveRate = 1.0
+
+
+class _DamperType(Frozen):
+    end_bushing: EndBushing = EndBushing()
+
+
+class CoulombDamper(_DamperType):
+    """Coulomb friction [C] Eq. (4), and a dashpot in parallel."""
+
+    law: Literal["coulomb"]
+    friction_force: _NonNegativeForce
+    damping: _NonNegativeDamping = 0.0
+
+
+class StvDamper(_DamperType):
+    """Friction with a stick transition velocity [C] Eq. (6), and a dashpot in parallel."""
+
+    law: Literal["stv"]
+    friction_force: _NonNegativeForce
+    transition_velocity: _PositiveVelocity
+    damping: _NonNegativeDamping = 0.0
+
+
+class HavsinDamper(_DamperType):
+    """Smoothed Coulomb friction [A] Eq. (2), and a dashpot in parallel."""
+
+    law: Literal["havsin"]
+    friction_force: _NonNegativeForce
+    full_friction_velocity: _PositiveVelocity
+    damping: _NonNegativeDamping = 0.0
+
+
+class MstvDamper(_DamperType):
+    """Massless sponge with MSTV friction [C] Eq. (2), (3), (7)."""
+
+    law: Literal["mstv"]
+    friction_force: _NonNegativeForce
+    friction_damping: _NonNegativeDamping = 0.0
+    regularisation_velocity: _PositiveVelocity = 1e-6
+    sponge_stiffness: Annotated[u.LinearStiffness, Field(ge=0.0)]
+    sponge_damping: _NonNegativeDamping
+    slider_damping: _NonNegativeDamping
+
+    @model_validator(mode="after")
+    def _slider_rate_is_finite(self) -> "MstvDamper":
+        if self.sponge_damping + self.slider_damping + self.friction_damping <= 0.0:
+            raise ValueError("sponge_damping, slider_damping and friction_damping are all zero: a massless slider needs one")
+        return self
+
+
+class FreeStrokeDamper(_DamperType):
+    """Free-stroke damper [A] Eq. (2)-(6) with a massless sponge; the curve is zero inside the free stroke."""
+
+    law: Literal["free_stroke"]
+    friction_force: _NonNegativeForce
+    friction_damping: Annotated[u.LinearDamping, Field(gt=0.0)]
+    regularisation_velocity: _PositiveVelocity = 1e-6
+    basic_friction_force: _NonNegativeForce
+    basic_full_friction_velocity: _PositiveVelocity
+    sponge: ForceTable
+
+
+DamperType: TypeAlias = Annotated[
+    CoulombDamper | StvDamper | HavsinDamper | MstvDamper | FreeStrokeDamper, Field(discriminator="law")
+]
+
+
+class Damper(Frozen):
+    """A damper in its place."""
+
+    type: str
+    tub_frame: str
+    housing_frame: str
+
+
+class Bushing(Frozen):
+    """Six-component bushing [A] Eq. (7), (8); the gasket of [B] Fig. 4 is one. Stiffness lives in the housing-side frame."""
+
+    tub_frame: str
+    housing_frame: str
+    stiffness_x: Stiffness
+    stiffness_y: Stiffness
+    stiffness_z: Stiffness
+    rotational_stiffness_x: RotationalStiffness
+    rotational_stiffness_y: RotationalStiffness
+    rotational_stiffness_z: RotationalStiffness
+    damping_x: _NonNegativeDamping = 0.0
+    damping_y: _NonNegativeDamping = 0.0
+    damping_z: _NonNegativeDamping = 0.0
+    rotational_damping_x: _NonNegativeRotationalDamping = 0.0
+    rotational_damping_y: _NonNegativeRotationalDamping = 0.0
+    rotational_damping_z: _NonNegativeRotationalDamping = 0.0
+    friction_torque_x: _NonNegativeTorque = 0.0
+    friction_torque_y: _NonNegativeTorque = 0.0
+    friction_torque_z: _NonNegativeTorque = 0.0
+    full_friction_rate_x: _PositiveRate = 1.0
+    full_friction_rate_y: _PositiveRate = 1.0
+    full_friction_rate_z: _PositiveRate = 1.0

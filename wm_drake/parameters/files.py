@@ -1,0 +1,228 @@
+"""Machine, load and profile files: YAML (profiles also CSV) in, YAML out. Every message names file, line and key path."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import pandas as pd
+from pydantic import BaseModel, ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.error import YAMLError
+
+from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.parameters.keys import problems_of, quantities, source_of
+from wm_drake.parameters.machine import MachineParameters
+from wm_drake.parameters.spin import Load, SpinProfile
+
+MACHINES_FOLDER = Path(__file__).parents[1] / "machines"
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def shipped_machines() -> dict[str, Path]:
+    """Machine files that come with the package, by name."""
+    return {path.stem: path for path in sorted(MACHINES_FOLDER.glob("*.yaml"))}
+
+
+def load_machine(name_or_path: str | Path = "reference") -> MachineParameters:
+    """Reads a machine file.
+
+    Args:
+        name_or_path: Name of a shipped machine, or path of a YAML file. ``extends: NAME_OR_PATH`` in a file starts from
+            another machine and changes what the file names.
+
+    Raises:
+        InputError: with one problem per fault.
+    """
+    path = machine_path(name_or_path)
+    tree = _extended(path, ())
+    plain, sources = _without_sources(tree)
+    plain = _with_absolute_paths(plain, path)
+    return _validated(MachineParameters, {**plain, "sources": sources}, path, tree)
+
+
+def machine_path(name_or_path: str | Path) -> Path:
+    """The file of a shipped machine's name or of a path."""
+    shipped = shipped_machines()
+    if str(name_or_path) in shipped:
+        return shipped[str(name_or_path)]
+    path = Path(name_or_path)
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "no such file"
+        raise input_error(f"{what}, and no shipped machine of that name{nearest_names(str(name_or_path), shipped)}", where=str(path))
+    return path
+
+
+def load_load(path: Path) -> Load:
+    """Reads a load file: ``unbalances: [{mass, radius, y, phase}, ...]``, written as in a machine file."""
+    tree = _read_yaml(path)
+    return _validated(Load, _without_sources(tree)[0], path, tree)
+
+
+def load_profile(path: Path) -> SpinProfile:
+    """Reads a spin profile: YAML as in a machine file, or CSV with the columns time_s and speed_rpm (# begins a comment)."""
+    if path.suffix.lower() != ".csv":
+        tree = _read_yaml(path)
+        return _validated(SpinProfile, _without_sources(tree)[0], path, tree)
+    try:
+        table = pd.read_csv(path, comment="#", skipinitialspace=True)
+    except (OSError, ValueError) as error:
+        raise input_error(f"cannot be read as CSV ({error})", where=str(path)) from None
+    if list(table.columns) != ["time_s", "speed_rpm"]:
+        raise input_error(f"needs the columns time_s,speed_rpm, has {','.join(map(str, table.columns))}", where=str(path))
+    numbers = table.apply(pd.to_numeric, errors="coerce")
+    if not np.isfinite(numbers.to_numpy()).all():
+        row = int(np.flatnonzero(~np.isfinite(numbers.to_numpy()).all(axis=1))[0])
+        raise input_error(f"row {row + 1} of the data is not two finite numbers: {table.iloc[row].tolist()}", where=str(path))
+    text = {"time": ("time_s", "s"), "speed": ("speed_rpm", "rpm")}
+    fields = {key: f"({', '.join(map(repr, numbers[name].tolist()))}) {unit}" for key, (name, unit) in text.items()}
+    return _validated(SpinProfile, fields, path, CommentedMap())
+
+
+def machine_yaml(parameters: MachineParameters) -> str:
+    """The machine as the text of a machine file, in engineers' units, each number with its source if it has one."""
+    tree = parameters.model_dump(mode="json", exclude={"sources"}, exclude_defaults=True)
+    for key, value, unit in list(quantities(parameters)):
+        *parents, name = key.split(".")
+        node: Any = tree
+        for part in parents:
+            node = node[int(part)] if isinstance(node, list) else node.get(part)
+            if node is None:
+                break  # a default: not written
+        if node is None or name not in node:
+            continue
+        source = source_of(parameters, key)
+        node[name] = {"value": unit.text(value), "source": source} if source else unit.text(value)
+    text = _TextStream()
+    _yaml().dump(tree, text)
+    return text.text
+
+
+class _TextStream:
+    text = ""
+
+    def write(self, part: str | bytes) -> None:
+        self.text += part if isinstance(part, str) else part.decode()
+
+
+def _yaml() -> YAML:
+    yaml = YAML(typ="rt")
+    yaml.width = 4096
+    return yaml
+
+
+def _read_yaml(path: Path) -> CommentedMap:
+    try:
+        tree = _yaml().load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise input_error(error.strerror or "cannot be read", where=str(path)) from None
+    except UnicodeDecodeError:
+        raise input_error("is not text in UTF-8", where=str(path)) from None
+    except YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f"{path}:{mark.line + 1}" if mark else str(path)
+        raise input_error(f"is not YAML: {getattr(error, 'problem', None) or error}", where=where) from None
+    if not isinstance(tree, CommentedMap):
+        raise input_error("is empty; allowed is a mapping of keys to values" if tree is None else "is not a mapping", where=str(path))
+    return tree
+
+
+def _extended(path: Path, seen: tuple[Path, ...]) -> CommentedMap:
+    tree = _read_yaml(path)
+    if "extends" not in tree:
+        return tree
+    named = str(tree.pop("extends"))
+    base = named if named in shipped_machines() else path.parent / named
+    base_path = machine_path(base)
+    if base_path.resolve() in (*seen, path.resolve()):
+        raise input_error("extends itself", where=str(path), key="extends")
+    base_tree = _extended(base_path, (*seen, path.resolve()))
+    for key in ("model", "measured"):  # paths are meant relative to the file that names them
+        if key in base_tree:
+            base_tree[key] = _with_absolute_paths({key: base_tree[key]}, base_path)[key]
+    _merge(base_tree, tree)
+    return base_tree
+
+
+def _merge(base: CommentedMap, changes: Mapping[str, Any]) -> None:
+    """Puts `changes` over `base`, mapping by mapping; null removes an entry. A number replaces its old source too."""
+    for key, value in changes.items():
+        old = base.get(key)
+        if value is None:
+            base.pop(key, None)
+        elif isinstance(old, CommentedMap) and isinstance(value, Mapping) and not _is_whole(value):
+            _merge(old, value)
+        else:
+            base[key] = value
+
+
+def _is_whole(value: Mapping[str, Any]) -> bool:
+    """Whether a mapping is one value (a number with source, a table, a profile), to be replaced and not merged."""
+    return any(key in value for key in ("value", "force", "torque", "steps", "time"))
+
+
+def _without_sources(node: Any, key: str = "") -> tuple[Any, dict[str, str]]:
+    """The tree without its ``source`` texts and ``{value, source}`` wrappers, and the sources by key path."""
+    sources: dict[str, str] = {}
+    if isinstance(node, Mapping):
+        if "source" in node:
+            sources[key] = str(node["source"])
+        if "value" in node and set(node) <= {"value", "source"}:
+            return node["value"], sources
+        plain = {}
+        for name, child in node.items():
+            if name == "source":
+                continue
+            plain[str(name)], below = _without_sources(child, f"{key}.{name}" if key else str(name))
+            sources |= below
+        return plain, sources
+    if isinstance(node, list):
+        items = []
+        for index, child in enumerate(node):
+            item, below = _without_sources(child, f"{key}.{index}")
+            items.append(item)
+            sources |= below
+        return items, sources
+    return node, sources
+
+
+def _with_absolute_paths(tree: dict[str, Any], path: Path) -> dict[str, Any]:
+    """File names in a machine file are relative to it; the shipped SDF models go by their bare name."""
+    changed = dict(tree)
+    model = tree.get("model")
+    if isinstance(model, str) and (path.parent / model).is_file():
+        changed["model"] = str((path.parent / model).resolve())
+    if isinstance(tree.get("measured"), list):
+        changed["measured"] = [str((path.parent / str(name)).resolve()) for name in tree["measured"]]
+    return changed
+
+
+def _validated(model: type[Model], plain: Any, path: Path, tree: CommentedMap) -> Model:
+    try:
+        return model.model_validate(plain, context={"units_required": True})
+    except ValidationError as error:
+        problems = problems_of(error, model)
+        raise InputError([replace(p, where=_place(path, tree, p.key)) for p in problems]) from None
+
+
+def _place(path: Path, tree: CommentedMap, key: str) -> str:
+    """file:line of a key path, or of the nearest key above it."""
+    node: Any = tree
+    line = None
+    for part in key.split("."):
+        if isinstance(node, CommentedMap) and part in node:
+            line = node.lc.key(part)[0] if part in (node.lc.data or {}) else line
+            node = node[part]
+        elif isinstance(node, list) and part.isdigit() and int(part) < len(node):
+            line = node.lc.item(int(part))[0]  # type: ignore[attr-defined]
+            node = node[int(part)]
+        else:
+            break
+    return str(path) if line is None else f"{path}:{line + 1}"
+
+
+def unknown_model(model: str, known: list[str]) -> InputError:
+    """The error of a machine whose SDF is not there."""
+    return InputError([Problem("", "model", f"no SDF file '{model}'{nearest_names(model, known)}")])

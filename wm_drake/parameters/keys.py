@@ -1,0 +1,158 @@
+"""Key paths such as ``gasket.stiffness_x``: the one way to change a number, and the list of all that can be changed."""
+
+import types
+import typing
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.parameters.machine import MachineParameters
+from wm_drake.parameters.units import Unit
+
+
+def with_value(parameters: MachineParameters, key: str, value: Any) -> MachineParameters:
+    """A copy with one value changed.
+
+    Args:
+        parameters: The machine.
+        key: Path of names from the top, joined by dots: ``gasket.stiffness_x``, ``loads.middle.unbalances.0.mass``.
+            ``bodies.NAME`` and ``frames.NAME`` need not be in the machine file.
+        value: SI number or text with a unit (``"5 N/mm"``); a mapping for a group of values.
+
+    Raises:
+        InputError: unknown key (with the nearest known one) or a value that is not allowed.
+    """
+    return typing.cast(MachineParameters, _replaced(parameters, key.split("."), value, key))
+
+
+def _replaced(node: Any, path: list[str], value: Any, key: str) -> Any:
+    if not path:
+        return value
+    name, rest = path[0], path[1:]
+    if isinstance(node, BaseModel):
+        fields = type(node).model_fields
+        if name not in fields:
+            raise input_error(f"unknown key '{name}'" + nearest_names(name, fields), key=key)
+        values = {field: getattr(node, field) for field in node.model_fields_set | {name}}
+        values[name] = _entered(node, name, rest, value, key)
+        try:
+            return type(node).model_validate(values)
+        except ValidationError as error:
+            raise InputError([replace(p, key=key) for p in problems_of(error, type(node))]) from None
+    if isinstance(node, dict):
+        if name not in node:
+            raise input_error(f"unknown key '{name}'" + nearest_names(name, node), key=key)
+        return {**node, name: _replaced(node[name], rest, value, key)}
+    if isinstance(node, tuple) and name.isdigit() and int(name) < len(node):
+        return tuple(_replaced(v, rest, value, key) if i == int(name) else v for i, v in enumerate(node))
+    raise input_error(f"'{name}' leads nowhere: the path ends before it", key=key)
+
+
+def _entered(node: BaseModel, name: str, rest: list[str], value: Any, key: str) -> Any:
+    child = getattr(node, name)
+    if name in ("bodies", "frames") and rest:  # overrides of the SDF come into being when they are first named
+        entry = child.get(rest[0])
+        if entry is None:
+            nested: Any = value
+            for part in reversed(rest[1:]):
+                nested = {part: nested}
+            return {**child, rest[0]: nested}
+    return _replaced(child, rest, value, key)
+
+
+def problems_of(error: ValidationError, root: type[BaseModel], key: str = "") -> list[Problem]:
+    """pydantic's account of what is wrong, in our words: one problem each, with its key path below `key`."""
+    problems = []
+    for detail in error.errors():
+        path = [str(part) for part in detail["loc"] if part not in _TAGS]
+        problems.append(Problem("", ".".join(([key] if key else []) + path), _message(detail, root)))
+    return problems
+
+
+_TAGS = ("number", "table", "coulomb", "stv", "havsin", "mstv", "free_stroke")
+
+
+def _message(detail: Any, root: type[BaseModel]) -> str:
+    kind, context, given = detail["type"], detail.get("ctx", {}), detail.get("input")
+    if kind == "value_error":
+        return str(context["error"])
+    if kind == "missing":
+        return "is missing"
+    if kind == "extra_forbidden":
+        return f"unknown key '{detail['loc'][-1]}'" + nearest_names(str(detail["loc"][-1]), _fields_at(root, detail["loc"][:-1]))
+    if kind in ("greater_than", "greater_than_equal"):
+        sign, limit = (">", context["gt"]) if kind == "greater_than" else (">=", context["ge"])
+        return f"'{given}' is out of range; allowed is {sign} {limit:g}"
+    if kind == "union_tag_invalid":
+        return f"'{context['tag']}' is not known; allowed are {context['expected_tags']}"
+    if kind == "union_tag_not_found":
+        return f"needs the key {context['discriminator']}"
+    if kind == "literal_error":
+        return f"'{given}' is not allowed; allowed are {context['expected']}"
+    return f"{detail['msg'][0].lower()}{detail['msg'][1:]}, is {given!r}"
+
+
+def _fields_at(root: type[BaseModel], path: tuple[str | int, ...]) -> set[str]:
+    """Names of the fields that a model allows at a path of pydantic's."""
+    candidates: list[Any] = [root]
+    for part in path:
+        models = [c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel)]
+        tagged = [c for c in models if "law" in c.model_fields and part in typing.get_args(c.model_fields["law"].annotation)]
+        stepped = [c.model_fields[str(part)].annotation for c in models if part in c.model_fields]
+        entries = [typing.get_args(c)[-1 if typing.get_origin(c) is dict else 0] for c in candidates if typing.get_origin(c)]
+        candidates = tagged or [inner for c in stepped + entries for inner in _alternatives(c)] or candidates
+    return {name for c in candidates if isinstance(c, type) and issubclass(c, BaseModel) for name in c.model_fields}
+
+
+def _alternatives(annotation: Any) -> list[Any]:
+    """The types an annotation stands for: members of a union, what Annotated annotates."""
+    origin = typing.get_origin(annotation)
+    if hasattr(annotation, "__metadata__"):
+        return _alternatives(typing.get_args(annotation)[0])
+    if origin in (typing.Union, types.UnionType):
+        return [inner for member in typing.get_args(annotation) for inner in _alternatives(member)]
+    return [annotation]
+
+
+def unit_of(annotation: Any, metadata: typing.Iterable[Any] = ()) -> Unit | None:
+    """The unit of a field, wherever in its annotation it stands; None for names and groups."""
+    for item in metadata:
+        if isinstance(item, Unit):
+            return item
+    arguments = typing.get_args(annotation)
+    if hasattr(annotation, "__metadata__"):
+        return unit_of(arguments[0], annotation.__metadata__)
+    if typing.get_origin(annotation) in (dict, tuple):
+        return None
+    return next((unit for unit in map(unit_of, arguments) if unit is not None), None)
+
+
+def quantities(node: Any, path: str = "") -> Iterator[tuple[str, Any, Unit]]:
+    """Every number of a tree of parameters: key path, SI value, unit."""
+    if isinstance(node, BaseModel):
+        for name, field in type(node).model_fields.items():
+            value = getattr(node, name)
+            unit = unit_of(field.annotation, field.metadata)
+            if unit is not None and value is not None and not isinstance(value, BaseModel):
+                yield f"{path}{name}", value, unit
+            elif name != "sources":
+                yield from quantities(value, f"{path}{name}.")
+    elif isinstance(node, dict):
+        for name, value in node.items():
+            yield from quantities(value, f"{path}{name}.")
+    elif isinstance(node, tuple):
+        for index, value in enumerate(node):
+            yield from quantities(value, f"{path}{index}.")
+
+
+def source_of(parameters: MachineParameters, key: str) -> str:
+    """Where a number comes from: its own source, or the nearest one above it; empty if none is given."""
+    parts = key.split(".")
+    while parts:
+        if ".".join(parts) in parameters.sources:
+            return parameters.sources[".".join(parts)]
+        parts.pop()
+    return ""

@@ -1,0 +1,106 @@
+"""All that describes a machine, as one frozen tree of SI numbers."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from wm_drake.errors import nearest_names
+from wm_drake.parameters import units as u
+from wm_drake.parameters.elements import Bushing, Damper, DamperType, Frozen, Spring, SpringType
+from wm_drake.parameters.spin import Load, SpinProfile
+
+
+class InertiaMatrix(Frozen):
+    """Inertia about the centre of mass, in the axes of T (or D). Products as elements of the matrix: xy = -sum(m x y)."""
+
+    xx: Annotated[u.Inertia, Field(gt=0.0)]
+    yy: Annotated[u.Inertia, Field(gt=0.0)]
+    zz: Annotated[u.Inertia, Field(gt=0.0)]
+    xy: u.Inertia = 0.0
+    xz: u.Inertia = 0.0
+    yz: u.Inertia = 0.0
+
+
+class BodyOverride(Frozen):
+    """Mass properties that replace those of the SDF. A new mass alone scales the inertia with it."""
+
+    mass: Annotated[u.Mass, Field(gt=0.0)] | None = None
+    centre_of_mass: u.Position | None = None
+    inertia: InertiaMatrix | None = None
+
+
+class FrameOverride(Frozen):
+    """Position that replaces the one in the SDF, in the frame the SDF attaches it to."""
+
+    position: u.Position
+
+
+class Sensor(Frozen):
+    """A displacement along one world axis of one point of the tub."""
+
+    frame: str
+    axis: Literal["x", "y", "z"]
+
+
+class Drive(Frozen):
+    """The motor: which joint it turns."""
+
+    joint: str = "drum_axis"
+
+
+class Clearance(Frozen):
+    """Where the tub comes near: the tub point nearest the detergent box ([B] section 4)."""
+
+    detergent_frame: str
+
+
+class MachineParameters(Frozen):
+    """A machine: the SDF model it stands on and all that is not a body. SI; W, T and D as in the project's conventions."""
+
+    name: str
+    about: str = ""
+    model: str = "oscillating_group.sdf"
+    gravity: Annotated[u.Acceleration, Field(ge=0.0)]
+    drive: Drive = Drive()
+    bodies: dict[str, BodyOverride] = {}
+    frames: dict[str, FrameOverride] = {}
+    spring_types: dict[str, SpringType]
+    springs: dict[str, Spring]
+    damper_types: dict[str, DamperType] = {}
+    dampers: dict[str, Damper] = {}
+    gasket: Bushing | None = None
+    bushings: dict[str, Bushing] = {}
+    sensors: dict[str, Sensor]
+    clearance: Clearance
+    loads: dict[str, Load]
+    profile: SpinProfile
+    measured: tuple[str, ...] = ()
+    sources: dict[str, str] = Field(default={}, repr=False)
+
+    @field_validator("springs", "dampers")
+    @classmethod
+    def _type_is_known(cls, places: dict[str, Spring | Damper], info: ValidationInfo) -> dict[str, Spring | Damper]:
+        table = "spring_types" if info.field_name == "springs" else "damper_types"
+        known = info.data.get(table)
+        if known is not None:  # None: the table itself is faulty and reported already
+            for name, place in places.items():
+                if place.type not in known:
+                    raise ValueError(f"{name}.type: '{place.type}' is not in {table}{nearest_names(place.type, known)}")
+        return places
+
+    @field_validator("springs", "sensors", "loads")
+    @classmethod
+    def _not_empty(cls, table: dict[str, object]) -> dict[str, object]:
+        if not table:
+            raise ValueError("needs at least one entry")
+        return table
+
+    @model_validator(mode="after")
+    def _gasket_is_not_a_bushing(self) -> "MachineParameters":
+        if "gasket" in self.bushings:
+            raise ValueError("bushings: the name 'gasket' belongs to the key 'gasket'")
+        return self
+
+    def all_bushings(self) -> dict[str, Bushing]:
+        """The six-component bushings by name, the gasket among them under its own."""
+        return ({"gasket": self.gasket} if self.gasket else {}) | self.bushings

@@ -1,0 +1,137 @@
+"""The door for units: text as engineers write it in, SI floats out, and back again for tables and files."""
+
+import functools
+import math
+import re
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import pint
+from pydantic import GetCoreSchemaHandler, ValidationInfo
+from pydantic_core import CoreSchema
+from pydantic_core.core_schema import with_info_before_validator_function
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_SCALAR = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*$")
+_VECTOR = re.compile(r"\s*\(([^()]*)\)\s*(\S.*?)?\s*$")
+
+
+@functools.cache
+def registry() -> pint.UnitRegistry:
+    """pint's units, with the angle as a dimension of its own, so that N m and N m/rad cannot be mixed up."""
+    units: pint.UnitRegistry = pint.UnitRegistry(on_redefinition="ignore")
+    units.define("radian = [angle] = rad")
+    units._build_cache()  # pint has worked out rpm and deg as pure numbers by now, and offers no public way to forget it
+    return units
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The SI unit a field holds, and the unit people read and write it in.
+
+    As metadata of a pydantic field (``Annotated[float, Unit("N/m", "N/mm")]``) it puts the field behind the door: text with
+    any unit of the same dimension is converted, everything else refused.
+    """
+
+    si: str
+    shown: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Parses text before the field's own checks."""
+        read = to_si if source is float else to_si_vector
+        return with_info_before_validator_function(lambda value, info: read(value, info, self), handler(source))
+
+    def from_si(self, value: float) -> float:
+        """The value in the unit people read."""
+        return float(registry().Quantity(value, self.si).to(self.shown).magnitude)
+
+    def text(self, value: Any) -> str:
+        """An SI value (or a tuple of them) as people write it, such as ``3.2 N/mm``; `to_si` reads the same value back."""
+        if isinstance(value, tuple):
+            return "(" + ", ".join(map(self._digits, value)) + f") {self.shown}"
+        return f"{self._digits(value)} {self.shown}"
+
+    def _digits(self, value: float) -> str:
+        shown = self.from_si(value)
+        short = f"{shown:.12g}"
+        exact = registry().Quantity(float(short), self.shown).to(self.si).magnitude == value
+        return short if exact else repr(shown)
+
+
+def convert(magnitude: float, unit_text: str | None, si: str, example: str) -> float:
+    """A number with its written unit in SI.
+
+    Raises:
+        ValueError: the unit is missing, unknown or of another dimension, or the number is not finite.
+    """
+    if unit_text is None:
+        raise ValueError(f"'{magnitude:g}' has no unit; write for example '{example}'")
+    try:
+        value = registry().Quantity(magnitude, unit_text).to(si).magnitude
+    except pint.DimensionalityError:
+        raise ValueError(f"unit '{unit_text}' does not fit; allowed is a unit such as {example.split(' ', 1)[1]}") from None
+    except Exception as error:  # pint raises tokenizer, attribute and assertion errors alike on text that is no unit
+        raise ValueError(f"unit '{unit_text}' is not known; write for example '{example}'") from error
+    if not math.isfinite(value):
+        raise ValueError(f"'{magnitude:g} {unit_text}' is not a finite number")
+    return float(value)
+
+
+def to_si(value: Any, info: ValidationInfo, unit: Unit) -> float:
+    """Reads ``'3.2 N/mm'``; passes an SI float through unless it stands in a file, where every number needs its unit."""
+    example = f"1 {unit.shown}"
+    if isinstance(value, str):
+        match = _SCALAR.fullmatch(value)
+        if match is None:
+            raise ValueError(f"'{value}' is not a number with a unit; write for example '{example}'")
+        return convert(float(match[1]), match[2], unit.si, example)
+    return _plain_number(value, info, example)
+
+
+def to_si_vector(value: Any, info: ValidationInfo, unit: Unit) -> tuple[float, ...]:
+    """Reads ``'(1, 2, 3) mm'``; passes a sequence of SI floats through unless it stands in a file."""
+    example = f"(1, 2, 3) {unit.shown}"
+    if isinstance(value, str):
+        match = _VECTOR.fullmatch(value)
+        parts = [] if match is None else match[1].split(",")
+        if match is None or not all(_SCALAR.fullmatch(part) and _SCALAR.fullmatch(part)[2] is None for part in parts):  # type: ignore[index]
+            raise ValueError(f"'{value}' is not a list of numbers with a unit; write for example '{example}'")
+        return tuple(convert(float(part), match[2], unit.si, example) for part in parts)
+    if not isinstance(value, list | tuple):
+        raise ValueError(f"{value!r} is not a list of numbers with a unit; write for example '{example}'")
+    return tuple(_plain_number(number, info, example) for number in value)
+
+
+def _plain_number(value: Any, info: ValidationInfo, example: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{value!r} is not a number with a unit; write for example '{example}'")
+    if not math.isfinite(value):
+        raise ValueError(f"{value!r} is not a finite number; write for example '{example}'")
+    if info.context and info.context.get("units_required"):
+        raise ValueError(f"'{value:g}' has no unit; write for example '{example}'")
+    return float(value)
+
+
+Mass = Annotated[float, Unit("kg", "kg")]
+Inertia = Annotated[float, Unit("kg*m^2", "kg*m^2")]
+Length = Annotated[float, Unit("m", "mm")]
+Angle = Annotated[float, Unit("rad", "deg")]
+Speed = Annotated[float, Unit("rad/s", "rpm")]
+AngularAcceleration = Annotated[float, Unit("rad/s^2", "rpm/s")]
+Duration = Annotated[float, Unit("s", "s")]
+Velocity = Annotated[float, Unit("m/s", "mm/s")]
+Acceleration = Annotated[float, Unit("m/s^2", "m/s^2")]
+AngularVelocity = Annotated[float, Unit("rad/s", "rad/s")]
+Force = Annotated[float, Unit("N", "N")]
+Torque = Annotated[float, Unit("N*m", "N*mm")]
+LinearStiffness = Annotated[float, Unit("N/m", "N/mm")]
+LinearDamping = Annotated[float, Unit("N*s/m", "N*s/mm")]
+RotationalStiffness = Annotated[float, Unit("N*m/rad", "N*mm/rad")]
+RotationalDamping = Annotated[float, Unit("N*m*s/rad", "N*mm*s/deg")]
+Position = Annotated[tuple[float, float, float], Unit("m", "mm")]
+Lengths = Annotated[tuple[float, ...], Unit("m", "mm")]
+Angles = Annotated[tuple[float, ...], Unit("rad", "deg")]
+Forces = Annotated[tuple[float, ...], Unit("N", "N")]
+Torques = Annotated[tuple[float, ...], Unit("N*m", "N*mm")]
+Times = Annotated[tuple[float, ...], Unit("s", "s")]
+Speeds = Annotated[tuple[float, ...], Unit("rad/s", "rpm")]

@@ -1,0 +1,114 @@
+"""Friction damper, as a massless strut between a point of the tub and a point of the housing."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from wm_drake.laws.compilation import law
+from wm_drake.laws.damper import COULOMB, FREE_STROKE, HAVSIN, MSTV, STV, damper_response
+from wm_drake.laws.strut import bending_moment, strut_line, transverse_couple, wrench_at_origin
+from wm_drake.laws.vectors import add, cross, rotate, rotation_from_rpy, scale
+from wm_drake.parameters.elements import (
+    CoulombDamper,
+    DamperType,
+    EndBushing,
+    FloatArray,
+    FreeStrokeDamper,
+    HavsinDamper,
+    StvDamper,
+)
+from wm_drake.systems.element import SCALARS, ForceElement
+
+
+def packed_damper_law(damper: DamperType) -> FloatArray:
+    """Law number, then its parameters in the order of `wm_drake.laws.damper`."""
+    match damper:
+        case CoulombDamper():
+            return np.array([COULOMB, damper.friction_force, damper.damping])
+        case StvDamper():
+            return np.array([STV, damper.friction_force, damper.transition_velocity, damper.damping])
+        case HavsinDamper():
+            return np.array([HAVSIN, damper.friction_force, damper.full_friction_velocity, damper.damping])
+    friction = [damper.friction_force, damper.friction_damping, damper.regularisation_velocity]
+    if isinstance(damper, FreeStrokeDamper):
+        basic = [damper.basic_friction_force, damper.basic_full_friction_velocity]
+        return np.concatenate([[FREE_STROKE], friction, basic, damper.sponge.packed()])
+    return np.array([MSTV, *friction, damper.sponge_stiffness, damper.sponge_damping, damper.slider_damping])
+
+
+@dataclass(frozen=True)
+class FrictionDamperParameters:
+    """A damper in its place: ends at the rest pose, law, bushings at the ends. `engaged` 0 takes it out of the machine."""
+
+    p_ToA_T: FloatArray
+    p_WH: FloatArray
+    end_bushing: EndBushing
+    packed_law: FloatArray
+    engaged: float = 1.0
+
+    @property
+    def has_sponge(self) -> bool:
+        """Whether the law has a state."""
+        return int(self.packed_law[0]) in (MSTV, FREE_STROKE)
+
+    def packed(self) -> FloatArray:
+        """Flat: tub end (T), housing end (W), axis, end bushing k, c, p, v_t, engaged, law number, law's parameters."""
+        line = self.p_ToA_T - self.p_WH
+        b = self.end_bushing
+        bushing = [b.stiffness, b.damping, b.friction_torque, b.full_friction_rate, self.engaged]
+        return np.concatenate([self.p_ToA_T, self.p_WH, line / np.linalg.norm(line), bushing, self.packed_law])
+
+
+@law
+def evaluate_friction_damper(x, state, p, generalized_force, force, rate):
+    """Force of a damper strut; arguments as in `ForceElement`, parameters as in `FrictionDamperParameters.packed`."""
+    rotation = rotation_from_rpy(x[0], x[1], x[2])
+    w = (x[7], x[8], x[9])
+    arm = rotate(rotation, (p[0], p[1], p[2]))
+    length, elongation_rate, direction, v_A = strut_line(arm, (x[3], x[4], x[5]), w, (x[10], x[11], x[12]), (p[3], p[4], p[5]))
+    deformation = state[0] if len(state) > 0 else 0.0 * length
+    tension, deformation_rate = damper_response(int(p[14]), elongation_rate, deformation, p, 15)
+    axis = (p[6], p[7], p[8])
+    w_strut = scale(1.0 / length, cross(direction, v_A))
+    zero = 0.0 * length
+    on_strut_by_tub = bending_moment(direction, w_strut, rotate(rotation, axis), w, p[9], p[10], p[11], p[12])
+    on_strut_by_housing = bending_moment(direction, w_strut, axis, (zero, zero, zero), p[9], p[10], p[11], p[12])
+    couple = transverse_couple(add(on_strut_by_tub, on_strut_by_housing), direction, length)
+    wrench = wrench_at_origin(arm, add(scale(-tension, direction), couple), scale(-1.0, on_strut_by_tub))
+    for i in range(6):
+        generalized_force[i] = p[13] * wrench[i]
+    generalized_force[6] = zero
+    force[0] = p[13] * tension
+    if len(rate) > 0:
+        rate[0] = deformation_rate
+
+
+@TemplateSystem.define("FrictionDamper_", T_list=SCALARS)
+def FrictionDamper_(T: type) -> Any:
+    """Template of FrictionDamper."""
+
+    class FrictionDamper(ForceElement, LeafSystem_[T]):
+        """A friction damper of any law, with bushings at its ends; laws `damper_response`, `bending_moment`.
+
+            plant_state (14) ──▶ [ FrictionDamper ] ──▶ generalized_force (7) [N m, N]
+                                  state: sponge     ──▶ force (1) tension, > 0 pulls its ends together [N]
+                                  deformation [m]
+
+        Laws without a sponge have no state.
+        """
+
+        def _construct(self, parameters: FloatArray, state_size: int, converter: Any = None) -> None:
+            LeafSystem_[T].__init__(self, converter=converter)
+            self.declare_element(T, evaluate_friction_damper, parameters, force_size=1, state_size=state_size)
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._construct(self, other.packed, other.sizes[1], converter=converter)
+
+    Impl = FrictionDamper
+    return FrictionDamper
+
+
+FrictionDamper = FrictionDamper_[None]

@@ -1,0 +1,73 @@
+"""Suspension spring between a point of the tub and a point of the housing."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from wm_drake.laws.compilation import law
+from wm_drake.laws.spring import spring_tension
+from wm_drake.laws.strut import strut_line, wrench_at_origin
+from wm_drake.laws.vectors import rotate, rotation_from_rpy, scale
+from wm_drake.parameters.elements import FloatArray
+from wm_drake.systems.element import SCALARS, ForceElement
+
+
+@dataclass(frozen=True)
+class SpringStrutParameters:
+    """A spring in its place: hooks at the rest pose, law, preload."""
+
+    p_ToA_T: FloatArray
+    p_WH: FloatArray
+    preload: float
+    packed_stiffness: FloatArray
+
+    @property
+    def rest_length(self) -> float:
+        """Distance of the hooks when T coincides with W. [m]"""
+        return float(np.linalg.norm(self.p_ToA_T - self.p_WH))
+
+    def packed(self) -> FloatArray:
+        """Flat: tub hook (T), housing hook (W), rest length, preload, packed stiffness."""
+        return np.concatenate([self.p_ToA_T, self.p_WH, [self.rest_length, self.preload], self.packed_stiffness])
+
+
+@law
+def evaluate_spring_strut(x, state, p, generalized_force, force, rate):
+    """Force of a spring strut; arguments as in `ForceElement`, parameters as in `SpringStrutParameters.packed`."""
+    arm = rotate(rotation_from_rpy(x[0], x[1], x[2]), (p[0], p[1], p[2]))
+    length, _, direction, _ = strut_line(arm, (x[3], x[4], x[5]), (x[7], x[8], x[9]), (x[10], x[11], x[12]), (p[3], p[4], p[5]))
+    tension = spring_tension(length, p[6], p[7], p, 8)
+    zero = 0.0 * tension
+    wrench = wrench_at_origin(arm, scale(-tension, direction), (zero, zero, zero))
+    for i in range(6):
+        generalized_force[i] = wrench[i]
+    generalized_force[6] = zero
+    force[0] = tension
+
+
+@TemplateSystem.define("SpringStrut_", T_list=SCALARS)
+def SpringStrut_(T: type) -> Any:
+    """Template of SpringStrut."""
+
+    class SpringStrut(ForceElement, LeafSystem_[T]):
+        """A suspension spring; law `spring_tension`.
+
+            plant_state (14) ──▶ [ SpringStrut ] ──▶ generalized_force (7) [N m, N]
+                                                 ──▶ force (1) tension, > 0 pulls its ends together [N]
+        """
+
+        def _construct(self, parameters: FloatArray, converter: Any = None) -> None:
+            LeafSystem_[T].__init__(self, converter=converter)
+            self.declare_element(T, evaluate_spring_strut, parameters, force_size=1, state_size=0)
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._construct(self, other.packed, converter=converter)
+
+    Impl = SpringStrut
+    return SpringStrut
+
+
+SpringStrut = SpringStrut_[None]
