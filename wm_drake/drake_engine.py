@@ -4,15 +4,14 @@ from collections.abc import Callable
 
 import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
-from pydrake.systems.framework import Context, EventStatus
 
-from wm_drake.machine import Machine, Setup
+from wm_drake.machine import Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
-from wm_drake.trajectory import Divergence, Trajectory, diverging_coordinate
+from wm_drake.trajectory import Trajectory, diverging_coordinate, ended_where_it_diverged
 
-PROGRESS_PERIOD = 0.5
-"""Simulated time between progress reports. [s]"""
+PAUSE_PERIOD = 0.5
+"""Simulated time between looks at the state and reports of progress. [s]"""
 
 
 def run_drake(setup: Setup, profile: SpinProfile, step: float, progress: Callable[[float], None]) -> Trajectory:
@@ -34,9 +33,9 @@ def run_drake(setup: Setup, profile: SpinProfile, step: float, progress: Callabl
     machine.plant.GetJointByName(setup.parameters.drive.joint).set_angular_rate(plant_context, profile.speed[0])
     simulator = Simulator(machine.diagram, context)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", step).set_fixed_step_mode(True)
-    divergence = _watch(simulator, machine)
     source_context = machine.source.GetMyContextFromRoot(context)
     machine.source.set_acceleration(source_context, profile.acceleration()[0])
+    failure = ""
     try:
         simulator.Initialize()
         for begin, end, acceleration in zip(profile.time, profile.time[1:], profile.acceleration(), strict=False):
@@ -44,45 +43,29 @@ def run_drake(setup: Setup, profile: SpinProfile, step: float, progress: Callabl
             for pause in _pauses(begin, end):
                 simulator.AdvanceTo(pause)
                 progress(pause / profile.duration)
-                if divergence:
-                    break
+                if diverging_coordinate(machine.plant.GetPositions(plant_context)):
+                    return _logged(setup, profile, failure)
         simulator.AdvancePendingEvents()
-    except RuntimeError as error:  # the plant refuses a state that is not a number
-        if not divergence:
-            divergence.append(Divergence(context.get_time(), "state", f"Drake: {str(error).splitlines()[0]}"))
-    return _logged(setup, profile, divergence[0] if divergence else None)
+    except RuntimeError as error:  # Drake refuses a state that is not a number
+        failure = str(error).splitlines()[0]
+    return _logged(setup, profile, failure)
 
 
 def _pauses(begin: float, end: float) -> list[float]:
-    """Times at which to report progress in a piece of the profile, and its end."""
-    inner = np.arange(np.floor(begin / PROGRESS_PERIOD) + 1, np.ceil(end / PROGRESS_PERIOD)) * PROGRESS_PERIOD
+    """Times at which to look up and report in a piece of the profile, and its end."""
+    inner = np.arange(np.floor(begin / PAUSE_PERIOD) + 1, np.ceil(end / PAUSE_PERIOD)) * PAUSE_PERIOD
     return [*map(float, inner), end]
 
 
-def _watch(simulator: Simulator, machine: Machine) -> list[Divergence]:
-    """Ends the run at the first step that leaves the region where the model means anything; tells of it in the list."""
-    found: list[Divergence] = []
-
-    def monitor(context: Context) -> EventStatus:
-        positions = machine.plant.GetPositions(machine.plant.GetMyContextFromRoot(context))
-        reason = diverging_coordinate(positions)
-        if reason is None:
-            return EventStatus.DidNothing()
-        found.append(Divergence(context.get_time(), *reason))
-        return EventStatus.ReachedTermination(machine.diagram, found[0].reason)
-
-    simulator.set_monitor(monitor)
-    return found
-
-
-def _logged(setup: Setup, profile: SpinProfile, divergence: Divergence | None) -> Trajectory:
-    data = {name: sink.FindLog(setup.context) for name, sink in setup.machine.logs.items()}
-    time = np.array(data["state"].sample_times())
-    state = np.array(data["state"].data()).T
-    good = np.array([diverging_coordinate(q) is None for q in state[:, :7]]) if divergence else slice(None)
-    rows = {name: np.array(log.data()).T[good] for name, log in data.items()}
+def _logged(setup: Setup, profile: SpinProfile, failure: str) -> Trajectory:
+    logs = {name: sink.FindLog(setup.context) for name, sink in setup.machine.logs.items()}
+    time = np.array(logs["bodies"].sample_times())
+    columns = {name: np.array(log.data()).T for name, log in logs.items()}
     # the drive's torque is what its reflected inertia does not take up: J alpha - J vdot
-    segment = np.clip(np.searchsorted(profile.time, time[good], side="right") - 1, 0, len(profile.time) - 2)
-    alpha = np.array(profile.acceleration())[segment]
-    torque = REFLECTED_INERTIA * (alpha - rows.pop("acceleration")[:, 6])
-    return Trajectory(time[good], rows.pop("state"), torque, rows, divergence)
+    segment = np.clip(np.searchsorted(profile.time, time, side="right") - 1, 0, len(profile.time) - 2)
+    torque = REFLECTED_INERTIA * (np.array(profile.acceleration())[segment] - columns["acceleration"][:, 6])
+    deformation = np.zeros((len(time), len(setup.dampers)))
+    for index, name in enumerate(setup.dampers):
+        if name in columns:
+            deformation[:, index] = columns[name][:, 0]
+    return ended_where_it_diverged(Trajectory(time, columns["bodies"], deformation, torque), failure)

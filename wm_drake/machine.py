@@ -212,15 +212,15 @@ def build_machine(parameters: MachineParameters) -> Machine:
     elements = {"spring": springs, "damper": dampers, "bushing": bushings}
     labels = [(_label(kind, name), system) for kind, systems in elements.items() for name, system in systems.items()]
     total = builder.AddNamedSystem("total_force", Adder(len(labels), GENERALIZED_FORCE_SIZE))
-    logs = {"state": plant.get_state_output_port(), "acceleration": plant.get_generalized_acceleration_output_port()}
+    logged = {"bodies": plant.get_state_output_port(), "acceleration": plant.get_generalized_acceleration_output_port()}
+    logged |= {name: damper.GetOutputPort("state") for name, damper in dampers.items() if damper.state_size}
     for index, (label, system) in enumerate(labels):
         builder.AddNamedSystem(label, system)
         builder.Connect(plant.get_state_output_port(), system.GetInputPort("plant_state"))
         builder.Connect(system.GetOutputPort("generalized_force"), total.get_input_port(index))
-        logs[label] = system.GetOutputPort("force")
     builder.Connect(total.get_output_port(), plant.get_applied_generalized_force_input_port())
     builder.Connect(source.get_output_port(), plant.get_actuation_input_port())
-    sinks = {name: LogVectorOutput(port, builder, publish_period=OUTPUT_PERIOD) for name, port in logs.items()}
+    sinks = {name: LogVectorOutput(port, builder, publish_period=OUTPUT_PERIOD) for name, port in logged.items()}
     for name, sink in sinks.items():
         sink.set_name(f"log_{name}")
     diagram = builder.Build()

@@ -18,6 +18,9 @@ from wm_drake.laws.vectors import rotate, rotation_from_rpy
 from wm_drake.machine import OUTPUT_PERIOD, Machine, Setup
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.elements import FloatArray
+from wm_drake.systems.friction_damper import friction_damper_history
+from wm_drake.systems.six_component_bushing import six_component_bushing_history
+from wm_drake.systems.spring_strut import spring_strut_history
 from wm_drake.trajectory import COORDINATES, Trajectory
 
 Record: TypeAlias = xr.Dataset
@@ -29,7 +32,7 @@ Engine: TypeAlias = Callable[[Setup, SpinProfile, float, Callable[[float], None]
 ENGINES: dict[str, Engine] = {"drake": run_drake}
 DEFAULT_ENGINE = "drake"
 
-DEFAULT_STEP = 1.25e-3
+DEFAULT_STEP = 2.5e-3
 """Integration step; a whole part of the output period. Peaks move by less than 0.05 % at a tenth of it (tested). [s]"""
 
 AXES = ("x", "y", "z")
@@ -105,7 +108,6 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
 
     Displacements are from the rest pose of the empty machine, in W.
     """
-    n = len(trajectory.time)
     rpy, position = trajectory.state[:, 0:3], trajectory.state[:, 3:6]
     sensor_axes = [AXES.index(sensor.axis) for sensor in setup.sensors.values()]
     sensors = [
@@ -113,11 +115,7 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
         for point, axis in zip(setup.sensor_points.values(), sensor_axes, strict=True)
     ]
     detergent = point_displacement(trajectory.state, setup.detergent_point, setup.rest_pose)
-    springs = [trajectory.forces[f"spring_{name}"][:, 0] for name in setup.springs]
-    dampers = [trajectory.forces[f"damper_{name}"][:, 0] for name in setup.dampers]
-    labels = {name: name if name == "gasket" else f"bushing_{name}" for name in setup.bushings}
-    bushings = [trajectory.forces[label] for label in labels.values()]
-    bushing = np.stack(bushings, axis=1) if bushings else np.empty((n, 0, 6))
+    springs, dampers, bushings = element_forces(setup, trajectory)
     variables = {
         "tub_angle": (("time", "angle"), rpy, "rad", "roll, pitch, yaw of T in W (3-2-1 Euler angles)"),
         "tub_position": (("time", "axis"), position, "m", "position of To in W"),
@@ -126,12 +124,13 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
         "drum_angle": (("time",), trajectory.state[:, 6], "rad", "angle of the drum against the tub"),
         "drum_speed": (("time",), trajectory.state[:, 13], "rad/s", "speed of the drum against the tub"),
         "motor_torque": (("time",), trajectory.motor_torque, "N m", "torque of the motor on the drum"),
-        "displacement": (("time", "sensor"), _columns(sensors, n), "m", "displacement at the sensors, along their axes"),
+        "displacement": (("time", "sensor"), np.stack(sensors, axis=1), "m", "displacement at the sensors, along their axes"),
         "detergent_displacement": (("time", "axis"), detergent, "m", "displacement of the point nearest the detergent box"),
-        "spring_tension": (("time", "spring"), _columns(springs, n), "N", "spring tension"),
-        "damper_tension": (("time", "damper"), _columns(dampers, n), "N", "damper tension"),
-        "bushing_force": (("time", "bushing", "axis"), bushing[:, :, :3], "N", "force of gasket and bushings on the housing"),
-        "bushing_moment": (("time", "bushing", "axis"), bushing[:, :, 3:], "N m", "moment of gasket and bushings on the housing"),
+        "spring_tension": (("time", "spring"), springs, "N", "spring tension"),
+        "damper_tension": (("time", "damper"), dampers, "N", "damper tension"),
+        "damper_deformation": (("time", "damper"), trajectory.deformation, "m", "deformation of the damper's sponge"),
+        "bushing_force": (("time", "bushing", "axis"), bushings[:, :, :3], "N", "force of gasket and bushings on the housing"),
+        "bushing_moment": (("time", "bushing", "axis"), bushings[:, :, 3:], "N m", "moment of gasket and bushings on the housing"),
     }
     record = xr.Dataset(
         {name: (dims, values, {"units": unit, "long_name": text}) for name, (dims, values, unit, text) in variables.items()},
@@ -157,6 +156,27 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
         **{f"version_{name}": version for name, version in versions().items()},
     }
     return record
+
+
+def element_forces(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Own forces of the elements along a trajectory.
+
+    Returns:
+        Spring tensions (n, springs), damper tensions (n, dampers) [N], and force and moment of the bushings on the housing
+        (n, bushings, 6) [N, N m].
+    """
+    states, none = trajectory.state, np.empty((len(trajectory.time), 0))
+    springs = np.empty((len(states), len(setup.springs)))
+    dampers = np.empty((len(states), len(setup.dampers)))
+    bushings = np.empty((len(states), len(setup.bushings), 6))
+    for index, spring in enumerate(setup.springs.values()):
+        spring_strut_history(states, none, spring.packed(), springs[:, index : index + 1])
+    for index, damper in enumerate(setup.dampers.values()):
+        own = trajectory.deformation[:, index : index + 1]
+        friction_damper_history(states, own, damper.packed(), dampers[:, index : index + 1])
+    for index, bushing in enumerate(setup.bushings.values()):
+        six_component_bushing_history(states, none, bushing.packed(), bushings[:, index])
+    return springs, dampers, bushings
 
 
 def point_displacement(state: FloatArray, point: FloatArray, rest_pose: FloatArray) -> FloatArray:
@@ -193,10 +213,6 @@ def load_record(path: Path) -> Record:
 def versions() -> dict[str, str]:
     """Versions that determine a result."""
     return {name: importlib.metadata.version(name) for name in ("wm-drake", "drake", "numpy", "scipy", "numba")}
-
-
-def _columns(columns: list[FloatArray], rows: int) -> FloatArray:
-    return np.stack(columns, axis=1) if columns else np.empty((rows, 0))
 
 
 def _divergence_text(trajectory: Trajectory) -> str:

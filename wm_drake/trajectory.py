@@ -1,6 +1,6 @@
 """What an engine hands over: the motion, sampled, and why it ended early if it did."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,7 +20,7 @@ class Divergence:
     """When and why a run stopped.
 
     Attributes:
-        time: Simulated time of the first step out of bounds. [s]
+        time: Simulated time of the first sample out of bounds. [s]
         coordinate: Coordinate of the tub that left its bounds.
         reason: Its value and the bound.
     """
@@ -38,17 +38,38 @@ class Trajectory:
         time: (n,) [s]
         state: (n, 14) positions and velocities of the plant: roll, pitch, yaw, x, y, z of T in W, drum angle; angular
             velocity and velocity of To in W, drum rate. [rad, m, rad/s, m/s]
+        deformation: (n, number of dampers) deformation of each damper's sponge; 0 where it has none. [m]
         motor_torque: (n,) torque of the motor on the drum, its reaction on the tub. [N m]
-        forces: By element label (``spring_left``, ``damper_left``, ``gasket``, ``bushing_...``), (n, 1) tension or
-            (n, 6) force and moment on the housing. [N, N m]
         divergence: None if the run came to its end.
     """
 
     time: FloatArray
     state: FloatArray
+    deformation: FloatArray
     motor_torque: FloatArray
-    forces: dict[str, FloatArray]
-    divergence: Divergence | None
+    divergence: Divergence | None = None
+
+
+def ended_where_it_diverged(trajectory: Trajectory, failure: str = "") -> Trajectory:
+    """Cuts a trajectory before its first sample out of bounds, and says why.
+
+    Args:
+        trajectory: As an engine sampled it.
+        failure: What stopped the engine, if something did.
+    """
+    for index, state in enumerate(trajectory.state):
+        reason = diverging_coordinate(state)
+        if reason is not None:
+            return _cut(trajectory, index, Divergence(float(trajectory.time[index]), *reason))
+    if failure:  # it went from a good sample to no number at all within one output period
+        last = float(trajectory.time[-1]) if len(trajectory.time) else 0.0
+        return replace(trajectory, divergence=Divergence(last, "state", failure))
+    return trajectory
+
+
+def _cut(trajectory: Trajectory, length: int, divergence: Divergence) -> Trajectory:
+    arrays = (trajectory.time, trajectory.state, trajectory.deformation, trajectory.motor_torque)
+    return Trajectory(*(array[:length] for array in arrays), divergence)
 
 
 def diverging_coordinate(positions: FloatArray) -> tuple[str, str] | None:

@@ -27,6 +27,7 @@ from wm_drake.parameters.machine import (
     MachineParameters,
     Sensor,
 )
+from wm_drake.parameters.measured import measured_amplitudes
 from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
 
 __all__ = [
@@ -58,6 +59,7 @@ __all__ = [
     "load_profile",
     "machine_path",
     "machine_yaml",
+    "measured_amplitudes",
     "packed_stiffness",
     "quantities",
     "shipped_machines",

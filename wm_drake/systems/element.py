@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
-from pydrake.systems.framework import BasicVector_, NumericParameterIndex
+from pydrake.systems.framework import BasicVector_, ContinuousStateIndex, NumericParameterIndex
 
 from wm_drake.laws.compilation import generic
 
@@ -38,37 +38,21 @@ class ForceElement:
     def declare_element(self, scalar: type, evaluate: Any, parameters: np.ndarray, force_size: int, state_size: int) -> None:
         """Declares ports, parameters and state. `self` is a LeafSystem of the given scalar type."""
         system: Any = self
-        self.scalar = scalar
-        self.evaluate = evaluator(evaluate, scalar)
         self.packed = parameters  # what a scalar-converted copy begins with
-        self.sizes = (force_size, state_size)
-        self.state_port = system.DeclareVectorInputPort("plant_state", PLANT_STATE_SIZE)
-        self.parameter_index = system.DeclareNumericParameter(BasicVector_[scalar](parameters))
+        self.state_size = state_size
+        state_port = system.DeclareVectorInputPort("plant_state", PLANT_STATE_SIZE)
+        index = system.DeclareNumericParameter(BasicVector_[scalar](parameters))
+        self.parameter_index = index
         if state_size:
             system.DeclareContinuousState(state_size)
-        needs = {self.state_port.ticket(), system.numeric_parameter_ticket(NumericParameterIndex(self.parameter_index)), system.xc_ticket()}
-        system.DeclareVectorOutputPort(
-            "generalized_force", GENERALIZED_FORCE_SIZE, lambda c, o: o.SetFromVector(self.evaluated(c)[0]), needs
+        calc_generalized_force, calc_force, self.calc_rate = _callbacks(
+            scalar, evaluator(evaluate, scalar), state_port, index, (GENERALIZED_FORCE_SIZE, force_size, state_size)
         )
-        system.DeclareVectorOutputPort("force", force_size, lambda c, o: o.SetFromVector(self.evaluated(c)[1]), needs)
-
-    def evaluated(self, context: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Generalized force, own force and state rate in a Context."""
-        force_size, state_size = self.sizes
-        kind = float if self.scalar is float else object
-        generalized_force, force = np.empty(GENERALIZED_FORCE_SIZE, kind), np.empty(force_size, kind)
-        rate = np.empty(state_size, kind)
-        parameters = context.get_numeric_parameter(self.parameter_index).CopyToVector()
-        if self.scalar is not float:  # a law needs plain numbers to walk its packed tables; derivatives are by state
-            parameters = np.array([p.value() for p in parameters])
-        state = context.get_continuous_state_vector().CopyToVector() if state_size else rate
-        self.evaluate(self.state_port.Eval(context), state, parameters, generalized_force, force, rate)
-        return generalized_force, force, rate
-
-    def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
-        """Drake's hook for the rate of the element's own state."""
-        if self.sizes[1]:
-            derivatives.get_mutable_vector().SetFromVector(self.evaluated(context)[2])
+        needs = {state_port.ticket(), system.numeric_parameter_ticket(NumericParameterIndex(index)), system.xc_ticket()}
+        system.DeclareVectorOutputPort("generalized_force", GENERALIZED_FORCE_SIZE, calc_generalized_force, needs)
+        system.DeclareVectorOutputPort("force", force_size, calc_force, needs)
+        if state_size:
+            system.DeclareStateOutputPort("state", ContinuousStateIndex(0))
 
     def set_parameters(self, context: Any, parameters: np.ndarray) -> None:
         """Puts packed parameters into the element's Context.
@@ -80,6 +64,53 @@ class ForceElement:
             name = self.get_name()  # type: ignore[attr-defined]
             raise ValueError(f"{name}: a table has another number of points than the built machine's; build a new one")
         context.get_mutable_numeric_parameter(self.parameter_index).SetFromVector(parameters)
+
+
+def _callbacks(
+    scalar: type, run: Callable[..., None], state_port: Any, index: int, sizes: tuple[int, int, int]
+) -> tuple[Callable[[Any, Any], None], ...]:
+    """Drake's callbacks for the two output ports and the state rate of an element.
+
+    One run comes here a million times: for floats names are bound beforehand, nothing is allocated, and a law writes where
+    Drake keeps the value.
+    """
+    generalized_force, force, rate = (np.empty(size, float if scalar is float else object) for size in sizes)
+    has_state = sizes[2] > 0
+    no_state = np.empty(0)
+    plant_state = state_port.Eval
+
+    def own_state(context: Any) -> np.ndarray:
+        return context.get_continuous_state_vector().CopyToVector() if has_state else no_state
+
+    def numbers(context: Any) -> np.ndarray:
+        values = context.get_numeric_parameter(index).value()
+        # a law needs plain numbers to walk its packed tables; derivatives are by state
+        return values if scalar is float else np.array([value.value() for value in values])
+
+    def calc_force(context: Any, output: Any) -> None:
+        run(plant_state(context), own_state(context), numbers(context), generalized_force, force, rate)
+        output.SetFromVector(force)
+
+    def calc_rate(context: Any, derivatives: Any) -> None:
+        run(plant_state(context), own_state(context), numbers(context), generalized_force, force, rate)
+        derivatives.get_mutable_vector().SetFromVector(rate)
+
+    def calc_generalized_force(context: Any, output: Any) -> None:
+        run(plant_state(context), own_state(context), numbers(context), generalized_force, force, rate)
+        output.SetFromVector(generalized_force)
+
+    def calc_stateless_force(context: Any, output: Any) -> None:
+        numbers = context.get_numeric_parameter(index).value()
+        run(plant_state(context), no_state, numbers, output.get_mutable_value(), force, no_state)
+
+    def calc_stateful_force(context: Any, output: Any) -> None:
+        state = context.get_continuous_state_vector().CopyToVector()
+        numbers = context.get_numeric_parameter(index).value()
+        run(plant_state(context), state, numbers, output.get_mutable_value(), force, rate)
+
+    if scalar is float:
+        return calc_stateful_force if has_state else calc_stateless_force, calc_force, calc_rate
+    return calc_generalized_force, calc_force, calc_rate
 
 
 __all__ = ["GENERALIZED_FORCE_SIZE", "PLANT_STATE_SIZE", "SCALARS", "ForceElement", "evaluator"]

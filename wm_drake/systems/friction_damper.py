@@ -86,6 +86,15 @@ def evaluate_friction_damper(x, state, p, generalized_force, force, rate):
         rate[0] = deformation_rate
 
 
+@law
+def friction_damper_history(states, own_states, p, forces):
+    """Own force at each row of a sampled motion: `evaluate_friction_damper` without Drake, for records."""
+    generalized_force = np.empty(7)
+    rate = np.empty(own_states.shape[1])
+    for i in range(len(states)):
+        evaluate_friction_damper(states[i], own_states[i], p, generalized_force, forces[i], rate)
+
+
 @TemplateSystem.define("FrictionDamper_", T_list=SCALARS)
 def FrictionDamper_(T: type) -> Any:
     """Template of FrictionDamper."""
@@ -105,7 +114,12 @@ def FrictionDamper_(T: type) -> Any:
             self.declare_element(T, evaluate_friction_damper, parameters, force_size=1, state_size=state_size)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other.packed, other.sizes[1], converter=converter)
+            Impl._construct(self, other.packed, other.state_size, converter=converter)
+
+        def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
+            """Drake's hook for the rate of the sponge deformation."""
+            if self.state_size:
+                self.calc_rate(context, derivatives)
 
     Impl = FrictionDamper
     return FrictionDamper

@@ -65,6 +65,15 @@ def evaluate_six_component_bushing(x, state, p, generalized_force, force, rate):
         force[3 + i] = -m[i]
 
 
+@law
+def six_component_bushing_history(states, own_states, p, forces):
+    """Own force at each row of a sampled motion: `evaluate_six_component_bushing` without Drake, for records."""
+    generalized_force = np.empty(7)
+    rate = np.empty(own_states.shape[1])
+    for i in range(len(states)):
+        evaluate_six_component_bushing(states[i], own_states[i], p, generalized_force, forces[i], rate)
+
+
 @TemplateSystem.define("SixComponentBushing_", T_list=SCALARS)
 def SixComponentBushing_(T: type) -> Any:
     """Template of SixComponentBushing."""

@@ -48,6 +48,15 @@ def evaluate_spring_strut(x, state, p, generalized_force, force, rate):
     force[0] = tension
 
 
+@law
+def spring_strut_history(states, own_states, p, forces):
+    """Own force at each row of a sampled motion: `evaluate_spring_strut` without Drake, for records."""
+    generalized_force = np.empty(7)
+    rate = np.empty(own_states.shape[1])
+    for i in range(len(states)):
+        evaluate_spring_strut(states[i], own_states[i], p, generalized_force, forces[i], rate)
+
+
 @TemplateSystem.define("SpringStrut_", T_list=SCALARS)
 def SpringStrut_(T: type) -> Any:
     """Template of SpringStrut."""

@@ -1,0 +1,106 @@
+"""Record -> what is measured of it: filtered displacements, envelopes, amplitudes, largest forces, smallest gap."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from scipy.signal import butter, find_peaks, sosfiltfilt
+
+from wm_drake.parameters.elements import FloatArray
+from wm_drake.scene import Gap, Scene
+from wm_drake.simulation import Record, point_position
+
+BAND_HZ = (0.5, 20.0)
+"""Pass band of the displacements ([B] section 2.2)."""
+
+FILTER_ORDER = 4
+"""Order of the Butterworth filter ([B] section 2.2); run forwards and backwards, so that it shifts nothing."""
+
+
+@dataclass(frozen=True)
+class Measures:
+    """What is read off a record. SI.
+
+    Attributes:
+        amplitude: (sensor) largest absolute value of the envelopes. [m]
+        critical_speed: (sensor) drum speed where it occurs. [rad/s]
+        detergent_displacement: (axis) largest displacement of the tub point nearest the detergent box from rest, D of [B]. [m]
+        gasket_force, gasket_moment: (axis) largest absolute force and moment of the gasket on the housing, F and M of [B];
+            zero without gasket. [N, N m]
+        smallest_gap: Between tub group and housing; None if not measured.
+    """
+
+    amplitude: xr.DataArray
+    critical_speed: xr.DataArray
+    detergent_displacement: xr.DataArray
+    gasket_force: xr.DataArray
+    gasket_moment: xr.DataArray
+    smallest_gap: Gap | None
+
+
+def filtered_displacement(record: Record) -> xr.DataArray:
+    """Displacements at the sensors (time, sensor), band 0.5-20 Hz, fourth-order Butterworth, zero phase. [m]
+
+    A record shorter than the filter needs (one that diverged at once) gives NaN.
+    """
+    raw = record.displacement
+    values = np.full(raw.shape, np.nan)
+    if raw.sizes["time"] > 1:
+        rate = 1.0 / float(record.time[1] - record.time[0])
+        sections = butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=rate, output="sos")
+        if raw.sizes["time"] > 6 * len(sections) + 3:  # padding of sosfiltfilt at each end
+            values = sosfiltfilt(sections, raw.values, axis=0)
+    return raw.copy(data=values)
+
+
+def envelopes(record: Record) -> xr.Dataset:
+    """Upper and lower envelope (time, sensor) of the filtered displacements: straight lines from peak to peak. [m]"""
+    displacement = filtered_displacement(record)
+    time = displacement.time.values
+    upper = np.stack([peak_line(time, column) for column in displacement.values.T], axis=1)
+    lower = np.stack([-peak_line(time, -column) for column in displacement.values.T], axis=1)
+    return xr.Dataset({"upper": displacement.copy(data=upper), "lower": displacement.copy(data=lower)})
+
+
+def peak_line(time: FloatArray, signal: FloatArray) -> FloatArray:
+    """Line through the local maxima of a signal; the first and last are held to the ends."""
+    peaks = find_peaks(signal)[0]
+    return np.interp(time, time[peaks], signal[peaks]) if len(peaks) else signal
+
+
+def percent_difference(value: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
+    """100 (value - reference) / reference; [B] Eq. (1). [%]"""
+    return 100.0 * (value - reference) / reference
+
+
+def axis_motion(record: Record, y: float) -> FloatArray:
+    """Path in W of the point of the drum axis at depth y, for orbits. (n, 3) [m]"""
+    pose = np.column_stack([record.tub_angle.values, record.tub_position.values])
+    return point_position(pose, np.array([0.0, y, 0.0]))
+
+
+def measure(record: Record, scene: Scene | None = None) -> Measures:
+    """Reads the measures off a record.
+
+    Args:
+        record: From `wm_drake.simulation.simulate`.
+        scene: The machine's shapes, for the smallest gap; it is left out if None.
+    """
+    size = abs(envelopes(record)).to_dataarray("side").max("side")
+    gasket = record.sel(bushing=[name for name in record.bushing.values if name == "gasket"])
+    pose = np.column_stack([record.tub_angle.values, record.tub_position.values])
+    gap = scene.smallest_gap(record.time.values, pose, np.asarray(record.attrs["rest_pose"])) if scene else None
+    return Measures(
+        amplitude=size.max("time"),
+        critical_speed=_speed_at_largest(record, size),
+        detergent_displacement=abs(record.detergent_displacement).max("time"),
+        gasket_force=abs(gasket.bushing_force).max("time").sum("bushing"),
+        gasket_moment=abs(gasket.bushing_moment).max("time").sum("bushing"),
+        smallest_gap=gap,
+    )
+
+
+def _speed_at_largest(record: Record, size: xr.DataArray) -> xr.DataArray:
+    if size.isnull().any() or not size.sizes["time"]:
+        return size.max("time") * np.nan
+    return record.drum_speed.isel(time=size.argmax("time"))

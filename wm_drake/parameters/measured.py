@@ -1,0 +1,36 @@
+"""Measured amplitudes that a machine file names, to stand beside the computed ones."""
+
+import numpy as np
+import pandas as pd
+
+from wm_drake.errors import input_error
+from wm_drake.parameters.machine import MachineParameters
+
+_KEYS = ["load", "gasket", "source"]
+
+
+def measured_amplitudes(parameters: MachineParameters) -> pd.DataFrame:
+    """All rows of the CSV files in `measured`: load, gasket (yes, no), source, then one column per sensor. [mm]
+
+    Raises:
+        InputError: file missing, columns missing or unknown, a value that is not a number.
+    """
+    sensors = list(parameters.sensors)
+    tables = [_read(path, sensors) for path in parameters.measured]
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=_KEYS + sensors)
+
+
+def _read(path: str, sensors: list[str]) -> pd.DataFrame:
+    try:
+        table = pd.read_csv(path, comment="#")
+    except (OSError, ValueError) as error:
+        raise input_error(f"cannot be read as CSV ({error})", where=path, key="measured") from None
+    if list(table.columns) != _KEYS + sensors:
+        wanted = ",".join(_KEYS + sensors)
+        raise input_error(f"needs the columns {wanted}, has {','.join(map(str, table.columns))}", where=path, key="measured")
+    if not set(table["gasket"]) <= {"yes", "no"}:
+        raise input_error("gasket is neither yes nor no in some row", where=path, key="measured")
+    values = table[sensors].apply(pd.to_numeric, errors="coerce")
+    if not np.isfinite(values.to_numpy()).all():
+        raise input_error("an amplitude is not a finite number", where=path, key="measured")
+    return table.assign(**{name: values[name] for name in sensors})
