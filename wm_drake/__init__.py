@@ -1,0 +1,45 @@
+"""Dynamics of front-loading washing machines on Drake.
+
+    import wm_drake as wm
+    record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
+    wm.envelopes(record).upper.sel(sensor="Xr").plot()
+
+The rooms, in the order data flows: `parameters`, `laws`, `systems`, `machine`, `simulation`, `measures`, `studies`, `report`,
+`cli`.
+"""
+
+import importlib
+from typing import Any
+
+_HOMES = {
+    "Case": "simulation",
+    "Scene": "scene",
+    "build_machine": "machine",
+    "case_of": "simulation",
+    "describe": "studies.description",
+    "envelopes": "measures",
+    "filtered_displacement": "measures",
+    "load_load": "parameters",
+    "load_machine": "parameters",
+    "load_profile": "parameters",
+    "load_record": "simulation",
+    "measure": "measures",
+    "natural_modes": "studies.modal",
+    "run_spin": "studies.spin",
+    "save_record": "simulation",
+    "simulate": "simulation",
+    "with_value": "parameters",
+}
+
+__all__ = sorted(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    """Loads a public name from its room when it is first used: Drake takes a second to import."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'wm_drake' has no attribute '{name}'")
+    return getattr(importlib.import_module(f"wm_drake.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOMES])

@@ -46,7 +46,9 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
     missing = [f"link '{name}'" for name in ("housing", "tub", "drum") if not plant.HasBodyNamed(name)]
     if not plant.HasJointNamed(parameters.drive.joint):
         joints = [plant.get_joint(index).name() for index in plant.GetJointIndices()]
-        raise input_error(f"no joint '{parameters.drive.joint}'{nearest_names(parameters.drive.joint, joints)}", key="drive.joint")
+        raise input_error(
+            f"no joint '{parameters.drive.joint}'{nearest_names(parameters.drive.joint, joints)}", key="drive.joint"
+        )
     if missing:
         raise input_error(f"SDF '{parameters.model}' has no {' and no '.join(missing)}", key="model")
     tub = plant.GetBodyByName("tub")
@@ -98,9 +100,11 @@ def frame_problems(plant: MultibodyPlant, parameters: MachineParameters) -> list
         elif not fixed_to(plant, body, frame):
             problems.append(Problem("", key, f"frame '{frame}' is not fixed to the {body}"))
     links = [plant.get_body(index).name() for index in plant.GetBodyIndices(plant.GetBodyByName("tub").model_instance())]
-    for name in parameters.bodies:
-        if name not in links:
-            problems.append(Problem("", f"bodies.{name}", f"no link '{name}' in the SDF{nearest_names(name, links)}"))
+    problems += [
+        Problem("", f"bodies.{name}", f"no link '{name}' in the SDF{nearest_names(name, links)}")
+        for name in parameters.bodies
+        if name not in links
+    ]
     for name in parameters.frames:
         if name not in known or not isinstance(plant.GetFrameByName(name), FixedOffsetFrame):
             movable = [frame for frame in known if isinstance(plant.GetFrameByName(frame), FixedOffsetFrame)]

@@ -10,7 +10,7 @@ from pydrake.systems.primitives import Adder, LogVectorOutput, VectorLogSink
 from scipy.optimize import root
 
 from wm_drake.bodies import add_bodies, set_bodies
-from wm_drake.errors import InputError, Problem, WmDrakeError, input_error, nearest_names
+from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.parameters import Load, MachineParameters, Sensor, packed_stiffness
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.systems.element import GENERALIZED_FORCE_SIZE
@@ -92,7 +92,7 @@ class Machine:
         Setting numbers in a Context of one built machine gives, bit for bit, what a machine built from them gives.
 
         Args:
-            load: Point masses in the drum; None for the empty machine. The rest pose is that of the empty machine.
+            load: Point masses in the drum; None for the empty machine. Preloads and rest pose are those of the empty machine.
             parameters: Numbers to use; those it was built from if None. Same elements, same laws, tables of the same length.
             gasket, dampers: False takes them out of the machine.
 
@@ -110,22 +110,18 @@ class Machine:
         self._set(context, self.dampers, placed_dampers)
         springs = self._preloaded_springs(context, parameters)
         self._set(context, self.springs, springs)
-        rest_pose, residual = self._rest_pose(context)
-        set_bodies(self.plant, plant_context, parameters, load)
         if not gasket and "gasket" in bushings:
-            bushings["gasket"] = _disengaged(bushings["gasket"])
+            bushings["gasket"] = replace(bushings["gasket"], engaged=0.0)
         if not dampers:
-            placed_dampers = {name: _disengaged(damper) for name, damper in placed_dampers.items()}
+            placed_dampers = {name: replace(damper, engaged=0.0) for name, damper in placed_dampers.items()}
         self._set(context, self.bushings, bushings)
         self._set(context, self.dampers, placed_dampers)
+        rest_pose, residual = self._rest_pose(context)
+        set_bodies(self.plant, plant_context, parameters, load)
         self.plant.SetPositions(plant_context, np.append(rest_pose, 0.0))
-        points = {
-            name: _point(self.plant, plant_context, "tub", sensor.frame) for name, sensor in parameters.sensors.items()
-        }
+        points = {name: _point(self.plant, plant_context, "tub", sensor.frame) for name, sensor in parameters.sensors.items()}
         detergent_point = _point(self.plant, plant_context, "tub", parameters.clearance.detergent_frame)
-        return Setup(
-            self, parameters, context, springs, placed_dampers, bushings, points, detergent_point, rest_pose, residual
-        )
+        return Setup(self, parameters, context, springs, placed_dampers, bushings, points, detergent_point, rest_pose, residual)
 
     def _set(self, context: Context, systems: dict[str, Any], placed: dict[str, Any]) -> None:
         for name, system in systems.items():
@@ -205,8 +201,7 @@ def build_machine(parameters: MachineParameters) -> Machine:
         for name, placed in _placed_dampers(plant, context, parameters).items()
     }
     bushings = {
-        name: SixComponentBushing(placed.packed())
-        for name, placed in _placed_bushings(plant, context, parameters).items()
+        name: SixComponentBushing(placed.packed()) for name, placed in _placed_bushings(plant, context, parameters).items()
     }
     source = builder.AddNamedSystem("speed_source", SpeedSource())
     elements = {"spring": springs, "damper": dampers, "bushing": bushings}
@@ -236,18 +231,23 @@ def _check_same_elements(built: MachineParameters, wanted: MachineParameters) ->
     """Refuses numbers for another machine than the built one."""
     for key in ("model", "gravity"):
         if getattr(wanted, key) != getattr(built, key):
-            raise input_error(f"{getattr(wanted, key)} is not the built machine's {getattr(built, key)}; build a new one", key=key)
+            raise input_error(
+                f"{getattr(wanted, key)} is not the built machine's {getattr(built, key)}; build a new one", key=key
+            )
     for table in ("springs", "dampers", "all_bushings"):
         names = [set(t() if callable(t := getattr(p, table)) else t) for p in (built, wanted)]
         if names[0] != names[1]:
             other = sorted(names[0] ^ names[1])[0]
             raise input_error(
-                f"'{other}' is not in both machines{nearest_names(other, names[0])}; build a new machine", key=table.removeprefix("all_")
+                f"'{other}' is not in both machines{nearest_names(other, names[0])}; build a new machine",
+                key=table.removeprefix("all_"),
             )
     for name, damper in wanted.dampers.items():
         law, built_law = wanted.damper_types[damper.type].law, built.damper_types[built.dampers[name].type].law
         if law != built_law:
-            raise input_error(f"law '{law}' is not the built machine's '{built_law}'; build a new machine", key=f"dampers.{name}")
+            raise input_error(
+                f"law '{law}' is not the built machine's '{built_law}'; build a new machine", key=f"dampers.{name}"
+            )
 
 
 def _point(plant: MultibodyPlant, context: Context, body: str, frame: str) -> FloatArray:
@@ -297,10 +297,3 @@ def _placed_bushings(
         r_housing = _rotation(plant, context, "world", bushing.housing_frame)
         placed[name] = SixComponentBushingParameters(tub_point, r_tub, housing_point, r_housing, packed_bushing_law(bushing))
     return placed
-
-
-def _disengaged(placed: Any) -> Any:
-    return replace(placed, engaged=0.0)
-
-
-__all__ = ["OUTPUT_PERIOD", "Machine", "Setup", "WmDrakeError", "build_machine"]

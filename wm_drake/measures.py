@@ -7,7 +7,7 @@ import xarray as xr
 from scipy.signal import butter, find_peaks, sosfiltfilt
 
 from wm_drake.parameters.elements import FloatArray
-from wm_drake.scene import Gap, Scene
+from wm_drake.scene import REPLAY_RATE, Gap, Scene
 from wm_drake.simulation import Record, point_position
 
 BAND_HZ = (0.5, 20.0)
@@ -15,6 +15,9 @@ BAND_HZ = (0.5, 20.0)
 
 FILTER_ORDER = 4
 """Order of the Butterworth filter ([B] section 2.2); run forwards and backwards, so that it shifts nothing."""
+
+REPLAY_SPAN = 8.0
+"""Length of a replay. [s]"""
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,21 @@ def axis_motion(record: Record, y: float) -> FloatArray:
     """Path in W of the point of the drum axis at depth y, for orbits. (n, 3) [m]"""
     pose = np.column_stack([record.tub_angle.values, record.tub_position.values])
     return point_position(pose, np.array([0.0, y, 0.0]))
+
+
+def largest_motion(record: Record) -> tuple[FloatArray, FloatArray]:
+    """The stretch of a record around its largest displacement, thinned out for a replay.
+
+    Returns:
+        Times (n,) [s] and positions of the plant (n, 7): roll, pitch, yaw, x, y, z, drum angle. [rad, m]
+    """
+    size = abs(record.displacement).max("sensor")
+    moment = float(record.time[int(size.argmax())])
+    stretch = record.sel(time=slice(moment - REPLAY_SPAN / 2, moment + REPLAY_SPAN / 2))
+    period = float(record.time[1] - record.time[0])
+    frames = stretch.isel(time=slice(None, None, max(1, round(1.0 / (REPLAY_RATE * period)))))
+    positions = np.column_stack([frames.tub_angle.values, frames.tub_position.values, frames.drum_angle.values])
+    return frames.time.values, positions
 
 
 def measure(record: Record, scene: Scene | None = None) -> Measures:

@@ -60,7 +60,9 @@ def case_of(parameters: MachineParameters, load: str, *, gasket: bool = True) ->
         InputError: no such load.
     """
     if load not in parameters.loads:
-        raise input_error(f"no load '{load}' in machine '{parameters.name}'{nearest_names(load, parameters.loads)}", key="loads")
+        raise input_error(
+            f"no load '{load}' in machine '{parameters.name}'{nearest_names(load, parameters.loads)}", key="loads"
+        )
     return Case(load, parameters.loads[load], parameters.profile, gasket)
 
 
@@ -130,7 +132,12 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
         "damper_tension": (("time", "damper"), dampers, "N", "damper tension"),
         "damper_deformation": (("time", "damper"), trajectory.deformation, "m", "deformation of the damper's sponge"),
         "bushing_force": (("time", "bushing", "axis"), bushings[:, :, :3], "N", "force of gasket and bushings on the housing"),
-        "bushing_moment": (("time", "bushing", "axis"), bushings[:, :, 3:], "N m", "moment of gasket and bushings on the housing"),
+        "bushing_moment": (
+            ("time", "bushing", "axis"),
+            bushings[:, :, 3:],
+            "N m",
+            "moment of gasket and bushings on the housing",
+        ),
     }
     record = xr.Dataset(
         {name: (dims, values, {"units": unit, "long_name": text}) for name, (dims, values, unit, text) in variables.items()},

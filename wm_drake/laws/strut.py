@@ -65,7 +65,7 @@ def bending_moment(direction, w_strut, axis, w_body, k, c, p, v_t):
 def transverse_couple(moment, direction, length):
     """Force on the tub end of a massless strut whose bushings put `moment` on it; the housing end gets its negative.
 
-        f = (m_tub + m_housing) x e / L      balance of moments of the strut, own derivation (physics of [B] section 3)
+    f = (m_tub + m_housing) x e / L      balance of moments of the strut, own derivation (physics of [B] section 3)
     """
     return scale(1.0 / length, cross(moment, direction))
 

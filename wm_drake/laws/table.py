@@ -36,7 +36,9 @@ def stiffness_force(x, packed, at):
     i = 0
     while x > packed[xs + i + 1]:
         i += 1
-    return hermite(x, packed[xs + i], packed[xs + i + 1], packed[ys + i], packed[ys + i + 1], packed[ms + i], packed[ms + i + 1])
+    return hermite(
+        x, packed[xs + i], packed[xs + i + 1], packed[ys + i], packed[ys + i + 1], packed[ms + i], packed[ms + i + 1]
+    )
 
 
 @law

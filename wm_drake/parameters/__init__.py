@@ -16,7 +16,15 @@ from wm_drake.parameters.elements import (
     TorqueTable,
     packed_stiffness,
 )
-from wm_drake.parameters.files import load_load, load_machine, load_profile, machine_path, machine_yaml, shipped_machines
+from wm_drake.parameters.files import (
+    load_load,
+    load_machine,
+    load_profile,
+    located,
+    machine_path,
+    machine_yaml,
+    shipped_machines,
+)
 from wm_drake.parameters.keys import quantities, source_of, with_value
 from wm_drake.parameters.machine import (
     BodyOverride,
@@ -57,6 +65,7 @@ __all__ = [
     "load_load",
     "load_machine",
     "load_profile",
+    "located",
     "machine_path",
     "machine_yaml",
     "measured_amplitudes",

@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.error import YAMLError
 
-from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.errors import InputError, input_error, nearest_names
 from wm_drake.parameters.keys import problems_of, quantities, source_of
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.spin import Load, SpinProfile
@@ -37,10 +37,15 @@ def load_machine(name_or_path: str | Path = "reference") -> MachineParameters:
         InputError: with one problem per fault.
     """
     path = machine_path(name_or_path)
-    tree = _extended(path, ())
-    plain, sources = _without_sources(tree)
+    plain, sources = _without_sources(_extended(path, ()))
     plain = _with_absolute_paths(plain, path)
-    return _validated(MachineParameters, {**plain, "sources": sources}, path, tree)
+    return _validated(MachineParameters, {**plain, "sources": sources}, path, _read_yaml(path))
+
+
+def located(error: InputError, path: Path) -> InputError:
+    """The same problems with the lines of the machine file where they stand, as far as it holds them."""
+    tree = _read_yaml(path)
+    return InputError(replace(p, where=p.where or _place(path, tree, p.key)) for p in error.problems)
 
 
 def machine_path(name_or_path: str | Path) -> Path:
@@ -51,7 +56,9 @@ def machine_path(name_or_path: str | Path) -> Path:
     path = Path(name_or_path)
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "no such file"
-        raise input_error(f"{what}, and no shipped machine of that name{nearest_names(str(name_or_path), shipped)}", where=str(path))
+        raise input_error(
+            f"{what}, and no shipped machine of that name{nearest_names(str(name_or_path), shipped)}", where=str(path)
+        )
     return path
 
 
@@ -125,7 +132,9 @@ def _read_yaml(path: Path) -> CommentedMap:
         where = f"{path}:{mark.line + 1}" if mark else str(path)
         raise input_error(f"is not YAML: {getattr(error, 'problem', None) or error}", where=where) from None
     if not isinstance(tree, CommentedMap):
-        raise input_error("is empty; allowed is a mapping of keys to values" if tree is None else "is not a mapping", where=str(path))
+        raise input_error(
+            "is empty; allowed is a mapping of keys to values" if tree is None else "is not a mapping", where=str(path)
+        )
     return tree
 
 
@@ -221,8 +230,3 @@ def _place(path: Path, tree: CommentedMap, key: str) -> str:
         else:
             break
     return str(path) if line is None else f"{path}:{line + 1}"
-
-
-def unknown_model(model: str, known: list[str]) -> InputError:
-    """The error of a machine whose SDF is not there."""
-    return InputError([Problem("", "model", f"no SDF file '{model}'{nearest_names(model, known)}")])

@@ -82,7 +82,9 @@ def _message(detail: Any, root: type[BaseModel]) -> str:
     if kind == "missing":
         return "is missing"
     if kind == "extra_forbidden":
-        return f"unknown key '{detail['loc'][-1]}'" + nearest_names(str(detail["loc"][-1]), _fields_at(root, detail["loc"][:-1]))
+        return f"unknown key '{detail['loc'][-1]}'" + nearest_names(
+            str(detail["loc"][-1]), _fields_at(root, detail["loc"][:-1])
+        )
     if kind in ("greater_than", "greater_than_equal"):
         sign, limit = (">", context["gt"]) if kind == "greater_than" else (">=", context["ge"])
         return f"'{given}' is out of range; allowed is {sign} {limit:g}"

@@ -10,7 +10,7 @@ from wm_drake.parameters.elements import Frozen
 
 
 class Unbalance(Frozen):
-    """A point mass fixed to the drum, at (r sin(phase), y, r cos(phase)) in drum axes: phase 0 is up when the drum angle is 0."""
+    """A point mass fixed to the drum, at (r sin(phase), y, r cos(phase)) in D: phase 0 is up while the drum angle is 0."""
 
     mass: Annotated[u.Mass, Field(ge=0.0)]
     radius: Annotated[u.Length, Field(ge=0.0)]
@@ -46,7 +46,8 @@ class _Step(Frozen):
         """Time and speed at the end of the step that begins at (time, speed)."""
         if self.hold_until is not None:
             return self.hold_until, speed
-        assert self.ramp_to is not None and self.rate is not None  # _one_form has seen to it
+        assert self.ramp_to is not None  # _one_form has seen to it
+        assert self.rate is not None
         return time + abs(self.ramp_to - speed) / self.rate, self.ramp_to
 
 
@@ -72,7 +73,9 @@ class SpinProfile(Frozen):
         unit = {name: cls.model_fields[name].metadata[0] for name in ("time", "speed")}
         times, speeds = zip(*points, strict=True)
         # as text again, for the door of the fields: repr keeps every digit
-        return {name: f"({', '.join(map(repr, values))}) {unit[name].si}" for name, values in (("time", times), ("speed", speeds))}
+        return {
+            name: f"({', '.join(map(repr, values))}) {unit[name].si}" for name, values in (("time", times), ("speed", speeds))
+        }
 
     @model_validator(mode="after")
     def _usable(self) -> "SpinProfile":

@@ -1,0 +1,1 @@
+"""Questions asked of a machine: spin runs, modes, a resolved description."""

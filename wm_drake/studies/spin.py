@@ -96,9 +96,7 @@ def _run_and_report(job: Any, index: int, reports: Any) -> CaseResult:
     return _run(*job, lambda fraction: reports.put((index, fraction)))
 
 
-def _run(
-    parameters: MachineParameters, case: Case, engine: str, step: float, progress: Callable[[float], None]
-) -> CaseResult:
+def _run(parameters: MachineParameters, case: Case, engine: str, step: float, progress: Callable[[float], None]) -> CaseResult:
     begin = time.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DivergenceWarning)  # the record carries it to the report

@@ -1,0 +1,1 @@
+"""LeafSystems: ports and geometry; each calls one law."""

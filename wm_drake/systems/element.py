@@ -83,7 +83,7 @@ def _callbacks(
         return context.get_continuous_state_vector().CopyToVector() if has_state else no_state
 
     def numbers(context: Any) -> np.ndarray:
-        values = context.get_numeric_parameter(index).value()
+        values = context.get_numeric_parameter(index).CopyToVector()
         # a law needs plain numbers to walk its packed tables; derivatives are by state
         return values if scalar is float else np.array([value.value() for value in values])
 

@@ -64,8 +64,8 @@ def SpringStrut_(T: type) -> Any:
     class SpringStrut(ForceElement, LeafSystem_[T]):
         """A suspension spring; law `spring_tension`.
 
-            plant_state (14) ──▶ [ SpringStrut ] ──▶ generalized_force (7) [N m, N]
-                                                 ──▶ force (1) tension, > 0 pulls its ends together [N]
+        plant_state (14) ──▶ [ SpringStrut ] ──▶ generalized_force (7) [N m, N]
+                                             ──▶ force (1) tension, > 0 pulls its ends together [N]
         """
 
         def _construct(self, parameters: FloatArray, converter: Any = None) -> None:
