@@ -234,7 +234,8 @@ def _print_tables(result: "SpinResult", out: Path) -> None:
         gap = case.measures.smallest_gap
         if gap:
             console.print(
-                f"{case.case.name}: smallest gap {millimetre.from_si(gap.distance):.1f} mm at {gap.time:.2f} s, {gap.moving} to {gap.fixed}"
+                f"{case.case.name}: smallest gap {millimetre.from_si(gap.distance):.1f} mm at {gap.time:.2f} s, "
+                f"{gap.moving} to {gap.fixed}"
             )
     console.print(f"Results in {out}: report.html, amplitudes.csv, record_<load>.nc")
 

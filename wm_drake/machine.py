@@ -253,12 +253,12 @@ def _check_same_elements(built: MachineParameters, wanted: MachineParameters) ->
 def _point(plant: MultibodyPlant, context: Context, body: str, frame: str) -> FloatArray:
     """Origin of a frame in a body's frame."""
     pose = plant.CalcRelativeTransform(context, plant.GetBodyByName(body).body_frame(), plant.GetFrameByName(frame))
-    return np.asarray(pose.translation())
+    return np.array(pose.translation())
 
 
 def _rotation(plant: MultibodyPlant, context: Context, body: str, frame: str) -> FloatArray:
     pose = plant.CalcRelativeTransform(context, plant.GetBodyByName(body).body_frame(), plant.GetFrameByName(frame))
-    return np.asarray(pose.rotation().matrix())
+    return np.array(pose.rotation().matrix())
 
 
 def _ends(plant: MultibodyPlant, context: Context, element: Any) -> tuple[FloatArray, FloatArray]:

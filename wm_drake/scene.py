@@ -95,7 +95,8 @@ class Scene:
                     distance, point = self.distance(poses[index], pair)
                     if distance < smallest:
                         names = self._name(pair[0]), self._name(pair[1])
-                        best = Gap(float(distance), float(time[index]), *names, tuple(map(float, point)))
+                        x, y, z = map(float, point)
+                        best = Gap(float(distance), float(time[index]), *names, (x, y, z))
         return best
 
     def _reach(self) -> float:

@@ -68,8 +68,13 @@ def ended_where_it_diverged(trajectory: Trajectory, failure: str = "") -> Trajec
 
 
 def _cut(trajectory: Trajectory, length: int, divergence: Divergence) -> Trajectory:
-    arrays = (trajectory.time, trajectory.state, trajectory.deformation, trajectory.motor_torque)
-    return Trajectory(*(array[:length] for array in arrays), divergence)
+    return Trajectory(
+        trajectory.time[:length],
+        trajectory.state[:length],
+        trajectory.deformation[:length],
+        trajectory.motor_torque[:length],
+        divergence,
+    )
 
 
 def diverging_coordinate(positions: FloatArray) -> tuple[str, str] | None:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import config
 from numba.core.dispatcher import Dispatcher
 
 _ROOM = Path(__file__).parents[1]
@@ -36,14 +37,14 @@ def _cache_folder() -> str:
 
 def law(function: Callable[..., Any]) -> Any:
     """Compiles a law for floats, with a cache on disk."""
-    chosen_by_user = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = _CACHE_FOLDER
+    chosen_by_user = config.CACHE_DIR
+    config.CACHE_DIR = _CACHE_FOLDER
     try:
         return numba.njit(cache=True, error_model="numpy")(function)
     except RuntimeError:  # no folder to write to: compile anew in each process
         return numba.njit(error_model="numpy")(function)
     finally:
-        numba.config.CACHE_DIR = chosen_by_user
+        config.CACHE_DIR = chosen_by_user
 
 
 @functools.cache

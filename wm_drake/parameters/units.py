@@ -17,9 +17,9 @@ _VECTOR = re.compile(r"\s*\(([^()]*)\)\s*(\S.*?)?\s*$")
 
 
 @functools.cache
-def registry() -> pint.UnitRegistry:
+def registry() -> pint.UnitRegistry[float]:
     """pint's units, with the angle as a dimension of its own, so that N m and N m/rad cannot be mixed up."""
-    units: pint.UnitRegistry = pint.UnitRegistry(on_redefinition="ignore")
+    units: pint.UnitRegistry[float] = pint.UnitRegistry(on_redefinition="ignore")
     units.define("radian = [angle] = rad")
     units._build_cache()  # pint has worked out rpm and deg as pure numbers by now, and offers no public way to forget it
     return units

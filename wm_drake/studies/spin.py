@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
+from functools import partial
 from queue import Empty
 from typing import Any
 
@@ -37,6 +38,16 @@ class SpinResult:
     results: tuple[CaseResult, ...]
 
 
+@dataclass(frozen=True)
+class _Job:
+    """All that a process needs to make one run."""
+
+    parameters: MachineParameters
+    case: Case
+    engine: str
+    step: float
+
+
 def run_spin(
     parameters: MachineParameters,
     cases: Sequence[Case],
@@ -56,15 +67,15 @@ def run_spin(
         workers: Processes; as many as cores by default. One case runs in this process.
     """
     count = min(workers or os.cpu_count() or 1, len(cases))
-    jobs = [(parameters, case, engine, step) for case in cases]
+    jobs = [_Job(parameters, case, engine, step) for case in cases]
     if count <= 1:
-        results = [_run(*job, lambda fraction, i=i: progress(i, fraction)) for i, job in enumerate(jobs)]  # type: ignore[misc]
+        results = [_run(job, partial(progress, index)) for index, job in enumerate(jobs)]
     else:
         results = _run_in_processes(jobs, count, progress)
     return SpinResult(parameters, engine, step, tuple(results))
 
 
-def _run_in_processes(jobs: list[Any], count: int, progress: Callable[[int, float], None]) -> list[CaseResult]:
+def _run_in_processes(jobs: list[_Job], count: int, progress: Callable[[int, float], None]) -> list[CaseResult]:
     # Drake diagrams do not pickle and forked Drake processes are not safe: fresh interpreters, plain parameters
     method = multiprocessing.get_context("spawn")
     with method.Manager() as manager, ProcessPoolExecutor(count, mp_context=method) as pool:
@@ -92,14 +103,14 @@ def _pass_on(reports: Any, progress: Callable[[int, float], None]) -> None:
         pass
 
 
-def _run_and_report(job: Any, index: int, reports: Any) -> CaseResult:
-    return _run(*job, lambda fraction: reports.put((index, fraction)))
+def _run_and_report(job: _Job, index: int, reports: Any) -> CaseResult:
+    return _run(job, lambda fraction: reports.put((index, fraction)))
 
 
-def _run(parameters: MachineParameters, case: Case, engine: str, step: float, progress: Callable[[float], None]) -> CaseResult:
+def _run(job: _Job, progress: Callable[[float], None]) -> CaseResult:
     begin = time.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DivergenceWarning)  # the record carries it to the report
-        record = simulate(build_machine(parameters), case, engine, step=step, progress=progress)
-    measures = measure(record, Scene(parameters))
-    return CaseResult(case, record, measures, time.perf_counter() - begin)
+        record = simulate(build_machine(job.parameters), job.case, job.engine, step=job.step, progress=progress)
+    measures = measure(record, Scene(job.parameters))
+    return CaseResult(job.case, record, measures, time.perf_counter() - begin)

@@ -1,0 +1,150 @@
+"""A plain second account of the machine's energy, from a record and the numbers alone: numpy, no law of the package."""
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from scipy.spatial.transform import Rotation
+
+from wm_drake.bodies import add_bodies, set_bodies
+from wm_drake.simulation import as_record
+from wm_drake.systems.speed_source import REFLECTED_INERTIA
+from wm_drake.trajectory import Trajectory
+
+
+class EnergyBook:
+    """Stored energy and dissipated power of a machine with linear springs, MSTV dampers and one linear gasket. [J, W]"""
+
+    def __init__(self, setup, load, record):
+        self.setup, self.parameters, self.time = setup, setup.parameters, record.time.values
+        self.rpy, self.position = record.tub_angle.values, record.tub_position.values
+        self.w, self.v = record.tub_angular_velocity.values, record.tub_velocity.values
+        self.rotation = Rotation.from_euler("xyz", self.rpy)  # space-fixed
+        self.record = record
+        self.plant = MultibodyPlant(0.0)
+        add_bodies(self.plant, self.parameters)
+        self.context = self.plant.CreateDefaultContext()
+        set_bodies(self.plant, self.context, self.parameters, load)
+        # without the drive's reflected inertia, which is a device and no energy of the machine
+        actuator = self.plant.get_joint_actuator(self.plant.GetJointActuatorIndices()[0])
+        actuator.SetRotorInertia(self.context, 0.0)
+
+    def bodies(self, index):
+        """Kinetic and gravitational energy at a sample."""
+        state = np.concatenate(
+            [self.rpy[index], self.position[index], [self.record.drum_angle.values[index]],
+             self.w[index], self.v[index], [self.record.drum_speed.values[index]]]
+        )  # fmt: skip
+        self.plant.SetPositionsAndVelocities(self.context, state)
+        return self.plant.CalcKineticEnergy(self.context) + self.plant.CalcPotentialEnergy(self.context)
+
+    def _strut(self, element):
+        arm = self.rotation.apply(element.p_ToA_T)
+        line = self.position + arm - element.p_WH
+        length = np.linalg.norm(line, axis=1)
+        direction = line / length[:, None]
+        velocity = self.v + np.cross(self.w, arm)
+        return length, direction, velocity
+
+    def springs(self):
+        """Elastic energy of the springs above the rest pose."""
+        total = 0.0
+        for name, spring in self.setup.springs.items():
+            stretch = self._strut(spring)[0] - np.linalg.norm(spring.p_ToA_T - spring.p_WH)
+            k = self.parameters.spring_types[self.parameters.springs[name].type].stiffness
+            total = total + spring.preload * stretch + 0.5 * k * stretch**2
+        return total
+
+    def gasket(self):
+        """Elastic energy and dissipated power of the gasket; its frames coincide with the axes of W at rest."""
+        g, placed = self.parameters.gasket, self.setup.bushings["gasket"]
+        arm = self.rotation.apply(placed.p_ToB_T)
+        d = self.position + arm - placed.p_WG
+        d_rate = self.v + np.cross(self.w, arm)
+        r = self.rotation.as_rotvec()
+        k = np.array([g.stiffness_x, g.stiffness_y, g.stiffness_z])
+        kr = np.array([g.rotational_stiffness_x, g.rotational_stiffness_y, g.rotational_stiffness_z])
+        c = np.array([g.damping_x, g.damping_y, g.damping_z])
+        cr = np.array([g.rotational_damping_x, g.rotational_damping_y, g.rotational_damping_z])
+        # rate of the rotation vector, by the inverse of the series for the angular velocity
+        r_rate = np.array([self._rotation_vector_rate(a, b) for a, b in zip(r, self.w, strict=True)])
+        stored = 0.5 * (d**2 @ k + r**2 @ kr)
+        return stored, d_rate**2 @ c + r_rate**2 @ cr
+
+    @staticmethod
+    def _rotation_vector_rate(r, w):
+        x = np.array([[0, -r[2], r[1]], [r[2], 0, -r[0]], [-r[1], r[0], 0]])
+        left_jacobian = np.eye(3) + x / 2 + x @ x / 6 + x @ x @ x / 24 + x @ x @ x @ x / 120  # w = J r'
+        return np.linalg.solve(left_jacobian, w)
+
+    def dampers(self):
+        """Stored energy and dissipated power of sponges and end bushings."""
+        stored, power = 0.0, 0.0
+        for index, (name, placed) in enumerate(self.setup.dampers.items()):
+            kind = self.parameters.damper_types[self.parameters.dampers[name].type]
+            length, direction, velocity = self._strut(placed)
+            rate = np.sum(direction * velocity, axis=1)
+            tension = self.record.damper_tension.values[:, index]
+            deformation = self.record.damper_deformation.values[:, index]
+            # s = k1 delta + c1 delta' gives delta', and w = v - delta'
+            deformation_rate = (tension - kind.sponge_stiffness * deformation) / kind.sponge_damping
+            w = rate - deformation_rate
+            friction = tension - kind.slider_damping * w
+            stored = stored + 0.5 * kind.sponge_stiffness * deformation**2
+            power = power + kind.sponge_damping * deformation_rate**2 + kind.slider_damping * w**2 + friction * w
+            line = placed.p_ToA_T - placed.p_WH
+            axis = line / np.linalg.norm(line)
+            w_strut = np.cross(direction, velocity) / length[:, None]
+            for body_axis, body_w in ((self.rotation.apply(axis), self.w), (np.broadcast_to(axis, direction.shape), 0.0)):
+                angle = np.arctan2(np.linalg.norm(np.cross(body_axis, direction), axis=1), np.sum(body_axis * direction, axis=1))
+                relative = w_strut - body_w
+                bend = relative - np.sum(relative * direction, axis=1)[:, None] * direction
+                speed = np.linalg.norm(bend, axis=1)
+                b = kind.end_bushing
+                full = np.minimum(speed / b.full_friction_rate, 1.0)
+                stored = stored + 0.5 * b.stiffness * angle**2
+                power = power + b.damping * speed**2 + b.friction_torque * np.sin(np.pi / 2 * full) * speed
+        return stored, power
+
+    def balance(self):
+        """Work of the drive, change of stored energy, dissipated energy over the record. [J]"""
+        gasket_stored, gasket_power = self.gasket()
+        damper_stored, damper_power = self.dampers()
+        elastic = self.springs() + gasket_stored + damper_stored
+        drive = self.record.motor_torque.values * self.record.drum_speed.values
+        change = self.bodies(-1) - self.bodies(0) + elastic[-1] - elastic[0]
+        return self.integral(drive), change, self.integral(gasket_power + damper_power)
+
+    def integral(self, power):
+        """Over the record; corners of the profile are sampled on both sides."""
+        return np.trapezoid(power, self.time)
+
+
+
+
+def dense_record(machine, case, step):
+    """A run sampled at every step: the 5 ms of a record are too coarse to integrate the power of friction to 1e-5."""
+    setup = machine.set_up(case.load, gasket=case.gasket)
+    profile, context = case.profile, setup.context
+    simulator = Simulator(machine.diagram, context)
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", step).set_fixed_step_mode(True)
+    source_context = machine.source.GetMyContextFromRoot(context)
+    plant_context = setup.plant_context
+    accelerations = machine.plant.get_generalized_acceleration_output_port()
+    dampers = [damper.GetMyContextFromRoot(context) for damper in machine.dampers.values()]
+    time, state, deformation, torque = [], [], [], []
+
+    def sample(alpha):
+        time.append(context.get_time())
+        state.append(machine.plant.GetPositionsAndVelocities(plant_context))
+        deformation.append([c.get_continuous_state_vector().GetAtIndex(0) for c in dampers])
+        torque.append(REFLECTED_INERTIA * (alpha - accelerations.Eval(plant_context)[6]))
+
+    for begin, stop, alpha in zip(profile.time, profile.time[1:], profile.acceleration(), strict=False):
+        machine.source.set_acceleration(source_context, alpha)
+        simulator.Initialize()
+        sample(alpha)
+        for moment in np.linspace(begin, stop, int(np.ceil((stop - begin) / step)) + 1)[1:]:
+            simulator.AdvanceTo(moment)
+            sample(alpha)
+    trajectory = Trajectory(np.array(time), np.array(state), np.array(deformation), np.array(torque))
+    return setup, as_record(setup, case, trajectory)

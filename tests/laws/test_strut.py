@@ -1,0 +1,126 @@
+"""Massless strut and the bushings at its ends (Hooke joints of [B] section 3)."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from wm_drake.laws.strut import bending_moment, strut_line, transverse_couple, tub_arm, wrench_at_origin
+from wm_drake.laws.vectors import rotation_from_rpy
+
+ZERO = (0.0, 0.0, 0.0)
+K, C, P, V_T = 12.0, 0.3, 0.9, 0.5  # N m/rad, N m s/rad, N m, rad/s
+
+directions = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda a: np.linalg.norm(a) > 0.1)
+rates = st.tuples(*[st.floats(-3.0, 3.0)] * 3)  # rad/s
+
+
+def unit(a):
+    return np.asarray(a) / np.linalg.norm(a)
+
+
+def turned(a, rotation_vector):
+    return Rotation.from_rotvec(rotation_vector).apply(a)
+
+
+def angle_between(a, b):
+    return np.arctan2(np.linalg.norm(np.cross(a, b)), np.dot(a, b))
+
+
+def test_strut_line_gives_length_direction_and_their_rates():
+    arm, p_WT, p_WH = np.array([0.2, -0.1, -0.25]), np.array([0.01, -0.02, 0.03]), np.array([0.3, -0.1, -0.6])  # m
+    w, v = np.array([0.3, -0.2, 0.5]), np.array([0.4, 0.1, -0.3])  # rad/s, m/s
+    length, rate, direction, v_A = strut_line(*map(tuple, (arm, p_WT, w, v, p_WH)))
+    line = p_WT + arm - p_WH
+    assert length == pytest.approx(np.linalg.norm(line))
+    assert direction == pytest.approx(line / np.linalg.norm(line))
+    assert v_A == pytest.approx(v + np.cross(w, arm))
+    h = 1e-6  # s
+
+    def length_at(t):
+        return np.linalg.norm(p_WT + v * t + turned(arm, w * t) - p_WH)
+
+    assert rate == pytest.approx((length_at(h) - length_at(-h)) / (2.0 * h), rel=1e-8)
+
+
+def test_no_moment_at_rest():
+    axis = tuple(map(float, unit((1.0, 2.0, -4.0))))
+    assert bending_moment(axis, ZERO, axis, ZERO, K, C, P, V_T) == pytest.approx(ZERO, abs=1e-15)
+
+
+def test_a_bent_strut_is_pushed_back_with_stiffness_times_angle():
+    for angle in (1e-6, 0.02, 0.6, 2.0):  # rad
+        direction = (float(np.sin(angle)), 0.0, float(np.cos(angle)))  # turned by angle about y, away from z
+        moment = bending_moment(direction, ZERO, (0.0, 0.0, 1.0), ZERO, K, 0.0, 0.0, V_T)
+        assert moment == pytest.approx((0.0, -K * angle, 0.0), rel=1e-12, abs=1e-18)
+
+
+def test_hand_values_of_damping_and_friction():
+    z = (0.0, 0.0, 1.0)
+    slow = bending_moment(z, (V_T / 2, 0.0, 0.0), z, ZERO, 0.0, C, P, V_T)
+    assert slow == pytest.approx((-0.3 * 0.25 - 0.9 * np.sin(np.pi / 4), 0.0, 0.0))
+    fast = bending_moment(z, ZERO, z, (0.0, 2.0, 0.0), 0.0, C, P, V_T)  # the body turns under a strut at rest
+    assert fast == pytest.approx((0.0, 0.3 * 2.0 + 0.9, 0.0))
+
+
+@given(axis=directions, direction=directions, w_strut=rates, w_body=rates)
+def test_elastic_power_is_minus_the_rate_of_half_k_angle_squared(axis, direction, w_strut, w_body):
+    axis, direction, w_strut, w_body = unit(axis), unit(direction), np.array(w_strut), np.array(w_body)
+    assume(angle_between(axis, direction) < 3.0)
+    w_strut = w_strut - (w_strut @ direction) * direction
+    moment = bending_moment(*map(tuple, (direction, w_strut, axis, w_body)), K, 0.0, 0.0, V_T)
+    h = 1e-5  # s
+
+    def energy(t):
+        return 0.5 * K * angle_between(turned(axis, w_body * t), turned(direction, w_strut * t)) ** 2
+
+    assert np.dot(moment, w_strut - w_body) == pytest.approx((energy(-h) - energy(h)) / (2.0 * h), rel=1e-6, abs=1e-6)
+
+
+@given(axis=directions, direction=directions, w_strut=rates, w_body=rates)
+def test_damping_and_friction_dissipate(axis, direction, w_strut, w_body):
+    moment = bending_moment(tuple(unit(direction)), w_strut, tuple(unit(axis)), w_body, 0.0, C, P, V_T)
+    assert np.dot(moment, np.subtract(w_strut, w_body)) <= 1e-14
+    assert abs(np.dot(moment, unit(direction))) <= 1e-14 * (1.0 + np.linalg.norm(moment))
+
+
+@given(direction=directions, spin=st.floats(-3.0, 3.0))
+def test_spin_about_the_struts_own_axis_is_free(direction, spin):
+    direction = unit(direction)
+    moment = bending_moment(tuple(direction), ZERO, tuple(direction), tuple(spin * direction), K, C, P, V_T)
+    assert moment == pytest.approx(ZERO, abs=1e-13)
+
+
+def test_friction_is_smooth_where_the_quotient_gives_way_to_its_limit():
+    z, switch = (0.0, 0.0, 1.0), 1e-8 * V_T  # rad/s
+    below, above = (bending_moment(z, (switch * f, 0.0, 0.0), z, ZERO, 0.0, 0.0, P, V_T)[0] / f for f in (0.999, 1.001))
+    assert below == pytest.approx(above, rel=1e-12)
+    assert below == pytest.approx(-0.5 * np.pi * P / V_T * switch, rel=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0099999, 0.01, 0.0100001])  # rad; the series gives way at sin = 0.01
+def test_bending_is_smooth_where_the_series_gives_way_to_the_arctangent(angle):
+    direction = (float(np.sin(angle)), 0.0, float(np.cos(angle)))
+    assert bending_moment(direction, ZERO, (0.0, 0.0, 1.0), ZERO, K, 0.0, 0.0, V_T)[1] == pytest.approx(-K * angle, rel=1e-14)
+
+
+@given(direction=directions, m_tub=rates, m_housing=rates, length=st.floats(0.05, 0.5))
+def test_transverse_couple_balances_the_moments_on_the_strut(direction, m_tub, m_housing, length):
+    e = unit(direction)
+    moments = np.array(m_tub) + m_housing
+    moments = moments - (moments @ e) * e  # N m, transverse as those of the end bushings
+    on_tub = np.array(transverse_couple(tuple(moments), tuple(e), length))
+    on_strut = -on_tub  # at the tub end, L e from the housing end
+    np.testing.assert_allclose(moments + np.cross(length * e, on_strut), 0.0, atol=1e-14 * (1.0 + np.linalg.norm(moments)))
+    assert on_tub @ e == pytest.approx(0.0, abs=1e-12)
+
+
+def test_wrench_at_origin_is_moment_about_to_then_force():
+    arm, force, moment = (0.1, 0.2, -0.3), (5.0, -7.0, 11.0), (0.5, 0.6, 0.7)  # m, N, N m
+    assert wrench_at_origin(arm, force, moment) == pytest.approx((*(np.cross(arm, force) + moment), *force))
+
+
+def test_tub_arm_turns_with_the_tub():
+    quarter = rotation_from_rpy(0.0, 0.0, np.pi / 2)  # yaw: x to y
+    assert tub_arm(quarter, (0.3, 0.1, 0.2)) == pytest.approx((-0.1, 0.3, 0.2))

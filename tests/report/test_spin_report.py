@@ -1,0 +1,345 @@
+import html
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from wm_drake.measures import measure
+from wm_drake.parameters import MachineParameters, SpinProfile, load_machine, quantities
+from wm_drake.report.figures import outline, revolution_starts, sensor_depth
+from wm_drake.report.spin_report import amplitude_table, spin_report
+from wm_drake.report.tables import differences
+from wm_drake.report.wording import number, percent
+from wm_drake.scene import Gap
+from wm_drake.simulation import Case, Record, point_displacement
+from wm_drake.studies.spin import CaseResult, SpinResult
+
+SENSOR_POINTS = {
+    "Xr": (0.0, 0.2, -0.2),
+    "Yr": (0.2, 0.2, 0.18),
+    "Zr": (-0.17, 0.2, 0.0),
+    "Xf": (0.0, -0.16, -0.1),
+    "Yf": (-0.2, -0.16, 0.0),
+    "Zf": (0.02, -0.16, 0.0),
+}
+DIVERGED = "the run diverged at 1.234 s: x = 0.6 m, bound 0.5 m"
+VOID = ("meta", "img", "br", "hr", "link", "input")
+
+
+def harmonic_record(parameters: MachineParameters, load: str, gasket: bool, size: float, samples: int = 400) -> Record:
+    """2 s of a tub that swings at 4 Hz, its drum at 240 rpm: every variable that as_record makes, by hand."""
+    time = 5e-3 * np.arange(samples)
+    wave = np.sin(2.0 * np.pi * 4.0 * time)[:, None]
+    angle, position = wave * [0.01, 0.002, 0.02], wave * [size, 0.3 * size, 0.5 * size]
+    pose = np.column_stack([angle, position])
+    axes = {name: "xyz".index(sensor.axis) for name, sensor in parameters.sensors.items()}
+    displacement = [point_displacement(pose, np.array(SENSOR_POINTS[n]), np.zeros(6))[:, axis] for n, axis in axes.items()]
+    force = 1000.0 * position[:, None, :] * float(gasket)
+    variables = {
+        "tub_angle": (("time", "angle"), angle),
+        "tub_position": (("time", "axis"), position),
+        "tub_angular_velocity": (("time", "axis"), np.zeros((samples, 3))),
+        "tub_velocity": (("time", "axis"), np.zeros((samples, 3))),
+        "drum_angle": (("time",), 8.0 * np.pi * time),
+        "drum_speed": (("time",), np.full(samples, 8.0 * np.pi)),
+        "motor_torque": (("time",), np.zeros(samples)),
+        "displacement": (("time", "sensor"), np.stack(displacement, axis=1)),
+        "detergent_displacement": (("time", "axis"), position),
+        "spring_tension": (("time", "spring"), np.full((samples, 3), 190.0)),
+        "damper_tension": (("time", "damper"), np.zeros((samples, 3))),
+        "damper_deformation": (("time", "damper"), np.zeros((samples, 3))),
+        "bushing_force": (("time", "bushing", "axis"), force),
+        "bushing_moment": (("time", "bushing", "axis"), 0.1 * force),
+    }
+    labels = {
+        "time": time,
+        "axis": list("xyz"),
+        "angle": ["roll", "pitch", "yaw"],
+        "sensor": list(parameters.sensors),
+        "spring": list(parameters.springs),
+        "damper": list(parameters.dampers),
+        "bushing": ["gasket"],
+    }
+    attrs = {
+        "machine": parameters.name,
+        "load": load,
+        "gasket": "yes" if gasket else "no",
+        "rest_pose": np.zeros(6),
+        "parameters": json.dumps(parameters.model_dump(mode="json", exclude={"sources"})),
+        "load_parameters": parameters.loads[load].model_dump_json(),
+        "profile": parameters.profile.model_dump_json(),
+        "diverged": "",
+        "version_wm-drake": "0.0.1",
+        "version_drake": "9.9.9",
+        "engine": "drake",
+        "step_s": 2.5e-3,
+    }
+    return xr.Dataset(variables, labels, attrs)
+
+
+def case_result(
+    parameters: MachineParameters,
+    load: str = "middle",
+    gasket: bool = True,
+    size: float = 0.02,
+    gap: float = 0.012,
+    **record: int,
+) -> CaseResult:
+    made = harmonic_record(parameters, load, gasket, size, **record)
+    measures = replace(measure(made), smallest_gap=Gap(gap, 0.5, "tub_shell", "wall_right", (0.28, 0.16, 0.0)))
+    return CaseResult(Case(load, parameters.loads[load], parameters.profile, gasket), made, measures, 1.5)
+
+
+def spin_result(parameters: MachineParameters, results: Sequence[CaseResult]) -> SpinResult:
+    return SpinResult(parameters, "drake", 2.5e-3, tuple(results))
+
+
+@pytest.fixture(scope="module")
+def machine() -> MachineParameters:
+    return load_machine("reference")
+
+
+@pytest.fixture(scope="module")
+def result(machine: MachineParameters) -> SpinResult:
+    return spin_result(machine, [case_result(machine, "middle"), case_result(machine, "back", size=0.01, gap=0.03)])
+
+
+@pytest.fixture(scope="module")
+def page(result: SpinResult) -> str:
+    return spin_report(result, "wm-drake spin --set 'a=<b>'")
+
+
+class Tags(HTMLParser):
+    """Checks that tags close in order and keeps what they load and say."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.words: list[str] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open, f"</{tag}> closes nothing"
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data.strip())
+
+    def all(self, tag: str) -> list[dict[str, str | None]]:
+        return [attrs for name, attrs in self.found if name == tag]
+
+
+def test_page_is_one_html_document_with_balanced_tags(page: str) -> None:
+    tags = Tags(page)
+    assert tags.open == []
+    assert page.lstrip().startswith("<!DOCTYPE html>")
+    assert [len(tags.all(tag)) for tag in ("html", "head", "body", "h1")] == [1, 1, 1, 1]
+
+
+def test_page_loads_nothing_from_elsewhere(page: str) -> None:
+    tags = Tags(page)
+    addresses = [value or "" for _, attrs in tags.found for name, value in attrs.items() if name in ("src", "href")]
+    assert addresses
+    assert all(address.startswith(("data:image/", "#")) for address in addresses)
+    assert not tags.all("script")
+    assert not tags.all("link")
+    assert "@import" not in page
+    assert "url(" not in page
+
+
+def test_links_within_the_page_lead_somewhere(page: str) -> None:
+    tags = Tags(page)
+    anchors = [attrs["id"] for _, attrs in tags.found if "id" in attrs]
+    assert len(anchors) == len(set(anchors))
+    assert {attrs["href"] for attrs in tags.all("a")} <= {f"#{anchor}" for anchor in anchors}
+
+
+def test_every_figure_says_what_it_shows(page: str) -> None:
+    images = Tags(page).all("img")
+    assert len(images) == 7  # three per case, and the gaps
+    assert all(len(image["alt"] or "") > 20 for image in images)
+
+
+def test_page_has_each_sensors_amplitude_as_in_the_table(result: SpinResult, page: str) -> None:
+    words = Tags(page).words
+    table = amplitude_table(result)
+    for _, row in table.iterrows():
+        cells = [number(row[name]) for name in result.parameters.sensors]
+        assert any(words_from(words, i, len(cells)) == cells for i in range(len(words))), f"{row['load']}, {row['source']}"
+
+
+def words_from(words: list[str], start: int, count: int) -> list[str]:
+    return [word for word in words[start : start + 2 * count] if word][:count]
+
+
+def test_page_names_what_was_run(page: str, machine: MachineParameters) -> None:
+    for text in ("drake 9.9.9", "2.5 ms", "wm-drake spin --set &#39;a=&lt;b&gt;&#39;", "oscillating_group.sdf", "4.13 N/mm"):
+        assert text in page
+    assert all(f">{html.escape(key)}</th>" in page for key, _, _ in quantities(machine))
+    assert "C_L, the same on every axis" in page
+    assert all(f"<dt>[{letter}]</dt>" in page for letter in "ABC")
+
+
+def test_summary_is_made_from_the_numbers(result: SpinResult, page: str) -> None:
+    size = 1e3 * float(result.results[0].measures.amplitude.max())
+    summary = re.search(r'<p class="summary">(.*?)</p>', page, re.DOTALL)
+    assert summary is not None
+    assert f"load middle (with gasket): {size:.1f} mm at sensor" in summary[1]
+    assert "at 240 rpm" in summary[1]
+    assert "12.0 mm between tub shell and wall right" in summary[1]
+    assert "12 amplitudes can be compared" in summary[1]
+
+
+def test_no_warning_where_all_is_well(page: str) -> None:
+    assert 'class="warning"' not in page
+
+
+def test_diverged_case_is_warned_of_and_left_out_of_the_summary(machine: MachineParameters) -> None:
+    good, bad = case_result(machine, "back", size=0.01), case_result(machine, "middle", size=0.3, samples=12)
+    bad.record.attrs["diverged"] = DIVERGED
+    page = spin_report(spin_result(machine, [bad, good]))
+    assert Tags(page).open == []
+    box = page[page.index('<section class="warning"') :]
+    assert DIVERGED in box[: box.index("</section>")]
+    assert "1 diverged and is left out" in page
+    assert "moves most with load back" in page
+    assert "too short for the filter" in page
+
+
+def test_all_cases_diverged_still_give_a_page(machine: MachineParameters) -> None:
+    bad = case_result(machine, samples=1)
+    bad.record.attrs["diverged"] = DIVERGED
+    page = spin_report(spin_result(machine, [bad]))
+    assert DIVERGED in page
+    assert "nothing to sum up" in page
+    assert "<img" not in page
+
+
+def test_overlap_and_foreign_profile_are_warned_of(machine: MachineParameters) -> None:
+    case = case_result(machine, gap=-0.003)
+    slow = SpinProfile(time=(0.0, 2.0), speed=(0.0, 10.0))
+    page = spin_report(spin_result(machine, [replace(case, case=replace(case.case, profile=slow))]))
+    assert "tub shell and wall right overlap by 3.0 mm" in page
+    assert "the spin profile is not the machine file" in page
+
+
+def test_names_cannot_inject_markup(machine: MachineParameters) -> None:
+    evil = "<script>alert('$x$')</script>"
+    parameters = machine.model_copy(update={"name": evil, "about": evil, "loads": {evil: machine.loads["middle"]}})
+    page = spin_report(
+        spin_result(parameters, [case_result(parameters, evil), case_result(parameters, evil, gasket=False)]), evil
+    )
+    assert "<script" not in page
+    assert page.count(html.escape(evil, quote=False).replace("'", "&#39;")) > 5
+    assert Tags(page).open == []
+
+
+def test_amplitude_table_has_only_measured_rows_that_match_a_case(result: SpinResult, machine: MachineParameters) -> None:
+    table = amplitude_table(result)
+    assert list(table.columns) == ["load", "gasket", "source", *machine.sensors]
+    assert table[["load", "gasket", "source"]].to_numpy().tolist() == [
+        ["middle", "yes", "experiment"],
+        ["middle", "yes", "wm_drake"],
+        ["back", "yes", "experiment"],
+        ["back", "yes", "Adams model of [B]"],
+        ["back", "yes", "wm_drake"],
+    ]
+    assert table.loc[0, "Xr"] == 29.1  # [B] Table 1, middle load with gasket
+    expected = 1e3 * result.results[0].measures.amplitude.values
+    np.testing.assert_allclose(table.loc[1, list(machine.sensors)].to_numpy(float), expected, rtol=1e-12)
+
+
+def test_amplitude_table_tells_gasket_from_none(machine: MachineParameters) -> None:
+    both = [case_result(machine, "counter", gasket) for gasket in (False, True)]
+    table = amplitude_table(spin_result(machine, both))
+    experiment = table[table["source"] == "experiment"]
+    assert experiment[["gasket", "Xr"]].to_numpy().tolist() == [["no", 12.6], ["yes", 9.6]]  # [B] Table 1
+
+
+def test_amplitude_table_without_measurements_has_our_rows_alone(machine: MachineParameters) -> None:
+    parameters = machine.model_copy(update={"measured": ()})
+    result = spin_result(parameters, [case_result(parameters)])
+    table = amplitude_table(result)
+    assert table["source"].tolist() == ["wm_drake"]
+    assert differences(table, result.results[0]) == []
+    assert "no measured amplitudes" in spin_report(result)
+
+
+def test_percent_difference_row_by_hand(machine: MachineParameters) -> None:
+    case = case_result(machine, "middle")
+    amplitude = case.measures.amplitude.copy(data=1e-3 * np.array([34.92, 8.7, 9.45, 23.9, 4.0, 2.3]))
+    result = spin_result(machine, [replace(case, measures=replace(case.measures, amplitude=amplitude))])
+    # experiment 29.1, 8.7, 18.9, 23.9, 8.0, 23.0 mm: 34.92 / 29.1 = 1.2, 9.45 / 18.9 = 0.5, 4 / 8 = 0.5, 2.3 / 23 = 0.1
+    found = differences(amplitude_table(result), result.results[0])
+    np.testing.assert_allclose([change.percent for change in found], [20.0, 0.0, -50.0, 0.0, -50.0, -90.0], atol=1e-9)
+    page = spin_report(result)
+    row = re.search(r"wm_drake vs. experiment</td>(.*?)</tr>", page, re.DOTALL)
+    assert row is not None
+    cells = [word for word in Tags(row[1]).words if word]
+    assert cells == ["+20 %", "0 %", "−50 %", "0 %", "−50 %", "−90 %", "35 %"]  # 210 / 6
+    assert "by 35 % in the mean" in page
+    assert "−90 % at most: sensor Zf" in page
+
+
+def test_case_without_gasket_has_no_gasket_figure(machine: MachineParameters) -> None:
+    page = spin_report(spin_result(machine, [case_result(machine, gasket=False)]))
+    alternatives = [image["alt"] or "" for image in Tags(page).all("img")]
+    assert len(alternatives) == 2
+    assert not any("Gasket" in text for text in alternatives)
+    assert "middle (without gasket)" in page
+
+
+def test_same_result_gives_the_same_page(result: SpinResult, page: str) -> None:
+    assert spin_report(result, "wm-drake spin --set 'a=<b>'") == page
+
+
+def test_page_is_small(page: str) -> None:
+    assert len(page.encode()) < 7 * 270_000  # LARGEST_SVG in base64 is the most a figure of lines may take
+
+
+def test_sensor_depth_is_found_from_the_record(result: SpinResult, machine: MachineParameters) -> None:
+    record = result.results[0].record
+    depths = {name: sensor_depth(record, name, sensor.axis) for name, sensor in machine.sensors.items()}
+    assert depths == pytest.approx({name: point[1] for name, point in SENSOR_POINTS.items()}, abs=1e-9)
+
+
+def test_outline_keeps_corners_within_tolerance() -> None:
+    x = np.linspace(0.0, 10.0, 1001)
+    tent = np.interp(x, [0.0, 3.0, 10.0], [0.0, 6.0, -1.0])
+    assert x[outline(x, tent, 1e-6)].tolist() == [0.0, 3.0, 10.0]
+    wave = np.sin(x)
+    kept = outline(x, wave, 0.01)
+    assert len(kept) < 40
+    assert np.abs(np.interp(x, x[kept], wave[kept]) - wave).max() <= 0.01
+
+
+def test_revolutions_start_where_the_drum_has_turned_once() -> None:
+    turning = xr.Dataset({"drum_angle": ("time", -2.0 * np.pi * (np.arange(1000) + 0.5) / 25.0)})  # 40 turns, either way round
+    starts = revolution_starts(turning)
+    assert np.all(np.diff(starts) == 25)
+    assert len(starts) == 39  # the last is not complete
+    standing = xr.Dataset({"drum_angle": ("time", np.zeros(7))})
+    assert revolution_starts(standing).tolist() == list(range(7))
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(12.34, "+12 %"), (-3.6, "−4 %"), (-0.4, "0 %"), (0.4, "0 %"), (float("nan"), "–")]
+)
+def test_percent_is_written_with_its_sign(value: float, text: str) -> None:
+    assert percent(value) == text
+
+
+def test_numbers_are_rounded_with_a_true_minus() -> None:
+    assert [number(-1.25), number(-0.04), number(float("inf")), number(2.0, 0)] == ["−1.2", "0.0", "–", "2"]

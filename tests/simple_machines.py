@@ -1,0 +1,35 @@
+"""Machines simple enough to have a closed form: one isotropic bushing at the centre of mass, no gravity, no friction."""
+
+from wm_drake.parameters import Load, SpinProfile, Unbalance, load_machine
+from wm_drake.parameters.machine import BodyOverride, InertiaMatrix
+
+STIFFNESS = 7000.0  # N/m
+DAMPING = 55.0  # N s/m
+MASS = 6 * 7.0  # kg, six bodies
+
+
+def isotropic_machine(stiffness=STIFFNESS, damping=DAMPING, rotational_stiffness=4000.0):
+    """All bodies' centres at To, one linear bushing there: translation is three equal oscillators."""
+    reference = load_machine("reference")
+    ball = BodyOverride(mass=7.0, centre_of_mass=(0.0, 0.0, 0.0), inertia=InertiaMatrix(xx=0.3, yy=0.3, zz=0.3))
+    bodies = ("tub", "drum", "motor", "upper_counterweight", "front_counterweight_left", "front_counterweight_right")
+    origin = {"position": (0.0, 0.0, 0.0)}
+    linear = {f"stiffness_{axis}": stiffness for axis in "xyz"} | {f"damping_{axis}": damping for axis in "xyz"}
+    rotational = {f"rotational_stiffness_{axis}": rotational_stiffness for axis in "xyz"}
+    tree = reference.model_dump() | {
+        "gravity": 0.0,
+        "bodies": dict.fromkeys(bodies, ball.model_dump()),
+        "frames": {"gasket_tub": origin, "gasket_housing": origin},
+        "spring_types": {"suspension": {"stiffness": 0.0}},
+        "dampers": {},
+        "gasket": {"tub_frame": "gasket_tub", "housing_frame": "gasket_housing"} | linear | rotational,
+    }
+    return type(reference).model_validate(tree)
+
+
+def unbalance(mass, radius=0.25, y=0.0, phase=0.0):
+    return Load(unbalances=(Unbalance(mass=mass, radius=radius, y=y, phase=phase),))
+
+
+def constant_speed(speed, duration):
+    return SpinProfile(time=(0.0, duration), speed=(speed, speed))

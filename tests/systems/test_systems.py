@@ -1,0 +1,394 @@
+"""Force systems: ports against a plainer second derivation, AutoDiff against finite differences, parameters in the Context."""
+
+import numpy as np
+import pytest
+from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoDiff
+from pydrake.common.eigen_geometry import AngleAxis
+from pydrake.math import RollPitchYaw, RotationMatrix
+from scipy.interpolate import PchipInterpolator
+
+from wm_drake.parameters.elements import (
+    Bushing,
+    CoulombDamper,
+    EndBushing,
+    ForceTable,
+    FreeStrokeDamper,
+    HavsinDamper,
+    MstvDamper,
+    StvDamper,
+    packed_stiffness,
+)
+from wm_drake.systems.friction_damper import (
+    FrictionDamper,
+    FrictionDamperParameters,
+    friction_damper_history,
+    packed_damper_law,
+)
+from wm_drake.systems.six_component_bushing import (
+    SixComponentBushing,
+    SixComponentBushingParameters,
+    packed_bushing_law,
+    six_component_bushing_history,
+)
+from wm_drake.systems.speed_source import REFLECTED_INERTIA, SpeedSource
+from wm_drake.systems.spring_strut import SpringStrut, SpringStrutParameters, spring_strut_history
+
+SPRING_CURVE = ForceTable(displacement=(-0.03, -0.01, 0.0, 0.01, 0.04), force=(-200.0, -50.0, 0.0, 60.0, 300.0))  # m, N
+SPONGE = ForceTable(displacement=(-0.02, -0.01, -0.003, 0.003, 0.01, 0.02), force=(-130.0, -40.0, 0.0, 0.0, 40.0, 130.0))
+END_BUSHING = EndBushing(stiffness=6.0, damping=0.2, friction_torque=0.4, full_friction_rate=0.8)  # N m/rad, N m s/rad, N m
+GASKET = Bushing(
+    tub_frame="tub_front",
+    housing_frame="housing_front",
+    stiffness_x=8e3,  # N/m
+    stiffness_y=ForceTable(displacement=(-0.02, -0.005, 0.004, 0.02), force=(-90.0, -10.0, 9.0, 80.0)),
+    stiffness_z=5e3,
+    rotational_stiffness_x=73.0,  # N m/rad
+    rotational_stiffness_y=890.0,
+    rotational_stiffness_z=150.0,
+    damping_x=50.0,  # N s/m
+    damping_y=10.0,
+    damping_z=40.0,
+    rotational_damping_x=3.0,  # N m s/rad
+    rotational_damping_y=5.0,
+    rotational_damping_z=4.0,
+    friction_torque_x=3.7,  # N m
+    friction_torque_y=1.7,
+    friction_torque_z=2.7,
+    full_friction_rate_x=1.5,  # rad/s
+    full_friction_rate_y=0.6,
+    full_friction_rate_z=0.9,
+)
+DAMPERS = {
+    "coulomb": CoulombDamper(law="coulomb", friction_force=60.0, damping=20.0, end_bushing=END_BUSHING),
+    "stv": StvDamper(law="stv", friction_force=60.0, transition_velocity=0.2, damping=20.0, end_bushing=END_BUSHING),
+    "havsin": HavsinDamper(law="havsin", friction_force=60.0, full_friction_velocity=0.2, damping=20.0, end_bushing=END_BUSHING),
+    "mstv": MstvDamper(
+        law="mstv",
+        friction_force=60.0,
+        friction_damping=30.0,
+        sponge_stiffness=176e3,
+        sponge_damping=90.0,
+        slider_damping=400.0,
+        end_bushing=END_BUSHING,
+    ),
+    "free_stroke": FreeStrokeDamper(
+        law="free_stroke",
+        friction_force=35.0,
+        friction_damping=60.0,
+        basic_friction_force=10.5,
+        basic_full_friction_velocity=0.09,
+        sponge=SPONGE,
+        end_bushing=END_BUSHING,
+    ),
+}
+every_damper = pytest.mark.parametrize("damper", DAMPERS.values(), ids=DAMPERS)
+
+
+def spring_parameters(stiffness=5200.0, preload=240.0):
+    return SpringStrutParameters(np.array([0.2, -0.05, 0.22]), np.array([0.28, -0.05, 0.4]), preload, packed_stiffness(stiffness))
+
+
+def damper_parameters(damper, end_bushing=None, engaged=1.0):
+    ends = np.array([0.15, 0.08, -0.24]), np.array([0.25, 0.1, -0.42])  # m
+    return FrictionDamperParameters(*ends, end_bushing or damper.end_bushing, packed_damper_law(damper), engaged)
+
+
+def bushing_parameters(engaged=1.0):
+    R_TB, R_WG = (RotationMatrix(RollPitchYaw(rpy)).matrix() for rpy in ([0.02, -0.03, 0.5], [-0.01, 0.02, 0.52]))
+    return SixComponentBushingParameters(
+        np.array([0.01, -0.16, 0.02]), R_TB, np.array([0.0, -0.17, 0.015]), R_WG, packed_bushing_law(GASKET), engaged
+    )
+
+
+def random_plant_states(count, seed):
+    """Poses within 0.1 rad and 10 mm, rates of about 1 rad/s and 0.3 m/s, any drum angle and speed."""
+    rng = np.random.default_rng(seed)
+    sizes = [0.1] * 3 + [0.01] * 3 + [3.0] + [1.0] * 3 + [0.3] * 3 + [40.0]
+    return rng.uniform(-1.0, 1.0, (count, 14)) * sizes
+
+
+def tub_motion(x, p_ToA_T):
+    """Rotation of the tub, arm from To to A, position and velocity of A, all in W."""
+    R_WT = RotationMatrix(RollPitchYaw(x[0:3])).matrix()
+    arm = R_WT @ p_ToA_T
+    return R_WT, arm, x[3:6] + arm, x[10:13] + np.cross(x[7:10], arm)
+
+
+def context_of(system, x, state=None):
+    context = system.CreateDefaultContext()
+    system.GetInputPort("plant_state").FixValue(context, x)
+    if state is not None:
+        context.SetContinuousState(state)
+    return context
+
+
+def port(system, context, name):
+    return system.GetOutputPort(name).Eval(context)
+
+
+def elements():
+    """All force elements: system, packed parameters, history function, own state."""
+    yield pytest.param(SpringStrut, (spring_parameters().packed(),), spring_strut_history, [], id="spring")
+    curved = spring_parameters(SPRING_CURVE).packed()
+    yield pytest.param(SpringStrut, (curved,), spring_strut_history, [], id="spring with a table")
+    for name, damper in DAMPERS.items():
+        parameters = damper_parameters(damper)
+        state = {"mstv": [2.3e-4], "free_stroke": [0.012]}.get(name, [])  # m
+        yield pytest.param(FrictionDamper, (parameters.packed(), len(state)), friction_damper_history, state, id=name)
+    yield pytest.param(SixComponentBushing, (bushing_parameters().packed(),), six_component_bushing_history, [], id="bushing")
+
+
+every_element = pytest.mark.parametrize(("kind", "arguments", "history", "state"), elements())
+
+
+@pytest.mark.parametrize("stiffness", [5200.0, SPRING_CURVE])  # N/m
+def test_a_spring_pulls_its_hooks_together(stiffness):
+    placed = spring_parameters(stiffness)
+    spring = SpringStrut(placed.packed())
+    curve = PchipInterpolator(SPRING_CURVE.displacement, SPRING_CURVE.force)
+    for x in random_plant_states(10, seed=21):
+        _, arm, p_WA, v_WA = tub_motion(x, placed.p_ToA_T)
+        line = p_WA - placed.p_WH
+        length = np.linalg.norm(line)
+        stretch = length - np.linalg.norm(placed.p_ToA_T - placed.p_WH)
+        tension = 240.0 + (stiffness * stretch if isinstance(stiffness, float) else curve(stretch))  # N
+        force = -tension * line / length
+        context = context_of(spring, x)
+        assert port(spring, context, "force") == pytest.approx([tension])
+        generalized_force = port(spring, context, "generalized_force")
+        assert generalized_force == pytest.approx([*np.cross(arm, force), *force, 0.0])
+        elongation_rate = line @ v_WA / length
+        assert generalized_force @ x[7:14] == pytest.approx(-tension * elongation_rate)
+
+
+def test_a_spring_at_rest_has_its_preload():
+    spring = SpringStrut(spring_parameters().packed())
+    assert port(spring, context_of(spring, np.zeros(14)), "force") == pytest.approx([240.0], rel=1e-15)
+
+
+def line_of(damper, x):
+    """Arm and direction of a damper, length, elongation rate, velocity of its tub end, rotation of the tub."""
+    R_WT, arm, p_WA, v_WA = tub_motion(x, damper.p_ToA_T)
+    line = p_WA - damper.p_WH
+    length = np.linalg.norm(line)
+    return arm, line / length, length, line @ v_WA / length, v_WA, R_WT
+
+
+@pytest.mark.parametrize(
+    ("name", "full_force", "transition"),
+    [("coulomb", 60.0, lambda q: np.sign(q)), ("stv", 60.0, lambda q: np.clip(q, -1, 1)),
+     ("havsin", 60.0, lambda q: np.sin(np.pi / 2 * np.clip(q, -1, 1)))],
+)  # fmt: skip
+def test_a_damper_without_sponge_resists_its_elongation_rate(name, full_force, transition):
+    placed = damper_parameters(DAMPERS[name], EndBushing())
+    damper = FrictionDamper(placed.packed(), 0)
+    for x in random_plant_states(10, seed=22):
+        arm, e, _, rate, _, _ = line_of(placed, x)
+        tension = 20.0 * rate + full_force * transition(rate / 0.2)  # N
+        context = context_of(damper, x)
+        assert context.num_continuous_states() == 0
+        assert port(damper, context, "force") == pytest.approx([tension])
+        assert port(damper, context, "generalized_force") == pytest.approx([*np.cross(arm, -tension * e), *(-tension * e), 0.0])
+
+
+def test_an_mstv_damper_pulls_with_its_sponge():
+    placed = damper_parameters(DAMPERS["mstv"], EndBushing())
+    damper = FrictionDamper(placed.packed(), 1)
+    deformation = 3.5e-4  # m
+    for x in random_plant_states(10, seed=23):
+        arm, e, _, rate, _, _ = line_of(placed, x)
+        context = context_of(damper, x, [deformation])
+        u = damper.EvalTimeDerivatives(context).CopyToVector()[0]
+        w = rate - u
+        tension = 176e3 * deformation + 90.0 * u  # N; [C] Eq. (2)
+        full = 60.0 + 30.0 * abs(w)
+        friction = full * np.sign(w) if abs(w) >= abs(u) else full * w / (abs(u) + 1e-6)
+        assert tension == pytest.approx(400.0 * w + friction)  # [C] Eq. (3) without mass
+        assert port(damper, context, "force") == pytest.approx([tension])
+        assert port(damper, context, "generalized_force") == pytest.approx([*np.cross(arm, -tension * e), *(-tension * e), 0.0])
+        assert port(damper, context, "state") == [deformation]
+
+
+def test_a_free_stroke_damper_pulls_with_its_sponge_and_basic_friction():
+    placed = damper_parameters(DAMPERS["free_stroke"], EndBushing())
+    damper = FrictionDamper(placed.packed(), 1)
+    for x in random_plant_states(10, seed=24):
+        *_, rate, _, _ = line_of(placed, x)
+        basic = 10.5 * np.sin(np.pi / 2 * np.clip(rate / 0.09, -1, 1))  # N
+        inside, beyond = context_of(damper, x, [0.002]), context_of(damper, x, [0.01])  # m
+        assert port(damper, inside, "force") == pytest.approx([basic])
+        assert damper.EvalTimeDerivatives(inside).CopyToVector() == pytest.approx([rate])
+        assert port(damper, beyond, "force") == pytest.approx([40.0 + basic])
+        w = rate - damper.EvalTimeDerivatives(beyond).CopyToVector()[0]
+        slips = abs(w) >= abs(rate - w)
+        friction = (35.0 + 60.0 * abs(w)) * (1.0 if slips else abs(w) / (abs(rate - w) + 1e-6))
+        assert friction * np.sign(w) == pytest.approx(40.0)
+
+
+@every_damper
+def test_end_bushings_bend_back_a_strut_and_their_moments_are_balanced(damper):
+    placed = damper_parameters(damper)
+    state = [0.0] * int(placed.has_sponge)
+    bent, free = (FrictionDamper(p.packed(), len(state)) for p in (placed, damper_parameters(damper, EndBushing())))
+    axis = placed.p_ToA_T - placed.p_WH
+    axis /= np.linalg.norm(axis)
+    for x in random_plant_states(10, seed=25):
+        arm, e, length, _, v_WA, R_WT = line_of(placed, x)
+        w_strut = np.cross(e, v_WA) / length
+        moments = []  # on the strut, at the tub and at the housing
+        for body_axis, w_body in ((R_WT @ axis, x[7:10]), (axis, np.zeros(3))):
+            bend = np.cross(body_axis, e)
+            angle = bend / np.linalg.norm(bend) * np.arcsin(np.linalg.norm(bend))
+            rate = (np.eye(3) - np.outer(e, e)) @ (w_strut - w_body)
+            speed = np.linalg.norm(rate)
+            moments.append(-6.0 * angle - 0.2 * rate - 0.4 * np.sin(np.pi / 2 * min(speed / 0.8, 1.0)) * rate / speed)
+        couple = np.cross(sum(moments), e) / length
+        np.testing.assert_allclose(sum(moments) + np.cross(length * e, -couple), 0.0, atol=1e-13)  # balance of the strut
+        extra = port(bent, context_of(bent, x, state), "generalized_force") - port(free, context_of(free, x, state), "generalized_force")
+        np.testing.assert_allclose(extra, [*(np.cross(arm, couple) - moments[0]), *couple, 0.0], rtol=1e-9, atol=1e-11)
+        power = moments[0] @ (w_strut - x[7:10]) + moments[1] @ w_strut  # of the bushings, W
+        assert extra @ x[7:14] == pytest.approx(power)
+
+
+def test_a_bushing_acts_at_its_tub_side_point_along_the_axes_of_its_housing_frame():
+    placed = bushing_parameters()
+    bushing = SixComponentBushing(placed.packed())
+    curve = PchipInterpolator(GASKET.stiffness_y.displacement, GASKET.stiffness_y.force)
+    R_WG = placed.R_WG
+    for x in random_plant_states(10, seed=26):
+        R_WT, arm, p_WB, v_WB = tub_motion(x, placed.p_ToB_T)
+        d, d_rate, w = R_WG.T @ (p_WB - placed.p_WG), R_WG.T @ v_WB, R_WG.T @ x[7:10]
+        rotation = AngleAxis(R_WG.T @ R_WT @ placed.R_TB)
+        r = rotation.angle() * rotation.axis()
+        # rate of the rotation vector and the moment that does its work, through the 3 x 3 matrix of the Bortz equation
+        angle, cross_r = rotation.angle(), np.cross(np.eye(3), -r)
+        B = np.eye(3) - 0.5 * cross_r + (1.0 / angle**2 - 0.5 / (angle * np.tan(0.5 * angle))) * cross_r @ cross_r
+        r_rate = B @ w
+        friction = [3.7, 1.7, 2.7] * np.sin(np.pi / 2 * np.clip(r_rate / [1.5, 0.6, 0.9], -1, 1))
+        force = -np.array([8e3 * d[0], curve(d[1]), 5e3 * d[2]]) - [50.0, 10.0, 40.0] * d_rate
+        moment = B.T @ (-np.array([73.0, 890.0, 150.0]) * r - [3.0, 5.0, 4.0] * r_rate - friction)
+        context = context_of(bushing, x)
+        expected = [*(np.cross(arm, R_WG @ force) + R_WG @ moment), *(R_WG @ force), 0.0]
+        np.testing.assert_allclose(port(bushing, context, "generalized_force"), expected, rtol=1e-9, atol=1e-10)
+        np.testing.assert_allclose(port(bushing, context, "force"), [*-force, *-moment], rtol=1e-9, atol=1e-10)
+
+
+def test_the_logged_force_of_a_bushing_is_the_reaction_to_what_acts_on_the_tub():
+    placed = bushing_parameters()
+    bushing = SixComponentBushing(placed.packed())
+    for x in random_plant_states(5, seed=27):
+        _, arm, _, _ = tub_motion(x, placed.p_ToB_T)
+        context = context_of(bushing, x)
+        on_tub, on_housing = port(bushing, context, "generalized_force"), port(bushing, context, "force")
+        force, moment = placed.R_WG @ on_housing[:3], placed.R_WG @ on_housing[3:]
+        np.testing.assert_allclose(on_tub[3:6], -force, rtol=1e-12)
+        np.testing.assert_allclose(on_tub[0:3] - np.cross(arm, on_tub[3:6]), -moment, rtol=1e-9, atol=1e-11)
+
+
+@every_element
+def test_a_history_repeats_the_ports_row_by_row(kind, arguments, history, state):
+    system = kind(*arguments)
+    states = random_plant_states(6, seed=28)
+    own_states = np.outer(np.linspace(0.5, 1.5, len(states)), state)
+    forces = np.empty((len(states), system.GetOutputPort("force").size()))
+    history(states, own_states, arguments[0], forces)
+    for x, own, force in zip(states, own_states, forces, strict=True):
+        context = context_of(system, x, own if state else None)
+        assert np.array_equal(port(system, context, "force"), force)
+
+
+def rates_and_ports(system, context):
+    """All that a system computes, as one list."""
+    values = [*port(system, context, "generalized_force"), *port(system, context, "force")]
+    if context.num_continuous_states():
+        values += [*system.EvalTimeDerivatives(context).CopyToVector()]
+    return np.array(values)
+
+
+@every_element
+def test_autodiff_gives_the_same_values_and_the_derivatives_of_finite_differences(kind, arguments, history, state):
+    system = kind(*arguments)
+    differentiable = system.ToAutoDiffXd()
+    steps = np.concatenate([np.full(14, 1e-6), 1e-6 * np.abs(state)])
+    for x in random_plant_states(3, seed=29):
+        xs = np.concatenate([x, state])
+
+        def values(xs):
+            return rates_and_ports(system, context_of(system, xs[:14], xs[14:] if state else None))
+
+        duals = InitializeAutoDiff(xs).ravel()
+        answer = rates_and_ports(differentiable, context_of(differentiable, duals[:14], duals[14:] if state else None))
+        answer = answer.reshape(-1, 1)
+        np.testing.assert_allclose(ExtractValue(answer).ravel(), values(xs), rtol=1e-12, atol=1e-12)
+        scaled = np.column_stack([(values(xs + step) - values(xs - step)) / 2.0 for step in np.diag(steps)])
+        gradient = ExtractGradient(answer) * steps
+        size = np.max(np.abs(scaled), axis=1, keepdims=True) + 1e-7 * np.abs(values(xs))[:, None]
+        assert np.max(np.abs(gradient - scaled) / (size + 1e-15)) < 1e-6
+
+
+@every_element
+def test_numbers_set_in_a_context_act_there_only_and_go_with_it_to_autodiff(kind, arguments, history, state):
+    packed, *rest = arguments
+    system, x = kind(packed, *rest), random_plant_states(1, seed=30)[0]
+    moved = packed.copy()
+    moved[:3] += [0.01, -0.02, 0.03]  # m; first stands the point on the tub
+    changed, unchanged = (context_of(system, x, state or None) for _ in range(2))
+    system.set_parameters(changed, moved)
+    rebuilt = kind(moved, *rest)
+    assert np.array_equal(rates_and_ports(system, changed), rates_and_ports(rebuilt, context_of(rebuilt, x, state or None)))
+    assert not np.array_equal(rates_and_ports(system, unchanged), rates_and_ports(system, changed))
+    differentiable = system.ToAutoDiffXd()
+    context = differentiable.CreateDefaultContext()
+    context.SetTimeStateAndParametersFrom(changed)
+    differentiable.GetInputPort("plant_state").FixValue(context, InitializeAutoDiff(x).ravel())
+    answer = ExtractValue(rates_and_ports(differentiable, context).reshape(-1, 1)).ravel()
+    np.testing.assert_allclose(answer, rates_and_ports(system, changed), rtol=1e-12, atol=1e-12)
+
+
+@every_element
+def test_the_ports_follow_what_changes_in_a_context(kind, arguments, history, state):
+    system, (x, y) = kind(*arguments), random_plant_states(2, seed=31)
+    context = context_of(system, x, state or None)
+    first = rates_and_ports(system, context)
+    system.GetInputPort("plant_state").FixValue(context, y)
+    second = rates_and_ports(system, context)
+    assert not np.array_equal(first, second)
+    assert np.array_equal(second, rates_and_ports(system, context_of(system, y, state or None)))
+    if state:
+        context.SetContinuousState(2.0 * np.array(state))
+        third = rates_and_ports(system, context)
+        assert np.array_equal(third, rates_and_ports(system, context_of(system, y, 2.0 * np.array(state))))
+        assert not np.array_equal(second, third)
+
+
+@every_element
+def test_parameters_of_another_length_are_refused(kind, arguments, history, state):
+    system = kind(*arguments)
+    system.set_name("left")
+    with pytest.raises(ValueError, match="left: a table has another number of points"):
+        system.set_parameters(system.CreateDefaultContext(), np.append(arguments[0], 0.0))
+
+
+@pytest.mark.parametrize("damper", [None, *DAMPERS.values()], ids=["bushing", *DAMPERS])
+def test_a_disengaged_element_exerts_nothing_at_all(damper):
+    if damper is None:
+        system, state = SixComponentBushing(bushing_parameters(engaged=0.0).packed()), None
+    else:
+        placed = damper_parameters(damper, engaged=0.0)
+        state = [2e-3] if placed.has_sponge else None  # m
+        system = FrictionDamper(placed.packed(), int(placed.has_sponge))
+    context = context_of(system, random_plant_states(1, seed=32)[0], state)
+    assert not np.any(port(system, context, "generalized_force"))
+    assert not np.any(port(system, context, "force"))
+
+
+def test_the_speed_source_actuates_with_its_inertia_times_the_acceleration():
+    source = SpeedSource()
+    context = source.CreateDefaultContext()
+    assert port(source, context, "actuation") == [0.0]
+    source.set_acceleration(context, 0.73)  # rad/s^2: 7 rpm/s
+    assert port(source, context, "actuation") == [REFLECTED_INERTIA * 0.73]
+    differentiable = source.ToAutoDiffXd()
+    copied = differentiable.CreateDefaultContext()
+    copied.SetTimeStateAndParametersFrom(context)
+    assert port(differentiable, copied, "actuation")[0].value() == REFLECTED_INERTIA * 0.73
