@@ -95,7 +95,9 @@ class EnergyBook:
             axis = line / np.linalg.norm(line)
             w_strut = np.cross(direction, velocity) / length[:, None]
             for body_axis, body_w in ((self.rotation.apply(axis), self.w), (np.broadcast_to(axis, direction.shape), 0.0)):
-                angle = np.arctan2(np.linalg.norm(np.cross(body_axis, direction), axis=1), np.sum(body_axis * direction, axis=1))
+                angle = np.arctan2(
+                    np.linalg.norm(np.cross(body_axis, direction), axis=1), np.sum(body_axis * direction, axis=1)
+                )
                 relative = w_strut - body_w
                 bend = relative - np.sum(relative * direction, axis=1)[:, None] * direction
                 speed = np.linalg.norm(bend, axis=1)
@@ -117,8 +119,6 @@ class EnergyBook:
     def integral(self, power):
         """Over the record; corners of the profile are sampled on both sides."""
         return np.trapezoid(power, self.time)
-
-
 
 
 def dense_record(machine, case, step):

@@ -90,11 +90,7 @@ def test_springs_that_cannot_hold_the_tub_are_refused(machine, reference):
 
 def test_another_machine_than_the_built_one_is_refused(machine, reference):
     with pytest.raises(InputError, match="law"):
-        machine.set_up(
-            parameters=with_value(
-                reference, "damper_types.friction", {"law": "coulomb", "friction_force": 30.0}
-            )
-        )
+        machine.set_up(parameters=with_value(reference, "damper_types.friction", {"law": "coulomb", "friction_force": 30.0}))
     with pytest.raises(InputError, match="gravity"):
         machine.set_up(parameters=with_value(reference, "gravity", 1.6))
 

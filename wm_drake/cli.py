@@ -40,7 +40,6 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object 
 
 def main() -> None:
     """Runs the command; the user's mistakes end it with their message and exit code 2."""
-    logging.getLogger("drake").setLevel(logging.WARNING)
     try:
         app()
     except WmDrakeError as error:
@@ -210,6 +209,7 @@ def _replay(result: "SpinResult", case: "CaseResult") -> str:
     from wm_drake.measures import largest_motion
     from wm_drake.scene import replay_page
 
+    logging.getLogger("drake").setLevel(logging.WARNING)  # Meshcat would tell of its server
     time, positions = largest_motion(case.record)
     return replay_page(result.parameters, time, positions)
 

@@ -16,6 +16,10 @@ BAND_HZ = (0.5, 20.0)
 FILTER_ORDER = 4
 """Order of the Butterworth filter ([B] section 2.2); run forwards and backwards, so that it shifts nothing."""
 
+PADDING = 5.0
+"""How far the displacements are mirrored at both ends before filtering: two periods and a half of the lower band edge. A
+record that ends at a resonance would flare by a third otherwise. [s]"""
+
 REPLAY_SPAN = 8.0
 """Length of a replay. [s]"""
 
@@ -51,8 +55,9 @@ def filtered_displacement(record: Record) -> xr.DataArray:
     if raw.sizes["time"] > 1:
         rate = 1.0 / float(record.time[1] - record.time[0])
         sections = butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=rate, output="sos")
-        if raw.sizes["time"] > 6 * len(sections) + 3:  # padding of sosfiltfilt at each end
-            values = sosfiltfilt(sections, raw.values, axis=0)
+        padding = min(round(PADDING * rate), raw.sizes["time"] - 1)
+        if padding > 6 * len(sections) + 3:  # what sosfiltfilt itself holds for the least
+            values = sosfiltfilt(sections, raw.values, axis=0, padtype="even", padlen=padding)
     return raw.copy(data=values)
 
 
@@ -89,7 +94,7 @@ def largest_motion(record: Record) -> tuple[FloatArray, FloatArray]:
         Times (n,) [s] and positions of the plant (n, 7): roll, pitch, yaw, x, y, z, drum angle. [rad, m]
     """
     size = abs(record.displacement).max("sensor")
-    moment = float(record.time[int(size.argmax())])
+    moment = float(record.time[int(size.argmax("time"))])
     stretch = record.sel(time=slice(moment - REPLAY_SPAN / 2, moment + REPLAY_SPAN / 2))
     period = float(record.time[1] - record.time[0])
     frames = stretch.isel(time=slice(None, None, max(1, round(1.0 / (REPLAY_RATE * period)))))

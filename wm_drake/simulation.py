@@ -128,6 +128,7 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
         "motor_torque": (("time",), trajectory.motor_torque, "N m", "torque of the motor on the drum"),
         "displacement": (("time", "sensor"), np.stack(sensors, axis=1), "m", "displacement at the sensors, along their axes"),
         "detergent_displacement": (("time", "axis"), detergent, "m", "displacement of the point nearest the detergent box"),
+        "sensor_point": (("sensor", "axis"), np.stack(list(setup.sensor_points.values())), "m", "points of the sensors in T"),
         "spring_tension": (("time", "spring"), springs, "N", "spring tension"),
         "damper_tension": (("time", "damper"), dampers, "N", "damper tension"),
         "damper_deformation": (("time", "damper"), trajectory.deformation, "m", "deformation of the damper's sponge"),

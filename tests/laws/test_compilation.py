@@ -122,6 +122,34 @@ def test_autodiff_agrees_with_finite_differences(name):
         assert np.max(np.abs(gradient - expected) / (scale + 1e-12)) < 1e-6
 
 
+AT_REST = {  # what linearisation about the rest pose meets: name -> (count, law, call)
+    "havsin": (1, friction.havsin_friction, lambda f, x: f(x[0], 0.6, 10.5)),
+    "mstv_damper": (2, damper.mstv_damper, lambda f, x: f(x[0], x[1], *MSTV)),
+    "free_stroke_damper": (2, damper.free_stroke_damper, lambda f, x: f(x[0], x[1], *FREE_STROKE, CURVE, 0)),
+    "rotation_vector": (3, vectors.rotation_vector, lambda f, x: f(_same_way(f, vectors.rotation_from_rpy)(x[0], x[1], x[2]))),
+    "bushing_force": LAWS["bushing_force"],
+    "bending_moment": (
+        9,
+        strut.bending_moment,
+        lambda f, x: f(unit((x[0], x[1], 1.0 + x[2])), three(x, 3), (0.0, 0.0, 1.0), three(x, 6), 12.0, 0.3, 0.9, 0.5),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", AT_REST)
+def test_autodiff_agrees_with_finite_differences_at_rest_too(name):
+    count, law, call = AT_REST[name]
+    h = 1e-9
+    answer = np.array(flat(call(generic(law), list(InitializeAutoDiff(np.zeros(count)).ravel())))).reshape(-1, 1)
+    assert not np.any(ExtractValue(answer))
+    columns = []
+    for step in h * np.eye(count):
+        after, before = (np.array(flat(call(law, [float(s) for s in turn * step]))) for turn in (1.0, -1.0))
+        columns.append((after - before) / (2.0 * h))
+    expected = np.column_stack(columns)
+    np.testing.assert_allclose(ExtractGradient(answer), expected, rtol=1e-5, atol=1e-5 * np.max(np.abs(expected)))
+
+
 def test_interpreted_laws_call_interpreted_laws_all_the_way_down():
     inner = generic(damper.damper_response).__globals__["mstv_damper"].__globals__["slider_rate"]
     assert inner is generic(damper.slider_rate)

@@ -1,5 +1,8 @@
 """Force systems: ports against a plainer second derivation, AutoDiff against finite differences, parameters in the Context."""
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 import pytest
 from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoDiff
@@ -61,7 +64,9 @@ GASKET = Bushing(
 DAMPERS = {
     "coulomb": CoulombDamper(law="coulomb", friction_force=60.0, damping=20.0, end_bushing=END_BUSHING),
     "stv": StvDamper(law="stv", friction_force=60.0, transition_velocity=0.2, damping=20.0, end_bushing=END_BUSHING),
-    "havsin": HavsinDamper(law="havsin", friction_force=60.0, full_friction_velocity=0.2, damping=20.0, end_bushing=END_BUSHING),
+    "havsin": HavsinDamper(
+        law="havsin", friction_force=60.0, full_friction_velocity=0.2, damping=20.0, end_bushing=END_BUSHING
+    ),
     "mstv": MstvDamper(
         law="mstv",
         friction_force=60.0,
@@ -85,7 +90,9 @@ every_damper = pytest.mark.parametrize("damper", DAMPERS.values(), ids=DAMPERS)
 
 
 def spring_parameters(stiffness=5200.0, preload=240.0):
-    return SpringStrutParameters(np.array([0.2, -0.05, 0.22]), np.array([0.28, -0.05, 0.4]), preload, packed_stiffness(stiffness))
+    return SpringStrutParameters(
+        np.array([0.2, -0.05, 0.22]), np.array([0.28, -0.05, 0.4]), preload, packed_stiffness(stiffness)
+    )
 
 
 def damper_parameters(damper, end_bushing=None, engaged=1.0):
@@ -114,10 +121,10 @@ def tub_motion(x, p_ToA_T):
     return R_WT, arm, x[3:6] + arm, x[10:13] + np.cross(x[7:10], arm)
 
 
-def context_of(system, x, state=None):
+def context_of(system, x, state=()):
     context = system.CreateDefaultContext()
     system.GetInputPort("plant_state").FixValue(context, x)
-    if state is not None:
+    if len(state):
         context.SetContinuousState(state)
     return context
 
@@ -126,19 +133,30 @@ def port(system, context, name):
     return system.GetOutputPort(name).Eval(context)
 
 
-def elements():
-    """All force elements: system, packed parameters, history function, own state."""
-    yield pytest.param(SpringStrut, (spring_parameters().packed(),), spring_strut_history, [], id="spring")
-    curved = spring_parameters(SPRING_CURVE).packed()
-    yield pytest.param(SpringStrut, (curved,), spring_strut_history, [], id="spring with a table")
-    for name, damper in DAMPERS.items():
-        parameters = damper_parameters(damper)
-        state = {"mstv": [2.3e-4], "free_stroke": [0.012]}.get(name, [])  # m
-        yield pytest.param(FrictionDamper, (parameters.packed(), len(state)), friction_damper_history, state, id=name)
-    yield pytest.param(SixComponentBushing, (bushing_parameters().packed(),), six_component_bushing_history, [], id="bushing")
+@dataclass(frozen=True)
+class Element:
+    """A force element in its place, with some state of its own."""
+
+    kind: Any
+    packed: np.ndarray
+    history: Any
+    state: tuple[float, ...] = ()
+
+    def system(self, packed=None):
+        packed = self.packed if packed is None else packed
+        return self.kind(packed, len(self.state)) if self.kind is FrictionDamper else self.kind(packed)
 
 
-every_element = pytest.mark.parametrize(("kind", "arguments", "history", "state"), elements())
+ELEMENTS = {
+    "spring": Element(SpringStrut, spring_parameters().packed(), spring_strut_history),
+    "spring with a table": Element(SpringStrut, spring_parameters(SPRING_CURVE).packed(), spring_strut_history),
+    "bushing": Element(SixComponentBushing, bushing_parameters().packed(), six_component_bushing_history),
+}
+SPONGE_STATES = {"mstv": (2.3e-4,), "free_stroke": (0.012,)}  # m
+for _name, _damper in DAMPERS.items():
+    _packed = damper_parameters(_damper).packed()
+    ELEMENTS[_name] = Element(FrictionDamper, _packed, friction_damper_history, SPONGE_STATES.get(_name, ()))
+every_element = pytest.mark.parametrize("element", ELEMENTS.values(), ids=ELEMENTS)
 
 
 @pytest.mark.parametrize("stiffness", [5200.0, SPRING_CURVE])  # N/m
@@ -244,7 +262,8 @@ def test_end_bushings_bend_back_a_strut_and_their_moments_are_balanced(damper):
             moments.append(-6.0 * angle - 0.2 * rate - 0.4 * np.sin(np.pi / 2 * min(speed / 0.8, 1.0)) * rate / speed)
         couple = np.cross(sum(moments), e) / length
         np.testing.assert_allclose(sum(moments) + np.cross(length * e, -couple), 0.0, atol=1e-13)  # balance of the strut
-        extra = port(bent, context_of(bent, x, state), "generalized_force") - port(free, context_of(free, x, state), "generalized_force")
+        with_bushings, without = (port(d, context_of(d, x, state), "generalized_force") for d in (bent, free))
+        extra = with_bushings - without
         np.testing.assert_allclose(extra, [*(np.cross(arm, couple) - moments[0]), *couple, 0.0], rtol=1e-9, atol=1e-11)
         power = moments[0] @ (w_strut - x[7:10]) + moments[1] @ w_strut  # of the bushings, W
         assert extra @ x[7:14] == pytest.approx(power)
@@ -261,7 +280,7 @@ def test_a_bushing_acts_at_its_tub_side_point_along_the_axes_of_its_housing_fram
         rotation = AngleAxis(R_WG.T @ R_WT @ placed.R_TB)
         r = rotation.angle() * rotation.axis()
         # rate of the rotation vector and the moment that does its work, through the 3 x 3 matrix of the Bortz equation
-        angle, cross_r = rotation.angle(), np.cross(np.eye(3), -r)
+        angle, cross_r = rotation.angle(), np.cross(np.eye(3), r)
         B = np.eye(3) - 0.5 * cross_r + (1.0 / angle**2 - 0.5 / (angle * np.tan(0.5 * angle))) * cross_r @ cross_r
         r_rate = B @ w
         friction = [3.7, 1.7, 2.7] * np.sin(np.pi / 2 * np.clip(r_rate / [1.5, 0.6, 0.9], -1, 1))
@@ -286,96 +305,90 @@ def test_the_logged_force_of_a_bushing_is_the_reaction_to_what_acts_on_the_tub()
 
 
 @every_element
-def test_a_history_repeats_the_ports_row_by_row(kind, arguments, history, state):
-    system = kind(*arguments)
+def test_a_history_repeats_the_ports_row_by_row(element):
+    system = element.system()
     states = random_plant_states(6, seed=28)
-    own_states = np.outer(np.linspace(0.5, 1.5, len(states)), state)
+    own_states = np.outer(np.linspace(0.5, 1.5, len(states)), element.state)
     forces = np.empty((len(states), system.GetOutputPort("force").size()))
-    history(states, own_states, arguments[0], forces)
+    element.history(states, own_states, element.packed, forces)
     for x, own, force in zip(states, own_states, forces, strict=True):
-        context = context_of(system, x, own if state else None)
-        assert np.array_equal(port(system, context, "force"), force)
+        assert np.array_equal(port(system, context_of(system, x, own), "force"), force)
 
 
-def rates_and_ports(system, context):
-    """All that a system computes, as one list."""
-    values = [*port(system, context, "generalized_force"), *port(system, context, "force")]
-    if context.num_continuous_states():
-        values += [*system.EvalTimeDerivatives(context).CopyToVector()]
-    return np.array(values)
+def computed(system, context):
+    """All that a system computes, as one array: generalized force, own force, rate of its state."""
+    rate = system.EvalTimeDerivatives(context).CopyToVector() if context.num_continuous_states() else []
+    return np.array([*port(system, context, "generalized_force"), *port(system, context, "force"), *rate])
 
 
 @every_element
-def test_autodiff_gives_the_same_values_and_the_derivatives_of_finite_differences(kind, arguments, history, state):
-    system = kind(*arguments)
-    differentiable = system.ToAutoDiffXd()
-    steps = np.concatenate([np.full(14, 1e-6), 1e-6 * np.abs(state)])
+def test_autodiff_gives_the_same_values_and_the_derivatives_of_finite_differences(element):
+    system, differentiable = element.system(), element.system().ToAutoDiffXd()
+    steps = np.array([1e-6] * 14 + [1e-6 * own for own in element.state])  # rad, m, rad/s, m/s, m
+
+    def values(xs):
+        return computed(system, context_of(system, xs[:14], xs[14:]))
+
     for x in random_plant_states(3, seed=29):
-        xs = np.concatenate([x, state])
-
-        def values(xs):
-            return rates_and_ports(system, context_of(system, xs[:14], xs[14:] if state else None))
-
+        xs = np.array([*x, *element.state])
         duals = InitializeAutoDiff(xs).ravel()
-        answer = rates_and_ports(differentiable, context_of(differentiable, duals[:14], duals[14:] if state else None))
-        answer = answer.reshape(-1, 1)
+        answer = computed(differentiable, context_of(differentiable, duals[:14], duals[14:])).reshape(-1, 1)
         np.testing.assert_allclose(ExtractValue(answer).ravel(), values(xs), rtol=1e-12, atol=1e-12)
-        scaled = np.column_stack([(values(xs + step) - values(xs - step)) / 2.0 for step in np.diag(steps)])
-        gradient = ExtractGradient(answer) * steps
-        size = np.max(np.abs(scaled), axis=1, keepdims=True) + 1e-7 * np.abs(values(xs))[:, None]
-        assert np.max(np.abs(gradient - scaled) / (size + 1e-15)) < 1e-6
+        expected = np.column_stack([(values(xs + step) - values(xs - step)) / 2.0 for step in np.diag(steps)])
+        size = np.max(np.abs(expected), axis=1, keepdims=True) + 1e-7 * np.abs(values(xs))[:, None]
+        assert np.max(np.abs(ExtractGradient(answer) * steps - expected) / (size + 1e-15)) < 1e-6
 
 
 @every_element
-def test_numbers_set_in_a_context_act_there_only_and_go_with_it_to_autodiff(kind, arguments, history, state):
-    packed, *rest = arguments
-    system, x = kind(packed, *rest), random_plant_states(1, seed=30)[0]
-    moved = packed.copy()
+def test_numbers_set_in_a_context_act_there_only_and_go_with_it_to_autodiff(element):
+    system, x = element.system(), random_plant_states(1, seed=30)[0]
+    moved = element.packed.copy()
     moved[:3] += [0.01, -0.02, 0.03]  # m; first stands the point on the tub
-    changed, unchanged = (context_of(system, x, state or None) for _ in range(2))
+    changed, unchanged = (context_of(system, x, element.state) for _ in range(2))
     system.set_parameters(changed, moved)
-    rebuilt = kind(moved, *rest)
-    assert np.array_equal(rates_and_ports(system, changed), rates_and_ports(rebuilt, context_of(rebuilt, x, state or None)))
-    assert not np.array_equal(rates_and_ports(system, unchanged), rates_and_ports(system, changed))
+    rebuilt = element.system(moved)
+    assert np.array_equal(computed(system, changed), computed(rebuilt, context_of(rebuilt, x, element.state)))
+    assert not np.array_equal(computed(system, unchanged), computed(system, changed))
     differentiable = system.ToAutoDiffXd()
     context = differentiable.CreateDefaultContext()
     context.SetTimeStateAndParametersFrom(changed)
     differentiable.GetInputPort("plant_state").FixValue(context, InitializeAutoDiff(x).ravel())
-    answer = ExtractValue(rates_and_ports(differentiable, context).reshape(-1, 1)).ravel()
-    np.testing.assert_allclose(answer, rates_and_ports(system, changed), rtol=1e-12, atol=1e-12)
+    answer = ExtractValue(computed(differentiable, context).reshape(-1, 1)).ravel()
+    np.testing.assert_allclose(answer, computed(system, changed), rtol=1e-12, atol=1e-12)
 
 
 @every_element
-def test_the_ports_follow_what_changes_in_a_context(kind, arguments, history, state):
-    system, (x, y) = kind(*arguments), random_plant_states(2, seed=31)
-    context = context_of(system, x, state or None)
-    first = rates_and_ports(system, context)
+def test_the_ports_follow_what_changes_in_a_context(element):
+    system, (x, y) = element.system(), random_plant_states(2, seed=31)
+    context = context_of(system, x, element.state)
+    first = computed(system, context)
     system.GetInputPort("plant_state").FixValue(context, y)
-    second = rates_and_ports(system, context)
+    second = computed(system, context)
     assert not np.array_equal(first, second)
-    assert np.array_equal(second, rates_and_ports(system, context_of(system, y, state or None)))
-    if state:
-        context.SetContinuousState(2.0 * np.array(state))
-        third = rates_and_ports(system, context)
-        assert np.array_equal(third, rates_and_ports(system, context_of(system, y, 2.0 * np.array(state))))
+    assert np.array_equal(second, computed(system, context_of(system, y, element.state)))
+    if element.state:
+        doubled = 2.0 * np.array(element.state)
+        context.SetContinuousState(doubled)
+        third = computed(system, context)
+        assert np.array_equal(third, computed(system, context_of(system, y, doubled)))
         assert not np.array_equal(second, third)
 
 
 @every_element
-def test_parameters_of_another_length_are_refused(kind, arguments, history, state):
-    system = kind(*arguments)
+def test_parameters_of_another_length_are_refused(element):
+    system = element.system()
     system.set_name("left")
     with pytest.raises(ValueError, match="left: a table has another number of points"):
-        system.set_parameters(system.CreateDefaultContext(), np.append(arguments[0], 0.0))
+        system.set_parameters(system.CreateDefaultContext(), np.append(element.packed, 0.0))
 
 
 @pytest.mark.parametrize("damper", [None, *DAMPERS.values()], ids=["bushing", *DAMPERS])
 def test_a_disengaged_element_exerts_nothing_at_all(damper):
     if damper is None:
-        system, state = SixComponentBushing(bushing_parameters(engaged=0.0).packed()), None
+        system, state = SixComponentBushing(bushing_parameters(engaged=0.0).packed()), ()
     else:
         placed = damper_parameters(damper, engaged=0.0)
-        state = [2e-3] if placed.has_sponge else None  # m
+        state = [2e-3] if placed.has_sponge else []  # m
         system = FrictionDamper(placed.packed(), int(placed.has_sponge))
     context = context_of(system, random_plant_states(1, seed=32)[0], state)
     assert not np.any(port(system, context, "generalized_force"))

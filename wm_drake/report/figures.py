@@ -18,7 +18,7 @@ from matplotlib.ticker import MaxNLocator
 from wm_drake.measures import axis_motion, envelopes
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.report.wording import MM_PER_M, RPM_PER_RAD_S, case_title, number, shape_name, speed_rpm
-from wm_drake.simulation import Record, point_displacement, point_position
+from wm_drake.simulation import Record, point_position
 from wm_drake.studies.spin import CaseResult
 
 IndexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
@@ -217,21 +217,6 @@ def outline(x: FloatArray, y: FloatArray, tolerance: float) -> IndexArray:
             kept.add(worst)
             pieces += [(first, worst), (worst, last)]
     return np.array(sorted(kept))
-
-
-def sensor_depth(record: Record, sensor: str, axis: str) -> float:
-    """Depth y of a sensor's point in T, from the record alone. [m]
-
-    The displacement of a point of a rigid body is linear in its coordinates; own derivation: with e_i the unit vectors,
-    d(p) = d(0) + sum_i p_i (d(e_i) - d(0)), solved for p by least squares over all samples.
-    """
-    rest_pose = np.asarray(record.attrs["rest_pose"])
-    pose = np.column_stack([record.tub_angle.values, record.tub_position.values])
-    column = ["x", "y", "z"].index(axis)
-    origin = point_displacement(pose, np.zeros(3), rest_pose)[:, column]
-    slopes = [point_displacement(pose, unit, rest_pose)[:, column] - origin for unit in np.eye(3)]
-    values = record.displacement.sel(sensor=sensor).values - origin
-    return float(np.linalg.lstsq(np.column_stack(slopes), values, rcond=None)[0][1])
 
 
 def _depths(y_front: float, y_rear: float) -> list[str]:

@@ -9,7 +9,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from wm_drake.report import tables
-from wm_drake.report.figures import envelopes_figure, gaps_figure, gasket_figure, inline_svg_or_png, orbits_figure, sensor_depth
+from wm_drake.report.figures import envelopes_figure, gaps_figure, gasket_figure, inline_svg_or_png, orbits_figure
 from wm_drake.report.tables import Table, amplitude_table
 from wm_drake.report.wording import MM_PER_M, RPM_PER_RAD_S, case_title, has_gasket, number, percent, shape_name, speed_rpm
 from wm_drake.scene import Gap
@@ -203,13 +203,13 @@ def _envelopes_picture(case: CaseResult, table: pd.DataFrame) -> Picture | None:
 def _orbits_picture(result: SpinResult, case: CaseResult) -> Picture | None:
     if case.record.sizes["time"] < 2:
         return None
-    depths = [sensor_depth(case.record, name, sensor.axis) for name, sensor in result.parameters.sensors.items()]
+    depths = case.record.sensor_point.sel(axis="y")
     caption = (
         "Path of the drum axis, seen from the front of the machine, in the planes of the foremost and the rearmost sensor. "
         "Strong line: the drum revolution in which the axis is farthest from rest; pale line: those before and after it."
     )
     alternative = f"Orbits of the drum axis, front and rear, around the largest motion, load {case_title(case)}."
-    return _picture(orbits_figure(case.record, min(depths), max(depths)), alternative, caption)
+    return _picture(orbits_figure(case.record, float(depths.min()), float(depths.max())), alternative, caption)
 
 
 def _gasket_picture(case: CaseResult) -> Picture | None:

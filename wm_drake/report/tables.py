@@ -1,7 +1,8 @@
 """Results of a spin run as tables: of numbers for files, of text for a page."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -9,6 +10,7 @@ import xarray as xr
 
 from wm_drake.measures import percent_difference
 from wm_drake.parameters import Load, MachineParameters, measured_amplitudes, quantities, source_of
+from wm_drake.parameters.units import Unit
 from wm_drake.report.wording import (
     MISSING,
     MM_PER_M,
@@ -29,9 +31,13 @@ EXPERIMENT = "experiment"
 """Source of the rows that others are compared with."""
 
 
+MOST_SHOWN = 24
+"""Of a list of numbers, or of the points of a profile, before the middle is left out."""
+
+
 @dataclass(frozen=True)
 class Row:
-    """Cells of one line; `kind` (ours, measured, difference, warning or empty) chooses how it looks."""
+    """Cells of one line; `kind` (ours, measured, difference, other, alarm or empty) chooses how it looks."""
 
     cells: tuple[str, ...]
     kind: str = ""
@@ -127,7 +133,7 @@ def comparison(result: SpinResult, table: pd.DataFrame) -> Table:
         "Amplitude of the displacement at each sensor: largest absolute value of its envelopes, band 0.5–20 Hz. "
         "The lower rows are differences, 100 % × (value − experiment) / experiment, Eq. (1) of [B]."
     )
-    header = ("load", "source", *(f"{name},\N{NO-BREAK SPACE}mm" for name in sensors), "mean absolute difference, %")
+    header = ("load", "source", *(f"{name}, mm" for name in sensors), "mean absolute difference, %")
     return Table(caption, header, tuple(groups), text_columns=2)
 
 
@@ -191,7 +197,7 @@ def _gap(case: CaseResult) -> Group:
     place = [number(MM_PER_M * value, 0) for value in gap.point]
     speed = number(speed_rpm(case, gap.time), 0)
     cells = [shape_name(gap.moving), shape_name(gap.fixed), number(MM_PER_M * gap.distance), speed, number(gap.time, 2), *place]
-    return _line(case_title(case), cells, "warning" if gap.distance <= 0.0 else "")
+    return _line(case_title(case), cells, "alarm" if gap.distance <= 0.0 else "")
 
 
 def loads(result: SpinResult) -> Table:
@@ -220,14 +226,18 @@ def profiles(result: SpinResult) -> Table:
     return Table("Spin profile, linear between these points.", ("load", "time, s", "drum speed, rpm"), tuple(groups))
 
 
-def _points(times: Iterable[float], speeds: Iterable[float]) -> tuple[Row, ...]:
-    return tuple(Row((number(t, 3), number(RPM_PER_RAD_S * w))) for t, w in zip(times, speeds, strict=True))
+def _points(times: Sequence[float], speeds: Sequence[float]) -> tuple[Row, ...]:
+    rows = [Row((number(t, 3), number(RPM_PER_RAD_S * w))) for t, w in zip(times, speeds, strict=True)]
+    if len(rows) > MOST_SHOWN:
+        half = MOST_SHOWN // 2
+        rows[half:-half] = [Row((f"{len(rows) - 2 * half} more", "…"))]
+    return tuple(rows)
 
 
 def parameter_table(parameters: MachineParameters) -> Table:
     """Every number of the machine: key path, value in the unit people read, source."""
     groups = (
-        _line(key, [readable(unit.text(value)), source_of(parameters, key) or MISSING])
+        _line(key, [readable(value, unit), source_of(parameters, key) or MISSING])
         for key, value, unit in quantities(parameters)
     )
     caption = "Numbers of the machine file. Masses, inertias, shapes and mounting points are in its SDF model."
@@ -240,16 +250,16 @@ def changed_numbers(result: SpinResult, case: CaseResult) -> Table | None:
         return None
     common = {key: value for key, value, _ in quantities(result.parameters)}
     groups = tuple(
-        _line(key, [readable(unit.text(value))])
-        for key, value, unit in quantities(case.case.parameters)
-        if common.get(key) != value
+        _line(key, [readable(value, unit)]) for key, value, unit in quantities(case.case.parameters) if common.get(key) != value
     )
     return Table("Numbers of this load that differ from the machine's.", ("key", "value"), groups, text_columns=2)
 
 
-def readable(text: str) -> str:
-    """A value as `Unit.text` writes it, for the eye: `4600 N*mm/rad` as `4600 N mm/rad`."""
-    return text.replace("*", " ").replace("^2", "²").replace("-", "−")
+def readable(value: Any, unit: Unit) -> str:
+    """A value as `Unit.text` writes it, for the eye: `4600 N*mm/rad` as `4600 N mm/rad`, long lists by their ends."""
+    if isinstance(value, tuple) and len(value) > MOST_SHOWN:
+        return f"{len(value)} values, {readable(value[0], unit)} to {readable(value[-1], unit)}"
+    return unit.text(value).replace("*", " ").replace("^2", "²").replace("-", "−")
 
 
 def _line(heading: str, cells: Iterable[str], kind: str = "") -> Group:

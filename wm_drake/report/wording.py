@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 
+from wm_drake.parameters.units import Unit
 from wm_drake.studies.spin import CaseResult
 
-MM_PER_M = 1e3
-RPM_PER_RAD_S = 30.0 / np.pi
+MM_PER_M = Unit("m", "mm").from_si(1.0)
+RPM_PER_RAD_S = Unit("rad/s", "rpm").from_si(1.0)
 
 MISSING = "–"
 """Stands where there is no number."""

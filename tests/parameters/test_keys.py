@@ -1,0 +1,130 @@
+"""Key paths: the one way to change a number."""
+
+import pytest
+
+from wm_drake.errors import InputError
+from wm_drake.parameters import BodyOverride, ForceTable, FrameOverride, load_machine, quantities, source_of, with_value
+
+KEYS = [key for key, _, _ in quantities(load_machine("reference"))]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "si"),
+    [
+        ("gravity", 1.62, 1.62),
+        ("gravity", "1.62 m/s^2", 1.62),
+        ("gasket.stiffness_x", 3200.0, 3200.0),
+        ("gasket.stiffness_x", "3.2 N/mm", 3200.0),
+        ("gasket.friction_torque_x", "80 N mm", 0.08),  # a default, not written in the file
+        ("damper_types.friction.end_bushing.stiffness", "750 N mm/rad", 0.75),
+        ("loads.counter.unbalances.1.mass", "300 g", 0.3),
+        ("profile.time", (0.0, 50.0, 60.0), (0.0, 50.0, 60.0)),
+        ("profile.time", "(0, 50, 60) s", (0.0, 50.0, 60.0)),
+    ],
+)
+def test_number_is_changed_and_nothing_else(reference, key, value, si):
+    changed = with_value(reference, key, value)
+    before, after = ({k: v for k, v, _ in quantities(p)} for p in (reference, changed))
+    assert after[key] == pytest.approx(si)
+    assert {k for k in before | after if before.get(k) != after.get(k)} == {key}
+
+
+def test_original_is_unchanged(reference):
+    before = reference.model_dump()
+    with_value(reference, "loads.counter.unbalances.1.mass", 9.0)
+    with_value(reference, "bodies.tub.mass", 9.0)
+    assert reference.model_dump() == before
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_every_number_can_be_set_to_what_it_is(reference, key):
+    value = {k: v for k, v, _ in quantities(reference)}[key]
+    assert with_value(reference, key, value) == reference
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_every_number_can_be_set_to_its_own_text(reference, key):
+    value, unit = {k: (v, u) for k, v, u in quantities(reference)}[key]
+    assert with_value(reference, key, unit.text(value)) == reference
+
+
+def test_numbers_are_listed_with_value_and_unit(reference):
+    listed = {key: (value, unit.shown) for key, value, unit in quantities(reference)}
+    assert listed["gasket.stiffness_x"] == (reference.gasket.stiffness_x, "N/mm")
+    assert listed["loads.middle.unbalances.0.radius"] == (reference.loads["middle"].unbalances[0].radius, "mm")
+    assert listed["profile.speed"] == (reference.profile.speed, "rpm")
+    assert len(listed) == len(KEYS) >= 50
+
+
+def test_override_of_a_body_comes_into_being(reference):
+    changed = with_value(reference, "bodies.upper_counterweight.mass", "12 kg")
+    assert changed.bodies == {"upper_counterweight": BodyOverride(mass=12.0)}
+    again = with_value(changed, "bodies.upper_counterweight.centre_of_mass", (0.0, 0.0, 0.2))
+    assert again.bodies == {"upper_counterweight": BodyOverride(mass=12.0, centre_of_mass=(0.0, 0.0, 0.2))}
+    assert ("bodies.upper_counterweight.mass", 12.0) in [(k, v) for k, v, _ in quantities(again)]
+
+
+def test_override_of_a_frame_comes_into_being(reference):
+    changed = with_value(reference, "frames.sensor_Xr.position", "(0, 201, -210) mm")
+    assert changed.frames == {"sensor_Xr": FrameOverride(position=(0.0, 0.201, -0.21))}
+
+
+def test_number_may_become_a_table(reference):
+    table = {"displacement": "(0, 1) mm", "force": "(0, 8) N"}
+    changed = with_value(reference, "spring_types.suspension.stiffness", table)
+    assert changed.spring_types["suspension"].stiffness == ForceTable(displacement=(0.0, 0.001), force=(0.0, 8.0))
+    steeper = with_value(changed, "spring_types.suspension.stiffness.force", "(0, 9) N")
+    assert steeper.spring_types["suspension"].stiffness.force == (0.0, 9.0)
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        ("gasket.stifness_x", "unknown key 'stifness_x' .did you mean 'stiffness_x'"),
+        ("gaskett.stiffness_x", "unknown key 'gaskett' .did you mean 'gasket'"),
+        ("loads.midle.unbalances.0.mass", "unknown key 'midle' .did you mean 'middle'"),
+        ("bodies.tub.mas", "unknown key 'mas' .did you mean 'mass'"),
+        ("damper_types.friction.end_bushing.stifness", "did you mean 'stiffness'"),
+        ("loads.middle.unbalances.1.mass", "'1' leads nowhere"),
+        ("loads.middle.unbalances.first.mass", "'first' leads nowhere"),
+        ("gravity.x", "'x' leads nowhere"),
+        ("", "unknown key ''"),
+        ("gasket..stiffness_x", "unknown key ''"),
+    ],
+)
+def test_unknown_key_is_refused(reference, key, message):
+    with pytest.raises(InputError, match=message) as refused:
+        with_value(reference, key, 1.0)
+    assert [problem.key for problem in refused.value.problems] == [key]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("gasket.stiffness_x", -1.0, "out of range; allowed is >= 0"),
+        ("gasket.stiffness_x", "3 N", "does not fit"),
+        ("gasket.stiffness_x", "3", "has no unit"),
+        ("gasket.stiffness_x", float("nan"), "not a finite number"),
+        ("gasket.stiffness_x", None, "not a number"),
+        ("bodies.tub.mass", 0.0, "out of range; allowed is > 0"),
+        ("springs.left.type", "rear", "'rear' is not in spring_types .known: suspension"),
+        ("sensors.Xr.axis", "w", "'w' is not allowed; allowed are 'x', 'y' or 'z'"),
+        ("profile.time", "(0, 5, 4) s", "times must rise"),
+        ("bodies.tub.mass.x", 1.0, "not a number"),
+    ],
+)
+def test_value_that_is_not_allowed_is_refused(reference, key, value, message):
+    with pytest.raises(InputError, match=message) as refused:
+        with_value(reference, key, value)
+    assert [problem.key for problem in refused.value.problems] == [key]
+
+
+def test_what_an_inertia_lacks_is_named(reference):
+    with pytest.raises(InputError, match=r"yy.*is missing\n.*zz.*is missing"):
+        with_value(reference, "bodies.tub.inertia.xx", 1.0)
+
+
+def test_source_is_the_nearest_above(reference):
+    assert source_of(reference, "profile.time") == source_of(reference, "profile") != ""
+    assert source_of(reference, "gravity") == "standard value to three digits"
+    assert source_of(reference, "drive.joint") == ""

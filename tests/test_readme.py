@@ -1,0 +1,40 @@
+"""README tells the truth where a machine can check it."""
+
+import re
+from pathlib import Path
+
+from wm_drake.machine import build_machine
+from wm_drake.parameters import load_machine
+from wm_drake.report.diagram import mermaid
+
+README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_picture_is_the_diagrams_own_graph():
+    drawn = re.search(r"```mermaid\n(.*?)\n```", README, re.DOTALL)[1]
+    assert drawn == mermaid(build_machine(load_machine("reference")).diagram)
+
+
+def test_the_short_python_way_runs():
+    code = re.search(r"```python\n(.*?)\n```", README, re.DOTALL)[1]
+    lines = [line for line in code.splitlines() if line.strip()]
+    assert len(lines) == 3
+    import matplotlib
+
+    matplotlib.use("Agg")
+    names = {}
+    exec(code.replace('"middle"', "case").replace("import wm_drake as wm", "import wm_drake as wm\n" + SHORT_CASE), names)
+    assert names["record"].sizes["time"] == 401
+
+
+SHORT_CASE = """
+from wm_drake.parameters import SpinProfile
+loads = wm.load_machine("reference").loads
+case = wm.Case("middle", loads["middle"], SpinProfile(time=(0.0, 2.0), speed=(0.0, 10.0)))
+"""
+
+
+def test_every_file_named_in_the_reading_order_exists():
+    root = Path(__file__).parents[1]
+    for name in re.findall(r"`((?:wm_drake|sdf|tests|analyses)/[\w/.]*)`", README):
+        assert (root / name).exists(), name

@@ -1,0 +1,138 @@
+"""The direction of the rooms: imports point upwards only, read from the source, imports inside functions included."""
+
+import ast
+import sys
+from pathlib import Path
+
+import pytest
+
+import wm_drake
+
+PACKAGE = Path(wm_drake.__file__).parent
+ORDER = (
+    {"errors"},
+    {"laws"},
+    {"parameters"},
+    {"systems"},
+    {"bodies"},
+    {"machine"},
+    {"trajectory"},
+    {"scene", "drake_engine"},
+    {"simulation"},
+    {"measures"},
+    {"studies"},
+    {"report"},
+    {"outputs"},
+    {"cli"},
+)
+LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}
+WITHOUT_DRAKE = {"errors", "parameters", "outputs", "cli"}  # laws do without much more
+
+
+def imported(name, source, is_package=False):
+    """Full names of what a module imports, wherever in it; `from a import b` gives a.b."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            parents = name.split(".") if is_package else name.split(".")[:-1]
+            base = parents[: len(parents) - node.level + 1] if node.level else []
+            yield from (".".join([*base, *filter(None, [node.module]), alias.name]) for alias in node.names)
+
+
+def faults(name, source, is_package=False):
+    """What is wrong with the imports of a module, one text each."""
+    room = name.split(".")[1]
+    if room not in LEVEL:
+        return [f"{name}: room '{room}' has no place in the order"]
+    found = []
+    for target in imported(name, source, is_package):
+        top, *below = target.split(".")
+        if top == "wm_drake":
+            other = below[0] if below else ""
+            if other != room and LEVEL.get(other, len(ORDER)) >= LEVEL[room]:
+                found.append(f"{name} imports {target}: not a room before it")
+        if top in ("analyses", "tests", "conftest"):
+            found.append(f"{name} imports {target}")
+        if top in ("matplotlib", "jinja2") and room != "report":
+            found.append(f"{name} imports {target}: only report may")
+        if top == "pydrake" and room in WITHOUT_DRAKE:
+            found.append(f"{name} imports {target}: this room does without Drake")
+        if (
+            room == "laws"
+            and top not in {"numpy", "numba", *sys.stdlib_module_names}
+            and not target.startswith("wm_drake.laws")
+        ):
+            found.append(f"{name} imports {target}: laws need numpy and numba only")
+    return found
+
+
+def modules():
+    for path in sorted(PACKAGE.rglob("*.py")):
+        parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+        if path.name == "__init__.py":
+            yield ".".join(parts[:-1]), path.read_text(encoding="utf-8"), True
+        else:
+            yield ".".join(parts), path.read_text(encoding="utf-8"), False
+
+
+def test_every_room_of_the_order_exists():
+    found = {name.split(".")[1] for name, _, _ in modules() if name != "wm_drake"}
+    assert set(LEVEL) <= found
+
+
+@pytest.mark.parametrize(("name", "source", "is_package"), [pytest.param(*m, id=m[0]) for m in modules() if m[0] != "wm_drake"])
+def test_imports_point_upwards(name, source, is_package):
+    assert faults(name, source, is_package) == []
+
+
+def test_package_itself_imports_no_room_until_asked():
+    (source,) = (source for name, source, _ in modules() if name == "wm_drake")
+    assert {target.split(".")[0] for target in imported("wm_drake", source, is_package=True)} <= sys.stdlib_module_names
+
+
+def test_no_room_imports_by_a_name_made_at_run_time():
+    hidden = ("import_module", "__import__")
+    assert [name for name, source, _ in modules() if name != "wm_drake" and any(word in source for word in hidden)] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "source"),
+    [
+        ("wm_drake.parameters.units", "from wm_drake.systems.element import X"),
+        ("wm_drake.parameters.units", "from wm_drake import systems"),
+        ("wm_drake.parameters.units", "from wm_drake import *"),
+        ("wm_drake.parameters.units", "from ..systems import element"),
+        ("wm_drake.parameters.units", "import wm_drake"),
+        ("wm_drake.parameters.units", "import wm_drake.machine as m"),
+        ("wm_drake.parameters.units", "from pydrake.math import RigidTransform"),
+        ("wm_drake.errors", "from wm_drake.parameters import units"),
+        ("wm_drake.laws.friction", "import pydrake"),
+        ("wm_drake.laws.friction", "def f():\n    from pydrake.autodiffutils import AutoDiffXd"),
+        ("wm_drake.laws.friction", "import scipy.interpolate"),
+        ("wm_drake.laws.friction", "from wm_drake.errors import InputError"),
+        ("wm_drake.scene", "from wm_drake.drake_engine import run_drake"),
+        ("wm_drake.simulation", "from wm_drake import measures"),
+        ("wm_drake.studies.modal", "import matplotlib.pyplot as plt"),
+        ("wm_drake.cli", "def f():\n    import matplotlib"),
+        ("wm_drake.cli", "from tests.conftest import wm_drake"),
+        ("wm_drake.studies.spin", "import analyses.run"),
+        ("wm_drake.studies.spin", "try:\n    import wm_drake.cli\nexcept ImportError:\n    pass"),
+        ("wm_drake.cellar", "import numpy"),
+    ],
+)
+def test_planted_fault_is_found(name, source):
+    assert len(faults(name, source)) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "source"),
+    [
+        ("wm_drake.systems.element", "from wm_drake.parameters import units\nfrom wm_drake.laws import table\nimport pydrake"),
+        ("wm_drake.parameters.units", "from .elements import Frozen\nfrom ..errors import InputError\nimport pint"),
+        ("wm_drake.report.figures", "import matplotlib\nfrom wm_drake.measures import measure"),
+        ("wm_drake.laws.friction", "import numba, numpy, functools\nfrom wm_drake.laws.compilation import law"),
+    ],
+)
+def test_good_imports_pass(name, source):
+    assert faults(name, source) == []
