@@ -45,6 +45,10 @@ FAULTY_MACHINES = {
         in_machine("springs: {extra: {type: suspension, tub_frame: tub, housing_frame: housing}}"),
         "springs.extra",
     ),
+    "damper of no length": (
+        in_machine("dampers: {extra: {type: friction, tub_frame: tub, housing_frame: housing}}"),
+        "dampers.extra",
+    ),
     "unknown frame": (in_machine("springs: {left: {tub_frame: spring_lft_tub}}"), "no frame 'spring_lft_tub' in the SDF"),
     "unknown link": (in_machine("bodies: {tubb: {mass: 1 kg}}"), "no link 'tubb' in the SDF (did you mean 'tub'?"),
     "unknown joint": (in_machine("drive: {joint: drum_axes}"), "no joint 'drum_axes' (did you mean 'drum_axis'?"),
@@ -163,12 +167,16 @@ def test_failed_run_leaves_nothing(monkeypatch, tmp_path, mishap):
 
 
 def test_failed_run_keeps_older_results(monkeypatch, tmp_path):
+    def fail_after_writing():
+        with result_folder(Path("out")) as folder:
+            (folder / "report.html").write_text("new")
+            raise RuntimeError
+
     monkeypatch.chdir(tmp_path)
     Path("out").mkdir()
     before = write_all({"out/report.html": "old"})
-    with pytest.raises(RuntimeError), result_folder(Path("out")) as folder:
-        (folder / "report.html").write_text("new")
-        raise RuntimeError
+    with pytest.raises(RuntimeError):
+        fail_after_writing()
     assert (listing(), Path("out/report.html").read_text()) == (before, "old")
 
 
@@ -337,9 +345,11 @@ def test_without_gasket_there_is_no_gasket_force(wm_drake):
 
 
 def test_set_changes_the_result_and_is_recorded(wm_drake, plain):
-    _, printed = spin(wm_drake, "--set", "gasket.damping_x = 0.19 N s/mm")
-    assert printed["cases"][0]["gasket_force_N"]["Fx"] > 2.0 * plain.case["gasket_force_N"]["Fx"]
-    assert json.loads(load_record(Path("out/record_middle.nc")).attrs["parameters"])["gasket"]["damping_x"] == 190.0
+    _, printed = spin(wm_drake, "--set", "loads.middle.unbalances.0.mass = 500 g", "--set", "gasket.damping_x=0.03 N s/mm")
+    assert printed["cases"][0]["amplitudes_mm"]["Xr"] < 0.8 * plain.case["amplitudes_mm"]["Xr"]
+    attrs = load_record(Path("out/record_middle.nc")).attrs
+    assert json.loads(attrs["load_parameters"])["unbalances"][0]["mass"] == 0.5
+    assert json.loads(attrs["parameters"])["gasket"]["damping_x"] == pytest.approx(30.0)
     report = Path("out/report.html").read_text(encoding="utf-8")
     assert "gasket.damping_x" in report
     assert "set on the command line" in report

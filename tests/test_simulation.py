@@ -157,7 +157,7 @@ def test_mirrored_machine_moves_as_the_mirror_image(machine, reference):
     assert np.max(np.abs(record.tub_position.sel(axis="x"))) > 1e-3
 
 
-def test_phase_shift_of_the_load_is_a_shift_of_the_start_angle(machine, reference):
+def test_phase_shift_of_the_load_is_a_shift_of_the_start_angle(machine):
     shift = 0.9
     profile = SpinProfile(time=(0.0, 2.0), speed=(8.0, 20.0))
     base = Load(unbalances=(Unbalance(mass=0.7, radius=0.25, y=-0.1),))
@@ -202,7 +202,7 @@ def test_moving_the_world_moves_the_machine_with_it(reference):
     assert float(np.abs(here.displacement).max()) > 1e-3
 
 
-def test_a_run_that_diverges_stops_keeps_its_record_and_says_when_and_why(machine, reference):
+def test_a_run_that_diverges_stops_keeps_its_record_and_says_when_and_why(machine):
     violent = Case("violent", Load(unbalances=(Unbalance(mass=60.0, radius=0.3, y=0.1),)), FAST_RUN_UP)
     with pytest.warns(DivergenceWarning, match=r"diverged at .* s: (roll|pitch|yaw|x|y|z) = "):
         record = simulate(machine, violent)

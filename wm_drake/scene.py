@@ -130,6 +130,8 @@ def replay_page(parameters: MachineParameters, time: FloatArray, positions: Floa
         positions: (n, 7) positions of the plant: roll, pitch, yaw, x, y, z, drum angle. [rad, m]
     """
     meshcat = Meshcat()
+    meshcat.SetProperty("/Grid", "visible", False)
+    meshcat.SetCameraPose(camera_in_world=[0.7, -1.5, 0.6], target_in_world=[0.0, 0.0, 0.0])
     scene = Scene(parameters, meshcat)
     scene.animate(meshcat, time, positions)
     return str(meshcat.StaticHtml())

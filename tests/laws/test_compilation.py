@@ -162,8 +162,9 @@ def test_compiled_code_lies_in_a_folder_named_by_the_sources(tmp_path, monkeypat
     monkeypatch.setattr(compilation, "_ROOM", copy)
     before = compilation._cache_folder()
     assert compilation._cache_folder() == before
-    for name in ("friction.py", "vectors.py"):  # laws that others call
-        source = copy / "laws" / name
+    # laws that others call, and a compiled function of a system that a kernel may call
+    for name in ("laws/friction.py", "laws/vectors.py", "systems/friction_damper.py"):
+        source = copy / name
         source.write_text(source.read_text() + "# changed\n")
         after = compilation._cache_folder()
         assert after != before

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 from scipy.optimize import brentq
 
+from wm_drake.laws.compilation import generic
 from wm_drake.laws.damper import (
     COULOMB,
     FREE_STROKE,
@@ -185,3 +187,10 @@ def test_the_free_stroke_damper_never_gives_back_more_than_its_sponge_stores(rat
     tension, deformation_rate = free_stroke_damper(rate, deformation, F_MAX, C_M, EPSILON, P_B, V_B, SPONGE, 0)
     stored = stiffness_force(deformation, SPONGE, 0) * deformation_rate  # W
     assert tension * rate - stored >= -1e-10 * (abs(tension * rate) + abs(stored))
+
+
+def test_derivatives_of_a_free_stroke_damper_without_main_friction_are_finite():
+    sponge = ForceTable(displacement=(-0.02, -0.008, 0.008, 0.02), force=(-90.0, 0.0, 0.0, 120.0)).packed()  # m, N
+    rate, deformation = InitializeAutoDiff(np.array([0.1, 0.0])).ravel()  # m/s, m
+    _, deformation_rate = generic(free_stroke_damper)(rate, deformation, 0.0, 60.0, 1e-6, 10.5, 0.09, sponge, 0)
+    assert np.all(np.isfinite(ExtractGradient(np.array([[deformation_rate]]))))

@@ -22,15 +22,16 @@ _ROOM = Path(__file__).parents[1]
 
 
 def _cache_folder() -> str:
-    """A folder of compiled code that belongs to exactly this source.
+    """A folder of compiled code that belongs to exactly these sources: the laws and all that compiles them in.
 
     numba looks only at the file of the function it compiles: after an edit of a called law, its cached callers would go on
     with the old one. A folder named by the hash of all sources cannot go stale.
     """
     digest = hashlib.sha256()
     for source in sorted(_ROOM.rglob("*.py")):
-        if "numba" in source.read_text() or source.parent.name == "laws":
-            digest.update(source.read_bytes())
+        text = source.read_text(encoding="utf-8")
+        if source.parent.name == "laws" or "laws.compilation" in text or "numba" in text:
+            digest.update(text.encode())
     home = os.environ.get("NUMBA_CACHE_DIR") or Path.home() / ".cache" / "wm_drake"
     return str(Path(home) / digest.hexdigest()[:16])
 

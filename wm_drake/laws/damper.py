@@ -39,7 +39,7 @@ def slider_rate(b, v, c, f_max, c_m, epsilon):
     w has the sign of b; turn signs so that b >= 0. Then the sticking branch is a quadratic with one positive root:
 
         v > 0, u = v - w:    (c_m - c) w^2 + (c (v + eps) + f_max + b) w - b (v + eps) = 0,   valid up to w = v/2
-        v <= 0, u = v - w:   (c_m + c) w^2 + (c (|v| + eps) + f_max - b) w - b (|v| + eps) = 0,   always valid
+        v <= 0, u = v - w:   (c_m + c) w^2 + (c (|v| + eps) + f_max - b) w - b (|v| + eps) = 0,   always valid (at v = 0 its limit)
 
     and the slipping one is w = (b - f_max) / (c + c_m). The right sides grow with w, so the balance has one solution; at
     w = v/2 the friction jumps by a relative eps/v, where the slider keeps w = v/2.
@@ -71,7 +71,10 @@ def slider_rate(b, v, c, f_max, c_m, epsilon):
 @law
 def positive_root(a2, a1, a0):
     """Positive root of a2 w^2 + a1 w - a0 = 0 for a0 >= 0, without cancellation (smaller one if a2 < 0 < a1)."""
-    root = np.sqrt(a1 * a1 + 4.0 * a2 * a0)
+    radicand = a1 * a1 + 4.0 * a2 * a0
+    if radicand <= 0.0:  # no friction, no force: at rest; the root of zero has no derivative
+        return 0.0 * a1
+    root = np.sqrt(radicand)
     if a1 > 0.0:
         return 2.0 * a0 / (a1 + root)
     return (root - a1) / (2.0 * a2)

@@ -61,7 +61,7 @@ def check_curve(x_name: str, x: tuple[float, ...], y_name: str, y: tuple[float, 
 
 def packed_curve(x: tuple[float, ...], y: tuple[float, ...]) -> FloatArray:
     """[n, x, y, slopes] of the monotone cubic (scipy's PCHIP) through the points."""
-    slopes = PchipInterpolator(x, y).derivative()(x)
+    slopes = np.maximum(PchipInterpolator(x, y).derivative()(x), 0.0)  # rounding can make a flat end fall by 1e-11
     return np.concatenate([[len(x)], x, y, slopes])
 
 

@@ -175,7 +175,7 @@ def facts_of_run(result: SpinResult, command: str) -> list[tuple[str, str]]:
 
 def _case_view(result: SpinResult, index: int, table: pd.DataFrame) -> CaseView:
     case = result.results[index]
-    pictures = (_envelopes_picture(case, table), _orbits_picture(result, case), _gasket_picture(case))
+    pictures = (_envelopes_picture(case, table), _orbits_picture(case), _gasket_picture(case))
     shown = tuple(picture for picture in pictures if picture is not None)
     return CaseView(f"case-{index + 1}", case_title(case), _case_facts(case), shown, tables.changed_numbers(result, case))
 
@@ -200,7 +200,7 @@ def _envelopes_picture(case: CaseResult, table: pd.DataFrame) -> Picture | None:
     return _picture(envelopes_figure(case.record, measured), alternative, caption)
 
 
-def _orbits_picture(result: SpinResult, case: CaseResult) -> Picture | None:
+def _orbits_picture(case: CaseResult) -> Picture | None:
     if case.record.sizes["time"] < 2:
         return None
     depths = case.record.sensor_point.sel(axis="y")
