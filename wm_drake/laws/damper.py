@@ -39,10 +39,11 @@ def slider_rate(b, v, c, f_max, c_m, epsilon):
     w has the sign of b; turn signs so that b >= 0. Then the sticking branch is a quadratic with one positive root:
 
         v > 0, u = v - w:    (c_m - c) w^2 + (c (v + eps) + f_max + b) w - b (v + eps) = 0,   valid up to w = v/2
-        v <= 0, u = v - w:   (c_m + c) w^2 + (c (|v| + eps) + f_max - b) w - b (|v| + eps) = 0,   always valid (at v = 0 its limit)
+        v <= 0, u = v - w:   (c_m + c) w^2 + (c (|v| + eps) + f_max - b) w - b (|v| + eps) = 0,   always valid
 
-    and the slipping one is w = (b - f_max) / (c + c_m). The right sides grow with w, so the balance has one solution; at
-    w = v/2 the friction jumps by a relative eps/v, where the slider keeps w = v/2.
+    (at v = 0, where [C] has both branches meet, the limit from below), and the slipping one is w = (b - f_max) / (c + c_m).
+    The right sides grow with w, so the balance has one solution; at w = v/2 the friction jumps by a relative eps/v, where the
+    slider keeps w = v/2.
 
     Args:
         b: Force of the sponge on the slider less what depends on w: k1 delta + c1 v in [C], K(delta) delta in [A]. [N]

@@ -9,12 +9,15 @@ import numpy as np
 import pandas as pd
 from pydantic import BaseModel, ValidationError
 from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import YAMLError
+from ruamel.yaml.resolver import VersionedResolver
 
 from wm_drake.errors import InputError, input_error, nearest_names
-from wm_drake.parameters.keys import problems_of, quantities, source_of
+from wm_drake.parameters.csv_files import read_csv
+from wm_drake.parameters.keys import quantities, source_of
 from wm_drake.parameters.machine import MachineParameters
+from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.spin import Load, SpinProfile
 
 MACHINES_FOLDER = Path(__file__).parents[1] / "machines"
@@ -39,13 +42,7 @@ def load_machine(name_or_path: str | Path = "reference") -> MachineParameters:
     path = machine_path(name_or_path)
     plain, sources = _without_sources(_extended(path, ()))
     plain = _with_absolute_paths(plain, path)
-    return _validated(MachineParameters, {**plain, "sources": sources}, path, _read_yaml(path))
-
-
-def located(error: InputError, path: Path) -> InputError:
-    """The same problems with the lines of the machine file where they stand, as far as it holds them."""
-    tree = _read_yaml(path)
-    return InputError(replace(p, where=p.where or _place(path, tree, p.key)) for p in error.problems)
+    return _validated(MachineParameters, {**plain, "sources": sources}, path)
 
 
 def machine_path(name_or_path: str | Path) -> Path:
@@ -65,39 +62,37 @@ def machine_path(name_or_path: str | Path) -> Path:
 def load_load(path: Path) -> Load:
     """Reads a load file: ``unbalances: [{mass, radius, y, phase}, ...]``, written as in a machine file."""
     tree = _read_yaml(path)
-    return _validated(Load, _without_sources(tree)[0], path, tree)
+    return _validated(Load, _without_sources(tree)[0], path)
 
 
 def load_profile(path: Path) -> SpinProfile:
     """Reads a spin profile: YAML as in a machine file, or CSV with the columns time_s and speed_rpm (# begins a comment)."""
     if path.suffix.lower() != ".csv":
         tree = _read_yaml(path)
-        return _validated(SpinProfile, _without_sources(tree)[0], path, tree)
-    try:
-        table = pd.read_csv(path, comment="#", skipinitialspace=True)
-    except (OSError, ValueError) as error:
-        raise input_error(f"cannot be read as CSV ({error})", where=str(path)) from None
-    if list(table.columns) != ["time_s", "speed_rpm"]:
-        raise input_error(f"needs the columns time_s,speed_rpm, has {','.join(map(str, table.columns))}", where=str(path))
+        return _validated(SpinProfile, _without_sources(tree)[0], path)
+    table = read_csv(path, ["time_s", "speed_rpm"])
+    if table.empty:
+        raise input_error("is empty: a profile needs at least two points", where=str(path))
     numbers = table.apply(pd.to_numeric, errors="coerce")
-    if not np.isfinite(numbers.to_numpy()).all():
-        row = int(np.flatnonzero(~np.isfinite(numbers.to_numpy()).all(axis=1))[0])
+    finite = np.isfinite(numbers.to_numpy(dtype=float)).all(axis=1)
+    if not finite.all():
+        row = int(np.flatnonzero(~finite)[0])
         raise input_error(f"row {row + 1} of the data is not two finite numbers: {table.iloc[row].tolist()}", where=str(path))
     text = {"time": ("time_s", "s"), "speed": ("speed_rpm", "rpm")}
     fields = {key: f"({', '.join(map(repr, numbers[name].tolist()))}) {unit}" for key, (name, unit) in text.items()}
-    return _validated(SpinProfile, fields, path, CommentedMap())
+    return _validated(SpinProfile, fields, path)
 
 
 def machine_yaml(parameters: MachineParameters) -> str:
     """The machine as the text of a machine file, in engineers' units, each number with its source if it has one."""
-    tree = parameters.model_dump(mode="json", exclude={"sources"}, exclude_defaults=True)
+    tree = parameters.model_dump(mode="json", exclude={"sources"}, exclude_unset=True)
     for key, value, unit in list(quantities(parameters)):
         *parents, name = key.split(".")
         node: Any = tree
         for part in parents:
             node = node[int(part)] if isinstance(node, list) else node.get(part)
             if node is None:
-                break  # a default: not written
+                break  # a default that was not set
         if node is None or name not in node:
             continue
         source = source_of(parameters, key)
@@ -114,8 +109,19 @@ class _TextStream:
         self.text += part if isinstance(part, str) else part.decode()
 
 
+class _TextResolver(VersionedResolver):
+    """Reads every plain scalar as text, null apart: numbers need units anyway, and no date or huge integer can trip it."""
+
+    @property
+    def versioned_resolver(self) -> dict[str, list[tuple[Any, Any]]]:
+        null = "tag:yaml.org,2002:null"
+        kept = {first: [pair for pair in pairs if str(pair[0]) == null] for first, pairs in super().versioned_resolver.items()}
+        return {first: pairs for first, pairs in kept.items() if pairs}
+
+
 def _yaml() -> YAML:
     yaml = YAML(typ="rt")
+    yaml.Resolver = _TextResolver
     yaml.width = 4096
     return yaml
 
@@ -130,7 +136,9 @@ def _read_yaml(path: Path) -> CommentedMap:
     except YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f"{path}:{mark.line + 1}" if mark else str(path)
-        raise input_error(f"is not YAML: {getattr(error, 'problem', None) or error}", where=where) from None
+        raise input_error(
+            f"is not YAML: {' '.join(str(getattr(error, 'problem', None) or error).split())}", where=where
+        ) from None
     if not isinstance(tree, CommentedMap):
         raise input_error(
             "is empty; allowed is a mapping of keys to values" if tree is None else "is not a mapping", where=str(path)
@@ -142,9 +150,8 @@ def _extended(path: Path, seen: tuple[Path, ...]) -> CommentedMap:
     tree = _read_yaml(path)
     if "extends" not in tree:
         return tree
-    named = str(tree.pop("extends"))
-    base = named if named in shipped_machines() else path.parent / named
-    base_path = machine_path(base)
+    base_path = _base_path(tree, path)
+    del tree["extends"]
     if base_path.resolve() in (*seen, path.resolve()):
         raise input_error("extends itself", where=str(path), key="extends")
     base_tree = _extended(base_path, (*seen, path.resolve()))
@@ -208,25 +215,49 @@ def _with_absolute_paths(tree: dict[str, Any], path: Path) -> dict[str, Any]:
     return changed
 
 
-def _validated(model: type[Model], plain: Any, path: Path, tree: CommentedMap) -> Model:
+def _validated(model: type[Model], plain: Any, path: Path) -> Model:
     try:
         return model.model_validate(plain, context={"units_required": True})
     except ValidationError as error:
-        problems = problems_of(error, model)
-        raise InputError([replace(p, where=_place(path, tree, p.key)) for p in problems]) from None
+        raise located(InputError(problems_of(error, model)), path) from None
 
 
-def _place(path: Path, tree: CommentedMap, key: str) -> str:
-    """file:line of a key path, or of the nearest key above it."""
+def located(error: InputError, path: Path) -> InputError:
+    """The same problems with the file and line where they stand: in the machine file, or in one that it extends."""
+    return InputError(replace(p, where=p.where or _place(path, p.key)) for p in error.problems)
+
+
+def _place(path: Path, key: str) -> str:
+    """file:line of a key path, in the file of the chain that holds most of it."""
+    best_depth, best = 0, str(path)
+    while path.suffix.lower() != ".csv":
+        tree = _read_yaml(path)
+        depth, line = _line_of(tree, key)
+        if depth > best_depth:
+            best_depth, best = depth, f"{path}:{line}"
+        if "extends" not in tree:
+            break
+        path = _base_path(tree, path)
+    return best
+
+
+def _line_of(tree: CommentedMap, key: str) -> tuple[int, int]:
+    """How many parts of a key path a file holds, and the line of the last of them."""
     node: Any = tree
-    line = None
+    depth, line = 0, 1
     for part in key.split("."):
         if isinstance(node, CommentedMap) and part in node:
-            line = node.lc.key(part)[0] if part in (node.lc.data or {}) else line
+            line = node.lc.key(part)[0] + 1 if part in (node.lc.data or {}) else line
             node = node[part]
-        elif isinstance(node, list) and part.isdigit() and int(part) < len(node):
-            line = node.lc.item(int(part))[0]  # type: ignore[attr-defined]
+        elif isinstance(node, CommentedSeq) and part.isdigit() and int(part) < len(node):
+            line = node.lc.item(int(part))[0] + 1
             node = node[int(part)]
         else:
             break
-    return str(path) if line is None else f"{path}:{line + 1}"
+        depth += 1
+    return depth, line
+
+
+def _base_path(tree: CommentedMap, path: Path) -> Path:
+    named = str(tree["extends"])
+    return machine_path(named if named in shipped_machines() else path.parent / named)

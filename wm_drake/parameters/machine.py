@@ -2,12 +2,15 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, StringConstraints, ValidationInfo, field_validator, model_validator
 
 from wm_drake.errors import nearest_names
 from wm_drake.parameters import units as u
 from wm_drake.parameters.elements import Bushing, Damper, DamperType, Frozen, Spring, SpringType
 from wm_drake.parameters.spin import Load, SpinProfile
+
+Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
+"""Of an entry: it becomes part of key paths and of file names."""
 
 
 class InertiaMatrix(Frozen):
@@ -62,17 +65,17 @@ class MachineParameters(Frozen):
     model: str = "oscillating_group.sdf"
     gravity: Annotated[u.Acceleration, Field(ge=0.0)]
     drive: Drive = Drive()
-    bodies: dict[str, BodyOverride] = {}
-    frames: dict[str, FrameOverride] = {}
-    spring_types: dict[str, SpringType]
-    springs: dict[str, Spring]
-    damper_types: dict[str, DamperType] = {}
-    dampers: dict[str, Damper] = {}
+    bodies: dict[Name, BodyOverride] = {}
+    frames: dict[Name, FrameOverride] = {}
+    spring_types: dict[Name, SpringType]
+    springs: dict[Name, Spring]
+    damper_types: dict[Name, DamperType] = {}
+    dampers: dict[Name, Damper] = {}
     gasket: Bushing | None = None
-    bushings: dict[str, Bushing] = {}
-    sensors: dict[str, Sensor]
+    bushings: dict[Name, Bushing] = {}
+    sensors: dict[Name, Sensor]
     clearance: Clearance
-    loads: dict[str, Load]
+    loads: dict[Name, Load]
     profile: SpinProfile
     measured: tuple[str, ...] = ()
     sources: dict[str, str] = Field(default={}, repr=False)

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.errors import input_error
+from wm_drake.parameters.csv_files import read_csv
 from wm_drake.parameters.machine import MachineParameters
 
 _KEYS = ["load", "gasket", "source"]
@@ -21,16 +22,10 @@ def measured_amplitudes(parameters: MachineParameters) -> pd.DataFrame:
 
 
 def _read(path: str, sensors: list[str]) -> pd.DataFrame:
-    try:
-        table = pd.read_csv(path, comment="#")
-    except (OSError, ValueError) as error:
-        raise input_error(f"cannot be read as CSV ({error})", where=path, key="measured") from None
-    if list(table.columns) != _KEYS + sensors:
-        wanted = ",".join(_KEYS + sensors)
-        raise input_error(f"needs the columns {wanted}, has {','.join(map(str, table.columns))}", where=path, key="measured")
+    table = read_csv(path, _KEYS + sensors, key="measured")
     if not set(table["gasket"]) <= {"yes", "no"}:
         raise input_error("gasket is neither yes nor no in some row", where=path, key="measured")
     values = table[sensors].apply(pd.to_numeric, errors="coerce")
-    if not np.isfinite(values.to_numpy()).all():
+    if not np.isfinite(values.to_numpy(dtype=float)).all():
         raise input_error("an amplitude is not a finite number", where=path, key="measured")
     return table.assign(**{name: values[name] for name in sensors})

@@ -3,10 +3,11 @@
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
 from wm_drake.parameters import units as u
 from wm_drake.parameters.elements import Frozen
+from wm_drake.parameters.problems import problems_of
 
 
 class Unbalance(Frozen):
@@ -68,8 +69,13 @@ class SpinProfile(Frozen):
         if set(data) != {"steps"} or not isinstance(data["steps"], list):
             raise ValueError("a profile is either {steps: [...]} or {time: (...) s, speed: (...) rpm}")
         points = [(0.0, 0.0)]
-        for entry in data["steps"]:
-            points.append(_Step.model_validate(entry, context=info.context).after(*points[-1]))
+        for index, entry in enumerate(data["steps"]):
+            try:
+                step = _Step.model_validate(entry, context=info.context)
+            except ValidationError as error:
+                text = "; ".join(f"{p.key}: {p.message}" if p.key else p.message for p in problems_of(error, _Step))
+                raise ValueError(f"steps.{index}: {text}") from None
+            points.append(step.after(*points[-1]))
         unit = {name: cls.model_fields[name].metadata[0] for name in ("time", "speed")}
         times, speeds = zip(*points, strict=True)
         # as text again, for the door of the fields: repr keeps every digit

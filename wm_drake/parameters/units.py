@@ -12,6 +12,7 @@ from pydantic_core import CoreSchema
 from pydantic_core.core_schema import with_info_before_validator_function
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_BARE = re.compile(_NUMBER)
 _SCALAR = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*$")
 _VECTOR = re.compile(r"\s*\(([^()]*)\)\s*(\S.*?)?\s*$")
 
@@ -46,35 +47,41 @@ class Unit:
         return float(registry().Quantity(value, self.si).to(self.shown).magnitude)
 
     def text(self, value: Any) -> str:
-        """An SI value (or a tuple of them) as people write it, such as ``3.2 N/mm``; `to_si` reads the same value back."""
-        if isinstance(value, tuple):
-            return "(" + ", ".join(map(self._digits, value)) + f") {self.shown}"
-        return f"{self._digits(value)} {self.shown}"
+        """An SI value (or a tuple of them) as people write it, such as ``3.2 N/mm``; `to_si` reads the same value back.
 
-    def _digits(self, value: float) -> str:
+        Where the unit people read cannot hold it exactly, the text is in SI.
+        """
+        values = value if isinstance(value, tuple) else (value,)
+        shown = [self._exact_digits(number) for number in values]
+        unit = self.si if None in shown else self.shown
+        digits = [repr(number) for number in values] if None in shown else [str(text) for text in shown]
+        return f"({', '.join(digits)}) {unit}" if isinstance(value, tuple) else f"{digits[0]} {unit}"
+
+    def _exact_digits(self, value: float) -> str | None:
         shown = self.from_si(value)
-        short = f"{shown:.12g}"
-        exact = registry().Quantity(float(short), self.shown).to(self.si).magnitude == value
-        return short if exact else repr(shown)
+        for digits in (f"{shown:.12g}", repr(shown)):
+            if convert(float(digits), self.shown, self) == value:
+                return digits
+        return None
 
 
-def convert(magnitude: float, unit_text: str | None, si: str, example: str) -> float:
+def convert(magnitude: float, unit_text: str | None, unit: Unit) -> float:
     """A number with its written unit in SI.
 
     Raises:
         ValueError: the unit is missing, unknown or of another dimension, or the number is not finite.
     """
     if unit_text is None:
-        raise ValueError(f"'{magnitude:g}' has no unit; write for example '{example}'")
+        raise ValueError(f"'{magnitude:g}' has no unit; write for example '1 {unit.shown}'")
     try:
-        value = registry().Quantity(magnitude, unit_text).to(si).magnitude
+        value = float(registry().Quantity(magnitude, unit_text).to(unit.si).magnitude)
     except pint.DimensionalityError:
-        raise ValueError(f"unit '{unit_text}' does not fit; allowed is a unit such as {example.split(' ', 1)[1]}") from None
+        raise ValueError(f"unit '{unit_text}' does not fit; allowed is a unit such as {unit.shown}") from None
     except Exception as error:  # pint raises tokenizer, attribute and assertion errors alike on text that is no unit
-        raise ValueError(f"unit '{unit_text}' is not known; write for example '{example}'") from error
+        raise ValueError(f"unit '{unit_text}' is not known; write for example '1 {unit.shown}'") from error
     if not math.isfinite(value):
         raise ValueError(f"'{magnitude:g} {unit_text}' is not a finite number")
-    return float(value)
+    return value
 
 
 def to_si(value: Any, info: ValidationInfo, unit: Unit) -> float:
@@ -84,7 +91,7 @@ def to_si(value: Any, info: ValidationInfo, unit: Unit) -> float:
         match = _SCALAR.fullmatch(value)
         if match is None:
             raise ValueError(f"'{value}' is not a number with a unit; write for example '{example}'")
-        return convert(float(match[1]), match[2], unit.si, example)
+        return convert(float(match[1]), match[2], unit)
     return _plain_number(value, info, example)
 
 
@@ -93,23 +100,29 @@ def to_si_vector(value: Any, info: ValidationInfo, unit: Unit) -> tuple[float, .
     example = f"(1, 2, 3) {unit.shown}"
     if isinstance(value, str):
         match = _VECTOR.fullmatch(value)
-        parts = [] if match is None else match[1].split(",")
-        if match is None or not all(_SCALAR.fullmatch(part) and _SCALAR.fullmatch(part)[2] is None for part in parts):  # type: ignore[index]
+        parts = [] if match is None else [part.strip() for part in match[1].split(",")]
+        if match is None or not all(_BARE.fullmatch(part) for part in parts):
             raise ValueError(f"'{value}' is not a list of numbers with a unit; write for example '{example}'")
-        return tuple(convert(float(part), match[2], unit.si, example) for part in parts)
+        return tuple(convert(float(part), match[2], unit) for part in parts)
     if not isinstance(value, list | tuple):
         raise ValueError(f"{value!r} is not a list of numbers with a unit; write for example '{example}'")
     return tuple(_plain_number(number, info, example) for number in value)
 
 
 def _plain_number(value: Any, info: ValidationInfo, example: str) -> float:
+    if isinstance(value, str) and _BARE.fullmatch(value):
+        raise ValueError(f"'{value}' has no unit; write for example '{example}'")
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"{value!r} is not a number with a unit; write for example '{example}'")
-    if not math.isfinite(value):
-        raise ValueError(f"{value!r} is not a finite number; write for example '{example}'")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ValueError(f"this is not a finite number; write for example '{example}'")
     if info.context and info.context.get("units_required"):
-        raise ValueError(f"'{value:g}' has no unit; write for example '{example}'")
-    return float(value)
+        raise ValueError(f"'{number:g}' has no unit; write for example '{example}'")
+    return number
 
 
 Mass = Annotated[float, Unit("kg", "kg")]

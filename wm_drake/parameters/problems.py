@@ -1,0 +1,67 @@
+"""What pydantic finds wrong, in our words."""
+
+import types
+import typing
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from wm_drake.errors import Problem, nearest_names
+
+
+def problems_of(error: ValidationError, root: type[BaseModel], key: str = "") -> list[Problem]:
+    """pydantic's account of what is wrong, in our words: one problem each, with its key path below `key`."""
+    problems = []
+    for detail in error.errors():
+        path = [str(part) for part in detail["loc"] if part not in _TAGS]
+        problems.append(Problem("", ".".join(([key] if key else []) + path), _message(detail, root)))
+    return problems
+
+
+_TAGS = ("[key]", "number", "table", "coulomb", "stv", "havsin", "mstv", "free_stroke")
+
+
+def _message(detail: Any, root: type[BaseModel]) -> str:
+    kind, context, given = detail["type"], detail.get("ctx", {}), detail.get("input")
+    if kind == "value_error":
+        return str(context["error"])
+    if kind == "missing":
+        return "is missing"
+    if kind == "extra_forbidden":
+        return f"unknown key '{detail['loc'][-1]}'" + nearest_names(
+            str(detail["loc"][-1]), _fields_at(root, detail["loc"][:-1])
+        )
+    if kind in ("greater_than", "greater_than_equal"):
+        sign, limit = (">", context["gt"]) if kind == "greater_than" else (">=", context["ge"])
+        return f"'{given}' is out of range; allowed is {sign} {limit:g}"
+    if kind == "string_pattern_mismatch":
+        return f"'{given}' is not a name; allowed are letters, digits, _ and -, with a letter or _ first"
+    if kind == "union_tag_invalid":
+        return f"'{context['tag']}' is not known; allowed are {context['expected_tags']}"
+    if kind == "union_tag_not_found":
+        return f"needs the key {context['discriminator']}"
+    if kind == "literal_error":
+        return f"'{given}' is not allowed; allowed are {context['expected']}"
+    return f"{detail['msg'][0].lower()}{detail['msg'][1:]}, is {given!r}"
+
+
+def _fields_at(root: type[BaseModel], path: tuple[str | int, ...]) -> set[str]:
+    """Names of the fields that a model allows at a path of pydantic's."""
+    candidates: list[Any] = [root]
+    for part in path:
+        models = [c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel)]
+        tagged = [c for c in models if "law" in c.model_fields and part in typing.get_args(c.model_fields["law"].annotation)]
+        stepped = [c.model_fields[str(part)].annotation for c in models if part in c.model_fields]
+        entries = [typing.get_args(c)[-1 if typing.get_origin(c) is dict else 0] for c in candidates if typing.get_origin(c)]
+        candidates = tagged or [inner for c in stepped + entries for inner in _alternatives(c)] or candidates
+    return {name for c in candidates if isinstance(c, type) and issubclass(c, BaseModel) for name in c.model_fields}
+
+
+def _alternatives(annotation: Any) -> list[Any]:
+    """The types an annotation stands for: members of a union, what Annotated annotates."""
+    origin = typing.get_origin(annotation)
+    if hasattr(annotation, "__metadata__"):
+        return _alternatives(typing.get_args(annotation)[0])
+    if origin in (typing.Union, types.UnionType):
+        return [inner for member in typing.get_args(annotation) for inner in _alternatives(member)]
+    return [annotation]
