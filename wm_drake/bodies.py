@@ -44,10 +44,10 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
     except RuntimeError as error:
         raise input_error(f"SDF '{parameters.model}' cannot be read: {error}", key="model") from None
     missing = [f"link '{name}'" for name in ("housing", "tub", "drum") if not plant.HasBodyNamed(name)]
-    if not plant.HasJointNamed(parameters.drive.joint):
-        joints = [plant.get_joint(index).name() for index in plant.GetJointIndices()]
+    if not plant.HasJointNamed(parameters.drive.joint) or not plant.GetJointByName(parameters.drive.joint).num_velocities():
+        joints = [joint.name() for joint in map(plant.get_joint, plant.GetJointIndices()) if joint.num_velocities()]
         raise input_error(
-            f"no joint '{parameters.drive.joint}'{nearest_names(parameters.drive.joint, joints)}", key="drive.joint"
+            f"no moving joint '{parameters.drive.joint}'{nearest_names(parameters.drive.joint, joints)}", key="drive.joint"
         )
     if missing:
         raise input_error(f"SDF '{parameters.model}' has no {' and no '.join(missing)}", key="model")
@@ -99,9 +99,10 @@ def frame_problems(plant: MultibodyPlant, parameters: MachineParameters) -> list
             problems.append(Problem("", key, f"no frame '{frame}' in the SDF{nearest_names(frame, known)}"))
         elif not fixed_to(plant, body, frame):
             problems.append(Problem("", key, f"frame '{frame}' is not fixed to the {body}"))
-    links = [plant.get_body(index).name() for index in plant.GetBodyIndices(plant.GetBodyByName("tub").model_instance())]
+    moving = [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]
+    links = [body.name() for body in moving]
     problems += [
-        Problem("", f"bodies.{name}", f"no link '{name}' in the SDF{nearest_names(name, links)}")
+        Problem("", f"bodies.{name}", f"no moving link '{name}' in the SDF{nearest_names(name, links)}")
         for name in parameters.bodies
         if name not in links
     ]

@@ -39,6 +39,8 @@ def input_error(message: str, *, where: str = "", key: str = "") -> InputError:
 def nearest_names(name: str, known: Iterable[str]) -> str:
     """`` (did you mean 'x'? known: x, y, z)``: the nearest known name, and all of them while they are few."""
     names = sorted(known)
+    if not names:
+        return " (there are none)"
     close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f"did you mean '{close[0]}'? " if close else ""
     if len(names) <= 24 or not close:

@@ -25,6 +25,9 @@ OUTPUT_PERIOD = 5e-3
 EQUILIBRIUM_TOLERANCE = 1e-9
 """Largest force [N] or moment [N m] that may remain at the rest pose."""
 
+SHORTEST_STRUT = 1e-3
+"""Springs and dampers shorter than this when drawn have no direction to speak of. [m]"""
+
 _FARTHEST_REST_POSITION = 0.02
 _FARTHEST_REST_ANGLE = np.deg2rad(3.0)
 
@@ -158,10 +161,14 @@ class Machine:
         plant_context = self.plant.GetMyContextFromRoot(context)
 
         def residual(pose: FloatArray) -> FloatArray:
+            if not np.all(np.abs(pose) < 10.0):  # a step of the root solver into nowhere, which Drake would abort on
+                return np.full(6, 1e9)
             self.plant.SetPositions(plant_context, np.append(pose, 0.0))
             return self.elastic_and_gravity_force(context)
 
         pose = np.zeros(6)
+        if not np.all(np.isfinite(residual(pose))):
+            raise input_error("forces at rest are not finite numbers; some mass, stiffness or distance is out of all bounds")
         if np.max(np.abs(residual(pose))) > EQUILIBRIUM_TOLERANCE:
             pose = np.asarray(root(residual, pose, tol=1e-15).x)
         remains = residual(pose)
@@ -172,8 +179,7 @@ class Machine:
             raise input_error(
                 "the springs cannot hold the empty machine near its drawn pose: there remain force "
                 f"({f_x:.3g}, {f_y:.3g}, {f_z:.3g}) N and moment ({m_x:.3g}, {m_y:.3g}, {m_z:.3g}) N m; "
-                "move hooks or masses so that they balance",
-                key="springs",
+                "move hooks or masses so that they balance"
             )
         return pose, remains
 
@@ -266,12 +272,24 @@ def _ends(plant: MultibodyPlant, context: Context, element: Any) -> tuple[FloatA
     return _point(plant, context, "tub", element.tub_frame), _point(plant, context, "world", element.housing_frame)
 
 
+def _strut_ends(plant: MultibodyPlant, context: Context, element: Any, key: str) -> tuple[FloatArray, FloatArray]:
+    """Ends of an element that acts along the line between them."""
+    tub_end, housing_end = _ends(plant, context, element)
+    if not np.linalg.norm(tub_end - housing_end) > SHORTEST_STRUT:
+        raise input_error(
+            f"frames '{element.tub_frame}' and '{element.housing_frame}' are at the same place: it has no line", key=key
+        )
+    return tub_end, housing_end
+
+
 def _placed_springs(
     plant: MultibodyPlant, context: Context, parameters: MachineParameters, preloads: dict[str, float]
 ) -> dict[str, SpringStrutParameters]:
     return {
         name: SpringStrutParameters(
-            *_ends(plant, context, spring), preloads[name], packed_stiffness(parameters.spring_types[spring.type].stiffness)
+            *_strut_ends(plant, context, spring, f"springs.{name}"),
+            preloads[name],
+            packed_stiffness(parameters.spring_types[spring.type].stiffness),
         )
         for name, spring in parameters.springs.items()
     }
@@ -283,7 +301,8 @@ def _placed_dampers(
     placed = {}
     for name, damper in parameters.dampers.items():
         kind = parameters.damper_types[damper.type]
-        placed[name] = FrictionDamperParameters(*_ends(plant, context, damper), kind.end_bushing, packed_damper_law(kind))
+        ends = _strut_ends(plant, context, damper, f"dampers.{name}")
+        placed[name] = FrictionDamperParameters(*ends, kind.end_bushing, packed_damper_law(kind))
     return placed
 
 

@@ -96,7 +96,7 @@ def largest_motion(record: Record) -> tuple[FloatArray, FloatArray]:
     size = abs(record.displacement).max("sensor")
     moment = float(record.time[int(size.argmax("time"))])
     stretch = record.sel(time=slice(moment - REPLAY_SPAN / 2, moment + REPLAY_SPAN / 2))
-    period = float(record.time[1] - record.time[0])
+    period = float(record.time[1] - record.time[0]) if record.sizes["time"] > 1 else 1.0 / REPLAY_RATE
     frames = stretch.isel(time=slice(None, None, max(1, round(1.0 / (REPLAY_RATE * period)))))
     positions = np.column_stack([frames.tub_angle.values, frames.tub_position.values, frames.drum_angle.values])
     return frames.time.values, positions

@@ -2,6 +2,7 @@
 
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field, StringConstraints, ValidationInfo, field_validator, model_validator
 
 from wm_drake.errors import nearest_names
@@ -22,6 +23,19 @@ class InertiaMatrix(Frozen):
     xy: u.Inertia = 0.0
     xz: u.Inertia = 0.0
     yz: u.Inertia = 0.0
+
+    @model_validator(mode="after")
+    def _physical(self) -> "InertiaMatrix":
+        matrix = [[self.xx, self.xy, self.xz], [self.xy, self.yy, self.yz], [self.xz, self.yz, self.zz]]
+        smallest, middle, largest = np.linalg.eigvalsh(matrix)
+        if smallest <= 0.0:
+            raise ValueError(f"is not positive definite: principal moments {smallest:g}, {middle:g}, {largest:g} kg m^2")
+        if smallest + middle < largest * (1.0 - 1e-12):
+            raise ValueError(
+                f"belongs to no body: of the principal moments {smallest:g}, {middle:g}, {largest:g} kg m^2 the largest must "
+                "not exceed the sum of the others"
+            )
+        return self
 
 
 class BodyOverride(Frozen):
