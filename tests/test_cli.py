@@ -58,7 +58,7 @@ FAULTY_MACHINES = {
     "empty profile": (in_machine("profile: {steps: []}"), "profile: is empty"),
     "times that fall": (in_machine("profile: {time: '(0, 2, 1) s', speed: '(0, 1, 2) rpm'}"), "times must rise"),
     "missing measured table": (in_machine("measured: [nosuch.csv]"), "measured: cannot be read as CSV"),
-    "springs out of balance": (in_machine("springs: {left: null}"), "springs: the springs cannot hold"),
+    "springs out of balance": (in_machine("springs: {left: null}"), "the springs cannot hold"),
 }
 
 FAULTY_SPINS = {

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem_
+from pydrake.systems.primitives import Demultiplexer, Integrator
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.laws.compilation import law
@@ -20,7 +21,7 @@ from wm_drake.parameters.elements import (
     HavsinDamper,
     StvDamper,
 )
-from wm_drake.systems.element import SCALARS, ForceElement
+from wm_drake.systems.element import GENERALIZED_FORCE_SIZE, SCALARS, ForceElement
 
 
 def packed_damper_law(damper: DamperType) -> FloatArray:
@@ -95,18 +96,15 @@ def friction_damper_history(states, own_states, p, forces):
         evaluate_friction_damper(states[i], own_states[i], p, generalized_force, forces[i], rate)
 
 
-@TemplateSystem.define("FrictionDamper_", T_list=SCALARS)
-def FrictionDamper_(T: type) -> Any:
-    """Template of FrictionDamper."""
+@TemplateSystem.define("DamperForce_", T_list=SCALARS)
+def DamperForce_(T: type) -> Any:
+    """Template of DamperForce."""
 
-    class FrictionDamper(ForceElement, LeafSystem_[T]):
-        """A friction damper of any law, with bushings at its ends; laws `damper_response`, `bending_moment`.
+    class DamperForce(ForceElement, LeafSystem_[T]):
+        """Force of a damper strut with bushings at its ends; laws `damper_response`, `bending_moment`.
 
-            plant_state (14) ──▶ [ FrictionDamper ] ──▶ generalized_force (7) [N m, N]
-                                  state: sponge     ──▶ force (1) tension, > 0 pulls its ends together [N]
-                                  deformation [m]
-
-        Laws without a sponge have no state.
+        plant_state (14) ──▶ [ DamperForce ] ──▶ generalized_force (7) [N m, N], and the rate (1) of the state [m/s]
+        state (1) [m]    ──▶                 ──▶ force (1) tension, > 0 pulls its ends together [N]
         """
 
         def _construct(self, parameters: FloatArray, state_size: int, converter: Any = None) -> None:
@@ -116,13 +114,42 @@ def FrictionDamper_(T: type) -> Any:
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._construct(self, other.packed, other.state_size, converter=converter)
 
-        def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
-            """Drake's hook for the rate of the sponge deformation."""
-            if self.state_size:
-                self.calc_rate(context, derivatives)
-
-    Impl = FrictionDamper
-    return FrictionDamper
+    Impl = DamperForce
+    return DamperForce
 
 
-FrictionDamper = FrictionDamper_[None]
+DamperForce = DamperForce_[None]
+
+
+class FrictionDamper(Diagram):
+    """A friction damper of any law; where it has a sponge, the sponge's deformation is its continuous state.
+
+    plant_state (14) ──▶ [ FrictionDamper        ] ──▶ generalized_force (7) [N m, N]
+                         [ force ──▶ rate        ] ──▶ force (1) tension, > 0 pulls its ends together [N]
+                         [   ◀── sponge (state)  ] ──▶ state (1) deformation, only with a sponge [m]
+    """
+
+    def __init__(self, parameters: FloatArray, state_size: int) -> None:
+        """Builds the damper from packed parameters; `state_size` is 1 for a law with a sponge, else 0."""
+        super().__init__()
+        builder = DiagramBuilder()
+        self._force = builder.AddNamedSystem("force", DamperForce(parameters, state_size))
+        self.state_size = state_size
+        builder.ExportInput(self._force.GetInputPort("plant_state"), "plant_state")
+        if state_size:
+            split = builder.AddNamedSystem("split", Demultiplexer([GENERALIZED_FORCE_SIZE, state_size]))
+            sponge = builder.AddNamedSystem("sponge", Integrator(state_size))
+            builder.Connect(self._force.GetOutputPort("generalized_force_and_rate"), split.get_input_port())
+            builder.Connect(split.get_output_port(1), sponge.get_input_port())
+            builder.Connect(sponge.get_output_port(), self._force.GetInputPort("state"))
+            builder.ExportOutput(split.get_output_port(0), "generalized_force")
+            builder.ExportOutput(self._force.GetOutputPort("force"), "force")
+            builder.ExportOutput(sponge.get_output_port(), "state")
+        else:
+            builder.ExportOutput(self._force.GetOutputPort("generalized_force"), "generalized_force")
+            builder.ExportOutput(self._force.GetOutputPort("force"), "force")
+        builder.BuildInto(self)
+
+    def set_parameters(self, context: Any, parameters: FloatArray) -> None:
+        """Puts packed parameters into the damper's Context; as `ForceElement.set_parameters`."""
+        self._force.set_parameters(self.GetMutableSubsystemContext(self._force, context), parameters, self.get_name())
