@@ -15,6 +15,7 @@ import pytest
 from wm_drake import load_record
 from wm_drake.cli import main
 from wm_drake.outputs import result_folder
+from wm_drake.parameters import load_machine
 
 SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
 PROFILE = "time: (0, 2) s\nspeed: (0, 100) rpm\n"
@@ -58,7 +59,7 @@ FAULTY_MACHINES = {
     "empty profile": (in_machine("profile: {steps: []}"), "profile: is empty"),
     "times that fall": (in_machine("profile: {time: '(0, 2, 1) s', speed: '(0, 1, 2) rpm'}"), "times must rise"),
     "missing measured table": (in_machine("measured: [nosuch.csv]"), "measured: cannot be read as CSV"),
-    "springs out of balance": (in_machine("springs: {left: null}"), "the springs cannot hold"),
+    "spring that would push": (in_machine("frames: {spring_left_housing: {position: '(-600, -100, 350) mm'}}"), "springs.left: would be pushed, not pulled"),
 }
 
 FAULTY_SPINS = {
@@ -356,7 +357,9 @@ def test_set_changes_the_result_and_is_recorded(wm_drake, plain):
 
 
 def test_load_file_equals_the_same_load_of_the_machine(wm_drake, plain):
-    Path("towels.yaml").write_text("unbalances: [{mass: 1 kg, radius: 249 mm, y: -32 mm, phase: 0 deg}]\n")
+    one = load_machine("reference").loads["middle"].unbalances[0]
+    place = f"radius: {1e3 * one.radius:g} mm, y: {1e3 * one.y:g} mm"
+    Path("towels.yaml").write_text(f"unbalances: [{{mass: 1 kg, {place}, phase: 0 deg}}]\n")
     _, printed = spin(wm_drake, load="towels.yaml")
     (case,) = printed["cases"]
     assert case["load"] == "towels"

@@ -197,8 +197,8 @@ def test_moving_the_world_moves_the_machine_with_it(reference):
     shifted = Load(unbalances=(Unbalance(mass=0.7, radius=0.25, y=-0.1 + shift[1]),))
     there = simulate(build_machine(moved), Case("one", shifted, profile))
     here = simulate(setup.machine, Case("one", base, profile))
-    np.testing.assert_allclose(there.displacement, here.displacement, atol=1e-9)
-    np.testing.assert_allclose(there.bushing_force, here.bushing_force, atol=1e-5)
+    np.testing.assert_allclose(there.displacement, here.displacement, atol=1e-8)  # m; rounding, grown at friction's corners
+    np.testing.assert_allclose(there.bushing_force, here.bushing_force, atol=1e-4)  # N
     assert float(np.abs(here.displacement).max()) > 1e-3
 
 

@@ -59,8 +59,9 @@ def _pauses(begin: float, end: float) -> list[float]:
 
 def _logged(setup: Setup, profile: SpinProfile, failure: str) -> Trajectory:
     logs = {name: sink.FindLog(setup.context) for name, sink in setup.machine.logs.items()}
-    time = np.array(logs["bodies"].sample_times())
-    columns = {name: np.array(log.data()).T for name, log in logs.items()}
+    count = min(log.num_samples() for log in logs.values())  # a run that failed may have ended between two logs
+    time = np.array(logs["bodies"].sample_times()[:count])
+    columns = {name: np.array(log.data()).T[:count] for name, log in logs.items()}
     # the drive's torque is what its reflected inertia does not take up: J alpha - J vdot
     segment = np.clip(np.searchsorted(profile.time, time, side="right") - 1, 0, len(profile.time) - 2)
     torque = REFLECTED_INERTIA * (np.array(profile.acceleration())[segment] - columns["acceleration"][:, 6])

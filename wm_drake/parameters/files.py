@@ -219,12 +219,17 @@ def _validated(model: type[Model], plain: Any, path: Path) -> Model:
     try:
         return model.model_validate(plain, context={"units_required": True})
     except ValidationError as error:
-        raise located(InputError(problems_of(error, model)), path) from None
+        raise InputError(replace(p, where=_place(path, p.key)) for p in problems_of(error, model)) from None
 
 
 def located(error: InputError, path: Path) -> InputError:
-    """The same problems with the file and line where they stand: in the machine file, or in one that it extends."""
-    return InputError(replace(p, where=p.where or _place(path, p.key)) for p in error.problems)
+    """The same problems, that showed when the machine was built, with the file the user gave and its line if it has one."""
+    tree = _read_yaml(path)
+    problems = []
+    for problem in error.problems:
+        depth, line = _line_of(tree, problem.key)
+        problems.append(replace(problem, where=problem.where or (f"{path}:{line}" if depth else str(path))))
+    return InputError(problems)
 
 
 def _place(path: Path, key: str) -> str:
