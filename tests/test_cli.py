@@ -59,7 +59,10 @@ FAULTY_MACHINES = {
     "empty profile": (in_machine("profile: {steps: []}"), "profile: is empty"),
     "times that fall": (in_machine("profile: {time: '(0, 2, 1) s', speed: '(0, 1, 2) rpm'}"), "times must rise"),
     "missing measured table": (in_machine("measured: [nosuch.csv]"), "measured: cannot be read as CSV"),
-    "spring that would push": (in_machine("frames: {spring_left_housing: {position: '(-600, -100, 350) mm'}}"), "springs.left: would be pushed, not pulled"),
+    "spring that would push": (
+        in_machine("frames: {spring_left_housing: {position: '(-600, -100, 350) mm'}}"),
+        "springs.left: would be pushed, not pulled",
+    ),
 }
 
 FAULTY_SPINS = {
