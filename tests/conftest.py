@@ -7,6 +7,7 @@ import pytest
 from hypothesis import settings
 
 from wm_drake.cli import main
+from wm_drake.machine import build_machine
 from wm_drake.parameters import load_machine
 
 settings.register_profile("same_every_time", derandomize=True, deadline=None, database=None)
@@ -17,6 +18,12 @@ settings.load_profile("same_every_time")
 def reference():
     """The shipped reference machine; frozen, so that tests may share it."""
     return load_machine("reference")
+
+
+@pytest.fixture(scope="session")
+def machine(reference):
+    """The reference machine, built; every test sets up a Context of its own."""
+    return build_machine(reference)
 
 
 @dataclass(frozen=True)

@@ -423,3 +423,14 @@ def test_help_does_not_wait_for_drake(tmp_path):
     code = "import sys, wm_drake.cli; print('pydrake' in sys.modules, 'matplotlib' in sys.modules)"
     ended = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert ended.stdout == "False False\n"
+
+
+def test_interrupt_says_so_and_leaves_nothing(wm_drake, monkeypatch):
+    def interrupted(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("wm_drake.studies.spin.run_spin", interrupted)
+    ended = wm_drake("spin", "--out", "out")
+    assert ended.code == 130
+    assert "interrupted; nothing was written" in ended.err
+    assert list(Path().iterdir()) == []

@@ -6,19 +6,9 @@ from scipy.linalg import eigh
 
 from wm_drake.errors import InputError
 from wm_drake.machine import EQUILIBRIUM_TOLERANCE, build_machine
-from wm_drake.parameters import Load, Unbalance, load_machine, with_value
+from wm_drake.parameters import Load, Unbalance, with_value
 from wm_drake.studies.modal import natural_modes
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
-
-
-@pytest.fixture(scope="module")
-def reference():
-    return load_machine("reference")
-
-
-@pytest.fixture(scope="module")
-def machine(reference):
-    return build_machine(reference)
 
 
 def test_rest_pose_is_a_static_equilibrium(machine):

@@ -8,21 +8,11 @@ from pydrake.systems.analysis import Simulator
 from wm_drake.errors import InputError
 from wm_drake.machine import build_machine
 from wm_drake.measures import measure
-from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, load_machine, with_value
+from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, with_value
 from wm_drake.simulation import Case, DivergenceWarning, case_of, load_record, save_record, simulate
 
 RPM = np.pi / 30.0
 FAST_RUN_UP = SpinProfile(time=(0.0, 8.0, 9.0), speed=(0.0, 280 * RPM, 280 * RPM))
-
-
-@pytest.fixture(scope="module")
-def reference():
-    return load_machine("reference")
-
-
-@pytest.fixture(scope="module")
-def machine(reference):
-    return build_machine(reference)
 
 
 @pytest.fixture(scope="module")

@@ -102,9 +102,13 @@ def spin(
     parameters = _load(machine, sets)
     cases = _cases(parameters, load, not no_gasket, profile)
     _check_buildable(machine, parameters)
-    with result_folder(out) as folder:
-        result = _run(parameters, cases, engine)
-        _write(result, folder, replay)
+    try:
+        with result_folder(out) as folder:
+            result = _run(parameters, cases, engine)
+            _write(result, folder, replay)
+    except KeyboardInterrupt:
+        typer.echo("interrupted; nothing was written", err=True)
+        raise typer.Exit(130) from None
     diverged = [f"{r.case.name}: {r.record.attrs['diverged']}" for r in result.results if r.record.attrs["diverged"]]
     if as_json:
         typer.echo(json.dumps(_as_json(result)))
