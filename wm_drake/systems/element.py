@@ -66,6 +66,10 @@ class ForceElement:
             raise ValueError(f"{name}: a table has another number of points than the built machine's; build a new one")
         context.get_mutable_numeric_parameter(self.parameter_index).SetFromVector(parameters)
 
+    def handles(self, context: Any) -> list[Any]:
+        """Python's handles of the element's Context and parameters: while they are held, callbacks need not make new ones."""
+        return [context, context.get_numeric_parameter(self.parameter_index)]
+
 
 def _callbacks(
     scalar: type, run: Callable[..., None], state_port: Any, own_state_port: Any, index: int, sizes: tuple[int, int]

@@ -153,3 +153,7 @@ class FrictionDamper(Diagram):
     def set_parameters(self, context: Any, parameters: FloatArray) -> None:
         """Puts packed parameters into the damper's Context; as `ForceElement.set_parameters`."""
         self._force.set_parameters(self.GetMutableSubsystemContext(self._force, context), parameters, self.get_name())
+
+    def handles(self, context: Any) -> list[Any]:
+        """As `ForceElement.handles`, of the force inside."""
+        return self._force.handles(self.GetSubsystemContext(self._force, context))
