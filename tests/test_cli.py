@@ -426,7 +426,7 @@ def test_help_does_not_wait_for_drake(tmp_path):
 
 
 def test_interrupt_says_so_and_leaves_nothing(wm_drake, monkeypatch):
-    def interrupted(*arguments, **options):
+    def interrupted(*_, **__):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("wm_drake.studies.spin.run_spin", interrupted)

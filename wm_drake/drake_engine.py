@@ -35,8 +35,8 @@ def run_drake(setup: Setup, profile: SpinProfile, step: float, progress: Callabl
     ResetIntegratorFromFlags(simulator, "runge_kutta3", step).set_fixed_step_mode(True)
     source_context = machine.source.GetMyContextFromRoot(context)
     machine.source.set_acceleration(source_context, profile.acceleration()[0])
+    _held = machine.handles(context)  # until this function returns
     failure = ""
-    held = machine.handles(context)
     try:
         simulator.Initialize()
         for begin, end, acceleration in zip(profile.time, profile.time[1:], profile.acceleration(), strict=False):
@@ -49,8 +49,6 @@ def run_drake(setup: Setup, profile: SpinProfile, step: float, progress: Callabl
         simulator.AdvancePendingEvents()
     except RuntimeError as error:  # Drake refuses a state that is not a number
         failure = str(error).splitlines()[0]
-    finally:
-        del held
     return _logged(setup, profile, failure)
 
 
