@@ -34,6 +34,17 @@ case = wm.Case("middle", loads["middle"], SpinProfile(time=(0.0, 2.0), speed=(0.
 """
 
 
+def test_the_example_of_an_own_machine_is_in_order(tmp_path):
+    example = re.search(r"```yaml\n(.*?)\n```", README, re.DOTALL)[1]
+    path = tmp_path / "mine.yaml"
+    path.write_text(example)
+    mine = load_machine(path)
+    setup = build_machine(mine).set_up(mine.loads["towel"])
+    assert setup.plant_context is not None
+    assert mine.bodies["upper_counterweight"].mass == 11.0
+    assert max(abs(setup.residual)) < 1e-9
+
+
 def test_every_file_named_in_the_reading_order_exists():
     root = Path(__file__).parents[1]
     for name in re.findall(r"`((?:wm_drake|sdf|tests|analyses)/[\w/.]*)`", README):
