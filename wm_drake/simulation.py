@@ -110,49 +110,20 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
 
     Displacements are from the rest pose of the empty machine, in W.
     """
-    rpy, position = trajectory.state[:, 0:3], trajectory.state[:, 3:6]
-    sensor_axes = [AXES.index(sensor.axis) for sensor in setup.sensors.values()]
-    sensors = [
-        point_displacement(trajectory.state, point, setup.rest_pose)[:, axis]
-        for point, axis in zip(setup.sensor_points.values(), sensor_axes, strict=True)
-    ]
-    detergent = point_displacement(trajectory.state, setup.detergent_point, setup.rest_pose)
-    springs, dampers, bushings = element_forces(setup, trajectory)
     variables = {
-        "tub_angle": (("time", "angle"), rpy, "rad", "roll, pitch, yaw of T in W (3-2-1 Euler angles)"),
-        "tub_position": (("time", "axis"), position, "m", "position of To in W"),
-        "tub_angular_velocity": (("time", "axis"), trajectory.state[:, 7:10], "rad/s", "angular velocity of T in W"),
-        "tub_velocity": (("time", "axis"), trajectory.state[:, 10:13], "m/s", "velocity of To in W"),
-        "drum_angle": (("time",), trajectory.state[:, 6], "rad", "angle of the drum against the tub"),
-        "drum_speed": (("time",), trajectory.state[:, 13], "rad/s", "speed of the drum against the tub"),
-        "motor_torque": (("time",), trajectory.motor_torque, "N m", "torque of the motor on the drum"),
-        "displacement": (("time", "sensor"), np.stack(sensors, axis=1), "m", "displacement at the sensors, along their axes"),
-        "detergent_displacement": (("time", "axis"), detergent, "m", "displacement of the point nearest the detergent box"),
-        "sensor_point": (("sensor", "axis"), np.stack(list(setup.sensor_points.values())), "m", "points of the sensors in T"),
-        "spring_tension": (("time", "spring"), springs, "N", "spring tension"),
-        "damper_tension": (("time", "damper"), dampers, "N", "damper tension"),
-        "damper_deformation": (("time", "damper"), trajectory.deformation, "m", "deformation of the damper's sponge"),
-        "bushing_force": (("time", "bushing", "axis"), bushings[:, :, :3], "N", "force of gasket and bushings on the housing"),
-        "bushing_moment": (
-            ("time", "bushing", "axis"),
-            bushings[:, :, 3:],
-            "N m",
-            "moment of gasket and bushings on the housing",
-        ),
+        name: (dims, values, {"units": unit, "long_name": text})
+        for name, (dims, values, unit, text) in {**_motion(setup, trajectory), **_forces(setup, trajectory)}.items()
     }
-    record = xr.Dataset(
-        {name: (dims, values, {"units": unit, "long_name": text}) for name, (dims, values, unit, text) in variables.items()},
-        {
-            "time": ("time", trajectory.time, {"units": "s"}),
-            "axis": list(AXES),
-            "angle": list(COORDINATES[:3]),
-            "sensor": list(setup.sensors),
-            "spring": list(setup.springs),
-            "damper": list(setup.dampers),
-            "bushing": list(setup.bushings),
-        },
-    )
-    record.attrs = {
+    labels = {
+        "time": ("time", trajectory.time, {"units": "s"}),
+        "axis": list(AXES),
+        "angle": list(COORDINATES[:3]),
+        "sensor": list(setup.sensors),
+        "spring": list(setup.springs),
+        "damper": list(setup.dampers),
+        "bushing": list(setup.bushings),
+    }
+    attributes = {
         "machine": setup.parameters.name,
         "load": case.name,
         "gasket": "yes" if case.gasket and "gasket" in setup.bushings else "no",
@@ -161,9 +132,45 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
         "load_parameters": case.load.model_dump_json(),
         "profile": case.profile.model_dump_json(),
         "diverged": _divergence_text(trajectory),
-        **{f"version_{name}": version for name, version in versions().items()},
     }
-    return record
+    attributes |= {f"version_{name}": version for name, version in versions().items()}
+    return xr.Dataset(variables, labels, attributes)
+
+
+_Variables: TypeAlias = dict[str, tuple[tuple[str, ...], FloatArray, str, str]]
+"""By name: dimensions, values, unit, what it is."""
+
+
+def _motion(setup: Setup, trajectory: Trajectory) -> _Variables:
+    state = trajectory.state
+    axes = [AXES.index(sensor.axis) for sensor in setup.sensors.values()]
+    points = list(setup.sensor_points.values())
+    moved = [point_displacement(state, point, setup.rest_pose)[:, axis] for point, axis in zip(points, axes, strict=True)]
+    detergent = point_displacement(state, setup.detergent_point, setup.rest_pose)
+    return {
+        "tub_angle": (("time", "angle"), state[:, 0:3], "rad", "roll, pitch, yaw of T in W (3-2-1 Euler angles)"),
+        "tub_position": (("time", "axis"), state[:, 3:6], "m", "position of To in W"),
+        "tub_angular_velocity": (("time", "axis"), state[:, 7:10], "rad/s", "angular velocity of T in W"),
+        "tub_velocity": (("time", "axis"), state[:, 10:13], "m/s", "velocity of To in W"),
+        "drum_angle": (("time",), state[:, 6], "rad", "angle of the drum against the tub"),
+        "drum_speed": (("time",), state[:, 13], "rad/s", "speed of the drum against the tub"),
+        "displacement": (("time", "sensor"), np.stack(moved, axis=1), "m", "displacement at the sensors, along their axes"),
+        "sensor_point": (("sensor", "axis"), np.stack(points), "m", "points of the sensors in T"),
+        "detergent_displacement": (("time", "axis"), detergent, "m", "displacement of the point nearest the detergent box"),
+        "damper_deformation": (("time", "damper"), trajectory.deformation, "m", "deformation of the damper's sponge"),
+    }
+
+
+def _forces(setup: Setup, trajectory: Trajectory) -> _Variables:
+    springs, dampers, bushings = element_forces(setup, trajectory)
+    dims = ("time", "bushing", "axis")
+    return {
+        "motor_torque": (("time",), trajectory.motor_torque, "N m", "torque of the motor on the drum"),
+        "spring_tension": (("time", "spring"), springs, "N", "spring tension"),
+        "damper_tension": (("time", "damper"), dampers, "N", "damper tension"),
+        "bushing_force": (dims, bushings[:, :, :3], "N", "force of gasket and bushings on the housing"),
+        "bushing_moment": (dims, bushings[:, :, 3:], "N m", "moment of gasket and bushings on the housing"),
+    }
 
 
 def element_forces(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -6,8 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from wm_drake.laws.strut import bending_moment, strut_line, transverse_couple, tub_arm, wrench_at_origin
-from wm_drake.laws.vectors import rotation_from_rpy
+from wm_drake.laws.strut import bending_moment, strut_line, transverse_couple, wrench_at_origin
 
 ZERO = (0.0, 0.0, 0.0)
 K, C, P, V_T = 12.0, 0.3, 0.9, 0.5  # N m/rad, N m s/rad, N m, rad/s
@@ -119,8 +118,3 @@ def test_transverse_couple_balances_the_moments_on_the_strut(direction, m_tub, m
 def test_wrench_at_origin_is_moment_about_to_then_force():
     arm, force, moment = (0.1, 0.2, -0.3), (5.0, -7.0, 11.0), (0.5, 0.6, 0.7)  # m, N, N m
     assert wrench_at_origin(arm, force, moment) == pytest.approx((*(np.cross(arm, force) + moment), *force))
-
-
-def test_tub_arm_turns_with_the_tub():
-    quarter = rotation_from_rpy(0.0, 0.0, np.pi / 2)  # yaw: x to y
-    assert tub_arm(quarter, (0.3, 0.1, 0.2)) == pytest.approx((-0.1, 0.3, 0.2))

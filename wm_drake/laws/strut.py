@@ -4,7 +4,7 @@ import numpy as np
 
 from wm_drake.laws.compilation import law
 from wm_drake.laws.friction import havsin_friction
-from wm_drake.laws.vectors import add, angle_over_sine, cross, dot, rotate, scale, subtract
+from wm_drake.laws.vectors import add, angle_over_sine, cross, dot, scale, subtract
 
 
 @law
@@ -75,9 +75,3 @@ def wrench_at_origin(arm, force, moment):
     """Moment about To and force, as six numbers, of a force at `arm` from To and a moment."""
     m = add(cross(arm, force), moment)
     return (m[0], m[1], m[2], force[0], force[1], force[2])
-
-
-@law
-def tub_arm(r, p):
-    """Vector from To to a point of the tub, in W."""
-    return rotate(r, p)
