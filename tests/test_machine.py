@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
+from wm_drake.bodies import sdf_path
 from wm_drake.errors import InputError
 from wm_drake.machine import EQUILIBRIUM_TOLERANCE, build_machine
-from wm_drake.parameters import Load, Unbalance, with_value
+from wm_drake.parameters import Load, Unbalance, load_machine, with_value
 from wm_drake.studies.modal import natural_modes
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
@@ -134,3 +135,17 @@ def test_drum_is_locked_to_its_speed_by_the_reflected_inertia(machine):
     mass = machine.plant.CalcMassMatrix(setup.plant_context)
     assert mass[6, 6] == pytest.approx(REFLECTED_INERTIA, rel=1e-6)
     assert np.max(np.abs(mass[6, :6])) < 1.0  # nothing of it reaches the tub
+
+
+@pytest.mark.parametrize("effort", ["0", "10"])
+def test_a_model_of_ones_own_must_not_clamp_the_motor(tmp_path, effort):
+    text = sdf_path("oscillating_group.sdf").read_text()
+    limit = f"<limit><effort>{effort}</effort><lower>"
+    assert "<limit><lower>" in text
+    (tmp_path / "own.sdf").write_text(text.replace("<limit><lower>", limit))
+    (tmp_path / "free.sdf").write_text(text)
+    for model in ("own", "free"):
+        (tmp_path / f"{model}.yaml").write_text(f"extends: reference\nmodel: {model}.sdf\n")
+    with pytest.raises(InputError, match="without <effort>"):
+        build_machine(load_machine(tmp_path / "own.yaml"))
+    assert np.max(np.abs(build_machine(load_machine(tmp_path / "free.yaml")).set_up().residual)) < 1e-9

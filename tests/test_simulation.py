@@ -119,19 +119,18 @@ def test_error_controlled_integration_agrees(machine, reference):
     assert final[6] == pytest.approx(record.drum_angle.values[-1], abs=1e-6)
 
 
-def mirrored(parameters: MachineParameters) -> MachineParameters:
-    """The machine seen in a mirror x -> -x: every frame and centre of mass changes side. Its numbers stay."""
+def redrawn(parameters: MachineParameters, move) -> MachineParameters:
+    """The machine with every frame and centre of mass moved by a function of its position. Its numbers stay."""
     setup = build_machine(parameters).set_up()
     plant, context = setup.machine.plant, setup.plant_context
     tree = parameters.model_dump()
     for index in plant.GetFrameIndices(plant.GetBodyByName("tub").model_instance()):
         frame = plant.get_frame(index)
         if frame.name().startswith(("spring_", "damper_", "gasket_", "sensor_", "detergent_")):
-            x, y, z = frame.CalcPoseInBodyFrame(context).translation()
-            tree["frames"][frame.name()] = {"position": (-x, y, z)}
+            tree["frames"][frame.name()] = {"position": tuple(move(frame.CalcPoseInBodyFrame(context).translation()))}
     for name in ("tub", "drum", "motor", "upper_counterweight", "front_counterweight_left", "front_counterweight_right"):
-        x, y, z = plant.GetBodyByName(name).CalcCenterOfMassInBodyFrame(context)
-        tree["bodies"][name] = {"centre_of_mass": (-x, y, z)}
+        centre = plant.GetBodyByName(name).CalcCenterOfMassInBodyFrame(context)
+        tree["bodies"][name] = {"centre_of_mass": tuple(move(centre))}
     return MachineParameters.model_validate(tree)
 
 
@@ -141,7 +140,9 @@ def test_mirrored_machine_moves_as_the_mirror_image(machine, reference):
     load = Load(unbalances=(Unbalance(mass=0.7, radius=0.25, y=-0.1, phase=0.4),))
     image = Load(unbalances=(Unbalance(mass=0.7, radius=0.25, y=-0.1, phase=-0.4),))
     record = simulate(machine, Case("one", load, profile))
-    reflected = simulate(build_machine(mirrored(reference)), Case("one", image, backwards))
+    reflected = simulate(
+        build_machine(redrawn(reference, lambda p: p * np.array([-1.0, 1.0, 1.0]))), Case("one", image, backwards)
+    )
     np.testing.assert_allclose(reflected.tub_position, record.tub_position * np.array([-1, 1, 1]), atol=1e-9)
     np.testing.assert_allclose(reflected.tub_angle, record.tub_angle * np.array([1, -1, -1]), atol=1e-9)
     assert np.max(np.abs(record.tub_position.sel(axis="x"))) > 1e-3
@@ -165,28 +166,18 @@ def test_phase_shift_of_the_load_is_a_shift_of_the_start_angle(machine):
     assert float(np.abs(turned.displacement).max()) > 1e-4
 
 
-def test_moving_the_world_moves_the_machine_with_it(reference):
+def test_moving_the_world_moves_the_machine_with_it(machine, reference):
     """Galilean: the same machine drawn elsewhere in the tub's own frame gives the same displacements.
 
     Every frame and centre of mass is shifted along y by the same amount, tub and housing alike; so is the load.
     """
     shift = np.array([0.0, 0.07, 0.0])
-    setup = build_machine(reference).set_up()
-    plant, context = setup.machine.plant, setup.plant_context
-    tree = reference.model_dump()
-    for index in plant.GetFrameIndices(plant.GetBodyByName("tub").model_instance()):
-        frame = plant.get_frame(index)
-        if frame.name().startswith(("spring_", "damper_", "gasket_", "sensor_", "detergent_")):
-            tree["frames"][frame.name()] = {"position": tuple(frame.CalcPoseInBodyFrame(context).translation() + shift)}
-    for name in ("tub", "drum", "motor", "upper_counterweight", "front_counterweight_left", "front_counterweight_right"):
-        centre = plant.GetBodyByName(name).CalcCenterOfMassInBodyFrame(context)
-        tree["bodies"][name] = {"centre_of_mass": tuple(centre + shift)}
-    moved = MachineParameters.model_validate(tree)
+    moved = redrawn(reference, lambda p: p + shift)
     profile = SpinProfile(time=(0.0, 4.0), speed=(0.0, 24.0))
     base = Load(unbalances=(Unbalance(mass=0.7, radius=0.25, y=-0.1),))
     shifted = Load(unbalances=(Unbalance(mass=0.7, radius=0.25, y=-0.1 + shift[1]),))
     there = simulate(build_machine(moved), Case("one", shifted, profile))
-    here = simulate(setup.machine, Case("one", base, profile))
+    here = simulate(machine, Case("one", base, profile))
     np.testing.assert_allclose(there.displacement, here.displacement, atol=1e-8)  # m; rounding, grown at friction's corners
     np.testing.assert_allclose(there.bushing_force, here.bushing_force, atol=1e-4)  # N
     assert float(np.abs(here.displacement).max()) > 1e-3

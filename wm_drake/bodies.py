@@ -8,7 +8,14 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, RotationalInertia, RpyFloatingJoint, SpatialInertia, UnitInertia
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    JointActuator,
+    RotationalInertia,
+    RpyFloatingJoint,
+    SpatialInertia,
+    UnitInertia,
+)
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.parameters import BodyOverride, Load, MachineParameters
@@ -53,12 +60,23 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
         raise input_error(f"SDF '{parameters.model}' has no {' and no '.join(missing)}", key="model")
     tub = plant.GetBodyByName("tub")
     plant.AddJoint(RpyFloatingJoint("tub_floating", plant.world_frame(), tub.body_frame()))
-    actuator = plant.get_joint_actuator(plant.GetJointActuatorIndices()[0])
+    actuator = _drive_actuator(plant, parameters.drive.joint)
     actuator.set_default_rotor_inertia(REFLECTED_INERTIA)
     actuator.set_default_gear_ratio(1.0)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -parameters.gravity])
     plant.Finalize()
     _check_freedoms(plant, parameters)
+
+
+def _drive_actuator(plant: MultibodyPlant, joint_name: str) -> JointActuator:
+    """The actuator that the parser gave the drive's joint; it gives one to every moving joint without an effort limit of 0."""
+    actuators = [plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices()]
+    if [actuator.joint().name() for actuator in actuators] != [joint_name] or np.isfinite(actuators[0].effort_limit()):
+        raise input_error(
+            f"joint '{joint_name}' must be the only driven one, and without <effort>, which would clamp the motor",
+            key="drive.joint",
+        )
+    return actuators[0]
 
 
 def _check_freedoms(plant: MultibodyPlant, parameters: MachineParameters) -> None:

@@ -50,13 +50,8 @@ def main() -> None:
 @machine_app.command("check")
 def machine_check(file: Annotated[str, typer.Argument(metavar="NAME|FILE")]) -> None:
     """Check a machine file: exit 0, or 2 with one line per problem."""
-    from wm_drake.machine import build_machine
-    from wm_drake.parameters import measured_amplitudes
-
     parameters = _load(file, None)
-    with _located(file):
-        measured_amplitudes(parameters)
-        build_machine(parameters).set_up()
+    _check_buildable(file, parameters)
     typer.echo(f"{file}: machine '{parameters.name}' is in order")
 
 
@@ -175,7 +170,7 @@ def _existing(path: Path, option: str) -> Path:
 
 
 def _check_buildable(file: str, parameters: "MachineParameters") -> None:
-    """Finds the faults that show only in the built machine before any work is begun."""
+    """Finds the faults that show only in the built machine."""
     from wm_drake.machine import build_machine
     from wm_drake.parameters import measured_amplitudes
 

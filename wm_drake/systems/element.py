@@ -88,9 +88,11 @@ def _callbacks(
     own_state = own_state_port.Eval if own_state_port is not None else lambda context: no_state
 
     def numbers(context: Any) -> np.ndarray:
-        values = context.get_numeric_parameter(index).CopyToVector()
+        parameters = context.get_numeric_parameter(index)
+        if scalar is float:
+            return np.asarray(parameters.value())
         # a law needs plain numbers to walk its packed tables; derivatives are by state
-        return values if scalar is float else np.array([value.value() for value in values])
+        return np.array([value.value() for value in parameters.CopyToVector()])
 
     def calc_generalized_force(context: Any, output: Any) -> None:
         run(plant_state(context), own_state(context), numbers(context), generalized_force, force, rate)
@@ -101,17 +103,10 @@ def _callbacks(
         output.SetFromVector(force)
 
     def calc_stateless_force(context: Any, output: Any) -> None:
-        numbers = context.get_numeric_parameter(index).value()
-        run(plant_state(context), no_state, numbers, output.get_mutable_value(), force, no_state)
+        run(plant_state(context), no_state, numbers(context), output.get_mutable_value(), force, no_state)
 
-    def calc_stateful_force(context: Any, output: Any) -> None:
-        numbers = context.get_numeric_parameter(index).value()
-        run(plant_state(context), own_state(context), numbers, generalized_force, force, rate)
-        output.SetFromVector(both)
-
-    if scalar is float:
-        return calc_stateful_force if state_size else calc_stateless_force, calc_force
-    return calc_generalized_force, calc_force
+    in_place = scalar is float and not state_size
+    return calc_stateless_force if in_place else calc_generalized_force, calc_force
 
 
 __all__ = ["GENERALIZED_FORCE_SIZE", "PLANT_STATE_SIZE", "SCALARS", "ForceElement", "evaluator"]
