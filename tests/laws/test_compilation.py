@@ -10,6 +10,7 @@ from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoD
 import wm_drake
 from wm_drake.laws import bushing, compilation, damper, friction, spring, strut, table, vectors
 from wm_drake.laws.compilation import generic
+from wm_drake.laws.motion import TubMotion
 from wm_drake.parameters.elements import ForceTable, packed_stiffness
 
 CURVE = ForceTable(displacement=(-0.02, -0.008, 0.008, 0.02), force=(-90.0, 0.0, 0.0, 120.0)).packed()  # m, N
@@ -59,7 +60,7 @@ LAWS = {
     "strut_line": (
         12,
         strut.strut_line,
-        lambda f, x: f(three(x, 0), three(x, 3), three(x, 6), three(x, 9), (0.3, -0.2, 3.0)),
+        lambda f, x: f(TubMotion((), three(x, 3), three(x, 6), three(x, 9)), three(x, 0), (0.3, -0.2, 3.0)),
     ),
     "bending_moment": (
         12,

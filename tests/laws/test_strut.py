@@ -6,6 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from wm_drake.laws.motion import TubMotion
 from wm_drake.laws.strut import bending_moment, strut_line, transverse_couple, wrench_at_origin
 
 ZERO = (0.0, 0.0, 0.0)
@@ -30,7 +31,7 @@ def angle_between(a, b):
 def test_strut_line_gives_length_direction_and_their_rates():
     arm, p_WT, p_WH = np.array([0.2, -0.1, -0.25]), np.array([0.01, -0.02, 0.03]), np.array([0.3, -0.1, -0.6])  # m
     w, v = np.array([0.3, -0.2, 0.5]), np.array([0.4, 0.1, -0.3])  # rad/s, m/s
-    length, rate, direction, v_A = strut_line(*map(tuple, (arm, p_WT, w, v, p_WH)))
+    length, rate, direction, v_A = strut_line(TubMotion((), tuple(p_WT), tuple(w), tuple(v)), tuple(arm), tuple(p_WH))
     line = p_WT + arm - p_WH
     assert length == pytest.approx(np.linalg.norm(line))
     assert direction == pytest.approx(line / np.linalg.norm(line))

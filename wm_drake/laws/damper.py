@@ -14,9 +14,8 @@ Packed parameters, by law:
     FREE_STROKE  f_max, c_m, epsilon, p_b, v_b, then the packed sponge curve
 """
 
-import numpy as np
-
 from wm_drake.laws.compilation import law
+from wm_drake.laws.elementary import sqrt, where
 from wm_drake.laws.friction import coulomb_friction, havsin_friction, stv_friction
 from wm_drake.laws.table import stiffness_force
 
@@ -56,29 +55,27 @@ def slider_rate(b, v, c, f_max, c_m, epsilon):
     Returns:
         Slider velocity w = X'. [m/s] Its sensitivity to b is at most 1/c: the damper is no stiffer than k1/c.
     """
-    sign = 1.0 if b >= 0.0 else -1.0
+    sign = where(b >= 0.0, 1.0, -1.0)
     b = sign * b
     v = sign * v
     e = abs(v) + epsilon
-    if v > 0.0:
-        stick = positive_root(c_m - c, c * e + f_max + b, b * e)
-        if stick <= 0.5 * v:
-            return sign * stick
-        slip = (b - f_max) / (c + c_m)
-        return sign * (slip if slip > 0.5 * v else 0.5 * v)
-    return sign * positive_root(c_m + c, c * e + f_max - b, b * e)
+    along = where(v > 0.0, 1.0, -1.0)
+    stick = positive_root(c_m - along * c, c * e + f_max + along * b, b * e)
+    slip = (b - f_max) / (c + c_m)
+    half = 0.5 * v
+    slips = (v > 0.0) & (stick > half)
+    return sign * where(slips, where(slip > half, slip, half), stick)
 
 
 @law
 def positive_root(a2, a1, a0):
     """Positive root of a2 w^2 + a1 w - a0 = 0 for a0 >= 0, without cancellation (smaller one if a2 < 0 < a1)."""
     radicand = a1 * a1 + 4.0 * a2 * a0
-    if radicand <= 0.0:  # no friction, no force: at rest; the root of zero has no derivative
-        return 0.0 * a1
-    root = np.sqrt(radicand)
-    if a1 > 0.0:
-        return 2.0 * a0 / (a1 + root)
-    return (root - a1) / (2.0 * a2)
+    free = radicand <= 0.0  # no friction, no force: at rest; the root of zero has no derivative
+    root = sqrt(where(free, 1.0, radicand))
+    rises = a1 > 0.0
+    w = where(rises, 2.0 * a0, root - a1) / where(rises, a1 + root, 2.0 * a2)
+    return where(free, 0.0 * a1, w)
 
 
 @law

@@ -7,6 +7,7 @@ Reversing all velocities reverses the force. Misprints of the papers are correct
 import numpy as np
 
 from wm_drake.laws.compilation import law
+from wm_drake.laws.elementary import anywhere, sine_over_angle, sqrt, where
 
 
 @law
@@ -22,11 +23,7 @@ def coulomb_friction(v, f_max):
     Returns:
         Force on the slider. [N]
     """
-    if v > 0.0:
-        return -f_max + 0.0 * v
-    if v < 0.0:
-        return f_max + 0.0 * v
-    return 0.0 * v
+    return where(v > 0.0, -f_max + 0.0 * v, where(v < 0.0, f_max + 0.0 * v, 0.0 * v))
 
 
 @law
@@ -43,9 +40,7 @@ def stv_friction(v, v_st, f_max):
     Returns:
         Force on the slider. [N]
     """
-    if abs(v) < v_st:
-        return -f_max * v / v_st
-    return coulomb_friction(v, f_max)
+    return where(abs(v) < v_st, -f_max * v / v_st, coulomb_friction(v, f_max))
 
 
 @law
@@ -65,9 +60,29 @@ def havsin_friction(v, v_t, p):
     Returns:
         Force or torque on the slider. [N or N m] Odd in v, never does positive work, |f| <= p.
     """
-    if abs(v) < v_t:
-        return -p * np.sin(0.5 * np.pi * v / v_t)
-    return coulomb_friction(v, p)
+    x = (0.5 * np.pi) * (v / v_t)
+    return where(abs(v) < v_t, -p * (x * sine_over_angle(x * x)), coulomb_friction(v, p))
+
+
+@law
+def havsin_friction_per_rate(rate_squared, v_t, p):
+    """f / v of `havsin_friction`, which multiplied with a vector of velocity or rate gives friction against it.
+
+    Smooth at rest, where it is -pi p / (2 v_t).
+
+    Args:
+        rate_squared: Square of the magnitude of the vector. [m^2/s^2 or rad^2/s^2]
+        v_t, p: As for `havsin_friction`.
+
+    Returns:
+        Force or torque per rate, <= 0. [N s/m or N m s]
+    """
+    slope = (0.5 * np.pi) / v_t
+    per_rate = -p * slope * sine_over_angle(slope * slope * rate_squared)
+    full = rate_squared >= v_t * v_t
+    if anywhere(full):
+        per_rate = where(full, -p / sqrt(rate_squared), per_rate)
+    return per_rate
 
 
 @law
@@ -92,6 +107,4 @@ def mstv_friction(w, u, f_max, c_m, epsilon):
         Force on the slider. [N]
     """
     g = f_max + c_m * abs(w)
-    if abs(w) >= abs(u):
-        return coulomb_friction(w, g)
-    return -g * w / (abs(u) + epsilon)
+    return where(abs(w) >= abs(u), coulomb_friction(w, g), -g * w / (abs(u) + epsilon))

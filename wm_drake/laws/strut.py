@@ -1,30 +1,27 @@
 """Geometry of a massless strut between the tub and the housing, and the bushings at its ends."""
 
-import numpy as np
-
 from wm_drake.laws.compilation import law
-from wm_drake.laws.friction import havsin_friction
+from wm_drake.laws.elementary import sqrt
+from wm_drake.laws.friction import havsin_friction_per_rate
 from wm_drake.laws.vectors import add, angle_over_sine, cross, dot, scale, subtract
 
 
 @law
-def strut_line(arm, p_WT, w, v, p_WH):
+def strut_line(motion, arm, p_WH):
     """Length, elongation rate and direction of a strut.
 
     Args:
+        motion: `TubMotion`.
         arm: From To to the tub end A, in W: R_WT p_ToA_T. [m]
-        p_WT: Position of To. [m]
-        w: Angular velocity of the tub, in W. [rad/s]
-        v: Velocity of To, in W. [m/s]
         p_WH: Housing end H. [m]
 
     Returns:
         Length |HA| [m], its rate [m/s], unit vector from H to A, and the velocity of A [m/s].
     """
-    line = subtract(add(p_WT, arm), p_WH)
-    length = np.sqrt(dot(line, line))
+    line = subtract(add(motion.position, arm), p_WH)
+    length = sqrt(dot(line, line))
     direction = scale(1.0 / length, line)
-    v_A = add(v, cross(w, arm))
+    v_A = add(motion.velocity, cross(motion.angular_velocity, arm))
     return length, dot(direction, v_A), direction, v_A
 
 
@@ -52,12 +49,7 @@ def bending_moment(direction, w_strut, axis, w_body, k, c, p, v_t):
     angle = scale(angle_over_sine(dot(sines, sines), dot(axis, direction)), sines)
     relative = subtract(w_strut, w_body)
     rate = subtract(relative, scale(dot(relative, direction), direction))
-    speed_squared = dot(rate, rate)
-    if speed_squared > 1e-16 * v_t * v_t:
-        speed = np.sqrt(speed_squared)
-        friction = havsin_friction(speed, v_t, p) / speed
-    else:
-        friction = -0.5 * np.pi * p / v_t + 0.0 * speed_squared
+    friction = havsin_friction_per_rate(dot(rate, rate), v_t, p)
     return add(scale(-k, angle), scale(friction - c, rate))
 
 

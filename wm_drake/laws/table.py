@@ -6,6 +6,7 @@ points, their ordinates and the slopes there. The slopes come from scipy's PCHIP
 """
 
 from wm_drake.laws.compilation import law
+from wm_drake.laws.elementary import where
 
 
 @law
@@ -29,16 +30,19 @@ def stiffness_force(x, packed, at):
     xs = at + 1
     ys = xs + n
     ms = ys + n
-    if x <= packed[xs]:
-        return packed[ys] + packed[ms] * (x - packed[xs])
-    if x >= packed[xs + n - 1]:
-        return packed[ys + n - 1] + packed[ms + n - 1] * (x - packed[xs + n - 1])
-    i = 0
-    while x > packed[xs + i + 1]:
-        i += 1
-    return hermite(
-        x, packed[xs + i], packed[xs + i + 1], packed[ys + i], packed[ys + i + 1], packed[ms + i], packed[ms + i + 1]
-    )
+    last = n - 1
+    x0, x1 = packed[xs], packed[xs + 1]
+    y0, y1 = packed[ys], packed[ys + 1]
+    m0, m1 = packed[ms], packed[ms + 1]
+    for i in range(1, last):
+        beyond = x > packed[xs + i]
+        x0, x1 = where(beyond, packed[xs + i], x0), where(beyond, packed[xs + i + 1], x1)
+        y0, y1 = where(beyond, packed[ys + i], y0), where(beyond, packed[ys + i + 1], y1)
+        m0, m1 = where(beyond, packed[ms + i], m0), where(beyond, packed[ms + i + 1], m1)
+    inside = hermite(x, x0, x1, y0, y1, m0, m1)
+    before = y0 + m0 * (x - x0)  # on the first and last piece, where these are the table's ends
+    after = y1 + m1 * (x - x1)
+    return where(x <= packed[xs], before, where(x >= packed[xs + last], after, inside))
 
 
 @law

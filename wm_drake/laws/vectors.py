@@ -1,8 +1,7 @@
 """Vectors of three and rotations of nine scalars as tuples: they stay in registers when compiled, and take any scalar."""
 
-import numpy as np
-
 from wm_drake.laws.compilation import law
+from wm_drake.laws.elementary import angle_of, anywhere, sine_cosine, sqrt, where
 
 
 @law
@@ -73,9 +72,9 @@ def transpose(r):
 @law
 def rotation_from_rpy(roll, pitch, yaw):
     """Rotation R_WT of space-fixed roll-pitch-yaw = 3-2-1 Euler angles of [B]: Rz(yaw) Ry(pitch) Rx(roll). [rad]"""
-    sr, cr = np.sin(roll), np.cos(roll)
-    sp, cp = np.sin(pitch), np.cos(pitch)
-    sy, cy = np.sin(yaw), np.cos(yaw)
+    sr, cr = sine_cosine(roll)
+    sp, cp = sine_cosine(pitch)
+    sy, cy = sine_cosine(yaw)
     return (
         cy * cp,
         cy * sp * sr - sy * cr,
@@ -93,13 +92,21 @@ def rotation_from_rpy(roll, pitch, yaw):
 def angle_over_sine(sine_squared, cosine):
     """theta / sin(theta) for 0 <= theta < pi, from sin^2 and cos; smooth at zero.
 
-    The series serves up to sin^2 = 1e-4, where its next term is below 1e-16.
+    The series (of the arcsine) serves up to sin^2 = 1e-2, where its next term is below 1e-17.
     """
-    if sine_squared < 1e-4 and cosine > 0.0:
-        s = sine_squared
-        return 1.0 + s * (1.0 / 6.0 + s * (3.0 / 40.0 + s * (15.0 / 336.0)))
-    sine = np.sqrt(sine_squared)
-    return np.arctan2(sine, cosine) / sine
+    s = sine_squared
+    ratio = 143.0 / 10240.0
+    ratio = 231.0 / 13312.0 + s * ratio
+    ratio = 63.0 / 2816.0 + s * ratio
+    ratio = 35.0 / 1152.0 + s * ratio
+    ratio = 5.0 / 112.0 + s * ratio
+    ratio = 3.0 / 40.0 + s * ratio
+    ratio = 1.0 + s * (1.0 / 6.0 + s * ratio)
+    large = (s >= 1e-2) | (cosine <= 0.0)
+    if anywhere(large):
+        sine = sqrt(s)
+        ratio = where(large, angle_of(sine, cosine) / sine, ratio)
+    return ratio
 
 
 @law
@@ -117,10 +124,13 @@ def rotation_vector_coefficient(angle_squared):
     (1 - (theta/2) cot(theta/2)) / theta^2; its series 1/12 + theta^2/720 + ... below 0.1 rad, exact to 1e-13 there.
     """
     s = angle_squared
-    if s < 1e-2:
-        return 1.0 / 12.0 + s * (1.0 / 720.0 + s * (1.0 / 30240.0 + s / 1209600.0))
-    half = 0.5 * np.sqrt(s)
-    return (1.0 - half * np.cos(half) / np.sin(half)) / s
+    coefficient = 1.0 / 12.0 + s * (1.0 / 720.0 + s * (1.0 / 30240.0 + s * (1.0 / 1209600.0)))
+    large = s >= 1e-2
+    if anywhere(large):
+        half = 0.5 * sqrt(s)
+        sine, cosine = sine_cosine(half)
+        coefficient = where(large, (1.0 - half * cosine / sine) / s, coefficient)
+    return coefficient
 
 
 @law

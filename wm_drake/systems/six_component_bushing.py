@@ -9,8 +9,9 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.laws.bushing import bushing_force
 from wm_drake.laws.compilation import law
+from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.strut import wrench_at_origin
-from wm_drake.laws.vectors import add, compose, cross, rotate, rotate_back, rotation_from_rpy, rotation_vector, scale, subtract
+from wm_drake.laws.vectors import add, compose, cross, rotate, rotate_back, rotation_vector, scale, subtract
 from wm_drake.laws.vectors import transpose as transposed
 from wm_drake.parameters.elements import Bushing, FloatArray, packed_stiffness
 from wm_drake.systems.element import SCALARS, ForceElement
@@ -43,26 +44,46 @@ class SixComponentBushingParameters:
 
 
 @law
+def six_component_bushing_wrench(motion, p, at):
+    """Moment about To and force on the tub (six numbers, W) of a bushing, and its force and moment on the housing (six, G).
+
+    Args:
+        motion: `TubMotion`.
+        p, at: Array that holds what `SixComponentBushingParameters.packed` gives, and where that begins.
+    """
+    r_tub = nine(p, at + 3)
+    r_ground = nine(p, at + 15)
+    arm = rotate(motion.rotation, (p[at], p[at + 1], p[at + 2]))
+    displaced = subtract(add(motion.position, arm), (p[at + 12], p[at + 13], p[at + 14]))
+    v_B = add(motion.velocity, cross(motion.angular_velocity, arm))
+    relative = compose(transposed(r_ground), compose(motion.rotation, r_tub))
+    f, m = bushing_force(
+        rotate_back(r_ground, displaced),
+        rotate_back(r_ground, v_B),
+        rotation_vector(relative),
+        rotate_back(r_ground, motion.angular_velocity),
+        p,
+        at + 25,
+    )
+    f = scale(p[at + 24], f)
+    m = scale(p[at + 24], m)
+    return wrench_at_origin(arm, rotate(r_ground, f), rotate(r_ground, m)), (-f[0], -f[1], -f[2], -m[0], -m[1], -m[2])
+
+
+@law
+def nine(p, at):
+    """A rotation by rows, from where it begins in an array."""
+    return (p[at], p[at + 1], p[at + 2], p[at + 3], p[at + 4], p[at + 5], p[at + 6], p[at + 7], p[at + 8])
+
+
+@law
 def evaluate_six_component_bushing(x, state, p, generalized_force, force, rate):
     """Force of a bushing; arguments as in `ForceElement`, parameters as in `SixComponentBushingParameters.packed`."""
-    rotation = rotation_from_rpy(x[0], x[1], x[2])
-    w = (x[7], x[8], x[9])
-    r_tub = (p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11])
-    r_ground = (p[15], p[16], p[17], p[18], p[19], p[20], p[21], p[22], p[23])
-    arm = rotate(rotation, (p[0], p[1], p[2]))
-    d = rotate_back(r_ground, subtract(add((x[3], x[4], x[5]), arm), (p[12], p[13], p[14])))
-    d_rate = rotate_back(r_ground, add((x[10], x[11], x[12]), cross(w, arm)))
-    relative = compose(transposed(r_ground), compose(rotation, r_tub))
-    f, m = bushing_force(d, d_rate, rotation_vector(relative), rotate_back(r_ground, w), p, 25)
-    f = scale(p[24], f)
-    m = scale(p[24], m)
-    wrench = wrench_at_origin(arm, rotate(r_ground, f), rotate(r_ground, m))
+    wrench, on_housing = six_component_bushing_wrench(tub_motion(x), p, 0)
     for i in range(6):
         generalized_force[i] = wrench[i]
-    generalized_force[6] = 0.0 * f[0]
-    for i in range(3):
-        force[i] = -f[i]
-        force[3 + i] = -m[i]
+        force[i] = on_housing[i]
+    generalized_force[6] = 0.0 * wrench[0]
 
 
 @law

@@ -8,9 +8,10 @@ from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.laws.compilation import law
+from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.spring import spring_tension
 from wm_drake.laws.strut import strut_line, wrench_at_origin
-from wm_drake.laws.vectors import rotate, rotation_from_rpy, scale
+from wm_drake.laws.vectors import rotate, scale
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.systems.element import SCALARS, ForceElement
 
@@ -35,16 +36,26 @@ class SpringStrutParameters:
 
 
 @law
+def spring_strut_wrench(motion, p, at):
+    """Moment about To and force on the tub (six numbers, W), and tension, of a spring strut.
+
+    Args:
+        motion: `TubMotion`.
+        p, at: Array that holds what `SpringStrutParameters.packed` gives, and where that begins.
+    """
+    arm = rotate(motion.rotation, (p[at], p[at + 1], p[at + 2]))
+    length, _, direction, _ = strut_line(motion, arm, (p[at + 3], p[at + 4], p[at + 5]))
+    tension = spring_tension(length, p[at + 6], p[at + 7], p, at + 8)
+    return wrench_at_origin(arm, scale(-tension, direction), (0.0, 0.0, 0.0)), tension
+
+
+@law
 def evaluate_spring_strut(x, state, p, generalized_force, force, rate):
     """Force of a spring strut; arguments as in `ForceElement`, parameters as in `SpringStrutParameters.packed`."""
-    arm = rotate(rotation_from_rpy(x[0], x[1], x[2]), (p[0], p[1], p[2]))
-    length, _, direction, _ = strut_line(arm, (x[3], x[4], x[5]), (x[7], x[8], x[9]), (x[10], x[11], x[12]), (p[3], p[4], p[5]))
-    tension = spring_tension(length, p[6], p[7], p, 8)
-    zero = 0.0 * tension
-    wrench = wrench_at_origin(arm, scale(-tension, direction), (zero, zero, zero))
+    wrench, tension = spring_strut_wrench(tub_motion(x), p, 0)
     for i in range(6):
         generalized_force[i] = wrench[i]
-    generalized_force[6] = zero
+    generalized_force[6] = 0.0 * tension
     force[0] = tension
 
 

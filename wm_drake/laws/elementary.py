@@ -1,0 +1,131 @@
+"""What laws are written with where plain Python would branch or call the C library: it works on any scalar.
+
+Floats, lanes of several runs (`wm_drake.laws.lanes`) and automatic differentiation alike. Compiled, sine and cosine are
+polynomials without a branch, to the last bit or two of the C library's, so that lanes can carry them and every machine
+gives the same digits; interpreted, they are numpy's.
+"""
+
+import numpy as np
+from numba.extending import overload
+
+from wm_drake.laws.compilation import law
+from wm_drake.laws.lanes import LanesType, MaskType, lanes_any, lanes_floor, lanes_select, lanes_sqrt
+
+
+def where(condition, a, b):
+    """`a` where the condition holds, else `b`. Both are computed; what is not chosen may be no number."""
+    return a if condition else b
+
+
+@overload(where)
+def _compiled_where(condition, a, b):
+    if isinstance(condition, MaskType):
+        return lambda condition, a, b: lanes_select(condition, a, b)
+    return lambda condition, a, b: a if condition else b
+
+
+def anywhere(condition):
+    """Whether the condition holds for some lane: guards a costly alternative between which `where` then chooses."""
+    return condition
+
+
+@overload(anywhere)
+def _compiled_anywhere(condition):
+    if isinstance(condition, MaskType):
+        return lambda condition: lanes_any(condition)
+    return lambda condition: condition
+
+
+def sqrt(x):
+    """Square root; NaN below zero."""
+    return np.sqrt(x)
+
+
+@overload(sqrt)
+def _compiled_sqrt(x):
+    if isinstance(x, LanesType):
+        return lambda x: lanes_sqrt(x)
+    return lambda x: np.sqrt(x)
+
+
+def floor(x):
+    """Largest whole number not above x, as a float."""
+    return np.floor(x)
+
+
+@overload(floor)
+def _compiled_floor(x):
+    if isinstance(x, LanesType):
+        return lambda x: lanes_floor(x)
+    return lambda x: np.floor(x)
+
+
+def sine_cosine(x):
+    """Sine and cosine of an angle, |x| < 1e5. [rad]"""
+    return np.sin(x), np.cos(x)
+
+
+@overload(sine_cosine)
+def _compiled_sine_cosine(x):
+    return _polynomial_sine_cosine
+
+
+def _polynomial_sine_cosine(x):
+    """Reduction to a quarter turn about zero in three parts, then minimax polynomials [Cephes library, sin.c]."""
+    turns = floor(x * (2.0 / np.pi) + 0.5)
+    r = ((x - turns * 1.57079625129699707031) - turns * 7.54978941586159635336e-8) - turns * 5.39030285815811905290e-15
+    z = r * r
+    s = 1.58962301576546568060e-10 * z - 2.50507477628578072866e-8
+    s = ((s * z + 2.75573136213857245213e-6) * z - 1.98412698295895385996e-4) * z + 8.33333333332211858878e-3
+    s = r + r * z * (s * z - 1.66666666666666307295e-1)
+    c = -1.13585365213876817300e-11 * z + 2.08757008419747316778e-9
+    c = ((c * z - 2.75573141792967388112e-7) * z + 2.48015872888517045348e-5) * z - 1.38888888888730564116e-3
+    c = 1.0 - 0.5 * z + z * z * (c * z + 4.16666666666665929218e-2)
+    quarter = turns - 4.0 * floor(0.25 * turns)
+    odd = turns - 2.0 * floor(0.5 * turns) > 0.5
+    sine = where(odd, c, s)
+    cosine = where(odd, s, c)
+    return where(quarter > 1.5, -sine, sine), where((quarter > 0.5) & (quarter < 2.5), -cosine, cosine)
+
+
+def angle_of(sine, cosine):
+    """Angle between 0 and pi from its sine, >= 0, and cosine. [rad]"""
+    return np.arctan2(sine, cosine)
+
+
+@overload(angle_of)
+def _compiled_angle_of(sine, cosine):
+    return _rational_angle_of
+
+
+def _rational_angle_of(sine, cosine):
+    """Reduction to tangents below 0.66, then a minimax fraction [Cephes library, atan.c]."""
+    size = abs(cosine)
+    steep = sine > size
+    t = where(steep, size, sine) / where(steep, sine, size)
+    high = t > 0.66
+    x = where(high, (t - 1.0) / (t + 1.0), t)
+    z = x * x
+    p = (-8.750608600031904122785e-1 * z - 1.615753718733365076637e1) * z - 7.500855792314704667340e1
+    p = (p * z - 1.228866684490136173410e2) * z - 6.485021904942025371773e1
+    q = ((z + 2.485846490142306297962e1) * z + 1.650270098316988542046e2) * z + 4.328810604912902668951e2
+    q = (q * z + 4.853903996359136964868e2) * z + 1.945506571482613964425e2
+    first = x + x * (z * p / q) + where(high, 0.25 * np.pi, 0.0)
+    half = where(steep, 0.5 * np.pi - first, first)
+    return where(cosine < 0.0, np.pi - half, half)
+
+
+@law
+def sine_over_angle(angle_squared):
+    """sin(x) / x from x^2, for |x| <= pi/2: the power series to x^20, where its next term is below 1e-17."""
+    z = angle_squared
+    s = 1.0 - z * (1.0 / 420.0)  # 20 * 21
+    s = 1.0 - s * z * (1.0 / 342.0)
+    s = 1.0 - s * z * (1.0 / 272.0)
+    s = 1.0 - s * z * (1.0 / 210.0)
+    s = 1.0 - s * z * (1.0 / 156.0)
+    s = 1.0 - s * z * (1.0 / 110.0)
+    s = 1.0 - s * z * (1.0 / 72.0)
+    s = 1.0 - s * z * (1.0 / 42.0)
+    s = 1.0 - s * z * (1.0 / 20.0)
+    return 1.0 - s * z * (1.0 / 6.0)
