@@ -13,6 +13,7 @@ LARGEST_ANGLE = 1.0
 """Beyond this tilt of the tub the motion is called divergent. [rad]"""
 
 COORDINATES = ("roll", "pitch", "yaw", "x", "y", "z")
+_BOUNDS = np.repeat([LARGEST_ANGLE, LARGEST_DISPLACEMENT], 3)
 
 
 @dataclass(frozen=True)
@@ -57,10 +58,12 @@ def ended_where_it_diverged(trajectory: Trajectory, failure: str = "") -> Trajec
         trajectory: As an engine sampled it.
         failure: What stopped the engine, if something did.
     """
-    for index, state in enumerate(trajectory.state):
-        reason = diverging_coordinate(state)
-        if reason is not None:
-            return _cut(trajectory, index, Divergence(float(trajectory.time[index]), *reason))
+    bad = np.flatnonzero(~np.all(np.abs(trajectory.state[:, :6]) <= _BOUNDS, axis=1))  # a NaN is not <= anything
+    if len(bad):
+        index = int(bad[0])
+        reason = diverging_coordinate(trajectory.state[index])
+        assert reason is not None  # the same question, of this sample
+        return _cut(trajectory, index, Divergence(float(trajectory.time[index]), *reason))
     if failure:  # it went from a good sample to no number at all within one output period
         last = float(trajectory.time[-1]) if len(trajectory.time) else 0.0
         return replace(trajectory, divergence=Divergence(last, "state", failure))
@@ -84,9 +87,9 @@ def diverging_coordinate(positions: FloatArray) -> tuple[str, str] | None:
         positions: roll, pitch, yaw, x, y, z, (drum angle). [rad, m]
     """
     size = np.abs(positions[:6])
-    if size[:3].max() <= LARGEST_ANGLE and size[3:].max() <= LARGEST_DISPLACEMENT:
-        return None  # a NaN is not <= anything
-    bounds = np.repeat([LARGEST_ANGLE, LARGEST_DISPLACEMENT], 3)
-    index = int(np.flatnonzero(~(size <= bounds))[0])
+    bad = np.flatnonzero(~(size <= _BOUNDS))
+    if not len(bad):
+        return None
+    index = int(bad[0])
     unit = "rad" if index < 3 else "m"
-    return COORDINATES[index], f"{COORDINATES[index]} = {positions[index]:.4g} {unit}, bound {bounds[index]:g} {unit}"
+    return COORDINATES[index], f"{COORDINATES[index]} = {positions[index]:.4g} {unit}, bound {_BOUNDS[index]:g} {unit}"

@@ -1,6 +1,7 @@
 """Six-component bushing: connecting bushing of [A], gasket of [A] and [B]."""
 
 from wm_drake.laws.compilation import law
+from wm_drake.laws.elementary import anywhere
 from wm_drake.laws.friction import havsin_friction
 from wm_drake.laws.table import packed_size, stiffness_force
 from wm_drake.laws.vectors import moment_from_rotation_vector, rotation_vector_rate
@@ -43,8 +44,14 @@ def bushing_force(d, d_rate, r, w, p, at):
         -stiffness_force(d[2], p, kz) - p[at + 2] * d_rate[2],
     )
     torque = (
-        -stiffness_force(r[0], p, tx) - p[at + 3] * r_rate[0] + havsin_friction(r_rate[0], p[at + 9], p[at + 6]),
-        -stiffness_force(r[1], p, ty) - p[at + 4] * r_rate[1] + havsin_friction(r_rate[1], p[at + 10], p[at + 7]),
-        -stiffness_force(r[2], p, tz) - p[at + 5] * r_rate[2] + havsin_friction(r_rate[2], p[at + 11], p[at + 8]),
+        -stiffness_force(r[0], p, tx) - p[at + 3] * r_rate[0],
+        -stiffness_force(r[1], p, ty) - p[at + 4] * r_rate[1],
+        -stiffness_force(r[2], p, tz) - p[at + 5] * r_rate[2],
     )
+    if anywhere((p[at + 6] > 0.0) | (p[at + 7] > 0.0) | (p[at + 8] > 0.0)):
+        torque = (
+            torque[0] + havsin_friction(r_rate[0], p[at + 9], p[at + 6]),
+            torque[1] + havsin_friction(r_rate[1], p[at + 10], p[at + 7]),
+            torque[2] + havsin_friction(r_rate[2], p[at + 11], p[at + 8]),
+        )
     return force, moment_from_rotation_vector(r, torque)

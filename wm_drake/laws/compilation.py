@@ -38,12 +38,21 @@ def _cache_folder() -> str:
 
 def law(function: Callable[..., Any]) -> Any:
     """Compiles a law for floats, with a cache on disk."""
+    return _compiled(function, error_model="numpy", forceinline=True, fastmath={"contract"})
+
+
+def long_running(function: Callable[..., Any]) -> Any:
+    """Compiles a loop that calls laws for milliseconds and more: other threads of Python go on meanwhile."""
+    return _compiled(function, error_model="numpy", nogil=True, fastmath={"contract"})
+
+
+def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     chosen_by_user = config.CACHE_DIR
     config.CACHE_DIR = _CACHE_FOLDER
     try:
-        return numba.njit(cache=True, error_model="numpy")(function)
+        return numba.njit(cache=True, **options)(function)
     except RuntimeError:  # no folder to write to: compile anew in each process
-        return numba.njit(error_model="numpy")(function)
+        return numba.njit(**options)(function)
     finally:
         config.CACHE_DIR = chosen_by_user
 

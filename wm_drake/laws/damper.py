@@ -60,22 +60,30 @@ def slider_rate(b, v, c, f_max, c_m, epsilon):
     v = sign * v
     e = abs(v) + epsilon
     along = where(v > 0.0, 1.0, -1.0)
-    stick = positive_root(c_m - along * c, c * e + f_max + along * b, b * e)
-    slip = (b - f_max) / (c + c_m)
+    a2, a1, a0 = c_m - along * c, c * e + f_max + along * b, b * e
     half = 0.5 * v
-    slips = (v > 0.0) & (stick > half)
-    return sign * where(slips, where(slip > half, slip, half), stick)
+    slips = (v > 0.0) & ((a2 * half + a1) * half < a0)  # the sticking balance has its root beyond v/2
+    above, below = root_as_quotient(a2, a1, a0)
+    w = where(slips, b - f_max, above) / where(slips, c + c_m, below)
+    return sign * where(slips & (w < half), half, w)
 
 
 @law
 def positive_root(a2, a1, a0):
     """Positive root of a2 w^2 + a1 w - a0 = 0 for a0 >= 0, without cancellation (smaller one if a2 < 0 < a1)."""
+    above, below = root_as_quotient(a2, a1, a0)
+    return above / below
+
+
+@law
+def root_as_quotient(a2, a1, a0):
+    """Numerator and denominator of `positive_root`; 0/1 where a1 and a0 are zero."""
     radicand = a1 * a1 + 4.0 * a2 * a0
     free = radicand <= 0.0  # no friction, no force: at rest; the root of zero has no derivative
     root = sqrt(where(free, 1.0, radicand))
     rises = a1 > 0.0
-    w = where(rises, 2.0 * a0, root - a1) / where(rises, a1 + root, 2.0 * a2)
-    return where(free, 0.0 * a1, w)
+    above = where(free, 0.0 * a1, where(rises, 2.0 * a0, root - a1))
+    return above, where(free, 1.0, where(rises, a1 + root, 2.0 * a2))
 
 
 @law

@@ -71,21 +71,30 @@ def _compiled_sine_cosine(x):
 
 
 def _polynomial_sine_cosine(x):
-    """Reduction to a quarter turn about zero in three parts, then minimax polynomials [Cephes library, sin.c]."""
-    turns = floor(x * (2.0 / np.pi) + 0.5)
-    r = ((x - turns * 1.57079625129699707031) - turns * 7.54978941586159635336e-8) - turns * 5.39030285815811905290e-15
+    """Reduction to a quarter turn about zero in three parts where needed, then polynomials [Cephes library, sin.c]."""
+    sine, cosine = _sine_cosine_near_zero(x)
+    if anywhere(abs(x) > 0.25 * np.pi):
+        turns = floor(x * (2.0 / np.pi) + 0.5)
+        r = ((x - turns * 1.57079625129699707031) - turns * 7.54978941586159635336e-8) - turns * 5.39030285815811905290e-15
+        s, c = _sine_cosine_near_zero(r)  # zero turns: as before
+        quarter = turns - 4.0 * floor(0.25 * turns)
+        odd = turns - 2.0 * floor(0.5 * turns) > 0.5
+        sine, cosine = where(odd, c, s), where(odd, s, c)
+        sine = where(quarter > 1.5, -sine, sine)
+        cosine = where((quarter > 0.5) & (quarter < 2.5), -cosine, cosine)
+    return sine, cosine
+
+
+@law
+def _sine_cosine_near_zero(r):
+    """Minimax polynomials for |r| <= pi/4."""
     z = r * r
     s = 1.58962301576546568060e-10 * z - 2.50507477628578072866e-8
     s = ((s * z + 2.75573136213857245213e-6) * z - 1.98412698295895385996e-4) * z + 8.33333333332211858878e-3
     s = r + r * z * (s * z - 1.66666666666666307295e-1)
     c = -1.13585365213876817300e-11 * z + 2.08757008419747316778e-9
     c = ((c * z - 2.75573141792967388112e-7) * z + 2.48015872888517045348e-5) * z - 1.38888888888730564116e-3
-    c = 1.0 - 0.5 * z + z * z * (c * z + 4.16666666666665929218e-2)
-    quarter = turns - 4.0 * floor(0.25 * turns)
-    odd = turns - 2.0 * floor(0.5 * turns) > 0.5
-    sine = where(odd, c, s)
-    cosine = where(odd, s, c)
-    return where(quarter > 1.5, -sine, sine), where((quarter > 0.5) & (quarter < 2.5), -cosine, cosine)
+    return s, 1.0 - 0.5 * z + z * z * (c * z + 4.16666666666665929218e-2)
 
 
 def angle_of(sine, cosine):
@@ -119,13 +128,13 @@ def _rational_angle_of(sine, cosine):
 def sine_over_angle(angle_squared):
     """sin(x) / x from x^2, for |x| <= pi/2: the power series to x^20, where its next term is below 1e-17."""
     z = angle_squared
-    s = 1.0 - z * (1.0 / 420.0)  # 20 * 21
-    s = 1.0 - s * z * (1.0 / 342.0)
-    s = 1.0 - s * z * (1.0 / 272.0)
-    s = 1.0 - s * z * (1.0 / 210.0)
-    s = 1.0 - s * z * (1.0 / 156.0)
-    s = 1.0 - s * z * (1.0 / 110.0)
-    s = 1.0 - s * z * (1.0 / 72.0)
-    s = 1.0 - s * z * (1.0 / 42.0)
-    s = 1.0 - s * z * (1.0 / 20.0)
-    return 1.0 - s * z * (1.0 / 6.0)
+    y = z * z  # terms of even and of odd power apart: two short chains of operations instead of a long one
+    even = 1.0 / 355687428096000.0 + y * (1.0 / 51090942171709440000.0)
+    even = 1.0 / 6227020800.0 + y * even
+    even = 1.0 / 362880.0 + y * even
+    even = 1.0 / 120.0 + y * even
+    odd = 1.0 / 1307674368000.0 + y * (1.0 / 121645100408832000.0)
+    odd = 1.0 / 39916800.0 + y * odd
+    odd = 1.0 / 5040.0 + y * odd
+    odd = 1.0 / 6.0 + y * odd
+    return (1.0 + y * even) - z * odd

@@ -165,6 +165,22 @@ def lane_array(typing_context, array):  # type: ignore[no-untyped-def]
     return LANE_ARRAY(array), emit
 
 
+@intrinsic
+def align_stack(typing_context):  # type: ignore[no-untyped-def]
+    """Makes the function that calls this keep vectors at addresses a vector load takes in one go."""
+
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        with builder.goto_entry_block():
+            slot = builder.alloca(_VECTOR)
+            slot.align = 64
+        # an address that leaves for an (empty) piece of assembly cannot be optimised away
+        kind = ir.FunctionType(ir.VoidType(), [_VECTOR.as_pointer()])
+        builder.asm(kind, "", "r", [slot], side_effect=True)
+        return ir.Constant(ir.IntType(8).as_pointer(), None)
+
+    return types.none(), emit
+
+
 def _place(builder: Any, array: Any, index: Any) -> Any:
     begin = builder.gep(array, [builder.mul(index, ir.Constant(index.type, WIDTH))])
     return builder.bitcast(begin, _VECTOR.as_pointer())

@@ -95,13 +95,10 @@ def angle_over_sine(sine_squared, cosine):
     The series (of the arcsine) serves up to sin^2 = 1e-2, where its next term is below 1e-17.
     """
     s = sine_squared
-    ratio = 143.0 / 10240.0
-    ratio = 231.0 / 13312.0 + s * ratio
-    ratio = 63.0 / 2816.0 + s * ratio
-    ratio = 35.0 / 1152.0 + s * ratio
-    ratio = 5.0 / 112.0 + s * ratio
-    ratio = 3.0 / 40.0 + s * ratio
-    ratio = 1.0 + s * (1.0 / 6.0 + s * ratio)
+    y = s * s  # terms of even and of odd power apart: two short chains of operations instead of a long one
+    even = 1.0 + y * (3.0 / 40.0 + y * (35.0 / 1152.0 + y * (231.0 / 13312.0)))
+    odd = 1.0 / 6.0 + y * (5.0 / 112.0 + y * (63.0 / 2816.0 + y * (143.0 / 10240.0)))
+    ratio = even + s * odd
     large = (s >= 1e-2) | (cosine <= 0.0)
     if anywhere(large):
         sine = sqrt(s)

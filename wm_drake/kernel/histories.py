@@ -1,0 +1,110 @@
+"""Sampled motion -> what is read off it, compiled, for one machine or for several side by side."""
+
+import numpy as np
+
+from wm_drake.kernel.mechanics import mass_properties, state_derivative
+from wm_drake.laws.compilation import law, long_running
+from wm_drake.laws.elementary import where
+from wm_drake.laws.lanes import align_stack, lane_array
+from wm_drake.laws.motion import tub_motion
+from wm_drake.laws.vectors import add, dot, rotate
+from wm_drake.systems.six_component_bushing import six_component_bushing_wrench
+from wm_drake.trajectory import LARGEST_ANGLE, LARGEST_DISPLACEMENT
+
+POINT_SIZE = 7
+"""Numbers of a measured point: its place in T, the direction in W along which it is measured, its value at rest. [m]"""
+
+
+@long_running
+def motor_torque_history(samples, acceleration, p, elements, torque):
+    """Torque of the motor on the drum at each sample. [N m]
+
+    Args:
+        samples: States, (n, size).
+        acceleration: Of the drum at each sample. [rad/s^2]
+        p, elements: As for `state_derivative`.
+        torque: (n,), written.
+    """
+    dx = np.empty(samples.shape[1])
+    for i in range(len(torque)):
+        x = samples[i]
+        masses = mass_properties(p, np.cos(x[6]), np.sin(x[6]))
+        torque[i] = state_derivative(x, dx, masses, x[13], acceleration[i], p, elements)
+
+
+@law
+def in_bounds(x):
+    """Whether a tub is where a run may go on: 1 or 0."""
+    tilted = (abs(x[0]) <= LARGEST_ANGLE) & (abs(x[1]) <= LARGEST_ANGLE) & (abs(x[2]) <= LARGEST_ANGLE)
+    displaced = (
+        (abs(x[3]) <= LARGEST_DISPLACEMENT) & (abs(x[4]) <= LARGEST_DISPLACEMENT) & (abs(x[5]) <= LARGEST_DISPLACEMENT)
+    )
+    return where(tilted & displaced, 1.0, 0.0)
+
+
+@law
+def measure_samples(samples, rows, size, p, gasket, points, count, x, moved, extremes):
+    """Displacements at measured points, and the largest values of a run up to the first sample out of bounds.
+
+    Args:
+        samples: States, one after the other.
+        rows, size: How many they are, and how many numbers each has.
+        p, gasket: Packed numbers and where the gasket begins in them, -1 without one.
+        points, count: Measured points, one after the other, and how many they are.
+        x: A state to work in.
+        moved: Displacement at each sample and point, written. [m]
+        extremes: Written: largest absolute displacement at each point [m]; largest absolute force and moment of the
+            gasket on the housing, x, y, z [N, N m]; number of samples in bounds.
+    """
+    zero = 0.0 * p[0]
+    for k in range(count + 7):
+        extremes[k] = zero
+    good = zero + 1.0
+    for row in range(rows):
+        for k in range(size):
+            x[k] = samples[row * size + k]
+        good = good * in_bounds(x)
+        motion = tub_motion(x)
+        for k in range(count):
+            at = k * POINT_SIZE
+            place = (points[at], points[at + 1], points[at + 2])
+            direction = (points[at + 3], points[at + 4], points[at + 5])
+            value = dot(direction, add(motion.position, rotate(motion.rotation, place))) - points[at + 6]
+            moved[row * count + k] = value
+            extremes[k] = larger(extremes[k], value, good)
+        if gasket >= 0:
+            _, on_housing = six_component_bushing_wrench(motion, p, gasket)
+            for k in range(6):
+                extremes[count + k] = larger(extremes[count + k], on_housing[k], good)
+        extremes[count + 6] = extremes[count + 6] + good
+
+
+@law
+def larger(largest, value, good):
+    """The largest absolute value so far, after one more, which counts if it is good."""
+    size = abs(value)
+    return where((good > 0.5) & (size > largest), size, largest)
+
+
+@long_running
+def measure_samples_alone(samples, rows, size, p, gasket, points, count, x, moved, extremes):
+    """`measure_samples` of one machine; flat arrays of floats."""
+    measure_samples(samples, rows, size, p, gasket, points, count, x, moved, extremes)
+
+
+@long_running
+def measure_samples_lanes(samples, rows, size, p, gasket, points, count, x, moved, extremes):
+    """`measure_samples` of `lanes.WIDTH` machines side by side."""
+    align_stack()
+    measure_samples(
+        lane_array(samples),
+        rows,
+        size,
+        lane_array(p),
+        gasket,
+        lane_array(points),
+        count,
+        lane_array(x),
+        lane_array(moved),
+        lane_array(extremes),
+    )

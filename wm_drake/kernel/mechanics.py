@@ -1,0 +1,192 @@
+"""Rigid-body mechanics of the compiled engine: a tub that floats, with a drum turning in it as prescribed.
+
+Own derivation; the Drake plant is its oracle (tests/kernel). All in the tub frame T, moments about a point O of the drum axis:
+
+    M a_O + w' x S + w x (w x S_t) + b x s_d + w_D x (w_D x s_d)          = F
+    S x a_O + I w' + w x (I_t w) + J_d b + w_D x (J_d w_D)                = tau
+    w_D = w + rate a,    b = acceleration a + rate (w x a),    S = S_t + s_d,    I = I_t + J_d
+
+M: total mass; S_t, s_d: first moments of tub group and drum about O; I_t, J_d: their inertias about O; a: unit vector of the
+axis, along the drum's rotation against the tub. Drum quantities follow the drum angle exactly: those of a body that
+turns about a fixed axis hold the angle's first and second harmonic and no other.
+
+Packed numbers of the bodies, from index 0 (`wm_drake.kernel.packing`): gravity vector in W [m/s^2]; M [kg]; a; position of
+O from To [m]; S_t [kg m]; I_t as xx, yy, zz, xy, xz, yz [kg m^2]; s_d, three times its mean, cosine and sine part; J_d, six
+times its mean, cosine, sine, double cosine and double sine part; damping of the drum joint [N m s/rad].
+"""
+
+from collections import namedtuple
+
+from wm_drake.laws.compilation import law
+from wm_drake.laws.elementary import sine_cosine
+from wm_drake.laws.motion import tub_motion
+from wm_drake.laws.vectors import add, cross, dot, rotate, rotate_back, scale, subtract
+from wm_drake.systems.friction_damper import friction_damper_wrench
+from wm_drake.systems.six_component_bushing import six_component_bushing_wrench
+from wm_drake.systems.spring_strut import spring_strut_wrench
+
+GRAVITY, MASS, AXIS, ORIGIN, TUB_MOMENT, TUB_INERTIA, DRUM_MOMENT, DRUM_INERTIA, JOINT_DAMPING = 0, 3, 4, 7, 10, 13, 19, 28, 58
+BODIES_SIZE = 59
+STATE_SIZE = 14
+"""As the plant's: roll, pitch, yaw, x, y, z, drum angle, w_WT, v_WTo, drum rate; the dampers' deformations follow."""
+
+MassProperties = namedtuple(  # noqa: PYI024 - numba's kind
+    "MassProperties", ("drum_moment", "drum_inertia", "moment", "inverse_inertia")
+)
+"""At one drum angle: s_d, J_d, S, and the inverse of the inertia about the common centre of mass."""
+
+
+@law
+def three(p, at):
+    """Three numbers as a vector."""
+    return (p[at], p[at + 1], p[at + 2])
+
+
+@law
+def six(p, at):
+    """Six numbers: a symmetric matrix as xx, yy, zz, xy, xz, yz."""
+    return (p[at], p[at + 1], p[at + 2], p[at + 3], p[at + 4], p[at + 5])
+
+
+@law
+def times(i, a):
+    """Symmetric matrix times vector."""
+    return (
+        i[0] * a[0] + i[3] * a[1] + i[4] * a[2],
+        i[3] * a[0] + i[1] * a[1] + i[5] * a[2],
+        i[4] * a[0] + i[5] * a[1] + i[2] * a[2],
+    )
+
+
+@law
+def inverse(i):
+    """Inverse of a symmetric matrix."""
+    xx, yy, zz = i[1] * i[2] - i[5] * i[5], i[0] * i[2] - i[4] * i[4], i[0] * i[1] - i[3] * i[3]
+    xy, xz, yz = i[4] * i[5] - i[3] * i[2], i[3] * i[5] - i[4] * i[1], i[3] * i[4] - i[5] * i[0]
+    s = 1.0 / (i[0] * xx + i[3] * xy + i[4] * xz)
+    return (s * xx, s * yy, s * zz, s * xy, s * xz, s * yz)
+
+
+@law
+def first_harmonic(p, at, c, s):
+    """mean + cosine part c + sine part s."""
+    return p[at] + p[at + 1] * c + p[at + 2] * s
+
+
+@law
+def second_harmonic(p, at, c, s):
+    """The same with the parts of the double angle."""
+    return first_harmonic(p, at, c, s) + p[at + 3] * (c * c - s * s) + p[at + 4] * (2.0 * c * s)
+
+
+@law
+def mass_properties(p, c, s):
+    """Mass properties at a drum angle of cosine c and sine s."""
+    at = DRUM_MOMENT
+    drum = (first_harmonic(p, at, c, s), first_harmonic(p, at + 3, c, s), first_harmonic(p, at + 6, c, s))
+    at = DRUM_INERTIA
+    j = (
+        second_harmonic(p, at, c, s),
+        second_harmonic(p, at + 5, c, s),
+        second_harmonic(p, at + 10, c, s),
+        second_harmonic(p, at + 15, c, s),
+        second_harmonic(p, at + 20, c, s),
+        second_harmonic(p, at + 25, c, s),
+    )
+    t = six(p, TUB_INERTIA)
+    m = add(three(p, TUB_MOMENT), drum)
+    q = 1.0 / p[MASS]
+    central = (
+        t[0] + j[0] - q * (m[1] * m[1] + m[2] * m[2]),
+        t[1] + j[1] - q * (m[0] * m[0] + m[2] * m[2]),
+        t[2] + j[2] - q * (m[0] * m[0] + m[1] * m[1]),
+        t[3] + j[3] + q * m[0] * m[1],
+        t[4] + j[4] + q * m[0] * m[2],
+        t[5] + j[5] + q * m[1] * m[2],
+    )
+    return MassProperties(drum, j, m, inverse(central))
+
+
+@law
+def accelerations(motion, masses, rate, acceleration, wrench, p):
+    """Accelerations of tub and torque of the motor under a wrench.
+
+    Args:
+        motion: `TubMotion`.
+        masses: `MassProperties` at the drum angle.
+        rate, acceleration: Of the drum against the tub. [rad/s, rad/s^2]
+        wrench: Moment about To and force of all elements on the tub, in W, without gravity. [N m, N]
+        p: Packed numbers of the bodies.
+
+    Returns:
+        Angular acceleration of the tub and acceleration of To, in W [rad/s^2, m/s^2], torque of the motor on the drum [N m].
+    """
+    a, o, tub_moment = three(p, AXIS), three(p, ORIGIN), three(p, TUB_MOMENT)
+    q = 1.0 / p[MASS]
+    gravity = rotate_back(motion.rotation, three(p, GRAVITY))
+    applied = rotate_back(motion.rotation, (wrench[3], wrench[4], wrench[5]))
+    moment = subtract(rotate_back(motion.rotation, (wrench[0], wrench[1], wrench[2])), cross(o, applied))
+    w = rotate_back(motion.rotation, motion.angular_velocity)
+    w_drum = add(w, scale(rate, a))
+    b = add(scale(acceleration, a), scale(rate, cross(w, a)))
+    drum_flow = add(cross(b, masses.drum_moment), cross(w_drum, cross(w_drum, masses.drum_moment)))
+    force = subtract(applied, add(cross(w, cross(w, tub_moment)), drum_flow))
+    gyration = add(times(masses.drum_inertia, b), cross(w_drum, times(masses.drum_inertia, w_drum)))
+    moment = subtract(moment, add(cross(w, times(six(p, TUB_INERTIA), w)), gyration))
+    # gravity acts at the common centre of mass, about which the inertia is: it turns nothing and falls out here
+    w_rate = times(masses.inverse_inertia, subtract(moment, scale(q, cross(masses.moment, force))))
+    a_O = add(gravity, scale(q, subtract(force, cross(w_rate, masses.moment))))
+    a_To = subtract(a_O, add(cross(w_rate, o), cross(w, cross(w, o))))
+    on_drum = add(gyration, add(times(masses.drum_inertia, w_rate), cross(masses.drum_moment, subtract(a_O, gravity))))
+    return rotate(motion.rotation, w_rate), rotate(motion.rotation, a_To), dot(a, on_drum) + p[JOINT_DAMPING] * rate
+
+
+@law
+def plus(a, b):
+    """Sum of two wrenches."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
+
+
+@law
+def state_derivative(x, dx, masses, rate, acceleration, p, elements):
+    """Writes the derivative of the state into `dx`.
+
+    Args:
+        x, dx: State and its derivative, laid out as `STATE_SIZE` says; x[6] and x[13] are not read.
+        masses, rate, acceleration, p: As for `accelerations`.
+        elements: Indices in p where springs, dampers and bushings begin, three arrays.
+
+    Returns:
+        Torque of the motor on the drum. [N m]
+    """
+    springs, dampers, bushings = elements
+    motion = tub_motion(x)
+    rates = rpy_rates(x)
+    zero = 0.0 * x[0]
+    total = (zero, zero, zero, zero, zero, zero)
+    for i in range(len(springs)):
+        wrench, _ = spring_strut_wrench(motion, p, springs[i])
+        total = plus(total, wrench)
+    for i in range(len(dampers)):
+        wrench, _, dx[STATE_SIZE + i] = friction_damper_wrench(motion, x[STATE_SIZE + i], p, dampers[i])
+        total = plus(total, wrench)
+    for i in range(len(bushings)):
+        wrench, _ = six_component_bushing_wrench(motion, p, bushings[i])
+        total = plus(total, wrench)
+    w_rate, v_rate, torque = accelerations(motion, masses, rate, acceleration, total, p)
+    dx[0], dx[1], dx[2] = rates
+    dx[3], dx[4], dx[5] = motion.velocity
+    dx[6] = zero + rate
+    dx[7], dx[8], dx[9] = w_rate
+    dx[10], dx[11], dx[12] = v_rate
+    dx[13] = zero + acceleration
+    return torque
+
+
+@law
+def rpy_rates(x):
+    """Rates of roll, pitch, yaw from the angular velocity in W, as Drake's RpyFloatingJoint has them. [rad/s]"""
+    s_p, c_p = sine_cosine(x[1])
+    s_y, c_y = sine_cosine(x[2])
+    roll_rate = (c_y * x[7] + s_y * x[8]) / c_p
+    return roll_rate, c_y * x[8] - s_y * x[7], x[9] + s_p * roll_rate

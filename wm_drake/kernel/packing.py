@@ -1,0 +1,140 @@
+"""Setup -> flat numbers and indices that the compiled engine runs on; everything is read from the built machine."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import BodyIndex, ForceElementIndex, RevoluteJoint, SpatialInertia
+
+from wm_drake.errors import InputError, input_error
+from wm_drake.kernel.mechanics import BODIES_SIZE
+from wm_drake.machine import Setup
+from wm_drake.parameters.elements import FloatArray
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where things begin in the packed numbers of a machine; the same for all its parameter sets.
+
+    Attributes:
+        springs, dampers, bushings: Index of each element.
+        gasket: Index of the gasket, -1 without one.
+        size: How many numbers there are.
+    """
+
+    springs: tuple[int, ...]
+    dampers: tuple[int, ...]
+    bushings: tuple[int, ...]
+    gasket: int
+    size: int
+
+    @property
+    def elements(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As compiled functions take them."""
+        return tuple(np.array(indices, dtype=np.int64) for indices in (self.springs, self.dampers, self.bushings))  # type: ignore[return-value]
+
+
+def pack(setup: Setup) -> tuple[FloatArray, Layout]:
+    """Packed numbers of a machine as it is set up, laid out as `wm_drake.kernel.mechanics` and the elements say.
+
+    Raises:
+        InputError: the machine has something that the compiled engine does not represent.
+    """
+    parts = [_packed_bodies(setup)]
+    size = BODIES_SIZE
+    indices: dict[str, tuple[int, ...]] = {}
+    for kind in ("springs", "dampers", "bushings"):
+        begins = []
+        for element in getattr(setup, kind).values():
+            begins.append(size)
+            parts.append(element.packed())
+            size += len(parts[-1])
+        indices[kind] = tuple(begins)
+    names = list(setup.bushings)
+    gasket = indices["bushings"][names.index("gasket")] if "gasket" in names else -1
+    return np.concatenate(parts), Layout(**indices, gasket=gasket, size=size)
+
+
+def _packed_bodies(setup: Setup) -> FloatArray:
+    plant, context = setup.machine.plant, setup.plant_context
+    joint = drum_joint(plant, setup.parameters.drive.joint)
+    tub = plant.GetBodyByName("tub").body_frame()
+    X_TF = plant.CalcRelativeTransform(context, tub, joint.frame_on_parent())
+    axis, origin = X_TF.rotation() @ joint.revolute_axis(), X_TF.translation()
+    tub_group, drum_group = _groups(plant, joint)
+    tub_inertia = plant.CalcSpatialInertia(context, tub, tub_group).Shift(origin)
+    drum_inertia = plant.CalcSpatialInertia(context, tub, drum_group).Shift(origin)
+    gravity = plant.gravity_field().gravity_vector()
+    mass = tub_inertia.get_mass() + drum_inertia.get_mass()
+    damping = joint.GetDampingVector(context)
+    parts = [gravity, [mass], axis, origin, _moment(tub_inertia), _six(_matrix(tub_inertia))]
+    angle = joint.get_angle(context)
+    return np.concatenate([*parts, *_drum_harmonics(drum_inertia, axis, angle), damping])
+
+
+def drum_joint(plant: MultibodyPlant, name: str) -> RevoluteJoint:
+    """The joint that the drive turns.
+
+    Raises:
+        InputError: the plant has a joint or a force that the compiled engine does not represent.
+    """
+    joint = plant.GetJointByName(name)
+    if not isinstance(joint, RevoluteJoint):
+        raise _not_represented(f"joint '{name}' is {joint.type_name()}, not revolute", "drive.joint")
+    tub = plant.GetBodiesWeldedTo(plant.GetBodyByName("tub"))
+    if not any(body.index() == joint.parent_body().index() for body in tub):
+        raise _not_represented(f"joint '{name}' has the tub as its child, not as its parent", "drive.joint")
+    if plant.num_force_elements() > 1:  # the first is gravity
+        force = plant.get_force_element(ForceElementIndex(1))
+        raise _not_represented(f"force element {type(force).__name__} of the SDF", "model")
+    return joint
+
+
+def _not_represented(what: str, key: str) -> InputError:
+    return input_error(f"the compiled engine does not represent this: {what}; use the drake engine", key=key)
+
+
+def _groups(plant: MultibodyPlant, joint: RevoluteJoint) -> tuple[list[BodyIndex], list[BodyIndex]]:
+    """Bodies that move with the tub, and with the drum."""
+    groups = [plant.GetBodiesWeldedTo(body) for body in (plant.GetBodyByName("tub"), joint.child_body())]
+    return [body.index() for body in groups[0]], [body.index() for body in groups[1]]
+
+
+def _moment(inertia: SpatialInertia) -> FloatArray:
+    """First moment about the point the inertia is about. [kg m]"""
+    return np.asarray(inertia.get_mass() * inertia.get_com())
+
+
+def _matrix(inertia: SpatialInertia) -> FloatArray:
+    return np.array(inertia.CalcRotationalInertia().CopyToFullMatrix3())
+
+
+def _six(matrix: FloatArray) -> FloatArray:
+    return matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+
+
+def _drum_harmonics(inertia: SpatialInertia, axis: FloatArray, angle: float) -> tuple[FloatArray, FloatArray]:
+    """First moment and inertia of the drum about the axis, as harmonics of the drum angle, given what they are at `angle`.
+
+    With R = A + B cos + C sin for a rotation about the axis: R s, and R J R^T with products of cosine and sine written in
+    the double angle.
+    """
+    along = np.outer(axis, axis)
+    across = np.eye(3) - along
+    turned = np.cross(axis, np.eye(3)).T  # axis x .
+    back = along + across * np.cos(angle) - turned * np.sin(angle)
+    s, j = back @ _moment(inertia), back @ _matrix(inertia) @ back.T
+    moment = np.column_stack([along @ s, across @ s, turned @ s])
+
+    def product(left: FloatArray, right: FloatArray) -> FloatArray:
+        return left @ j @ right.T
+
+    cosine_squared, sine_squared = product(across, across), product(turned, turned)
+    parts = (
+        product(along, along) + 0.5 * (cosine_squared + sine_squared),
+        product(along, across) + product(across, along),
+        product(along, turned) + product(turned, along),
+        0.5 * (cosine_squared - sine_squared),
+        0.5 * (product(across, turned) + product(turned, across)),
+    )
+    return moment.ravel(), np.column_stack([_six(part) for part in parts]).ravel()
