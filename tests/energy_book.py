@@ -5,7 +5,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from scipy.spatial.transform import Rotation
 
-from wm_drake.bodies import add_bodies, set_bodies
+from wm_drake.bodies import add_bodies, add_load, set_bodies
 from wm_drake.simulation import as_record
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 from wm_drake.trajectory import Trajectory
@@ -23,7 +23,8 @@ class EnergyBook:
         self.plant = MultibodyPlant(0.0)
         add_bodies(self.plant, self.parameters)
         self.context = self.plant.CreateDefaultContext()
-        set_bodies(self.plant, self.context, self.parameters, load)
+        set_bodies(self.plant, self.context, self.parameters)
+        add_load(self.plant, self.context, load)
         # without the drive's reflected inertia, which is a device and no energy of the machine
         actuator = self.plant.get_joint_actuator(self.plant.GetJointActuatorIndices()[0])
         actuator.SetRotorInertia(self.context, 0.0)

@@ -21,6 +21,7 @@ ORDER = (
     {"scene", "drake_engine", "compiled_engine"},
     {"simulation"},
     {"measures"},
+    {"batch"},
     {"studies"},
     {"report"},
     {"outputs"},

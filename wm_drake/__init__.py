@@ -28,6 +28,7 @@ _HOMES = {
     "run_spin": "studies.spin",
     "save_record": "simulation",
     "simulate": "simulation",
+    "simulate_many": "batch",
     "with_value": "parameters",
 }
 

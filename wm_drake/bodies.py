@@ -1,5 +1,6 @@
 """The bodies: SDF model -> MultibodyPlant, and what the machine file changes in it, set in a Context."""
 
+import functools
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -110,6 +111,14 @@ def frame_problems(plant: MultibodyPlant, parameters: MachineParameters) -> list
     ]
     wanted += [(f"sensors.{name}.frame", "tub", sensor.frame) for name, sensor in parameters.sensors.items()]
     wanted.append(("clearance.detergent_frame", "tub", parameters.clearance.detergent_frame))
+    return list(_name_problems(plant, tuple(wanted), tuple(parameters.bodies), tuple(parameters.frames)))
+
+
+@functools.lru_cache(maxsize=64)  # a study asks a thousand times with other numbers and the same names
+def _name_problems(
+    plant: MultibodyPlant, wanted: tuple[tuple[str, str, str], ...], bodies: tuple[str, ...], frames: tuple[str, ...]
+) -> tuple[Problem, ...]:
+    """Of frames (key, body they must be fixed to, name), overridden bodies, and overridden frames."""
     known = frame_names(plant)
     problems = []
     for key, body, frame in wanted:
@@ -121,14 +130,14 @@ def frame_problems(plant: MultibodyPlant, parameters: MachineParameters) -> list
     links = [body.name() for body in moving]
     problems += [
         Problem("", f"bodies.{name}", f"no moving link '{name}' in the SDF{nearest_names(name, links)}")
-        for name in parameters.bodies
+        for name in bodies
         if name not in links
     ]
-    for name in parameters.frames:
+    for name in frames:
         if name not in known or not isinstance(plant.GetFrameByName(name), FixedOffsetFrame):
             movable = [frame for frame in known if isinstance(plant.GetFrameByName(frame), FixedOffsetFrame)]
             problems.append(Problem("", f"frames.{name}", f"no frame '{name}' in the SDF{nearest_names(name, movable)}"))
-    return problems
+    return tuple(problems)
 
 
 def _placed_elements(parameters: MachineParameters) -> Iterable[tuple[str, str, Any]]:
@@ -139,8 +148,8 @@ def _placed_elements(parameters: MachineParameters) -> Iterable[tuple[str, str, 
         yield "gasket", "", parameters.gasket
 
 
-def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameters, load: Load | None) -> None:
-    """Puts the overrides of the machine file, and the load on the drum, into a plant Context.
+def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameters) -> None:
+    """Puts the overrides of the machine file into a plant Context.
 
     Raises:
         InputError: names the SDF does not have.
@@ -155,13 +164,16 @@ def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameter
         frame = plant.GetFrameByName(name)
         rotation = frame.GetFixedPoseInBodyFrame().rotation()
         frame.SetPoseInParentFrame(context, RigidTransform(rotation, frame_override.position))
-    if load is not None:
-        drum = plant.GetBodyByName("drum")
-        loaded = drum.CalcSpatialInertiaInBodyFrame(context)
-        for unbalance in load.unbalances:
-            p_DoU_D = unbalance.position()
-            loaded += SpatialInertia(unbalance.mass, p_DoU_D, UnitInertia.PointMass(p_DoU_D))
-        drum.SetSpatialInertiaInBodyFrame(context, loaded)
+
+
+def add_load(plant: MultibodyPlant, context: Any, load: Load) -> None:
+    """Adds the point masses of a load to the drum in a plant Context."""
+    drum = plant.GetBodyByName("drum")
+    loaded = drum.CalcSpatialInertiaInBodyFrame(context)
+    for unbalance in load.unbalances:
+        p_DoU_D = unbalance.position()
+        loaded += SpatialInertia(unbalance.mass, p_DoU_D, UnitInertia.PointMass(p_DoU_D))
+    drum.SetSpatialInertiaInBodyFrame(context, loaded)
 
 
 def _overridden(inertia: SpatialInertia, override: BodyOverride) -> SpatialInertia:

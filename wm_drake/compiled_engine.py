@@ -7,7 +7,7 @@ import numpy as np
 from wm_drake.kernel.histories import motor_torque_history
 from wm_drake.kernel.integration import integrate_alone
 from wm_drake.kernel.mechanics import STATE_SIZE
-from wm_drake.kernel.packing import pack
+from wm_drake.kernel.packing import initial_state, pack
 from wm_drake.kernel.schedule import schedule_of
 from wm_drake.machine import OUTPUT_PERIOD, Setup
 from wm_drake.parameters import SpinProfile
@@ -48,11 +48,3 @@ def run_compiled(setup: Setup, profile: SpinProfile, step: float, progress: Call
     torque = np.empty(len(samples))
     motor_torque_history(samples, schedule.sample_acceleration, p, layout.elements, torque)
     return ended_where_it_diverged(Trajectory(schedule.time, samples[:, :STATE_SIZE], samples[:, STATE_SIZE:], torque))
-
-
-def initial_state(setup: Setup, profile: SpinProfile) -> np.ndarray:
-    """The state a run begins with: at rest at the rest pose, the drum at its first speed, sponges undeformed."""
-    x = np.zeros(STATE_SIZE + len(setup.dampers))
-    x[:6] = setup.rest_pose
-    x[13] = profile.speed[0]
-    return x

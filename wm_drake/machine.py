@@ -9,7 +9,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import Adder, LogVectorOutput, VectorLogSink
 from scipy.optimize import root
 
-from wm_drake.bodies import add_bodies, set_bodies
+from wm_drake.bodies import add_bodies, add_load, set_bodies
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.parameters import Load, MachineParameters, Sensor, packed_stiffness
 from wm_drake.parameters.elements import FloatArray
@@ -71,7 +71,10 @@ class Setup:
 
 @dataclass(frozen=True)
 class Machine:
-    """A built machine: diagram, plant and handles to every system in it. Numbers live in a Context: see `set_up`."""
+    """A built machine: diagram, plant and handles to every system in it. Numbers live in a Context: see `set_up`.
+
+    `blank` is a Context in which nothing is set.
+    """
 
     parameters: MachineParameters
     diagram: Diagram
@@ -81,6 +84,7 @@ class Machine:
     dampers: dict[str, FrictionDamper]
     bushings: dict[str, SixComponentBushing]
     logs: dict[str, VectorLogSink]
+    blank: Context
 
     def set_up(
         self,
@@ -89,8 +93,9 @@ class Machine:
         parameters: MachineParameters | None = None,
         gasket: bool = True,
         dampers: bool = True,
+        context: Context | None = None,
     ) -> Setup:
-        """A fresh Context at the rest pose, with these numbers.
+        """A Context at the rest pose, with these numbers.
 
         Setting numbers in a Context of one built machine gives, bit for bit, what a machine built from them gives.
 
@@ -98,15 +103,19 @@ class Machine:
             load: Point masses in the drum; None for the empty machine. Preloads and rest pose are those of the empty machine.
             parameters: Numbers to use; those it was built from if None. Same elements, same laws, tables of the same length.
             gasket, dampers: False takes them out of the machine.
+            context: A Context of an earlier Setup to use again, which is over then; a fresh one if None.
 
         Raises:
             InputError: other elements than were built, names unknown to the SDF, or no static equilibrium.
         """
         parameters = parameters or self.parameters
         _check_same_elements(self.parameters, parameters)
-        context = self.diagram.CreateDefaultContext()
+        if context is None:
+            context = self.diagram.CreateDefaultContext()
+        else:
+            context.SetTimeStateAndParametersFrom(self.blank)
         plant_context = self.plant.GetMyContextFromRoot(context)
-        set_bodies(self.plant, plant_context, parameters, None)
+        set_bodies(self.plant, plant_context, parameters)
         bushings = _placed_bushings(self.plant, plant_context, parameters)
         placed_dampers = _placed_dampers(self.plant, plant_context, parameters)
         self._set(context, self.bushings, bushings)
@@ -120,7 +129,8 @@ class Machine:
         self._set(context, self.bushings, bushings)
         self._set(context, self.dampers, placed_dampers)
         rest_pose, residual = self._rest_pose(context)
-        set_bodies(self.plant, plant_context, parameters, load)
+        if load is not None:
+            add_load(self.plant, plant_context, load)
         self.plant.SetPositions(plant_context, np.append(rest_pose, 0.0))
         points = {name: _point(self.plant, plant_context, "tub", sensor.frame) for name, sensor in parameters.sensors.items()}
         detergent_point = _point(self.plant, plant_context, "tub", parameters.clearance.detergent_frame)
@@ -159,7 +169,7 @@ class Machine:
                         "move its hooks or the centre of mass")
                 for name in slack
             )  # fmt: skip
-        return _placed_springs(self.plant, plant_context, parameters, preloads)
+        return {name: replace(spring, preload=preloads[name]) for name, spring in unloaded.items()}
 
     def _rest_pose(self, context: Context) -> tuple[FloatArray, FloatArray]:
         """Equilibrium of the machine in the Context near T = W, where springs alone may not quite balance it."""
@@ -202,7 +212,7 @@ def build_machine(parameters: MachineParameters) -> Machine:
     plant = builder.AddNamedSystem("bodies", MultibodyPlant(time_step=0.0))
     add_bodies(plant, parameters)
     context = plant.CreateDefaultContext()
-    set_bodies(plant, context, parameters, None)  # reports unknown names before anything is placed by them
+    set_bodies(plant, context, parameters)  # reports unknown names before anything is placed by them
     springs = {
         name: SpringStrut(placed.packed())
         for name, placed in _placed_springs(plant, context, parameters, dict.fromkeys(parameters.springs, 0.0)).items()
@@ -231,7 +241,7 @@ def build_machine(parameters: MachineParameters) -> Machine:
         sink.set_name(f"log_{name}")
     diagram = builder.Build()
     diagram.set_name(parameters.name)
-    return Machine(parameters, diagram, plant, source, springs, dampers, bushings, sinks)
+    return Machine(parameters, diagram, plant, source, springs, dampers, bushings, sinks, diagram.CreateDefaultContext())
 
 
 def _label(kind: str, name: str) -> str:

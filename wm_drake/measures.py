@@ -45,20 +45,44 @@ class Measures:
     smallest_gap: Gap | None
 
 
-def filtered_displacement(record: Record) -> xr.DataArray:
-    """Displacements at the sensors (time, sensor), band 0.5-20 Hz, fourth-order Butterworth, zero phase. [m]
+def filtered(displacement: FloatArray, period: float) -> FloatArray:
+    """Displacements (n, k) in the band 0.5-20 Hz, fourth-order Butterworth, zero phase. [m]
 
-    A record shorter than the filter needs (one that diverged at once) gives NaN.
+    Fewer samples than the filter needs (of a run that diverged at once) give NaN.
+
+    Args:
+        displacement: One column a signal. [m]
+        period: Between samples. [s]
     """
+    sections = butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=1.0 / period, output="sos")
+    padding = min(round(PADDING / period), len(displacement) - 1)
+    if padding <= 6 * len(sections) + 3:  # what sosfiltfilt itself holds for the least
+        return np.full(displacement.shape, np.nan)
+    return np.asarray(sosfiltfilt(sections, displacement, axis=0, padtype="even", padlen=padding))
+
+
+def filtered_displacement(record: Record) -> xr.DataArray:
+    """Displacements at the sensors (time, sensor) of a record, as `filtered`. [m]"""
     raw = record.displacement
-    values = np.full(raw.shape, np.nan)
-    if raw.sizes["time"] > 1:
-        rate = 1.0 / float(record.time[1] - record.time[0])
-        sections = butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=rate, output="sos")
-        padding = min(round(PADDING * rate), raw.sizes["time"] - 1)
-        if padding > 6 * len(sections) + 3:  # what sosfiltfilt itself holds for the least
-            values = sosfiltfilt(sections, raw.values, axis=0, padtype="even", padlen=padding)
-    return raw.copy(data=values)
+    period = float(record.time[1] - record.time[0]) if raw.sizes["time"] > 1 else 1.0
+    return raw.copy(data=filtered(raw.values, period))
+
+
+def amplitudes(displacement: FloatArray) -> tuple[FloatArray, np.ndarray]:
+    """Largest absolute value of the envelopes of signals (n, k), and the samples where it occurs, each (k,).
+
+    An envelope runs straight from peak to peak, so its largest value is at one of them.
+    """
+    sizes, samples = np.full(displacement.shape[1], np.nan), np.zeros(displacement.shape[1], dtype=np.int64)
+    for column, signal in enumerate(displacement.T):
+        signal = np.ascontiguousarray(signal)
+        if not len(signal) or np.isnan(signal[0]):
+            continue
+        sides = (find_peaks(signal)[0], find_peaks(-signal)[0])
+        nodes = np.concatenate([side if len(side) else np.arange(len(signal)) for side in sides])
+        samples[column] = nodes[np.argmax(np.abs(signal[nodes]))]
+        sizes[column] = abs(signal[samples[column]])
+    return sizes, samples
 
 
 def envelopes(record: Record) -> xr.Dataset:
@@ -109,21 +133,18 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
         record: From `wm_drake.simulation.simulate`.
         scene: The machine's shapes, for the smallest gap; it is left out if None.
     """
-    size = abs(envelopes(record)).to_dataarray("side").max("side")
+    size, samples = amplitudes(filtered_displacement(record).values)
+    speed = record.drum_speed.values[samples] if record.sizes["time"] else size
+    by_sensor = {"sensor": record.sensor.values}
     gasket = record.sel(bushing=[name for name in record.bushing.values if name == "gasket"])
     pose = np.column_stack([record.tub_angle.values, record.tub_position.values])
     gap = scene.smallest_gap(record.time.values, pose, np.asarray(record.attrs["rest_pose"])) if scene else None
     return Measures(
-        amplitude=size.max("time"),
-        critical_speed=_speed_at_largest(record, size),
+        amplitude=xr.DataArray(size, by_sensor),
+        critical_speed=xr.DataArray(np.where(np.isnan(size), np.nan, speed), by_sensor),
         detergent_displacement=abs(record.detergent_displacement).max("time"),
         gasket_force=abs(gasket.bushing_force).max("time").sum("bushing"),
         gasket_moment=abs(gasket.bushing_moment).max("time").sum("bushing"),
         smallest_gap=gap,
     )
 
-
-def _speed_at_largest(record: Record, size: xr.DataArray) -> xr.DataArray:
-    if size.isnull().any() or not size.sizes["time"]:
-        return size.max("time") * np.nan
-    return record.drum_speed.isel(time=size.argmax("time"))

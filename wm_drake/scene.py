@@ -49,7 +49,7 @@ class Scene:
         self._diagram = builder.Build()
         self._context = self._diagram.CreateDefaultContext()
         self._plant_context = self.plant.GetMyContextFromRoot(self._context)
-        set_bodies(self.plant, self._plant_context, parameters, None)
+        set_bodies(self.plant, self._plant_context, parameters)
         self._pairs = [(a, b) for a in self._shapes("tub") for b in self._shapes("housing")]
 
     def _shapes(self, body: str) -> list[GeometryId]:

@@ -22,7 +22,7 @@ from wm_drake.parameters.elements import FloatArray
 from wm_drake.systems.friction_damper import friction_damper_history
 from wm_drake.systems.six_component_bushing import six_component_bushing_history
 from wm_drake.systems.spring_strut import spring_strut_history
-from wm_drake.trajectory import COORDINATES, Trajectory
+from wm_drake.trajectory import COORDINATES, Trajectory, divergence_text
 
 Record: TypeAlias = xr.Dataset
 """One run. Dimensions time, axis (x, y, z), angle (roll, pitch, yaw), sensor, spring, damper, bushing; SI, each variable with
@@ -93,8 +93,7 @@ def simulate(
     """
     if engine not in ENGINES:
         raise input_error(f"no engine '{engine}'{nearest_names(engine, ENGINES)}", key="engine")
-    if not step > 0.0 or abs(OUTPUT_PERIOD / step - round(OUTPUT_PERIOD / step)) > 1e-9 or step > OUTPUT_PERIOD:
-        raise input_error(f"{step:g} s is not a whole part of the output period {OUTPUT_PERIOD:g} s", key="step")
+    check_step(step)
     if isinstance(case, str):
         case = case_of(machine.parameters, case)
     setup = machine.set_up(case.load, parameters=case.parameters, gasket=case.gasket)
@@ -104,6 +103,12 @@ def simulate(
     if trajectory.divergence:
         warnings.warn(record.attrs["diverged"], DivergenceWarning, stacklevel=2)
     return record
+
+
+def check_step(step: float) -> None:
+    """Refuses an integration step that does not divide the output period. [s]"""
+    if not step > 0.0 or abs(OUTPUT_PERIOD / step - round(OUTPUT_PERIOD / step)) > 1e-9 or step > OUTPUT_PERIOD:
+        raise input_error(f"{step:g} s is not a whole part of the output period {OUTPUT_PERIOD:g} s", key="step")
 
 
 def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
@@ -132,7 +137,7 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
         "parameters": json.dumps(setup.parameters.model_dump(mode="json", exclude={"sources"})),
         "load_parameters": case.load.model_dump_json(),
         "profile": case.profile.model_dump_json(),
-        "diverged": _divergence_text(trajectory),
+        "diverged": divergence_text(trajectory.divergence, trajectory.time, trajectory.state),
     }
     attributes |= {f"version_{name}": version for name, version in versions().items()}
     return xr.Dataset(variables, labels, attributes)
@@ -229,13 +234,3 @@ def load_record(path: Path) -> Record:
 def versions() -> dict[str, str]:
     """Versions that determine a result."""
     return {name: importlib.metadata.version(name) for name in ("wm-drake", "drake", "numpy", "scipy", "numba")}
-
-
-def _divergence_text(trajectory: Trajectory) -> str:
-    if trajectory.divergence is None:
-        return ""
-    where = "no sample was good"
-    if len(trajectory.time):
-        last = ", ".join(f"{name} {value:.4g}" for name, value in zip(COORDINATES, trajectory.state[-1, :6], strict=True))
-        where = f"last good state at {trajectory.time[-1]:.3f} s: {last} (rad, m)"
-    return f"the run diverged at {trajectory.divergence.time:.3f} s: {trajectory.divergence.reason}; {where}"

@@ -93,3 +93,19 @@ def diverging_coordinate(positions: FloatArray) -> tuple[str, str] | None:
     index = int(bad[0])
     unit = "rad" if index < 3 else "m"
     return COORDINATES[index], f"{COORDINATES[index]} = {positions[index]:.4g} {unit}, bound {_BOUNDS[index]:g} {unit}"
+
+
+def divergence_text(divergence: Divergence | None, time: FloatArray, state: FloatArray) -> str:
+    """When and why a run stopped, and its last good sample; "" for one that did not.
+
+    Args:
+        divergence: Of the run.
+        time, state: Its good samples, (n,) [s] and (n, >= 6).
+    """
+    if divergence is None:
+        return ""
+    where = "no sample was good"
+    if len(time):
+        last = ", ".join(f"{name} {value:.4g}" for name, value in zip(COORDINATES, state[-1, :6], strict=True))
+        where = f"last good state at {time[-1]:.3f} s: {last} (rad, m)"
+    return f"the run diverged at {divergence.time:.3f} s: {divergence.reason}; {where}"

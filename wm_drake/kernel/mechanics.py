@@ -30,6 +30,8 @@ BODIES_SIZE = 59
 STATE_SIZE = 14
 """As the plant's: roll, pitch, yaw, x, y, z, drum angle, w_WT, v_WTo, drum rate; the dampers' deformations follow."""
 
+DRUM_RATE = 13
+
 MassProperties = namedtuple(  # noqa: PYI024 - numba's kind
     "MassProperties", ("drum_moment", "drum_inertia", "moment", "inverse_inertia")
 )

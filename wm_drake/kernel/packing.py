@@ -7,8 +7,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, ForceElementIndex, RevoluteJoint, SpatialInertia
 
 from wm_drake.errors import InputError, input_error
-from wm_drake.kernel.mechanics import BODIES_SIZE
+from wm_drake.kernel.mechanics import BODIES_SIZE, DRUM_RATE, STATE_SIZE
 from wm_drake.machine import Setup
+from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.elements import FloatArray
 
 
@@ -53,6 +54,14 @@ def pack(setup: Setup) -> tuple[FloatArray, Layout]:
     names = list(setup.bushings)
     gasket = indices["bushings"][names.index("gasket")] if "gasket" in names else -1
     return np.concatenate(parts), Layout(**indices, gasket=gasket, size=size)
+
+
+def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
+    """The state a run begins with: at rest at the rest pose, the drum at its first speed, sponges undeformed."""
+    x = np.zeros(STATE_SIZE + len(setup.dampers))
+    x[:6] = setup.rest_pose
+    x[DRUM_RATE] = profile.speed[0]
+    return x
 
 
 def _packed_bodies(setup: Setup) -> FloatArray:
