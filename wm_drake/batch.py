@@ -13,7 +13,7 @@ from pydrake.systems.framework import Context
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.kernel.histories import POINT_SIZE, measure_samples_lanes
 from wm_drake.kernel.integration import integrate_lanes
-from wm_drake.kernel.mechanics import DRUM_RATE
+from wm_drake.kernel.mechanics import DRUM_RATE, LINE_SIZE
 from wm_drake.kernel.packing import Layout, initial_state, pack
 from wm_drake.kernel.schedule import Schedule, schedule_of
 from wm_drake.laws.lanes import WIDTH
@@ -237,7 +237,8 @@ class _Batches:
         return [self._ended(job, schedule, *(a[..., lane] for a in histories)) for lane, job in enumerate(jobs)]
 
     def _integrate(self, schedule: Schedule, layout: Layout, p: FloatArray, x: FloatArray, samples: FloatArray) -> None:
-        work = tuple(self._array(f"stage {i}", len(x)) for i in range(3))
+        sizes = (len(x), len(x), len(x), LINE_SIZE * len(layout.dampers))
+        work = tuple(self._array(f"stage {i}", size) for i, size in enumerate(sizes))
         done, count = 0, len(schedule.step)
         while done < count and not self.stopped.is_set():
             begin, done = done, min(done + PAUSE_STEPS, count)

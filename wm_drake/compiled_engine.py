@@ -6,7 +6,7 @@ import numpy as np
 
 from wm_drake.kernel.histories import motor_torque_history
 from wm_drake.kernel.integration import integrate_alone
-from wm_drake.kernel.mechanics import STATE_SIZE
+from wm_drake.kernel.mechanics import LINE_SIZE, STATE_SIZE
 from wm_drake.kernel.packing import initial_state, pack
 from wm_drake.kernel.schedule import schedule_of
 from wm_drake.machine import OUTPUT_PERIOD, Setup
@@ -39,7 +39,7 @@ def run_compiled(setup: Setup, profile: SpinProfile, step: float, progress: Call
     x = initial_state(setup, profile)
     samples = np.full((len(schedule.time), len(x)), np.nan)
     samples[0] = x
-    work = (np.empty_like(x), np.empty_like(x), np.empty_like(x))
+    work = (*(np.empty_like(x) for _ in range(3)), np.empty(LINE_SIZE * len(layout.dampers)))
     done = 0
     while done < len(schedule.step) and diverging_coordinate(x) is None:
         begin, done = done, min(done + PAUSE_STEPS, len(schedule.step))

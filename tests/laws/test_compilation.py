@@ -65,7 +65,7 @@ LAWS = {
     "bending_moment": (
         12,
         strut.bending_moment,
-        lambda f, x: f(unit(three(x, 0)), three(x, 3), unit(three(x, 6)), three(x, 9), 12.0, 0.3, 0.9, 0.5),
+        lambda f, x: f(unit(three(x, 0)), three(x, 3), unit(three(x, 6)), 12.0, 0.3, 0.9, 0.5),
     ),
     "transverse_couple": (7, strut.transverse_couple, lambda f, x: f(three(x, 0), three(x, 3), 2.0 + x[6])),
     "wrench_at_origin": (9, strut.wrench_at_origin, lambda f, x: f(three(x, 0), three(x, 3), three(x, 6))),
@@ -76,8 +76,8 @@ LAWS = {
         vectors.rotation_vector,
         lambda f, x: f(_same_way(f, vectors.rotation_from_rpy)(4e-3 * x[0], 4e-3 * x[1], 4e-3 * x[2])),
     ),
-    "rotation_vector_rate": (6, vectors.rotation_vector_rate, lambda f, x: f(three(x, 0), three(x, 3))),
-    "moment_from_rotation_vector": (6, vectors.moment_from_rotation_vector, lambda f, x: f(three(x, 0), three(x, 3))),
+    "rotation_vector_rate": (6, vectors.rotation_vector_rate, lambda f, x: f(three(x, 0), three(x, 3), 0.08)),
+    "moment_from_rotation_vector": (6, vectors.moment_from_rotation_vector, lambda f, x: f(three(x, 0), three(x, 3), 0.08)),
 }
 
 
@@ -132,7 +132,7 @@ AT_REST = {  # what linearisation about the rest pose meets: name -> (count, law
     "bending_moment": (
         9,
         strut.bending_moment,
-        lambda f, x: f(unit((x[0], x[1], 1.0 + x[2])), three(x, 3), (0.0, 0.0, 1.0), three(x, 6), 12.0, 0.3, 0.9, 0.5),
+        lambda f, x: f(unit((x[0], x[1], 1.0 + x[2])), three(x, 3), (0.0, 0.0, 1.0), 12.0, 0.3, 0.9, 0.5),
     ),
 }
 

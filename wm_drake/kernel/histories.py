@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wm_drake.kernel.mechanics import mass_properties, state_derivative
+from wm_drake.kernel.mechanics import LINE_SIZE, mass_properties, state_derivative
 from wm_drake.laws.compilation import law, long_running
 from wm_drake.laws.elementary import where
 from wm_drake.laws.lanes import align_stack, lane_array
@@ -26,10 +26,11 @@ def motor_torque_history(samples, acceleration, p, elements, torque):
         torque: (n,), written.
     """
     dx = np.empty(samples.shape[1])
+    scratch = np.empty(LINE_SIZE * len(elements[1]))
     for i in range(len(torque)):
         x = samples[i]
         masses = mass_properties(p, np.cos(x[6]), np.sin(x[6]))
-        torque[i] = state_derivative(x, dx, masses, x[13], acceleration[i], p, elements)
+        torque[i] = state_derivative(x, dx, masses, x[13], acceleration[i], p, elements, scratch)
 
 
 @law

@@ -14,28 +14,27 @@ def integrate(steps, begin, end, p, elements, x, work, history):
         begin, end: Numbers of steps.
         p, elements: As for `state_derivative`.
         x: State, which is advanced.
-        work: Three arrays of the size of the state, to work in.
+        work: Three arrays of the size of the state, to work in, and `state_derivative`'s scratch.
         history: States at the samples, one after the other; written at the end of steps that have a sample.
     """
     length, acceleration, drum, row = steps
-    y, dx, total = work
+    y, dx, total, scratch = work
     size = STATE_SIZE + len(elements[1])
     masses = mass_properties(p, drum[2 * begin, 1], drum[2 * begin, 2])
     for k in range(size):
-        y[k] = x[k]
+        y[k] = total[k] = x[k]
     for i in range(begin, end):
         h = length[i]
         for stage in range(4):
             node = 2 * i + (stage + 1) // 2
             if stage == 1 or stage == 3:  # noqa: PLR1714 - two comparisons, no tuple
                 masses = mass_properties(p, drum[node, 1], drum[node, 2])
-            state_derivative(y, dx, masses, drum[node, 0], acceleration[i], p, elements)
+            state_derivative(y, dx, masses, drum[node, 0], acceleration[i], p, elements, scratch)
             inner = stage == 1 or stage == 2  # noqa: PLR1714
             weight = h / 3.0 if inner else h / 6.0
             ahead = h if stage == 2 else 0.5 * h
             for k in range(size):
-                before = x[k] if stage == 0 else total[k]
-                total[k] = before + weight * dx[k]
+                total[k] = total[k] + weight * dx[k]
                 y[k] = x[k] + ahead * dx[k]
         zero = 0.0 * x[0]
         total[6] = zero + drum[2 * i + 2, 3]
@@ -59,5 +58,5 @@ def integrate_alone(steps, begin, end, p, elements, x, work, history):
 def integrate_lanes(steps, begin, end, p, elements, x, work, history):
     """`integrate` of `lanes.WIDTH` machines side by side: each array holds, for each number, that of every machine."""
     align_stack()
-    lanes_of_work = (lane_array(work[0]), lane_array(work[1]), lane_array(work[2]))
+    lanes_of_work = (lane_array(work[0]), lane_array(work[1]), lane_array(work[2]), lane_array(work[3]))
     integrate(steps, begin, end, lane_array(p), elements, lane_array(x), lanes_of_work, lane_array(history))

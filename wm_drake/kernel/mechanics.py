@@ -10,7 +10,7 @@ M: total mass; S_t, s_d: first moments of tub group and drum about O; I_t, J_d: 
 axis, along the drum's rotation against the tub. Drum quantities follow the drum angle exactly: those of a body that
 turns about a fixed axis hold the angle's first and second harmonic and no other.
 
-Packed numbers of the bodies, from index 0 (`wm_drake.kernel.packing`): gravity vector in W [m/s^2]; M [kg]; a; position of
+Packed numbers of the bodies, from index 0 (`wm_drake.kernel.packing`): gravity vector in W [m/s^2]; 1/M [1/kg]; a; position of
 O from To [m]; S_t [kg m]; I_t as xx, yy, zz, xy, xz, yz [kg m^2]; s_d, three times its mean, cosine and sine part; J_d, six
 times its mean, cosine, sine, double cosine and double sine part; damping of the drum joint [N m s/rad].
 """
@@ -18,15 +18,17 @@ times its mean, cosine, sine, double cosine and double sine part; damping of the
 from collections import namedtuple
 
 from wm_drake.laws.compilation import law
-from wm_drake.laws.elementary import sine_cosine
-from wm_drake.laws.motion import tub_motion
+from wm_drake.laws.elementary import anywhere, sine_cosine
+from wm_drake.laws.motion import tub_motion_from_sines
 from wm_drake.laws.vectors import add, cross, dot, rotate, rotate_back, scale, subtract
-from wm_drake.systems.friction_damper import friction_damper_wrench
+from wm_drake.systems.friction_damper import friction_damper_line, friction_damper_tension, friction_damper_wrench
 from wm_drake.systems.six_component_bushing import six_component_bushing_wrench
 from wm_drake.systems.spring_strut import spring_strut_wrench
 
-GRAVITY, MASS, AXIS, ORIGIN, TUB_MOMENT, TUB_INERTIA, DRUM_MOMENT, DRUM_INERTIA, JOINT_DAMPING = 0, 3, 4, 7, 10, 13, 19, 28, 58
+GRAVITY, INVERSE_MASS, AXIS, ORIGIN, TUB_MOMENT, TUB_INERTIA, DRUM_MOMENT, DRUM_INERTIA, JOINT_DAMPING = 0, 3, 4, 7, 10, 13, 19, 28, 58
 BODIES_SIZE = 59
+LINE_SIZE = 12
+"""Numbers kept of a damper between the rounds of `state_derivative`."""
 STATE_SIZE = 14
 """As the plant's: roll, pitch, yaw, x, y, z, drum angle, w_WT, v_WTo, drum rate; the dampers' deformations follow."""
 
@@ -97,7 +99,7 @@ def mass_properties(p, c, s):
     )
     t = six(p, TUB_INERTIA)
     m = add(three(p, TUB_MOMENT), drum)
-    q = 1.0 / p[MASS]
+    q = p[INVERSE_MASS]
     central = (
         t[0] + j[0] - q * (m[1] * m[1] + m[2] * m[2]),
         t[1] + j[1] - q * (m[0] * m[0] + m[2] * m[2]),
@@ -124,10 +126,12 @@ def accelerations(motion, masses, rate, acceleration, wrench, p):
         Angular acceleration of the tub and acceleration of To, in W [rad/s^2, m/s^2], torque of the motor on the drum [N m].
     """
     a, o, tub_moment = three(p, AXIS), three(p, ORIGIN), three(p, TUB_MOMENT)
-    q = 1.0 / p[MASS]
-    gravity = rotate_back(motion.rotation, three(p, GRAVITY))
+    q = p[INVERSE_MASS]
     applied = rotate_back(motion.rotation, (wrench[3], wrench[4], wrench[5]))
-    moment = subtract(rotate_back(motion.rotation, (wrench[0], wrench[1], wrench[2])), cross(o, applied))
+    moment = rotate_back(motion.rotation, (wrench[0], wrench[1], wrench[2]))
+    apart = anywhere((abs(o[0]) > 0.0) | (abs(o[1]) > 0.0) | (abs(o[2]) > 0.0))
+    if apart:
+        moment = subtract(moment, cross(o, applied))
     w = rotate_back(motion.rotation, motion.angular_velocity)
     w_drum = add(w, scale(rate, a))
     b = add(scale(acceleration, a), scale(rate, cross(w, a)))
@@ -135,12 +139,15 @@ def accelerations(motion, masses, rate, acceleration, wrench, p):
     force = subtract(applied, add(cross(w, cross(w, tub_moment)), drum_flow))
     gyration = add(times(masses.drum_inertia, b), cross(w_drum, times(masses.drum_inertia, w_drum)))
     moment = subtract(moment, add(cross(w, times(six(p, TUB_INERTIA), w)), gyration))
-    # gravity acts at the common centre of mass, about which the inertia is: it turns nothing and falls out here
+    # gravity accelerates all alike: it turns nothing, and comes in at the end
     w_rate = times(masses.inverse_inertia, subtract(moment, scale(q, cross(masses.moment, force))))
-    a_O = add(gravity, scale(q, subtract(force, cross(w_rate, masses.moment))))
-    a_To = subtract(a_O, add(cross(w_rate, o), cross(w, cross(w, o))))
-    on_drum = add(gyration, add(times(masses.drum_inertia, w_rate), cross(masses.drum_moment, subtract(a_O, gravity))))
-    return rotate(motion.rotation, w_rate), rotate(motion.rotation, a_To), dot(a, on_drum) + p[JOINT_DAMPING] * rate
+    a_O = scale(q, subtract(force, cross(w_rate, masses.moment)))
+    on_drum = add(gyration, add(times(masses.drum_inertia, w_rate), cross(masses.drum_moment, a_O)))
+    a_To = a_O
+    if apart:
+        a_To = subtract(a_O, add(cross(w_rate, o), cross(w, cross(w, o))))
+    v_rate = add(rotate(motion.rotation, a_To), three(p, GRAVITY))
+    return rotate(motion.rotation, w_rate), v_rate, dot(a, on_drum) + p[JOINT_DAMPING] * rate
 
 
 @law
@@ -150,33 +157,40 @@ def plus(a, b):
 
 
 @law
-def state_derivative(x, dx, masses, rate, acceleration, p, elements):
+def state_derivative(x, dx, masses, rate, acceleration, p, elements, scratch):
     """Writes the derivative of the state into `dx`.
 
     Args:
         x, dx: State and its derivative, laid out as `STATE_SIZE` says; x[6] and x[13] are not read.
         masses, rate, acceleration, p: As for `accelerations`.
         elements: Indices in p where springs, dampers and bushings begin, three arrays.
+        scratch: At least `LINE_SIZE` numbers a damper to work in.
 
     Returns:
         Torque of the motor on the drum. [N m]
     """
     springs, dampers, bushings = elements
-    motion = tub_motion(x)
-    rates = rpy_rates(x)
+    roll, pitch, yaw = sine_cosine(x[0]), sine_cosine(x[1]), sine_cosine(x[2])
+    motion = tub_motion_from_sines(x, roll, pitch, yaw)
     zero = 0.0 * x[0]
     total = (zero, zero, zero, zero, zero, zero)
     for i in range(len(springs)):
         wrench, _ = spring_strut_wrench(motion, p, springs[i])
         total = plus(total, wrench)
+    # dampers in three rounds: each is a long chain of roots and quotients, and short rounds let the processor overlap them
     for i in range(len(dampers)):
-        wrench, _, dx[STATE_SIZE + i] = friction_damper_wrench(motion, x[STATE_SIZE + i], p, dampers[i])
-        total = plus(total, wrench)
+        write_line(scratch, LINE_SIZE * i, *friction_damper_line(motion, p, dampers[i]))
+    for i in range(len(dampers)):
+        rate_i = scratch[LINE_SIZE * i + 4]
+        scratch[LINE_SIZE * i + 11], dx[STATE_SIZE + i] = friction_damper_tension(rate_i, x[STATE_SIZE + i], p, dampers[i])
+    for i in range(len(dampers)):
+        arm, line = read_line(scratch, LINE_SIZE * i)
+        total = plus(total, friction_damper_wrench(motion, arm, line, scratch[LINE_SIZE * i + 11], p, dampers[i]))
     for i in range(len(bushings)):
         wrench, _ = six_component_bushing_wrench(motion, p, bushings[i])
         total = plus(total, wrench)
     w_rate, v_rate, torque = accelerations(motion, masses, rate, acceleration, total, p)
-    dx[0], dx[1], dx[2] = rates
+    dx[0], dx[1], dx[2] = rpy_rates(x, pitch, yaw)
     dx[3], dx[4], dx[5] = motion.velocity
     dx[6] = zero + rate
     dx[7], dx[8], dx[9] = w_rate
@@ -186,9 +200,25 @@ def state_derivative(x, dx, masses, rate, acceleration, p, elements):
 
 
 @law
-def rpy_rates(x):
+def write_line(scratch, at, arm, line):
+    """Keeps what `friction_damper_line` found, for the rounds to come."""
+    length, rate, direction, v_A = line
+    scratch[at], scratch[at + 1], scratch[at + 2] = arm
+    scratch[at + 3], scratch[at + 4] = length, rate
+    scratch[at + 5], scratch[at + 6], scratch[at + 7] = direction
+    scratch[at + 8], scratch[at + 9], scratch[at + 10] = v_A
+
+
+@law
+def read_line(scratch, at):
+    """What `write_line` kept: the arm, and the line."""
+    return three(scratch, at), (scratch[at + 3], scratch[at + 4], three(scratch, at + 5), three(scratch, at + 8))
+
+
+@law
+def rpy_rates(x, pitch, yaw):
     """Rates of roll, pitch, yaw from the angular velocity in W, as Drake's RpyFloatingJoint has them. [rad/s]"""
-    s_p, c_p = sine_cosine(x[1])
-    s_y, c_y = sine_cosine(x[2])
+    s_p, c_p = pitch
+    s_y, c_y = yaw
     roll_rate = (c_y * x[7] + s_y * x[8]) / c_p
     return roll_rate, c_y * x[8] - s_y * x[7], x[9] + s_p * roll_rate

@@ -76,7 +76,7 @@ def _packed_bodies(setup: Setup) -> FloatArray:
     gravity = plant.gravity_field().gravity_vector()
     mass = tub_inertia.get_mass() + drum_inertia.get_mass()
     damping = joint.GetDampingVector(context)
-    parts = [gravity, [mass], axis, origin, _moment(tub_inertia), _six(_matrix(tub_inertia))]
+    parts = [gravity, [1.0 / mass], axis, origin, _moment(tub_inertia), _six(_matrix(tub_inertia))]
     angle = joint.get_angle(context)
     return np.concatenate([*parts, *_drum_harmonics(drum_inertia, axis, angle), damping])
 

@@ -4,7 +4,7 @@ from wm_drake.laws.compilation import law
 from wm_drake.laws.elementary import anywhere
 from wm_drake.laws.friction import havsin_friction
 from wm_drake.laws.table import packed_size, stiffness_force
-from wm_drake.laws.vectors import moment_from_rotation_vector, rotation_vector_rate
+from wm_drake.laws.vectors import dot, moment_from_rotation_vector, rotation_vector_coefficient, rotation_vector_rate
 
 
 @law
@@ -31,7 +31,8 @@ def bushing_force(d, d_rate, r, w, p, at):
     Returns:
         Force [N] and moment [N m] on the tub side at the tub-side point, in G; the reaction acts at the same point.
     """
-    r_rate = rotation_vector_rate(r, w)
+    coefficient = rotation_vector_coefficient(dot(r, r))
+    r_rate = rotation_vector_rate(r, w, coefficient)
     kx = at + 12
     ky = kx + packed_size(p, kx)
     kz = ky + packed_size(p, ky)
@@ -54,4 +55,4 @@ def bushing_force(d, d_rate, r, w, p, at):
             torque[1] + havsin_friction(r_rate[1], p[at + 10], p[at + 7]),
             torque[2] + havsin_friction(r_rate[2], p[at + 11], p[at + 8]),
         )
-    return force, moment_from_rotation_vector(r, torque)
+    return force, moment_from_rotation_vector(r, torque, coefficient)

@@ -26,7 +26,7 @@ def strut_line(motion, arm, p_WH):
 
 
 @law
-def bending_moment(direction, w_strut, axis, w_body, k, c, p, v_t):
+def bending_moment(direction, rate, axis, k, c, p, v_t):
     """Moment on a strut of the bushing at one end (Hooke joint of [B] section 3).
 
         m = -(k a + c a') + HAVSIN(|a'|) a'/|a'|      physics of [A] Eq. (7) for bending; own derivation of the vector form
@@ -36,9 +36,8 @@ def bending_moment(direction, w_strut, axis, w_body, k, c, p, v_t):
 
     Args:
         direction: Unit vector e along the strut, in W.
-        w_strut: Angular velocity of the strut, transverse to e. [rad/s]
+        rate: Angular velocity of the strut against the body, transverse to e. [rad/s]
         axis: Unit vector fixed in the body, equal to e at the rest pose, in W.
-        w_body: Angular velocity of the body. [rad/s]
         k, c: Rotational stiffness [N m/rad] and damping [N m s/rad].
         p, v_t: Full friction torque [N m] and the rate at which it is full [rad/s].
 
@@ -47,10 +46,14 @@ def bending_moment(direction, w_strut, axis, w_body, k, c, p, v_t):
     """
     sines = cross(axis, direction)
     angle = scale(angle_over_sine(dot(sines, sines), dot(axis, direction)), sines)
-    relative = subtract(w_strut, w_body)
-    rate = subtract(relative, scale(dot(relative, direction), direction))
     friction = havsin_friction_per_rate(dot(rate, rate), v_t, p)
     return add(scale(-k, angle), scale(friction - c, rate))
+
+
+@law
+def transverse(a, direction):
+    """Part of a vector across a direction."""
+    return subtract(a, scale(dot(a, direction), direction))
 
 
 @law

@@ -72,9 +72,15 @@ def transpose(r):
 @law
 def rotation_from_rpy(roll, pitch, yaw):
     """Rotation R_WT of space-fixed roll-pitch-yaw = 3-2-1 Euler angles of [B]: Rz(yaw) Ry(pitch) Rx(roll). [rad]"""
-    sr, cr = sine_cosine(roll)
-    sp, cp = sine_cosine(pitch)
-    sy, cy = sine_cosine(yaw)
+    return rotation_from_sines(sine_cosine(roll), sine_cosine(pitch), sine_cosine(yaw))
+
+
+@law
+def rotation_from_sines(roll, pitch, yaw):
+    """The same from sine and cosine of each angle."""
+    sr, cr = roll
+    sp, cp = pitch
+    sy, cy = yaw
     return (
         cy * cp,
         cy * sp * sr - sy * cr,
@@ -131,20 +137,20 @@ def rotation_vector_coefficient(angle_squared):
 
 
 @law
-def rotation_vector_rate(r, w):
+def rotation_vector_rate(r, w, coefficient):
     """Rate of the rotation vector r when the turned frame has angular velocity w, both in the fixed frame. [rad/s]
 
-    r' = w - (r x w)/2 + k r x (r x w)   (Bortz equation, in the fixed frame)
+    r' = w - (r x w)/2 + k r x (r x w)   (Bortz equation, in the fixed frame), k: `rotation_vector_coefficient`
     """
     rxw = cross(r, w)
-    return add(add(w, scale(-0.5, rxw)), scale(rotation_vector_coefficient(dot(r, r)), cross(r, rxw)))
+    return add(add(w, scale(-0.5, rxw)), scale(coefficient, cross(r, rxw)))
 
 
 @law
-def moment_from_rotation_vector(r, tau):
+def moment_from_rotation_vector(r, tau, coefficient):
     """Moment that does on w the work that tau does on r': m . w = tau . r' for every w. [N m]
 
     The transpose of `rotation_vector_rate`: m = tau + (r x tau)/2 + k r x (r x tau).
     """
     rxt = cross(r, tau)
-    return add(add(tau, scale(0.5, rxt)), scale(rotation_vector_coefficient(dot(r, r)), cross(r, rxt)))
+    return add(add(tau, scale(0.5, rxt)), scale(coefficient, cross(r, rxt)))

@@ -11,8 +11,8 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 from wm_drake.laws.compilation import law
 from wm_drake.laws.damper import COULOMB, FREE_STROKE, HAVSIN, MSTV, STV, damper_response
 from wm_drake.laws.motion import tub_motion
-from wm_drake.laws.strut import bending_moment, strut_line, transverse_couple, wrench_at_origin
-from wm_drake.laws.vectors import add, cross, rotate, scale
+from wm_drake.laws.strut import bending_moment, strut_line, transverse, transverse_couple, wrench_at_origin
+from wm_drake.laws.vectors import add, cross, rotate, scale, subtract
 from wm_drake.parameters.elements import (
     CoulombDamper,
     DamperType,
@@ -65,38 +65,50 @@ class FrictionDamperParameters:
 
 
 @law
-def friction_damper_wrench(motion, deformation, p, at):
-    """Moment about To and force on the tub (six numbers, W), tension, and rate of deformation of a damper strut.
+def friction_damper_line(motion, p, at):
+    """Arm of the tub end in W and `strut_line` of a damper.
 
     Args:
         motion: `TubMotion`.
-        deformation: Of the sponge; any number for a law without one. [m]
         p, at: Array that holds what `FrictionDamperParameters.packed` gives, and where that begins.
     """
     arm = rotate(motion.rotation, (p[at], p[at + 1], p[at + 2]))
-    length, elongation_rate, direction, v_A = strut_line(motion, arm, (p[at + 3], p[at + 4], p[at + 5]))
-    tension, deformation_rate = damper_response(int(p[at + 14]), elongation_rate, deformation, p, at + 15)
+    return arm, strut_line(motion, arm, (p[at + 3], p[at + 4], p[at + 5]))
+
+
+@law
+def friction_damper_tension(elongation_rate, deformation, p, at):
+    """Tension and rate of deformation; `deformation` of the sponge is any number for a law without one. [N, m/s; m]"""
+    return damper_response(int(p[at + 14]), elongation_rate, deformation, p, at + 15)
+
+
+@law
+def friction_damper_wrench(motion, arm, line, tension, p, at):
+    """Moment about To and force on the tub (six numbers, W) of a damper under a tension; arguments as above."""
+    length, _, direction, v_A = line
     axis, engaged = (p[at + 6], p[at + 7], p[at + 8]), p[at + 13]
     k, c, p_t, v_t = p[at + 9], p[at + 10], p[at + 11], p[at + 12]
     w_strut = scale(1.0 / length, cross(direction, v_A))
-    w_tub = motion.angular_velocity
-    on_strut_by_tub = bending_moment(direction, w_strut, rotate(motion.rotation, axis), w_tub, k, c, p_t, v_t)
-    on_strut_by_housing = bending_moment(direction, w_strut, axis, (0.0, 0.0, 0.0), k, c, p_t, v_t)
+    against_tub = subtract(w_strut, transverse(motion.angular_velocity, direction))
+    on_strut_by_tub = bending_moment(direction, against_tub, rotate(motion.rotation, axis), k, c, p_t, v_t)
+    on_strut_by_housing = bending_moment(direction, w_strut, axis, k, c, p_t, v_t)
     couple = transverse_couple(add(on_strut_by_tub, on_strut_by_housing), direction, length)
     force = scale(engaged, add(scale(-tension, direction), couple))
-    wrench = wrench_at_origin(arm, force, scale(-engaged, on_strut_by_tub))
-    return wrench, engaged * tension, deformation_rate
+    return wrench_at_origin(arm, force, scale(-engaged, on_strut_by_tub))
 
 
 @law
 def evaluate_friction_damper(x, state, p, generalized_force, force, rate):
     """Force of a damper strut; arguments as in `ForceElement`, parameters as in `FrictionDamperParameters.packed`."""
     deformation = state[0] if len(state) > 0 else 0.0 * x[0]
-    wrench, tension, deformation_rate = friction_damper_wrench(tub_motion(x), deformation, p, 0)
+    motion = tub_motion(x)
+    arm, line = friction_damper_line(motion, p, 0)
+    tension, deformation_rate = friction_damper_tension(line[1], deformation, p, 0)
+    wrench = friction_damper_wrench(motion, arm, line, tension, p, 0)
     for i in range(6):
         generalized_force[i] = wrench[i]
     generalized_force[6] = 0.0 * tension
-    force[0] = tension
+    force[0] = p[13] * tension
     if len(rate) > 0:
         rate[0] = deformation_rate
 
