@@ -62,10 +62,10 @@ def faults(name, source, is_package=False):
             found.append(f"{name} imports {target}: this room does without Drake")
         if (
             room == "laws"
-            and top not in {"numpy", "numba", *sys.stdlib_module_names}
+            and top not in {"numpy", "numba", "llvmlite", *sys.stdlib_module_names}
             and not target.startswith("wm_drake.laws")
         ):
-            found.append(f"{name} imports {target}: laws need numpy and numba only")
+            found.append(f"{name} imports {target}: laws need numpy and the compiler only")
     return found
 
 

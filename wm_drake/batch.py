@@ -14,14 +14,15 @@ from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.kernel.histories import POINT_SIZE, measure_samples_lanes
 from wm_drake.kernel.integration import integrate_lanes
 from wm_drake.kernel.mechanics import DRUM_RATE, LINE_SIZE
-from wm_drake.kernel.packing import Layout, initial_state, pack
+from wm_drake.kernel.packing import Layout, initial_state, pack_bodies, pack_elements
 from wm_drake.kernel.schedule import Schedule, schedule_of
 from wm_drake.laws.lanes import WIDTH
+from wm_drake.laws.vectors import rotate, rotation_from_rpy
 from wm_drake.machine import OUTPUT_PERIOD, Machine, Setup
 from wm_drake.measures import amplitudes, filtered
-from wm_drake.parameters import SpinProfile
+from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.elements import FloatArray
-from wm_drake.simulation import AXES, DEFAULT_STEP, Case, check_step, point_position
+from wm_drake.simulation import AXES, DEFAULT_STEP, Case, check_step
 from wm_drake.trajectory import Divergence, diverging_coordinate, divergence_text
 
 MEASURES = {
@@ -38,6 +39,7 @@ _VARIABLES = {
     "critical_speed": ("sensor", "rad/s", "drum speed where it occurs"),
 }
 
+_KEPT_BODIES, _KEPT_NUMBERS = 64, 2048
 PAUSE_STEPS = 4000
 """Steps between looks at the states: some ten milliseconds."""
 
@@ -76,6 +78,17 @@ class _Job:
     packed: FloatArray
     points: FloatArray
     begin: FloatArray
+
+
+@dataclass(frozen=True)
+class _Numbers:
+    """What is packed of a set of numbers apart from bodies and load; `parameters` are held so that no other takes their id."""
+
+    parameters: MachineParameters
+    elements: FloatArray
+    layout: Layout
+    points: FloatArray
+    rest: FloatArray
 
 
 @dataclass(frozen=True)
@@ -189,6 +202,8 @@ class _Batches:
         self.stopped = threading.Event()
         self._context: Context | None = None
         self._schedules: dict[SpinProfile, Schedule] = {}
+        self._known_bodies: list[tuple[object, FloatArray]] = []
+        self._known_numbers: dict[tuple[int, bool], _Numbers] = {}
         self._memory = threading.local()
 
     def prepared(self, cases: Iterable[Case]) -> Iterator[tuple[_Kind, list[_Job]]]:
@@ -206,14 +221,44 @@ class _Batches:
         if case.profile not in self._schedules:
             self._schedules[case.profile] = schedule_of(case.profile, self.step, OUTPUT_PERIOD)
         try:
-            setup = self.machine.set_up(case.load, parameters=case.parameters, gasket=case.gasket, context=self._context)
-            if list(setup.sensors) != self.sensors:
-                raise input_error(f"has sensors {', '.join(setup.sensors)}; the machine has {', '.join(self.sensors)}")
-            self._context = setup.context
-            packed, layout = pack(setup)
+            bodies, numbers = self._bodies(case), self._numbers(case)
         except InputError as error:
             raise InputError(Problem(f"case {number} '{case.name}'", p.key, p.message) for p in error.problems) from None
-        return _Kind(case.profile, layout), _Job(number, case, packed, _points(setup), initial_state(setup, case.profile))
+        begin = numbers.rest.copy()
+        begin[DRUM_RATE] = case.profile.speed[0]
+        job = _Job(number, case, np.concatenate([bodies, numbers.elements]), numbers.points, begin)
+        return _Kind(case.profile, numbers.layout), job
+
+    def _bodies(self, case: Case) -> FloatArray:
+        """Packed bodies: the same for all cases with these bodies, frames and load."""
+        parameters = case.parameters or self.machine.parameters
+        key = (parameters.bodies, parameters.frames, case.load)
+        for known, bodies in self._known_bodies:
+            if known == key:
+                return bodies
+        bodies = pack_bodies(self._set_up(case, case.load))
+        self._known_bodies = [(key, bodies), *self._known_bodies[: _KEPT_BODIES - 1]]
+        return bodies
+
+    def _numbers(self, case: Case) -> "_Numbers":
+        """All else of a case: the same whatever its load."""
+        parameters = case.parameters or self.machine.parameters
+        key = (id(parameters), case.gasket)
+        if key not in self._known_numbers:
+            if len(self._known_numbers) >= _KEPT_NUMBERS:
+                del self._known_numbers[next(iter(self._known_numbers))]
+            setup = self._set_up(case, None)
+            elements, layout = pack_elements(setup)
+            rest = initial_state(setup, case.profile)
+            self._known_numbers[key] = _Numbers(parameters, elements, layout, _points(setup), rest)
+        return self._known_numbers[key]
+
+    def _set_up(self, case: Case, load: Load | None) -> Setup:
+        setup = self.machine.set_up(load, parameters=case.parameters, gasket=case.gasket, context=self._context)
+        if list(setup.sensors) != self.sensors:
+            raise input_error(f"has sensors {', '.join(setup.sensors)}; the machine has {', '.join(self.sensors)}")
+        self._context = setup.context
+        return setup
 
     def run(self, kind: _Kind, jobs: list[_Job]) -> list[Ended]:
         """Runs up to `WIDTH` jobs side by side and measures them; none if stopped on the way."""
@@ -288,5 +333,9 @@ def _points(setup: Setup) -> FloatArray:
     """What is measured of the motion, packed for `measure_samples`: the sensors, then the detergent point along x, y, z."""
     places = [*setup.sensor_points.values(), *[setup.detergent_point] * 3]
     axes = [*(AXES.index(sensor.axis) for sensor in setup.sensors.values()), 0, 1, 2]
-    rest = [point_position(setup.rest_pose[None, :], place)[0, axis] for place, axis in zip(places, axes, strict=True)]
-    return np.concatenate([[*place, *np.eye(3)[axis], at] for place, axis, at in zip(places, axes, rest, strict=True)])
+    rotation = rotation_from_rpy(*map(float, setup.rest_pose[:3]))
+    packed = []
+    for place, axis in zip(places, axes, strict=True):
+        at_rest = setup.rest_pose[3 + axis] + rotate(rotation, tuple(map(float, place)))[axis]
+        packed += [*place, *(float(axis == i) for i in range(3)), at_rest]
+    return np.array(packed)

@@ -124,10 +124,10 @@ class Machine:
         self._set(context, self.springs, springs)
         if not gasket and "gasket" in bushings:
             bushings["gasket"] = replace(bushings["gasket"], engaged=0.0)
+            self._set(context, self.bushings, bushings)
         if not dampers:
             placed_dampers = {name: replace(damper, engaged=0.0) for name, damper in placed_dampers.items()}
-        self._set(context, self.bushings, bushings)
-        self._set(context, self.dampers, placed_dampers)
+            self._set(context, self.dampers, placed_dampers)
         rest_pose, residual = self._rest_pose(context)
         if load is not None:
             add_load(self.plant, plant_context, load)
@@ -182,11 +182,12 @@ class Machine:
             return self.elastic_and_gravity_force(context)
 
         pose = np.zeros(6)
-        if not np.all(np.isfinite(residual(pose))):
-            raise input_error("forces at rest are not finite numbers; some mass, stiffness or distance is out of all bounds")
-        if np.max(np.abs(residual(pose))) > EQUILIBRIUM_TOLERANCE:
-            pose = np.asarray(root(residual, pose, tol=1e-15).x)
         remains = residual(pose)
+        if not np.all(np.isfinite(remains)):
+            raise input_error("forces at rest are not finite numbers; some mass, stiffness or distance is out of all bounds")
+        if np.max(np.abs(remains)) > EQUILIBRIUM_TOLERANCE:
+            pose = np.asarray(root(residual, pose, tol=1e-15).x)
+            remains = residual(pose)
         far = np.max(np.abs(pose[:3])) > _FARTHEST_REST_ANGLE or np.max(np.abs(pose[3:])) > _FARTHEST_REST_POSITION
         if not np.max(np.abs(remains)) <= EQUILIBRIUM_TOLERANCE or far:
             self.plant.SetPositions(plant_context, np.zeros(7))

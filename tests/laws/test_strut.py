@@ -6,11 +6,13 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from wm_drake.laws.friction import havsin_friction
 from wm_drake.laws.motion import TubMotion
-from wm_drake.laws.strut import bending_moment, strut_line, transverse_couple, wrench_at_origin
+from wm_drake.laws.strut import bending_moment, strut_line, transverse, transverse_couple, wrench_at_origin
 
 ZERO = (0.0, 0.0, 0.0)
 K, C, P, V_T = 12.0, 0.3, 0.9, 0.5  # N m/rad, N m s/rad, N m, rad/s
+SLOPE = 0.5 * np.pi / V_T  # s/rad
 
 directions = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda a: np.linalg.norm(a) > 0.1)
 rates = st.tuples(*[st.floats(-3.0, 3.0)] * 3)  # rad/s
@@ -46,21 +48,21 @@ def test_strut_line_gives_length_direction_and_their_rates():
 
 def test_no_moment_at_rest():
     axis = tuple(map(float, unit((1.0, 2.0, -4.0))))
-    assert bending_moment(axis, ZERO, axis, ZERO, K, C, P, V_T) == pytest.approx(ZERO, abs=1e-15)
+    assert bending_moment(axis, ZERO, axis, K, C, P, SLOPE) == pytest.approx(ZERO, abs=1e-15)
 
 
 def test_a_bent_strut_is_pushed_back_with_stiffness_times_angle():
     for angle in (1e-6, 0.02, 0.6, 2.0):  # rad
         direction = (float(np.sin(angle)), 0.0, float(np.cos(angle)))  # turned by angle about y, away from z
-        moment = bending_moment(direction, ZERO, (0.0, 0.0, 1.0), ZERO, K, 0.0, 0.0, V_T)
+        moment = bending_moment(direction, ZERO, (0.0, 0.0, 1.0), K, 0.0, 0.0, SLOPE)
         assert moment == pytest.approx((0.0, -K * angle, 0.0), rel=1e-12, abs=1e-18)
 
 
 def test_hand_values_of_damping_and_friction():
     z = (0.0, 0.0, 1.0)
-    slow = bending_moment(z, (V_T / 2, 0.0, 0.0), z, ZERO, 0.0, C, P, V_T)
+    slow = bending_moment(z, (V_T / 2, 0.0, 0.0), z, 0.0, C, P, SLOPE)
     assert slow == pytest.approx((-0.3 * 0.25 - 0.9 * np.sin(np.pi / 4), 0.0, 0.0))
-    fast = bending_moment(z, ZERO, z, (0.0, 2.0, 0.0), 0.0, C, P, V_T)  # the body turns under a strut at rest
+    fast = bending_moment(z, (0.0, -2.0, 0.0), z, 0.0, C, P, SLOPE)  # the body turns under a strut at rest
     assert fast == pytest.approx((0.0, 0.3 * 2.0 + 0.9, 0.0))
 
 
@@ -69,7 +71,8 @@ def test_elastic_power_is_minus_the_rate_of_half_k_angle_squared(axis, direction
     axis, direction, w_strut, w_body = unit(axis), unit(direction), np.array(w_strut), np.array(w_body)
     assume(angle_between(axis, direction) < 3.0)
     w_strut = w_strut - (w_strut @ direction) * direction
-    moment = bending_moment(*map(tuple, (direction, w_strut, axis, w_body)), K, 0.0, 0.0, V_T)
+    rate = transverse(tuple(w_strut - w_body), tuple(direction))
+    moment = bending_moment(tuple(direction), rate, tuple(axis), K, 0.0, 0.0, SLOPE)
     h = 1e-5  # s
 
     def energy(t):
@@ -78,31 +81,32 @@ def test_elastic_power_is_minus_the_rate_of_half_k_angle_squared(axis, direction
     assert np.dot(moment, w_strut - w_body) == pytest.approx((energy(-h) - energy(h)) / (2.0 * h), rel=1e-6, abs=1e-6)
 
 
-@given(axis=directions, direction=directions, w_strut=rates, w_body=rates)
-def test_damping_and_friction_dissipate(axis, direction, w_strut, w_body):
-    moment = bending_moment(tuple(unit(direction)), w_strut, tuple(unit(axis)), w_body, 0.0, C, P, V_T)
-    assert np.dot(moment, np.subtract(w_strut, w_body)) <= 1e-12
+@given(axis=directions, direction=directions, w=rates)
+def test_damping_and_friction_dissipate(axis, direction, w):
+    rate = transverse(w, tuple(unit(direction)))
+    moment = bending_moment(tuple(unit(direction)), rate, tuple(unit(axis)), 0.0, C, P, SLOPE)
+    assert np.dot(moment, w) <= 1e-12
     assert abs(np.dot(moment, unit(direction))) <= 1e-13 * (1.0 + np.linalg.norm(moment))
 
 
 @given(direction=directions, spin=st.floats(-3.0, 3.0))
 def test_spin_about_the_struts_own_axis_is_free(direction, spin):
-    direction = unit(direction)
-    moment = bending_moment(tuple(direction), ZERO, tuple(direction), tuple(spin * direction), K, C, P, V_T)
+    direction = tuple(map(float, unit(direction)))
+    rate = transverse(tuple(spin * e for e in direction), direction)
+    moment = bending_moment(direction, rate, direction, K, C, P, SLOPE)
     assert moment == pytest.approx(ZERO, abs=1e-13)
 
 
-def test_friction_is_smooth_where_the_quotient_gives_way_to_its_limit():
-    z, switch = (0.0, 0.0, 1.0), 1e-8 * V_T  # rad/s
-    below, above = (bending_moment(z, (switch * f, 0.0, 0.0), z, ZERO, 0.0, 0.0, P, V_T)[0] / f for f in (0.999, 1.001))
-    assert below == pytest.approx(above, rel=1e-12)
-    assert below == pytest.approx(-0.5 * np.pi * P / V_T * switch, rel=1e-12)
+@pytest.mark.parametrize("rate", [0.0, 1e-9, 0.3 * V_T, 0.999999 * V_T, V_T, 1.000001 * V_T, 5.0 * V_T])  # rad/s
+def test_bending_friction_is_that_of_havsin(rate):
+    z = (0.0, 0.0, 1.0)
+    assert bending_moment(z, (rate, 0.0, 0.0), z, 0.0, 0.0, P, SLOPE)[0] == pytest.approx(havsin_friction(rate, V_T, P), rel=1e-14)
 
 
-@pytest.mark.parametrize("angle", [0.0099999, 0.01, 0.0100001])  # rad; the series gives way at sin = 0.01
+@pytest.mark.parametrize("angle", [0.0999999, 0.1001674, 0.1001675, 0.11])  # rad; the series gives way at sin = 0.1
 def test_bending_is_smooth_where_the_series_gives_way_to_the_arctangent(angle):
     direction = (float(np.sin(angle)), 0.0, float(np.cos(angle)))
-    assert bending_moment(direction, ZERO, (0.0, 0.0, 1.0), ZERO, K, 0.0, 0.0, V_T)[1] == pytest.approx(-K * angle, rel=1e-14)
+    assert bending_moment(direction, ZERO, (0.0, 0.0, 1.0), K, 0.0, 0.0, SLOPE)[1] == pytest.approx(-K * angle, rel=1e-14)
 
 
 @given(direction=directions, m_tub=rates, m_housing=rates, length=st.floats(0.05, 0.5))

@@ -41,7 +41,13 @@ def pack(setup: Setup) -> tuple[FloatArray, Layout]:
     Raises:
         InputError: the machine has something that the compiled engine does not represent.
     """
-    parts = [_packed_bodies(setup)]
+    elements, layout = pack_elements(setup)
+    return np.concatenate([pack_bodies(setup), elements]), layout
+
+
+def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
+    """The part of `pack` that follows the bodies: springs, dampers, bushings; no load changes it."""
+    parts: list[FloatArray] = []
     size = BODIES_SIZE
     indices: dict[str, tuple[int, ...]] = {}
     for kind in ("springs", "dampers", "bushings"):
@@ -64,7 +70,8 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     return x
 
 
-def _packed_bodies(setup: Setup) -> FloatArray:
+def pack_bodies(setup: Setup) -> FloatArray:
+    """The first part of `pack`: bodies and load, which no number of an element changes; raises as `pack` does."""
     plant, context = setup.machine.plant, setup.plant_context
     joint = drum_joint(plant, setup.parameters.drive.joint)
     tub = plant.GetBodyByName("tub").body_frame()

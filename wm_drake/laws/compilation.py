@@ -38,12 +38,12 @@ def _cache_folder() -> str:
 
 def law(function: Callable[..., Any]) -> Any:
     """Compiles a law for floats, with a cache on disk."""
-    return _compiled(function, error_model="numpy", forceinline=True, fastmath={"contract"})
+    return _compiled(function, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
 
 
 def long_running(function: Callable[..., Any]) -> Any:
     """Compiles a loop that calls laws for milliseconds and more: other threads of Python go on meanwhile."""
-    return _compiled(function, error_model="numpy", nogil=True, fastmath={"contract"})
+    return _compiled(function, error_model="numpy", nogil=True, fastmath={"contract", "nsz"})
 
 
 def _compiled(function: Callable[..., Any], **options: Any) -> Any:

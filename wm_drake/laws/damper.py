@@ -69,17 +69,14 @@ def slider_rate(b, v, c, f_max, c_m, epsilon):
 
 
 @law
-def positive_root(a2, a1, a0):
-    """Positive root of a2 w^2 + a1 w - a0 = 0 for a0 >= 0, without cancellation (smaller one if a2 < 0 < a1)."""
-    above, below = root_as_quotient(a2, a1, a0)
-    return above / below
-
-
-@law
 def root_as_quotient(a2, a1, a0):
-    """Numerator and denominator of `positive_root`; 0/1 where a1 and a0 are zero."""
+    """Positive root of a2 w^2 + a1 w - a0 = 0 for a0 >= 0 (smaller one if a2 < 0 < a1), without cancellation.
+
+    Returns:
+        Numerator and denominator; 0 and 1 where there is neither friction nor force.
+    """
     radicand = a1 * a1 + 4.0 * a2 * a0
-    free = radicand <= 0.0  # no friction, no force: at rest; the root of zero has no derivative
+    free = radicand <= 0.0  # the root of zero has no derivative
     root = sqrt(where(free, 1.0, radicand))
     rises = a1 > 0.0
     above = where(free, 0.0 * a1, where(rises, 2.0 * a0, root - a1))

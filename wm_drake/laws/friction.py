@@ -65,21 +65,20 @@ def havsin_friction(v, v_t, p):
 
 
 @law
-def havsin_friction_per_rate(rate_squared, v_t, p):
-    """f / v of `havsin_friction`, which multiplied with a vector of velocity or rate gives friction against it.
-
-    Smooth at rest, where it is -pi p / (2 v_t).
+def havsin_friction_per_rate(rate_squared, slope, p):
+    """f / v of `havsin_friction`, which multiplied with a vector of velocity or rate gives the friction against it.
 
     Args:
         rate_squared: Square of the magnitude of the vector. [m^2/s^2 or rad^2/s^2]
-        v_t, p: As for `havsin_friction`.
+        slope: pi / (2 v_t), the relative slope of the friction at rest. [s/m or s/rad]
+        p: As for `havsin_friction`.
 
     Returns:
-        Force or torque per rate, <= 0. [N s/m or N m s]
+        Force or torque per rate, <= 0; -p slope at rest, where it is smooth. [N s/m or N m s]
     """
-    slope = (0.5 * np.pi) / v_t
-    per_rate = -p * slope * sine_over_angle(slope * slope * rate_squared)
-    full = rate_squared >= v_t * v_t
+    x_squared = slope * slope * rate_squared
+    per_rate = -p * slope * sine_over_angle(x_squared)
+    full = x_squared >= 0.25 * np.pi * np.pi
     if anywhere(full):
         per_rate = where(full, -p / sqrt(rate_squared), per_rate)
     return per_rate

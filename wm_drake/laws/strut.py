@@ -26,7 +26,7 @@ def strut_line(motion, arm, p_WH):
 
 
 @law
-def bending_moment(direction, rate, axis, k, c, p, v_t):
+def bending_moment(direction, rate, axis, k, c, p, slope):
     """Moment on a strut of the bushing at one end (Hooke joint of [B] section 3).
 
         m = -(k a + c a') + HAVSIN(|a'|) a'/|a'|      physics of [A] Eq. (7) for bending; own derivation of the vector form
@@ -39,14 +39,14 @@ def bending_moment(direction, rate, axis, k, c, p, v_t):
         rate: Angular velocity of the strut against the body, transverse to e. [rad/s]
         axis: Unit vector fixed in the body, equal to e at the rest pose, in W.
         k, c: Rotational stiffness [N m/rad] and damping [N m s/rad].
-        p, v_t: Full friction torque [N m] and the rate at which it is full [rad/s].
+        p, slope: Full friction torque [N m]; pi/2 over the rate at which it is full [s/rad].
 
     Returns:
         Moment on the strut, in W, transverse to e. [N m]
     """
     sines = cross(axis, direction)
     angle = scale(angle_over_sine(dot(sines, sines), dot(axis, direction)), sines)
-    friction = havsin_friction_per_rate(dot(rate, rate), v_t, p)
+    friction = havsin_friction_per_rate(dot(rate, rate), slope, p)
     return add(scale(-k, angle), scale(friction - c, rate))
 
 

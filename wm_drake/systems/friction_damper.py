@@ -57,10 +57,10 @@ class FrictionDamperParameters:
         return int(self.packed_law[0]) in (MSTV, FREE_STROKE)
 
     def packed(self) -> FloatArray:
-        """Flat: tub end (T), housing end (W), axis, end bushing k, c, p, v_t, engaged, law number, law's parameters."""
+        """Flat: tub end (T), housing end (W), axis, end bushing k, c, p, pi / (2 v_t), engaged, law number, law's parameters."""
         line = self.p_ToA_T - self.p_WH
         b = self.end_bushing
-        bushing = [b.stiffness, b.damping, b.friction_torque, b.full_friction_rate, self.engaged]
+        bushing = [b.stiffness, b.damping, b.friction_torque, 0.5 * np.pi / b.full_friction_rate, self.engaged]
         return np.concatenate([self.p_ToA_T, self.p_WH, line / np.linalg.norm(line), bushing, self.packed_law])
 
 
@@ -87,11 +87,11 @@ def friction_damper_wrench(motion, arm, line, tension, p, at):
     """Moment about To and force on the tub (six numbers, W) of a damper under a tension; arguments as above."""
     length, _, direction, v_A = line
     axis, engaged = (p[at + 6], p[at + 7], p[at + 8]), p[at + 13]
-    k, c, p_t, v_t = p[at + 9], p[at + 10], p[at + 11], p[at + 12]
+    bushing = (p[at + 9], p[at + 10], p[at + 11], p[at + 12])
     w_strut = scale(1.0 / length, cross(direction, v_A))
     against_tub = subtract(w_strut, transverse(motion.angular_velocity, direction))
-    on_strut_by_tub = bending_moment(direction, against_tub, rotate(motion.rotation, axis), k, c, p_t, v_t)
-    on_strut_by_housing = bending_moment(direction, w_strut, axis, k, c, p_t, v_t)
+    on_strut_by_tub = bending_moment(direction, against_tub, rotate(motion.rotation, axis), *bushing)
+    on_strut_by_housing = bending_moment(direction, w_strut, axis, *bushing)
     couple = transverse_couple(add(on_strut_by_tub, on_strut_by_housing), direction, length)
     force = scale(engaged, add(scale(-tension, direction), couple))
     return wrench_at_origin(arm, force, scale(-engaged, on_strut_by_tub))
