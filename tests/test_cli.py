@@ -271,7 +271,7 @@ def test_spin_prints_one_json_object(plain):
     assert plain.ended.returncode == 0
     printed = strict_json(plain.ended.stdout)
     assert set(printed) == {"machine", "engine", "cases"}
-    assert (printed["machine"], printed["engine"]) == ("reference", "drake")
+    assert (printed["machine"], printed["engine"]) == ("reference", "compiled")
     case = plain.case
     assert set(case) == {
         *("load", "gasket", "amplitudes_mm", "detergent_box_mm", "gasket_force_N", "gasket_moment_Nm"),

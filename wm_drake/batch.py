@@ -123,7 +123,7 @@ def simulate_many(
         finished: Called with each run as it ends.
 
     Returns:
-        Table over `run`, the number of the case: coordinate `load`, the measures as in `Measures` (SI, attrs["units"]), and
+        Table over `run`, the number of the case: coordinate `case` with their names, the measures as in `Measures` (SI, attrs["units"]), and
         `diverged`: when and why a run stopped early, "" if it did not; its measures are those up to there.
 
     Raises:
@@ -154,7 +154,7 @@ def _table(machine: Machine, measures: tuple[str, ...], results: dict[int, tuple
     numbers = sorted(results)
     labels = {
         "run": numbers,
-        "load": ("run", [results[number][0] for number in numbers]),
+        "case": ("run", [results[number][0] for number in numbers]),
         "axis": list(AXES),
         "sensor": list(machine.parameters.sensors),
     }

@@ -54,10 +54,10 @@ def filtered(displacement: FloatArray, period: float) -> FloatArray:
         displacement: One column a signal. [m]
         period: Between samples. [s]
     """
-    sections = butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=1.0 / period, output="sos")
     padding = min(round(PADDING / period), len(displacement) - 1)
-    if padding <= 6 * len(sections) + 3:  # what sosfiltfilt itself holds for the least
+    if padding <= 6 * FILTER_ORDER + 3:  # what sosfiltfilt itself holds for the least
         return np.full(displacement.shape, np.nan)
+    sections = butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=1.0 / period, output="sos")
     return np.asarray(sosfiltfilt(sections, displacement, axis=0, padtype="even", padlen=padding))
 
 

@@ -11,12 +11,13 @@ SHORT = SpinProfile(time=(0.0, 2.0), speed=(0.0, 15.0))
 
 
 @pytest.mark.slow
-def test_results_do_not_depend_on_the_number_of_workers():
+@pytest.mark.parametrize("engine", ["compiled", "drake"])
+def test_results_do_not_depend_on_the_number_of_workers(engine):
     parameters = load_machine("reference")
     cases = [Case(name, parameters.loads[name], SHORT) for name in ("middle", "back", "front")]
     told = []
-    alone = run_spin(parameters, cases, workers=1)
-    shared = run_spin(parameters, cases, workers=2, progress=lambda index, fraction: told.append((index, fraction)))
+    alone = run_spin(parameters, cases, engine, workers=1)
+    shared = run_spin(parameters, cases, engine, workers=2, progress=lambda index, fraction: told.append((index, fraction)))
     for one, other in zip(alone.results, shared.results, strict=True):
         assert one.case == other.case
         assert one.record.identical(other.record)

@@ -1,4 +1,4 @@
-"""Spin runs: cases side by side in processes of their own, each with its measures."""
+"""Spin runs: cases, each with its measures."""
 
 import multiprocessing
 import os
@@ -11,11 +11,15 @@ from functools import partial
 from queue import Empty
 from typing import Any
 
-from wm_drake.machine import build_machine
+from wm_drake.machine import Machine, build_machine
 from wm_drake.measures import Measures, measure
 from wm_drake.parameters import MachineParameters
 from wm_drake.scene import Scene
 from wm_drake.simulation import DEFAULT_ENGINE, DEFAULT_STEP, Case, DivergenceWarning, Record, simulate
+
+
+_IN_PROCESSES = {"drake"}
+"""Engines whose cases run in processes of their own: seconds each, and Drake's Python callbacks take turns in one."""
 
 
 @dataclass(frozen=True)
@@ -57,21 +61,22 @@ def run_spin(
     progress: Callable[[int, float], None] = lambda index, fraction: None,
     workers: int | None = None,
 ) -> SpinResult:
-    """Runs cases, each in a process of its own; results do not depend on the number of workers.
+    """Runs cases; results do not depend on the number of workers.
 
     Args:
         parameters: The machine.
         cases: What to run.
         engine, step: As for `simulate`.
         progress: Called with the number of the case and the fraction of it done.
-        workers: Processes; as many as cores by default. One case runs in this process.
+        workers: Processes for an engine that needs them; as many as cores by default. One case runs in this process.
     """
     count = min(workers or os.cpu_count() or 1, len(cases))
     jobs = [_Job(parameters, case, engine, step) for case in cases]
-    if count <= 1:
-        results = [_run(job, partial(progress, index)) for index, job in enumerate(jobs)]
-    else:
+    if engine in _IN_PROCESSES and count > 1:
         results = _run_in_processes(jobs, count, progress)
+    else:
+        machine, scene = build_machine(parameters), Scene(parameters)
+        results = [_run(job, machine, scene, partial(progress, index)) for index, job in enumerate(jobs)]
     return SpinResult(parameters, engine, step, tuple(results))
 
 
@@ -104,13 +109,14 @@ def _pass_on(reports: Any, progress: Callable[[int, float], None]) -> None:
 
 
 def _run_and_report(job: _Job, index: int, reports: Any) -> CaseResult:
-    return _run(job, lambda fraction: reports.put((index, fraction)))
+    machine, scene = build_machine(job.parameters), Scene(job.parameters)
+    return _run(job, machine, scene, lambda fraction: reports.put((index, fraction)))
 
 
-def _run(job: _Job, progress: Callable[[float], None]) -> CaseResult:
+def _run(job: _Job, machine: Machine, scene: Scene, progress: Callable[[float], None]) -> CaseResult:
     begin = time.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DivergenceWarning)  # the record carries it to the report
-        record = simulate(build_machine(job.parameters), job.case, job.engine, step=job.step, progress=progress)
-    measures = measure(record, Scene(job.parameters))
+        record = simulate(machine, job.case, job.engine, step=job.step, progress=progress)
+    measures = measure(record, scene)
     return CaseResult(job.case, record, measures, time.perf_counter() - begin)
