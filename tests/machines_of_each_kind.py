@@ -26,7 +26,9 @@ DAMPERS = {
     },
 }
 FRICTION = {f"friction_torque_{axis}": 0.5 for axis in "xyz"} | {f"full_friction_rate_{axis}": 1.5 for axis in "xyz"}
-TABLES = {f"stiffness_{axis}": LINEAR_TABLE for axis in "xyz"} | {f"rotational_stiffness_{axis}": TORQUE_TABLE for axis in "xyz"}
+TABLES = {f"stiffness_{axis}": LINEAR_TABLE for axis in "xyz"} | {
+    f"rotational_stiffness_{axis}": TORQUE_TABLE for axis in "xyz"
+}
 
 
 def changed(**parts):

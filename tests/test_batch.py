@@ -160,7 +160,12 @@ def test_memory_does_not_grow_with_the_number_of_runs(reference, machine):
 
     def many(count):
         for number in range(count):
-            yield Case("short", reference.loads["middle"], profile, parameters=with_value(reference, "gasket.stiffness_x", 3e3 + number))
+            yield Case(
+                "short",
+                reference.loads["middle"],
+                profile,
+                parameters=with_value(reference, "gasket.stiffness_x", 3e3 + number),
+            )
 
     simulate_many(machine, many(WIDTH), measures=["extremes"])
     peaks = []

@@ -23,7 +23,7 @@ from wm_drake.measures import amplitudes, filtered
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.simulation import AXES, DEFAULT_STEP, Case, check_step
-from wm_drake.trajectory import Divergence, diverging_coordinate, divergence_text
+from wm_drake.trajectory import Divergence, divergence_text, diverging_coordinate
 
 MEASURES = {
     "extremes": ("detergent_displacement", "gasket_force", "gasket_moment"),
@@ -48,6 +48,7 @@ class SimulationInterrupted(KeyboardInterrupt):
     """Ctrl-C during `simulate_many`; `finished` is the table of the runs that had ended."""
 
     def __init__(self, finished: xr.Dataset) -> None:
+        """Keeps the table of what had ended."""
         super().__init__(f"interrupted after {finished.sizes['run']} runs")
         self.finished = finished
 
@@ -123,8 +124,8 @@ def simulate_many(
         finished: Called with each run as it ends.
 
     Returns:
-        Table over `run`, the number of the case: coordinate `case` with their names, the measures as in `Measures` (SI, attrs["units"]), and
-        `diverged`: when and why a run stopped early, "" if it did not; its measures are those up to there.
+        Table over `run`, the number of the case: coordinate `case` with its name; the measures as in `Measures` (SI,
+        attrs["units"]); `diverged`: when and why a run stopped early, "" if it did not; its measures are those up to there.
 
     Raises:
         InputError: a case or an argument at fault; runs that had ended were handed to `finished`.
@@ -275,9 +276,7 @@ class _Batches:
         if self.stopped.is_set():
             return []
         work = self._array("work", size)
-        measure_samples_lanes(
-            samples, rows, size, p.ravel(), kind.layout.gasket, points.ravel(), count, work, moved, extremes
-        )
+        measure_samples_lanes(samples, rows, size, p.ravel(), kind.layout.gasket, points.ravel(), count, work, moved, extremes)
         histories = samples.reshape(rows, size, WIDTH), moved.reshape(rows, count, WIDTH), extremes.reshape(-1, WIDTH)
         return [self._ended(job, schedule, *(a[..., lane] for a in histories)) for lane, job in enumerate(jobs)]
 
@@ -311,7 +310,7 @@ class _Batches:
         return lanes
 
     def _array(self, name: str, size: int) -> FloatArray:
-        """An array of lanes of this thread, used again from batch to batch, at an address that vectors are loaded from in one go."""
+        """An array of lanes of this thread, used again from batch to batch, at an address vectors are loaded from in one go."""
         kept = self._memory.__dict__
         if name not in kept or len(kept[name]) != size * WIDTH:
             raw = np.zeros(size * WIDTH + WIDTH)

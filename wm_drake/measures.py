@@ -147,4 +147,3 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
         gasket_moment=abs(gasket.bushing_moment).max("time").sum("bushing"),
         smallest_gap=gap,
     )
-

@@ -91,14 +91,20 @@ def redrawn(tmp_path, *changes):
 
 
 def test_a_drum_that_turns_about_another_axis_is_represented(tmp_path):
-    axis = (r'(<joint name="drum_axis" type="revolute">)(.*?)<xyz>0 1 0</xyz>', r"\1<pose>0.02 0.1 -0.03 0.2 0.1 -0.3</pose>\2<xyz>0.1 0.9 -0.2</xyz>")
+    axis = (
+        r'(<joint name="drum_axis" type="revolute">)(.*?)<xyz>0 1 0</xyz>',
+        r"\1<pose>0.02 0.1 -0.03 0.2 0.1 -0.3</pose>\2<xyz>0.1 0.9 -0.2</xyz>",
+    )
     damping = (r"(<xyz>0.1 0.9 -0.2</xyz><limit>.*?</limit>)", r"\1<dynamics><damping>0.3</damping></dynamics>")
     machine = build_machine(redrawn(tmp_path, axis, damping))
     assert worst_difference(machine, machine.set_up(LOAD), 300) < 1e-10
 
 
 REVERSED = (
-    (r'(<joint name="drum_axis" type="revolute">\s*)<parent>tub</parent>\s*<child>drum</child>', r"\1<parent>drum</parent><child>tub</child>"),
+    (
+        r'(<joint name="drum_axis" type="revolute">\s*)<parent>tub</parent>\s*<child>drum</child>',
+        r"\1<parent>drum</parent><child>tub</child>",
+    ),
 )
 SLIDING = ((r'<joint name="drum_axis" type="revolute">', r'<joint name="drum_axis" type="prismatic">'),)
 EXTRA_FORCE = (

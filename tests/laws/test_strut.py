@@ -100,7 +100,9 @@ def test_spin_about_the_struts_own_axis_is_free(direction, spin):
 @pytest.mark.parametrize("rate", [0.0, 1e-9, 0.3 * V_T, 0.999999 * V_T, V_T, 1.000001 * V_T, 5.0 * V_T])  # rad/s
 def test_bending_friction_is_that_of_havsin(rate):
     z = (0.0, 0.0, 1.0)
-    assert bending_moment(z, (rate, 0.0, 0.0), z, 0.0, 0.0, P, SLOPE)[0] == pytest.approx(havsin_friction(rate, V_T, P), rel=1e-14)
+    assert bending_moment(z, (rate, 0.0, 0.0), z, 0.0, 0.0, P, SLOPE)[0] == pytest.approx(
+        havsin_friction(rate, V_T, P), rel=1e-14
+    )
 
 
 @pytest.mark.parametrize("angle", [0.0999999, 0.1001674, 0.1001675, 0.11])  # rad; the series gives way at sin = 0.1

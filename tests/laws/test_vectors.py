@@ -83,7 +83,9 @@ def test_rotation_vector_rate_is_the_finite_difference_under_an_angular_velocity
         r, w = angle * random_axis(rng), rng.normal(size=3)  # rad, rad/s, both in the fixed frame
         R = matrix_of(r)
         after, before = (np.array(rotation_vector(rows(matrix_of(step * w) @ R))) for step in (h, -h))
-        np.testing.assert_allclose(rotation_vector_rate(tuple(r), tuple(w), coefficient_of(r)), (after - before) / (2.0 * h), rtol=0.0, atol=2e-8)
+        np.testing.assert_allclose(
+            rotation_vector_rate(tuple(r), tuple(w), coefficient_of(r)), (after - before) / (2.0 * h), rtol=0.0, atol=2e-8
+        )
 
 
 @pytest.mark.parametrize("angle", [0.0, *ANGLES])
@@ -92,7 +94,9 @@ def test_moment_does_the_work_of_the_torque_on_the_rotation_vector(angle):
     for _ in range(10):
         r, w, tau = tuple(angle * random_axis(rng)), tuple(rng.normal(size=3)), tuple(rng.normal(size=3))
         k = coefficient_of(r)
-        assert dot(moment_from_rotation_vector(r, tau, k), w) == pytest.approx(dot(tau, rotation_vector_rate(r, w, k)), abs=1e-13)
+        assert dot(moment_from_rotation_vector(r, tau, k), w) == pytest.approx(
+            dot(tau, rotation_vector_rate(r, w, k)), abs=1e-13
+        )
 
 
 def test_rotation_about_one_fixed_axis_is_plain():

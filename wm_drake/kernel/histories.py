@@ -37,9 +37,7 @@ def motor_torque_history(samples, acceleration, p, elements, torque):
 def in_bounds(x):
     """Whether a tub is where a run may go on: 1 or 0."""
     tilted = (abs(x[0]) <= LARGEST_ANGLE) & (abs(x[1]) <= LARGEST_ANGLE) & (abs(x[2]) <= LARGEST_ANGLE)
-    displaced = (
-        (abs(x[3]) <= LARGEST_DISPLACEMENT) & (abs(x[4]) <= LARGEST_DISPLACEMENT) & (abs(x[5]) <= LARGEST_DISPLACEMENT)
-    )
+    displaced = (abs(x[3]) <= LARGEST_DISPLACEMENT) & (abs(x[4]) <= LARGEST_DISPLACEMENT) & (abs(x[5]) <= LARGEST_DISPLACEMENT)
     return where(tilted & displaced, 1.0, 0.0)
 
 

@@ -27,10 +27,10 @@ def integrate(steps, begin, end, p, elements, x, work, history):
         h = length[i]
         for stage in range(4):
             node = 2 * i + (stage + 1) // 2
-            if stage == 1 or stage == 3:  # noqa: PLR1714 - two comparisons, no tuple
+            if stage == 1 or stage == 3:
                 masses = mass_properties(p, drum[node, 1], drum[node, 2])
             state_derivative(y, dx, masses, drum[node, 0], acceleration[i], p, elements, scratch)
-            inner = stage == 1 or stage == 2  # noqa: PLR1714
+            inner = stage == 1 or stage == 2
             weight = h / 3.0 if inner else h / 6.0
             ahead = h if stage == 2 else 0.5 * h
             for k in range(size):

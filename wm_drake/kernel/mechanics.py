@@ -25,7 +25,17 @@ from wm_drake.systems.friction_damper import friction_damper_line, friction_damp
 from wm_drake.systems.six_component_bushing import six_component_bushing_wrench
 from wm_drake.systems.spring_strut import spring_strut_wrench
 
-GRAVITY, INVERSE_MASS, AXIS, ORIGIN, TUB_MOMENT, TUB_INERTIA, DRUM_MOMENT, DRUM_INERTIA, JOINT_DAMPING = 0, 3, 4, 7, 10, 13, 19, 28, 58
+GRAVITY, INVERSE_MASS, AXIS, ORIGIN, TUB_MOMENT, TUB_INERTIA, DRUM_MOMENT, DRUM_INERTIA, JOINT_DAMPING = (
+    0,
+    3,
+    4,
+    7,
+    10,
+    13,
+    19,
+    28,
+    58,
+)
 BODIES_SIZE = 59
 LINE_SIZE = 12
 """Numbers kept of a damper between the rounds of `state_derivative`."""
@@ -34,9 +44,7 @@ STATE_SIZE = 14
 
 DRUM_RATE = 13
 
-MassProperties = namedtuple(  # noqa: PYI024 - numba's kind
-    "MassProperties", ("drum_moment", "drum_inertia", "moment", "inverse_inertia")
-)
+MassProperties = namedtuple("MassProperties", ("drum_moment", "drum_inertia", "moment", "inverse_inertia"))
 """At one drum angle: s_d, J_d, S, and the inverse of the inertia about the common centre of mass."""
 
 

@@ -37,32 +37,32 @@ class Schedule:
 
 def schedule_of(profile: SpinProfile, step: float, period: float) -> Schedule:
     """Steps of at most `step` through a profile, sampled every `period`. [s]"""
-    count = int(np.floor(profile.duration / period * (1.0 + 1e-12)))
-    time = period * np.arange(count + 1)
-    corners = np.array(profile.time)
+    time: FloatArray = period * np.arange(int(profile.duration / period * (1.0 + 1e-12)) + 1, dtype=float)
+    corners, acceleration = np.array(profile.time), np.array(profile.acceleration())
     marks = np.union1d(time, corners)
-    close = np.flatnonzero(np.diff(marks) < 1e-9 * period)  # a corner that is a sample, but for rounding
-    marks = np.delete(marks, close + 1)
+    marks = np.delete(marks, np.flatnonzero(np.diff(marks) < 1e-9 * period) + 1)  # a corner that is a sample, but for rounding
     pieces = np.ceil(np.diff(marks) / step * (1.0 - 1e-9)).astype(int)
-    begins = np.repeat(marks[:-1], pieces)
     lengths = np.repeat(np.diff(marks) / pieces, pieces)
-    offset = np.arange(len(begins)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    begins = begins + offset * lengths
-    nodes = np.append(np.column_stack([begins, begins + 0.5 * lengths]).ravel(), marks[-1])
-    acceleration = np.array(profile.acceleration())
-    row = np.full(len(begins), -1, dtype=np.int64)
-    ends = np.cumsum(pieces) - 1
-    nearest = np.rint(marks[1:] / period).astype(int)
-    sampled = (np.abs(marks[1:] - period * nearest) < 1e-9 * period) & (nearest <= count)
-    row[ends[sampled]] = nearest[sampled]
+    number = np.arange(len(lengths)) - np.repeat(np.cumsum(pieces) - pieces, pieces)  # of a step between two marks
+    begins = np.repeat(marks[:-1], pieces) + number * lengths
+    middles = begins + 0.5 * lengths
     return Schedule(
         step=lengths,
-        acceleration=acceleration[_piece(corners, begins + 0.5 * lengths)],
-        drum=_drum_motion(profile, nodes),
-        row=row,
+        acceleration=acceleration[_piece(corners, middles)],
+        drum=_drum_motion(profile, np.append(np.column_stack([begins, middles]).ravel(), marks[-1])),
+        row=_rows(marks, pieces, period),
         time=time,
         sample_acceleration=acceleration[_piece(corners, time)],
     )
+
+
+def _rows(marks: FloatArray, pieces: np.ndarray, period: float) -> np.ndarray:
+    """Number of the sample that each step ends with, or -1."""
+    row = np.full(np.sum(pieces), -1, dtype=np.int64)
+    nearest = np.rint(marks[1:] / period).astype(int)
+    sampled = np.abs(marks[1:] - period * nearest) < 1e-9 * period
+    row[(np.cumsum(pieces) - 1)[sampled]] = nearest[sampled]
+    return row
 
 
 def _piece(corners: FloatArray, time: FloatArray) -> np.ndarray:

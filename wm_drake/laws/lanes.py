@@ -30,6 +30,7 @@ class LanesType(types.Type):
     """Type of `WIDTH` floats; a plain number that meets it becomes the same number in each lane."""
 
     def __init__(self) -> None:
+        """One type, by its name."""
         super().__init__("Lanes")
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Conversion | None:
@@ -45,6 +46,7 @@ class MaskType(types.Type):
     """Type of the answer to a comparison of lanes: yes or no for each."""
 
     def __init__(self) -> None:
+        """One type, by its name."""
         super().__init__("Mask")
 
 
@@ -52,6 +54,7 @@ class LaneArrayType(types.Type):
     """Type of an array of lanes: entry i is the numbers [i * WIDTH, (i + 1) * WIDTH) of a contiguous array of floats."""
 
     def __init__(self) -> None:
+        """One type, by its name."""
         super().__init__("LaneArray")
 
 
@@ -125,25 +128,25 @@ def _llvm(builder: Any, name: str, lanes: Any) -> Any:
 
 
 @intrinsic
-def lanes_sqrt(typing_context, x):  # type: ignore[no-untyped-def]
+def lanes_sqrt(typing_context, x):
     """Square root in each lane."""
     return LANES(LANES), lambda context, builder, sig, args: _llvm(builder, "sqrt", args[0])
 
 
 @intrinsic
-def lanes_floor(typing_context, x):  # type: ignore[no-untyped-def]
+def lanes_floor(typing_context, x):
     """Largest whole number not above, in each lane."""
     return LANES(LANES), lambda context, builder, sig, args: _llvm(builder, "floor", args[0])
 
 
 @intrinsic
-def lanes_select(typing_context, condition, a, b):  # type: ignore[no-untyped-def]
+def lanes_select(typing_context, condition, a, b):
     """`a` where the condition holds, else `b`, in each lane."""
     return LANES(MASK, LANES, LANES), lambda context, builder, sig, args: builder.select(*args)
 
 
 @intrinsic
-def lanes_any(typing_context, condition):  # type: ignore[no-untyped-def]
+def lanes_any(typing_context, condition):
     """Whether the condition holds in any lane."""
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -154,7 +157,7 @@ def lanes_any(typing_context, condition):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def lane_array(typing_context, array):  # type: ignore[no-untyped-def]
+def lane_array(typing_context, array):
     """An array of lanes over a contiguous array of floats, which must outlive it; nothing checks its bounds."""
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -166,7 +169,7 @@ def lane_array(typing_context, array):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def align_stack(typing_context):  # type: ignore[no-untyped-def]
+def align_stack(typing_context):
     """Makes the function that calls this keep vectors at addresses a vector load takes in one go."""
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:

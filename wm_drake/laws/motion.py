@@ -6,7 +6,7 @@ from wm_drake.laws.compilation import law
 from wm_drake.laws.elementary import sine_cosine
 from wm_drake.laws.vectors import rotation_from_sines
 
-TubMotion = namedtuple("TubMotion", ("rotation", "position", "angular_velocity", "velocity"))  # noqa: PYI024 - numba's kind
+TubMotion = namedtuple("TubMotion", ("rotation", "position", "angular_velocity", "velocity"))
 """R_WT by rows, p_WTo [m], w_WT [rad/s], v_WTo [m/s]: tuples of scalars, in W."""
 
 

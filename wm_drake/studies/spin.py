@@ -17,7 +17,6 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.scene import Scene
 from wm_drake.simulation import DEFAULT_ENGINE, DEFAULT_STEP, Case, DivergenceWarning, Record, simulate
 
-
 _IN_PROCESSES = {"drake"}
 """Engines whose cases run in processes of their own: seconds each, and Drake's Python callbacks take turns in one."""
 

@@ -57,7 +57,7 @@ class FrictionDamperParameters:
         return int(self.packed_law[0]) in (MSTV, FREE_STROKE)
 
     def packed(self) -> FloatArray:
-        """Flat: tub end (T), housing end (W), axis, end bushing k, c, p, pi / (2 v_t), engaged, law number, law's parameters."""
+        """Flat: tub end (T), housing end (W), axis; end bushing k, c, p, pi / (2 v_t); engaged; law number, its parameters."""
         line = self.p_ToA_T - self.p_WH
         b = self.end_bushing
         bushing = [b.stiffness, b.damping, b.friction_torque, 0.5 * np.pi / b.full_friction_rate, self.engaged]

@@ -1,0 +1,178 @@
+"""How fast are the engines, does the cost of many runs grow linearly, and do the lanes of the compiled one use vector units?
+
+Prints medians of several after a warm-up, with the processor and its load: absolute times mean little on a shared machine,
+ratios of one session do.
+"""
+
+import argparse
+import os
+import platform
+import re
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numba
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from wm_drake import Case, Scene, build_machine, load_machine, measure, simulate, simulate_many, with_value
+from wm_drake.kernel.integration import integrate_lanes
+from wm_drake.kernel.mechanics import LINE_SIZE, mass_properties, state_derivative
+from wm_drake.kernel.packing import initial_state, pack
+from wm_drake.laws.lanes import WIDTH
+from wm_drake.machine import Machine
+from wm_drake.parameters import SpinProfile
+
+GASKET = ("stiffness_x", "stiffness_y", "stiffness_z", "damping_x", "rotational_stiffness_x", "rotational_damping_x")
+FIRST_CALL = """
+import time, wm_drake as wm
+machine = wm.build_machine(wm.load_machine("reference"))
+begin = time.perf_counter(); wm.simulate(machine, "middle"); print(time.perf_counter() - begin)
+case = wm.case_of(machine.parameters, "middle")
+begin = time.perf_counter(); wm.simulate_many(machine, [case]); print(time.perf_counter() - begin)
+"""
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much to do."""
+
+    profile: SpinProfile
+    repeats: int
+    drake_repeats: int
+    many: tuple[int, ...]
+
+
+def median_s(work: Callable[[], object], repeats: int) -> float:
+    """Median time of a piece of work. [s]"""
+    walls = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        work()
+        walls.append(time.perf_counter() - begin)
+    return statistics.median(walls)
+
+
+def processor() -> str:
+    """Name of the processor, as well as the system tells it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        return next(line.split(":")[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or platform.machine()
+
+
+def gasket_cases(machine: Machine, profile: SpinProfile, count: int) -> Iterator[Case]:
+    """Two loads on each of count/2 random gaskets, half to one and a half times as stiff and damped."""
+    rng = np.random.default_rng(0)
+    for _ in range(count // 2):
+        changed = machine.parameters
+        for name in GASKET:
+            value = getattr(machine.parameters.gasket, name)
+            changed = with_value(changed, f"gasket.{name}", float(value * rng.uniform(0.5, 1.5)))
+        for load in ("middle", "counter"):
+            yield Case(load, changed.loads[load], profile, parameters=changed)
+
+
+def one_run(machine: Machine, size: Size) -> Iterator[str]:
+    """The engines on one run, and scipy's LSODA on the right-hand side of the compiled one."""
+    case, scene = Case("middle", machine.parameters.loads["middle"], size.profile), Scene(machine.parameters)
+    run = {engine: lambda engine=engine: simulate(machine, case, engine) for engine in ("compiled", "drake")}
+    record = run["compiled"]()
+    measure(record, scene)
+    measured = median_s(lambda: measure(run["compiled"](), scene), size.repeats)
+    compiled, drake = median_s(run["compiled"], size.repeats), median_s(run["drake"], size.drake_repeats)
+    lsoda = median_s(lambda: by_lsoda(machine, case), size.drake_repeats)
+    yield f"one run of {case.profile.duration:g} s: {1e3 * compiled:.0f} ms compiled, {1e3 * measured:.0f} ms with all measures"
+    yield f"the same, Drake engine: {drake:.2f} s, {drake / compiled:.0f} times as long"
+    yield f"the same, LSODA (rtol 1e-6) on the compiled right-hand side: {lsoda:.2f} s, {lsoda / compiled:.0f} times as long"
+
+
+def by_lsoda(machine: Machine, case: Case) -> None:
+    """The motion by scipy's stiff integrator, piece by piece of the profile."""
+    setup = machine.set_up(case.load)
+    p, layout = pack(setup)
+    elements, scratch = layout.elements, np.empty(LINE_SIZE * len(layout.dampers))
+    x = initial_state(setup, case.profile)
+
+    def rate(_: float, x: np.ndarray, acceleration: float) -> np.ndarray:
+        dx = np.empty_like(x)
+        masses = mass_properties(p, np.cos(x[6]), np.sin(x[6]))
+        state_derivative(x, dx, masses, x[13], acceleration, p, elements, scratch)
+        return dx
+
+    corners = case.profile.time
+    for begin, end, acceleration in zip(corners, corners[1:], case.profile.acceleration(), strict=False):
+        samples = np.arange(begin, end, 5e-3)
+        options = {"method": "LSODA", "rtol": 1e-6, "atol": 1e-9, "max_step": 0.02}
+        x = solve_ivp(rate, (begin, end), x, t_eval=np.append(samples, end), args=(acceleration,), **options).y[:, -1]
+
+
+def many_runs(machine: Machine, size: Size) -> Iterator[str]:
+    """Cost against the number of runs, and the peak of the process's memory."""
+    for measures in (("extremes",), ("extremes", "amplitudes")):
+        for count in size.many if measures == ("extremes",) else size.many[-2:-1]:
+            begin = time.perf_counter()
+            simulate_many(machine, gasket_cases(machine, size.profile, count), measures=measures)
+            wall = time.perf_counter() - begin
+            memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+            what = "D, F, M" if len(measures) == 1 else "D, F, M and amplitudes"
+            yield f"{count} runs with {what}: {wall:.2f} s, {1e3 * wall / count:.2f} ms each; {memory:.0f} MB at most so far"
+
+
+def assembly() -> str:
+    """What the lanes were compiled to, from a copy compiled here."""
+    fresh = numba.njit(error_model="numpy", nogil=True, fastmath={"contract", "nsz"})(integrate_lanes.py_func)
+    fresh.compile(integrate_lanes.signatures[0])
+    text = fresh.inspect_asm(fresh.signatures[0])
+    arithmetic = re.findall(r"^\s+v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d+)(pd|sd)\s(.*)$", text, re.MULTILINE)
+    wide = {
+        name: sum(f"%{name}" in operands for kind, operands in arithmetic if kind == "pd") for name in ("zmm", "ymm", "xmm")
+    }
+    counts = ", ".join(f"{count} on {name}" for name, count in wide.items())
+    return f"{WIDTH} lanes compiled to arithmetic: {counts}, {sum(kind == 'sd' for kind, _ in arithmetic)} on one number"
+
+
+def first_calls() -> Iterator[str]:
+    """Time of the first run ever, and of the first in a process that finds the laws compiled."""
+    with tempfile.TemporaryDirectory() as folder:
+        environment = os.environ | {"NUMBA_CACHE_DIR": folder}
+        for what in ("nothing compiled yet", "compiled before"):
+            command = [sys.executable, "-c", FIRST_CALL]
+            told = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
+            yield f"first run of a process, {what}: simulate {float(told[0]):.1f} s, then simulate_many {float(told[1]):.1f} s"
+
+
+def main() -> None:
+    """Runs the benchmark and prints one line a figure."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="runs of 2 s instead of 70 s, a few dozen of them")
+    parser.add_argument("--out", type=Path, help="also write the lines to this file")
+    arguments = parser.parse_args()
+    machine = build_machine(load_machine("reference"))
+    size = Size(machine.parameters.profile, 15, 3, (100, 1000, 2000, 10_000))
+    if arguments.quick:
+        size = Size(SpinProfile(time=(0.0, 2.0), speed=(0.0, 9.0)), 3, 1, (16, 32))
+    simulate_many(machine, gasket_cases(machine, size.profile, 2))  # warms up: compiles, or reads from the cache
+    lines = [f"processor: {processor()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.2f}"]
+    print(lines[0])
+    parts = [one_run(machine, size), many_runs(machine, size)]
+    if not arguments.quick:
+        parts += [iter([assembly()]), first_calls()]
+    for part in parts:
+        for line in part:
+            print(line, flush=True)
+            lines.append(line)
+    if arguments.out:
+        arguments.out.write_text("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()
