@@ -45,6 +45,7 @@ def run_compiled(setup: Setup, profile: SpinProfile, step: float, progress: Call
         begin, done = done, min(done + PAUSE_STEPS, len(schedule.step))
         integrate_alone(schedule.steps, begin, done, p, layout.elements, x, work, samples.ravel())
         progress(done / len(schedule.step))
-    torque = np.empty(len(samples))
-    motor_torque_history(samples, schedule.sample_acceleration, p, layout.elements, torque)
-    return ended_where_it_diverged(Trajectory(schedule.time, samples[:, :STATE_SIZE], samples[:, STATE_SIZE:], torque))
+    torque = np.empty((len(samples), 1))
+    motor_torque_history(samples, schedule.sample_acceleration[:, None], p, layout.elements, torque)
+    motion, deformation = samples[:, :STATE_SIZE], samples[:, STATE_SIZE:]
+    return ended_where_it_diverged(Trajectory(schedule.time, motion, deformation, torque[:, 0]))

@@ -8,7 +8,7 @@ from scipy.signal import butter, find_peaks, sosfiltfilt
 
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.scene import REPLAY_RATE, Gap, Scene
-from wm_drake.simulation import Record, point_position
+from wm_drake.simulation import Record, point_positions
 
 BAND_HZ = (0.5, 20.0)
 """Pass band of the displacements ([B] section 2.2)."""
@@ -108,7 +108,7 @@ def percent_difference(value: xr.DataArray, reference: xr.DataArray) -> xr.DataA
 def axis_motion(record: Record, y: float) -> FloatArray:
     """Path in W of the point of the drum axis at depth y, for orbits. (n, 3) [m]"""
     pose = np.column_stack([record.tub_angle.values, record.tub_position.values])
-    return point_position(pose, np.array([0.0, y, 0.0]))
+    return point_positions(pose, np.array([[0.0, y, 0.0]]))[:, 0]
 
 
 def largest_motion(record: Record) -> tuple[FloatArray, FloatArray]:
@@ -136,14 +136,27 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
     size, samples = amplitudes(filtered_displacement(record).values)
     speed = record.drum_speed.values[samples] if record.sizes["time"] else size
     by_sensor = {"sensor": record.sensor.values}
-    gasket = record.sel(bushing=[name for name in record.bushing.values if name == "gasket"])
     pose = np.column_stack([record.tub_angle.values, record.tub_position.values])
     gap = scene.smallest_gap(record.time.values, pose, np.asarray(record.attrs["rest_pose"])) if scene else None
     return Measures(
         amplitude=xr.DataArray(size, by_sensor),
         critical_speed=xr.DataArray(np.where(np.isnan(size), np.nan, speed), by_sensor),
-        detergent_displacement=abs(record.detergent_displacement).max("time"),
-        gasket_force=abs(gasket.bushing_force).max("time").sum("bushing"),
-        gasket_moment=abs(gasket.bushing_moment).max("time").sum("bushing"),
+        detergent_displacement=_largest(record.detergent_displacement),
+        gasket_force=_largest_of_gasket(record.bushing_force),
+        gasket_moment=_largest_of_gasket(record.bushing_moment),
         smallest_gap=gap,
     )
+
+
+def _largest(history: xr.DataArray) -> xr.DataArray:
+    """Largest absolute value over time (time, axis); NaN of no samples."""
+    # column by column: numpy is slow along the long side of a narrow table
+    size = [np.max(np.abs(column)) if len(column) else np.nan for column in history.values.T]
+    return xr.DataArray(size, {"axis": history.axis.values})
+
+
+def _largest_of_gasket(history: xr.DataArray) -> xr.DataArray:
+    """The same of (time, bushing, axis) for the gasket; zero without one."""
+    if "gasket" not in history.bushing.values:
+        return xr.DataArray(np.zeros(history.sizes["axis"]), {"axis": history.axis.values})
+    return _largest(history.sel(bushing="gasket"))

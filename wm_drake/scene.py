@@ -136,8 +136,8 @@ class Scene:
         if not self._pairs or not len(time):
             return None
         rotations = np.stack(generic(rotation_from_rpy)(*poses[:, :3].T), axis=1).reshape(-1, 3, 3)
-        moved = poses - rest_pose
-        shift = np.linalg.norm(moved[:, 3:], axis=1) + np.abs(moved[:, :3]).sum(axis=1) * self._reach
+        roll, pitch, yaw, x, y, z = (poses - rest_pose).T
+        shift = np.sqrt(x * x + y * y + z * z) + (np.abs(roll) + np.abs(pitch) + np.abs(yaw)) * self._reach
         best = Gap(np.inf, 0.0, "", "", (0.0, 0.0, 0.0))
         for distance, direction, pair in self._at_rest(tuple(map(float, rest_pose))):
             near = distance - shift < best.distance  # no gap shrinks by more than the farthest point moves

@@ -1,5 +1,6 @@
 """simulate(machine, case) -> Record: a labelled, unit-carrying dataset of one run."""
 
+import functools
 import importlib.metadata
 import json
 import warnings
@@ -15,7 +16,7 @@ from wm_drake.compiled_engine import run_compiled
 from wm_drake.drake_engine import run_drake
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.laws.compilation import generic
-from wm_drake.laws.vectors import rotate, rotation_from_rpy
+from wm_drake.laws.vectors import rotation_from_rpy
 from wm_drake.machine import OUTPUT_PERIOD, Machine, Setup
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.elements import FloatArray
@@ -151,8 +152,9 @@ def _motion(setup: Setup, trajectory: Trajectory) -> _Variables:
     state = trajectory.state
     axes = [AXES.index(sensor.axis) for sensor in setup.sensors.values()]
     points = list(setup.sensor_points.values())
-    moved = [point_displacement(state, point, setup.rest_pose)[:, axis] for point, axis in zip(points, axes, strict=True)]
-    detergent = point_displacement(state, setup.detergent_point, setup.rest_pose)
+    displaced = point_displacements(state, np.stack([*points, setup.detergent_point]), setup.rest_pose)
+    moved = [displaced[:, index, axis] for index, axis in enumerate(axes)]
+    detergent = displaced[:, -1]
     return {
         "tub_angle": (("time", "angle"), state[:, 0:3], "rad", "roll, pitch, yaw of T in W (3-2-1 Euler angles)"),
         "tub_position": (("time", "axis"), state[:, 3:6], "m", "position of To in W"),
@@ -200,24 +202,25 @@ def element_forces(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, Fl
     return springs, dampers, bushings
 
 
-def point_displacement(state: FloatArray, point: FloatArray, rest_pose: FloatArray) -> FloatArray:
-    """Displacement from the rest pose of a point of the tub.
+def point_displacements(state: FloatArray, points: FloatArray, rest_pose: FloatArray) -> FloatArray:
+    """Displacements from the rest pose of points of the tub.
 
     Args:
         state: (n, >= 6) roll, pitch, yaw, x, y, z. [rad, m]
-        point: In T. [m]
+        points: (k, 3) in T. [m]
         rest_pose: (6,) the same coordinates at rest.
 
     Returns:
-        (n, 3) in W. [m]
+        (n, k, 3) in W. [m]
     """
-    return point_position(state, point) - point_position(rest_pose[None, :], point)
+    return point_positions(state, points) - point_positions(rest_pose[None, :], points)
 
 
-def point_position(state: FloatArray, point: FloatArray) -> FloatArray:
-    """Position in W of a point of the tub; arguments as in `point_displacement`. (n, 3) [m]"""
-    rotation = generic(rotation_from_rpy)(state[:, 0], state[:, 1], state[:, 2])
-    return state[:, 3:6] + np.stack(generic(rotate)(rotation, point), axis=1)
+def point_positions(state: FloatArray, points: FloatArray) -> FloatArray:
+    """Positions in W of points of the tub; arguments as in `point_displacements`. (n, k, 3) [m]"""
+    rows = np.stack(generic(rotation_from_rpy)(state[:, 0], state[:, 1], state[:, 2]), axis=1).reshape(-1, 3)
+    turned = (rows @ points.T).reshape(len(state), 3, len(points))  # one product of two matrices
+    return (state[:, 3:6, None] + turned).transpose(0, 2, 1)
 
 
 def save_record(record: Record, path: Path) -> None:
@@ -231,6 +234,7 @@ def load_record(path: Path) -> Record:
     return xr.load_dataset(path, engine="h5netcdf")
 
 
+@functools.cache  # reading them takes longer than a tenth of a run
 def versions() -> dict[str, str]:
     """Versions that determine a result."""
     return {name: importlib.metadata.version(name) for name in ("wm-drake", "drake", "numpy", "scipy", "numba")}

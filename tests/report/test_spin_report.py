@@ -17,7 +17,7 @@ from wm_drake.report.spin_report import amplitude_table, spin_report
 from wm_drake.report.tables import differences, profiles, readable
 from wm_drake.report.wording import number, percent
 from wm_drake.scene import Gap
-from wm_drake.simulation import Case, Record, point_displacement
+from wm_drake.simulation import Case, Record, point_displacements
 from wm_drake.studies.spin import CaseResult, SpinResult
 
 SENSOR_POINTS = {
@@ -39,7 +39,7 @@ def harmonic_record(parameters: MachineParameters, load: str, gasket: bool, size
     angle, position = wave * [0.01, 0.002, 0.02], wave * [size, 0.3 * size, 0.5 * size]
     pose = np.column_stack([angle, position])
     axes = {name: "xyz".index(sensor.axis) for name, sensor in parameters.sensors.items()}
-    displacement = [point_displacement(pose, np.array(SENSOR_POINTS[n]), np.zeros(6))[:, axis] for n, axis in axes.items()]
+    displacement = [point_displacements(pose, np.array([SENSOR_POINTS[n]]), np.zeros(6))[:, 0, axis] for n, axis in axes.items()]
     force = 1000.0 * position[:, None, :] * float(gasket)
     variables = {
         "tub_angle": (("time", "angle"), angle),

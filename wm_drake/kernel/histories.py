@@ -4,8 +4,8 @@ import numpy as np
 
 from wm_drake.kernel.mechanics import LINE_SIZE, mass_properties, state_derivative
 from wm_drake.laws.compilation import law, long_running
-from wm_drake.laws.elementary import where
-from wm_drake.laws.lanes import align_stack, lane_array
+from wm_drake.laws.elementary import lanes_to_rows, rows_to_lanes, sine_cosine, where
+from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
 from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.vectors import add, dot, rotate
 from wm_drake.systems.six_component_bushing import six_component_bushing_wrench
@@ -21,16 +21,22 @@ def motor_torque_history(samples, acceleration, p, elements, torque):
 
     Args:
         samples: States, (n, size).
-        acceleration: Of the drum at each sample. [rad/s^2]
+        acceleration: Of the drum at each sample, (n, 1). [rad/s^2]
         p, elements: As for `state_derivative`.
-        torque: (n,), written.
+        torque: (n, 1), written.
     """
-    dx = np.empty(samples.shape[1])
-    scratch = np.empty(LINE_SIZE * len(elements[1]))
-    for i in range(len(torque)):
-        x = samples[i]
-        masses = mass_properties(p, np.cos(x[6]), np.sin(x[6]))
-        torque[i] = state_derivative(x, dx, masses, x[13], acceleration[i], p, elements, scratch)
+    align_stack()
+    size = samples.shape[1] * WIDTH
+    x_numbers, drum_numbers, numbers = np.empty(size), np.empty(WIDTH), np.empty(WIDTH)
+    x, drum, answer = lane_array(x_numbers), lane_array(drum_numbers), lane_array(numbers)
+    dx, scratch = lane_array(np.empty(size)), lane_array(np.empty(LINE_SIZE * WIDTH * len(elements[1])))
+    for begin in range(0, len(torque), WIDTH):
+        rows_to_lanes(samples, begin, x_numbers)
+        rows_to_lanes(acceleration, begin, drum_numbers)
+        sine, cosine = sine_cosine(x[6])
+        masses = mass_properties(p, cosine, sine)
+        answer[0] = state_derivative(x, dx, masses, x[13], drum[0], p, elements, scratch)
+        lanes_to_rows(numbers, begin, torque)
 
 
 @law
@@ -83,12 +89,6 @@ def larger(largest, value, good):
     """The largest absolute value so far, after one more, which counts if it is good."""
     size = abs(value)
     return where((good > 0.5) & (size > largest), size, largest)
-
-
-@long_running
-def measure_samples_alone(samples, rows, size, p, gasket, points, count, x, moved, extremes):
-    """`measure_samples` of one machine; flat arrays of floats."""
-    measure_samples(samples, rows, size, p, gasket, points, count, x, moved, extremes)
 
 
 @long_running

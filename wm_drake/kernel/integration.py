@@ -2,7 +2,7 @@
 
 from wm_drake.kernel.mechanics import STATE_SIZE, mass_properties, state_derivative
 from wm_drake.laws.compilation import law, long_running
-from wm_drake.laws.lanes import align_stack, lane_array
+from wm_drake.laws.lanes import align_stack, lane_array, number_array
 
 
 @law
@@ -51,7 +51,8 @@ def integrate(steps, begin, end, p, elements, x, work, history):
 @long_running
 def integrate_alone(steps, begin, end, p, elements, x, work, history):
     """`integrate` of one machine; flat arrays of floats."""
-    integrate(steps, begin, end, p, elements, x, work, history)
+    numbers_of_work = (number_array(work[0]), number_array(work[1]), number_array(work[2]), number_array(work[3]))
+    integrate(steps, begin, end, number_array(p), elements, number_array(x), numbers_of_work, number_array(history))
 
 
 @long_running

@@ -1,5 +1,6 @@
 """Spin profile -> the steps of an integration and the drum's motion at them, in closed form."""
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +36,7 @@ class Schedule:
         return self.step, self.acceleration, self.drum, self.row
 
 
+@functools.lru_cache(maxsize=8)
 def schedule_of(profile: SpinProfile, step: float, period: float) -> Schedule:
     """Steps of at most `step` through a profile, sampled every `period`. [s]"""
     time: FloatArray = period * np.arange(int(profile.duration / period * (1.0 + 1e-12)) + 1, dtype=float)

@@ -9,7 +9,7 @@ import numpy as np
 from numba.extending import overload
 
 from wm_drake.laws.compilation import law
-from wm_drake.laws.lanes import LanesType, MaskType, lanes_any, lanes_floor, lanes_select, lanes_sqrt
+from wm_drake.laws.lanes import WIDTH, LanesType, MaskType, lanes_any, lanes_floor, lanes_select, lanes_sqrt
 
 
 def where(condition, a, b):
@@ -138,3 +138,20 @@ def sine_over_angle(angle_squared):
     odd = 1.0 / 5040.0 + y * odd
     odd = 1.0 / 6.0 + y * odd
     return (1.0 + y * even) - z * odd
+
+
+@law
+def rows_to_lanes(rows, begin, numbers):
+    """Writes `WIDTH` rows of a table, from row `begin`, side by side for an array of lanes; past its end, the last row."""
+    for lane in range(WIDTH):
+        row = min(begin + lane, len(rows) - 1)
+        for k in range(rows.shape[1]):
+            numbers[k * WIDTH + lane] = rows[row, k]
+
+
+@law
+def lanes_to_rows(numbers, begin, rows):
+    """The way back of `rows_to_lanes`."""
+    for lane in range(min(WIDTH, len(rows) - begin)):
+        for k in range(rows.shape[1]):
+            rows[begin + lane, k] = numbers[k * WIDTH + lane]

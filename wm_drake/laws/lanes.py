@@ -58,7 +58,16 @@ class LaneArrayType(types.Type):
         super().__init__("LaneArray")
 
 
-LANES, MASK, LANE_ARRAY = LanesType(), MaskType(), LaneArrayType()
+class NumberArrayType(types.Type):
+    """Type of a contiguous array of floats whose indices do not count from the end if negative: asking costs a third of a law."""
+
+    def __init__(self) -> None:
+        """One type, by its name."""
+        super().__init__("NumberArray")
+
+
+LANES, MASK, LANE_ARRAY, NUMBER_ARRAY = LanesType(), MaskType(), LaneArrayType(), NumberArrayType()
+_ENTRIES = {LANE_ARRAY: LANES, NUMBER_ARRAY: types.float64}
 
 
 @register_model(LanesType)
@@ -74,7 +83,8 @@ class _MaskModel(models.PrimitiveModel):
 
 
 @register_model(LaneArrayType)
-class _LaneArrayModel(models.PrimitiveModel):
+@register_model(NumberArrayType)
+class _PointerModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, ir.DoubleType().as_pointer())
 
@@ -159,13 +169,21 @@ def lanes_any(typing_context, condition):
 @intrinsic
 def lane_array(typing_context, array):
     """An array of lanes over a contiguous array of floats, which must outlive it; nothing checks its bounds."""
+    return (LANE_ARRAY(array), _address_of) if _is_flat(array) else None
 
-    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return context.make_array(sig.args[0])(context, builder, args[0]).data
 
-    if not (isinstance(array, types.Array) and array.dtype == types.float64 and array.layout == "C"):
-        return None
-    return LANE_ARRAY(array), emit
+@intrinsic
+def number_array(typing_context, array):
+    """The same of single numbers."""
+    return (NUMBER_ARRAY(array), _address_of) if _is_flat(array) else None
+
+
+def _is_flat(array: Any) -> bool:
+    return isinstance(array, types.Array) and array.dtype == types.float64 and array.layout == "C"
+
+
+def _address_of(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return context.make_array(sig.args[0])(context, builder, args[0]).data
 
 
 @intrinsic
@@ -179,9 +197,23 @@ def align_stack(typing_context):
         # an address that leaves for an (empty) piece of assembly cannot be optimised away
         kind = ir.FunctionType(ir.VoidType(), [_VECTOR.as_pointer()])
         builder.asm(kind, "", "r", [slot], side_effect=True)
-        return ir.Constant(ir.IntType(8).as_pointer(), None)
+        return context.get_dummy_value()
 
     return types.none(), emit
+
+
+@infer_global(operator.getitem)
+class _GetItem(AbstractTemplate):
+    def generic(self, args: tuple[Any, ...], kws: Any) -> Any:
+        fits = args[0] in _ENTRIES and isinstance(args[1], types.Integer)
+        return signature(_ENTRIES[args[0]], args[0], types.intp) if fits else None
+
+
+@infer_global(operator.setitem)
+class _SetItem(AbstractTemplate):
+    def generic(self, args: tuple[Any, ...], kws: Any) -> Any:
+        fits = args[0] in _ENTRIES and isinstance(args[1], types.Integer)
+        return signature(types.none, args[0], types.intp, _ENTRIES[args[0]]) if fits else None
 
 
 def _place(builder: Any, array: Any, index: Any) -> Any:
@@ -189,30 +221,23 @@ def _place(builder: Any, array: Any, index: Any) -> Any:
     return builder.bitcast(begin, _VECTOR.as_pointer())
 
 
-def _store(builder: Any, array: Any, index: Any, lanes: Any) -> Any:
-    builder.store(lanes, _place(builder, array, index), align=8)
-    return ir.Constant(ir.IntType(8).as_pointer(), None)  # how numba writes None
-
-
-@infer_global(operator.getitem)
-class _GetItem(AbstractTemplate):
-    def generic(self, args: tuple[Any, ...], kws: Any) -> Any:
-        fits = args[0] == LANE_ARRAY and isinstance(args[1], types.Integer)
-        return signature(LANES, LANE_ARRAY, types.intp) if fits else None
-
-
-@infer_global(operator.setitem)
-class _SetItem(AbstractTemplate):
-    def generic(self, args: tuple[Any, ...], kws: Any) -> Any:
-        fits = args[0] == LANE_ARRAY and isinstance(args[1], types.Integer)
-        return signature(types.none, LANE_ARRAY, types.intp, LANES) if fits else None
-
-
 @lower_builtin(operator.getitem, LaneArrayType, types.intp)
-def _get(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+def _get_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.load(_place(builder, *args), align=8)
 
 
 @lower_builtin(operator.setitem, LaneArrayType, types.intp, LanesType)
-def _set(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return _store(builder, *args)
+def _set_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    builder.store(args[2], _place(builder, *args[:2]), align=8)
+    return context.get_dummy_value()
+
+
+@lower_builtin(operator.getitem, NumberArrayType, types.intp)
+def _get_number(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.load(builder.gep(args[0], [args[1]]))
+
+
+@lower_builtin(operator.setitem, NumberArrayType, types.intp, types.float64)
+def _set_number(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    builder.store(args[2], builder.gep(args[0], [args[1]]))
+    return context.get_dummy_value()

@@ -18,7 +18,7 @@ from matplotlib.ticker import MaxNLocator
 from wm_drake.measures import axis_motion, envelopes
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.report.wording import MM_PER_M, RPM_PER_RAD_S, case_title, number, shape_name, speed_rpm
-from wm_drake.simulation import Record, point_position
+from wm_drake.simulation import Record, point_positions
 from wm_drake.studies.spin import CaseResult
 
 IndexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
@@ -173,7 +173,7 @@ def gaps_figure(results: Sequence[CaseResult]) -> Figure:
 
 def axis_path_mm(record: Record, y: float) -> FloatArray:
     """Motion from rest of the point of the drum axis at depth y. (n, 3) [mm]"""
-    at_rest = point_position(np.asarray(record.attrs["rest_pose"])[None, :], np.array([0.0, y, 0.0]))
+    at_rest = point_positions(np.asarray(record.attrs["rest_pose"])[None, :], np.array([[0.0, y, 0.0]]))[:, 0]
     return (axis_motion(record, y) - at_rest) * MM_PER_M
 
 

@@ -10,6 +10,8 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.laws.compilation import law
 from wm_drake.laws.damper import COULOMB, FREE_STROKE, HAVSIN, MSTV, STV, damper_response
+from wm_drake.laws.elementary import lanes_to_rows, rows_to_lanes
+from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
 from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.strut import bending_moment, strut_line, transverse, transverse_couple, wrench_at_origin
 from wm_drake.laws.vectors import add, cross, rotate, scale, subtract
@@ -116,10 +118,16 @@ def evaluate_friction_damper(x, state, p, generalized_force, force, rate):
 @law
 def friction_damper_history(states, own_states, p, forces):
     """Own force at each row of a sampled motion: `evaluate_friction_damper` without Drake, for records."""
-    generalized_force = np.empty(7)
-    rate = np.empty(own_states.shape[1])
-    for i in range(len(states)):
-        evaluate_friction_damper(states[i], own_states[i], p, generalized_force, forces[i], rate)
+    align_stack()
+    x_numbers, own_numbers, numbers = np.empty(14 * WIDTH), np.empty(WIDTH), np.empty(WIDTH)
+    x, own, own_force = lane_array(x_numbers), lane_array(own_numbers), lane_array(numbers)
+    for begin in range(0, len(states), WIDTH):
+        rows_to_lanes(states, begin, x_numbers)
+        rows_to_lanes(own_states, begin, own_numbers)
+        _, line = friction_damper_line(tub_motion(x), p, 0)
+        tension, _ = friction_damper_tension(line[1], own[0], p, 0)
+        own_force[0] = p[13] * tension
+        lanes_to_rows(numbers, begin, forces)
 
 
 @TemplateSystem.define("DamperForce_", T_list=SCALARS)

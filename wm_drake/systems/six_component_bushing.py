@@ -9,6 +9,8 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.laws.bushing import bushing_force
 from wm_drake.laws.compilation import law
+from wm_drake.laws.elementary import lanes_to_rows, rows_to_lanes
+from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
 from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.strut import wrench_at_origin
 from wm_drake.laws.vectors import add, compose, cross, rotate, rotate_back, rotation_vector, scale, subtract
@@ -89,10 +91,15 @@ def evaluate_six_component_bushing(x, state, p, generalized_force, force, rate):
 @law
 def six_component_bushing_history(states, own_states, p, forces):
     """Own force at each row of a sampled motion: `evaluate_six_component_bushing` without Drake, for records."""
-    generalized_force = np.empty(7)
-    rate = np.empty(own_states.shape[1])
-    for i in range(len(states)):
-        evaluate_six_component_bushing(states[i], own_states[i], p, generalized_force, forces[i], rate)
+    align_stack()
+    x_numbers, numbers = np.empty(14 * WIDTH), np.empty(6 * WIDTH)
+    x, own_force = lane_array(x_numbers), lane_array(numbers)
+    for begin in range(0, len(states), WIDTH):
+        rows_to_lanes(states, begin, x_numbers)
+        _, on_housing = six_component_bushing_wrench(tub_motion(x), p, 0)
+        for k in range(6):
+            own_force[k] = on_housing[k]
+        lanes_to_rows(numbers, begin, forces)
 
 
 @TemplateSystem.define("SixComponentBushing_", T_list=SCALARS)

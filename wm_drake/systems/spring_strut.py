@@ -8,6 +8,8 @@ from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.laws.compilation import law
+from wm_drake.laws.elementary import lanes_to_rows, rows_to_lanes
+from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
 from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.spring import spring_tension
 from wm_drake.laws.strut import strut_line, wrench_at_origin
@@ -62,10 +64,13 @@ def evaluate_spring_strut(x, state, p, generalized_force, force, rate):
 @law
 def spring_strut_history(states, own_states, p, forces):
     """Own force at each row of a sampled motion: `evaluate_spring_strut` without Drake, for records."""
-    generalized_force = np.empty(7)
-    rate = np.empty(own_states.shape[1])
-    for i in range(len(states)):
-        evaluate_spring_strut(states[i], own_states[i], p, generalized_force, forces[i], rate)
+    align_stack()
+    x_numbers, numbers = np.empty(14 * WIDTH), np.empty(WIDTH)
+    x, own_force = lane_array(x_numbers), lane_array(numbers)
+    for begin in range(0, len(states), WIDTH):
+        rows_to_lanes(states, begin, x_numbers)
+        _, own_force[0] = spring_strut_wrench(tub_motion(x), p, 0)
+        lanes_to_rows(numbers, begin, forces)
 
 
 @TemplateSystem.define("SpringStrut_", T_list=SCALARS)
