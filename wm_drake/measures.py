@@ -1,5 +1,6 @@
 """Record -> what is measured of it: filtered displacements, envelopes, amplitudes, largest forces, smallest gap."""
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,14 +58,19 @@ def filtered(displacement: FloatArray, period: float) -> FloatArray:
     padding = min(round(PADDING / period), len(displacement) - 1)
     if padding <= 6 * FILTER_ORDER + 3:  # what sosfiltfilt itself holds for the least
         return np.full(displacement.shape, np.nan)
-    sections = butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=1.0 / period, output="sos")
-    return np.asarray(sosfiltfilt(sections, displacement, axis=0, padtype="even", padlen=padding))
+    return np.asarray(sosfiltfilt(_band_pass(period), displacement, axis=0, padtype="even", padlen=padding))
+
+
+@functools.cache
+def _band_pass(period: float) -> FloatArray:
+    return np.asarray(butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=1.0 / period, output="sos"))
 
 
 def filtered_displacement(record: Record) -> xr.DataArray:
     """Displacements at the sensors (time, sensor) of a record, as `filtered`. [m]"""
     raw = record.displacement
-    period = float(record.time[1] - record.time[0]) if raw.sizes["time"] > 1 else 1.0
+    time = record.time.values
+    period = float(time[1] - time[0]) if len(time) > 1 else 1.0
     return raw.copy(data=filtered(raw.values, period))
 
 
