@@ -27,6 +27,17 @@ def test_the_short_python_way_runs():
     assert names["record"].sizes["time"] == 401
 
 
+def test_the_python_way_to_many_runs_runs():
+    code = re.findall(r"```python\n(.*?)\n```", README, re.DOTALL)[1]
+    code = code.replace("parameters.profile", "short").replace("range(0, 40, 5)", "(0, 30)")
+    names = {}
+    exec("import wm_drake as wm\nfrom wm_drake.parameters import SpinProfile\n" + SHORT_PROFILE + code, names)
+    assert names["table"].sizes["run"] == 2
+    assert names["table"].case.values[1] == "30 % softer"
+    assert names["table"].gasket_force.sel(axis="x")[1] < names["table"].gasket_force.sel(axis="x")[0]
+
+
+SHORT_PROFILE = "short = SpinProfile(time=(0.0, 6.0), speed=(0.0, 12.0))\n"
 SHORT_CASE = """
 from wm_drake.parameters import SpinProfile
 loads = wm.load_machine("reference").loads

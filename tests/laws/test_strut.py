@@ -33,9 +33,12 @@ def angle_between(a, b):
 def test_strut_line_gives_length_direction_and_their_rates():
     arm, p_WT, p_WH = np.array([0.2, -0.1, -0.25]), np.array([0.01, -0.02, 0.03]), np.array([0.3, -0.1, -0.6])  # m
     w, v = np.array([0.3, -0.2, 0.5]), np.array([0.4, 0.1, -0.3])  # rad/s, m/s
-    length, rate, direction, v_A = strut_line(TubMotion((), tuple(p_WT), tuple(w), tuple(v)), tuple(arm), tuple(p_WH))
+    length, rate, direction, v_A, inverse_length = strut_line(
+        TubMotion((), tuple(p_WT), tuple(w), tuple(v)), tuple(arm), tuple(p_WH)
+    )
     line = p_WT + arm - p_WH
     assert length == pytest.approx(np.linalg.norm(line))
+    assert inverse_length * length == pytest.approx(1.0, rel=1e-15)
     assert direction == pytest.approx(line / np.linalg.norm(line))
     assert v_A == pytest.approx(v + np.cross(w, arm))
     h = 1e-6  # s
@@ -116,7 +119,7 @@ def test_transverse_couple_balances_the_moments_on_the_strut(direction, m_tub, m
     e = unit(direction)
     moments = np.array(m_tub) + m_housing
     moments = moments - (moments @ e) * e  # N m, transverse as those of the end bushings
-    on_tub = np.array(transverse_couple(tuple(moments), tuple(e), length))
+    on_tub = np.array(transverse_couple(tuple(moments), tuple(e), 1.0 / length))
     on_strut = -on_tub  # at the tub end, L e from the housing end
     np.testing.assert_allclose(moments + np.cross(length * e, on_strut), 0.0, atol=1e-14 * (1.0 + np.linalg.norm(moments)))
     assert on_tub @ e == pytest.approx(0.0, abs=1e-12)

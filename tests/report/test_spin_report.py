@@ -39,7 +39,9 @@ def harmonic_record(parameters: MachineParameters, load: str, gasket: bool, size
     angle, position = wave * [0.01, 0.002, 0.02], wave * [size, 0.3 * size, 0.5 * size]
     pose = np.column_stack([angle, position])
     axes = {name: "xyz".index(sensor.axis) for name, sensor in parameters.sensors.items()}
-    displacement = [point_displacements(pose, np.array([SENSOR_POINTS[n]]), np.zeros(6))[:, 0, axis] for n, axis in axes.items()]
+    displacement = [
+        point_displacements(pose, np.array([SENSOR_POINTS[n]]), np.zeros(6))[:, 0, axis] for n, axis in axes.items()
+    ]
     force = 1000.0 * position[:, None, :] * float(gasket)
     variables = {
         "tub_angle": (("time", "angle"), angle),

@@ -37,7 +37,7 @@ GRAVITY, INVERSE_MASS, AXIS, ORIGIN, TUB_MOMENT, TUB_INERTIA, DRUM_MOMENT, DRUM_
     58,
 )
 BODIES_SIZE = 59
-LINE_SIZE = 12
+LINE_SIZE = 13
 """Numbers kept of a damper between the rounds of `state_derivative`."""
 STATE_SIZE = 14
 """As the plant's: roll, pitch, yaw, x, y, z, drum angle, w_WT, v_WTo, drum rate; the dampers' deformations follow."""
@@ -190,10 +190,10 @@ def state_derivative(x, dx, masses, rate, acceleration, p, elements, scratch):
         write_line(scratch, LINE_SIZE * i, *friction_damper_line(motion, p, dampers[i]))
     for i in range(len(dampers)):
         rate_i = scratch[LINE_SIZE * i + 4]
-        scratch[LINE_SIZE * i + 11], dx[STATE_SIZE + i] = friction_damper_tension(rate_i, x[STATE_SIZE + i], p, dampers[i])
+        scratch[LINE_SIZE * i + 12], dx[STATE_SIZE + i] = friction_damper_tension(rate_i, x[STATE_SIZE + i], p, dampers[i])
     for i in range(len(dampers)):
         arm, line = read_line(scratch, LINE_SIZE * i)
-        total = plus(total, friction_damper_wrench(motion, arm, line, scratch[LINE_SIZE * i + 11], p, dampers[i]))
+        total = plus(total, friction_damper_wrench(motion, arm, line, scratch[LINE_SIZE * i + 12], p, dampers[i]))
     for i in range(len(bushings)):
         wrench, _ = six_component_bushing_wrench(motion, p, bushings[i])
         total = plus(total, wrench)
@@ -210,17 +210,19 @@ def state_derivative(x, dx, masses, rate, acceleration, p, elements, scratch):
 @law
 def write_line(scratch, at, arm, line):
     """Keeps what `friction_damper_line` found, for the rounds to come."""
-    length, rate, direction, v_A = line
+    length, rate, direction, v_A, inverse_length = line
     scratch[at], scratch[at + 1], scratch[at + 2] = arm
     scratch[at + 3], scratch[at + 4] = length, rate
     scratch[at + 5], scratch[at + 6], scratch[at + 7] = direction
     scratch[at + 8], scratch[at + 9], scratch[at + 10] = v_A
+    scratch[at + 11] = inverse_length
 
 
 @law
 def read_line(scratch, at):
     """What `write_line` kept: the arm, and the line."""
-    return three(scratch, at), (scratch[at + 3], scratch[at + 4], three(scratch, at + 5), three(scratch, at + 8))
+    line = (scratch[at + 3], scratch[at + 4], three(scratch, at + 5), three(scratch, at + 8), scratch[at + 11])
+    return three(scratch, at), line
 
 
 @law

@@ -59,7 +59,7 @@ class LaneArrayType(types.Type):
 
 
 class NumberArrayType(types.Type):
-    """Type of a contiguous array of floats whose indices do not count from the end if negative: asking costs a third of a law."""
+    """Type of a contiguous array of floats whose indices never count from its end; to ask for that costs a third of a law."""
 
     def __init__(self) -> None:
         """One type, by its name."""

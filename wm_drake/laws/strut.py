@@ -16,13 +16,15 @@ def strut_line(motion, arm, p_WH):
         p_WH: Housing end H. [m]
 
     Returns:
-        Length |HA| [m], its rate [m/s], unit vector from H to A, and the velocity of A [m/s].
+        Length |HA| [m], its rate [m/s], unit vector from H to A, velocity of A [m/s], and 1 / length.
     """
     line = subtract(add(motion.position, arm), p_WH)
-    length = sqrt(dot(line, line))
-    direction = scale(1.0 / length, line)
+    square = dot(line, line)
+    length = sqrt(square)
+    inverse = length * (1.0 / square)  # root and quotient do not wait for each other
+    direction = scale(inverse, line)
     v_A = add(motion.velocity, cross(motion.angular_velocity, arm))
-    return length, dot(direction, v_A), direction, v_A
+    return length, dot(direction, v_A), direction, v_A, inverse
 
 
 @law
@@ -57,12 +59,12 @@ def transverse(a, direction):
 
 
 @law
-def transverse_couple(moment, direction, length):
+def transverse_couple(moment, direction, inverse_length):
     """Force on the tub end of a massless strut whose bushings put `moment` on it; the housing end gets its negative.
 
     f = (m_tub + m_housing) x e / L      balance of moments of the strut, own derivation (physics of [B] section 3)
     """
-    return scale(1.0 / length, cross(moment, direction))
+    return scale(inverse_length, cross(moment, direction))
 
 
 @law

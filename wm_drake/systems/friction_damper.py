@@ -87,14 +87,14 @@ def friction_damper_tension(elongation_rate, deformation, p, at):
 @law
 def friction_damper_wrench(motion, arm, line, tension, p, at):
     """Moment about To and force on the tub (six numbers, W) of a damper under a tension; arguments as above."""
-    length, _, direction, v_A = line
+    _, _, direction, v_A, inverse_length = line
     axis, engaged = (p[at + 6], p[at + 7], p[at + 8]), p[at + 13]
     bushing = (p[at + 9], p[at + 10], p[at + 11], p[at + 12])
-    w_strut = scale(1.0 / length, cross(direction, v_A))
+    w_strut = scale(inverse_length, cross(direction, v_A))
     against_tub = subtract(w_strut, transverse(motion.angular_velocity, direction))
     on_strut_by_tub = bending_moment(direction, against_tub, rotate(motion.rotation, axis), *bushing)
     on_strut_by_housing = bending_moment(direction, w_strut, axis, *bushing)
-    couple = transverse_couple(add(on_strut_by_tub, on_strut_by_housing), direction, length)
+    couple = transverse_couple(add(on_strut_by_tub, on_strut_by_housing), direction, inverse_length)
     force = scale(engaged, add(scale(-tension, direction), couple))
     return wrench_at_origin(arm, force, scale(-engaged, on_strut_by_tub))
 

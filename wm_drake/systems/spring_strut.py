@@ -46,7 +46,7 @@ def spring_strut_wrench(motion, p, at):
         p, at: Array that holds what `SpringStrutParameters.packed` gives, and where that begins.
     """
     arm = rotate(motion.rotation, (p[at], p[at + 1], p[at + 2]))
-    length, _, direction, _ = strut_line(motion, arm, (p[at + 3], p[at + 4], p[at + 5]))
+    length, _, direction, _, _ = strut_line(motion, arm, (p[at + 3], p[at + 4], p[at + 5]))
     tension = spring_tension(length, p[at + 6], p[at + 7], p, at + 8)
     return wrench_at_origin(arm, scale(-tension, direction), (0.0, 0.0, 0.0)), tension
 
