@@ -2,17 +2,20 @@
 
 import itertools
 import tracemalloc
+import warnings
 
 import numpy as np
 import pytest
+import xarray as xr
 
-from wm_drake import batch
 from wm_drake.batch import SimulationInterrupted, simulate_many
+from wm_drake.batch.jobs import KEPT_NUMBERS
 from wm_drake.errors import InputError
 from wm_drake.laws.lanes import WIDTH
 from wm_drake.machine import build_machine
 from wm_drake.measures import measure
 from wm_drake.parameters import Load, SpinProfile, Unbalance, with_value
+from wm_drake.scene import Scene
 from wm_drake.simulation import Case, DivergenceWarning, simulate
 
 RUN_UP = SpinProfile(time=(0.0, 12.0), speed=(5.0, 30.0))
@@ -72,6 +75,29 @@ def test_company_changes_no_bit(machine, cases, table):
         np.testing.assert_array_equal(some[name].values, table[name].values[4:7])
 
 
+def test_smallest_gap_is_that_of_the_scene(machine, reference, cases):
+    told = simulate_many(machine, cases[:5], measures=["gap"], workers=2)
+    assert set(told.data_vars) == {"smallest_gap", "diverged"}
+    for index in (0, 4):
+        alone = measure(simulate(machine, cases[index]), Scene(reference))
+        assert told.smallest_gap.values[index] == pytest.approx(alone.smallest_gap.distance, rel=1e-9)
+
+
+def test_histories_on_request_are_the_records_of_simulate(machine, cases):
+    ended = []
+    violent = Case("violent", VIOLENT, RUN_UP)
+    simulate_many(machine, [*cases[:3], violent], measures=[], histories=True, finished=ended.append)
+    for run in ended:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DivergenceWarning)
+            alone = simulate(machine, run.case)
+        assert run.record.attrs["diverged"] == alone.attrs["diverged"]
+        xr.testing.assert_allclose(run.record, alone, rtol=1e-9, atol=1e-9)
+        assert set(run.record.attrs) == set(alone.attrs)
+    simulate_many(machine, cases[:1], finished=ended.append)
+    assert ended[-1].record is None
+
+
 def test_only_what_is_asked_for_is_measured(machine, cases, table):
     few = simulate_many(machine, cases[:2], measures=["extremes"])
     assert set(few.data_vars) == {"detergent_displacement", "gasket_force", "gasket_moment", "diverged"}
@@ -123,7 +149,7 @@ def test_ctrl_c_keeps_the_runs_that_had_ended(machine, cases, table):
 
     def interrupt(done):
         if done >= WIDTH:
-            raise KeyboardInterrupt
+            raise KeyboardInterrupt  # once per batch that ends, as an impatient user would
 
     with pytest.raises(SimulationInterrupted, match="interrupted after") as interrupted:
         simulate_many(machine, cases * 4, workers=2, progress=interrupt, finished=lambda run: ended.append(run))
@@ -175,7 +201,7 @@ def test_memory_does_not_grow_with_the_number_of_runs(reference, machine):
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     results = (2500 - 500) * 2000  # bytes; the table itself, and the numbers kept for the next load
-    assert peaks[1] - peaks[0] < results + batch._KEPT_NUMBERS * 12_000
+    assert peaks[1] - peaks[0] < results + KEPT_NUMBERS * 12_000
     assert peaks[1] < 60e6
 
 

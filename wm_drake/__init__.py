@@ -25,6 +25,7 @@ _HOMES = {
     "load_record": "simulation",
     "measure": "measures",
     "natural_modes": "studies.modal",
+    "progress_bar": "outputs",
     "run_spin": "studies.spin",
     "save_record": "simulation",
     "simulate": "simulation",

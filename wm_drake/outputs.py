@@ -1,12 +1,31 @@
-"""Result folders: complete or not there."""
+"""What a user sees while and after a long piece of work: a progress bar; result folders, complete or not there."""
 
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
 from wm_drake.errors import input_error
+
+
+@contextmanager
+def progress_bar(total: int, what: str = "runs") -> Iterator[Callable[[int], None]]:
+    """A bar on standard error with the time that is left; gives the function to call with how many are done."""
+    columns = (
+        TextColumn(what),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda done: bar.update(task, completed=done)
 
 
 @contextmanager

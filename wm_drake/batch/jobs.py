@@ -1,0 +1,144 @@
+"""Cases -> jobs: packed numbers, in batches that can run side by side."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.framework import Context
+
+from wm_drake.errors import InputError, Problem, input_error
+from wm_drake.kernel.mechanics import DRUM_RATE
+from wm_drake.kernel.packing import Layout, initial_state, pack_bodies, pack_elements
+from wm_drake.laws.lanes import WIDTH
+from wm_drake.laws.vectors import rotate, rotation_from_rpy
+from wm_drake.machine import Machine, Setup
+from wm_drake.parameters import Load, SpinProfile
+from wm_drake.parameters.elements import FloatArray
+from wm_drake.simulation import AXES, Case
+
+KEPT_BODIES, KEPT_NUMBERS = 64, 2048
+"""How many sets of bodies with a load, and of other numbers, are remembered for cases to come."""
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """What is packed of a set of numbers apart from bodies and load.
+
+    Attributes:
+        setup: From which it was packed, without load; its Context has been used again since.
+        elements, layout: From `pack_elements`.
+        points: What is measured of the motion, for `measure_samples`: the sensors, then the detergent point along x, y, z.
+        rest: State of rest.
+    """
+
+    setup: Setup
+    elements: FloatArray
+    layout: Layout
+    points: FloatArray
+    rest: FloatArray
+
+
+@dataclass(frozen=True)
+class Job:
+    """A case, packed: all that its run needs.
+
+    Attributes:
+        number: Of the case, in the order given.
+        case: What to run.
+        numbers: Shared by the cases with these parameters.
+        packed: From `pack`.
+        begin: State to begin with.
+    """
+
+    number: int
+    case: Case
+    numbers: Numbers
+    packed: FloatArray
+    begin: FloatArray
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What runs side by side must have in common."""
+
+    profile: SpinProfile
+    layout: Layout
+
+
+class Preparation:
+    """Packs cases of one machine. To set it up takes a good part of the time of a run, so that is done as rarely as can be."""
+
+    def __init__(self, machine: Machine) -> None:
+        """For a built machine."""
+        self.machine = machine
+        self.sensors = list(machine.parameters.sensors)
+        self._context: Context | None = None
+        self._known_bodies: list[tuple[object, FloatArray]] = []
+        self._known_numbers: dict[tuple[int, bool], Numbers] = {}
+
+    def batches(self, cases: Iterable[Case]) -> Iterator[tuple[Kind, list[Job]]]:
+        """Up to `WIDTH` jobs each that can run side by side, in the order of the cases as far as that goes.
+
+        Raises:
+            InputError: of a case; says which.
+        """
+        waiting: dict[Kind, list[Job]] = {}
+        for number, case in enumerate(cases):
+            job = self._job(number, case)
+            kind = Kind(case.profile, job.numbers.layout)
+            jobs = waiting.setdefault(kind, [])
+            jobs.append(job)
+            if len(jobs) == WIDTH:
+                yield kind, waiting.pop(kind)
+        yield from waiting.items()
+
+    def _job(self, number: int, case: Case) -> Job:
+        try:
+            bodies, numbers = self._bodies(case), self._numbers(case)
+        except InputError as error:
+            raise InputError(Problem(f"case {number} '{case.name}'", p.key, p.message) for p in error.problems) from None
+        begin = numbers.rest.copy()
+        begin[DRUM_RATE] = case.profile.speed[0]
+        return Job(number, case, numbers, np.concatenate([bodies, numbers.elements]), begin)
+
+    def _bodies(self, case: Case) -> FloatArray:
+        """Packed bodies: the same for all cases with these bodies, frames and load."""
+        parameters = case.parameters or self.machine.parameters
+        key = (parameters.bodies, parameters.frames, case.load)
+        for known, bodies in self._known_bodies:
+            if known == key:
+                return bodies
+        bodies = pack_bodies(self._set_up(case, case.load))
+        self._known_bodies = [(key, bodies), *self._known_bodies[: KEPT_BODIES - 1]]
+        return bodies
+
+    def _numbers(self, case: Case) -> Numbers:
+        """All else of a case: the same whatever its load."""
+        # the parameters are held by the setup, so that no others can take their id meanwhile
+        key = (id(case.parameters or self.machine.parameters), case.gasket)
+        if key not in self._known_numbers:
+            if len(self._known_numbers) >= KEPT_NUMBERS:
+                del self._known_numbers[next(iter(self._known_numbers))]
+            setup = self._set_up(case, None)
+            elements, layout = pack_elements(setup)
+            self._known_numbers[key] = Numbers(setup, elements, layout, _points(setup), initial_state(setup, case.profile))
+        return self._known_numbers[key]
+
+    def _set_up(self, case: Case, load: Load | None) -> Setup:
+        setup = self.machine.set_up(load, parameters=case.parameters, gasket=case.gasket, context=self._context)
+        if list(setup.sensors) != self.sensors:
+            raise input_error(f"has sensors {', '.join(setup.sensors)}; the machine has {', '.join(self.sensors)}")
+        self._context = setup.context
+        return setup
+
+
+def _points(setup: Setup) -> FloatArray:
+    """What is measured of the motion, packed for `measure_samples`: the sensors, then the detergent point along x, y, z."""
+    places = [*setup.sensor_points.values(), *[setup.detergent_point] * 3]
+    axes = [*(AXES.index(sensor.axis) for sensor in setup.sensors.values()), 0, 1, 2]
+    rotation = rotation_from_rpy(*map(float, setup.rest_pose[:3]))
+    packed = []
+    for place, axis in zip(places, axes, strict=True):
+        at_rest = setup.rest_pose[3 + axis] + rotate(rotation, tuple(map(float, place)))[axis]
+        packed += [*place, *(float(axis == i) for i in range(3)), at_rest]
+    return np.array(packed)

@@ -1,0 +1,134 @@
+"""simulate_many(machine, cases): thousands of cases on all cores, measured as they end, in flat memory."""
+
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+
+import numpy as np
+import xarray as xr
+
+from wm_drake.batch.jobs import Preparation
+from wm_drake.batch.runs import MEASURES, Ended, Runner
+from wm_drake.errors import input_error, nearest_names
+from wm_drake.machine import Machine
+from wm_drake.parameters.elements import FloatArray
+from wm_drake.simulation import AXES, DEFAULT_STEP, Case, check_step
+
+_VARIABLES = {
+    "detergent_displacement": ("axis", "m", "largest displacement of the tub point nearest the detergent box, D of [B]"),
+    "gasket_force": ("axis", "N", "largest force of the gasket on the housing, F of [B]"),
+    "gasket_moment": ("axis", "N m", "largest moment of the gasket on the housing, M of [B]"),
+    "amplitude": ("sensor", "m", "largest absolute value of the envelopes"),
+    "critical_speed": ("sensor", "rad/s", "drum speed where it occurs"),
+    "smallest_gap": ("", "m", "smallest distance between tub group and housing"),
+}
+
+
+class SimulationInterrupted(KeyboardInterrupt):
+    """Ctrl-C during `simulate_many`; `finished` is the table of the runs that had ended."""
+
+    def __init__(self, finished: xr.Dataset) -> None:
+        """Keeps the table of what had ended."""
+        super().__init__(f"interrupted after {finished.sizes['run']} runs")
+        self.finished = finished
+
+
+def simulate_many(
+    machine: Machine,
+    cases: Iterable[Case],
+    *,
+    measures: Iterable[str] = ("extremes", "amplitudes"),
+    step: float = DEFAULT_STEP,
+    histories: bool = False,
+    workers: int | None = None,
+    progress: Callable[[int], None] = lambda done: None,
+    finished: Callable[[Ended], None] = lambda ended: None,
+) -> xr.Dataset:
+    """Runs many cases of one machine with the compiled engine, several side by side in the vector units of each core.
+
+    The numbers of a run do not depend on how many workers there are or what it runs beside.
+
+    Args:
+        machine: A built machine.
+        cases: What to run; taken one by one as they are needed, so a generator keeps memory flat.
+        measures: Keys of `MEASURES`: "extremes" are D, F, M of [B], "amplitudes" those of `measure` with their speeds, "gap"
+            is the smallest distance between tub group and housing (NaN if the SDF has no shapes).
+        step: As for `simulate`.
+        histories: Whether each run handed to `finished` shall carry its record, as `simulate` gives it.
+        workers: Threads; as many as cores by default.
+        progress: Called with the number of runs that have ended; `outputs.progress_bar` shows them with an estimate.
+        finished: Called with each run as it ends.
+
+    Returns:
+        Table over `run`, the number of the case: coordinate `case` with its name; the measures as in `Measures` (SI,
+        attrs["units"]); `diverged`: when and why a run stopped early, "" if it did not; its measures are those up to there.
+
+    Raises:
+        InputError: a case or an argument at fault; runs that had ended were handed to `finished`.
+        SimulationInterrupted: Ctrl-C.
+    """
+    wanted = tuple(dict.fromkeys(measures))
+    for name in wanted:
+        if name not in MEASURES:
+            raise input_error(f"no measure '{name}'{nearest_names(name, MEASURES)}", key="measures")
+    check_step(step)
+    results: dict[int, tuple[str, str, list[FloatArray]]] = {}
+
+    def collect(runs: list[Ended]) -> None:
+        for run in runs:  # first of all into the table, whatever the callbacks do
+            results[run.number] = (run.case.name, run.diverged, list(run.values.values()))
+        for run in runs:
+            finished(run)
+        progress(len(results))
+
+    try:
+        runner = Runner(machine.parameters, step, wanted, histories)
+        _run_all(Preparation(machine), runner, cases, workers or os.cpu_count() or 1, collect)
+    except KeyboardInterrupt:
+        raise SimulationInterrupted(_table(machine, wanted, results)) from None
+    return _table(machine, wanted, results)
+
+
+def _table(machine: Machine, measures: tuple[str, ...], results: dict[int, tuple[str, str, list[FloatArray]]]) -> xr.Dataset:
+    numbers = sorted(results)
+    labels = {
+        "run": numbers,
+        "case": ("run", [results[number][0] for number in numbers]),
+        "axis": list(AXES),
+        "sensor": list(machine.parameters.sensors),
+    }
+    variables = {}
+    for index, name in enumerate(name for measure in measures for name in MEASURES[measure]):
+        dim, unit, text = _VARIABLES[name]
+        dims = ("run", dim) if dim else ("run",)
+        values = np.reshape([results[number][2][index] for number in numbers], [len(labels[d]) for d in dims])
+        variables[name] = (dims, values, {"units": unit, "long_name": text})
+    diverged = np.array([results[number][1] for number in numbers], dtype=object)
+    return xr.Dataset({**variables, "diverged": ("run", diverged)}, labels)
+
+
+def _run_all(
+    preparation: Preparation, runner: Runner, cases: Iterable[Case], workers: int, collect: Callable[[list[Ended]], None]
+) -> None:
+    """Feeds batches to threads, no more of them than keeps those busy, and hands on what ends."""
+    running: set[Future[list[Ended]]] = set()
+
+    def gather(at_most: int) -> None:
+        while len(running) > at_most:
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                running.remove(future)
+                collect(future.result())
+
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            for kind, jobs in preparation.batches(cases):
+                running.add(pool.submit(runner.run, kind, jobs))
+                gather(workers)  # one waits while the others run
+            gather(0)
+        except BaseException:
+            runner.stopped.set()
+            pool.shutdown(wait=True, cancel_futures=True)
+            # what had ended meanwhile is not lost
+            good = [f for f in running if f.done() and not f.cancelled() and f.exception() is None]
+            collect([run for future in good for run in future.result()])
+            raise

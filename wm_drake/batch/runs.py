@@ -1,0 +1,145 @@
+"""Jobs -> ended runs: several side by side, measured as they end."""
+
+import threading
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from wm_drake.batch.jobs import Job, Kind
+from wm_drake.kernel.histories import POINT_SIZE, measure_samples_lanes, motor_torque_history
+from wm_drake.kernel.integration import integrate_lanes
+from wm_drake.kernel.mechanics import DRUM_RATE, LINE_SIZE, STATE_SIZE
+from wm_drake.kernel.packing import Layout
+from wm_drake.kernel.schedule import Schedule, schedule_of
+from wm_drake.laws.lanes import WIDTH
+from wm_drake.machine import OUTPUT_PERIOD
+from wm_drake.measures import amplitudes, filtered
+from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.elements import FloatArray
+from wm_drake.scene import Scene
+from wm_drake.simulation import Case, Record, as_record
+from wm_drake.trajectory import Divergence, Trajectory, divergence_text, diverging_coordinate, ended_where_it_diverged
+
+MEASURES = {
+    "extremes": ("detergent_displacement", "gasket_force", "gasket_moment"),
+    "amplitudes": ("amplitude", "critical_speed"),
+    "gap": ("smallest_gap",),
+}
+"""What can be measured of each run, and the variables that gives."""
+
+PAUSE_STEPS = 4000
+"""Steps between looks at the states: some ten milliseconds."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A run that has ended.
+
+    Attributes:
+        number: Of its case, in the order given.
+        case: What was run.
+        values: Measures by name. SI.
+        diverged: When and why it stopped early; "" if it did not.
+        record: Its history, if that was asked for.
+    """
+
+    number: int
+    case: Case
+    values: dict[str, FloatArray]
+    diverged: str
+    record: Record | None
+
+
+class Runner:
+    """Runs jobs, in any thread: each has memory of its own, used again from batch to batch."""
+
+    def __init__(self, parameters: MachineParameters, step: float, measures: tuple[str, ...], histories: bool) -> None:
+        """For a machine; what to measure, and whether records are wanted."""
+        self.parameters, self.step, self.measures, self.histories = parameters, step, measures, histories
+        self.stopped = threading.Event()
+        self._memory = threading.local()
+
+    def run(self, kind: Kind, jobs: list[Job]) -> list[Ended]:
+        """Runs up to `WIDTH` jobs side by side and measures them; none if stopped on the way."""
+        schedule = schedule_of(kind.profile, self.step, OUTPUT_PERIOD)
+        points = [job.numbers.points for job in jobs]
+        size, count, rows = len(jobs[0].begin), len(points[0]) // POINT_SIZE, len(schedule.time)
+        p, x = self._lanes("packed", [job.packed for job in jobs]), self._lanes("begin", [job.begin for job in jobs])
+        samples, moved, extremes = (
+            self._array(name, length)
+            for name, length in (("samples", rows * size), ("moved", rows * count), ("extremes", count + 7))
+        )
+        samples[: x.size] = x.ravel()
+        self._integrate(schedule, kind.layout, p.ravel(), x, samples)
+        if self.stopped.is_set():
+            return []
+        measured = self._lanes("points", points).ravel(), count, self._array("work", size), moved, extremes
+        measure_samples_lanes(samples, rows, size, p.ravel(), kind.layout.gasket, *measured)
+        histories = samples.reshape(rows, size, WIDTH), moved.reshape(rows, count, WIDTH), extremes.reshape(-1, WIDTH)
+        return [self._ended(job, schedule, *(a[..., lane] for a in histories)) for lane, job in enumerate(jobs)]
+
+    def _integrate(self, schedule: Schedule, layout: Layout, p: FloatArray, x: FloatArray, samples: FloatArray) -> None:
+        sizes = (len(x), len(x), len(x), LINE_SIZE * len(layout.dampers))
+        work = tuple(self._array(f"stage {i}", size) for i, size in enumerate(sizes))
+        done, count = 0, len(schedule.step)
+        while done < count and not self.stopped.is_set():
+            begin, done = done, min(done + PAUSE_STEPS, count)
+            integrate_lanes(schedule.steps, begin, done, p, layout.elements, x.ravel(), work, samples)
+            if all(diverging_coordinate(lane) for lane in x.T):
+                samples[(np.max(schedule.row[:done]) + 1) * x.size :] = np.nan
+                return
+
+    def _ended(self, job: Job, schedule: Schedule, samples: FloatArray, moved: FloatArray, extremes: FloatArray) -> Ended:
+        good, sensors = int(extremes[-1]), moved.shape[1] - 3  # the last three points are the detergent point's
+        values: dict[str, FloatArray] = {}
+        for measure in self.measures:
+            if measure == "extremes":
+                arrays: Iterable[FloatArray] = extremes[sensors:-1].reshape(3, 3).copy()
+            elif measure == "gap":
+                arrays = [self._gap(schedule.time[:good], samples[:good, :6], job.begin[:6])]
+            else:
+                size, at = amplitudes(filtered(moved[:good, :sensors], OUTPUT_PERIOD))
+                arrays = size, np.where(np.isnan(size), np.nan, samples[at, DRUM_RATE])
+            values |= dict(zip(MEASURES[measure], arrays, strict=True))
+        record = self._record(job, schedule, samples.copy()) if self.histories else None
+        return Ended(job.number, job.case, values, _divergence(schedule.time, samples, good), record)
+
+    def _record(self, job: Job, schedule: Schedule, samples: FloatArray) -> Record:
+        torque = np.empty((len(samples), 1))
+        elements = job.numbers.layout.elements
+        motor_torque_history(samples, schedule.sample_acceleration[:, None], job.packed, elements, torque)
+        trajectory = Trajectory(schedule.time, samples[:, :STATE_SIZE], samples[:, STATE_SIZE:], torque[:, 0])
+        record = as_record(job.numbers.setup, job.case, ended_where_it_diverged(trajectory))
+        return record.assign_attrs(engine="compiled", step_s=self.step)
+
+    def _gap(self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray) -> FloatArray:
+        kept = self._memory.__dict__
+        if "scene" not in kept:  # one for each thread: a scene is in one pose at a time
+            kept["scene"] = Scene(self.parameters)
+        gap = kept["scene"].smallest_gap(time, poses, rest_pose)
+        return np.array(np.nan if gap is None else gap.distance)
+
+    def _lanes(self, name: str, rows: list[FloatArray]) -> FloatArray:
+        """Arrays of several runs as one of lanes, (size, WIDTH); idle lanes repeat the last."""
+        lanes = self._array(name, len(rows[0])).reshape(-1, WIDTH)
+        lanes[:] = np.stack([*rows, *[rows[-1]] * (WIDTH - len(rows))], axis=1)
+        return lanes
+
+    def _array(self, name: str, size: int) -> FloatArray:
+        """An array of lanes of this thread, used again from batch to batch, at an address vectors are loaded from in one go."""
+        kept = self._memory.__dict__
+        if name not in kept or len(kept[name]) != size * WIDTH:
+            raw = np.zeros(size * WIDTH + WIDTH)
+            begin = (-raw.ctypes.data // raw.itemsize) % WIDTH
+            kept[name] = raw[begin : begin + size * WIDTH]
+        return kept[name]
+
+
+def _divergence(time: FloatArray, samples: FloatArray, good: int) -> str:
+    """What a record of the run would say."""
+    if good == len(time):
+        return ""
+    reason = diverging_coordinate(samples[good])
+    assert reason is not None  # the first sample out of bounds
+    return divergence_text(Divergence(float(time[good]), *reason), time[:good], samples[:good])
