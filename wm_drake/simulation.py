@@ -15,8 +15,7 @@ import xarray as xr
 from wm_drake.compiled_engine import run_compiled
 from wm_drake.drake_engine import run_drake
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.laws.compilation import generic
-from wm_drake.laws.vectors import rotation_from_rpy
+from wm_drake.kernel.histories import position_history
 from wm_drake.machine import OUTPUT_PERIOD, Machine, Setup
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.elements import FloatArray
@@ -218,9 +217,9 @@ def point_displacements(state: FloatArray, points: FloatArray, rest_pose: FloatA
 
 def point_positions(state: FloatArray, points: FloatArray) -> FloatArray:
     """Positions in W of points of the tub; arguments as in `point_displacements`. (n, k, 3) [m]"""
-    rows = np.stack(generic(rotation_from_rpy)(state[:, 0], state[:, 1], state[:, 2]), axis=1).reshape(-1, 3)
-    turned = (rows @ points.T).reshape(len(state), 3, len(points))  # one product of two matrices
-    return (state[:, 3:6, None] + turned).transpose(0, 2, 1)
+    positions = np.empty((len(state), 3 * len(points)))
+    position_history(np.ascontiguousarray(state[:, :6]), np.ascontiguousarray(points), positions)
+    return positions.reshape(len(state), len(points), 3)
 
 
 def save_record(record: Record, path: Path) -> None:

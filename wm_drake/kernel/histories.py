@@ -7,7 +7,7 @@ from wm_drake.laws.compilation import law, long_running
 from wm_drake.laws.elementary import lanes_to_rows, rows_to_lanes, sine_cosine, where
 from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
 from wm_drake.laws.motion import tub_motion
-from wm_drake.laws.vectors import add, dot, rotate
+from wm_drake.laws.vectors import add, dot, rotate, rotation_from_rpy
 from wm_drake.systems.six_component_bushing import six_component_bushing_wrench
 from wm_drake.trajectory import LARGEST_ANGLE, LARGEST_DISPLACEMENT
 
@@ -37,6 +37,27 @@ def motor_torque_history(samples, acceleration, p, elements, torque):
         masses = mass_properties(p, cosine, sine)
         answer[0] = state_derivative(x, dx, masses, x[13], drum[0], p, elements, scratch)
         lanes_to_rows(numbers, begin, torque)
+
+
+@long_running
+def position_history(samples, points, positions):
+    """Positions in W of points of the tub at each sample. [m]
+
+    Args:
+        samples: (n, >= 6) roll, pitch, yaw, x, y, z. [rad, m]
+        points: (k, 3) in T. [m]
+        positions: (n, 3 k), written: x, y, z of each point.
+    """
+    align_stack()
+    x_numbers, numbers = np.empty(samples.shape[1] * WIDTH), np.empty(3 * len(points) * WIDTH)
+    x, place = lane_array(x_numbers), lane_array(numbers)
+    for begin in range(0, len(samples), WIDTH):
+        rows_to_lanes(samples, begin, x_numbers)
+        rotation = rotation_from_rpy(x[0], x[1], x[2])
+        for k in range(len(points)):
+            turned = rotate(rotation, (points[k, 0], points[k, 1], points[k, 2]))
+            place[3 * k], place[3 * k + 1], place[3 * k + 2] = add((x[3], x[4], x[5]), turned)
+        lanes_to_rows(numbers, begin, positions)
 
 
 @law
