@@ -156,11 +156,11 @@ class Machine:
         plant_context = self.plant.GetMyContextFromRoot(context)
         unloaded = _placed_springs(self.plant, plant_context, parameters, dict.fromkeys(parameters.springs, 0.0))
         self._set(context, self.springs, unloaded)
-        wrenches = []
-        for spring in unloaded.values():
-            pull = (spring.p_WH - spring.p_ToA_T) / spring.rest_length
-            wrenches.append(np.concatenate([np.cross(spring.p_ToA_T, pull), pull]))
-        solution = np.linalg.lstsq(np.column_stack(wrenches), -self.elastic_and_gravity_force(context), rcond=None)[0]
+        hooks = np.stack([spring.p_ToA_T for spring in unloaded.values()])
+        lines = np.stack([spring.p_WH for spring in unloaded.values()]) - hooks
+        pulls = lines / np.linalg.norm(lines, axis=1, keepdims=True)
+        wrenches = np.column_stack([np.cross(hooks, pulls), pulls]).T
+        solution = np.linalg.lstsq(wrenches, -self.elastic_and_gravity_force(context), rcond=None)[0]
         preloads = dict(zip(unloaded, map(float, solution), strict=True))
         slack = [name for name, preload in preloads.items() if preload <= 0.0 and parameters.gravity > 0.0]
         if slack:

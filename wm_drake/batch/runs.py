@@ -63,7 +63,9 @@ class Runner:
     def run(self, kind: Kind, jobs: list[Job]) -> list[Ended]:
         """Runs up to `WIDTH` jobs side by side and measures them; none if stopped on the way."""
         schedule = schedule_of(kind.profile, self.step, OUTPUT_PERIOD)
-        points = [job.numbers.points for job in jobs]
+        # without amplitudes only the detergent point is followed, which comes last
+        first = 0 if "amplitudes" in self.measures else -3 * POINT_SIZE
+        points = [job.numbers.points[first:] for job in jobs]
         size, count, rows = len(jobs[0].begin), len(points[0]) // POINT_SIZE, len(schedule.time)
         p, x = self._lanes("packed", [job.packed for job in jobs]), self._lanes("begin", [job.begin for job in jobs])
         samples, moved, extremes = (

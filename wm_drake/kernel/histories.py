@@ -4,7 +4,7 @@ import numpy as np
 
 from wm_drake.kernel.mechanics import LINE_SIZE, mass_properties, state_derivative
 from wm_drake.laws.compilation import law, long_running
-from wm_drake.laws.elementary import lanes_to_rows, rows_to_lanes, sine_cosine, where
+from wm_drake.laws.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, sine_cosine, where
 from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
 from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.vectors import add, dot, rotate, rotation_from_rpy
@@ -29,13 +29,15 @@ def motor_torque_history(samples, acceleration, p, elements, torque):
     size = samples.shape[1] * WIDTH
     x_numbers, drum_numbers, numbers = np.empty(size), np.empty(WIDTH), np.empty(WIDTH)
     x, drum, answer = lane_array(x_numbers), lane_array(drum_numbers), lane_array(numbers)
-    dx, scratch = lane_array(np.empty(size)), lane_array(np.empty(LINE_SIZE * WIDTH * len(elements[1])))
+    dx_numbers, scratch_numbers = np.empty(size), np.empty(LINE_SIZE * WIDTH * len(elements[1]))
+    p_numbers = in_each_lane(p)
+    dx, scratch, q = lane_array(dx_numbers), lane_array(scratch_numbers), lane_array(p_numbers)
     for begin in range(0, len(torque), WIDTH):
         rows_to_lanes(samples, begin, x_numbers)
         rows_to_lanes(acceleration, begin, drum_numbers)
         sine, cosine = sine_cosine(x[6])
-        masses = mass_properties(p, cosine, sine)
-        answer[0] = state_derivative(x, dx, masses, x[13], drum[0], p, elements, scratch)
+        masses = mass_properties(q, cosine, sine)
+        answer[0] = state_derivative(x, dx, masses, x[13], drum[0], q, elements, scratch)
         lanes_to_rows(numbers, begin, torque)
 
 

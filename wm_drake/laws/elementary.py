@@ -9,7 +9,7 @@ import numpy as np
 from numba.extending import overload
 
 from wm_drake.laws.compilation import law
-from wm_drake.laws.lanes import WIDTH, LanesType, MaskType, lanes_any, lanes_floor, lanes_select, lanes_sqrt
+from wm_drake.laws.lanes import WIDTH, LanesType, MaskType, lanes_any, lanes_floor, lanes_select, lanes_sqrt, number_array
 
 
 def where(condition, a, b):
@@ -138,6 +138,25 @@ def sine_over_angle(angle_squared):
     odd = 1.0 / 5040.0 + y * odd
     odd = 1.0 / 6.0 + y * odd
     return (1.0 + y * even) - z * odd
+
+
+def numbers(array):
+    """An array of numbers as laws take it fastest; the array itself where it is not one of floats."""
+    return array
+
+
+@overload(numbers)
+def _compiled_numbers(array):
+    return lambda array: number_array(array)
+
+
+@law
+def in_each_lane(array):
+    """The numbers of an array, each in every lane; for `lane_array`."""
+    copies = np.empty(len(array) * WIDTH)
+    for k in range(len(array)):
+        copies[k * WIDTH : (k + 1) * WIDTH] = array[k]
+    return copies
 
 
 @law

@@ -10,7 +10,7 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.laws.compilation import law
 from wm_drake.laws.damper import COULOMB, FREE_STROKE, HAVSIN, MSTV, STV, damper_response
-from wm_drake.laws.elementary import lanes_to_rows, rows_to_lanes
+from wm_drake.laws.elementary import in_each_lane, lanes_to_rows, numbers, rows_to_lanes
 from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
 from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.strut import bending_moment, strut_line, transverse, transverse_couple, wrench_at_origin
@@ -103,10 +103,10 @@ def friction_damper_wrench(motion, arm, line, tension, p, at):
 def evaluate_friction_damper(x, state, p, generalized_force, force, rate):
     """Force of a damper strut; arguments as in `ForceElement`, parameters as in `FrictionDamperParameters.packed`."""
     deformation = state[0] if len(state) > 0 else 0.0 * x[0]
-    motion = tub_motion(x)
-    arm, line = friction_damper_line(motion, p, 0)
-    tension, deformation_rate = friction_damper_tension(line[1], deformation, p, 0)
-    wrench = friction_damper_wrench(motion, arm, line, tension, p, 0)
+    motion, q = tub_motion(numbers(x)), numbers(p)
+    arm, line = friction_damper_line(motion, q, 0)
+    tension, deformation_rate = friction_damper_tension(line[1], deformation, q, 0)
+    wrench = friction_damper_wrench(motion, arm, line, tension, q, 0)
     for i in range(6):
         generalized_force[i] = wrench[i]
     generalized_force[6] = 0.0 * tension
@@ -119,15 +119,17 @@ def evaluate_friction_damper(x, state, p, generalized_force, force, rate):
 def friction_damper_history(states, own_states, p, forces):
     """Own force at each row of a sampled motion: `evaluate_friction_damper` without Drake, for records."""
     align_stack()
-    x_numbers, own_numbers, numbers = np.empty(14 * WIDTH), np.empty(WIDTH), np.empty(WIDTH)
-    x, own, own_force = lane_array(x_numbers), lane_array(own_numbers), lane_array(numbers)
+    x_numbers, own_numbers, force_numbers = np.empty(14 * WIDTH), np.empty(WIDTH), np.empty(WIDTH)
+    x, own, own_force = lane_array(x_numbers), lane_array(own_numbers), lane_array(force_numbers)
+    p_numbers = in_each_lane(p)
+    q = lane_array(p_numbers)
     for begin in range(0, len(states), WIDTH):
         rows_to_lanes(states, begin, x_numbers)
         rows_to_lanes(own_states, begin, own_numbers)
-        _, line = friction_damper_line(tub_motion(x), p, 0)
-        tension, _ = friction_damper_tension(line[1], own[0], p, 0)
-        own_force[0] = p[13] * tension
-        lanes_to_rows(numbers, begin, forces)
+        _, line = friction_damper_line(tub_motion(x), q, 0)
+        tension, _ = friction_damper_tension(line[1], own[0], q, 0)
+        own_force[0] = q[13] * tension
+        lanes_to_rows(force_numbers, begin, forces)
 
 
 @TemplateSystem.define("DamperForce_", T_list=SCALARS)

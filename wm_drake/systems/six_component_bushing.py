@@ -9,7 +9,7 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.laws.bushing import bushing_force
 from wm_drake.laws.compilation import law
-from wm_drake.laws.elementary import lanes_to_rows, rows_to_lanes
+from wm_drake.laws.elementary import in_each_lane, lanes_to_rows, numbers, rows_to_lanes
 from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
 from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.strut import wrench_at_origin
@@ -81,7 +81,7 @@ def nine(p, at):
 @law
 def evaluate_six_component_bushing(x, state, p, generalized_force, force, rate):
     """Force of a bushing; arguments as in `ForceElement`, parameters as in `SixComponentBushingParameters.packed`."""
-    wrench, on_housing = six_component_bushing_wrench(tub_motion(x), p, 0)
+    wrench, on_housing = six_component_bushing_wrench(tub_motion(numbers(x)), numbers(p), 0)
     for i in range(6):
         generalized_force[i] = wrench[i]
         force[i] = on_housing[i]
@@ -92,14 +92,14 @@ def evaluate_six_component_bushing(x, state, p, generalized_force, force, rate):
 def six_component_bushing_history(states, own_states, p, forces):
     """Own force at each row of a sampled motion: `evaluate_six_component_bushing` without Drake, for records."""
     align_stack()
-    x_numbers, numbers = np.empty(14 * WIDTH), np.empty(6 * WIDTH)
-    x, own_force = lane_array(x_numbers), lane_array(numbers)
+    x_numbers, force_numbers, p_numbers = np.empty(14 * WIDTH), np.empty(6 * WIDTH), in_each_lane(p)
+    x, own_force, q = lane_array(x_numbers), lane_array(force_numbers), lane_array(p_numbers)
     for begin in range(0, len(states), WIDTH):
         rows_to_lanes(states, begin, x_numbers)
-        _, on_housing = six_component_bushing_wrench(tub_motion(x), p, 0)
+        _, on_housing = six_component_bushing_wrench(tub_motion(x), q, 0)
         for k in range(6):
             own_force[k] = on_housing[k]
-        lanes_to_rows(numbers, begin, forces)
+        lanes_to_rows(force_numbers, begin, forces)
 
 
 @TemplateSystem.define("SixComponentBushing_", T_list=SCALARS)

@@ -8,7 +8,7 @@ from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.laws.compilation import law
-from wm_drake.laws.elementary import lanes_to_rows, rows_to_lanes
+from wm_drake.laws.elementary import in_each_lane, lanes_to_rows, numbers, rows_to_lanes
 from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
 from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.spring import spring_tension
@@ -54,7 +54,7 @@ def spring_strut_wrench(motion, p, at):
 @law
 def evaluate_spring_strut(x, state, p, generalized_force, force, rate):
     """Force of a spring strut; arguments as in `ForceElement`, parameters as in `SpringStrutParameters.packed`."""
-    wrench, tension = spring_strut_wrench(tub_motion(x), p, 0)
+    wrench, tension = spring_strut_wrench(tub_motion(numbers(x)), numbers(p), 0)
     for i in range(6):
         generalized_force[i] = wrench[i]
     generalized_force[6] = 0.0 * tension
@@ -65,12 +65,12 @@ def evaluate_spring_strut(x, state, p, generalized_force, force, rate):
 def spring_strut_history(states, own_states, p, forces):
     """Own force at each row of a sampled motion: `evaluate_spring_strut` without Drake, for records."""
     align_stack()
-    x_numbers, numbers = np.empty(14 * WIDTH), np.empty(WIDTH)
-    x, own_force = lane_array(x_numbers), lane_array(numbers)
+    x_numbers, force_numbers, p_numbers = np.empty(14 * WIDTH), np.empty(WIDTH), in_each_lane(p)
+    x, own_force, q = lane_array(x_numbers), lane_array(force_numbers), lane_array(p_numbers)
     for begin in range(0, len(states), WIDTH):
         rows_to_lanes(states, begin, x_numbers)
-        _, own_force[0] = spring_strut_wrench(tub_motion(x), p, 0)
-        lanes_to_rows(numbers, begin, forces)
+        _, own_force[0] = spring_strut_wrench(tub_motion(x), q, 0)
+        lanes_to_rows(force_numbers, begin, forces)
 
 
 @TemplateSystem.define("SpringStrut_", T_list=SCALARS)
