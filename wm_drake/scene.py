@@ -135,15 +135,23 @@ class Scene:
         """
         if not self._pairs or not len(time):
             return None
-        rotations = np.stack(generic(rotation_from_rpy)(*poses[:, :3].T), axis=1).reshape(-1, 3, 3)
         roll, pitch, yaw, x, y, z = (poses - rest_pose).T
         shift = np.sqrt(x * x + y * y + z * z) + (np.abs(roll) + np.abs(pitch) + np.abs(yaw)) * self._reach
-        best = Gap(np.inf, 0.0, "", "", (0.0, 0.0, 0.0))
-        for distance, direction, pair in self._at_rest(tuple(map(float, rest_pose))):
-            near = distance - shift < best.distance  # no gap shrinks by more than the farthest point moves
-            if near.any():
-                best = self._smallest_of_pair(pair, direction, best, (time[near], poses[near], rotations[near]))
+        at_rest = self._at_rest(tuple(map(float, rest_pose)))
+        farthest = int(np.argmax(shift))
+        best = self._measured(at_rest[0][2], time[farthest], poses[farthest])[0]  # some gap, so that most poses drop out
+        for distance, direction, pair in at_rest:
+            if distance - shift[farthest] >= best.distance:  # nor can any of the pairs that are farther apart at rest
+                break
+            near = np.flatnonzero(distance - shift < best.distance)  # no gap shrinks by more than the farthest point moves
+            best = self._smallest_of_pair(pair, direction, best, time[near], poses[near])
         return best
+
+    def _measured(self, pair: tuple[GeometryId, GeometryId], time: float, pose: FloatArray) -> tuple[Gap, FloatArray]:
+        """The gap of a pair at a pose, and its direction."""
+        distance, point, direction = self._nearest(pose, pair)
+        x, y, z = map(float, point)
+        return Gap(float(distance), float(time), self._name(pair[0]), self._name(pair[1]), (x, y, z)), direction
 
     def _at_rest(self, rest_pose: tuple[float, ...]) -> list[tuple[float, FloatArray, tuple[GeometryId, GeometryId]]]:
         """Distance, direction and pair, nearest first; kept, since runs of a machine begin at the same pose."""
@@ -158,10 +166,11 @@ class Scene:
         pair: tuple[GeometryId, GeometryId],
         direction: FloatArray,
         best: Gap,
-        motion: tuple[FloatArray, FloatArray, FloatArray],
+        time: FloatArray,
+        poses: FloatArray,
     ) -> Gap:
         """The smallest gap after this pair was looked at; `direction` is a first guess of where it is narrowest."""
-        time, poses, rotations = motion
+        rotations = np.stack(generic(rotation_from_rpy)(*poses[:, :3].T), axis=1).reshape(-1, 3, 3)
         moving, fixed = (self._outlines[shape] for shape in pair)
         bound = np.full(len(time), -np.inf)
         while True:
@@ -169,10 +178,8 @@ class Scene:
             index = int(np.argmin(bound))
             if not bound[index] < best.distance:
                 return best
-            distance, point, direction = self._nearest(poses[index], pair)
-            if distance < best.distance:
-                x, y, z = map(float, point)
-                best = Gap(float(distance), float(time[index]), self._name(pair[0]), self._name(pair[1]), (x, y, z))
+            gap, direction = self._measured(pair, time[index], poses[index])
+            best = min(best, gap, key=lambda found: found.distance)
             bound[index] = np.inf  # measured
 
     def animate(self, meshcat: Meshcat, time: FloatArray, positions: FloatArray) -> None:

@@ -212,7 +212,9 @@ def point_displacements(state: FloatArray, points: FloatArray, rest_pose: FloatA
     Returns:
         (n, k, 3) in W. [m]
     """
-    return point_positions(state, points) - point_positions(rest_pose[None, :], points)
+    displaced = point_positions(state, points)
+    displaced -= point_positions(rest_pose[None, :], points)
+    return displaced
 
 
 def point_positions(state: FloatArray, points: FloatArray) -> FloatArray:
