@@ -14,7 +14,7 @@ from wm_drake.errors import InputError
 from wm_drake.laws.lanes import WIDTH
 from wm_drake.machine import build_machine
 from wm_drake.measures import measure
-from wm_drake.parameters import Load, SpinProfile, Unbalance, with_value
+from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, with_value
 from wm_drake.scene import Scene
 from wm_drake.simulation import Case, DivergenceWarning, simulate
 
@@ -203,6 +203,22 @@ def test_memory_does_not_grow_with_the_number_of_runs(reference, machine):
     results = (2500 - 500) * 2000  # bytes; the table itself, and the numbers kept for the next load
     assert peaks[1] - peaks[0] < results + KEPT_NUMBERS * 12_000
     assert peaks[1] < 60e6
+
+
+def test_machines_whose_tables_are_elsewhere_do_not_run_side_by_side(reference):
+    """A table on x and a number on z take as much room as the other way round, but are not read alike."""
+    table = {"displacement": (-0.05, 0.0, 0.05), "force": (-150.0, 0.0, 300.0)}
+    cases = []
+    for axis in "xz":
+        gasket = reference.gasket.model_dump() | {f"stiffness_{axis}": table}
+        parameters = MachineParameters.model_validate(reference.model_dump() | {"gasket": gasket})
+        cases.append(Case(axis, reference.loads["middle"], RUN_UP, parameters=parameters))
+    built = build_machine(cases[0].parameters)
+    told = simulate_many(built, cases)
+    for index, case in enumerate(cases):
+        alone = measure(simulate(built, case))
+        np.testing.assert_allclose(told.gasket_force.values[index], alone.gasket_force.values, rtol=1e-9)
+    assert abs(told.gasket_force.values[0] / told.gasket_force.values[1] - 1.0).max() > 0.01
 
 
 def test_machines_with_tables_and_sponges_run_side_by_side():

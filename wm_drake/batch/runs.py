@@ -19,7 +19,15 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.scene import Scene
 from wm_drake.simulation import Case, Record, as_record
-from wm_drake.trajectory import Divergence, Trajectory, divergence_text, diverging_coordinate, ended_where_it_diverged
+from wm_drake.trajectory import (
+    LARGEST_ANGLE,
+    LARGEST_DISPLACEMENT,
+    Divergence,
+    Trajectory,
+    divergence_text,
+    diverging_coordinate,
+    ended_where_it_diverged,
+)
 
 MEASURES = {
     "extremes": ("detergent_displacement", "gasket_force", "gasket_moment"),
@@ -77,7 +85,8 @@ class Runner:
         if self.stopped.is_set():
             return []
         measured = self._lanes("points", points).ravel(), count, self._array("work", size), moved, extremes
-        measure_samples_lanes(samples, rows, size, p.ravel(), kind.layout.gasket, *measured)
+        bounds = LARGEST_ANGLE, LARGEST_DISPLACEMENT
+        measure_samples_lanes(samples, rows, size, bounds, p.ravel(), kind.layout.gasket, *measured)
         histories = samples.reshape(rows, size, WIDTH), moved.reshape(rows, count, WIDTH), extremes.reshape(-1, WIDTH)
         return [self._ended(job, schedule, *(a[..., lane] for a in histories)) for lane, job in enumerate(jobs)]
 

@@ -9,7 +9,6 @@ from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
 from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.vectors import add, dot, rotate, rotation_from_rpy
 from wm_drake.systems.six_component_bushing import six_component_bushing_wrench
-from wm_drake.trajectory import LARGEST_ANGLE, LARGEST_DISPLACEMENT
 
 POINT_SIZE = 7
 """Numbers of a measured point: its place in T, the direction in W along which it is measured, its value at rest. [m]"""
@@ -63,20 +62,21 @@ def position_history(samples, points, positions):
 
 
 @law
-def in_bounds(x):
-    """Whether a tub is where a run may go on: 1 or 0."""
-    tilted = (abs(x[0]) <= LARGEST_ANGLE) & (abs(x[1]) <= LARGEST_ANGLE) & (abs(x[2]) <= LARGEST_ANGLE)
-    displaced = (abs(x[3]) <= LARGEST_DISPLACEMENT) & (abs(x[4]) <= LARGEST_DISPLACEMENT) & (abs(x[5]) <= LARGEST_DISPLACEMENT)
-    return where(tilted & displaced, 1.0, 0.0)
+def in_bounds(x, angle, displacement):
+    """Whether a tub is within the bounds where a run may go on: 1 or 0."""
+    level = (abs(x[0]) <= angle) & (abs(x[1]) <= angle) & (abs(x[2]) <= angle)
+    near = (abs(x[3]) <= displacement) & (abs(x[4]) <= displacement) & (abs(x[5]) <= displacement)
+    return where(level & near, 1.0, 0.0)
 
 
 @law
-def measure_samples(samples, rows, size, p, gasket, points, count, x, moved, extremes):
+def measure_samples(samples, rows, size, bounds, p, gasket, points, count, x, moved, extremes):
     """Displacements at measured points, and the largest values of a run up to the first sample out of bounds.
 
     Args:
         samples: States, one after the other.
         rows, size: How many they are, and how many numbers each has.
+        bounds: Largest angle and displacement of the tub at which a run goes on. [rad, m]
         p, gasket: Packed numbers and where the gasket begins in them, -1 without one.
         points, count: Measured points, one after the other, and how many they are.
         x: A state to work in.
@@ -91,7 +91,7 @@ def measure_samples(samples, rows, size, p, gasket, points, count, x, moved, ext
     for row in range(rows):
         for k in range(size):
             x[k] = samples[row * size + k]
-        good = good * in_bounds(x)
+        good = good * in_bounds(x, bounds[0], bounds[1])
         motion = tub_motion(x)
         for k in range(count):
             at = k * POINT_SIZE
@@ -115,18 +115,9 @@ def larger(largest, value, good):
 
 
 @long_running
-def measure_samples_lanes(samples, rows, size, p, gasket, points, count, x, moved, extremes):
+def measure_samples_lanes(samples, rows, size, bounds, p, gasket, points, count, x, moved, extremes):
     """`measure_samples` of `lanes.WIDTH` machines side by side."""
     align_stack()
-    measure_samples(
-        lane_array(samples),
-        rows,
-        size,
-        lane_array(p),
-        gasket,
-        lane_array(points),
-        count,
-        lane_array(x),
-        lane_array(moved),
-        lane_array(extremes),
-    )
+    runs = (lane_array(samples), rows, size, bounds)
+    measured = (lane_array(points), count, lane_array(x), lane_array(moved), lane_array(extremes))
+    measure_samples(*runs, lane_array(p), gasket, *measured)

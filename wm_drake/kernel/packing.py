@@ -15,19 +15,19 @@ from wm_drake.parameters.elements import FloatArray
 
 @dataclass(frozen=True)
 class Layout:
-    """Where things begin in the packed numbers of a machine; the same for all its parameter sets.
+    """Where things begin in the packed numbers of a machine, and what must be the same where machines run side by side.
 
     Attributes:
         springs, dampers, bushings: Index of each element.
         gasket: Index of the gasket, -1 without one.
-        size: How many numbers there are.
+        structure: Number of each damper's law, and of the points of every table, in order.
     """
 
     springs: tuple[int, ...]
     dampers: tuple[int, ...]
     bushings: tuple[int, ...]
     gasket: int
-    size: int
+    structure: tuple[int, ...]
 
     @property
     def elements(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -50,16 +50,18 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
     parts: list[FloatArray] = []
     size = BODIES_SIZE
     indices: dict[str, tuple[int, ...]] = {}
+    structure: list[int] = []
     for kind in ("springs", "dampers", "bushings"):
         begins = []
         for element in getattr(setup, kind).values():
             begins.append(size)
             parts.append(element.packed())
             size += len(parts[-1])
+            structure += element.structure
         indices[kind] = tuple(begins)
     names = list(setup.bushings)
     gasket = indices["bushings"][names.index("gasket")] if "gasket" in names else -1
-    return np.concatenate(parts), Layout(**indices, gasket=gasket, size=size)
+    return np.concatenate(parts), Layout(**indices, gasket=gasket, structure=tuple(structure))
 
 
 def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:

@@ -1,9 +1,11 @@
-"""One source for each law, run two ways: compiled for floats, interpreted for any other scalar.
+"""One source for each law, run three ways: compiled for floats or for lanes of several runs, interpreted for other scalars.
 
-A law is a plain function of scalars (or short tuples and arrays of scalars). ``@law`` compiles it with numba for floats.
-``generic(law)`` runs the very same source in Python, so that automatic differentiation sees every operation; a law that
-calls other laws calls their generic forms then. Rules for the source: numpy functions that exist on scalars (``np.sin``,
-``np.sqrt``), comparisons and ``abs`` are fine; ``np.sign`` drops derivatives, a square root of zero has none.
+A law is a plain function of scalars (or short tuples and arrays of scalars). ``@law`` compiles it with numba for floats, and
+for lanes (`wm_drake.laws.lanes`) when a compiled loop calls it with them. ``generic(law)`` runs the very same source in
+Python, so that automatic differentiation sees every operation; a law that calls other laws calls their generic forms then.
+Rules for the source: choose between values with ``where``, and take functions from `wm_drake.laws.elementary`; an ``if``
+may ask what is the same in all lanes. ``np.sign`` drops derivatives, a square root of zero has none. Numbers of other
+modules become constants of the compiled code: they must lie in files that `_cache_folder` looks at.
 """
 
 import functools
@@ -37,7 +39,7 @@ def _cache_folder() -> str:
 
 
 def law(function: Callable[..., Any]) -> Any:
-    """Compiles a law for floats, with a cache on disk."""
+    """Compiles a law, with a cache on disk. Products and sums may fuse into one rounding; nothing else is reordered."""
     return _compiled(function, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
 
 

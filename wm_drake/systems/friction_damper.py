@@ -58,6 +58,12 @@ class FrictionDamperParameters:
         """Whether the law has a state."""
         return int(self.packed_law[0]) in (MSTV, FREE_STROKE)
 
+    @property
+    def structure(self) -> list[int]:
+        """Number of its law, and of the points of its sponge's table if it has one."""
+        number = int(self.packed_law[0])
+        return [number, int(self.packed_law[6])] if number == FREE_STROKE else [number]
+
     def packed(self) -> FloatArray:
         """Flat: tub end (T), housing end (W), axis; end bushing k, c, p, pi / (2 v_t); engaged; law number, its parameters."""
         line = self.p_ToA_T - self.p_WH

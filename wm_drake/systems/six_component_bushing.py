@@ -13,6 +13,7 @@ from wm_drake.laws.elementary import in_each_lane, lanes_to_rows, numbers, rows_
 from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
 from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.strut import wrench_at_origin
+from wm_drake.laws.table import packed_size
 from wm_drake.laws.vectors import add, compose, cross, rotate, rotate_back, rotation_vector, scale, subtract
 from wm_drake.laws.vectors import transpose as transposed
 from wm_drake.parameters.elements import Bushing, FloatArray, packed_stiffness
@@ -39,6 +40,15 @@ class SixComponentBushingParameters:
     R_WG: FloatArray
     packed_law: FloatArray
     engaged: float = 1.0
+
+    @property
+    def structure(self) -> list[int]:
+        """Numbers of points of its six tables, 0 for those that are a number."""
+        points, at = [], 12
+        for _ in range(6):
+            points.append(int(self.packed_law[at]))
+            at += packed_size(self.packed_law, at)
+        return points
 
     def packed(self) -> FloatArray:
         """Flat: tub-side point (T) and rotation by rows, housing-side point (W) and rotation by rows, engaged, law."""

@@ -32,6 +32,11 @@ class SpringStrutParameters:
         """Distance of the hooks when T coincides with W. [m]"""
         return float(np.linalg.norm(self.p_ToA_T - self.p_WH))
 
+    @property
+    def structure(self) -> list[int]:
+        """Number of points of its table, 0 without one."""
+        return [int(self.packed_stiffness[0])]
+
     def packed(self) -> FloatArray:
         """Flat: tub hook (T), housing hook (W), rest length, preload, packed stiffness."""
         return np.concatenate([self.p_ToA_T, self.p_WH, [self.rest_length, self.preload], self.packed_stiffness])
