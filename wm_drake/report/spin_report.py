@@ -79,7 +79,7 @@ def summary(result: SpinResult, table: pd.DataFrame) -> str:
     count = len(result.results)
     runs = "1 case was" if count == 1 else f"{count} cases were"
     speed = number(RPM_PER_RAD_S * max(max(case.case.profile.speed) for case in result.results), 0)
-    opening = f"{runs} run, at drum speeds up to {speed} rpm, with the engine {result.engine}."
+    opening = f"{runs} run, at drum speeds up to {speed} rpm, with the {result.engine} engine."
     if not ended:
         return f"{opening} None came to its end, so there is nothing to sum up."
     if len(ended) < count:
