@@ -1,6 +1,7 @@
 """The machine: SDF bodies and force systems as one Drake diagram, and the Contexts in which its numbers are set."""
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.optimize import root
 
 from wm_drake.bodies import add_bodies, add_load, set_bodies
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
-from wm_drake.parameters import Load, MachineParameters, Sensor, packed_stiffness
+from wm_drake.parameters import FrameOverride, Load, MachineParameters, Sensor, packed_stiffness
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.systems.element import GENERALIZED_FORCE_SIZE
 from wm_drake.systems.friction_damper import FrictionDamper, FrictionDamperParameters, packed_damper_law
@@ -73,7 +74,7 @@ class Setup:
 class Machine:
     """A built machine: diagram, plant and handles to every system in it. Numbers live in a Context: see `set_up`.
 
-    `blank` is a Context in which nothing is set.
+    `blank` is a Context in which nothing is set; `places` remembers where frames are.
     """
 
     parameters: MachineParameters
@@ -85,6 +86,7 @@ class Machine:
     bushings: dict[str, SixComponentBushing]
     logs: dict[str, VectorLogSink]
     blank: Context
+    places: "list[_Places]" = field(default_factory=list, repr=False, compare=False)
 
     def set_up(
         self,
@@ -116,8 +118,8 @@ class Machine:
             context.SetTimeStateAndParametersFrom(self.blank)
         plant_context = self.plant.GetMyContextFromRoot(context)
         set_bodies(self.plant, plant_context, parameters)
-        bushings = _placed_bushings(self.plant, plant_context, parameters)
-        placed_dampers = _placed_dampers(self.plant, plant_context, parameters)
+        places = self._places(plant_context, parameters)
+        bushings, placed_dampers = _placed_bushings(places, parameters), _placed_dampers(places, parameters)
         self._set(context, self.bushings, bushings)
         self._set(context, self.dampers, placed_dampers)
         springs = self._preloaded_springs(context, parameters)
@@ -132,9 +134,16 @@ class Machine:
         if load is not None:
             add_load(self.plant, plant_context, load)
         self.plant.SetPositions(plant_context, np.append(rest_pose, 0.0))
-        points = {name: _point(self.plant, plant_context, "tub", sensor.frame) for name, sensor in parameters.sensors.items()}
-        detergent_point = _point(self.plant, plant_context, "tub", parameters.clearance.detergent_frame)
+        points = {name: places("tub", sensor.frame)[0] for name, sensor in parameters.sensors.items()}
+        detergent_point = places("tub", parameters.clearance.detergent_frame)[0]
         return Setup(self, parameters, context, springs, placed_dampers, bushings, points, detergent_point, rest_pose, residual)
+
+    def _places(self, plant_context: Context, parameters: MachineParameters) -> "_Places":
+        """Where frames are; remembered from the last set-up, if that had the same overrides."""
+        if not self.places or self.places[0].frames != parameters.frames:
+            self.places[:] = [_Places(self.plant, parameters.frames, plant_context)]
+        self.places[0].context = plant_context
+        return self.places[0]
 
     def _set(self, context: Context, systems: dict[str, Any], placed: dict[str, Any]) -> None:
         for name, system in systems.items():
@@ -154,7 +163,7 @@ class Machine:
     def _preloaded_springs(self, context: Context, parameters: MachineParameters) -> dict[str, SpringStrutParameters]:
         """Springs with the preloads that balance the empty machine when T coincides with W, as well as they can."""
         plant_context = self.plant.GetMyContextFromRoot(context)
-        unloaded = _placed_springs(self.plant, plant_context, parameters, dict.fromkeys(parameters.springs, 0.0))
+        unloaded = _placed_springs(self._places(plant_context, parameters), parameters)
         self._set(context, self.springs, unloaded)
         hooks = np.stack([spring.p_ToA_T for spring in unloaded.values()])
         lines = np.stack([spring.p_WH for spring in unloaded.values()]) - hooks
@@ -214,17 +223,13 @@ def build_machine(parameters: MachineParameters) -> Machine:
     add_bodies(plant, parameters)
     context = plant.CreateDefaultContext()
     set_bodies(plant, context, parameters)  # reports unknown names before anything is placed by them
-    springs = {
-        name: SpringStrut(placed.packed())
-        for name, placed in _placed_springs(plant, context, parameters, dict.fromkeys(parameters.springs, 0.0)).items()
-    }
+    places = _Places(plant, parameters.frames, context)
+    springs = {name: SpringStrut(placed.packed()) for name, placed in _placed_springs(places, parameters).items()}
     dampers = {
         name: FrictionDamper(placed.packed(), int(placed.has_sponge))
-        for name, placed in _placed_dampers(plant, context, parameters).items()
+        for name, placed in _placed_dampers(places, parameters).items()
     }
-    bushings = {
-        name: SixComponentBushing(placed.packed()) for name, placed in _placed_bushings(plant, context, parameters).items()
-    }
+    bushings = {name: SixComponentBushing(placed.packed()) for name, placed in _placed_bushings(places, parameters).items()}
     source = builder.AddNamedSystem("speed_source", SpeedSource())
     elements = {"spring": springs, "damper": dampers, "bushing": bushings}
     labels = [(_label(kind, name), system) for kind, systems in elements.items() for name, system in systems.items()]
@@ -272,63 +277,63 @@ def _check_same_elements(built: MachineParameters, wanted: MachineParameters) ->
             )
 
 
-def _point(plant: MultibodyPlant, context: Context, body: str, frame: str) -> FloatArray:
-    """Origin of a frame in a body's frame."""
-    pose = plant.CalcRelativeTransform(context, plant.GetBodyByName(body).body_frame(), plant.GetFrameByName(frame))
-    return np.array(pose.translation())
+class _Places:
+    """Where frames are in a body's frame, under one set of overrides; each is asked of the plant once."""
+
+    def __init__(self, plant: MultibodyPlant, frames: dict[str, FrameOverride], context: Context) -> None:
+        self.frames, self.context, self._plant = frames, context, plant
+        self._known: dict[tuple[str, str], tuple[FloatArray, FloatArray]] = {}
+
+    def __call__(self, body: str, frame: str) -> tuple[FloatArray, FloatArray]:
+        """Origin and rotation of a frame; the Context must have the overrides in it. [m]"""
+        if (body, frame) not in self._known:
+            carrier = self._plant.GetBodyByName(body).body_frame()
+            pose = self._plant.CalcRelativeTransform(self.context, carrier, self._plant.GetFrameByName(frame))
+            self._known[body, frame] = np.array(pose.translation()), np.array(pose.rotation().matrix())
+        return self._known[body, frame]
 
 
-def _rotation(plant: MultibodyPlant, context: Context, body: str, frame: str) -> FloatArray:
-    pose = plant.CalcRelativeTransform(context, plant.GetBodyByName(body).body_frame(), plant.GetFrameByName(frame))
-    return np.array(pose.rotation().matrix())
-
-
-def _ends(plant: MultibodyPlant, context: Context, element: Any) -> tuple[FloatArray, FloatArray]:
+def _ends(places: _Places, element: Any) -> tuple[FloatArray, FloatArray]:
     """Tub end in T and housing end in W of an element."""
-    return _point(plant, context, "tub", element.tub_frame), _point(plant, context, "world", element.housing_frame)
+    return places("tub", element.tub_frame)[0], places("world", element.housing_frame)[0]
 
 
-def _strut_ends(plant: MultibodyPlant, context: Context, element: Any, key: str) -> tuple[FloatArray, FloatArray]:
+def _strut_ends(places: _Places, element: Any, key: str) -> tuple[FloatArray, FloatArray]:
     """Ends of an element that acts along the line between them."""
-    tub_end, housing_end = _ends(plant, context, element)
-    if not np.linalg.norm(tub_end - housing_end) > SHORTEST_STRUT:
+    tub_end, housing_end = _ends(places, element)
+    if not math.dist(tub_end, housing_end) > SHORTEST_STRUT:
         raise input_error(
             f"frames '{element.tub_frame}' and '{element.housing_frame}' are at the same place: it has no line", key=key
         )
     return tub_end, housing_end
 
 
-def _placed_springs(
-    plant: MultibodyPlant, context: Context, parameters: MachineParameters, preloads: dict[str, float]
-) -> dict[str, SpringStrutParameters]:
+def _placed_springs(places: _Places, parameters: MachineParameters) -> dict[str, SpringStrutParameters]:
+    """Without preload yet."""
     return {
         name: SpringStrutParameters(
-            *_strut_ends(plant, context, spring, f"springs.{name}"),
-            preloads[name],
+            *_strut_ends(places, spring, f"springs.{name}"),
+            0.0,
             packed_stiffness(parameters.spring_types[spring.type].stiffness),
         )
         for name, spring in parameters.springs.items()
     }
 
 
-def _placed_dampers(
-    plant: MultibodyPlant, context: Context, parameters: MachineParameters
-) -> dict[str, FrictionDamperParameters]:
+def _placed_dampers(places: _Places, parameters: MachineParameters) -> dict[str, FrictionDamperParameters]:
     placed = {}
     for name, damper in parameters.dampers.items():
         kind = parameters.damper_types[damper.type]
-        ends = _strut_ends(plant, context, damper, f"dampers.{name}")
+        ends = _strut_ends(places, damper, f"dampers.{name}")
         placed[name] = FrictionDamperParameters(*ends, kind.end_bushing, packed_damper_law(kind))
     return placed
 
 
-def _placed_bushings(
-    plant: MultibodyPlant, context: Context, parameters: MachineParameters
-) -> dict[str, SixComponentBushingParameters]:
+def _placed_bushings(places: _Places, parameters: MachineParameters) -> dict[str, SixComponentBushingParameters]:
     placed = {}
     for name, bushing in parameters.all_bushings().items():
-        tub_point, housing_point = _ends(plant, context, bushing)
-        r_tub = _rotation(plant, context, "tub", bushing.tub_frame)
-        r_housing = _rotation(plant, context, "world", bushing.housing_frame)
+        tub_point, housing_point = _ends(places, bushing)
+        r_tub = places("tub", bushing.tub_frame)[1]
+        r_housing = places("world", bushing.housing_frame)[1]
         placed[name] = SixComponentBushingParameters(tub_point, r_tub, housing_point, r_housing, packed_bushing_law(bushing))
     return placed

@@ -10,11 +10,10 @@ from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.kernel.mechanics import DRUM_RATE
 from wm_drake.kernel.packing import Layout, initial_state, pack_bodies, pack_elements
 from wm_drake.laws.lanes import WIDTH
-from wm_drake.laws.vectors import rotate, rotation_from_rpy
 from wm_drake.machine import Machine, Setup
 from wm_drake.parameters import Load, SpinProfile
 from wm_drake.parameters.elements import FloatArray
-from wm_drake.simulation import AXES, Case
+from wm_drake.simulation import AXES, Case, point_positions
 
 KEPT_BODIES, KEPT_NUMBERS = 64, 2048
 """How many sets of bodies with a load, and of other numbers, are remembered for cases to come."""
@@ -136,9 +135,5 @@ def _points(setup: Setup) -> FloatArray:
     """What is measured of the motion, packed for `measure_samples`: the sensors, then the detergent point along x, y, z."""
     places = [*setup.sensor_points.values(), *[setup.detergent_point] * 3]
     axes = [*(AXES.index(sensor.axis) for sensor in setup.sensors.values()), 0, 1, 2]
-    rotation = rotation_from_rpy(*map(float, setup.rest_pose[:3]))
-    packed = []
-    for place, axis in zip(places, axes, strict=True):
-        at_rest = setup.rest_pose[3 + axis] + rotate(rotation, tuple(map(float, place)))[axis]
-        packed += [*place, *(float(axis == i) for i in range(3)), at_rest]
-    return np.array(packed)
+    at_rest = point_positions(setup.rest_pose[None, :], np.array(places))[0, range(len(axes)), axes]
+    return np.column_stack([places, np.eye(3)[axes], at_rest]).ravel()

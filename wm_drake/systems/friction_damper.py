@@ -1,5 +1,6 @@
 """Friction damper, as a massless strut between a point of the tub and a point of the housing."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -69,7 +70,7 @@ class FrictionDamperParameters:
         line = self.p_ToA_T - self.p_WH
         b = self.end_bushing
         bushing = [b.stiffness, b.damping, b.friction_torque, 0.5 * np.pi / b.full_friction_rate, self.engaged]
-        return np.concatenate([self.p_ToA_T, self.p_WH, line / np.linalg.norm(line), bushing, self.packed_law])
+        return np.concatenate([self.p_ToA_T, self.p_WH, line / math.dist(self.p_ToA_T, self.p_WH), bushing, self.packed_law])
 
 
 @law

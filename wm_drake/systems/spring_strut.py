@@ -1,5 +1,6 @@
 """Suspension spring between a point of the tub and a point of the housing."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,7 +31,7 @@ class SpringStrutParameters:
     @property
     def rest_length(self) -> float:
         """Distance of the hooks when T coincides with W. [m]"""
-        return float(np.linalg.norm(self.p_ToA_T - self.p_WH))
+        return math.dist(self.p_ToA_T, self.p_WH)
 
     @property
     def structure(self) -> list[int]:
