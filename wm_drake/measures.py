@@ -69,9 +69,13 @@ def _band_pass(period: float) -> FloatArray:
 def filtered_displacement(record: Record) -> xr.DataArray:
     """Displacements at the sensors (time, sensor) of a record, as `filtered`. [m]"""
     raw = record.displacement
+    return raw.copy(data=filtered(raw.values, _period(record)))
+
+
+def _period(record: Record) -> float:
+    """Between samples; any number for fewer than two. [s]"""
     time = record.time.values
-    period = float(time[1] - time[0]) if len(time) > 1 else 1.0
-    return raw.copy(data=filtered(raw.values, period))
+    return float(time[1] - time[0]) if len(time) > 1 else 1.0
 
 
 def amplitudes(displacement: FloatArray) -> tuple[FloatArray, np.ndarray]:
@@ -139,7 +143,7 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
         record: From `wm_drake.simulation.simulate`.
         scene: The machine's shapes, for the smallest gap; it is left out if None.
     """
-    size, samples = amplitudes(filtered_displacement(record).values)
+    size, samples = amplitudes(filtered(record.displacement.values, _period(record)))
     speed = record.drum_speed.values[samples] if record.sizes["time"] else size
     by_sensor = {"sensor": record.sensor.values}
     pose = np.column_stack([record.tub_angle.values, record.tub_position.values])

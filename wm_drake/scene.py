@@ -16,6 +16,9 @@ from wm_drake.laws.vectors import rotation_from_rpy
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.elements import FloatArray
 
+_FIRST_LOOK = 16
+"""Every so many poses are looked at first for the smallest gap."""
+
 REPLAY_RATE = 32.0
 """Frames of a replay per simulated second. [Hz]"""
 
@@ -139,12 +142,13 @@ class Scene:
         shift = np.sqrt(x * x + y * y + z * z) + (np.abs(roll) + np.abs(pitch) + np.abs(yaw)) * self._reach
         at_rest = self._at_rest(tuple(map(float, rest_pose)))
         farthest = int(np.argmax(shift))
-        best = self._measured(at_rest[0][2], time[farthest], poses[farthest])[0]  # some gap, so that most poses drop out
-        for distance, direction, pair in at_rest:
-            if distance - shift[farthest] >= best.distance:  # nor can any of the pairs that are farther apart at rest
-                break
-            near = np.flatnonzero(distance - shift < best.distance)  # no gap shrinks by more than the farthest point moves
-            best = self._smallest_of_pair(pair, direction, best, time[near], poses[near])
+        best = self._measured(at_rest[0][2], time[farthest], poses[farthest])[0]
+        for stride in (_FIRST_LOOK, 1):  # a first look at some poses, so that most of the others need none
+            for distance, direction, pair in at_rest:
+                if distance - shift[farthest] >= best.distance:  # nor can any pair that is farther apart at rest
+                    break
+                near = stride * np.flatnonzero(distance - shift[::stride] < best.distance)  # a gap shrinks by no more
+                best = self._smallest_of_pair(pair, direction, best, time[near], poses[near])
         return best
 
     def _measured(self, pair: tuple[GeometryId, GeometryId], time: float, pose: FloatArray) -> tuple[Gap, FloatArray]:
@@ -170,6 +174,8 @@ class Scene:
         poses: FloatArray,
     ) -> Gap:
         """The smallest gap after this pair was looked at; `direction` is a first guess of where it is narrowest."""
+        if not len(time):
+            return best
         rotations = np.stack(generic(rotation_from_rpy)(*poses[:, :3].T), axis=1).reshape(-1, 3, 3)
         moving, fixed = (self._outlines[shape] for shape in pair)
         bound = np.full(len(time), -np.inf)
