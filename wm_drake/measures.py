@@ -151,22 +151,23 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
     return Measures(
         amplitude=xr.DataArray(size, by_sensor),
         critical_speed=xr.DataArray(np.where(np.isnan(size), np.nan, speed), by_sensor),
-        detergent_displacement=_largest(record.detergent_displacement),
+        detergent_displacement=_largest(record.detergent_displacement.values, record.axis.values),
         gasket_force=_largest_of_gasket(record.bushing_force),
         gasket_moment=_largest_of_gasket(record.bushing_moment),
         smallest_gap=gap,
     )
 
 
-def _largest(history: xr.DataArray) -> xr.DataArray:
+def _largest(history: FloatArray, axes: FloatArray) -> xr.DataArray:
     """Largest absolute value over time (time, axis); NaN of no samples."""
     # column by column: numpy is slow along the long side of a narrow table
-    size = [np.max(np.abs(column)) if len(column) else np.nan for column in history.values.T]
-    return xr.DataArray(size, {"axis": history.axis.values})
+    size = [np.max(np.abs(column)) if len(column) else np.nan for column in history.T]
+    return xr.DataArray(size, {"axis": axes})
 
 
 def _largest_of_gasket(history: xr.DataArray) -> xr.DataArray:
     """The same of (time, bushing, axis) for the gasket; zero without one."""
-    if "gasket" not in history.bushing.values:
-        return xr.DataArray(np.zeros(history.sizes["axis"]), {"axis": history.axis.values})
-    return _largest(history.sel(bushing="gasket"))
+    names, axes = list(history.bushing.values), history.axis.values
+    if "gasket" not in names:
+        return xr.DataArray(np.zeros(len(axes)), {"axis": axes})
+    return _largest(history.values[:, names.index("gasket")], axes)
