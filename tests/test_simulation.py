@@ -1,4 +1,4 @@
-"""The run-up of the reference machine in the Drake engine: speed, torque, energy, convergence, symmetries, divergence."""
+"""The run-up of the reference machine in each engine: speed, torque, energy, convergence, symmetries, divergence."""
 
 import numpy as np
 import pytest
@@ -15,9 +15,14 @@ RPM = np.pi / 30.0
 FAST_RUN_UP = SpinProfile(time=(0.0, 8.0, 9.0), speed=(0.0, 280 * RPM, 280 * RPM))
 
 
+@pytest.fixture(scope="module", params=["compiled", "drake"])
+def engine(request):
+    return request.param
+
+
 @pytest.fixture(scope="module")
-def run_up(machine):
-    return simulate(machine, "middle")
+def run_up(machine, engine):
+    return simulate(machine, "middle", engine)
 
 
 def fast(parameters, load, **changes):
@@ -36,9 +41,9 @@ def test_drum_follows_the_profile_within_1e_5_rpm(run_up, reference):
     assert np.max(np.abs(run_up.drum_speed.values - wanted)) / RPM < 1e-5
 
 
-def test_drum_follows_a_profile_with_corners_off_the_grid(machine, reference):
+def test_drum_follows_a_profile_with_corners_off_the_grid(machine, reference, engine):
     profile = SpinProfile(time=(0.0, 0.3333, 1.00017, 1.5), speed=(0.0, 12.0, -5.0, -5.0))
-    record = simulate(machine, Case("middle", reference.loads["middle"], profile))
+    record = simulate(machine, Case("middle", reference.loads["middle"], profile), engine)
     assert np.max(np.abs(record.drum_speed.values - profile.speed_at(record.time.values))) / RPM < 1e-5
 
 
@@ -87,21 +92,25 @@ def peaks(record):
     return np.concatenate([measure(record).amplitude.values, np.abs(record.bushing_force).max("time").values.ravel()])
 
 
-def test_peaks_of_a_fast_run_up_hold_to_half_a_permille_at_a_fifth_of_the_step(machine, reference):
+def test_peaks_of_a_fast_run_up_hold_to_half_a_permille_at_a_fifth_of_the_step(machine, reference, engine):
     case = fast(reference, "middle")
-    np.testing.assert_allclose(peaks(simulate(machine, case)), peaks(simulate(machine, case, step=5e-4)), rtol=5e-4)
+    np.testing.assert_allclose(
+        peaks(simulate(machine, case, engine)), peaks(simulate(machine, case, engine, step=5e-4)), rtol=5e-4
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("load", ["middle", "counter", "back", "front"])
-def test_peaks_of_the_run_up_hold_to_half_a_permille_at_a_tenth_of_the_step(machine, reference, load):
+def test_peaks_of_the_run_up_hold_to_half_a_permille_at_a_tenth_of_the_step(machine, reference, engine, load):
     case = case_of(reference, load)
-    np.testing.assert_allclose(peaks(simulate(machine, case)), peaks(simulate(machine, case, step=2.5e-4)), rtol=5e-4)
+    np.testing.assert_allclose(
+        peaks(simulate(machine, case, engine)), peaks(simulate(machine, case, engine, step=2.5e-4)), rtol=5e-4
+    )
 
 
-def test_error_controlled_integration_agrees(machine, reference):
+def test_error_controlled_integration_agrees(machine, reference, engine):
     case = fast(reference, "middle")
-    record = simulate(machine, case)
+    record = simulate(machine, case, engine)
     setup = machine.set_up(case.load)
     simulator = Simulator(machine.diagram, setup.context)
     integrator = simulator.get_mutable_integrator()  # Drake's default: RK3 with error control
@@ -134,14 +143,14 @@ def redrawn(parameters: MachineParameters, move) -> MachineParameters:
     return MachineParameters.model_validate(tree)
 
 
-def test_mirrored_machine_moves_as_the_mirror_image(machine, reference):
+def test_mirrored_machine_moves_as_the_mirror_image(machine, reference, engine):
     profile = SpinProfile(time=(0.0, 4.0), speed=(0.0, 24.0))
     backwards = SpinProfile(time=(0.0, 4.0), speed=(0.0, -24.0))
     load = Load(unbalances=(Unbalance(mass=0.7, radius=0.25, y=-0.1, phase=0.4),))
     image = Load(unbalances=(Unbalance(mass=0.7, radius=0.25, y=-0.1, phase=-0.4),))
-    record = simulate(machine, Case("one", load, profile))
+    record = simulate(machine, Case("one", load, profile), engine)
     reflected = simulate(
-        build_machine(redrawn(reference, lambda p: p * np.array([-1.0, 1.0, 1.0]))), Case("one", image, backwards)
+        build_machine(redrawn(reference, lambda p: p * np.array([-1.0, 1.0, 1.0]))), Case("one", image, backwards), engine
     )
     np.testing.assert_allclose(reflected.tub_position, record.tub_position * np.array([-1, 1, 1]), atol=1e-9)
     np.testing.assert_allclose(reflected.tub_angle, record.tub_angle * np.array([1, -1, -1]), atol=1e-9)
@@ -162,11 +171,11 @@ def test_phase_shift_of_the_load_is_a_shift_of_the_start_angle(machine):
         setup.context.SetContinuousState(state)
         derivatives.append(machine.diagram.EvalTimeDerivatives(setup.context).CopyToVector())
     np.testing.assert_allclose(derivatives[0], derivatives[1], rtol=1e-9, atol=1e-9)
-    turned = simulate(machine, Case("one", shifted, profile))
+    turned = simulate(machine, Case("one", shifted, profile), "drake")
     assert float(np.abs(turned.displacement).max()) > 1e-4
 
 
-def test_moving_the_world_moves_the_machine_with_it(machine, reference):
+def test_moving_the_world_moves_the_machine_with_it(machine, reference, engine):
     """Galilean: the same machine drawn elsewhere in the tub's own frame gives the same displacements.
 
     Every frame and centre of mass is shifted along y by the same amount, tub and housing alike; so is the load.
@@ -176,27 +185,27 @@ def test_moving_the_world_moves_the_machine_with_it(machine, reference):
     profile = SpinProfile(time=(0.0, 4.0), speed=(0.0, 24.0))
     base = Load(unbalances=(Unbalance(mass=0.7, radius=0.25, y=-0.1),))
     shifted = Load(unbalances=(Unbalance(mass=0.7, radius=0.25, y=-0.1 + shift[1]),))
-    there = simulate(build_machine(moved), Case("one", shifted, profile))
-    here = simulate(machine, Case("one", base, profile))
+    there = simulate(build_machine(moved), Case("one", shifted, profile), engine)
+    here = simulate(machine, Case("one", base, profile), engine)
     np.testing.assert_allclose(there.displacement, here.displacement, atol=1e-8)  # m; rounding, grown at friction's corners
     np.testing.assert_allclose(there.bushing_force, here.bushing_force, atol=1e-4)  # N
     assert float(np.abs(here.displacement).max()) > 1e-3
 
 
-def test_a_run_that_diverges_stops_keeps_its_record_and_says_when_and_why(machine):
+def test_a_run_that_diverges_stops_keeps_its_record_and_says_when_and_why(machine, engine):
     violent = Case("violent", Load(unbalances=(Unbalance(mass=60.0, radius=0.3, y=0.1),)), FAST_RUN_UP)
     with pytest.warns(DivergenceWarning, match=r"diverged at .* s: (roll|pitch|yaw|x|y|z) = "):
-        record = simulate(machine, violent)
+        record = simulate(machine, violent, engine)
     assert "last good state at" in record.attrs["diverged"]
     assert 10 < record.sizes["time"] < 1800
     assert np.isfinite(record.displacement).all()
     assert np.max(np.abs(record.tub_position)) <= 0.5
 
 
-def test_records_are_reproducible_and_survive_the_disk(machine, reference, tmp_path):
+def test_records_are_reproducible_and_survive_the_disk(machine, reference, engine, tmp_path):
     case = Case("middle", reference.loads["middle"], SpinProfile(time=(0.0, 1.0), speed=(0.0, 20.0)), gasket=False)
-    record = simulate(machine, case)
-    assert record.identical(simulate(machine, case))
+    record = simulate(machine, case, engine)
+    assert record.identical(simulate(machine, case, engine))
     save_record(record, tmp_path / "record.nc")
     loaded = load_record(tmp_path / "record.nc")
     assert loaded.equals(record)
@@ -216,9 +225,9 @@ def test_unknown_load_names_the_nearest(machine):
         simulate(machine, "midle")
 
 
-def test_parameters_of_a_case_replace_the_machines(machine, reference):
+def test_parameters_of_a_case_replace_the_machines(machine, reference, engine):
     profile = SpinProfile(time=(0.0, 2.0), speed=(8.0, 20.0))
     softer = with_value(reference, "gasket.stiffness_x", 1000.0)
-    base = simulate(machine, Case("a", reference.loads["middle"], profile))
-    changed = simulate(machine, Case("a", reference.loads["middle"], profile, parameters=softer))
+    base = simulate(machine, Case("a", reference.loads["middle"], profile), engine)
+    changed = simulate(machine, Case("a", reference.loads["middle"], profile, parameters=softer), engine)
     assert not np.allclose(base.displacement, changed.displacement, atol=1e-6)

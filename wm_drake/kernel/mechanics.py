@@ -21,28 +21,20 @@ from wm_drake.laws.compilation import law
 from wm_drake.laws.elementary import anywhere, sine_cosine
 from wm_drake.laws.motion import tub_motion_from_sines
 from wm_drake.laws.vectors import add, cross, dot, rotate, rotate_back, scale, subtract
+from wm_drake.systems.element import PLANT_STATE_SIZE
 from wm_drake.systems.friction_damper import friction_damper_line, friction_damper_tension, friction_damper_wrench
 from wm_drake.systems.six_component_bushing import six_component_bushing_wrench
 from wm_drake.systems.spring_strut import spring_strut_wrench
 
-GRAVITY, INVERSE_MASS, AXIS, ORIGIN, TUB_MOMENT, TUB_INERTIA, DRUM_MOMENT, DRUM_INERTIA, JOINT_DAMPING = (
-    0,
-    3,
-    4,
-    7,
-    10,
-    13,
-    19,
-    28,
-    58,
-)
-BODIES_SIZE = 59
+GRAVITY, INVERSE_MASS, AXIS, ORIGIN = 0, 3, 4, 7
+TUB_MOMENT, TUB_INERTIA, DRUM_MOMENT, DRUM_INERTIA = 10, 13, 19, 28
+JOINT_DAMPING, BODIES_SIZE = 58, 59
 LINE_SIZE = 13
 """Numbers kept of a damper between the rounds of `state_derivative`."""
-STATE_SIZE = 14
-"""As the plant's: roll, pitch, yaw, x, y, z, drum angle, w_WT, v_WTo, drum rate; the dampers' deformations follow."""
-
+STATE_SIZE = PLANT_STATE_SIZE
+"""The plant's state comes first; the dampers' deformations follow."""
 DRUM_RATE = 13
+"""Where the state has it."""
 
 MassProperties = namedtuple("MassProperties", ("drum_moment", "drum_inertia", "moment", "inverse_inertia"))
 """At one drum angle: s_d, J_d, S, and the inverse of the inertia about the common centre of mass."""

@@ -25,7 +25,7 @@ from wm_drake.parameters.elements import (
     HavsinDamper,
     StvDamper,
 )
-from wm_drake.systems.element import GENERALIZED_FORCE_SIZE, SCALARS, ForceElement
+from wm_drake.systems.element import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE, SCALARS, ForceElement
 
 
 def packed_damper_law(damper: DamperType) -> FloatArray:
@@ -126,7 +126,7 @@ def evaluate_friction_damper(x, state, p, generalized_force, force, rate):
 def friction_damper_history(states, own_states, p, forces):
     """Own force at each row of a sampled motion: `evaluate_friction_damper` without Drake, for records."""
     align_stack()
-    x_numbers, own_numbers, force_numbers = np.empty(14 * WIDTH), np.empty(WIDTH), np.empty(WIDTH)
+    x_numbers, own_numbers, force_numbers = np.empty(PLANT_STATE_SIZE * WIDTH), np.empty(WIDTH), np.empty(WIDTH)
     x, own, own_force = lane_array(x_numbers), lane_array(own_numbers), lane_array(force_numbers)
     p_numbers = in_each_lane(p)
     q = lane_array(p_numbers)

@@ -17,7 +17,7 @@ from wm_drake.laws.table import packed_size
 from wm_drake.laws.vectors import add, compose, cross, rotate, rotate_back, rotation_vector, scale, subtract
 from wm_drake.laws.vectors import transpose as transposed
 from wm_drake.parameters.elements import Bushing, FloatArray, packed_stiffness
-from wm_drake.systems.element import SCALARS, ForceElement
+from wm_drake.systems.element import PLANT_STATE_SIZE, SCALARS, ForceElement
 
 AXES = ("x", "y", "z")
 
@@ -102,7 +102,7 @@ def evaluate_six_component_bushing(x, state, p, generalized_force, force, rate):
 def six_component_bushing_history(states, own_states, p, forces):
     """Own force at each row of a sampled motion: `evaluate_six_component_bushing` without Drake, for records."""
     align_stack()
-    x_numbers, force_numbers, p_numbers = np.empty(14 * WIDTH), np.empty(6 * WIDTH), in_each_lane(p)
+    x_numbers, force_numbers, p_numbers = np.empty(PLANT_STATE_SIZE * WIDTH), np.empty(6 * WIDTH), in_each_lane(p)
     x, own_force, q = lane_array(x_numbers), lane_array(force_numbers), lane_array(p_numbers)
     for begin in range(0, len(states), WIDTH):
         rows_to_lanes(states, begin, x_numbers)

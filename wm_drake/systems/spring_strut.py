@@ -16,7 +16,7 @@ from wm_drake.laws.spring import spring_tension
 from wm_drake.laws.strut import strut_line, wrench_at_origin
 from wm_drake.laws.vectors import rotate, scale
 from wm_drake.parameters.elements import FloatArray
-from wm_drake.systems.element import SCALARS, ForceElement
+from wm_drake.systems.element import PLANT_STATE_SIZE, SCALARS, ForceElement
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def evaluate_spring_strut(x, state, p, generalized_force, force, rate):
 def spring_strut_history(states, own_states, p, forces):
     """Own force at each row of a sampled motion: `evaluate_spring_strut` without Drake, for records."""
     align_stack()
-    x_numbers, force_numbers, p_numbers = np.empty(14 * WIDTH), np.empty(WIDTH), in_each_lane(p)
+    x_numbers, force_numbers, p_numbers = np.empty(PLANT_STATE_SIZE * WIDTH), np.empty(WIDTH), in_each_lane(p)
     x, own_force, q = lane_array(x_numbers), lane_array(force_numbers), lane_array(p_numbers)
     for begin in range(0, len(states), WIDTH):
         rows_to_lanes(states, begin, x_numbers)
