@@ -121,7 +121,7 @@ def page(result: SpinResult) -> str:
 @pytest.fixture
 def without_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests of words and tables: the figures are made, but not drawn, which is what takes long."""
-    monkeypatch.setattr("wm_drake.report.spin_report.inline_svg_or_png", lambda figure: "data:image/png;base64,")
+    monkeypatch.setattr("wm_drake.report.page.inline_svg_or_png", lambda figure: "data:image/png;base64,")
 
 
 class Tags(HTMLParser):

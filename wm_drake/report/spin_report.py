@@ -5,26 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from matplotlib.figure import Figure
 
 from wm_drake.report import tables
-from wm_drake.report.figures import envelopes_figure, gaps_figure, gasket_figure, inline_svg_or_png, orbits_figure
+from wm_drake.report.figures import envelopes_figure, gaps_figure, gasket_figure, orbits_figure
+from wm_drake.report.page import Picture, picture, render, versions_of
 from wm_drake.report.tables import Table, amplitude_table
 from wm_drake.report.wording import MM_PER_M, RPM_PER_RAD_S, case_title, has_gasket, number, percent, shape_name, speed_rpm
 from wm_drake.scene import Gap
 from wm_drake.studies.spin import CaseResult, SpinResult
 
 __all__ = ["amplitude_table", "spin_report"]
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A figure on the page: data URI, what is said to those who do not see it, caption."""
-
-    source: str
-    alternative: str
-    caption: str
 
 
 @dataclass(frozen=True)
@@ -49,15 +39,10 @@ def spin_report(result: SpinResult, command: str = "") -> str:
         InputError: a file of measured amplitudes cannot be used.
     """
     table = amplitude_table(result)
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("spin.html").render(
-        parameters=result.parameters,
+    return render(
+        "spin.html",
+        title=f"Spin run of machine {result.parameters.name}",
+        about=result.parameters.about,
         summary=summary(result, table),
         warnings=warnings_of(result),
         comparison=tables.comparison(result, table),
@@ -158,15 +143,13 @@ def warnings_of(result: SpinResult) -> list[str]:
 def facts_of_run(result: SpinResult, command: str) -> list[tuple[str, str]]:
     """What was run and by what, as pairs of word and text."""
     attrs = result.results[0].record.attrs
-    prefix = "version_"
-    versions = [f"{name.removeprefix(prefix)} {text}" for name, text in attrs.items() if name.startswith(prefix)]
     times = [f"{case_title(case)} {number(case.wall_s)} s" for case in result.results]
     facts = [
         ("Machine", result.parameters.name),
         ("About", result.parameters.about),
         ("SDF model", Path(result.parameters.model).name),
         ("Engine", f"{result.engine}, step {1e3 * result.step:g} ms"),
-        ("Versions", ", ".join(versions)),
+        ("Versions", versions_of(attrs)),
         ("Computing time", "; ".join(times)),
         ("Command", command),
     ]
@@ -197,7 +180,7 @@ def _envelopes_picture(case: CaseResult, table: pd.DataFrame) -> Picture | None:
     if measured is not None:
         caption += " Dashed: measured amplitude, on both sides of zero."
     alternative = f"Envelopes of the displacement over time, load {case_title(case)}. Largest: {largest}."
-    return _picture(envelopes_figure(case.record, measured), alternative, caption)
+    return picture(envelopes_figure(case.record, measured), alternative, caption)
 
 
 def _orbits_picture(case: CaseResult) -> Picture | None:
@@ -209,7 +192,7 @@ def _orbits_picture(case: CaseResult) -> Picture | None:
         "Strong line: the drum revolution in which the axis is farthest from rest; pale line: those before and after it."
     )
     alternative = f"Orbits of the drum axis, front and rear, around the largest motion, load {case_title(case)}."
-    return _picture(orbits_figure(case.record, float(depths.min()), float(depths.max())), alternative, caption)
+    return picture(orbits_figure(case.record, float(depths.min()), float(depths.max())), alternative, caption)
 
 
 def _gasket_picture(case: CaseResult) -> Picture | None:
@@ -224,7 +207,7 @@ def _gasket_picture(case: CaseResult) -> Picture | None:
         f"Gasket force and moment over time, load {case_title(case)}. Largest force {number(float(force.max()))} N, largest "
         f"moment {number(float(moment.max()), 2)} N m."
     )
-    return _picture(gasket_figure(case.record), alternative, caption)
+    return picture(gasket_figure(case.record), alternative, caption)
 
 
 def _gaps_picture(result: SpinResult) -> Picture | None:
@@ -232,10 +215,6 @@ def _gaps_picture(result: SpinResult) -> Picture | None:
     if len(cases) < 2:
         return None
     caption = "Smallest gap of each load, the two parts between which it occurs, and the drum speed at that moment."
-    return _picture(
+    return picture(
         gaps_figure(cases), "Smallest gap between tub and housing per load; the numbers are in the table above.", caption
     )
-
-
-def _picture(figure: Figure, alternative: str, caption: str) -> Picture:
-    return Picture(inline_svg_or_png(figure), alternative, caption)

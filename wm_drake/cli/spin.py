@@ -1,17 +1,16 @@
-"""The command `wm-drake`. No physics and no statistics here: it reads, calls a study, and writes what comes back."""
+"""`wm-drake spin`: run the drum up, and report how the tub moves."""
 
 import json
 import logging
 import shlex
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wm_drake.errors import InputError, Problem, WmDrakeError, input_error, nearest_names
+from wm_drake.cli.common import JsonOption, MachineOption, SetOption, cases_of, check_buildable, load_parameters
+from wm_drake.errors import input_error, nearest_names
 from wm_drake.outputs import result_folder
 
 if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
@@ -19,59 +18,9 @@ if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
     from wm_drake.simulation import Case
     from wm_drake.studies.spin import CaseResult, SpinResult
 
-app = typer.Typer(
-    help="Dynamics of front-loading washing machines.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    add_completion=False,
-)
-machine_app = typer.Typer(help="Look at machine files.", no_args_is_help=True)
-app.add_typer(machine_app, name="machine")
-
 DEFAULT_OUT = Path("wm-drake-spin")
 
-MachineOption = Annotated[str, typer.Option("--machine", help="Shipped machine or machine file.", metavar="NAME|FILE")]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option("--set", help="Change a number: gasket.stiffness_x='5 N/mm'. Repeatable.", metavar="KEY=VALUE"),
-]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output and nothing else there.")]
 
-
-def main() -> None:
-    """Runs the command; the user's mistakes end it with their message and exit code 2."""
-    try:
-        app()
-    except WmDrakeError as error:
-        typer.echo(str(error), err=True)
-        sys.exit(2)
-
-
-@machine_app.command("check")
-def machine_check(file: Annotated[str, typer.Argument(metavar="NAME|FILE")]) -> None:
-    """Check a machine file: exit 0, or 2 with one line per problem."""
-    parameters = _load(file, None)
-    _check_buildable(file, parameters)
-    typer.echo(f"{file}: machine '{parameters.name}' is in order")
-
-
-@machine_app.command("show")
-def machine_show(
-    file: Annotated[str, typer.Argument(metavar="[NAME|FILE]")] = "reference",
-    as_json: JsonOption = False,
-    sets: SetOption = None,
-) -> None:
-    """Show a machine resolved in SI: bodies, elements, preloads, equilibrium, natural frequencies."""
-    from wm_drake.machine import build_machine
-    from wm_drake.studies.description import as_text, describe
-
-    parameters = _load(file, sets)
-    with _located(file):
-        description = describe(build_machine(parameters))
-    typer.echo(json.dumps(description, indent=1) if as_json else as_text(description))
-
-
-@app.command()
 def spin(
     machine: MachineOption = "reference",
     load: Annotated[
@@ -94,9 +43,9 @@ def spin(
     engine = engine or DEFAULT_ENGINE
     if engine not in ENGINES:
         raise input_error(f"no engine '{engine}'{nearest_names(engine, ENGINES)}", where="--engine")
-    parameters = _load(machine, sets)
-    cases = _cases(parameters, load, not no_gasket, profile)
-    _check_buildable(machine, parameters)
+    parameters = load_parameters(machine, sets)
+    cases = cases_of(parameters, load, not no_gasket, profile)
+    check_buildable(machine, parameters)
     try:
         with result_folder(out) as folder:
             result = _run(parameters, cases, engine)
@@ -113,70 +62,6 @@ def spin(
         typer.echo(message, err=True)
     if diverged:
         raise typer.Exit(1)
-
-
-@contextmanager
-def _located(file: str) -> Iterator[None]:
-    """Adds file and line to problems that show only once the machine is built."""
-    from wm_drake.parameters import located, machine_path
-
-    try:
-        yield
-    except InputError as error:
-        raise located(error, machine_path(file)) from None
-
-
-def _load(file: str, sets: list[str] | None) -> "MachineParameters":
-    from wm_drake.parameters import load_machine, with_value
-
-    parameters = load_machine(file)
-    for entry in sets or []:
-        key, separator, value = entry.partition("=")
-        if not separator:
-            raise input_error(f"'{entry}' is not KEY=VALUE", where="--set")
-        try:
-            changed = with_value(parameters, key.strip(), value.strip())
-        except InputError as error:
-            raise InputError(Problem("--set", p.key, p.message) for p in error.problems) from None
-        parameters = changed.model_copy(update={"sources": {**changed.sources, key.strip(): "set on the command line"}})
-    return parameters
-
-
-def _cases(parameters: "MachineParameters", loads: list[str] | None, gasket: bool, profile: Path | None) -> "list[Case]":
-    from wm_drake.parameters import load_load, load_profile
-    from wm_drake.simulation import Case
-
-    spin_profile = parameters.profile if profile is None else load_profile(_existing(profile, "--profile"))
-    cases = []
-    for name in loads or list(parameters.loads):
-        if name in parameters.loads:
-            cases.append(Case(name, parameters.loads[name], spin_profile, gasket))
-        elif Path(name).is_file():
-            cases.append(Case(Path(name).stem, load_load(Path(name)), spin_profile, gasket))
-        else:
-            hint = nearest_names(name, parameters.loads)
-            raise input_error(f"'{name}' is neither a load of machine '{parameters.name}' nor a file{hint}", where="--load")
-    names = [case.name for case in cases]
-    for name in names:
-        if names.count(name) > 1:
-            raise input_error(f"'{name}' is asked for twice; record_{name}.nc can hold one", where="--load")
-    return cases
-
-
-def _existing(path: Path, option: str) -> Path:
-    if not path.is_file():
-        raise input_error(f"no such file '{path}'", where=option)
-    return path
-
-
-def _check_buildable(file: str, parameters: "MachineParameters") -> None:
-    """Finds the faults that show only in the built machine."""
-    from wm_drake.machine import build_machine
-    from wm_drake.parameters import measured_amplitudes
-
-    with _located(file):
-        measured_amplitudes(parameters)
-        build_machine(parameters).set_up()
 
 
 def _run(parameters: "MachineParameters", cases: "list[Case]", engine: str) -> "SpinResult":

@@ -1,0 +1,34 @@
+"""`wm-drake machine`: look at machine files."""
+
+import json
+from typing import Annotated
+
+import typer
+
+from wm_drake.cli.common import JsonOption, SetOption, check_buildable, load_parameters, located_in
+
+app = typer.Typer(help="Look at machine files.", no_args_is_help=True)
+
+
+@app.command("check")
+def machine_check(file: Annotated[str, typer.Argument(metavar="NAME|FILE")]) -> None:
+    """Check a machine file: exit 0, or 2 with one line per problem."""
+    parameters = load_parameters(file, None)
+    check_buildable(file, parameters)
+    typer.echo(f"{file}: machine '{parameters.name}' is in order")
+
+
+@app.command("show")
+def machine_show(
+    file: Annotated[str, typer.Argument(metavar="[NAME|FILE]")] = "reference",
+    as_json: JsonOption = False,
+    sets: SetOption = None,
+) -> None:
+    """Show a machine resolved in SI: bodies, elements, preloads, equilibrium, natural frequencies."""
+    from wm_drake.machine import build_machine
+    from wm_drake.studies.description import as_text, describe
+
+    parameters = load_parameters(file, sets)
+    with located_in(file):
+        description = describe(build_machine(parameters))
+    typer.echo(json.dumps(description, indent=1) if as_json else as_text(description))
