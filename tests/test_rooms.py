@@ -11,6 +11,7 @@ import wm_drake
 PACKAGE = Path(wm_drake.__file__).parent
 ORDER = (
     {"errors"},
+    {"ledger"},
     {"laws"},
     {"parameters"},
     {"systems"},
@@ -28,7 +29,7 @@ ORDER = (
     {"cli"},
 )
 LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}
-WITHOUT_DRAKE = {"errors", "parameters", "outputs", "cli"}  # laws do without much more
+WITHOUT_DRAKE = {"errors", "ledger", "parameters", "outputs", "cli"}  # laws do without much more
 
 
 def imported(name, source, is_package=False):

@@ -1,6 +1,7 @@
 """Many runs of one machine: cases -> jobs -> ended runs -> a table."""
 
 from wm_drake.batch.many import SimulationInterrupted, simulate_many
+from wm_drake.batch.remembered import run_keys, simulate_remembered, sources_version
 from wm_drake.batch.runs import MEASURES, Ended
 
-__all__ = ["MEASURES", "Ended", "SimulationInterrupted", "simulate_many"]
+__all__ = ["MEASURES", "Ended", "SimulationInterrupted", "run_keys", "simulate_many", "simulate_remembered", "sources_version"]

@@ -11,6 +11,7 @@ from wm_drake.batch.jobs import Preparation
 from wm_drake.batch.runs import MEASURES, Ended, Runner
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.machine import Machine
+from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.simulation import AXES, DEFAULT_STEP, Case, check_step
 
@@ -85,17 +86,20 @@ def simulate_many(
         runner = Runner(machine.parameters, step, wanted, histories)
         _run_all(Preparation(machine), runner, cases, workers or os.cpu_count() or 1, collect)
     except KeyboardInterrupt:
-        raise SimulationInterrupted(_table(machine, wanted, results)) from None
-    return _table(machine, wanted, results)
+        raise SimulationInterrupted(as_table(machine.parameters, wanted, results)) from None
+    return as_table(machine.parameters, wanted, results)
 
 
-def _table(machine: Machine, measures: tuple[str, ...], results: dict[int, tuple[str, str, list[FloatArray]]]) -> xr.Dataset:
+def as_table(
+    parameters: MachineParameters, measures: tuple[str, ...], results: dict[int, tuple[str, str, list[FloatArray]]]
+) -> xr.Dataset:
+    """The table of runs by number: name of the case, when and why it diverged, its measures in the order of `MEASURES`."""
     numbers = sorted(results)
     labels = {
         "run": numbers,
         "case": ("run", [results[number][0] for number in numbers]),
         "axis": list(AXES),
-        "sensor": list(machine.parameters.sensors),
+        "sensor": list(parameters.sensors),
     }
     variables = {}
     for index, name in enumerate(name for measure in measures for name in MEASURES[measure]):
