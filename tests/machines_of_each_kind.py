@@ -17,6 +17,13 @@ DAMPERS = {
         "sponge_damping": 90.0,
         "slider_damping": 400.0,
     },
+    "stv_sponge": {
+        "friction_force": 60.0,
+        "transition_velocity": 0.1,
+        "sponge_stiffness": 176e3,
+        "sponge_damping": 90.0,
+        "slider_damping": 400.0,
+    },
     "free_stroke": {
         "friction_force": 35.0,
         "friction_damping": 60.0,

@@ -15,7 +15,7 @@ ORDER = (
     {"laws"},
     {"parameters"},
     {"systems"},
-    {"bodies"},
+    {"bodies", "rigs"},
     {"machine"},
     {"trajectory"},
     {"kernel"},

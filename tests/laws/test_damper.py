@@ -14,12 +14,14 @@ from wm_drake.laws.damper import (
     HAVSIN,
     MSTV,
     STV,
+    STV_SPONGE,
     damper_response,
     free_stroke_damper,
     mstv_damper,
     slider_rate,
+    stv_sponge_damper,
 )
-from wm_drake.laws.friction import mstv_friction
+from wm_drake.laws.friction import mstv_friction, stv_friction
 from wm_drake.laws.table import stiffness_force
 from wm_drake.parameters.elements import ForceTable
 
@@ -145,6 +147,7 @@ PACKED = {
     STV: [60.0, 0.05, 25.0],  # f_max N, v_st m/s, damping N s/m
     HAVSIN: [P_B, V_B, 25.0],  # p N, v_t m/s, damping N s/m
     MSTV: [60.0, 30.0, EPSILON, K1, C1, C2],
+    STV_SPONGE: [60.0, 0.01, K1, C1, C2],  # f_max N, v_st m/s, k1 N/m, c1, c2 N s/m
     FREE_STROKE: [F_MAX, C_M, EPSILON, P_B, V_B, *SPONGE],
 }
 
@@ -159,6 +162,9 @@ def direct_response(law_number, v, deformation):
         return 25.0 * v + P_B * np.sin(0.5 * np.pi * np.clip(v / V_B, -1.0, 1.0)), 0.0
     if law_number == MSTV:
         w = brentq(lambda w: C2 * w - mstv_friction(w, v - w, 60.0, 30.0, EPSILON) - K1 * deformation - C1 * (v - w), -9.0, 9.0)
+        return K1 * deformation + C1 * (v - w), v - w
+    if law_number == STV_SPONGE:
+        w = brentq(lambda w: C2 * w - stv_friction(w, 0.01, 60.0) - K1 * deformation - C1 * (v - w), -9.0, 9.0, xtol=1e-15)
         return K1 * deformation + C1 * (v - w), v - w
     f_d = stiffness_force(deformation, SPONGE, 0)
     w = brentq(lambda w: -mstv_friction(w, v - w, F_MAX, C_M, EPSILON) - f_d, -9.0, 9.0)
@@ -180,6 +186,21 @@ def test_the_mstv_damper_never_gives_back_more_than_its_sponge_stores(rate, defo
     tension, deformation_rate = mstv_damper(rate, deformation, f_max, c_m, EPSILON, K1, c1, c2)
     stored = K1 * deformation * deformation_rate  # W: rate of k1 delta^2/2
     assert tension * rate - stored >= -1e-10 * (abs(tension * rate) + abs(stored))
+
+
+@given(rate=velocities, deformation=st.floats(-2e-3, 2e-3), f_max=full_forces, v_st=velocities, c1=dampings, c2=dampings)
+def test_the_damper_with_stv_sponge_never_gives_back_more_than_its_sponge_stores(rate, deformation, f_max, v_st, c1, c2):
+    assume(c1 + c2 > 0.0)
+    tension, deformation_rate = stv_sponge_damper(rate, deformation, f_max, abs(v_st), K1, c1, c2)
+    stored = K1 * deformation * deformation_rate  # W
+    assert tension * rate - stored >= -1e-10 * (abs(tension * rate) + abs(stored))
+
+
+def test_under_coulomb_friction_the_slider_holds_up_to_full_friction_and_then_slips():
+    for deformation, w in ((59.9 / K1, 0.0), (-60.0 / K1, 0.0), (70.0 / K1, 10.0 / 490.0), (-109.0 / K1, -0.1)):  # m, m/s
+        tension, deformation_rate = stv_sponge_damper(0.0, deformation, 60.0, 0.0, K1, C1, C2)
+        assert -deformation_rate == pytest.approx(w, abs=1e-12)
+        assert tension == pytest.approx(K1 * deformation - C1 * w)
 
 
 @given(rate=velocities, deformation=st.floats(-0.03, 0.03))

@@ -27,6 +27,7 @@ DAMPERS = {
     "stv": "{law: stv, friction_force: 20 N, transition_velocity: 2 mm/s}",
     "havsin": "{law: havsin, friction_force: 20 N, full_friction_velocity: 2 mm/s, end_bushing: {stiffness: 750 N mm/rad}}",
     "mstv": "{law: mstv, friction_force: 20 N, sponge_stiffness: 176 N/mm, sponge_damping: 0.09 N s/mm, slider_damping: 0.4 N s/mm}",
+    "stv_sponge": "{law: stv_sponge, friction_force: 20 N, sponge_stiffness: 176 N/mm, sponge_damping: 0.09 N s/mm}",
     "free_stroke": """{law: free_stroke, friction_force: 80 N, friction_damping: 0.1 N s/mm, basic_friction_force: 5 N,
         basic_full_friction_velocity: 2 mm/s, sponge: {displacement: '(-9, -5, 5, 9) mm', force: '(-200, 0, 0, 200) N'}}""",
 }

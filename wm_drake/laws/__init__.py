@@ -8,7 +8,8 @@ Equation -> function -> test (below tests/laws):
     [A] (7), (8)   bushing and gasket, six forces   bushing.bushing_force                test_bushing
     [B] sec. 3     Hooke joints of the dampers      strut.bending_moment                 test_strut
     [B] Fig. 4, 6  gasket, tabulated stiffness      bushing.bushing_force, table         test_bushing, test_table
-    [C] (2), (3)   damper with massless sponge      damper.mstv_damper, slider_rate      test_damper, test_mstv_rig_limit
+    [C] (2), (3)   damper with massless sponge      damper.mstv_damper, slider_rate      test_damper
+    [C] (3), (6)   the same with STV, Coulomb       damper.stv_sponge_damper            test_damper
     [C] (4)        Coulomb friction, corrected      friction.coulomb_friction            test_friction
     [C] (6)        STV friction                     friction.stv_friction                test_friction
     [C] (7)        MSTV friction, corrected         friction.mstv_friction               test_friction

@@ -12,6 +12,7 @@ Packed parameters, by law:
     HAVSIN       p, v_t, damping
     MSTV         f_max, c_m, epsilon, k1, c1, c2
     FREE_STROKE  f_max, c_m, epsilon, p_b, v_b, then the packed sponge curve
+    STV_SPONGE   f_max, v_st, k1, c1, c2
 """
 
 from wm_drake.laws.compilation import law
@@ -24,6 +25,7 @@ STV = 1
 HAVSIN = 2
 MSTV = 3
 FREE_STROKE = 4
+STV_SPONGE = 5
 
 
 @law
@@ -104,6 +106,34 @@ def mstv_damper(rate, deformation, f_max, c_m, epsilon, k1, c1, c2):
 
 
 @law
+def stv_sponge_damper(rate, deformation, f_max, v_st, k1, c1, c2):
+    """Friction damper with a massless sponge under STV friction; under Coulomb friction if v_st = 0.
+
+        s = k1 delta + c1 (v - w),   s = c2 w - f_stv(w)      [C] Eq. (2), (3), (4), (6) with M = m = 0
+
+    Own derivation: with b = k1 delta + c1 v and c = c1 + c2 the balance c w + f_max clip(w / v_st, -1, 1) = b has the one
+    solution w = b v_st / (f_max + c v_st) for |b| <= f_max + c v_st, else sgn(b) (|b| - f_max) / c.
+
+    Args:
+        rate: Rate of elongation v. [m/s]
+        deformation: Deformation of the sponge delta. [m]
+        f_max, v_st: STV friction; v_st >= 0. [N, m/s]
+        k1, c1: Stiffness and damping of the sponge. [N/m, N s/m]
+        c2: Air resistance of the slider; c1 + c2 > 0. [N s/m]
+
+    Returns:
+        Tension s [N] and the rate of deformation v - w [m/s].
+    """
+    b = k1 * deformation + c1 * rate
+    c = c1 + c2
+    size, full = abs(b), f_max + c * v_st
+    sticks = size <= full
+    creep = size * v_st / where(full > 0.0, full, 1.0)
+    w = where(b >= 0.0, 1.0, -1.0) * where(sticks, creep, (size - f_max) / c)
+    return k1 * deformation + c1 * (rate - w), rate - w
+
+
+@law
 def free_stroke_damper(rate, deformation, f_max, c_m, epsilon, p_b, v_b, packed, at):
     """Free-stroke damper with a massless sponge.
 
@@ -133,6 +163,8 @@ def damper_response(law_number, rate, deformation, p, at):
         return mstv_damper(rate, deformation, p[at], p[at + 1], p[at + 2], p[at + 3], p[at + 4], p[at + 5])
     if law_number == FREE_STROKE:
         return free_stroke_damper(rate, deformation, p[at], p[at + 1], p[at + 2], p[at + 3], p[at + 4], p, at + 5)
+    if law_number == STV_SPONGE:
+        return stv_sponge_damper(rate, deformation, p[at], p[at + 1], p[at + 2], p[at + 3], p[at + 4])
     if law_number == HAVSIN:
         return p[at + 2] * rate - havsin_friction(rate, p[at + 1], p[at]), 0.0 * rate
     if law_number == STV:

@@ -13,6 +13,7 @@ from wm_drake.parameters.elements import (
     Spring,
     SpringType,
     StvDamper,
+    StvSpongeDamper,
     TorqueTable,
     packed_stiffness,
 )
@@ -60,6 +61,7 @@ __all__ = [
     "Spring",
     "SpringType",
     "StvDamper",
+    "StvSpongeDamper",
     "TorqueTable",
     "Unbalance",
     "load_load",

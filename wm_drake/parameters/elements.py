@@ -162,6 +162,23 @@ class MstvDamper(_DamperType):
         return self
 
 
+class StvSpongeDamper(_DamperType):
+    """Massless sponge with STV friction [C] Eq. (2), (3), (6); at a transition velocity of 0 with Coulomb's Eq. (4)."""
+
+    law: Literal["stv_sponge"]
+    friction_force: _NonNegativeForce
+    transition_velocity: Annotated[u.Velocity, Field(ge=0.0)] = 0.0
+    sponge_stiffness: Annotated[u.LinearStiffness, Field(ge=0.0)]
+    sponge_damping: _NonNegativeDamping
+    slider_damping: _NonNegativeDamping = 0.0
+
+    @model_validator(mode="after")
+    def _slider_rate_is_finite(self) -> "StvSpongeDamper":
+        if self.sponge_damping + self.slider_damping <= 0.0:
+            raise ValueError("sponge_damping and slider_damping are both zero: a massless slider needs one")
+        return self
+
+
 class FreeStrokeDamper(_DamperType):
     """Free-stroke damper [A] Eq. (2)-(6) with a massless sponge; the curve is zero inside the free stroke."""
 
@@ -175,7 +192,7 @@ class FreeStrokeDamper(_DamperType):
 
 
 DamperType: TypeAlias = Annotated[
-    CoulombDamper | StvDamper | HavsinDamper | MstvDamper | FreeStrokeDamper, Field(discriminator="law")
+    CoulombDamper | StvDamper | HavsinDamper | MstvDamper | StvSpongeDamper | FreeStrokeDamper, Field(discriminator="law")
 ]
 
 

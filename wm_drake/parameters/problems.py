@@ -18,7 +18,7 @@ def problems_of(error: ValidationError, root: type[BaseModel], key: str = "") ->
     return problems
 
 
-_TAGS = ("[key]", "number", "table", "coulomb", "stv", "havsin", "mstv", "free_stroke")
+_TAGS = ("[key]", "number", "table", "coulomb", "stv", "havsin", "mstv", "stv_sponge", "free_stroke")
 
 
 def _message(detail: Any, root: type[BaseModel]) -> str:

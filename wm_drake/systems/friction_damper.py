@@ -10,7 +10,7 @@ from pydrake.systems.primitives import Demultiplexer, Integrator
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.laws.compilation import law
-from wm_drake.laws.damper import COULOMB, FREE_STROKE, HAVSIN, MSTV, STV, damper_response
+from wm_drake.laws.damper import COULOMB, FREE_STROKE, HAVSIN, MSTV, STV, STV_SPONGE, damper_response
 from wm_drake.laws.elementary import in_each_lane, lanes_to_rows, numbers, rows_to_lanes
 from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
 from wm_drake.laws.motion import tub_motion
@@ -24,6 +24,7 @@ from wm_drake.parameters.elements import (
     FreeStrokeDamper,
     HavsinDamper,
     StvDamper,
+    StvSpongeDamper,
 )
 from wm_drake.systems.element import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE, SCALARS, ForceElement
 
@@ -37,11 +38,19 @@ def packed_damper_law(damper: DamperType) -> FloatArray:
             return np.array([STV, damper.friction_force, damper.transition_velocity, damper.damping])
         case HavsinDamper():
             return np.array([HAVSIN, damper.friction_force, damper.full_friction_velocity, damper.damping])
+    if isinstance(damper, StvSpongeDamper):
+        sponge = [damper.sponge_stiffness, damper.sponge_damping, damper.slider_damping]
+        return np.array([STV_SPONGE, damper.friction_force, damper.transition_velocity, *sponge])
     friction = [damper.friction_force, damper.friction_damping, damper.regularisation_velocity]
     if isinstance(damper, FreeStrokeDamper):
         basic = [damper.basic_friction_force, damper.basic_full_friction_velocity]
         return np.concatenate([[FREE_STROKE], friction, basic, damper.sponge.packed()])
     return np.array([MSTV, *friction, damper.sponge_stiffness, damper.sponge_damping, damper.slider_damping])
+
+
+def has_sponge(packed_law: FloatArray) -> bool:
+    """Whether a packed law has a state."""
+    return int(packed_law[0]) in (MSTV, FREE_STROKE, STV_SPONGE)
 
 
 @dataclass(frozen=True)
@@ -57,7 +66,7 @@ class FrictionDamperParameters:
     @property
     def has_sponge(self) -> bool:
         """Whether the law has a state."""
-        return int(self.packed_law[0]) in (MSTV, FREE_STROKE)
+        return has_sponge(self.packed_law)
 
     @property
     def structure(self) -> list[int]:

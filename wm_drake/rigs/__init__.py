@@ -1,0 +1,26 @@
+"""Component rigs: one law on a bench, harmonic motion, steady force loops.
+
+from wm_drake.rigs import Harmonic, damper_bench, force_loop, measures_of
+loop = force_loop(damper_bench(machine.damper_types["friction"]), Harmonic(frequency=3.0, amplitude=0.005))
+measures_of(loop).energy_per_cycle
+"""
+
+from wm_drake.rigs.bench import AXES, Bench, BushingBench, DamperBench, Harmonic, bushing_bench, damper_bench
+from wm_drake.rigs.integration import NotSteadyError
+from wm_drake.rigs.loops import ForceLoop, LoopMeasures, force_loop, force_loops, measures_of
+
+__all__ = [
+    "AXES",
+    "Bench",
+    "BushingBench",
+    "DamperBench",
+    "ForceLoop",
+    "Harmonic",
+    "LoopMeasures",
+    "NotSteadyError",
+    "bushing_bench",
+    "damper_bench",
+    "force_loop",
+    "force_loops",
+    "measures_of",
+]

@@ -1,0 +1,133 @@
+"""Steady force loops of components on the bench, and what is read off them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wm_drake.errors import input_error
+from wm_drake.parameters.elements import FloatArray
+from wm_drake.rigs.bench import Bench, BushingBench, DamperBench, Harmonic
+from wm_drake.rigs.forces import bushing_loads, damper_tensions
+from wm_drake.rigs.integration import PHASE, steady_states
+
+
+@dataclass(frozen=True, eq=False)
+class ForceLoop:
+    """One steady period of a component on the bench, equally spaced, without the point that closes it.
+
+    Attributes:
+        motion: What it was given.
+        rotates: Whether motion and force are angle and moment.
+        time: From the passage through the middle, upwards (n,). [s]
+        displacement, velocity: Of the driven end (n,). [m, m/s; rad, rad/s]
+        force: On the component at the driven end, > 0 in the direction of the displacement (n,). [N; N m]
+    """
+
+    motion: Harmonic
+    rotates: bool
+    time: FloatArray
+    displacement: FloatArray
+    velocity: FloatArray
+    force: FloatArray
+
+
+@dataclass(frozen=True)
+class LoopMeasures:
+    """What is read off a loop; moments and angles in place of forces and displacements where the component is turned.
+
+    Attributes:
+        peak_force: Largest absolute force. [N; N m]
+        energy_per_cycle: Work done on the component in a period, the area of the loop. [J]
+        equivalent_damping: Of the dashpot that takes the same energy, E / (pi 2 pi f A^2). [N s/m; N m s/rad]
+        dynamic_stiffness: Amplitude of the fundamental of the force by that of the displacement. [N/m; N m/rad]
+        loss_angle: By which the fundamental of the force leads that of the displacement. [rad]
+    """
+
+    peak_force: float
+    energy_per_cycle: float
+    equivalent_damping: float
+    dynamic_stiffness: float
+    loss_angle: float
+
+
+def force_loop(bench: Bench, motion: Harmonic) -> ForceLoop:
+    """The steady loop of a component under harmonic motion, after its transient has decayed.
+
+    Raises:
+        NotSteadyError: it does not.
+        InputError: the motion is wider than the jig arm is long.
+    """
+    return force_loops(bench, [motion])[0]
+
+
+def force_loops(bench: Bench, motions: Sequence[Harmonic]) -> list[ForceLoop]:
+    """The same for several motions, integrated side by side."""
+    phase = PHASE[:-1]
+    if isinstance(bench, BushingBench):
+        return [_loop(bench, motion, bushing_loads(bench, *_driven(bench, motion, phase))) for motion in motions]
+    amplitude = np.array([motion.amplitude for motion in motions])
+    omega = np.array([motion.angular_frequency for motion in motions])
+    packed = np.tile(bench.packed, (len(motions), 1))
+    deformation = steady_deformations(bench, packed, amplitude, omega)[:, :-1]
+    if bench.sponge_mass > 0.0:
+        return [_loop(bench, motion, _tension_of_heavy_sponge(bench, motion)) for motion in motions]
+    return [
+        _loop(bench, motion, damper_tensions(_driven(bench, motion, phase)[1], own, bench.packed))
+        for motion, own in zip(motions, deformation, strict=True)
+    ]
+
+
+def steady_deformations(bench: DamperBench, packed: FloatArray, amplitude: FloatArray, omega: FloatArray) -> FloatArray:
+    """Deformation of massless sponges over a steady period, at `PHASE` (r, POINTS + 1); zero where the law has none. [m]
+
+    Args:
+        bench: A damper of the same law.
+        packed: Law number and parameters of each (r, s).
+        amplitude, omega: Of the motion of each (r,). [m, rad/s]
+    """
+    if bench.state_size != 1:
+        return np.zeros((len(packed), len(PHASE)))
+    states = steady_states(packed, np.zeros(len(packed)), amplitude, omega, 1)
+    return np.asarray(states[:, :, 0].T * amplitude[:, None])
+
+
+def measures_of(loop: ForceLoop) -> LoopMeasures:
+    """What is read off a loop."""
+    period = 1.0 / loop.motion.frequency
+    energy = float(np.mean(loop.force * loop.velocity)) * period
+    fundamental = np.fft.rfft(loop.force)[1] / np.fft.rfft(loop.displacement)[1]
+    return LoopMeasures(
+        peak_force=float(np.max(np.abs(loop.force))),
+        energy_per_cycle=energy,
+        equivalent_damping=energy / (np.pi * loop.motion.angular_frequency * loop.motion.amplitude**2),
+        dynamic_stiffness=float(np.abs(fundamental)),
+        loss_angle=float(np.angle(fundamental)),
+    )
+
+
+def _driven(bench: Bench, motion: Harmonic, phase: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Displacement and velocity of the driven end."""
+    if isinstance(bench, BushingBench) and bench.arm and motion.amplitude >= bench.arm:
+        raise input_error(f"is {motion.amplitude:g} m; allowed is less than the arm, {bench.arm:g} m", key="amplitude")
+    speed = motion.amplitude * motion.angular_frequency
+    velocity = speed * np.cos(phase)
+    velocity[np.abs(velocity) < 1e-12 * speed] = 0.0  # at its reversals it stands still, and dry friction must know
+    return motion.amplitude * np.sin(phase), velocity
+
+
+def _tension_of_heavy_sponge(bench: DamperBench, motion: Harmonic) -> FloatArray:
+    phase = PHASE[:-1]
+    amplitude, omega = motion.amplitude, motion.angular_frequency
+    states = steady_states(bench.packed[None], np.array([bench.sponge_mass]), np.array([amplitude]), np.array([omega]), 2)[
+        :-1, 0
+    ]
+    displacement, velocity = _driven(bench, motion, phase)
+    k1, c1 = bench.packed[4], bench.packed[5]
+    return np.asarray(k1 * (displacement - amplitude * states[:, 0]) + c1 * (velocity - amplitude * omega * states[:, 1]))
+
+
+def _loop(bench: Bench, motion: Harmonic, force: FloatArray) -> ForceLoop:
+    displacement, velocity = _driven(bench, motion, PHASE[:-1])
+    time = PHASE[:-1] / motion.angular_frequency
+    return ForceLoop(motion, bench.rotates, time, displacement, velocity, np.asarray(force))
