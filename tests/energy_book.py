@@ -132,13 +132,15 @@ def dense_record(machine, case, step):
     plant_context = setup.plant_context
     accelerations = machine.plant.get_generalized_acceleration_output_port()
     dampers = [damper.GetMyContextFromRoot(context) for damper in machine.dampers.values()]
-    time, state, deformation, torque = [], [], [], []
+    time, state, deformation, torque, acceleration = [], [], [], [], []
 
     def sample(alpha):
         time.append(context.get_time())
         state.append(machine.plant.GetPositionsAndVelocities(plant_context))
         deformation.append([c.get_continuous_state_vector().GetAtIndex(0) for c in dampers])
-        torque.append(REFLECTED_INERTIA * (alpha - accelerations.Eval(plant_context)[6]))
+        rates = accelerations.Eval(plant_context).copy()
+        torque.append(REFLECTED_INERTIA * (alpha - rates[6]))
+        acceleration.append(rates[:6])
 
     for begin, stop, alpha in zip(profile.time, profile.time[1:], profile.acceleration(), strict=False):
         machine.source.set_acceleration(source_context, alpha)
@@ -147,5 +149,5 @@ def dense_record(machine, case, step):
         for moment in np.linspace(begin, stop, int(np.ceil((stop - begin) / step)) + 1)[1:]:
             simulator.AdvanceTo(moment)
             sample(alpha)
-    trajectory = Trajectory(np.array(time), np.array(state), np.array(deformation), np.array(torque))
+    trajectory = Trajectory(np.array(time), np.array(state), np.array(deformation), np.array(torque), np.array(acceleration))
     return setup, as_record(setup, case, trajectory)

@@ -56,7 +56,13 @@ def python(wheel, tmp_path_factory):
 
 def test_wheel_holds_the_data_and_nothing_else(wheel):
     names = zipfile.ZipFile(wheel).namelist()
-    for folder, pattern in (("sdf", "*"), ("wm_drake", "machines/*"), ("wm_drake", "report/*"), ("wm_drake", "**/*.py")):
+    for folder, pattern in (
+        ("sdf", "*"),
+        ("wm_drake", "machines/*"),
+        ("wm_drake", "cycles/*"),
+        ("wm_drake", "report/*"),
+        ("wm_drake", "**/*.py"),
+    ):
         wanted = [path for path in (CHECKOUT / folder).glob(pattern) if path.is_file()]
         prefix = "wm_drake/" if folder == "sdf" else ""
         assert wanted

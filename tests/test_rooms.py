@@ -21,7 +21,7 @@ ORDER = (
     {"kernel"},
     {"scene", "drake_engine", "compiled_engine"},
     {"simulation"},
-    {"measures"},
+    {"measures", "vibration"},
     {"batch"},
     {"studies"},
     {"report"},

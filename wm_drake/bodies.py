@@ -110,6 +110,7 @@ def frame_problems(plant: MultibodyPlant, parameters: MachineParameters) -> list
         for end in ("tub", "housing")
     ]
     wanted += [(f"sensors.{name}.frame", "tub", sensor.frame) for name, sensor in parameters.sensors.items()]
+    wanted += [(f"accelerometers.{name}.frame", "tub", sensor.frame) for name, sensor in parameters.accelerometers.items()]
     wanted.append(("clearance.detergent_frame", "tub", parameters.clearance.detergent_frame))
     return list(_name_problems(plant, tuple(wanted), tuple(parameters.bodies), tuple(parameters.frames)))
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wm_drake.kernel.histories import motor_torque_history
+from wm_drake.kernel.histories import rates_history
 from wm_drake.kernel.integration import integrate_alone
 from wm_drake.kernel.mechanics import LINE_SIZE, STATE_SIZE
 from wm_drake.kernel.packing import initial_state, pack
@@ -45,7 +45,7 @@ def run_compiled(setup: Setup, profile: SpinProfile, step: float, progress: Call
         begin, done = done, min(done + PAUSE_STEPS, len(schedule.step))
         integrate_alone(schedule.steps, begin, done, p, layout.elements, x, work, samples.ravel())
         progress(done / len(schedule.step))
-    torque = np.empty((len(samples), 1))
-    motor_torque_history(samples, schedule.sample_acceleration[:, None], p, layout.elements, torque)
+    rates = np.empty((len(samples), 7))
+    rates_history(samples, schedule.sample_acceleration[:, None], p, layout.elements, rates)
     motion, deformation = samples[:, :STATE_SIZE], samples[:, STATE_SIZE:]
-    return ended_where_it_diverged(Trajectory(schedule.time, motion, deformation, torque[:, 0]))
+    return ended_where_it_diverged(Trajectory(schedule.time, motion, deformation, rates[:, 6], rates[:, :6]))

@@ -70,4 +70,5 @@ def _logged(setup: Setup, profile: SpinProfile, failure: str) -> Trajectory:
     for index, name in enumerate(setup.dampers):
         if name in columns:
             deformation[:, index] = columns[name][:, 0]
-    return ended_where_it_diverged(Trajectory(time, columns["bodies"], deformation, torque), failure)
+    accelerations = columns["acceleration"][:, :6]
+    return ended_where_it_diverged(Trajectory(time, columns["bodies"], deformation, torque, accelerations), failure)

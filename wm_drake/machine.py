@@ -44,6 +44,7 @@ class Setup:
         springs, dampers, bushings: The elements in their places, by name.
         sensor_points: By sensor name, the point in T. [m]
         detergent_point: Tub point nearest the detergent box, in T. [m]
+        accelerometer_points: By name of the vibration sensor, the point in T. [m]
         rest_pose: Equilibrium of the empty machine: roll, pitch, yaw, x, y, z. [rad, m]
         residual: What remains there of moment about To and force, in W. [N m, N]
     """
@@ -56,6 +57,7 @@ class Setup:
     bushings: dict[str, SixComponentBushingParameters]
     sensor_points: dict[str, FloatArray]
     detergent_point: FloatArray
+    accelerometer_points: dict[str, FloatArray]
     rest_pose: FloatArray
     residual: FloatArray
 
@@ -133,10 +135,13 @@ class Machine:
         rest_pose, residual = self._rest_pose(context)
         if load is not None:
             add_load(self.plant, plant_context, load)
+            add_load(self.plant, plant_context, Load(unbalances=(parameters.imperfections.residual_imbalance,)))
         self.plant.SetPositions(plant_context, np.append(rest_pose, 0.0))
         points = {name: places("tub", sensor.frame)[0] for name, sensor in parameters.sensors.items()}
         detergent_point = places("tub", parameters.clearance.detergent_frame)[0]
-        return Setup(self, parameters, context, springs, placed_dampers, bushings, points, detergent_point, rest_pose, residual)
+        vibrations = {name: places("tub", frame)[0] for name, frame in parameters.accelerometer_frames().items()}
+        elements = springs, placed_dampers, bushings
+        return Setup(self, parameters, context, *elements, points, detergent_point, vibrations, rest_pose, residual)
 
     def _places(self, plant_context: Context, parameters: MachineParameters) -> "_Places":
         """Where frames are; remembered from the last set-up, if that had the same overrides."""

@@ -25,8 +25,8 @@ from wm_drake.systems.spring_strut import spring_strut_history
 from wm_drake.trajectory import COORDINATES, Trajectory, divergence_text
 
 Record: TypeAlias = xr.Dataset
-"""One run. Dimensions time, axis (x, y, z), angle (roll, pitch, yaw), sensor, spring, damper, bushing; SI, each variable with
-its unit in attrs["units"]. See `as_record`."""
+"""One run. Dimensions time, axis (x, y, z), angle (roll, pitch, yaw), sensor, accelerometer, spring, damper, bushing; SI, each
+variable with its unit in attrs["units"]. See `as_record`."""
 
 Engine: TypeAlias = Callable[[Setup, SpinProfile, float, Callable[[float], None]], Trajectory]
 
@@ -125,6 +125,7 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
         "axis": list(AXES),
         "angle": list(COORDINATES[:3]),
         "sensor": list(setup.sensors),
+        "accelerometer": list(setup.accelerometer_points),
         "spring": list(setup.springs),
         "damper": list(setup.dampers),
         "bushing": list(setup.bushings),
@@ -151,6 +152,7 @@ def _motion(setup: Setup, trajectory: Trajectory) -> _Variables:
     state = trajectory.state
     axes = [AXES.index(sensor.axis) for sensor in setup.sensors.values()]
     points = list(setup.sensor_points.values())
+    accelerometers = np.stack(list(setup.accelerometer_points.values()))
     displaced = point_displacements(state, np.stack([*points, setup.detergent_point]), setup.rest_pose)
     moved = [displaced[:, index, axis] for index, axis in enumerate(axes)]
     detergent = displaced[:, -1]
@@ -159,10 +161,13 @@ def _motion(setup: Setup, trajectory: Trajectory) -> _Variables:
         "tub_position": (("time", "axis"), state[:, 3:6], "m", "position of To in W"),
         "tub_angular_velocity": (("time", "axis"), state[:, 7:10], "rad/s", "angular velocity of T in W"),
         "tub_velocity": (("time", "axis"), state[:, 10:13], "m/s", "velocity of To in W"),
+        "tub_angular_acceleration": (("time", "axis"), trajectory.acceleration[:, :3], "rad/s^2", "rate of it in W"),
+        "tub_acceleration": (("time", "axis"), trajectory.acceleration[:, 3:], "m/s^2", "acceleration of To in W"),
         "drum_angle": (("time",), state[:, 6], "rad", "angle of the drum against the tub"),
         "drum_speed": (("time",), state[:, 13], "rad/s", "speed of the drum against the tub"),
         "displacement": (("time", "sensor"), np.stack(moved, axis=1), "m", "displacement at the sensors, along their axes"),
         "sensor_point": (("sensor", "axis"), np.stack(points), "m", "points of the sensors in T"),
+        "accelerometer_point": (("accelerometer", "axis"), accelerometers, "m", "points of the vibration sensors in T"),
         "detergent_displacement": (("time", "axis"), detergent, "m", "displacement of the point nearest the detergent box"),
         "damper_deformation": (("time", "damper"), trajectory.deformation, "m", "deformation of the damper's sponge"),
     }

@@ -41,6 +41,7 @@ class Trajectory:
             velocity and velocity of To in W, drum rate. [rad, m, rad/s, m/s]
         deformation: (n, number of dampers) deformation of each damper's sponge; 0 where it has none. [m]
         motor_torque: (n,) torque of the motor on the drum, its reaction on the tub. [N m]
+        acceleration: (n, 6) angular acceleration of the tub and acceleration of To, in W. [rad/s^2, m/s^2]
         divergence: None if the run came to its end.
     """
 
@@ -48,6 +49,7 @@ class Trajectory:
     state: FloatArray
     deformation: FloatArray
     motor_torque: FloatArray
+    acceleration: FloatArray
     divergence: Divergence | None = None
 
 
@@ -76,6 +78,7 @@ def _cut(trajectory: Trajectory, length: int, divergence: Divergence) -> Traject
         trajectory.state[:length],
         trajectory.deformation[:length],
         trajectory.motor_torque[:length],
+        trajectory.acceleration[:length],
         divergence,
     )
 

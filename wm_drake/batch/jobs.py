@@ -103,7 +103,7 @@ class Preparation:
     def _bodies(self, case: Case) -> FloatArray:
         """Packed bodies: the same for all cases with these bodies, frames and load."""
         parameters = case.parameters or self.machine.parameters
-        key = (parameters.bodies, parameters.frames, case.load)
+        key = (parameters.bodies, parameters.frames, parameters.imperfections.residual_imbalance, case.load)
         for known, bodies in self._known_bodies:
             if known == key:
                 return bodies

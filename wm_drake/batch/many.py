@@ -22,6 +22,8 @@ _VARIABLES = {
     "amplitude": ("sensor", "m", "largest absolute value of the envelopes"),
     "critical_speed": ("sensor", "rad/s", "drum speed where it occurs"),
     "smallest_gap": ("", "m", "smallest distance between tub group and housing"),
+    "region_displacement": ("region accelerometer axis", "m", "RMS displacement in each region of the spin profile"),
+    "region_displacement_integrated": ("region accelerometer axis", "m", "the same from acceleration, integrated twice"),
 }
 
 
@@ -53,7 +55,8 @@ def simulate_many(
         machine: A built machine.
         cases: What to run; taken one by one as they are needed, so a generator keeps memory flat.
         measures: Keys of `MEASURES`: "extremes" are D, F, M of [B], "amplitudes" those of `measure` with their speeds, "gap"
-            is the smallest distance between tub group and housing (NaN if the SDF has no shapes).
+            is the smallest distance between tub group and housing (NaN if the SDF has no shapes), "regions" the RMS
+            displacements of the accelerometers in the regions of the profile, by number (`wm_drake.vibration`).
         step: As for `simulate`.
         histories: Whether each run handed to `finished` shall carry its record, as `simulate` gives it.
         workers: Threads; as many as cores by default.
@@ -101,14 +104,34 @@ def as_table(
         "axis": list(AXES),
         "sensor": list(parameters.sensors),
     }
+    if "regions" in measures:
+        labels |= {
+            "accelerometer": list(parameters.accelerometer_frames()),
+            "region": range(_region_count(measures, results)),
+        }
     variables = {}
     for index, name in enumerate(name for measure in measures for name in MEASURES[measure]):
         dim, unit, text = _VARIABLES[name]
-        dims = ("run", dim) if dim else ("run",)
+        dims = ("run", *dim.split())
         values = np.reshape([results[number][2][index] for number in numbers], [len(labels[d]) for d in dims])
         variables[name] = (dims, values, {"units": unit, "long_name": text})
     diverged = np.array([results[number][1] for number in numbers], dtype=object)
     return xr.Dataset({**variables, "diverged": ("run", diverged)}, labels)
+
+
+def _region_count(measures: tuple[str, ...], results: dict[int, tuple[str, str, list[FloatArray]]]) -> int:
+    """How many regions the profile of all runs has.
+
+    Raises:
+        InputError: not all have equally many.
+    """
+    names = [name for measure in measures for name in MEASURES[measure]]
+    counts = {len(values[names.index("region_displacement")]) for _, _, values in results.values()}
+    if len(counts) > 1:
+        raise input_error(
+            f"have {' and '.join(map(str, sorted(counts)))} regions; runs of one table need equally many", key="profile"
+        )
+    return counts.pop() if counts else 0
 
 
 def _run_all(

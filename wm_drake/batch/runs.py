@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wm_drake.batch.jobs import Job, Kind
-from wm_drake.kernel.histories import POINT_SIZE, measure_samples_lanes, motor_torque_history
+from wm_drake.kernel.histories import POINT_SIZE, measure_samples_lanes, rates_history
 from wm_drake.kernel.integration import integrate_lanes
 from wm_drake.kernel.mechanics import DRUM_RATE, LINE_SIZE, STATE_SIZE
 from wm_drake.kernel.packing import Layout
@@ -28,11 +28,13 @@ from wm_drake.trajectory import (
     diverging_coordinate,
     ended_where_it_diverged,
 )
+from wm_drake.vibration import region_displacements
 
 MEASURES = {
     "extremes": ("detergent_displacement", "gasket_force", "gasket_moment"),
     "amplitudes": ("amplitude", "critical_speed"),
     "gap": ("smallest_gap",),
+    "regions": ("region_displacement", "region_displacement_integrated"),
 }
 """What can be measured of each run, and the variables that gives."""
 
@@ -109,6 +111,8 @@ class Runner:
                 arrays: Iterable[FloatArray] = extremes[sensors:-1].reshape(3, 3).copy()
             elif measure == "gap":
                 arrays = [self._gap(schedule.time[:good], samples[:good, :6], job.begin[:6])]
+            elif measure == "regions":
+                arrays = self._regions(job, schedule, np.ascontiguousarray(samples[:good]))
             else:
                 size, at = amplitudes(filtered(moved[:good, :sensors], OUTPUT_PERIOD))
                 arrays = size, np.where(np.isnan(size), np.nan, samples[at, DRUM_RATE])
@@ -117,12 +121,24 @@ class Runner:
         return Ended(job.number, job.case, values, _divergence(schedule.time, samples, good), record)
 
     def _record(self, job: Job, schedule: Schedule, samples: FloatArray) -> Record:
-        torque = np.empty((len(samples), 1))
-        elements = job.numbers.layout.elements
-        motor_torque_history(samples, schedule.sample_acceleration[:, None], job.packed, elements, torque)
-        trajectory = Trajectory(schedule.time, samples[:, :STATE_SIZE], samples[:, STATE_SIZE:], torque[:, 0])
+        rates = self._rates(job, schedule, samples)
+        motion, deformation = samples[:, :STATE_SIZE], samples[:, STATE_SIZE:]
+        trajectory = Trajectory(schedule.time, motion, deformation, rates[:, 6], rates[:, :6])
         record = as_record(job.numbers.setup, job.case, ended_where_it_diverged(trajectory))
         return record.assign_attrs(engine="compiled", step_s=self.step)
+
+    def _rates(self, job: Job, schedule: Schedule, samples: FloatArray) -> FloatArray:
+        rates = np.empty((len(samples), 7))
+        acceleration = schedule.sample_acceleration[: len(samples), None]
+        rates_history(samples, acceleration, job.packed, job.numbers.layout.elements, rates)
+        return rates
+
+    def _regions(self, job: Job, schedule: Schedule, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
+        setup = job.numbers.setup
+        points = np.stack(list(setup.accelerometer_points.values()))
+        acceleration = self._rates(job, schedule, samples)[:, :6]
+        motion = samples[:, :STATE_SIZE]
+        return region_displacements(motion, acceleration, points, setup.rest_pose, OUTPUT_PERIOD, job.case.profile)
 
     def _gap(self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray) -> FloatArray:
         kept = self._memory.__dict__

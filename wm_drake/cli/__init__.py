@@ -4,7 +4,7 @@ import sys
 
 import typer
 
-from wm_drake.cli import machine, spin
+from wm_drake.cli import machine, spin, study
 from wm_drake.errors import WmDrakeError
 
 app = typer.Typer(
@@ -14,6 +14,7 @@ app = typer.Typer(
     add_completion=False,
 )
 app.add_typer(machine.app, name="machine")
+app.add_typer(study.app, name="study")
 app.command()(spin.spin)
 
 

@@ -15,29 +15,32 @@ POINT_SIZE = 7
 
 
 @long_running
-def motor_torque_history(samples, acceleration, p, elements, torque):
-    """Torque of the motor on the drum at each sample. [N m]
+def rates_history(samples, acceleration, p, elements, rates):
+    """What follows from the state at each sample: accelerations of the tub, torque of the motor.
 
     Args:
         samples: States, (n, size).
         acceleration: Of the drum at each sample, (n, 1). [rad/s^2]
         p, elements: As for `state_derivative`.
-        torque: (n, 1), written.
+        rates: (n, 7), written: angular acceleration of the tub and acceleration of To, in W [rad/s^2, m/s^2]; torque of the
+            motor on the drum [N m].
     """
     align_stack()
     size = samples.shape[1] * WIDTH
-    x_numbers, drum_numbers, numbers = np.empty(size), np.empty(WIDTH), np.empty(WIDTH)
+    x_numbers, drum_numbers, numbers = np.empty(size), np.empty(WIDTH), np.empty(7 * WIDTH)
     x, drum, answer = lane_array(x_numbers), lane_array(drum_numbers), lane_array(numbers)
     dx_numbers, scratch_numbers = np.empty(size), np.empty(LINE_SIZE * WIDTH * len(elements[1]))
     p_numbers = in_each_lane(p)
     dx, scratch, q = lane_array(dx_numbers), lane_array(scratch_numbers), lane_array(p_numbers)
-    for begin in range(0, len(torque), WIDTH):
+    for begin in range(0, len(rates), WIDTH):
         rows_to_lanes(samples, begin, x_numbers)
         rows_to_lanes(acceleration, begin, drum_numbers)
         sine, cosine = sine_cosine(x[6])
         masses = mass_properties(q, cosine, sine)
-        answer[0] = state_derivative(x, dx, masses, x[13], drum[0], q, elements, scratch)
-        lanes_to_rows(numbers, begin, torque)
+        answer[6] = state_derivative(x, dx, masses, x[13], drum[0], q, elements, scratch)
+        for k in range(6):
+            answer[k] = dx[7 + k]
+        lanes_to_rows(numbers, begin, rates)
 
 
 @long_running

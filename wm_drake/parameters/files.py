@@ -21,6 +21,7 @@ from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.spin import Load, SpinProfile
 
 MACHINES_FOLDER = Path(__file__).parents[1] / "machines"
+CYCLES_FOLDER = Path(__file__).parents[1] / "cycles"
 Model = TypeVar("Model", bound=BaseModel)
 
 
@@ -65,22 +66,58 @@ def load_load(path: Path) -> Load:
     return _validated(Load, _without_sources(tree)[0], path)
 
 
-def load_profile(path: Path) -> SpinProfile:
-    """Reads a spin profile: YAML as in a machine file, or CSV with the columns time_s and speed_rpm (# begins a comment)."""
+def shipped_profiles() -> dict[str, Path]:
+    """Spin profiles that come with the package, by name."""
+    return {path.stem: path for path in sorted(CYCLES_FOLDER.iterdir()) if path.stem.startswith("profile_")}
+
+
+def load_profile(name_or_path: str | Path) -> SpinProfile:
+    """Reads a spin profile: YAML as in a machine file, or CSV (# begins a comment).
+
+    Args:
+        name_or_path: Name of a shipped profile, or a file. CSV has the columns time_s and speed_rpm, and perhaps region: the
+            name of the region that a row begins or goes on; empty outside of all.
+
+    Raises:
+        InputError: with one problem per fault.
+    """
+    shipped = shipped_profiles()
+    path = shipped.get(f"profile_{name_or_path}", Path(name_or_path))
+    if not path.is_file():
+        known = [name.removeprefix("profile_") for name in shipped]
+        raise input_error(
+            f"no such file, and no shipped profile of that name{nearest_names(str(path), known)}", where=str(path)
+        )
     if path.suffix.lower() != ".csv":
         tree = _read_yaml(path)
         return _validated(SpinProfile, _without_sources(tree)[0], path)
-    table = read_csv(path, ["time_s", "speed_rpm"])
+    table = read_csv(path, ["time_s", "speed_rpm"], optional="region")
     if table.empty:
         raise input_error("is empty: a profile needs at least two points", where=str(path))
-    numbers = table.apply(pd.to_numeric, errors="coerce")
+    numbers = table[["time_s", "speed_rpm"]].apply(pd.to_numeric, errors="coerce")
     finite = np.isfinite(numbers.to_numpy(dtype=float)).all(axis=1)
     if not finite.all():
         row = int(np.flatnonzero(~finite)[0])
         raise input_error(f"row {row + 1} of the data is not two finite numbers: {table.iloc[row].tolist()}", where=str(path))
     text = {"time": ("time_s", "s"), "speed": ("speed_rpm", "rpm")}
-    fields = {key: f"({', '.join(map(repr, numbers[name].tolist()))}) {unit}" for key, (name, unit) in text.items()}
+    fields: dict[str, Any] = {
+        key: f"({', '.join(map(repr, numbers[name].tolist()))}) {unit}" for key, (name, unit) in text.items()
+    }
+    if "region" in table:
+        fields["regions"] = _regions(numbers["time_s"].tolist(), table["region"].fillna("").astype(str).tolist())
     return _validated(SpinProfile, fields, path)
+
+
+def _regions(times: list[float], names: list[str]) -> list[dict[str, str]]:
+    """Stretches of equal name between the rows of a profile."""
+    regions: list[dict[str, str]] = []
+    for begin, end, name, before in zip(times, times[1:], names, ["", *names], strict=False):
+        name = name.strip()
+        if name and name == before.strip():
+            regions[-1]["end"] = f"{end!r} s"
+        elif name:
+            regions.append({"name": name, "begin": f"{begin!r} s", "end": f"{end!r} s"})
+    return regions
 
 
 def machine_yaml(parameters: MachineParameters) -> str:

@@ -8,7 +8,7 @@ from pydantic import Field, StringConstraints, ValidationInfo, field_validator, 
 from wm_drake.errors import nearest_names
 from wm_drake.parameters import units as u
 from wm_drake.parameters.elements import Bushing, Damper, DamperType, Frozen, Spring, SpringType
-from wm_drake.parameters.spin import Load, SpinProfile
+from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
 """Of an entry: it becomes part of key paths and of file names."""
@@ -71,6 +71,38 @@ class Clearance(Frozen):
     detergent_frame: str
 
 
+class Accelerometer(Frozen):
+    """A vibration sensor with three axes, along those of W at rest, at one point of the tub ([A] section 4.1)."""
+
+    frame: str
+
+
+class UnbalancePlace(Frozen):
+    """Where unbalance masses are put in the drum: on which radius, how deep."""
+
+    radius: Annotated[u.Length, Field(gt=0.0)]
+    y: u.Length
+
+
+class UnbalancePlanes(Frozen):
+    """The two places of unbalance masses in [A] section 4.1."""
+
+    front: UnbalancePlace
+    rear: UnbalancePlace
+
+
+class Imperfections(Frozen):
+    """What [A] section 4.2 names as causes of error, as far as it is a matter of loads. None by default.
+
+    Attributes:
+        residual_imbalance: Mass that a drum is out of balance by itself; in every run beside the load.
+        phase_error: By how much the rear mass of the spin cycle's cases is farther ahead than said.
+    """
+
+    residual_imbalance: Unbalance = Unbalance(mass=0.0, radius=0.0, y=0.0)
+    phase_error: u.Angle = 0.0
+
+
 class MachineParameters(Frozen):
     """A machine: the SDF model it stands on and all that is not a body. SI; W, T and D as in the project's conventions."""
 
@@ -88,7 +120,10 @@ class MachineParameters(Frozen):
     gasket: Bushing | None = None
     bushings: dict[Name, Bushing] = {}
     sensors: dict[Name, Sensor]
+    accelerometers: dict[Name, Accelerometer] = {}
     clearance: Clearance
+    unbalance_planes: UnbalancePlanes | None = None
+    imperfections: Imperfections = Imperfections()
     loads: dict[Name, Load]
     profile: SpinProfile
     measured: tuple[str, ...] = ()
@@ -117,6 +152,14 @@ class MachineParameters(Frozen):
         if "gasket" in self.bushings:
             raise ValueError("bushings: the name 'gasket' belongs to the key 'gasket'")
         return self
+
+    def accelerometer_frames(self) -> dict[str, str]:
+        """Frame of each vibration sensor; without any, S1 to S3 are at the points of every second displacement sensor."""
+        if self.accelerometers:
+            return {name: sensor.frame for name, sensor in self.accelerometers.items()}
+        frames = list(dict.fromkeys(sensor.frame for sensor in self.sensors.values()))
+        chosen = frames[::2][:3] if len(frames) > 3 else frames
+        return {f"S{number}": frame for number, frame in enumerate(chosen, start=1)}
 
     def all_bushings(self) -> dict[str, Bushing]:
         """The six-component bushings by name, the gasket among them under its own."""

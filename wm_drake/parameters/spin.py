@@ -3,7 +3,7 @@
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, ValidationError, ValidationInfo, model_validator
+from pydantic import Field, StringConstraints, ValidationError, ValidationInfo, model_validator
 
 from wm_drake.parameters import units as u
 from wm_drake.parameters.elements import Frozen
@@ -52,6 +52,14 @@ class _Step(Frozen):
         return time + abs(self.ramp_to - speed) / self.rate, self.ramp_to
 
 
+class Region(Frozen):
+    """A named stretch of a spin profile, over which vibrations are summed up ([A] section 4.1: R1 to R8)."""
+
+    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
+    begin: Annotated[u.Duration, Field(ge=0.0)]
+    end: u.Duration
+
+
 class SpinProfile(Frozen):
     """Drum speed over time, linear between the points; in a file also as `steps` from standstill.
 
@@ -60,14 +68,17 @@ class SpinProfile(Frozen):
 
     time: u.Times
     speed: u.Speeds
+    regions: tuple[Region, ...] = ()
 
     @model_validator(mode="before")
     @classmethod
     def _from_steps(cls, data: Any, info: ValidationInfo) -> Any:
         if not isinstance(data, dict) or "steps" not in data:
             return data
-        if set(data) != {"steps"} or not isinstance(data["steps"], list):
-            raise ValueError("a profile is either {steps: [...]} or {time: (...) s, speed: (...) rpm}")
+        if not set(data) <= {"steps", "regions"} or not isinstance(data["steps"], list):
+            raise ValueError(
+                "a profile is either {steps: [...]} or {time: (...) s, speed: (...) rpm}, each with regions or not"
+            )
         points = [(0.0, 0.0)]
         for index, entry in enumerate(data["steps"]):
             try:
@@ -79,9 +90,9 @@ class SpinProfile(Frozen):
         unit = {name: cls.model_fields[name].metadata[0] for name in ("time", "speed")}
         times, speeds = zip(*points, strict=True)
         # as text again, for the door of the fields: repr keeps every digit
-        return {
-            name: f"({', '.join(map(repr, values))}) {unit[name].si}" for name, values in (("time", times), ("speed", speeds))
-        }
+        points_of = {"time": times, "speed": speeds}
+        texts = {name: f"({', '.join(map(repr, values))}) {unit[name].si}" for name, values in points_of.items()}
+        return {**texts, "regions": data.get("regions", ())}
 
     @model_validator(mode="after")
     def _usable(self) -> "SpinProfile":
@@ -93,6 +104,21 @@ class SpinProfile(Frozen):
             raise ValueError(f"must begin at time 0 s, begins at {self.time[0]:g} s")
         if np.any(np.diff(self.time) <= 0.0):
             raise ValueError("times must rise from point to point")
+        return self
+
+    @model_validator(mode="after")
+    def _regions_in_order(self) -> "SpinProfile":
+        before = 0.0
+        names = [region.name for region in self.regions]
+        for region in self.regions:
+            if names.count(region.name) > 1:
+                raise ValueError(f"regions: '{region.name}' is there twice")
+            if not before <= region.begin < region.end <= self.time[-1] * (1.0 + 1e-12):
+                raise ValueError(
+                    f"regions: {region.name} from {region.begin:g} s to {region.end:g} s is not a stretch after the one before "
+                    f"it and within the {self.time[-1]:g} s of the profile"
+                )
+            before = region.end
         return self
 
     @property

@@ -1,0 +1,8 @@
+"""`wm-drake study`: questions that take many runs; a module per study."""
+
+import typer
+
+from wm_drake.cli.study import spin_cycle
+
+app = typer.Typer(help="Answer a question with many runs, and report.", no_args_is_help=True)
+app.command("spin-cycle")(spin_cycle.spin_cycle)

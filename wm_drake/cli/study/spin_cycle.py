@@ -1,0 +1,210 @@
+"""`wm-drake study spin-cycle`: vibration per region of a spin cycle, over a table of unbalance cases."""
+
+import json
+import shlex
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wm_drake.cli.common import JsonOption, MachineOption, SetOption, check_buildable, existing_file, load_parameters
+from wm_drake.errors import input_error, nearest_names
+from wm_drake.outputs import progress_bar, result_folder
+
+if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
+    import xarray as xr
+
+    from wm_drake.ledger import Ledger
+    from wm_drake.parameters import MachineParameters, SpinProfile
+    from wm_drake.parameters.unbalance_cases import UnbalanceCase
+    from wm_drake.studies.spin_cycle import SpinCycleResult
+
+DEFAULT_OUT = Path("wm-drake-spin-cycle")
+LEDGER = "runs.sqlite"
+
+
+def spin_cycle(
+    machine: MachineOption = "reference",
+    profile: Annotated[
+        str, typer.Option(help="Shipped profile (spin_cycle, run_up, ifb_9kg), or file with regions.", metavar="NAME|FILE")
+    ] = "spin_cycle",
+    cases: Annotated[
+        Path | None,
+        typer.Option(help="CSV of cases: case,front_g,rear_g,phase_deg. The 33 of [A] Table 9 by default.", metavar="FILE"),
+    ] = None,
+    case: Annotated[list[str] | None, typer.Option(help="Run this case only. Repeatable.", metavar="NAME")] = None,
+    measured: Annotated[
+        Path | None, typer.Option(help="Measured RMS: CSV case,region,sensor,axis,rms_mm.", metavar="FILE")
+    ] = None,
+    accelerations: Annotated[
+        Path | None,
+        typer.Option(help="Folder of measured accelerations, CASE.csv: time_s,S1_x,S1_y,... in m/s^2.", metavar="DIR"),
+    ] = None,
+    engine: Annotated[str, typer.Option(help="compiled; or drake, minutes a case.", metavar="NAME")] = "compiled",
+    out: Annotated[
+        Path, typer.Option(help="Folder for the results; runs found there are not run again.", metavar="DIR")
+    ] = DEFAULT_OUT,
+    as_json: JsonOption = False,
+    sets: SetOption = None,
+) -> None:
+    """Run the spin cycle with many unbalances, and report RMS displacements per region, sensor and axis."""
+    from wm_drake.parameters import load_profile
+
+    if engine not in ("compiled", "drake"):
+        raise input_error(f"no engine '{engine}'{nearest_names(engine, ('compiled', 'drake'))}", where="--engine")
+    parameters = load_parameters(machine, sets)
+    spin_profile = load_profile(profile)
+    table = cases_of_table(cases, case)
+    comparison = measurement(parameters, table, spin_profile, measured, accelerations)
+    check_buildable(machine, parameters)
+    try:
+        with result_folder(out) as folder, _ledger(out) as ledger:
+            result = _run(parameters, table, spin_profile, engine, ledger)
+            result = result if comparison is None else _with(result, comparison)
+            _write(result, folder, engine)
+            ledger.mark_finished()
+    except KeyboardInterrupt:
+        typer.echo("interrupted; cases that had ended are kept, the same command goes on from there", err=True)
+        raise typer.Exit(130) from None
+    diverged = [f"case {c.name}: {text}" for c, text in zip(result.cases, result.diverged, strict=True) if text]
+    typer.echo(json.dumps(_as_json(result, engine))) if as_json else _print_table(result, out)
+    for message in diverged:
+        typer.echo(message, err=True)
+    if diverged:
+        raise typer.Exit(1)
+
+
+def cases_of_table(path: Path | None, names: list[str] | None) -> "list[UnbalanceCase]":
+    """The cases that `--cases` and `--case` ask for."""
+    from wm_drake.parameters.unbalance_cases import TABLE_9, load_unbalance_cases
+
+    table = load_unbalance_cases(existing_file(path, "--cases") if path else TABLE_9)
+    known = {case.name: case for case in table}
+    for name in names or []:
+        if name not in known:
+            raise input_error(f"no case '{name}'{nearest_names(name, known)}", where="--case")
+    return [known[name] for name in dict.fromkeys(names)] if names else table
+
+
+def measurement(
+    parameters: "MachineParameters",
+    cases: "list[UnbalanceCase]",
+    profile: "SpinProfile",
+    measured: Path | None,
+    accelerations: Path | None,
+) -> "xr.DataArray | None":
+    """What `--measured` or `--accelerations` name."""
+    from wm_drake.studies.spin_cycle import labels_of, runs_of
+    from wm_drake.studies.spin_measured import read_accelerations, read_rms
+
+    if measured and accelerations:
+        raise input_error("and --measured exclude each other", where="--accelerations")
+    runs_of(parameters, cases, profile)  # refuses what cannot be run
+    labels = labels_of(parameters, cases, profile)
+    if measured:
+        return read_rms(existing_file(measured, "--measured"), labels)
+    return read_accelerations(accelerations, labels, profile) if accelerations else None
+
+
+@contextmanager
+def _ledger(out: Path) -> "Iterator[Ledger]":
+    from wm_drake.ledger import open_ledger
+
+    out.mkdir(exist_ok=True)
+    with open_ledger(out / LEDGER, {"study": "spin cycle"}, resume=True) as ledger:
+        yield ledger
+
+
+def _run(
+    parameters: "MachineParameters", cases: "list[UnbalanceCase]", profile: "SpinProfile", engine: str, ledger: "Ledger"
+) -> "SpinCycleResult":
+    from wm_drake.machine import build_machine
+    from wm_drake.studies.spin_cycle import run_spin_cycle
+    from wm_drake.studies.spin_cycle_runs import compiled_runs, drake_runs
+
+    with progress_bar(len(cases), "cases") as progress:
+        if engine == "drake":
+            evaluate = drake_runs(parameters, progress=progress)
+        else:
+            evaluate = compiled_runs(build_machine(parameters), ledger, progress=progress)
+        return run_spin_cycle(parameters, cases, profile, evaluate)
+
+
+def _with(result: "SpinCycleResult", measured: "xr.DataArray") -> "SpinCycleResult":
+    from dataclasses import replace
+
+    return replace(result, measured=measured)
+
+
+def _write(result: "SpinCycleResult", folder: Path, engine: str) -> None:
+    from wm_drake.report.spin_cycle_report import spin_cycle_report
+    from wm_drake.report.spin_cycle_tables import case_table
+    from wm_drake.studies.spin_measured import rms_table
+
+    rms_table(result.displacement).to_csv(folder / "rms.csv", index=False, float_format="%.6g")
+    case_table(result).to_csv(folder / "cases.csv", index=False, float_format="%.4g")
+    command = shlex.join(["wm-drake", *sys.argv[1:]])
+    (folder / "report.html").write_text(spin_cycle_report(result, engine, command), encoding="utf-8")
+
+
+def _print_table(result: "SpinCycleResult", out: Path) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from wm_drake.report.spin_cycle_tables import case_table
+
+    numbers = case_table(result)
+    table = Table(title=f"Spin cycle of machine '{result.parameters.name}'")
+    for name in numbers.columns:
+        table.add_column(name.replace("_", " "), justify="right")
+    for row in numbers.itertuples(index=False):
+        table.add_row(*(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row))
+    console = Console()
+    console.print(table)
+    console.print(f"Results in {out}: report.html, cases.csv, rms.csv")
+
+
+def _as_json(result: "SpinCycleResult", engine: str) -> dict[str, Any]:
+    import numpy as np
+
+    from wm_drake.studies.spin_cycle import average_errors, disagreement, mean_and_deviation, region_errors
+
+    def plain(values: Any, scale: float = 1.0) -> Any:
+        """Nested lists; JSON has no NaN."""
+        if np.ndim(values):
+            return [plain(value, scale) for value in np.asarray(values)]
+        return scale * float(values) if np.isfinite(values) else None
+
+    shown: dict[str, Any] = {
+        "machine": result.parameters.name,
+        "engine": engine,
+        "regions": [region.name for region in result.profile.regions],
+        "sensors": list(map(str, result.displacement.accelerometer.values)),
+        "axes": list(map(str, result.displacement.axis.values)),
+        "cases": [
+            {
+                "case": case.name,
+                "front_kg": case.front,
+                "rear_kg": case.rear,
+                "phase_deg": float(np.rad2deg(case.phase)),
+                "rms_mm": plain(result.displacement.sel(case=case.name), 1e3),
+                "rms_from_acceleration_mm": plain(result.integrated.sel(case=case.name), 1e3),
+                "smallest_gap_mm": plain(result.smallest_gap.sel(case=case.name), 1e3),
+                "diverged": diverged or None,
+            }
+            for case, diverged in zip(result.cases, result.diverged, strict=True)
+        ],
+        "disagreement_of_integration": plain(disagreement(result).max("case")),
+    }
+    if result.measured is not None:
+        errors = region_errors(result.displacement, result.measured)
+        mean, deviation = mean_and_deviation(errors)
+        shown["relative_error"] = {
+            "by_region_mean": plain(mean),
+            "by_region_deviation": plain(deviation),
+            "by_case_average": plain(average_errors(result.displacement, result.measured)),
+        }
+    return shown

@@ -1,0 +1,100 @@
+"""Cases of a spin-cycle study: how much unbalance in front and at the rear, and the angle between them ([A] Table 9)."""
+
+from collections.abc import Hashable, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import pandas as pd
+from pydantic import Field, ValidationError
+
+from wm_drake.errors import InputError, Problem, input_error
+from wm_drake.parameters import units as u
+from wm_drake.parameters.csv_files import read_csv
+from wm_drake.parameters.elements import Frozen
+from wm_drake.parameters.files import CYCLES_FOLDER
+from wm_drake.parameters.machine import MachineParameters, UnbalancePlace, UnbalancePlanes
+from wm_drake.parameters.problems import problems_of
+from wm_drake.parameters.spin import Load, Unbalance
+
+TABLE_9 = CYCLES_FOLDER / "cases_table9.csv"
+"""The 33 cases of [A] Table 9, in its order."""
+
+_COLUMNS = {"front_g": "front", "rear_g": "rear", "phase_deg": "phase"}
+_PUBLISHED = "published_error_percent"
+
+
+class UnbalanceCase(Frozen):
+    """One row of a table of cases.
+
+    Attributes:
+        name: Of the case.
+        front, rear: Masses in the two planes. [kg]
+        phase: By how much the rear mass is ahead of the front one, in the direction in which the drum turns. [rad]
+        published_error_percent: What [A] Table 9 has for it, its model against its experiment.
+    """
+
+    name: str
+    front: Annotated[u.Mass, Field(ge=0.0)]
+    rear: Annotated[u.Mass, Field(ge=0.0)]
+    phase: u.Angle = 0.0
+    published_error_percent: float | None = None
+
+    def load(self, parameters: MachineParameters) -> Load:
+        """The masses in the drum of a machine, the error of its phase angle included; the front one is up at angle 0."""
+        planes = unbalance_planes(parameters)
+        ahead = self.phase + (parameters.imperfections.phase_error if self.front and self.rear else 0.0)
+        masses = ((self.front, planes.front, 0.0), (self.rear, planes.rear, ahead))
+        return Load(
+            unbalances=tuple(
+                Unbalance(mass=mass, radius=place.radius, y=place.y, phase=phase) for mass, place, phase in masses if mass > 0.0
+            )
+        )
+
+
+def unbalance_planes(parameters: MachineParameters) -> UnbalancePlanes:
+    """Where a machine's unbalances go: as its file says, else where its loads 'front' and 'back' or 'rear' have them.
+
+    Raises:
+        InputError: it has neither.
+    """
+    if parameters.unbalance_planes:
+        return parameters.unbalance_planes
+    found = []
+    for names in (("front",), ("back", "rear")):
+        masses = [parameters.loads[name].unbalances for name in names if name in parameters.loads]
+        if not masses or len(masses[0]) != 1:
+            raise input_error(
+                "is missing, and there is no load 'front' and 'back' of one mass each to take the places from",
+                key="unbalance_planes",
+            )
+        found.append(UnbalancePlace(radius=masses[0][0].radius, y=masses[0][0].y))
+    return UnbalancePlanes(front=found[0], rear=found[1])
+
+
+def load_unbalance_cases(path: Path = TABLE_9) -> list[UnbalanceCase]:
+    """Reads a CSV of cases: columns case, front_g, rear_g, phase_deg, and perhaps published_error_percent.
+
+    Raises:
+        InputError: not such a table, no row, a value that is not allowed, a case named twice.
+    """
+    table = read_csv(path, ["case", *_COLUMNS], optional=_PUBLISHED)
+    if table.empty:
+        raise input_error("has no case", where=str(path))
+    cases = [_case(path, row) for row in table.to_dict("records")]
+    names = [case.name for case in cases]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise input_error(f"case '{twice[0]}' is there twice", where=str(path))
+    return cases
+
+
+def _case(path: Path, row: Mapping[Hashable, Any]) -> UnbalanceCase:
+    units = {"front_g": "g", "rear_g": "g", "phase_deg": "deg"}
+    fields: dict[str, object] = {name: f"{row[column]} {units[column]}" for column, name in _COLUMNS.items()}
+    if pd.notna(row.get(_PUBLISHED)):
+        fields[_PUBLISHED] = row[_PUBLISHED]
+    try:
+        return UnbalanceCase.model_validate({"name": str(row["case"]), **fields})
+    except ValidationError as error:
+        found = problems_of(error, UnbalanceCase)
+        raise InputError(Problem(str(path), f"case {row['case']}.{p.key}", p.message) for p in found) from None
