@@ -17,6 +17,17 @@ from wm_drake.parameters.elements import (
     TorqueTable,
     packed_stiffness,
 )
+from wm_drake.parameters.factors import (
+    GASKET_FACTORS,
+    TABLES,
+    Factor,
+    FactorLevels,
+    at_levels,
+    factor_of_text,
+    levels_of,
+    load_factors,
+    nominal_stiffness,
+)
 from wm_drake.parameters.files import (
     load_load,
     load_machine,
@@ -40,6 +51,8 @@ from wm_drake.parameters.measured import measured_amplitudes
 from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
 
 __all__ = [
+    "GASKET_FACTORS",
+    "TABLES",
     "BodyOverride",
     "Bushing",
     "Clearance",
@@ -48,6 +61,8 @@ __all__ = [
     "DamperType",
     "Drive",
     "EndBushing",
+    "Factor",
+    "FactorLevels",
     "ForceTable",
     "FrameOverride",
     "FreeStrokeDamper",
@@ -64,6 +79,10 @@ __all__ = [
     "StvSpongeDamper",
     "TorqueTable",
     "Unbalance",
+    "at_levels",
+    "factor_of_text",
+    "levels_of",
+    "load_factors",
     "load_load",
     "load_machine",
     "load_profile",
@@ -71,6 +90,7 @@ __all__ = [
     "machine_path",
     "machine_yaml",
     "measured_amplitudes",
+    "nominal_stiffness",
     "packed_stiffness",
     "quantities",
     "shipped_machines",

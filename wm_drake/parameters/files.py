@@ -62,7 +62,7 @@ def machine_path(name_or_path: str | Path) -> Path:
 
 def load_load(path: Path) -> Load:
     """Reads a load file: ``unbalances: [{mass, radius, y, phase}, ...]``, written as in a machine file."""
-    tree = _read_yaml(path)
+    tree = read_yaml(path)
     return _validated(Load, _without_sources(tree)[0], path)
 
 
@@ -89,7 +89,7 @@ def load_profile(name_or_path: str | Path) -> SpinProfile:
             f"no such file, and no shipped profile of that name{nearest_names(str(path), known)}", where=str(path)
         )
     if path.suffix.lower() != ".csv":
-        tree = _read_yaml(path)
+        tree = read_yaml(path)
         return _validated(SpinProfile, _without_sources(tree)[0], path)
     table = read_csv(path, ["time_s", "speed_rpm"], optional="region")
     if table.empty:
@@ -163,7 +163,12 @@ def _yaml() -> YAML:
     return yaml
 
 
-def _read_yaml(path: Path) -> CommentedMap:
+def read_yaml(path: Path) -> CommentedMap:
+    """The mapping in a YAML file; every plain scalar is text.
+
+    Raises:
+        InputError: not there, not YAML, not a mapping.
+    """
     try:
         tree = _yaml().load(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -184,7 +189,7 @@ def _read_yaml(path: Path) -> CommentedMap:
 
 
 def _extended(path: Path, seen: tuple[Path, ...]) -> CommentedMap:
-    tree = _read_yaml(path)
+    tree = read_yaml(path)
     if "extends" not in tree:
         return tree
     base_path = _base_path(tree, path)
@@ -261,7 +266,7 @@ def _validated(model: type[Model], plain: Any, path: Path) -> Model:
 
 def located(error: InputError, path: Path) -> InputError:
     """The same problems, that showed when the machine was built, with the file the user gave and its line if it has one."""
-    tree = _read_yaml(path)
+    tree = read_yaml(path)
     problems = []
     for problem in error.problems:
         depth, line = _line_of(tree, problem.key)
@@ -273,7 +278,7 @@ def _place(path: Path, key: str) -> str:
     """file:line of a key path, in the file of the chain that holds most of it."""
     best_depth, best = 0, str(path)
     while path.suffix.lower() != ".csv":
-        tree = _read_yaml(path)
+        tree = read_yaml(path)
         depth, line = _line_of(tree, key)
         if depth > best_depth:
             best_depth, best = depth, f"{path}:{line}"

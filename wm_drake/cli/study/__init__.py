@@ -2,7 +2,8 @@
 
 import typer
 
-from wm_drake.cli.study import spin_cycle
+from wm_drake.cli.study import gasket, spin_cycle
 
 app = typer.Typer(help="Answer a question with many runs, and report.", no_args_is_help=True)
+app.command("gasket")(gasket.gasket)
 app.command("spin-cycle")(spin_cycle.spin_cycle)

@@ -1,0 +1,203 @@
+"""Designs: efficiency by an independent library and by brute force, optimality by search, strength of arrays, files."""
+
+import itertools
+import time
+
+import numpy as np
+import oapackage
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wm_drake.errors import InputError
+from wm_drake.studies.doe import (
+    MODELS,
+    d_optimal_levels,
+    efficiency,
+    level_matrix,
+    make_design,
+    orthogonal_levels,
+    read_design,
+    write_design,
+)
+from wm_drake.studies.doe.orthogonal import strength
+
+NAMES = ("C_L", "C_T", "K_Lx", "K_Ly", "K_Lz", "K_Tx", "K_Ty", "K_Tz")
+
+
+@pytest.fixture(scope="module")
+def d_optimal():
+    begin = time.perf_counter()
+    design = make_design("d-optimal", NAMES)
+    return design, time.perf_counter() - begin
+
+
+def treatment_efficiency(levels, model):
+    """By another coding (indicators), another normalisation (against the full factorial's determinant) and log determinants."""
+
+    def columns(array):
+        main = [np.stack([array[:, f] == 0, array[:, f] == 1], axis=1).astype(float) for f in range(array.shape[1])]
+        blocks = [np.ones((len(array), 1)), *main]
+        if model == "main+2fi":
+            blocks += [(a[:, :, None] * b[:, None, :]).reshape(len(array), -1) for a, b in itertools.combinations(main, 2)]
+        return np.hstack(blocks)
+
+    def logarithm(x):
+        return np.log(np.linalg.svd(x / np.sqrt(len(x)), compute_uv=False)).sum() * 2.0
+
+    x, full = columns(levels), columns(level_matrix(levels.shape[1]))
+    return 100.0 * np.exp((logarithm(x) - logarithm(full)) / x.shape[1])
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_efficiency_of_another_coding_is_the_same(d_optimal, model):
+    design, _ = d_optimal
+    assert efficiency(design.levels, model) == pytest.approx(treatment_efficiency(design.levels, model), abs=1e-6)
+
+
+def test_thousand_trials_are_efficient_different_and_quickly_found(d_optimal):
+    design, wall_s = d_optimal
+    assert design.trials == 1000
+    assert design.efficiency() >= 99.6
+    assert len(np.unique(design.levels, axis=0)) == 1000
+    assert set(np.unique(design.levels)) == {-1, 0, 1}
+    assert wall_s < 20.0  # some two seconds where nothing else runs
+
+
+def test_main_effects_alone_are_found_nearly_perfectly():
+    design = make_design("d-optimal", NAMES, model="main")
+    assert design.efficiency() > 99.99
+
+
+def test_seed_decides():
+    first, again, other = (d_optimal_levels(5, 80, "main+2fi", seed) for seed in (0, 0, 1))
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+def oapackage_array(levels):
+    return oapackage.array_link(np.ascontiguousarray(levels + 1, dtype=np.int32))
+
+
+@pytest.mark.parametrize("factors", [5, 6, 7, 8])
+@pytest.mark.parametrize(("trials", "least"), [(243, 4), (729, 5)])
+def test_arrays_have_their_strength_by_oapackage(trials, least, factors):
+    levels = orthogonal_levels(factors, trials)
+    assert len(np.unique(levels, axis=0)) == len(levels) == min(trials, 3**factors)
+    assert oapackage_array(levels).strength() >= least
+    assert strength(levels, 8) == oapackage_array(levels).strength()
+    assert efficiency(levels, "main+2fi") == pytest.approx(100.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("model", "columns"), [("main", 17), ("main+2fi", 129)])
+def test_efficiency_by_oapackage(d_optimal, model, columns):
+    """oapackage's own model matrices. It scales each column over the array at hand; here all get the scale of a balanced one.
+
+    Only its matrix with interactions is used, which begins with the main effects: its matrix of main effects alone (mode m)
+    now and then comes back damaged.
+    """
+
+    def matrix(levels):
+        array = oapackage_array(levels)
+        return np.array(oapackage.array2modelmatrix(array, "i"))[:, :columns]
+
+    balanced = np.abs(matrix(orthogonal_levels(8, 243))).max(axis=0)
+    for levels in (d_optimal[0].levels, orthogonal_levels(8, 729)):
+        x = matrix(levels)
+        x *= balanced / np.abs(x).max(axis=0)
+        expected = 100.0 * np.exp(np.linalg.slogdet(x.T @ x / len(x))[1] / x.shape[1])
+        assert efficiency(levels, model) == pytest.approx(expected, abs=1e-8)
+
+
+def test_strength_of_an_unbalanced_array_is_less():
+    levels = orthogonal_levels(6, 243).copy()
+    levels[0, 0] = (levels[0, 0] + 2) % 3 - 1
+    assert strength(levels) == oapackage_array(levels).strength() == 0
+
+
+def test_small_design_is_the_best_of_all():
+    best = max(
+        efficiency(level_matrix(2)[list(rows)], "main") for rows in itertools.combinations(range(9), 6)
+    )  # all 84 of them
+    found = max(efficiency(d_optimal_levels(2, 6, "main", seed), "main") for seed in range(5))
+    assert found == pytest.approx(best)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_no_design_beats_the_bound(seed):
+    rng = np.random.default_rng(seed)
+    levels = rng.integers(-1, 2, size=(rng.integers(1, 120), 4)).astype(np.int8)
+    assert 0.0 <= efficiency(levels, "main+2fi") <= 100.0 + 1e-9
+
+
+def test_efficiency_does_not_know_names_of_factors_and_levels(d_optimal):
+    levels = d_optimal[0].levels
+    assert efficiency(levels[:, ::-1], "main+2fi") == pytest.approx(efficiency(levels, "main+2fi"), rel=1e-10)
+    assert efficiency(-levels, "main+2fi") == pytest.approx(efficiency(levels, "main+2fi"), rel=1e-10)
+    turned = ((levels.astype(int) + 2) % 3 - 1).astype(np.int8)
+    assert efficiency(turned, "main+2fi") == pytest.approx(efficiency(levels, "main+2fi"), rel=1e-10)
+
+
+def test_few_trials_and_large_grids():
+    assert make_design("d-optimal", NAMES[:4], trials=33).efficiency() > 0.0  # as many trials as coefficients
+    assert make_design("d-optimal", NAMES[:3], trials=27).efficiency() == pytest.approx(100.0)
+    ten = make_design("d-optimal", tuple("abcdefghij"), trials=100, model="main")
+    assert ten.efficiency() > 95.0
+    assert len(np.unique(ten.levels, axis=0)) == 100
+
+
+FAULTS = {
+    "kind": ({"kind": "d-optmal"}, "no design 'd-optmal' (did you mean 'd-optimal'?"),
+    "model": ({"kind": "full", "model": "quadratic"}, "no model 'quadratic'"),
+    "too few": ({"kind": "d-optimal", "trials": 100}, "100 trials cannot determine the 129 coefficients"),
+    "too many": ({"kind": "d-optimal", "trials": 6562}, "6561 different trials"),
+    "full of another size": ({"kind": "full", "trials": 1000}, "has 6561 trials, not 1000"),
+    "no such array": ({"kind": "orthogonal", "trials": 1000}, "orthogonal designs have 243 or 729"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_impossible_designs_are_refused(fault):
+    options, message = FAULTS[fault]
+    with pytest.raises(InputError) as caught:
+        make_design(factors=NAMES, **options)
+    assert message in str(caught.value)
+
+
+def test_nine_factors_have_no_array_here():
+    with pytest.raises(InputError, match="at most 8"):
+        make_design("orthogonal", tuple("abcdefghi"))
+
+
+def test_design_file_comes_back(tmp_path):
+    design = make_design("d-optimal", NAMES, trials=150, seed=3)
+    write_design(design, tmp_path / "design.csv")
+    read = read_design(tmp_path / "design.csv", NAMES)
+    np.testing.assert_array_equal(read.levels, design.levels)
+    table = pd.read_csv(tmp_path / "design.csv")
+    assert list(table.columns) == ["trial", *NAMES]
+    table[[*reversed(NAMES)]].to_csv(tmp_path / "other.csv", index=False)
+    np.testing.assert_array_equal(read_design(tmp_path / "other.csv", NAMES).levels, design.levels)
+
+
+FAULTY_FILES = {
+    "other columns": ("a,c\n0,0\n", "needs the columns a,b"),
+    "level": ("a,b\n0,0\n1,2\n", "row 2: '2' is no level"),
+    "word": ("a,b\n0,low\n", "row 1: 'low' is no level"),
+    "nothing": ("a,b\n", "do not determine the 5 coefficients"),
+    "repeated": ("a,b\n0,0\n1,1\n0,0\n", "row 1 is there more than once"),
+    "too few": ("a,b\n0,0\n1,1\n-1,-1\n", "these 3 trials do not determine the 5 coefficients"),
+    "one level missing": ("a,b\n0,0\n1,0\n0,1\n1,1\n0,-1\n1,-1\n", "do not determine"),
+    "no text": ("\x00\x01", "design.csv"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTY_FILES)
+def test_faulty_files_are_refused(tmp_path, fault):
+    text, message = FAULTY_FILES[fault]
+    (tmp_path / "design.csv").write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_design(tmp_path / "design.csv", ("a", "b"), "main")
+    assert message in str(caught.value)
+    assert "design.csv" in str(caught.value)

@@ -1,0 +1,196 @@
+"""`wm-drake study gasket`: how stiffness and damping of the gasket act on the tub and on the housing."""
+
+import time
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from wm_drake.cli.common import JsonOption, MachineOption, SetOption, cases_of, check_buildable, existing_file, load_parameters
+from wm_drake.cli.study.common import ProfileOption, ResumeOption, WorkersOption, study_ledger
+from wm_drake.errors import input_error, nearest_names
+from wm_drake.outputs import progress_bar, result_folder
+
+if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
+    from collections.abc import Callable
+
+    import xarray as xr
+
+    from wm_drake.parameters import FactorLevels, MachineParameters
+    from wm_drake.simulation import Case
+    from wm_drake.studies.doe import Design
+    from wm_drake.studies.gasket import GasketTrials
+    from wm_drake.studies.screening import Screening
+
+DEFAULT_OUT = Path("wm-drake-gasket")
+
+
+def gasket(
+    machine: MachineOption = "reference",
+    load: Annotated[
+        list[str] | None,
+        typer.Option(help="Load of the machine, or load file. Repeatable; middle and counter by default.", metavar="NAME|FILE"),
+    ] = None,
+    design: Annotated[
+        str, typer.Option(help="d-optimal, orthogonal, full, or a CSV file with a column of -1, 0, 1 per factor.")
+    ] = "d-optimal",
+    trials: Annotated[
+        int | None, typer.Option(help="Trials: 1000 d-optimal; 243 or 729 orthogonal; all full.", min=1, metavar="N")
+    ] = None,
+    model: Annotated[
+        str, typer.Option(help="What is estimated: main effects, or with all two-factor interactions.")
+    ] = "main+2fi",
+    seed: Annotated[int, typer.Option(help="Of the D-optimal design.", min=0)] = 0,
+    factor: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Factor to study instead of the eight of the gasket: C_L, K_Lx, ... or any key path of the machine file, with "
+            "bounds in percent of its value (50 %..150 % by default) or with a unit. Repeatable.",
+            metavar="NAME|KEY[=LOW..HIGH]",
+        ),
+    ] = None,
+    factors: Annotated[Path | None, typer.Option(help="File of factors, YAML.", metavar="FILE")] = None,
+    tables: Annotated[
+        str,
+        typer.Option(help="A stiffness given as a table becomes: linear, level times its slope at rest; scaled, its forces."),
+    ] = "linear",
+    profile: ProfileOption = None,
+    workers: WorkersOption = None,
+    resume: ResumeOption = False,
+    out: Annotated[Path, typer.Option(help="Folder for the results and the ledger of runs.", metavar="DIR")] = DEFAULT_OUT,
+    as_json: JsonOption = False,
+    sets: SetOption = None,
+) -> None:
+    """Screen the gasket: which of its stiffnesses and dampings drive displacement, force and moment, and which way."""
+    begin = time.perf_counter()
+    from wm_drake.studies.gasket import GasketTrials
+
+    parameters = load_parameters(machine, sets)
+    levels = _factors(parameters, factor, factors, tables)
+    plan = _design(design, levels, trials, model, seed)
+    cases = _loads(parameters, load, profile)
+    middle = _at_middle(parameters, levels)
+    check_buildable(machine, parameters)
+    work = GasketTrials(middle, levels, cases)
+    with study_ledger(out, _identity(work, plan), resume) as ledger:
+        from wm_drake.batch import simulate_remembered
+        from wm_drake.machine import build_machine
+
+        run = partial(simulate_remembered, build_machine(middle), ledger=ledger, workers=workers)
+        screening = _run(work, plan, run)
+        ledger.mark_finished()
+        with result_folder(out) as folder:
+            _write(screening, folder)
+    _tell(screening, out, as_json, time.perf_counter() - begin)
+
+
+def _factors(
+    parameters: "MachineParameters", named: list[str] | None, file: Path | None, tables: str
+) -> "tuple[FactorLevels, ...]":
+    from wm_drake.parameters import GASKET_FACTORS, TABLES, factor_of_text, levels_of, load_factors
+
+    if tables not in TABLES:
+        raise input_error(f"no way '{tables}'{nearest_names(tables, TABLES)}", where="--tables")
+    known = load_factors(GASKET_FACTORS if file is None else existing_file(file, "--factors"))
+    chosen = dict(factor_of_text(text, known) for text in named) if named else known
+    if named and len(chosen) < len(named):
+        raise input_error("a factor is named twice", where="--factor")
+    return levels_of(parameters, chosen, tables)
+
+
+def _design(kind: str, levels: "Sequence[FactorLevels]", trials: int | None, model: str, seed: int) -> "Design":
+    from wm_drake.studies.doe import DESIGNS, MODELS, make_design, read_design
+
+    names = tuple(factor.name for factor in levels)
+    if model not in MODELS:
+        raise input_error(f"no model '{model}'{nearest_names(model, MODELS)}", where="--model")
+    if kind in DESIGNS:
+        return make_design(kind, names, trials=trials, model=model, seed=seed)
+    if not Path(kind).is_file():
+        raise input_error(f"'{kind}' is neither a kind of design nor a file{nearest_names(kind, DESIGNS)}", where="--design")
+    if trials is not None:
+        raise input_error("a design from a file has as many trials as it has", where="--trials")
+    return read_design(Path(kind), names, model)
+
+
+def _loads(parameters: "MachineParameters", loads: list[str] | None, profile: Path | None) -> "list[Case]":
+    from wm_drake.studies.gasket import LOADS
+
+    usual = [name for name in LOADS if name in parameters.loads]
+    return cases_of(parameters, loads or usual, gasket=True, profile=profile)
+
+
+def _at_middle(parameters: "MachineParameters", levels: "Sequence[FactorLevels]") -> "MachineParameters":
+    from wm_drake.parameters import at_levels
+
+    return at_levels(parameters, levels, [0] * len(levels))
+
+
+def _identity(work: "GasketTrials", plan: "Design") -> dict[str, str]:
+    """What tells this study from another, in words as far as that goes."""
+    from wm_drake.batch import sources_version
+    from wm_drake.ledger import key_of
+    from wm_drake.studies.gasket import MEASURES
+
+    machine = work.parameters
+    levels = key_of(levels=plan.levels, settings=[f.settings for f in work.factors])[:8]
+    runs = key_of(numbers=machine.model_dump_json(exclude={"name", "about", "sources", "measured"}))[:8]
+    loads = key_of(loads=[(case.load, case.profile) for case in work.loads])[:8]
+    return {
+        "study": "gasket",
+        "machine": f"{machine.name} {runs}",
+        "design": f"{plan.kind}, {plan.trials} trials, {levels}",
+        "loads": f"{', '.join(case.name for case in work.loads)}, {loads}",
+        "measures": ", ".join(MEASURES),
+        "sources": sources_version(),
+    }
+
+
+def _run(work: "GasketTrials", plan: "Design", run: "Callable[..., xr.Dataset]") -> "Screening":
+    from wm_drake.studies.gasket import MEASURES
+    from wm_drake.studies.screening import run_screening
+
+    with progress_bar(plan.trials * len(work.loads)) as progress:
+        return run_screening(plan, lambda d: work.responses(d, lambda cases: run(cases, measures=MEASURES, progress=progress)))
+
+
+def _write(screening: "Screening", folder: Path) -> None:
+    from wm_drake.studies.screening_tables import write_tables
+
+    write_tables(screening, folder)
+
+
+def _tell(screening: "Screening", out: Path, as_json: bool, wall_s: float) -> None:
+    from wm_drake.studies.screening_tables import as_plain_data, to_json
+
+    if as_json:
+        typer.echo(to_json(as_plain_data(screening) | {"wall_s": wall_s}))
+    else:
+        _print_table(screening)
+        typer.echo(f"Results in {out}: CSV tables")
+    for (trial, load), reason in screening.responses.failed.items():
+        typer.echo(f"trial {trial + 1}, load {load}: {reason}", err=True)
+    if screening.responses.failed:
+        raise typer.Exit(1)
+
+
+def _print_table(screening: "Screening") -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from wm_drake.studies.screening import leading_terms
+
+    design = screening.design
+    about = f"{design.kind}, {design.trials} trials, D-efficiency {design.efficiency():.2f} %"
+    table = Table(title=f"Percent of the variance explained ({about})")
+    for name in ("load", "response", "mean", "main", "interactions", "rest"):
+        table.add_column(name, justify="left" if name in ("load", "response") else "right")
+    table.add_column("leading terms")
+    for (load, name), found in screening.tables.items():
+        leading = ", ".join(f"{term.name} {term.percent:.0f}" for term in leading_terms(found))
+        percents = (found.main_percent, found.interaction_percent, found.residual_percent)
+        mean = f"{found.constant:.3g} {screening.responses.units[name]}"
+        table.add_row(load, name, mean, *(f"{value:.1f}" for value in percents), leading)
+    Console().print(table)
