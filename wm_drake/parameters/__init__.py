@@ -1,5 +1,6 @@
 """Numbers enter here: frozen types of a machine, a load, a spin profile, in SI; files and units are read and checked."""
 
+from wm_drake.parameters.components import Component, load_component, shipped_components
 from wm_drake.parameters.elements import (
     Bushing,
     CoulombDamper,
@@ -38,6 +39,7 @@ from wm_drake.parameters.files import (
     shipped_machines,
 )
 from wm_drake.parameters.keys import quantities, source_of, with_value
+from wm_drake.parameters.loop_files import MeasuredLoop, read_loop, read_loops
 from wm_drake.parameters.machine import (
     BodyOverride,
     Clearance,
@@ -56,6 +58,7 @@ __all__ = [
     "BodyOverride",
     "Bushing",
     "Clearance",
+    "Component",
     "CoulombDamper",
     "Damper",
     "DamperType",
@@ -70,6 +73,7 @@ __all__ = [
     "InertiaMatrix",
     "Load",
     "MachineParameters",
+    "MeasuredLoop",
     "MstvDamper",
     "Sensor",
     "SpinProfile",
@@ -82,6 +86,7 @@ __all__ = [
     "at_levels",
     "factor_of_text",
     "levels_of",
+    "load_component",
     "load_factors",
     "load_load",
     "load_machine",
@@ -93,6 +98,9 @@ __all__ = [
     "nominal_stiffness",
     "packed_stiffness",
     "quantities",
+    "read_loop",
+    "read_loops",
+    "shipped_components",
     "shipped_machines",
     "source_of",
     "with_value",

@@ -66,6 +66,11 @@ def load_load(path: Path) -> Load:
     return _validated(Load, _without_sources(tree)[0], path)
 
 
+def read_mapping(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
+    """A YAML file as plain text values, and the sources of its numbers by key path."""
+    return _without_sources(_read_yaml(path))
+
+
 def shipped_profiles() -> dict[str, Path]:
     """Spin profiles that come with the package, by name."""
     return {path.stem: path for path in sorted(CYCLES_FOLDER.iterdir()) if path.stem.startswith("profile_")}

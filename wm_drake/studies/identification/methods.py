@@ -58,7 +58,7 @@ def least_squares(
     problem: Problem,
     *,
     seed: int = 0,
-    starts: int = 6,
+    starts: int = 4,
     screened: int = 64,
     progress: Progress = silent,
 ) -> Fit:
@@ -148,7 +148,7 @@ def evolution(
         [(0.0, 1.0)] * len(problem.unknowns),
         popsize=population,
         maxiter=generations,
-        tol=1e-4,
+        tol=0.01,
         polish=False,
         updating="deferred",
         vectorized=True,

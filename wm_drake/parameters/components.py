@@ -1,0 +1,69 @@
+"""Parameter files of single components: a damper type or a bushing, written as in a machine file; some are shipped."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from pydantic import TypeAdapter, ValidationError
+
+from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.parameters.elements import Bushing, DamperType, Frozen
+from wm_drake.parameters.files import read_mapping
+from wm_drake.parameters.problems import problems_of
+
+COMPONENTS_FOLDER = Path(__file__).parents[1] / "components"
+
+ComponentParameters: TypeAlias = DamperType | Bushing
+
+_NOWHERE = {"tub_frame": "bench", "housing_frame": "bench"}
+"""A component file does not say where its bushing sits."""
+
+
+@dataclass(frozen=True)
+class Component:
+    """A component with a name and the sources of its numbers by key."""
+
+    name: str
+    parameters: ComponentParameters
+    sources: dict[str, str]
+
+    @property
+    def is_damper(self) -> bool:
+        """Whether it is a damper, not a bushing."""
+        return not isinstance(self.parameters, Bushing)
+
+
+class _DamperFile(Frozen):
+    damper: DamperType
+
+
+def shipped_components() -> dict[str, Path]:
+    """Component files that come with the package, by name."""
+    return {path.stem: path for path in sorted(COMPONENTS_FOLDER.glob("*.yaml"))}
+
+
+def load_component(name_or_path: str) -> Component:
+    """Reads a component file: the keys of a damper type (with `law`) or of a bushing (without its frames).
+
+    Raises:
+        InputError: with one problem per fault.
+    """
+    shipped = shipped_components()
+    path = shipped.get(name_or_path, Path(name_or_path))
+    if not path.is_file():
+        hint = nearest_names(name_or_path, shipped)
+        raise input_error(f"no such file, and no shipped component of that name{hint}", where=str(path))
+    plain, sources = read_mapping(path)
+    return Component(path.stem, _validated(plain, path), sources)
+
+
+def _validated(plain: dict[str, Any], path: Path) -> ComponentParameters:
+    context = {"units_required": True}
+    try:
+        if "law" in plain:
+            return TypeAdapter(_DamperFile).validate_python({"damper": plain}, context=context).damper
+        return Bushing.model_validate(_NOWHERE | plain, context=context)
+    except ValidationError as error:
+        root = _DamperFile if "law" in plain else Bushing
+        problems = problems_of(error, root)
+        raise InputError(Problem(str(path), p.key.removeprefix("damper").lstrip("."), p.message) for p in problems) from None
