@@ -4,7 +4,7 @@ import sys
 
 import typer
 
-from wm_drake.cli import machine, spin, study
+from wm_drake.cli import identify, machine, rig, spin, study
 from wm_drake.errors import WmDrakeError
 
 app = typer.Typer(
@@ -13,7 +13,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     add_completion=False,
 )
+app.add_typer(identify.app, name="identify")
 app.add_typer(machine.app, name="machine")
+app.add_typer(rig.app, name="rig")
 app.add_typer(study.app, name="study")
 app.command()(spin.spin)
 

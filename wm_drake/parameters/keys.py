@@ -12,12 +12,14 @@ from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.units import Unit
 
+Tree = typing.TypeVar("Tree", bound=BaseModel)
 
-def with_value(parameters: MachineParameters, key: str, value: Any) -> MachineParameters:
+
+def with_value(parameters: Tree, key: str, value: Any) -> Tree:
     """A copy with one value changed.
 
     Args:
-        parameters: The machine.
+        parameters: The machine; any part of one, such as a damper type, does as well.
         key: Path of names from the top, joined by dots: ``gasket.stiffness_x``, ``loads.middle.unbalances.0.mass``.
             ``bodies.NAME`` and ``frames.NAME`` need not be in the machine file.
         value: SI number or text with a unit (``"5 N/mm"``); a mapping for a group of values.
@@ -25,7 +27,7 @@ def with_value(parameters: MachineParameters, key: str, value: Any) -> MachinePa
     Raises:
         InputError: unknown key (with the nearest known one) or a value that is not allowed.
     """
-    return typing.cast(MachineParameters, _replaced(parameters, key.split("."), value, key))
+    return typing.cast(Tree, _replaced(parameters, key.split("."), value, key))
 
 
 def _replaced(node: Any, path: list[str], value: Any, key: str) -> Any:

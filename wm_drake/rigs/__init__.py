@@ -8,9 +8,12 @@ measures_of(loop).energy_per_cycle
 from wm_drake.rigs.bench import AXES, Bench, BushingBench, DamperBench, Harmonic, bushing_bench, damper_bench
 from wm_drake.rigs.integration import NotSteadyError
 from wm_drake.rigs.loops import ForceLoop, LoopMeasures, force_loop, force_loops, measures_of
+from wm_drake.rigs.run import JIG_ARM, MATRICES, RigRun, run_rig
 
 __all__ = [
     "AXES",
+    "JIG_ARM",
+    "MATRICES",
     "Bench",
     "BushingBench",
     "DamperBench",
@@ -18,9 +21,11 @@ __all__ = [
     "Harmonic",
     "LoopMeasures",
     "NotSteadyError",
+    "RigRun",
     "bushing_bench",
     "damper_bench",
     "force_loop",
     "force_loops",
     "measures_of",
+    "run_rig",
 ]

@@ -14,6 +14,10 @@ LARGEST_DISTORTION = 0.2
 """Of the displacement: root mean square of what is neither fundamental nor drift, in amplitudes."""
 
 
+WHOLE_PERIOD = 0.97
+"""Of a period: samples of a whole one end a step before its end."""
+
+
 @dataclass(frozen=True, eq=False)
 class MeasuredMotion:
     """A measured loop on the clock of its own motion.
@@ -49,7 +53,7 @@ def measured_motion(loop: MeasuredLoop) -> MeasuredMotion:
         options={"xatol": 1e-9 * guess},
     )
     frequency = float(found.x)
-    if frequency * length < 1.0 - 1.0 / len(time):
+    if frequency * length < WHOLE_PERIOD:
         raise input_error(f"covers {frequency * length:.2f} of a period; a loop needs at least one", where=loop.path)
     amounts, error = _projected(time, loop.displacement, frequency)
     amplitude = float(np.hypot(amounts[0], amounts[1]))

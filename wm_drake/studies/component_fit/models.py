@@ -124,13 +124,14 @@ def damper_model(
     if law not in DAMPER_LAWS:
         raise input_error(f"no law '{law}' of a damper{nearest_names(law, DAMPER_LAWS)}", where="--law")
     kinds, scale = DAMPER_LAWS[law] | OPTIONAL.get(law, {}), _scale(motions)
+    kept = ["regularisation_velocity"] if law in ("mstv", "free_stroke") else []
     units = {"force": FORCE, "stiffness": STIFFNESS, "damping": DAMPING, "speed": SPEED}
     searched = [name for name in kinds if name in DAMPER_LAWS[law] or name in (bounds or {})]
     unknowns = _unknowns({name: kinds[name] for name in searched}, units, scale, bounds, fixed)
     constants = dict(fixed or {})
     table = _OddTable("sponge", scale, knots) if law == "free_stroke" else None
     steps = _bounded(table.unknowns, bounds) if table else ()
-    _check_names([*kinds, *(u.name for u in steps)], bounds, fixed)
+    _check_names([*kinds, *kept, *(u.name for u in steps)], bounds, fixed)
 
     def fields(point: FloatArray) -> dict[str, Any]:
         named = {u.name: float(value) for u, value in zip(unknowns, point, strict=False)}
@@ -288,3 +289,23 @@ def _check_names(known: list[str], bounds: Mapping[str, tuple[float, float]] | N
     for name in fixed or {}:
         if name in (bounds or {}):
             raise input_error(f"'{name}' has bounds and is fixed", where="--fix")
+
+
+def units_of_fields() -> dict[str, Unit]:
+    """Unit of every number of a component that can be unknown or fixed."""
+    kinds = {"force": FORCE, "stiffness": STIFFNESS, "damping": DAMPING, "speed": SPEED}
+    found = {name: kinds[kind] for law in (*DAMPER_LAWS.values(), *OPTIONAL.values()) for name, kind in law.items()}
+    found["regularisation_velocity"] = SPEED
+    for letter in "xyz":
+        found |= {f"stiffness_{letter}": STIFFNESS, f"damping_{letter}": DAMPING}
+        found |= {f"rotational_stiffness_{letter}": ROTATIONAL_STIFFNESS, f"rotational_damping_{letter}": ROTATIONAL_DAMPING}
+        found |= {f"friction_torque_{letter}": TORQUE, f"full_friction_rate_{letter}": RATE}
+    return found
+
+
+def unit_of_field(name: str) -> Unit | None:
+    """Unit of such a number, or of a rise of a table; None if there is no such."""
+    field, _, rise = name.partition(".")
+    if rise.startswith("rise_"):
+        return TORQUE if field.startswith("rotational") else FORCE
+    return units_of_fields().get(name)

@@ -101,21 +101,25 @@ def _scattered(p: int, number: int, seed: int) -> FloatArray:
 def _descend(count: _Count, begin: FloatArray, step_done: Callable[[float], None], most: int = 60) -> tuple[FloatArray, float]:
     """One search by scipy's trust-region reflective method; gives where it ended and its RMSE."""
     steps = 0
+    last: tuple[FloatArray, FloatArray] = (np.full(len(begin), np.nan), np.empty(0))
 
     def residuals(z: FloatArray) -> FloatArray:
-        return np.asarray(count.residuals(z[None])[0])
+        nonlocal last
+        last = (z.copy(), np.asarray(count.residuals(z[None])[0]))
+        return last[1]
 
     def jacobian(z: FloatArray) -> FloatArray:
         nonlocal steps
         steps += 1
         step_done(min(1.0, steps / 25))
+        here = last[1] if np.array_equal(z, last[0]) else count.residuals(z[None])[0]
         sign = np.where(z > 0.5, -1.0, 1.0)
-        found = count.residuals(np.concatenate([z[None], z + np.diag(STEP * sign)]))
-        return np.asarray(((found[1:] - found[0]) / (STEP * sign)[:, None]).T)
+        found = count.residuals(z + np.diag(STEP * sign))
+        return np.asarray(((found - here) / (STEP * sign)[:, None]).T)
 
     inside = np.clip(begin, 1e-4, 1.0 - 1e-4)
     end = optimize.least_squares(
-        residuals, inside, jacobian, bounds=(0.0, 1.0), x_scale=1.0, ftol=1e-10, xtol=1e-10, gtol=1e-14, max_nfev=most
+        residuals, inside, jacobian, bounds=(0.0, 1.0), x_scale=1.0, ftol=1e-9, xtol=1e-9, gtol=1e-14, max_nfev=most
     )
     return end.x, float(rmse(end.fun))
 

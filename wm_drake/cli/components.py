@@ -1,0 +1,142 @@
+"""What `rig` and `identify` share: which component, on which axis, and numbers with units from the command line."""
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wm_drake.cli.common import load_parameters
+from wm_drake.errors import InputError, Problem, input_error, nearest_names
+
+if TYPE_CHECKING:
+    from wm_drake.parameters import Component
+    from wm_drake.parameters.units import Unit
+
+NameOption = Annotated[
+    str | None, typer.Option("--name", help="Damper type or bushing of the machine; its first by default.", metavar="NAME")
+]
+ComponentOption = Annotated[
+    str | None,
+    typer.Option("--component", help="Component file, or a shipped one, in place of one of a machine.", metavar="NAME|FILE"),
+]
+AxisOption = Annotated[
+    str, typer.Option("--axis", help="radial, axial, tilt, twist; or x, y, z, about_x, about_y, about_z.", metavar="AXIS")
+]
+ArmOption = Annotated[
+    str | None,
+    typer.Option("--arm", help="Radius of the jig through which a rotation is driven, e.g. '100 mm'.", metavar="LENGTH"),
+]
+
+AXIS_WORDS = {"radial": ("x", "z"), "axial": ("y",), "tilt": ("about_x", "about_z"), "twist": ("about_y",)}
+"""Axes of an axisymmetric bushing: y is its axis; the first of each is what goes on the bench."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A component and where it came from: a machine as it was named, and its key there; both "" for a component file."""
+
+    component: "Component"
+    machine: str
+    key: str
+
+
+def target_of(kind: str, machine: str, name: str | None, component: str | None, sets: list[str] | None) -> Target:
+    """The component that a command is about.
+
+    Args:
+        kind: damper, bushing or gasket.
+        machine, name, component, sets: Options of the command.
+
+    Raises:
+        InputError: it is not there, or of another kind.
+    """
+    from wm_drake.parameters import Component, load_component, shipped_components, source_of
+
+    if component is not None:
+        found = load_component(component)
+        if found.is_damper != (kind == "damper"):
+            kinds = ("a damper", "a bushing")
+            is_one, wanted = kinds if found.is_damper else kinds[::-1]
+            raise input_error(f"'{component}' is {is_one}, needs {wanted}", where="--component")
+        return Target(_with_sets(found, sets), "", "")
+    parameters = load_parameters(machine, sets)
+    chosen: Any
+    if kind == "gasket":
+        if parameters.gasket is None:
+            raise input_error(f"machine '{parameters.name}' has no gasket", where="--machine")
+        key, chosen = "gasket", parameters.gasket
+    else:
+        table: dict[str, Any]
+        table, folder = (parameters.damper_types, "damper_types") if kind == "damper" else (parameters.bushings, "bushings")
+        if not table:
+            shipped = ", ".join(shipped_components())
+            message = f"machine '{parameters.name}' has no {folder}; name a file or a shipped component ({shipped})"
+            raise input_error(message, where="--component")
+        name = name or next(iter(table))
+        if name not in table:
+            raise input_error(f"no '{name}' in {folder} of '{parameters.name}'{nearest_names(name, table)}", where="--name")
+        key, chosen = f"{folder}.{name}", table[name]
+    sources = {field: text for field in type(chosen).model_fields if (text := source_of(parameters, f"{key}.{field}"))}
+    return Target(Component(key.split(".")[-1], chosen, sources), machine, key)
+
+
+def _with_sets(component: "Component", sets: list[str] | None) -> "Component":
+    from wm_drake.parameters import with_value
+
+    for entry in sets or []:
+        key, separator, value = entry.partition("=")
+        if not separator:
+            raise input_error(f"'{entry}' is not KEY=VALUE", where="--set")
+        try:
+            changed = with_value(component.parameters, key.strip(), value.strip())
+        except InputError as error:
+            raise InputError(Problem("--set", p.key, p.message) for p in error.problems) from None
+        sources = {**component.sources, key.strip(): "set on the command line"}
+        component = replace(component, parameters=changed, sources=sources)
+    return component
+
+
+def axes_of(word: str) -> tuple[str, ...]:
+    """The axes that a word means, the one for the bench first."""
+    from wm_drake.rigs import AXES
+
+    if word in AXIS_WORDS:
+        return AXIS_WORDS[word]
+    if word in AXES:
+        return (word,)
+    raise input_error(f"no axis '{word}'{nearest_names(word, [*AXIS_WORDS, *AXES])}", where="--axis")
+
+
+def quantities_of(text: str, unit: "Unit", option: str) -> tuple[float, ...]:
+    """Several with one unit, ``(1, 3, 5) mm`` or ``1,3,5 mm``, in SI."""
+    from wm_drake.parameters.units import convert
+
+    body = text.strip()
+    if not body.startswith("("):
+        size = len(_digits(body))
+        body = f"({body[:size]}) {body[size:]}"
+    numbers, _, written = body[1:].partition(")")
+    try:
+        values = [float(part) for part in numbers.split(",")]
+    except ValueError:
+        raise input_error(f"'{text}' is not a number with a unit; write for example '1 {unit.shown}'", where=option) from None
+    try:
+        return tuple(convert(value, written.strip() or None, unit) for value in values)
+    except ValueError as error:
+        raise input_error(f"'{text}': {error}", where=option) from None
+
+
+def _digits(text: str) -> str:
+    """The leading numbers of a text, commas between them."""
+    match = re.match(r"[\s,]*(?:[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[\s,]*)*", text.strip())
+    return match[0] if match else ""
+
+
+def existing_files(paths: list[Path]) -> list[Path]:
+    """The paths, if all are files."""
+    problems = [Problem(str(path), "", "no such file") for path in paths if not path.is_file()]
+    if problems:
+        raise InputError(problems)
+    return paths

@@ -1,0 +1,308 @@
+"""`wm-drake identify`: the numbers of a component from measured loops."""
+
+import json
+import shlex
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from wm_drake.cli.common import JsonOption, MachineOption, SetOption
+from wm_drake.cli.components import (
+    ArmOption,
+    AxisOption,
+    ComponentOption,
+    NameOption,
+    Target,
+    axes_of,
+    existing_files,
+    quantities_of,
+    target_of,
+)
+from wm_drake.errors import input_error, nearest_names
+from wm_drake.outputs import progress_bar, result_folder
+
+if TYPE_CHECKING:
+    from wm_drake.parameters.units import Unit
+    from wm_drake.rigs.measured import MeasuredMotion
+    from wm_drake.studies.component_fit import ComponentModel
+    from wm_drake.studies.identification import Fit
+
+app = typer.Typer(help="Find the numbers of a component from measured loops.", no_args_is_help=True)
+
+DEFAULT_OUT = Path("wm-drake-identify")
+PER_CENT = 100
+
+FilesArgument = Annotated[list[Path], typer.Argument(help="CSV files: time, displacement, force.", metavar="FILES...")]
+MethodOption = Annotated[str, typer.Option("--method", help="least-squares, response-surface or evolution.", metavar="NAME")]
+BoundsOption = Annotated[
+    list[str] | None,
+    typer.Option("--bounds", help="Of an unknown: sponge_stiffness='(50, 300) N/mm'. Repeatable.", metavar="KEY=RANGE"),
+]
+FixOption = Annotated[
+    list[str] | None,
+    typer.Option("--fix", help="A number that is known: slider_damping='0.4 N s/mm'. Repeatable.", metavar="KEY=VALUE"),
+]
+UnitsOption = Annotated[
+    str | None,
+    typer.Option("--units", help="Of time, displacement, force, where files do not say: 's,mm,N'.", metavar="UNITS"),
+]
+KnotsOption = Annotated[int, typer.Option("--knots", help="Points of a table on each side of zero.", min=1, max=12)]
+SeedOption = Annotated[int, typer.Option("--seed", help="Of the search.")]
+OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.", metavar="DIR")]
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What all three commands ask alike."""
+
+    files: list[Path]
+    units: str | None
+    method: str
+    seed: int
+    out: Path
+    as_json: bool
+
+
+@app.command("damper")
+def identify_damper(
+    files: FilesArgument,
+    law: Annotated[
+        str | None, typer.Option(help="coulomb, stv, havsin, mstv, stv_sponge, free_stroke; the component's by default.")
+    ] = None,
+    method: MethodOption = "least-squares",
+    bounds: BoundsOption = None,
+    fix: FixOption = None,
+    units: UnitsOption = None,
+    knots: KnotsOption = 5,
+    seed: SeedOption = 0,
+    machine: MachineOption = "reference",
+    name: NameOption = None,
+    component: ComponentOption = None,
+    out: OutOption = DEFAULT_OUT,
+    as_json: JsonOption = False,
+    sets: SetOption = None,
+) -> None:
+    """A friction damper; free_stroke finds the curve of its sponge as a monotone table."""
+    from wm_drake.studies.component_fit import damper_model
+
+    target = target_of("damper", machine, name, component, sets)
+    own = str(target.component.parameters.law)  # type: ignore[union-attr]
+    asked = _Asked(files, units, method, seed, out, as_json)
+    motions = _motions(asked, rotates=False)
+    kept = _kept_fields(target, law or own)
+    fixed = kept | _single(fix, "--fix")
+    model = damper_model(law or own, motions, _ranges(bounds), fixed, knots)
+    _run(asked, f"damper {target.component.name}, law {model.law}", target, model, motions, {})
+
+
+@app.command("bushing")
+def identify_bushing(
+    files: FilesArgument,
+    axis: AxisOption,
+    law: Annotated[str, typer.Option(help="voigt, table (monotone curve) or, about an axis, voigt_havsin.")] = "voigt",
+    arm: ArmOption = None,
+    method: MethodOption = "least-squares",
+    bounds: BoundsOption = None,
+    fix: FixOption = None,
+    units: UnitsOption = None,
+    knots: KnotsOption = 5,
+    seed: SeedOption = 0,
+    machine: MachineOption = "reference",
+    name: NameOption = None,
+    component: ComponentOption = None,
+    out: OutOption = DEFAULT_OUT,
+    as_json: JsonOption = False,
+    sets: SetOption = None,
+) -> None:
+    """One axis of a six-component bushing."""
+    target = target_of("bushing", machine, name, component, sets)
+    asked = _Asked(files, units, method, seed, out, as_json)
+    _identify_bushing(asked, target, axis, law, arm, bounds, fix, knots)
+
+
+@app.command("gasket")
+def identify_gasket(
+    files: FilesArgument,
+    axis: AxisOption,
+    law: Annotated[str, typer.Option(help="voigt, table (monotone curve) or, about an axis, voigt_havsin.")] = "voigt",
+    arm: ArmOption = None,
+    method: MethodOption = "least-squares",
+    bounds: BoundsOption = None,
+    fix: FixOption = None,
+    units: UnitsOption = None,
+    knots: KnotsOption = 5,
+    seed: SeedOption = 0,
+    machine: MachineOption = "reference",
+    component: ComponentOption = None,
+    out: OutOption = DEFAULT_OUT,
+    as_json: JsonOption = False,
+    sets: SetOption = None,
+) -> None:
+    """One axis of the gasket."""
+    target = target_of("gasket", machine, None, component, sets)
+    asked = _Asked(files, units, method, seed, out, as_json)
+    _identify_bushing(asked, target, axis, law, arm, bounds, fix, knots)
+
+
+def _identify_bushing(
+    asked: _Asked,
+    target: Target,
+    axis: str,
+    law: str,
+    arm: str | None,
+    bounds: list[str] | None,
+    fix: list[str] | None,
+    knots: int,
+) -> None:
+    from wm_drake.parameters.units import Unit
+    from wm_drake.studies.component_fit import bushing_model
+
+    axes = axes_of(axis)
+    radius = quantities_of(arm, Unit("m", "mm"), "--arm")[0] if arm else 0.0
+    motions = _motions(asked, rotates=axes[0].startswith("about") and not radius)
+    model = bushing_model(
+        law,
+        motions,
+        target.component.parameters,  # type: ignore[arg-type]
+        axes[0],
+        arm=radius,
+        bounds=_ranges(bounds),
+        fixed=_single(fix, "--fix"),
+        knots=knots,
+    )
+    ours, others = axes[0][-1], [other[-1] for other in axes[1:]]
+    fields = [unknown.name.split(".")[0] for unknown in model.unknowns]
+    copies = {f"{field[: -len(ours)]}{other}": field for field in fields for other in others}
+    _run(asked, f"{target.component.name}, {axis.replace('_', ' ')}, law {law}", target, model, motions, copies)
+
+
+def _motions(asked: _Asked, *, rotates: bool) -> "list[MeasuredMotion]":
+    """The loops of the files, with the motion each made."""
+    from wm_drake.errors import InputError, Problem
+    from wm_drake.parameters import read_loops
+    from wm_drake.rigs.measured import measured_motion
+
+    units = None
+    if asked.units is not None:
+        parts = [part.strip() for part in asked.units.split(",")]
+        if len(parts) != 3:
+            raise input_error(f"'{asked.units}' is not three units; write for example 's,mm,N'", where="--units")
+        units = (parts[0], parts[1], parts[2])
+    loops = read_loops(existing_files(asked.files), units)
+    if loops[0].rotates != rotates:
+        holds, needs = ("angles and moments", "displacements and forces")[:: 1 if loops[0].rotates else -1]
+        raise input_error(f"holds {holds}, needs {needs} (or --arm)", where=loops[0].path)
+    motions, problems = [], list[Problem]()
+    for loop in loops:
+        try:
+            motions.append(measured_motion(loop))
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    return sorted(motions, key=lambda measured: (round(measured.motion.frequency, 2), measured.motion.amplitude))
+
+
+def _kept_fields(target: Target, law: str) -> dict[str, float]:
+    """Numbers of the component that no loop shall change: of the same law, those that are not unknown."""
+    from wm_drake.parameters import quantities
+    from wm_drake.studies.component_fit import DAMPER_LAWS
+
+    parameters = target.component.parameters
+    if law not in DAMPER_LAWS or getattr(parameters, "law", None) != law:
+        return {}
+    free = set(DAMPER_LAWS[law])
+    return {key: value for key, value, _ in quantities(parameters) if "." not in key and key not in free}
+
+
+def _pairs(entries: list[str] | None, option: str) -> list[tuple[str, str]]:
+    found = []
+    for entry in entries or []:
+        key, separator, text = entry.partition("=")
+        if not separator:
+            raise input_error(f"'{entry}' is not KEY=VALUE", where=option)
+        found.append((key.strip(), text.strip()))
+    return found
+
+
+def _ranges(entries: list[str] | None) -> dict[str, tuple[float, float]]:
+    found = {}
+    for key, text in _pairs(entries, "--bounds"):
+        values = quantities_of(text, _unit_of_field(key, "--bounds"), "--bounds")
+        if len(values) != 2:
+            raise input_error(f"'{text}' is not a range; write for example '(50, 300) N/mm'", where="--bounds", key=key)
+        found[key] = (values[0], values[1])
+    return found
+
+
+def _single(entries: list[str] | None, option: str) -> dict[str, float]:
+    return {key: quantities_of(text, _unit_of_field(key, option), option)[0] for key, text in _pairs(entries, option)}
+
+
+def _unit_of_field(key: str, option: str) -> "Unit":
+    """Unit of a component's field, or of a rise of one of its tables."""
+    from wm_drake.studies.component_fit.models import unit_of_field, units_of_fields
+
+    unit = unit_of_field(key)
+    if unit is None:
+        raise input_error(f"unknown number '{key}'{nearest_names(key, units_of_fields())}", where=option)
+    return unit
+
+
+def _run(
+    asked: _Asked,
+    title: str,
+    target: Target,
+    model: "ComponentModel",
+    motions: "list[MeasuredMotion]",
+    copies: dict[str, str],
+) -> None:
+    from wm_drake.report.identify_report import errors_table, estimates_table, fitted_loops, identify_report
+    from wm_drake.studies.component_fit import fit_problem, fragment
+    from wm_drake.studies.identification import identify
+
+    try:
+        with result_folder(asked.out) as folder:
+            with progress_bar(PER_CENT, "identify") as bar:
+                fit = identify(
+                    fit_problem(model, motions),
+                    asked.method,
+                    seed=asked.seed,
+                    progress=lambda fraction, least: bar(int(PER_CENT * fraction)),
+                )
+            text = fragment(fit, model, target.component, target.machine, target.key, copies, asked.out)
+            (folder / "identified.yaml").write_text(text, encoding="utf-8")
+            estimates_table(fit).to_csv(folder / "parameters.csv", index=False)
+            errors_table(fit, motions).to_csv(folder / "errors.csv", index=False)
+            fitted_loops(fit, motions).to_csv(folder / "loops.csv", index=False, float_format="%.7g")
+            (folder / "fit.json").write_text(json.dumps(fit.as_dict(), indent=1), encoding="utf-8")
+            command = shlex.join(["wm-drake", *sys.argv[1:]])
+            (folder / "report.html").write_text(identify_report(title, fit, motions, command), encoding="utf-8")
+    except KeyboardInterrupt:
+        typer.echo("interrupted; nothing was written", err=True)
+        raise typer.Exit(130) from None
+    if asked.as_json:
+        typer.echo(json.dumps({"component": title, **fit.as_dict()}))
+    else:
+        _print(title, fit, asked.out)
+
+
+def _print(title: str, fit: "Fit", out: Path) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from wm_drake.report.identify_report import estimate_cells, undetermined_sentences
+
+    table = Table(title=f"{title}: RMSE {fit.rmse:.4g} by {fit.method}")
+    for head in ("unknown", "value", "95 % interval", "unit", "remark"):
+        table.add_column(head)
+    for cells in estimate_cells(fit):
+        table.add_row(*cells)
+    console = Console()
+    console.print(table)
+    for sentence in (*undetermined_sentences(fit), *fit.notes):
+        console.print(sentence, highlight=False)
+    console.print(f"Results in {out}: report.html, identified.yaml, parameters.csv, errors.csv, loops.csv, fit.json")

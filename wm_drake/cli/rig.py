@@ -1,0 +1,202 @@
+"""`wm-drake rig`: a component on a bench, its force loops, and what is read off them."""
+
+import json
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wm_drake.cli.common import JsonOption, MachineOption, SetOption
+from wm_drake.cli.components import ArmOption, AxisOption, ComponentOption, NameOption, axes_of, quantities_of, target_of
+from wm_drake.errors import input_error, nearest_names
+from wm_drake.outputs import progress_bar, result_folder
+
+if TYPE_CHECKING:
+    from wm_drake.parameters import Component
+    from wm_drake.rigs import Bench, Harmonic, RigRun
+
+app = typer.Typer(help="Test a component on a bench: harmonic motion, steady force loops.", no_args_is_help=True)
+
+DEFAULT_OUT = Path("wm-drake-rig")
+FrequencyOption = Annotated[
+    str | None, typer.Option("--frequency", "-f", help="Of the motion; several as '1,3,5 Hz'.", metavar="FREQUENCIES")
+]
+AmplitudeOption = Annotated[
+    str | None,
+    typer.Option("--amplitude", "-a", help="Of the motion; several as '1,3,5 mm', angles in deg.", metavar="AMPLITUDES"),
+]
+MatrixOption = Annotated[
+    str | None, typer.Option("--matrix", help="Run the test matrix of a paper: A, or for dampers C.", metavar="PAPER")
+]
+OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.", metavar="DIR")]
+
+
+@app.command("damper")
+def rig_damper(
+    frequency: FrequencyOption = None,
+    amplitude: AmplitudeOption = None,
+    matrix: MatrixOption = None,
+    machine: MachineOption = "reference",
+    name: NameOption = None,
+    component: ComponentOption = None,
+    sponge_mass: Annotated[
+        str | None, typer.Option(help="Mass of the sponge of an mstv damper, e.g. '10 g'; none in the machine.", metavar="MASS")
+    ] = None,
+    out: OutOption = DEFAULT_OUT,
+    as_json: JsonOption = False,
+    sets: SetOption = None,
+) -> None:
+    """A friction damper along its line."""
+    from wm_drake.parameters.units import Unit
+    from wm_drake.rigs import damper_bench
+
+    chosen = target_of("damper", machine, name, component, sets).component
+    mass = quantities_of(sponge_mass, Unit("kg", "kg"), "--sponge-mass")[0] if sponge_mass else 0.0
+    bench = damper_bench(chosen.parameters, mass)  # type: ignore[arg-type]
+    motions = _motions("damper", bench, frequency, amplitude, matrix)
+    law = chosen.parameters.law  # type: ignore[union-attr]
+    title = f"damper {chosen.name}, law {law}{f', sponge of {1e3 * mass:g} g' if mass else ''}"
+    _run(title, bench, motions, chosen, out, as_json)
+
+
+@app.command("bushing")
+def rig_bushing(
+    axis: AxisOption,
+    frequency: FrequencyOption = None,
+    amplitude: AmplitudeOption = None,
+    matrix: MatrixOption = None,
+    arm: ArmOption = None,
+    machine: MachineOption = "reference",
+    name: NameOption = None,
+    component: ComponentOption = None,
+    out: OutOption = DEFAULT_OUT,
+    as_json: JsonOption = False,
+    sets: SetOption = None,
+) -> None:
+    """One axis of a six-component bushing."""
+    chosen = target_of("bushing", machine, name, component, sets).component
+    _rig_of_bushing("bushing", chosen, axis, frequency, amplitude, matrix, arm, out, as_json)
+
+
+@app.command("gasket")
+def rig_gasket(
+    axis: AxisOption,
+    frequency: FrequencyOption = None,
+    amplitude: AmplitudeOption = None,
+    matrix: MatrixOption = None,
+    arm: ArmOption = None,
+    machine: MachineOption = "reference",
+    component: ComponentOption = None,
+    out: OutOption = DEFAULT_OUT,
+    as_json: JsonOption = False,
+    sets: SetOption = None,
+) -> None:
+    """One axis of the gasket."""
+    chosen = target_of("gasket", machine, None, component, sets).component
+    _rig_of_bushing("gasket", chosen, axis, frequency, amplitude, matrix, arm, out, as_json)
+
+
+def _rig_of_bushing(
+    kind: str,
+    chosen: "Component",
+    axis: str,
+    frequency: str | None,
+    amplitude: str | None,
+    matrix: str | None,
+    arm: str | None,
+    out: Path,
+    as_json: bool,
+) -> None:
+    from wm_drake.parameters.units import Unit
+    from wm_drake.rigs import JIG_ARM, bushing_bench
+
+    turned = axes_of(axis)[0]
+    radius = quantities_of(arm, Unit("m", "mm"), "--arm")[0] if arm else 0.0
+    if matrix is not None and turned.startswith("about") and not arm:
+        radius = JIG_ARM
+    bench = bushing_bench(chosen.parameters, turned, radius)  # type: ignore[arg-type]
+    motions = _motions(kind, bench, frequency, amplitude, matrix)
+    name = kind if chosen.name == kind else f"{kind} {chosen.name}"
+    title = f"{name}, axis {turned.replace('_', ' ')}{f', through an arm of {1e3 * radius:g} mm' if radius else ''}"
+    _run(title, bench, motions, chosen, out, as_json)
+
+
+def _motions(kind: str, bench: "Bench", frequency: str | None, amplitude: str | None, matrix: str | None) -> "list[Harmonic]":
+    from wm_drake.parameters.units import Unit
+    from wm_drake.rigs import MATRICES, Harmonic
+
+    if matrix is not None:
+        if frequency or amplitude:
+            raise input_error("has its own frequencies and amplitudes; leave -f and -a out", where="--matrix")
+        papers = MATRICES[kind]
+        if matrix not in papers:
+            raise input_error(f"no matrix '{matrix}' for a {kind}{nearest_names(matrix, papers)}", where="--matrix")
+        return list(papers[matrix])
+    if not (frequency and amplitude):
+        raise input_error("needs -f and -a (for example -f '3 Hz' -a '5 mm'), or --matrix", where=f"rig {kind}")
+    unit = Unit("rad", "deg") if bench.rotates else Unit("m", "mm")
+    return [
+        Harmonic(f, a)
+        for f in quantities_of(frequency, Unit("Hz", "Hz"), "--frequency")
+        for a in quantities_of(amplitude, unit, "--amplitude")
+    ]
+
+
+def _run(title: str, bench: "Bench", motions: "list[Harmonic]", chosen: "Component", out: Path, as_json: bool) -> None:
+    from wm_drake.report.rig_report import loop_file, loop_table, measures_table, rig_report
+    from wm_drake.rigs import run_rig
+
+    try:
+        with result_folder(out) as folder:
+            with progress_bar(len(motions), "loops") as progress:
+                run = run_rig(title, bench, motions, _numbers(chosen), progress)
+            for loop in run.loops:
+                loop_table(loop).to_csv(folder / loop_file(loop), index=False, float_format="%.9g")
+            measures_table(run).to_csv(folder / "measures.csv", index=False, float_format="%.9g")
+            command = shlex.join(["wm-drake", *sys.argv[1:]])
+            (folder / "report.html").write_text(rig_report(run, command), encoding="utf-8")
+    except KeyboardInterrupt:
+        typer.echo("interrupted; nothing was written", err=True)
+        raise typer.Exit(130) from None
+    if as_json:
+        typer.echo(json.dumps(_as_json(run)))
+    else:
+        _print(run, out)
+
+
+def _numbers(chosen: "Component") -> tuple[tuple[str, str, str], ...]:
+    from wm_drake.parameters import quantities
+    from wm_drake.report.tables import readable
+
+    found = []
+    for key, value, unit in quantities(chosen.parameters):
+        if key.startswith("end_bushing"):
+            continue  # not on the bench
+        source = next((chosen.sources[part] for part in (key, key.split(".")[0]) if part in chosen.sources), "")
+        found.append((key, readable(value, unit), source))
+    return tuple(found)
+
+
+def _as_json(run: "RigRun") -> dict[str, Any]:
+    from wm_drake.report.rig_report import measures_table
+
+    rows = json.loads(measures_table(run).to_json(orient="records", double_precision=15))
+    return {"component": run.title, **rows[0]} if len(rows) == 1 else {"component": run.title, "loops": rows}
+
+
+def _print(run: "RigRun", out: Path) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from wm_drake.report.rig_report import measures_cells, measures_header
+
+    table = Table(title=run.title)
+    for name in measures_header(run):
+        table.add_column(name, justify="right")
+    for cells in measures_cells(run):
+        table.add_row(*cells)
+    console = Console()
+    console.print(table)
+    console.print(f"Results in {out}: report.html, measures.csv, loop_<frequency>_<amplitude>.csv")

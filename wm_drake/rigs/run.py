@@ -1,0 +1,79 @@
+"""Many loops of one component, as a test report has them; the test matrices of the papers."""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wm_drake.laws.damper import MSTV
+from wm_drake.laws.friction import mstv_friction
+from wm_drake.parameters.elements import FloatArray
+from wm_drake.rigs.bench import Bench, DamperBench, Harmonic
+from wm_drake.rigs.loops import ForceLoop, LoopMeasures, force_loops, measures_of
+
+JIG_ARM = 0.1
+"""Radius of the jig of [A] section 2.2. [m]"""
+
+_MM = 1e-3
+_A_DAMPER = tuple(itertools.product((1.0, 3.0, 5.0, 7.0), (1.0, 3.0, 5.0, 6.0, 8.0, 10.0)))
+_A_BUSHING = tuple(itertools.product((1.0, 3.0, 5.0, 7.0), (0.1, 0.2, 0.4, 2.0, 4.0)))
+_A_GASKET = tuple(itertools.product((1.0, 3.0, 5.0), (1.0, 5.0, 10.0)))
+_C_DAMPER = (
+    *itertools.product((1.0,), (0.3, 0.5, 1.0, 5.0, 10.0)),
+    *itertools.product((3.0,), (0.3, 0.5, 1.0, 3.0, 5.0)),
+    *itertools.product((6.67, 10.0), (0.3, 0.5, 1.0, 1.5)),
+)
+MATRICES: dict[str, dict[str, tuple[Harmonic, ...]]] = {
+    component: {paper: tuple(Harmonic(f, a * _MM) for f, a in tests) for paper, tests in papers.items()}
+    for component, papers in {
+        "damper": {"A": _A_DAMPER, "C": _C_DAMPER},
+        "bushing": {"A": _A_BUSHING},
+        "gasket": {"A": _A_GASKET},
+    }.items()
+}
+"""By component and paper: [C] Table 1; the frequencies and amplitudes of [A] Tables 2, 4, 5 and 7, all with all. Rotations are
+driven through the jig arm, so these amplitudes are its displacements."""
+
+
+@dataclass(frozen=True, eq=False)
+class RigRun:
+    """Loops of a component.
+
+    Attributes:
+        title: What is on the bench, in words.
+        bench: It.
+        numbers: Its parameters for reading: key, value with unit, source.
+        loops, measures: One of each for every motion.
+    """
+
+    title: str
+    bench: Bench
+    numbers: tuple[tuple[str, str, str], ...]
+    loops: tuple[ForceLoop, ...]
+    measures: tuple[LoopMeasures, ...]
+
+
+def run_rig(
+    title: str,
+    bench: Bench,
+    motions: Sequence[Harmonic],
+    numbers: tuple[tuple[str, str, str], ...] = (),
+    progress: Callable[[int], None] = lambda done: None,
+) -> RigRun:
+    """Runs all motions, those of one frequency side by side."""
+    found: dict[Harmonic, ForceLoop] = {}
+    for frequency in dict.fromkeys(motion.frequency for motion in motions):
+        together = [motion for motion in motions if motion.frequency == frequency]
+        found |= dict(zip(together, force_loops(bench, together), strict=True))
+        progress(len(found))
+    loops = tuple(found[motion] for motion in motions)
+    return RigRun(title, bench, numbers, loops, tuple(map(measures_of, loops)))
+
+
+def mstv_friction_curves(bench: Bench, deformation_rates: Sequence[float], rates: FloatArray) -> FloatArray | None:
+    """Friction over the velocity of the slider at held deformation rates, as [C] Fig. 12; None for other laws. [m/s -> N]"""
+    if not isinstance(bench, DamperBench) or int(bench.packed[0]) != MSTV:
+        return None
+    f_max, c_m, epsilon = bench.packed[1:4]
+    return np.array([[mstv_friction(w, u, f_max, c_m, epsilon) for w in rates] for u in deformation_rates])
