@@ -68,7 +68,7 @@ def load_load(path: Path) -> Load:
 
 def read_mapping(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     """A YAML file as plain text values, and the sources of its numbers by key path."""
-    return _without_sources(_read_yaml(path))
+    return _without_sources(read_yaml(path))
 
 
 def shipped_profiles() -> dict[str, Path]:
