@@ -1,5 +1,7 @@
 """`wm-drake study gasket`: how stiffness and damping of the gasket act on the tub and on the housing."""
 
+import shlex
+import sys
 import time
 from collections.abc import Sequence
 from functools import partial
@@ -82,7 +84,7 @@ def gasket(
         screening = _run(work, plan, run)
         ledger.mark_finished()
         with result_folder(out) as folder:
-            _write(screening, folder)
+            _write(screening, work, folder, time.perf_counter() - begin)
     _tell(screening, out, as_json, time.perf_counter() - begin)
 
 
@@ -156,10 +158,13 @@ def _run(work: "GasketTrials", plan: "Design", run: "Callable[..., xr.Dataset]")
         return run_screening(plan, lambda d: work.responses(d, lambda cases: run(cases, measures=MEASURES, progress=progress)))
 
 
-def _write(screening: "Screening", folder: Path) -> None:
+def _write(screening: "Screening", work: "GasketTrials", folder: Path, wall_s: float) -> None:
+    from wm_drake.report.gasket_report import gasket_report
     from wm_drake.studies.screening_tables import write_tables
 
     write_tables(screening, folder)
+    command = shlex.join(["wm-drake", *sys.argv[1:]])
+    (folder / "report.html").write_text(gasket_report(screening, work, command, wall_s), encoding="utf-8")
 
 
 def _tell(screening: "Screening", out: Path, as_json: bool, wall_s: float) -> None:
@@ -169,7 +174,7 @@ def _tell(screening: "Screening", out: Path, as_json: bool, wall_s: float) -> No
         typer.echo(to_json(as_plain_data(screening) | {"wall_s": wall_s}))
     else:
         _print_table(screening)
-        typer.echo(f"Results in {out}: CSV tables")
+        typer.echo(f"Results in {out}: report.html and CSV tables")
     for (trial, load), reason in screening.responses.failed.items():
         typer.echo(f"trial {trial + 1}, load {load}: {reason}", err=True)
     if screening.responses.failed:
