@@ -36,7 +36,7 @@ def test_prints_one_json_object_and_writes_what_it_says(study):
     rms = np.array([case["rms_mm"] for case in shown["cases"]])
     assert rms.shape == (2, 2, 3, 3)
     assert rms.min() > 0.0
-    assert sorted(path.name for path in Path("out").iterdir()) == ["cases.csv", "report.html", "rms.csv", "runs.sqlite"]
+    assert sorted(path.name for path in Path("out").iterdir()) == ["cases.csv", "ledger.sqlite", "report.html", "rms.csv"]
     table = pd.read_csv("out/rms.csv")
     np.testing.assert_allclose(table["rms_mm"].to_numpy().reshape(rms.shape), rms, rtol=1e-5)
     page = Path("out/report.html").read_text(encoding="utf-8")
@@ -61,7 +61,7 @@ def test_interrupted_it_keeps_what_had_ended(study, monkeypatch):
         patched.setattr("wm_drake.report.spin_cycle_report.spin_cycle_report", interrupted)
         ended = study()
         assert ended.code == 130
-        assert [path.name for path in Path("out").iterdir()] == ["runs.sqlite"]
+        assert [path.name for path in Path("out").iterdir()] == ["ledger.sqlite"]
     monkeypatch.setattr("wm_drake.batch.runs.integrate_lanes", None)
     assert study().code == 0
 

@@ -12,6 +12,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
     JointActuator,
+    PrismaticJoint,
+    RigidBody,
     RotationalInertia,
     RpyFloatingJoint,
     SpatialInertia,
@@ -59,14 +61,31 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
         )
     if missing:
         raise input_error(f"SDF '{parameters.model}' has no {' and no '.join(missing)}", key="model")
-    tub = plant.GetBodyByName("tub")
-    plant.AddJoint(RpyFloatingJoint("tub_floating", plant.world_frame(), tub.body_frame()))
+    floating = [plant.GetBodyByName("tub"), *(outer_tube(plant, parameters, name) for name in parameters.telescopic_dampers)]
+    for body in floating:
+        plant.AddJoint(RpyFloatingJoint(f"{body.name()}_floating", plant.world_frame(), body.body_frame()))
     actuator = _drive_actuator(plant, parameters.drive.joint)
     actuator.set_default_rotor_inertia(REFLECTED_INERTIA)
     actuator.set_default_gear_ratio(1.0)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -parameters.gravity])
     plant.Finalize()
     _check_freedoms(plant, parameters)
+
+
+def outer_tube(plant: MultibodyPlant, parameters: MachineParameters, name: str) -> RigidBody:
+    """The outer tube of a telescopic damper: the parent of its joint.
+
+    Raises:
+        InputError: no such joint, or not a prismatic one.
+    """
+    key, joint_name = f"telescopic_dampers.{name}.joint", parameters.telescopic_dampers[name].joint
+    joints = [joint.name() for joint in map(plant.get_joint, plant.GetJointIndices())]
+    if joint_name not in joints:
+        raise input_error(f"no joint '{joint_name}'{nearest_names(joint_name, joints)}", key=key)
+    joint = plant.GetJointByName(joint_name)
+    if not isinstance(joint, PrismaticJoint):
+        raise input_error(f"joint '{joint_name}' is {joint.type_name()}, not prismatic", key=key)
+    return joint.parent_body()
 
 
 def _drive_actuator(plant: MultibodyPlant, joint_name: str) -> JointActuator:
@@ -82,12 +101,22 @@ def _drive_actuator(plant: MultibodyPlant, joint_name: str) -> JointActuator:
 
 def _check_freedoms(plant: MultibodyPlant, parameters: MachineParameters) -> None:
     floating, drive = plant.GetJointByName("tub_floating"), plant.GetJointByName(parameters.drive.joint)
-    if plant.num_velocities() != 7 or floating.velocity_start() != 0 or drive.velocity_start() != 6:
+    dampers = len(parameters.telescopic_dampers)
+    if plant.num_velocities() != 7 + 7 * dampers or floating.velocity_start() != 0 or drive.velocity_start() != 6:
+        tubes = ", seven for each damper with tubes" if dampers else ""
         raise input_error(
-            f"SDF '{parameters.model}' has {plant.num_velocities()} freedoms; a machine has the tub's six and the drum's one, "
-            "all else on fixed joints",
+            f"SDF '{parameters.model}' has {plant.num_velocities()} freedoms; a machine has the tub's six and the drum's one"
+            f"{tubes}, all else on fixed joints",
             key="model",
         )
+    for index, damper in enumerate(parameters.telescopic_dampers.values()):  # Drake counts trees in the order of their joints
+        assert plant.GetJointByName(damper.joint).position_start() == 13 + 7 * index
+
+
+def tubes_of(plant: MultibodyPlant, joint: str) -> tuple[RigidBody, RigidBody]:
+    """Outer and inner tube of a telescoping joint."""
+    telescope = plant.GetJointByName(joint)
+    return telescope.parent_body(), telescope.child_body()
 
 
 def frame_names(plant: MultibodyPlant) -> list[str]:
@@ -109,6 +138,11 @@ def frame_problems(plant: MultibodyPlant, parameters: MachineParameters) -> list
         for table, name, element in _placed_elements(parameters)
         for end in ("tub", "housing")
     ]
+    for name, damper in parameters.telescopic_dampers.items():
+        outer, inner = (body.name() for body in tubes_of(plant, damper.joint))
+        ends = (("tub", "tub"), ("outer", outer), ("inner", inner), ("housing", "housing"))
+        key = f"telescopic_dampers.{name}"
+        wanted += [(f"{key}.{end}_frame", body, getattr(damper, f"{end}_frame")) for end, body in ends]
     wanted += [(f"sensors.{name}.frame", "tub", sensor.frame) for name, sensor in parameters.sensors.items()]
     wanted += [(f"accelerometers.{name}.frame", "tub", sensor.frame) for name, sensor in parameters.accelerometers.items()]
     wanted.append(("clearance.detergent_frame", "tub", parameters.clearance.detergent_frame))
@@ -127,8 +161,12 @@ def _name_problems(
             problems.append(Problem("", key, f"no frame '{frame}' in the SDF{nearest_names(frame, known)}"))
         elif not fixed_to(plant, body, frame):
             problems.append(Problem("", key, f"frame '{frame}' is not fixed to the {body}"))
-    moving = [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]
-    links = [body.name() for body in moving]
+    fixed = [body.index() for body in plant.GetBodiesWeldedTo(plant.world_body())]
+    links = [
+        body.name()
+        for body in map(plant.get_body, plant.GetBodyIndices(plant.GetBodyByName("tub").model_instance()))
+        if body.index() not in fixed
+    ]
     problems += [
         Problem("", f"bodies.{name}", f"no moving link '{name}' in the SDF{nearest_names(name, links)}")
         for name in bodies

@@ -6,7 +6,7 @@ import numpy as np
 
 from wm_drake.kernel.histories import rates_history
 from wm_drake.kernel.integration import integrate_alone
-from wm_drake.kernel.mechanics import LINE_SIZE, STATE_SIZE
+from wm_drake.kernel.mechanics import LINE_SIZE
 from wm_drake.kernel.packing import initial_state, pack
 from wm_drake.kernel.schedule import schedule_of
 from wm_drake.machine import OUTPUT_PERIOD, Setup
@@ -47,5 +47,5 @@ def run_compiled(setup: Setup, profile: SpinProfile, step: float, progress: Call
         progress(done / len(schedule.step))
     rates = np.empty((len(samples), 7))
     rates_history(samples, schedule.sample_acceleration[:, None], p, layout.elements, rates)
-    motion, deformation = samples[:, :STATE_SIZE], samples[:, STATE_SIZE:]
-    return ended_where_it_diverged(Trajectory(schedule.time, motion, deformation, rates[:, 6], rates[:, :6]))
+    motion, deformation, tubes = layout.parts(samples)
+    return ended_where_it_diverged(Trajectory(schedule.time, motion, deformation, rates[:, 6], rates[:, :6], tubes))

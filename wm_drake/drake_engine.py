@@ -7,6 +7,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from wm_drake.machine import Setup
 from wm_drake.parameters import SpinProfile
+from wm_drake.systems.element import PLANT_STATE_SIZE
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 from wm_drake.trajectory import Trajectory, diverging_coordinate, ended_where_it_diverged
 
@@ -66,9 +67,12 @@ def _logged(setup: Setup, profile: SpinProfile, failure: str) -> Trajectory:
     # the drive's torque is what its reflected inertia does not take up: J alpha - J vdot
     segment = np.clip(np.searchsorted(profile.time, time, side="right") - 1, 0, len(profile.time) - 2)
     torque = REFLECTED_INERTIA * (np.array(profile.acceleration())[segment] - columns["acceleration"][:, 6])
-    deformation = np.zeros((len(time), len(setup.dampers)))
-    for index, name in enumerate(setup.dampers):
+    dampers = [*setup.dampers, *setup.telescopes]
+    deformation = np.zeros((len(time), len(dampers)))
+    for index, name in enumerate(dampers):
         if name in columns:
             deformation[:, index] = columns[name][:, 0]
+    trees = [columns["bodies"][:, list(indices)] for indices in setup.machine.tree_states()]
+    tubes = np.stack(trees[1:], axis=1) if trees[1:] else np.empty((len(time), 0, PLANT_STATE_SIZE))
     accelerations = columns["acceleration"][:, :6]
-    return ended_where_it_diverged(Trajectory(time, columns["bodies"], deformation, torque, accelerations), failure)
+    return ended_where_it_diverged(Trajectory(time, trees[0], deformation, torque, accelerations, tubes), failure)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
-from pydrake.systems.primitives import Adder, LogVectorOutput, VectorLogSink
+from pydrake.systems.primitives import Adder, Demultiplexer, LogVectorOutput, MatrixGain, Multiplexer, VectorLogSink
 from scipy.optimize import root
 
 from wm_drake.bodies import add_bodies, add_load, set_bodies
@@ -19,12 +19,16 @@ from wm_drake.systems.friction_damper import FrictionDamper, FrictionDamperParam
 from wm_drake.systems.six_component_bushing import SixComponentBushing, SixComponentBushingParameters, packed_bushing_law
 from wm_drake.systems.speed_source import SpeedSource
 from wm_drake.systems.spring_strut import SpringStrut, SpringStrutParameters
+from wm_drake.systems.telescopic_damper import TelescopicDamper, TelescopicDamperParameters
 
 OUTPUT_PERIOD = 5e-3
 """Time between samples of a record, as the measurements of [B]. [s]"""
 
 EQUILIBRIUM_TOLERANCE = 1e-9
 """Largest force [N] or moment [N m] that may remain at the rest pose."""
+
+TUBES_TOLERANCE = 1e-6
+"""The same on the tubes of a damper: what is left turns them about their axis, by 1e-6 rad/s, where friction alone holds."""
 
 SHORTEST_STRUT = 1e-3
 """Springs and dampers shorter than this when drawn have no direction to speak of. [m]"""
@@ -41,12 +45,13 @@ class Setup:
         machine: The built machine.
         parameters: The numbers in force.
         context: Root Context of the diagram.
-        springs, dampers, bushings: The elements in their places, by name.
+        springs, dampers, bushings, telescopes: The elements in their places, by name.
         sensor_points: By sensor name, the point in T. [m]
         detergent_point: Tub point nearest the detergent box, in T. [m]
         accelerometer_points: By name of the vibration sensor, the point in T. [m]
         rest_pose: Equilibrium of the empty machine: roll, pitch, yaw, x, y, z. [rad, m]
-        residual: What remains there of moment about To and force, in W. [N m, N]
+        residual: What remains there of moment about To and force on the tub, in W. [N m, N]
+        tube_rest: (telescopic dampers, 7) angles and position of each outer tube and extension of the damper there. [rad, m]
     """
 
     machine: "Machine"
@@ -55,11 +60,13 @@ class Setup:
     springs: dict[str, SpringStrutParameters]
     dampers: dict[str, FrictionDamperParameters]
     bushings: dict[str, SixComponentBushingParameters]
+    telescopes: dict[str, TelescopicDamperParameters]
     sensor_points: dict[str, FloatArray]
     detergent_point: FloatArray
     accelerometer_points: dict[str, FloatArray]
     rest_pose: FloatArray
     residual: FloatArray
+    tube_rest: FloatArray
 
     @property
     def plant_context(self) -> Context:
@@ -86,6 +93,7 @@ class Machine:
     springs: dict[str, SpringStrut]
     dampers: dict[str, FrictionDamper]
     bushings: dict[str, SixComponentBushing]
+    telescopes: dict[str, TelescopicDamper]
     logs: dict[str, VectorLogSink]
     blank: Context
     places: "list[_Places]" = field(default_factory=list, repr=False, compare=False)
@@ -122,8 +130,10 @@ class Machine:
         set_bodies(self.plant, plant_context, parameters)
         places = self._places(plant_context, parameters)
         bushings, placed_dampers = _placed_bushings(places, parameters), _placed_dampers(places, parameters)
+        telescopes = _placed_telescopes(self.plant, places, parameters)
         self._set(context, self.bushings, bushings)
         self._set(context, self.dampers, placed_dampers)
+        self._set(context, self.telescopes, telescopes)
         springs = self._preloaded_springs(context, parameters)
         self._set(context, self.springs, springs)
         if not gasket and "gasket" in bushings:
@@ -132,16 +142,20 @@ class Machine:
         if not dampers:
             placed_dampers = {name: replace(damper, engaged=0.0) for name, damper in placed_dampers.items()}
             self._set(context, self.dampers, placed_dampers)
+            telescopes = {name: telescope.without_friction() for name, telescope in telescopes.items()}
+            self._set(context, self.telescopes, telescopes)
         rest_pose, residual = self._rest_pose(context)
+        tube_rest = self.plant.GetPositions(plant_context)[7:].reshape(-1, 7)
         if load is not None:
             add_load(self.plant, plant_context, load)
             add_load(self.plant, plant_context, Load(unbalances=(parameters.imperfections.residual_imbalance,)))
-        self.plant.SetPositions(plant_context, np.append(rest_pose, 0.0))
+        self.plant.SetPositions(plant_context, np.concatenate([rest_pose, [0.0], tube_rest.ravel()]))
         points = {name: places("tub", sensor.frame)[0] for name, sensor in parameters.sensors.items()}
         detergent_point = places("tub", parameters.clearance.detergent_frame)[0]
         vibrations = {name: places("tub", frame)[0] for name, frame in parameters.accelerometer_frames().items()}
-        elements = springs, placed_dampers, bushings
-        return Setup(self, parameters, context, *elements, points, detergent_point, vibrations, rest_pose, residual)
+        elements = springs, placed_dampers, bushings, telescopes
+        rest = rest_pose, residual, tube_rest
+        return Setup(self, parameters, context, *elements, points, detergent_point, vibrations, *rest)
 
     def _places(self, plant_context: Context, parameters: MachineParameters) -> "_Places":
         """Where frames are; remembered from the last set-up, if that had the same overrides."""
@@ -156,18 +170,62 @@ class Machine:
 
     def handles(self, context: Context) -> list[Any]:
         """Handles of all elements' Contexts; holding them through a run makes it a tenth faster."""
-        elements = [*self.springs.values(), *self.dampers.values(), *self.bushings.values()]
+        elements = [*self.springs.values(), *self.dampers.values(), *self.bushings.values(), *self.telescopes.values()]
         return [element.handles(element.GetMyContextFromRoot(context)) for element in elements]
+
+    def tree_states(self) -> list[np.ndarray]:
+        """Indices in the plant's state of the 14 numbers of tub and drum, then of each telescopic damper's tubes."""
+        q, v = np.arange(7), self.plant.num_positions() + np.arange(7)
+        return [np.concatenate([q + 7 * tree, v + 7 * tree]) for tree in range(1 + len(self.telescopes))]
 
     def elastic_and_gravity_force(self, context: Context) -> FloatArray:
         """Moment about To and force on the tub in W at the Context's pose: all elements and gravity. [N m, N]"""
+        return self._generalized_force(context)[:6]
+
+    def _generalized_force(self, context: Context) -> FloatArray:
         plant_context = self.plant.GetMyContextFromRoot(context)
         elements = self.plant.get_applied_generalized_force_input_port().Eval(plant_context)
-        return np.asarray((elements + self.plant.CalcGravityGeneralizedForces(plant_context))[:6])
+        return np.asarray(elements + self.plant.CalcGravityGeneralizedForces(plant_context))
+
+    def _balance(self, context: Context, begin: int) -> None:
+        """Moves coordinates of the plant from number `begin` on, the drum's apart, to where no force is left on them.
+
+        Newton's method; a tube that may spin freely stays as it is, by least squares.
+
+        Raises:
+            InputError: it finds no such place nearby.
+        """
+        plant_context = self.plant.GetMyContextFromRoot(context)
+        chosen = [k for k in range(begin, self.plant.num_positions()) if k != 6]
+
+        def forces(q: FloatArray) -> FloatArray:
+            if not np.all(np.abs(q) < 1.0):
+                return np.full(len(chosen), np.inf)
+            self.plant.SetPositions(plant_context, q)
+            return self._generalized_force(context)[chosen]
+
+        q = self.plant.GetPositions(plant_context)
+        steps = 1e-6 * np.eye(len(q))[chosen]
+        remains = forces(q)
+        for number in range(100):
+            if not 0.1 * EQUILIBRIUM_TOLERANCE < np.max(np.abs(remains)) < np.inf:
+                break
+            if number % 10 == 0:  # springs are nearly linear: one stiffness serves for several steps
+                stiffness = np.linalg.pinv(np.column_stack([(forces(q + step) - remains) / 1e-6 for step in steps]), rcond=1e-9)
+            q[chosen] -= stiffness @ remains
+            remains = forces(q)
+        if not np.max(np.abs(remains[7 - begin - (begin < 7) :])) <= TUBES_TOLERANCE:
+            raise input_error(
+                "their bushings cannot hold the tubes near where they are drawn: nothing resists a turn about the damper's "
+                "axis, say, of a tube whose centre of mass is beside it",
+                key="telescopic_dampers",
+            )
 
     def _preloaded_springs(self, context: Context, parameters: MachineParameters) -> dict[str, SpringStrutParameters]:
         """Springs with the preloads that balance the empty machine when T coincides with W, as well as they can."""
         plant_context = self.plant.GetMyContextFromRoot(context)
+        if self.telescopes:
+            self._balance(context, begin=7)  # their weight hangs on the tub
         unloaded = _placed_springs(self._places(plant_context, parameters), parameters)
         self._set(context, self.springs, unloaded)
         hooks = np.stack([spring.p_ToA_T for spring in unloaded.values()])
@@ -192,19 +250,23 @@ class Machine:
         def residual(pose: FloatArray) -> FloatArray:
             if not np.all(np.abs(pose) < 10.0):  # a step of the root solver into nowhere, which Drake would abort on
                 return np.full(6, 1e9)
-            self.plant.SetPositions(plant_context, np.append(pose, 0.0))
+            self.plant.SetPositions(plant_context, np.concatenate([pose, [0.0], tubes]))
             return self.elastic_and_gravity_force(context)
 
         pose = np.zeros(6)
+        if self.telescopes:
+            self._balance(context, begin=0)
+            pose = self.plant.GetPositions(plant_context)[:6]
+        tubes = self.plant.GetPositions(plant_context)[7:]
         remains = residual(pose)
         if not np.all(np.isfinite(remains)):
             raise input_error("forces at rest are not finite numbers; some mass, stiffness or distance is out of all bounds")
-        if np.max(np.abs(remains)) > EQUILIBRIUM_TOLERANCE:
+        if np.max(np.abs(remains)) > EQUILIBRIUM_TOLERANCE and not self.telescopes:
             pose = np.asarray(root(residual, pose, tol=1e-15).x)
             remains = residual(pose)
         far = np.max(np.abs(pose[:3])) > _FARTHEST_REST_ANGLE or np.max(np.abs(pose[3:])) > _FARTHEST_REST_POSITION
         if not np.max(np.abs(remains)) <= EQUILIBRIUM_TOLERANCE or far:
-            self.plant.SetPositions(plant_context, np.zeros(7))
+            self.plant.SetPositions(plant_context, np.zeros(self.plant.num_positions()))
             m_x, m_y, m_z, f_x, f_y, f_z = self.elastic_and_gravity_force(context)
             raise input_error(
                 "the springs cannot hold the empty machine near its drawn pose: there remain force "
@@ -236,23 +298,66 @@ def build_machine(parameters: MachineParameters) -> Machine:
     }
     bushings = {name: SixComponentBushing(placed.packed()) for name, placed in _placed_bushings(places, parameters).items()}
     source = builder.AddNamedSystem("speed_source", SpeedSource())
+    telescopes = {
+        name: TelescopicDamper(placed.packed(), int(placed.has_sponge))
+        for name, placed in _placed_telescopes(plant, places, parameters).items()
+    }
     elements = {"spring": springs, "damper": dampers, "bushing": bushings}
     labels = [(_label(kind, name), system) for kind, systems in elements.items() for name, system in systems.items()]
-    total = builder.AddNamedSystem("total_force", Adder(len(labels), GENERALIZED_FORCE_SIZE))
-    logged = {"bodies": plant.get_state_output_port(), "acceleration": plant.get_generalized_acceleration_output_port()}
-    logged |= {name: damper.GetOutputPort("state") for name, damper in dampers.items() if damper.state_size}
-    for index, (label, system) in enumerate(labels):
-        builder.AddNamedSystem(label, system)
-        builder.Connect(plant.get_state_output_port(), system.GetInputPort("plant_state"))
-        builder.Connect(system.GetOutputPort("generalized_force"), total.get_input_port(index))
-    builder.Connect(total.get_output_port(), plant.get_applied_generalized_force_input_port())
+    if telescopes:
+        _connect_with_tubes(builder, plant, labels, telescopes)
+    else:
+        _connect(builder, plant, labels)
     builder.Connect(source.get_output_port(), plant.get_actuation_input_port())
+    logged = {"bodies": plant.get_state_output_port(), "acceleration": plant.get_generalized_acceleration_output_port()}
+    with_state = {name: damper for name, damper in (dampers | telescopes).items() if damper.state_size}
+    logged |= {name: damper.GetOutputPort("state") for name, damper in with_state.items()}
     sinks = {name: LogVectorOutput(port, builder, publish_period=OUTPUT_PERIOD) for name, port in logged.items()}
     for name, sink in sinks.items():
         sink.set_name(f"log_{name}")
     diagram = builder.Build()
     diagram.set_name(parameters.name)
-    return Machine(parameters, diagram, plant, source, springs, dampers, bushings, sinks, diagram.CreateDefaultContext())
+    context = diagram.CreateDefaultContext()
+    return Machine(parameters, diagram, plant, source, springs, dampers, bushings, telescopes, sinks, context)
+
+
+def _connect(builder: DiagramBuilder, plant: MultibodyPlant, elements: list[tuple[str, Any]]) -> None:
+    """Elements, by name, see the plant's state and add their forces to one sum."""
+    total = builder.AddNamedSystem("total_force", Adder(len(elements), GENERALIZED_FORCE_SIZE))
+    for index, (label, system) in enumerate(elements):
+        builder.AddNamedSystem(label, system)
+        builder.Connect(plant.get_state_output_port(), system.GetInputPort("plant_state"))
+        builder.Connect(system.GetOutputPort("generalized_force"), total.get_input_port(index))
+    builder.Connect(total.get_output_port(), plant.get_applied_generalized_force_input_port())
+
+
+def _connect_with_tubes(
+    builder: DiagramBuilder, plant: MultibodyPlant, elements: list[tuple[str, Any]], telescopes: dict[str, TelescopicDamper]
+) -> None:
+    """The same where tubes are bodies: elements see their part of the state, tubes get forces of their own."""
+    size, count = GENERALIZED_FORCE_SIZE, len(telescopes)
+    total = builder.AddNamedSystem("total_force", Adder(len(elements) + count, size))
+    all_forces = builder.AddNamedSystem("all_forces", Multiplexer([size] * (1 + count)))
+    states = np.eye(plant.num_multibody_states())
+    trees = [np.concatenate([7 * k + np.arange(7), plant.num_positions() + 7 * k + np.arange(7)]) for k in range(1 + count)]
+    of_tub = builder.AddNamedSystem("state_of_tub", MatrixGain(states[trees[0]]))
+    builder.Connect(plant.get_state_output_port(), of_tub.get_input_port())
+    for index, (label, system) in enumerate(elements):
+        builder.AddNamedSystem(label, system)
+        builder.Connect(of_tub.get_output_port(), system.GetInputPort("plant_state"))
+        builder.Connect(system.GetOutputPort("generalized_force"), total.get_input_port(index))
+    for index, (name, system) in enumerate(telescopes.items()):
+        builder.AddNamedSystem(f"damper_{name}", system)
+        chosen = np.concatenate([trees[0], trees[1 + index]])
+        state = builder.AddNamedSystem(f"state_of_{name}", MatrixGain(states[chosen]))
+        split = builder.AddNamedSystem(f"forces_of_{name}", Demultiplexer([size, size]))
+        builder.Connect(plant.get_state_output_port(), state.get_input_port())
+        builder.Connect(state.get_output_port(), system.GetInputPort("plant_state"))
+        builder.Connect(system.GetOutputPort("generalized_force"), split.get_input_port())
+        builder.Connect(split.get_output_port(0), total.get_input_port(len(elements) + index))
+        builder.Connect(split.get_output_port(1), all_forces.get_input_port(1 + index))
+    builder.Connect(total.get_output_port(), all_forces.get_input_port(0))
+    builder.Connect(all_forces.get_output_port(), plant.get_applied_generalized_force_input_port())
 
 
 def _label(kind: str, name: str) -> str:
@@ -266,7 +371,7 @@ def _check_same_elements(built: MachineParameters, wanted: MachineParameters) ->
             raise input_error(
                 f"{getattr(wanted, key)} is not the built machine's {getattr(built, key)}; build a new one", key=key
             )
-    for table in ("springs", "dampers", "all_bushings"):
+    for table in ("springs", "dampers", "all_bushings", "telescopic_dampers"):
         names = [set(t() if callable(t := getattr(p, table)) else t) for p in (built, wanted)]
         if names[0] != names[1]:
             other = sorted(names[0] ^ names[1])[0]
@@ -274,12 +379,16 @@ def _check_same_elements(built: MachineParameters, wanted: MachineParameters) ->
                 f"'{other}' is not in both machines{nearest_names(other, names[0])}; build a new machine",
                 key=table.removeprefix("all_"),
             )
-    for name, damper in wanted.dampers.items():
-        law, built_law = wanted.damper_types[damper.type].law, built.damper_types[built.dampers[name].type].law
-        if law != built_law:
-            raise input_error(
-                f"law '{law}' is not the built machine's '{built_law}'; build a new machine", key=f"dampers.{name}"
-            )
+    for table in ("dampers", "telescopic_dampers"):
+        for name, damper in getattr(wanted, table).items():
+            built_damper = getattr(built, table)[name]
+            law, built_law = wanted.damper_types[damper.type].law, built.damper_types[built_damper.type].law
+            if law != built_law:
+                raise input_error(
+                    f"law '{law}' is not the built machine's '{built_law}'; build a new machine", key=f"{table}.{name}"
+                )
+            if getattr(damper, "joint", "") != getattr(built_damper, "joint", ""):
+                raise input_error("is not the built machine's; build a new one", key=f"{table}.{name}.joint")
 
 
 class _Places:
@@ -341,4 +450,24 @@ def _placed_bushings(places: _Places, parameters: MachineParameters) -> dict[str
         r_tub = places("tub", bushing.tub_frame)[1]
         r_housing = places("world", bushing.housing_frame)[1]
         placed[name] = SixComponentBushingParameters(tub_point, r_tub, housing_point, r_housing, packed_bushing_law(bushing))
+    return placed
+
+
+def _placed_telescopes(
+    plant: MultibodyPlant, places: _Places, parameters: MachineParameters
+) -> dict[str, TelescopicDamperParameters]:
+    """To be asked for while all joints are at zero."""
+    placed = {}
+    for name, damper in parameters.telescopic_dampers.items():
+        joint = plant.GetJointByName(damper.joint)
+        outer = joint.parent_body().name()
+        X_OF = joint.frame_on_parent().GetFixedPoseInBodyFrame()
+        laws = [packed_bushing_law(parameters.bushing_types[kind]) for kind in (damper.tub_bushing, damper.housing_bushing)]
+        ends = [
+            (*places("tub", damper.tub_frame), *places(outer, damper.outer_frame)),
+            (*places(outer, damper.inner_frame), *places("world", damper.housing_frame)),
+        ]
+        at_tub, at_housing = (SixComponentBushingParameters(*end, law) for end, law in zip(ends, laws, strict=True))
+        axis, law = X_OF.rotation() @ joint.translation_axis(), packed_damper_law(parameters.damper_types[damper.type])
+        placed[name] = TelescopicDamperParameters(axis, at_tub, at_housing, law)
     return placed

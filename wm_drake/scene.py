@@ -116,12 +116,17 @@ class Scene:
 
     def _nearest(self, pose: FloatArray, pair: tuple[GeometryId, GeometryId]) -> tuple[float, FloatArray, FloatArray]:
         """`distance`, and the unit vector in W along which the first is to move away from the second."""
-        self.plant.SetPositions(self._plant_context, np.append(pose, 0.0))
+        self._put(np.append(pose, 0.0))
         query = self._scene_graph.get_query_output_port().Eval(self._scene_graph.GetMyContextFromRoot(self._context))
         nearest = query.ComputeSignedDistancePairClosestPoints(*pair)
         first = nearest.id_A == pair[0]  # Drake may swap the pair
         witness, away = (nearest.p_ACa, nearest.nhat_BA_W) if first else (nearest.p_BCb, -nearest.nhat_BA_W)
         return nearest.distance, query.GetPoseInWorld(pair[0]) @ witness, away
+
+    def _put(self, positions: FloatArray) -> None:
+        """Into a pose; tubes of which no position is given stay as they are drawn."""
+        drawn = np.zeros(self.plant.num_positions() - len(positions))
+        self.plant.SetPositions(self._plant_context, np.concatenate([positions, drawn]))
 
     def smallest_gap(self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray) -> Gap | None:
         """Smallest distance between tub group and housing over sampled poses; None if the SDF has no shapes to measure.
@@ -193,7 +198,7 @@ class Scene:
         meshcat.StartRecording(frames_per_second=REPLAY_RATE, set_visualizations_while_recording=False)
         for moment, position in zip(time, positions, strict=True):
             self._context.SetTime(float(moment - time[0]))
-            self.plant.SetPositions(self._plant_context, position)
+            self._put(position)
             self._diagram.ForcedPublish(self._context)
         meshcat.StopRecording()
         meshcat.PublishRecording()

@@ -19,9 +19,11 @@ from wm_drake.kernel.histories import position_history
 from wm_drake.machine import OUTPUT_PERIOD, Machine, Setup
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.elements import FloatArray
+from wm_drake.parameters.machine import DEFAULT_STEP as DEFAULT_STEP
 from wm_drake.systems.friction_damper import friction_damper_history
 from wm_drake.systems.six_component_bushing import six_component_bushing_history
 from wm_drake.systems.spring_strut import spring_strut_history
+from wm_drake.systems.telescopic_damper import FORCE_SIZE, telescopic_damper_history
 from wm_drake.trajectory import COORDINATES, Trajectory, divergence_text
 
 Record: TypeAlias = xr.Dataset
@@ -32,9 +34,6 @@ Engine: TypeAlias = Callable[[Setup, SpinProfile, float, Callable[[float], None]
 
 ENGINES: dict[str, Engine] = {"compiled": run_compiled, "drake": run_drake}
 DEFAULT_ENGINE = "compiled"
-
-DEFAULT_STEP = 2.5e-3
-"""Integration step; a whole part of the output period. Peaks move by less than 0.05 % at a tenth of it (tested). [s]"""
 
 AXES = ("x", "y", "z")
 
@@ -72,7 +71,7 @@ def simulate(
     case: Case | str,
     engine: str = DEFAULT_ENGINE,
     *,
-    step: float = DEFAULT_STEP,
+    step: float | None = None,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> Record:
     """Runs a machine through a case.
@@ -81,7 +80,7 @@ def simulate(
         machine: A built machine.
         case: What to run, or the name of one of the machine's loads.
         engine: Name in `ENGINES`.
-        step: Integration step, a whole part of the 5 ms between samples. [s]
+        step: Integration step, a whole part of the 5 ms between samples; the machine's if None. [s]
         progress: Called now and then with the fraction done.
 
     Returns:
@@ -93,7 +92,7 @@ def simulate(
     """
     if engine not in ENGINES:
         raise input_error(f"no engine '{engine}'{nearest_names(engine, ENGINES)}", key="engine")
-    check_step(step)
+    step = checked_step(machine.parameters, step)
     if isinstance(case, str):
         case = case_of(machine.parameters, case)
     setup = machine.set_up(case.load, parameters=case.parameters, gasket=case.gasket)
@@ -105,10 +104,16 @@ def simulate(
     return record
 
 
-def check_step(step: float) -> None:
-    """Refuses an integration step that does not divide the output period. [s]"""
+def checked_step(parameters: MachineParameters, step: float | None) -> float:
+    """The step to integrate with: the machine's if None.
+
+    Raises:
+        InputError: it does not divide the output period.
+    """
+    step = parameters.step if step is None else step
     if not step > 0.0 or abs(OUTPUT_PERIOD / step - round(OUTPUT_PERIOD / step)) > 1e-9 or step > OUTPUT_PERIOD:
         raise input_error(f"{step:g} s is not a whole part of the output period {OUTPUT_PERIOD:g} s", key="step")
+    return step
 
 
 def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
@@ -127,8 +132,9 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
         "sensor": list(setup.sensors),
         "accelerometer": list(setup.accelerometer_points),
         "spring": list(setup.springs),
-        "damper": list(setup.dampers),
-        "bushing": list(setup.bushings),
+        "damper": [*setup.dampers, *setup.telescopes],
+        "bushing": [*setup.bushings, *(f"{name}_{end}" for name in setup.telescopes for end in ("tub", "housing"))],
+        **({"tube": list(setup.telescopes)} if setup.telescopes else {}),
     }
     attributes = {
         "machine": setup.parameters.name,
@@ -156,7 +162,7 @@ def _motion(setup: Setup, trajectory: Trajectory) -> _Variables:
     displaced = point_displacements(state, np.stack([*points, setup.detergent_point]), setup.rest_pose)
     moved = [displaced[:, index, axis] for index, axis in enumerate(axes)]
     detergent = displaced[:, -1]
-    return {
+    return _tubes(trajectory) | {
         "tub_angle": (("time", "angle"), state[:, 0:3], "rad", "roll, pitch, yaw of T in W (3-2-1 Euler angles)"),
         "tub_position": (("time", "axis"), state[:, 3:6], "m", "position of To in W"),
         "tub_angular_velocity": (("time", "axis"), state[:, 7:10], "rad/s", "angular velocity of T in W"),
@@ -170,6 +176,18 @@ def _motion(setup: Setup, trajectory: Trajectory) -> _Variables:
         "accelerometer_point": (("accelerometer", "axis"), accelerometers, "m", "points of the vibration sensors in T"),
         "detergent_displacement": (("time", "axis"), detergent, "m", "displacement of the point nearest the detergent box"),
         "damper_deformation": (("time", "damper"), trajectory.deformation, "m", "deformation of the damper's sponge"),
+    }
+
+
+def _tubes(trajectory: Trajectory) -> _Variables:
+    """Of machines whose damper tubes are bodies."""
+    tubes = trajectory.tubes
+    if not tubes.shape[1]:
+        return {}
+    return {
+        "tube_angle": (("time", "tube", "angle"), tubes[:, :, :3], "rad", "roll, pitch, yaw of the outer tubes in W"),
+        "tube_position": (("time", "tube", "axis"), tubes[:, :, 3:6], "m", "displacement of their link frames in W"),
+        "tube_extension": (("time", "tube"), tubes[:, :, 6], "m", "by how much the damper is longer than drawn"),
     }
 
 
@@ -190,12 +208,12 @@ def element_forces(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, Fl
 
     Returns:
         Spring tensions (n, springs), damper tensions (n, dampers) [N], and force and moment of the bushings on the housing
-        (n, bushings, 6) [N, N m].
+        (n, bushings, 6) [N, N m]. Of a telescopic damper, its bushing at the tub (on the outer tube), that at the housing.
     """
     states, none = trajectory.state, np.empty((len(trajectory.time), 0))
     springs = np.empty((len(states), len(setup.springs)))
-    dampers = np.empty((len(states), len(setup.dampers)))
-    bushings = np.empty((len(states), len(setup.bushings), 6))
+    dampers = np.empty((len(states), len(setup.dampers) + len(setup.telescopes)))
+    bushings = np.empty((len(states), len(setup.bushings) + 2 * len(setup.telescopes), 6))
     for index, spring in enumerate(setup.springs.values()):
         spring_strut_history(states, none, spring.packed(), springs[:, index : index + 1])
     for index, damper in enumerate(setup.dampers.values()):
@@ -203,6 +221,12 @@ def element_forces(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, Fl
         friction_damper_history(states, own, damper.packed(), dampers[:, index : index + 1])
     for index, bushing in enumerate(setup.bushings.values()):
         six_component_bushing_history(states, none, bushing.packed(), bushings[:, index])
+    for index, telescope in enumerate(setup.telescopes.values()):
+        column, first = len(setup.dampers) + index, len(setup.bushings) + 2 * index
+        forces, both = np.empty((len(states), FORCE_SIZE)), np.hstack([states, trajectory.tubes[:, index]])
+        telescopic_damper_history(both, trajectory.deformation[:, column : column + 1], telescope.packed(), forces)
+        dampers[:, column] = forces[:, 0]
+        bushings[:, first : first + 2] = forces[:, 1:].reshape(-1, 2, 6)
     return springs, dampers, bushings
 
 

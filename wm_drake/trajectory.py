@@ -39,9 +39,12 @@ class Trajectory:
         time: (n,) [s]
         state: (n, 14) positions and velocities of the plant: roll, pitch, yaw, x, y, z of T in W, drum angle; angular
             velocity and velocity of To in W, drum rate. [rad, m, rad/s, m/s]
-        deformation: (n, number of dampers) deformation of each damper's sponge; 0 where it has none. [m]
+        deformation: (n, number of dampers) deformation of each damper's sponge, those of telescopic ones last; 0 where it
+            has none. [m]
         motor_torque: (n,) torque of the motor on the drum, its reaction on the tub. [N m]
         acceleration: (n, 6) angular acceleration of the tub and acceleration of To, in W. [rad/s^2, m/s^2]
+        tubes: (n, number of telescopic dampers, 14) position of the outer tube and extension, their velocities; as `state`
+            for tub and drum.
         divergence: None if the run came to its end.
     """
 
@@ -50,6 +53,7 @@ class Trajectory:
     deformation: FloatArray
     motor_torque: FloatArray
     acceleration: FloatArray
+    tubes: FloatArray
     divergence: Divergence | None = None
 
 
@@ -79,6 +83,7 @@ def _cut(trajectory: Trajectory, length: int, divergence: Divergence) -> Traject
         trajectory.deformation[:length],
         trajectory.motor_torque[:length],
         trajectory.acceleration[:length],
+        trajectory.tubes[:length],
         divergence,
     )
 

@@ -26,6 +26,9 @@ DRIFT_HZ = 0.1
 ORDER = 4
 """Of the Butterworth filters; run forwards and backwards, so that they shift nothing."""
 
+FEWEST = 16
+"""Samples; with fewer there is nothing to filter."""
+
 PADDING_PERIODS = 2.5
 """By how much a record is made longer at both ends before filtering, in periods of the corner."""
 
@@ -78,7 +81,7 @@ def point_accelerations(motion: FloatArray, acceleration: FloatArray, points: Fl
 
 def integrated_twice(acceleration: FloatArray, period: float) -> FloatArray:
     """Displacements from accelerations (n, k), each integral of a cubic spline, with the drift taken out after each. [m]"""
-    if len(acceleration) < 2:
+    if len(acceleration) < FEWEST or not np.isfinite(acceleration).all():  # of a run that diverged
         return np.full(acceleration.shape, np.nan)
     velocity = high_passed(_integral(acceleration, period), period, DRIFT_HZ)
     return high_passed(_integral(velocity, period), period, DRIFT_HZ)
@@ -94,10 +97,10 @@ def high_passed(signal: FloatArray, period: float, corner_hz: float) -> FloatArr
 
     Before the first sample there was rest. At the end the signal is mirrored: a record ends in full motion.
     """
+    if len(signal) < FEWEST:
+        return np.full(signal.shape, np.nan)
     padding = round(PADDING_PERIODS / corner_hz / period)
     mirrored = signal[::-1][1 : padding + 1]
-    if len(mirrored) < 3 * ORDER:
-        return np.full(signal.shape, np.nan)
     padded = np.concatenate([np.zeros((padding, signal.shape[1])), signal, mirrored])
     return np.asarray(sosfiltfilt(_high_pass(period, corner_hz), padded, axis=0)[padding : padding + len(signal)])
 

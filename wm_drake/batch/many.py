@@ -13,7 +13,7 @@ from wm_drake.errors import input_error, nearest_names
 from wm_drake.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.elements import FloatArray
-from wm_drake.simulation import AXES, DEFAULT_STEP, Case, check_step
+from wm_drake.simulation import AXES, Case, checked_step
 
 _VARIABLES = {
     "detergent_displacement": ("axis", "m", "largest displacement of the tub point nearest the detergent box, D of [B]"),
@@ -41,7 +41,7 @@ def simulate_many(
     cases: Iterable[Case],
     *,
     measures: Iterable[str] = ("extremes", "amplitudes"),
-    step: float = DEFAULT_STEP,
+    step: float | None = None,
     histories: bool = False,
     workers: int | None = None,
     progress: Callable[[int], None] = lambda done: None,
@@ -75,7 +75,7 @@ def simulate_many(
     for name in wanted:
         if name not in MEASURES:
             raise input_error(f"no measure '{name}'{nearest_names(name, MEASURES)}", key="measures")
-    check_step(step)
+    step = checked_step(machine.parameters, step)
     results: dict[int, tuple[str, str, list[FloatArray]]] = {}
 
     def collect(runs: list[Ended]) -> None:

@@ -13,7 +13,7 @@ from wm_drake.bodies import sdf_path
 from wm_drake.ledger import Ledger, key_of
 from wm_drake.machine import Machine
 from wm_drake.parameters import MachineParameters
-from wm_drake.simulation import DEFAULT_STEP, Case, versions
+from wm_drake.simulation import Case, checked_step, versions
 
 _ROOMS_AFTER = ("cli", "ledger.py", "outputs.py", "report", "studies")
 """What of the package does not determine a run."""
@@ -40,10 +40,11 @@ def model_version(parameters: MachineParameters) -> str:
 
 
 def run_keys(
-    parameters: MachineParameters, cases: Iterable[Case], *, measures: Iterable[str], step: float = DEFAULT_STEP
+    parameters: MachineParameters, cases: Iterable[Case], *, measures: Iterable[str], step: float | None = None
 ) -> Iterator[str]:
     """The key of each case: of its numbers, its load and profile, SDF, step, engine, measures, sources, versions."""
-    common = {"model": model_version(parameters), "sources": sources_version(), "engine": "compiled", "step": step}
+    common: dict[str, object] = {"model": model_version(parameters), "sources": sources_version(), "engine": "compiled"}
+    common |= {"step": checked_step(parameters, step)}
     common |= {"measures": sorted(set(measures))}
     for case in cases:
         numbers = (case.parameters or parameters).model_dump_json(exclude=_NO_NUMBERS)
@@ -56,7 +57,7 @@ def simulate_remembered(
     ledger: Ledger,
     *,
     measures: Iterable[str] = ("extremes",),
-    step: float = DEFAULT_STEP,
+    step: float | None = None,
     workers: int | None = None,
     progress: Callable[[int], None] = lambda done: None,
 ) -> xr.Dataset:

@@ -122,8 +122,8 @@ class Runner:
 
     def _record(self, job: Job, schedule: Schedule, samples: FloatArray) -> Record:
         rates = self._rates(job, schedule, samples)
-        motion, deformation = samples[:, :STATE_SIZE], samples[:, STATE_SIZE:]
-        trajectory = Trajectory(schedule.time, motion, deformation, rates[:, 6], rates[:, :6])
+        motion, deformation, tubes = job.numbers.layout.parts(samples)
+        trajectory = Trajectory(schedule.time, motion, deformation, rates[:, 6], rates[:, :6], tubes)
         record = as_record(job.numbers.setup, job.case, ended_where_it_diverged(trajectory))
         return record.assign_attrs(engine="compiled", step_s=self.step)
 

@@ -1,6 +1,6 @@
 """The classical fourth-order Runge-Kutta scheme at fixed steps, for one machine or for several side by side."""
 
-from wm_drake.kernel.mechanics import STATE_SIZE, mass_properties, state_derivative
+from wm_drake.kernel.mechanics import mass_properties, state_derivative, state_size
 from wm_drake.laws.compilation import law, long_running
 from wm_drake.laws.lanes import align_stack, lane_array, number_array
 
@@ -19,7 +19,7 @@ def integrate(steps, begin, end, p, elements, x, work, history):
     """
     length, acceleration, drum, row = steps
     y, dx, total, scratch = work
-    size = STATE_SIZE + len(elements[1])
+    size = state_size(elements)
     masses = mass_properties(p, drum[2 * begin, 1], drum[2 * begin, 2])
     for k in range(size):
         y[k] = total[k] = x[k]

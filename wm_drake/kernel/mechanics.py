@@ -17,9 +17,11 @@ times its mean, cosine, sine, double cosine and double sine part; damping of the
 
 from collections import namedtuple
 
+from wm_drake.kernel.matrices import about_centre, inverse, plus, six, three, times
+from wm_drake.kernel.tubes import TUBES_STATE_SIZE, count_of, with_telescopes
 from wm_drake.laws.compilation import law
 from wm_drake.laws.elementary import anywhere, sine_cosine
-from wm_drake.laws.motion import tub_motion_from_sines
+from wm_drake.laws.motion import motion_from_sines, rpy_rates
 from wm_drake.laws.vectors import add, cross, dot, rotate, rotate_back, scale, subtract
 from wm_drake.systems.element import PLANT_STATE_SIZE
 from wm_drake.systems.friction_damper import friction_damper_line, friction_damper_tension, friction_damper_wrench
@@ -32,43 +34,12 @@ JOINT_DAMPING, BODIES_SIZE = 58, 59
 LINE_SIZE = 13
 """Numbers kept of a damper between the rounds of `state_derivative`."""
 STATE_SIZE = PLANT_STATE_SIZE
-"""The plant's state comes first; the dampers' deformations follow."""
+"""The state of tub and drum comes first; the deformations of the strut dampers follow, then what `kernel.tubes` says."""
 DRUM_RATE = 13
 """Where the state has it."""
 
 MassProperties = namedtuple("MassProperties", ("drum_moment", "drum_inertia", "moment", "inverse_inertia"))
 """At one drum angle: s_d, J_d, S, and the inverse of the inertia about the common centre of mass."""
-
-
-@law
-def three(p, at):
-    """Three numbers as a vector."""
-    return (p[at], p[at + 1], p[at + 2])
-
-
-@law
-def six(p, at):
-    """Six numbers: a symmetric matrix as xx, yy, zz, xy, xz, yz."""
-    return (p[at], p[at + 1], p[at + 2], p[at + 3], p[at + 4], p[at + 5])
-
-
-@law
-def times(i, a):
-    """Symmetric matrix times vector."""
-    return (
-        i[0] * a[0] + i[3] * a[1] + i[4] * a[2],
-        i[3] * a[0] + i[1] * a[1] + i[5] * a[2],
-        i[4] * a[0] + i[5] * a[1] + i[2] * a[2],
-    )
-
-
-@law
-def inverse(i):
-    """Inverse of a symmetric matrix."""
-    xx, yy, zz = i[1] * i[2] - i[5] * i[5], i[0] * i[2] - i[4] * i[4], i[0] * i[1] - i[3] * i[3]
-    xy, xz, yz = i[4] * i[5] - i[3] * i[2], i[3] * i[5] - i[4] * i[1], i[3] * i[4] - i[5] * i[0]
-    s = 1.0 / (i[0] * xx + i[3] * xy + i[4] * xz)
-    return (s * xx, s * yy, s * zz, s * xy, s * xz, s * yz)
 
 
 @law
@@ -100,15 +71,8 @@ def mass_properties(p, c, s):
     t = six(p, TUB_INERTIA)
     m = add(three(p, TUB_MOMENT), drum)
     q = p[INVERSE_MASS]
-    central = (
-        t[0] + j[0] - q * (m[1] * m[1] + m[2] * m[2]),
-        t[1] + j[1] - q * (m[0] * m[0] + m[2] * m[2]),
-        t[2] + j[2] - q * (m[0] * m[0] + m[1] * m[1]),
-        t[3] + j[3] + q * m[0] * m[1],
-        t[4] + j[4] + q * m[0] * m[2],
-        t[5] + j[5] + q * m[1] * m[2],
-    )
-    return MassProperties(drum, j, m, inverse(central))
+    both = (t[0] + j[0], t[1] + j[1], t[2] + j[2], t[3] + j[3], t[4] + j[4], t[5] + j[5])
+    return MassProperties(drum, j, m, inverse(about_centre(both, m, q)))
 
 
 @law
@@ -151,27 +115,22 @@ def accelerations(motion, masses, rate, acceleration, wrench, p):
 
 
 @law
-def plus(a, b):
-    """Sum of two wrenches."""
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
-
-
-@law
 def state_derivative(x, dx, masses, rate, acceleration, p, elements, scratch):
     """Writes the derivative of the state into `dx`.
 
     Args:
         x, dx: State and its derivative, laid out as `STATE_SIZE` says; x[6] and x[13] are not read.
         masses, rate, acceleration, p: As for `accelerations`.
-        elements: Indices in p where springs, dampers and bushings begin, three arrays.
+        elements: Indices in p where springs, dampers, bushings and telescopic dampers begin: four arrays, the last None
+            without any.
         scratch: At least `LINE_SIZE` numbers a damper to work in.
 
     Returns:
         Torque of the motor on the drum. [N m]
     """
-    springs, dampers, bushings = elements
+    springs, dampers, bushings, telescopes = elements
     roll, pitch, yaw = sine_cosine(x[0]), sine_cosine(x[1]), sine_cosine(x[2])
-    motion = tub_motion_from_sines(x, roll, pitch, yaw)
+    motion = motion_from_sines(x, 0, roll, pitch, yaw)
     zero = 0.0 * x[0]
     total = (zero, zero, zero, zero, zero, zero)
     for i in range(len(springs)):
@@ -189,14 +148,22 @@ def state_derivative(x, dx, masses, rate, acceleration, p, elements, scratch):
     for i in range(len(bushings)):
         wrench, _ = six_component_bushing_wrench(motion, p, bushings[i])
         total = plus(total, wrench)
+    gravity = three(p, GRAVITY)
+    total = with_telescopes(x, dx, motion, gravity, p, telescopes, STATE_SIZE + len(dampers), total)
     w_rate, v_rate, torque = accelerations(motion, masses, rate, acceleration, total, p)
-    dx[0], dx[1], dx[2] = rpy_rates(x, pitch, yaw)
+    dx[0], dx[1], dx[2] = rpy_rates(motion.angular_velocity, pitch, yaw)
     dx[3], dx[4], dx[5] = motion.velocity
     dx[6] = zero + rate
     dx[7], dx[8], dx[9] = w_rate
     dx[10], dx[11], dx[12] = v_rate
     dx[13] = zero + acceleration
     return torque
+
+
+@law
+def state_size(elements):
+    """How many numbers the state of a machine with these elements has."""
+    return STATE_SIZE + len(elements[1]) + TUBES_STATE_SIZE * count_of(elements[3])
 
 
 @law
@@ -215,12 +182,3 @@ def read_line(scratch, at):
     """What `write_line` kept: the arm, and the line."""
     line = (scratch[at + 3], scratch[at + 4], three(scratch, at + 5), three(scratch, at + 8), scratch[at + 11])
     return three(scratch, at), line
-
-
-@law
-def rpy_rates(x, pitch, yaw):
-    """Rates of roll, pitch, yaw from the angular velocity in W, as Drake's RpyFloatingJoint has them. [rad/s]"""
-    s_p, c_p = pitch
-    s_y, c_y = yaw
-    roll_rate = (c_y * x[7] + s_y * x[8]) / c_p
-    return roll_rate, c_y * x[8] - s_y * x[7], x[9] + s_p * roll_rate

@@ -8,6 +8,7 @@ from pydrake.multibody.tree import BodyIndex, ForceElementIndex, RevoluteJoint, 
 
 from wm_drake.errors import InputError, input_error
 from wm_drake.kernel.mechanics import BODIES_SIZE, DRUM_RATE, STATE_SIZE
+from wm_drake.kernel.tubes import TUBES_STATE_SIZE
 from wm_drake.machine import Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.elements import FloatArray
@@ -18,7 +19,7 @@ class Layout:
     """Where things begin in the packed numbers of a machine, and what must be the same where machines run side by side.
 
     Attributes:
-        springs, dampers, bushings: Index of each element.
+        springs, dampers, bushings, telescopes: Index of each element.
         gasket: Index of the gasket, -1 without one.
         structure: Number of each damper's law, and of the points of every table, in order.
     """
@@ -26,13 +27,24 @@ class Layout:
     springs: tuple[int, ...]
     dampers: tuple[int, ...]
     bushings: tuple[int, ...]
+    telescopes: tuple[int, ...]
     gasket: int
     structure: tuple[int, ...]
 
     @property
-    def elements(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """As compiled functions take them."""
-        return tuple(np.array(indices, dtype=np.int64) for indices in (self.springs, self.dampers, self.bushings))  # type: ignore[return-value]
+    def elements(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]:
+        """As compiled functions take them; None lets them be compiled without tubes."""
+        springs, dampers, bushings, telescopes = (
+            np.array(indices, dtype=np.int64) for indices in (self.springs, self.dampers, self.bushings, self.telescopes)
+        )
+        return springs, dampers, bushings, telescopes if self.telescopes else None
+
+    def parts(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Of states (n, size): those of the plant's first 14, deformations of all dampers, states of the tubes (n, k, 14)."""
+        tubes_begin = STATE_SIZE + len(self.dampers)
+        tubes = states[:, tubes_begin:].reshape(len(states), len(self.telescopes), TUBES_STATE_SIZE)
+        deformation = np.hstack([states[:, STATE_SIZE:tubes_begin], tubes[:, :, -1]])
+        return states[:, :STATE_SIZE], deformation, tubes[:, :, :-1]
 
 
 def pack(setup: Setup) -> tuple[FloatArray, Layout]:
@@ -59,6 +71,13 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
             size += len(parts[-1])
             structure += element.structure
         indices[kind] = tuple(begins)
+    begins = []
+    for name, telescope in setup.telescopes.items():
+        begins.append(size)
+        parts += [pack_tubes(setup, name), telescope.packed()]
+        size += sum(map(len, parts[-2:]))
+        structure += telescope.structure
+    indices["telescopes"] = tuple(begins)
     names = list(setup.bushings)
     gasket = indices["bushings"][names.index("gasket")] if "gasket" in names else -1
     return np.concatenate(parts), Layout(**indices, gasket=gasket, structure=tuple(structure))
@@ -69,7 +88,38 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     x = np.zeros(STATE_SIZE + len(setup.dampers))
     x[:6] = setup.rest_pose
     x[DRUM_RATE] = profile.speed[0]
-    return x
+    tubes = np.zeros((len(setup.telescopes), TUBES_STATE_SIZE))
+    tubes[:, :7] = setup.tube_rest
+    return np.append(x, tubes)
+
+
+def pack_tubes(setup: Setup, name: str) -> FloatArray:
+    """Bodies of a telescopic damper, as `wm_drake.kernel.tubes` says.
+
+    Raises:
+        InputError: its joint has something that the compiled engine does not represent.
+    """
+    plant, context = setup.machine.plant, setup.plant_context
+    joint = plant.GetJointByName(setup.parameters.telescopic_dampers[name].joint)
+    if np.any(joint.GetDampingVector(context)):
+        raise _not_represented(f"joint '{joint.name()}' has damping of its own", f"telescopic_dampers.{name}.joint")
+    outer_inertia, inner_inertia = (
+        plant.CalcSpatialInertia(context, body.body_frame(), [part.index() for part in plant.GetBodiesWeldedTo(body)])
+        for body in (joint.parent_body(), joint.child_body())
+    )
+    # of the inner tube in the frame of the outer one, at extension 0
+    frames = joint.frame_on_parent(), joint.frame_on_child()
+    X_OI = frames[0].GetFixedPoseInBodyFrame() @ frames[1].GetFixedPoseInBodyFrame().inverse()
+    inner_inertia = inner_inertia.ReExpress(X_OI.rotation()).Shift(-X_OI.translation())
+    m, s = inner_inertia.get_mass(), _moment(inner_inertia)
+    a = setup.telescopes[name].axis
+    along = np.dot(a, s)
+    first_order = 2.0 * along * np.eye(3) - np.outer(a, s) - np.outer(s, a)
+    second_order = m * (np.eye(3) - np.outer(a, a))
+    both = _matrix(outer_inertia) + _matrix(inner_inertia)
+    mass = outer_inertia.get_mass() + m
+    inertias = [_six(matrix) for matrix in (both, first_order, second_order)]
+    return np.concatenate([[1.0 / mass, m], a, _moment(outer_inertia) + s, s, *inertias])
 
 
 def pack_bodies(setup: Setup) -> FloatArray:

@@ -3,6 +3,7 @@
 from wm_drake.parameters.components import Component, load_component, shipped_components
 from wm_drake.parameters.elements import (
     Bushing,
+    BushingType,
     CoulombDamper,
     Damper,
     DamperType,
@@ -15,6 +16,7 @@ from wm_drake.parameters.elements import (
     SpringType,
     StvDamper,
     StvSpongeDamper,
+    TelescopicDamper,
     TorqueTable,
     packed_stiffness,
 )
@@ -57,6 +59,7 @@ __all__ = [
     "TABLES",
     "BodyOverride",
     "Bushing",
+    "BushingType",
     "Clearance",
     "Component",
     "CoulombDamper",
@@ -81,6 +84,7 @@ __all__ = [
     "SpringType",
     "StvDamper",
     "StvSpongeDamper",
+    "TelescopicDamper",
     "TorqueTable",
     "Unbalance",
     "at_levels",

@@ -204,11 +204,9 @@ class Damper(Frozen):
     housing_frame: str
 
 
-class Bushing(Frozen):
-    """Six-component bushing [A] Eq. (7), (8); the gasket of [B] Fig. 4 is one. Stiffness lives in the housing-side frame."""
+class BushingType(Frozen):
+    """Six-component bushing [A] Eq. (7), (8)."""
 
-    tub_frame: str
-    housing_frame: str
     stiffness_x: Stiffness
     stiffness_y: Stiffness
     stiffness_z: Stiffness
@@ -227,3 +225,31 @@ class Bushing(Frozen):
     full_friction_rate_x: _PositiveRate = 1.0
     full_friction_rate_y: _PositiveRate = 1.0
     full_friction_rate_z: _PositiveRate = 1.0
+
+
+class Bushing(BushingType):
+    """A six-component bushing in its place; the gasket of [B] Fig. 4 is one. Stiffness lives in the housing-side frame."""
+
+    tub_frame: str
+    housing_frame: str
+
+
+class TelescopicDamper(Frozen):
+    """A damper whose tubes are bodies ([A] Fig. 20): tub - bushing - outer tube - joint - inner tube - bushing - housing.
+
+    Attributes:
+        type: Law along the joint, one of `damper_types`; its end_bushing is for dampers without tubes.
+        joint: Prismatic joint of the SDF from the outer tube, which is otherwise free, to the inner one; positive when longer.
+        tub_bushing, housing_bushing: Of `bushing_types`. Stiffness lives in outer_frame, and in housing_frame.
+        tub_frame, outer_frame: Of the first, on tub and outer tube; at the same place when drawn.
+        inner_frame, housing_frame: Of the second, on inner tube and housing.
+    """
+
+    type: str
+    joint: str
+    tub_bushing: str
+    housing_bushing: str
+    tub_frame: str
+    outer_frame: str
+    inner_frame: str
+    housing_frame: str

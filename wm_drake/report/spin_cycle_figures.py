@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -68,11 +69,11 @@ def heat_map_figure(values: FloatArray, rows: Sequence[str], columns: Sequence[s
     return figure
 
 
-def bars_figure(computed: xr.DataArray, integrated: xr.DataArray, measured: xr.DataArray | None) -> Figure:
+def bars_figure(computed: xr.DataArray, integrated: xr.DataArray | None, measured: xr.DataArray | None) -> Figure:
     """RMS displacement per region, a panel for each axis (columns) of each sensor (rows), as [A] Figs. 24 to 26.
 
     Args:
-        computed, integrated: (region, accelerometer, axis) of one case, direct and from acceleration. [m]
+        computed, integrated: (region, accelerometer, axis) of one case, direct and from acceleration, if wanted. [m]
         measured: The same, or None.
     """
     sensors, axes_names = (list(map(str, computed[dim].values)) for dim in ("accelerometer", "axis"))
@@ -88,9 +89,9 @@ def bars_figure(computed: xr.DataArray, integrated: xr.DataArray, measured: xr.D
             here = {"accelerometer": sensor, "axis": axis}
             shift = 0.0 if measured is None else 0.5 * width
             panel.bar(places + shift, MM_PER_M * computed.sel(here).values, width, color=OURS)
-            panel.plot(
-                places + shift, MM_PER_M * integrated.sel(here).values, "_", color=MARK, markersize=11, markeredgewidth=1.6
-            )
+            if integrated is not None:
+                ends = MM_PER_M * integrated.sel(here).values
+                panel.plot(places + shift, ends, "_", color=MARK, markersize=11, markeredgewidth=1.6)
             if measured is not None:
                 panel.bar(places - shift, MM_PER_M * measured.sel(here).values, width, color=MEASURED)
             panel.text(0.02, 0.94, f"{sensor} {axis}", transform=panel.transAxes, va="top", fontsize=10, fontweight="bold")
@@ -102,10 +103,10 @@ def bars_figure(computed: xr.DataArray, integrated: xr.DataArray, measured: xr.D
                 panel.spines[side].set_visible(False)
             panel.spines["left"].set_color(QUIET)
         panels[row, 0].set_ylabel("RMS, mm", fontsize=9.5)
-    handles = [
-        Patch(color=OURS, label="wm_drake, displacement"),
-        Line2D([], [], color=MARK, marker="_", markersize=11, linestyle="none", label="wm_drake, from acceleration"),
-    ]
+    handles: list[Artist] = [Patch(color=OURS, label="wm_drake" if integrated is None else "wm_drake, displacement")]
+    if integrated is not None:
+        line = Line2D([], [], color=MARK, marker="_", markersize=11, linestyle="none", label="wm_drake, from acceleration")
+        handles.append(line)
     if measured is not None:
         handles.insert(0, Patch(color=MEASURED, label="measured"))
     figure.legend(handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=9.5, borderaxespad=0.2)

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from wm_drake.bodies import tubes_of
 from wm_drake.laws.compilation import generic
 from wm_drake.laws.vectors import rotation_from_rpy
 from wm_drake.machine import Machine, Setup
@@ -32,6 +33,7 @@ def describe(machine: Machine) -> dict[str, Any]:
         "springs": {name: _spring(setup, name) for name in setup.springs},
         "dampers": {name: _damper(setup, name) for name in setup.dampers},
         "bushings": {name: _bushing(setup, name) for name in setup.bushings},
+        "telescopic_dampers": {name: _telescope(setup, name) for name in setup.telescopes},
         "sensors": {
             name: {"point_T": setup.sensor_points[name].tolist(), "axis_W": sensor.axis}
             for name, sensor in parameters.sensors.items()
@@ -57,13 +59,16 @@ def _bodies(setup: Setup) -> dict[str, Any]:
     plant, context = setup.machine.plant, setup.plant_context
     tub = plant.GetBodyByName("tub").body_frame()
     described = {}
-    for part in [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]:
+    moving = [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]
+    groups = {part.name(): "drum" if part.name() == "drum" else "tub" for part in moving}
+    tubes = [body for damper in setup.parameters.telescopic_dampers.values() for body in tubes_of(plant, damper.joint)]
+    for part in [*moving, *tubes]:
         X_TB = plant.CalcRelativeTransform(context, tub, part.body_frame())
         M_B = part.CalcSpatialInertiaInBodyFrame(context)
         central = M_B.Shift(M_B.get_com()).CalcRotationalInertia().ReExpress(X_TB.rotation())
         matrix = central.CopyToFullMatrix3()
         described[part.name()] = {
-            "turns_with": "drum" if part.name() == "drum" else "tub",
+            "turns_with": groups.get(part.name(), part.name()),
             "mass": M_B.get_mass(),
             "centre_of_mass_T": (X_TB @ M_B.get_com()).tolist(),
             "inertia_about_centre_T": {key: float(matrix["xyz".index(key[0]), "xyz".index(key[1])]) for key in PRODUCTS},
@@ -121,6 +126,24 @@ def _bushing(setup: Setup, name: str) -> dict[str, Any]:
         "housing_point_W": placed.p_WG.tolist(),
         "housing_rotation_W": placed.R_WG.tolist(),
         **constants,
+    }
+
+
+def _telescope(setup: Setup, name: str) -> dict[str, Any]:
+    placed, damper = setup.telescopes[name], setup.parameters.telescopic_dampers[name]
+    kind = setup.parameters.damper_types[damper.type]
+    tubes = [body.name() for body in tubes_of(setup.machine.plant, damper.joint)]
+    return {
+        "outer_tube": tubes[0],
+        "inner_tube": tubes[1],
+        "axis_outer_tube": placed.axis.tolist(),
+        "tub_point_T": placed.tub_bushing.p_ToB_T.tolist(),
+        "outer_point_outer_tube": placed.tub_bushing.p_WG.tolist(),
+        "inner_point_outer_tube": placed.housing_bushing.p_ToB_T.tolist(),
+        "housing_point_W": placed.housing_bushing.p_WG.tolist(),
+        "tub_bushing": setup.parameters.bushing_types[damper.tub_bushing].model_dump(),
+        "housing_bushing": setup.parameters.bushing_types[damper.housing_bushing].model_dump(),
+        **kind.model_dump(exclude={"end_bushing"}),
     }
 
 

@@ -15,7 +15,7 @@ from wm_drake.machine import Machine, build_machine
 from wm_drake.measures import Measures, measure
 from wm_drake.parameters import MachineParameters
 from wm_drake.scene import Scene
-from wm_drake.simulation import DEFAULT_ENGINE, DEFAULT_STEP, Case, DivergenceWarning, Record, simulate
+from wm_drake.simulation import DEFAULT_ENGINE, Case, DivergenceWarning, Record, checked_step, simulate
 
 _IN_PROCESSES = {"drake"}
 """Engines whose cases run in processes of their own: seconds each, and Drake's Python callbacks take turns in one."""
@@ -56,7 +56,7 @@ def run_spin(
     cases: Sequence[Case],
     engine: str = DEFAULT_ENGINE,
     *,
-    step: float = DEFAULT_STEP,
+    step: float | None = None,
     progress: Callable[[int, float], None] = lambda index, fraction: None,
     workers: int | None = None,
 ) -> SpinResult:
@@ -69,6 +69,7 @@ def run_spin(
         progress: Called with the number of the case and the fraction of it done.
         workers: Processes for an engine that needs them; as many as cores by default. One case runs in this process.
     """
+    step = checked_step(parameters, step)
     count = min(workers or os.cpu_count() or 1, len(cases))
     jobs = [_Job(parameters, case, engine, step) for case in cases]
     if engine in _IN_PROCESSES and count > 1:

@@ -10,7 +10,7 @@ from wm_drake.batch import simulate_many, simulate_remembered
 from wm_drake.ledger import Ledger
 from wm_drake.machine import Machine
 from wm_drake.parameters import MachineParameters
-from wm_drake.simulation import DEFAULT_STEP, Case
+from wm_drake.simulation import Case
 from wm_drake.studies.spin import CaseResult, run_spin
 from wm_drake.studies.spin_cycle import MEASURES, Evaluate
 from wm_drake.vibration import record_region_displacements
@@ -45,7 +45,7 @@ def drake_runs(parameters: MachineParameters, *, progress: Callable[[int], None]
             done[index] = fraction
             progress(int(done.sum()))
 
-        return _table(run_spin(parameters, runs, "drake", step=DEFAULT_STEP, progress=tell).results)
+        return _table(run_spin(parameters, runs, "drake", progress=tell).results)
 
     return evaluate
 

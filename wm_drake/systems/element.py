@@ -36,23 +36,34 @@ class ForceElement:
     Python gives both then, where a state of its own would cost a second one at every step.
     """
 
-    def declare_element(self, scalar: type, evaluate: Any, parameters: np.ndarray, force_size: int, state_size: int) -> None:
-        """Declares ports and parameters. `self` is a LeafSystem of the given scalar type."""
+    def declare_element(
+        self, scalar: type, evaluate: Any, parameters: np.ndarray, force_size: int, state_size: int, trees: int = 1
+    ) -> None:
+        """Declares ports and parameters. `self` is a LeafSystem of the given scalar type.
+
+        An element between bodies of two `trees` of the plant gets the states of both, one after the other, and answers with
+        the generalized forces on both.
+        """
         system: Any = self
         self.packed = parameters  # what a scalar-converted copy begins with
         self.state_size = state_size
-        state_port = system.DeclareVectorInputPort("plant_state", PLANT_STATE_SIZE)
+        state_port = system.DeclareVectorInputPort("plant_state", trees * PLANT_STATE_SIZE)
         own_state_port = system.DeclareVectorInputPort("state", state_size) if state_size else None
         index = system.DeclareNumericParameter(BasicVector_[scalar](parameters))
         self.parameter_index = index
         calc_generalized_force, calc_force = _callbacks(
-            scalar, evaluator(evaluate, scalar), state_port, own_state_port, index, (force_size, state_size)
+            scalar,
+            evaluator(evaluate, scalar),
+            state_port,
+            own_state_port,
+            index,
+            (trees * GENERALIZED_FORCE_SIZE, force_size, state_size),
         )
         needs = {state_port.ticket(), system.numeric_parameter_ticket(NumericParameterIndex(index))}
         if own_state_port is not None:
             needs.add(own_state_port.ticket())
         first = "generalized_force_and_rate" if state_size else "generalized_force"
-        system.DeclareVectorOutputPort(first, GENERALIZED_FORCE_SIZE + state_size, calc_generalized_force, needs)
+        system.DeclareVectorOutputPort(first, trees * GENERALIZED_FORCE_SIZE + state_size, calc_generalized_force, needs)
         system.DeclareVectorOutputPort("force", force_size, calc_force, needs)
 
     def set_parameters(self, context: Any, parameters: np.ndarray, name: str = "") -> None:
@@ -72,7 +83,7 @@ class ForceElement:
 
 
 def _callbacks(
-    scalar: type, run: Callable[..., None], state_port: Any, own_state_port: Any, index: int, sizes: tuple[int, int]
+    scalar: type, run: Callable[..., None], state_port: Any, own_state_port: Any, index: int, sizes: tuple[int, int, int]
 ) -> tuple[Callable[[Any, Any], None], ...]:
     """Drake's callbacks for the two output ports of an element.
 
@@ -80,9 +91,9 @@ def _callbacks(
     where Drake keeps the value.
     """
     kind = float if scalar is float else object
-    force_size, state_size = sizes
-    both, force = np.empty(GENERALIZED_FORCE_SIZE + state_size, kind), np.empty(force_size, kind)
-    generalized_force, rate = both[:GENERALIZED_FORCE_SIZE], both[GENERALIZED_FORCE_SIZE:]
+    size, force_size, state_size = sizes
+    both, force = np.empty(size + state_size, kind), np.empty(force_size, kind)
+    generalized_force, rate = both[:size], both[size:]
     no_state = np.empty(0)
     plant_state = state_port.Eval
     own_state = own_state_port.Eval if own_state_port is not None else lambda context: no_state

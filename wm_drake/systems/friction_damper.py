@@ -53,6 +53,12 @@ def has_sponge(packed_law: FloatArray) -> bool:
     return int(packed_law[0]) in (MSTV, FREE_STROKE, STV_SPONGE)
 
 
+def law_structure(packed_law: FloatArray) -> list[int]:
+    """Number of a packed law, and of the points of its sponge's table if it has one."""
+    number = int(packed_law[0])
+    return [number, int(packed_law[6])] if number == FREE_STROKE else [number]
+
+
 @dataclass(frozen=True)
 class FrictionDamperParameters:
     """A damper in its place: ends at the rest pose, law, bushings at the ends. `engaged` 0 takes it out of the machine."""
@@ -71,8 +77,7 @@ class FrictionDamperParameters:
     @property
     def structure(self) -> list[int]:
         """Number of its law, and of the points of its sponge's table if it has one."""
-        number = int(self.packed_law[0])
-        return [number, int(self.packed_law[6])] if number == FREE_STROKE else [number]
+        return law_structure(self.packed_law)
 
     def packed(self) -> FloatArray:
         """Flat: tub end (T), housing end (W), axis; end bushing k, c, p, pi / (2 v_t); engaged; law number, its parameters."""
@@ -173,23 +178,18 @@ def DamperForce_(T: type) -> Any:
 DamperForce = DamperForce_[None]
 
 
-class FrictionDamper(Diagram):
-    """A friction damper of any law; where it has a sponge, the sponge's deformation is its continuous state.
+class DamperWithSponge(Diagram):
+    """A force of a damper, and the integrator that holds the deformation of its sponge, if it has one."""
 
-    plant_state (14) ──▶ [ FrictionDamper        ] ──▶ generalized_force (7) [N m, N]
-                         [ force ──▶ rate        ] ──▶ force (1) tension, > 0 pulls its ends together [N]
-                         [   ◀── sponge (state)  ] ──▶ state (1) deformation, only with a sponge [m]
-    """
-
-    def __init__(self, parameters: FloatArray, state_size: int) -> None:
-        """Builds the damper from packed parameters; `state_size` is 1 for a law with a sponge, else 0."""
+    def __init__(self, force: Any, state_size: int, generalized_force_size: int) -> None:
+        """Puts both together; `force` is a `ForceElement`."""
         super().__init__()
         builder = DiagramBuilder()
-        self._force = builder.AddNamedSystem("force", DamperForce(parameters, state_size))
+        self._force = builder.AddNamedSystem("force", force)
         self.state_size = state_size
         builder.ExportInput(self._force.GetInputPort("plant_state"), "plant_state")
         if state_size:
-            split = builder.AddNamedSystem("split", Demultiplexer([GENERALIZED_FORCE_SIZE, state_size]))
+            split = builder.AddNamedSystem("split", Demultiplexer([generalized_force_size, state_size]))
             sponge = builder.AddNamedSystem("sponge", Integrator(state_size))
             builder.Connect(self._force.GetOutputPort("generalized_force_and_rate"), split.get_input_port())
             builder.Connect(split.get_output_port(1), sponge.get_input_port())
@@ -209,3 +209,16 @@ class FrictionDamper(Diagram):
     def handles(self, context: Any) -> list[Any]:
         """As `ForceElement.handles`, of the force inside."""
         return self._force.handles(self.GetSubsystemContext(self._force, context))
+
+
+class FrictionDamper(DamperWithSponge):
+    """A friction damper of any law; where it has a sponge, the sponge's deformation is its continuous state.
+
+    plant_state (14) ──▶ [ FrictionDamper        ] ──▶ generalized_force (7) [N m, N]
+                         [ force ──▶ rate        ] ──▶ force (1) tension, > 0 pulls its ends together [N]
+                         [   ◀── sponge (state)  ] ──▶ state (1) deformation, only with a sponge [m]
+    """
+
+    def __init__(self, parameters: FloatArray, state_size: int) -> None:
+        """Builds the damper from packed parameters; `state_size` is 1 for a law with a sponge, else 0."""
+        super().__init__(DamperForce(parameters, state_size), state_size, GENERALIZED_FORCE_SIZE)

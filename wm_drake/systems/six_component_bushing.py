@@ -16,13 +16,13 @@ from wm_drake.laws.strut import wrench_at_origin
 from wm_drake.laws.table import packed_size
 from wm_drake.laws.vectors import add, compose, cross, rotate, rotate_back, rotation_vector, scale, subtract
 from wm_drake.laws.vectors import transpose as transposed
-from wm_drake.parameters.elements import Bushing, FloatArray, packed_stiffness
+from wm_drake.parameters.elements import BushingType, FloatArray, packed_stiffness
 from wm_drake.systems.element import PLANT_STATE_SIZE, SCALARS, ForceElement
 
 AXES = ("x", "y", "z")
 
 
-def packed_bushing_law(bushing: Bushing) -> FloatArray:
+def packed_bushing_law(bushing: BushingType) -> FloatArray:
     """Parameters in the order of `wm_drake.laws.bushing.bushing_force`."""
     kinds = ("damping", "rotational_damping", "friction_torque", "full_friction_rate")
     constants = [getattr(bushing, f"{kind}_{axis}") for kind in kinds for axis in AXES]
@@ -80,6 +80,40 @@ def six_component_bushing_wrench(motion, p, at):
     f = scale(p[at + 24], f)
     m = scale(p[at + 24], m)
     return wrench_at_origin(arm, rotate(r_ground, f), rotate(r_ground, m)), (-f[0], -f[1], -f[2], -m[0], -m[1], -m[2])
+
+
+@law
+def six_component_bushing_between(motion, ground, p, at):
+    """The same between two bodies that move: its ground side is fixed to the second.
+
+    Args:
+        motion, ground: `TubMotion` of the two bodies.
+        p, at: As there; the housing-side point and rotation are in the frame of the second body.
+
+    Returns:
+        Moment about its origin and force on each body (six numbers, W), and force and moment on the second, in G.
+    """
+    r_ground = compose(ground.rotation, nine(p, at + 15))
+    arm = rotate(motion.rotation, (p[at], p[at + 1], p[at + 2]))
+    place = add(motion.position, arm)
+    ground_arm = subtract(place, ground.position)
+    displaced = subtract(ground_arm, rotate(ground.rotation, (p[at + 12], p[at + 13], p[at + 14])))
+    v_B = add(motion.velocity, cross(motion.angular_velocity, arm))
+    v_ground = add(ground.velocity, cross(ground.angular_velocity, ground_arm))
+    relative = compose(transposed(r_ground), compose(motion.rotation, nine(p, at + 3)))
+    f, m = bushing_force(
+        rotate_back(r_ground, displaced),
+        rotate_back(r_ground, subtract(v_B, v_ground)),
+        rotation_vector(relative),
+        rotate_back(r_ground, subtract(motion.angular_velocity, ground.angular_velocity)),
+        p,
+        at + 25,
+    )
+    f = scale(p[at + 24], f)
+    m = scale(p[at + 24], m)
+    force, moment = rotate(r_ground, f), rotate(r_ground, m)
+    on_ground = wrench_at_origin(ground_arm, scale(-1.0, force), scale(-1.0, moment))
+    return wrench_at_origin(arm, force, moment), on_ground, (-f[0], -f[1], -f[2], -m[0], -m[1], -m[2])
 
 
 @law

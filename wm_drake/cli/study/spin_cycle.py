@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wm_drake.cli.common import JsonOption, MachineOption, SetOption, check_buildable, existing_file, load_parameters
+from wm_drake.cli.study.common import LEDGER, WorkersOption
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.outputs import progress_bar, result_folder
 
@@ -23,11 +24,10 @@ if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
     from wm_drake.studies.spin_cycle import SpinCycleResult
 
 DEFAULT_OUT = Path("wm-drake-spin-cycle")
-LEDGER = "runs.sqlite"
 
 
 def spin_cycle(
-    machine: MachineOption = "reference",
+    machine: MachineOption = "free_stroke",
     profile: Annotated[
         str, typer.Option(help="Shipped profile (spin_cycle, run_up, ifb_9kg), or file with regions.", metavar="NAME|FILE")
     ] = "spin_cycle",
@@ -44,6 +44,7 @@ def spin_cycle(
         typer.Option(help="Folder of measured accelerations, CASE.csv: time_s,S1_x,S1_y,... in m/s^2.", metavar="DIR"),
     ] = None,
     engine: Annotated[str, typer.Option(help="compiled; or drake, minutes a case.", metavar="NAME")] = "compiled",
+    workers: WorkersOption = None,
     out: Annotated[
         Path, typer.Option(help="Folder for the results; runs found there are not run again.", metavar="DIR")
     ] = DEFAULT_OUT,
@@ -61,8 +62,8 @@ def spin_cycle(
     comparison = measurement(parameters, table, spin_profile, measured, accelerations)
     check_buildable(machine, parameters)
     try:
-        with result_folder(out) as folder, _ledger(out) as ledger:
-            result = _run(parameters, table, spin_profile, engine, ledger)
+        with result_folder(out) as folder, open_runs(out) as ledger:
+            result = _run(parameters, table, spin_profile, engine, ledger, workers)
             result = result if comparison is None else _with(result, comparison)
             _write(result, folder, engine)
             ledger.mark_finished()
@@ -110,7 +111,8 @@ def measurement(
 
 
 @contextmanager
-def _ledger(out: Path) -> "Iterator[Ledger]":
+def open_runs(out: Path) -> "Iterator[Ledger]":
+    """The ledger of runs in a folder; what it holds is used without being asked."""
     from wm_drake.ledger import open_ledger
 
     out.mkdir(exist_ok=True)
@@ -119,7 +121,12 @@ def _ledger(out: Path) -> "Iterator[Ledger]":
 
 
 def _run(
-    parameters: "MachineParameters", cases: "list[UnbalanceCase]", profile: "SpinProfile", engine: str, ledger: "Ledger"
+    parameters: "MachineParameters",
+    cases: "list[UnbalanceCase]",
+    profile: "SpinProfile",
+    engine: str,
+    ledger: "Ledger",
+    workers: int | None,
 ) -> "SpinCycleResult":
     from wm_drake.machine import build_machine
     from wm_drake.studies.spin_cycle import run_spin_cycle
@@ -129,7 +136,7 @@ def _run(
         if engine == "drake":
             evaluate = drake_runs(parameters, progress=progress)
         else:
-            evaluate = compiled_runs(build_machine(parameters), ledger, progress=progress)
+            evaluate = compiled_runs(build_machine(parameters), ledger, workers=workers, progress=progress)
         return run_spin_cycle(parameters, cases, profile, evaluate)
 
 

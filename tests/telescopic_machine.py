@@ -1,0 +1,45 @@
+"""The machine with tubes as bodies, and what its tests share."""
+
+import numpy as np
+
+from wm_drake.parameters import MachineParameters, SpinProfile, load_machine
+from wm_drake.parameters.spin import Region
+
+RUN_UP = SpinProfile(
+    time=(0.0, 0.501, 5.0, 6.0),
+    speed=(5.0, 7.0, 28.0, 28.0),
+    regions=(Region(name="A", begin=1.0, end=3.0), Region(name="B", begin=3.0, end=6.0)),
+)
+OUTER_TUBES = ("damper_left_outer", "damper_right_rear_outer", "damper_right_front_outer")
+
+
+def telescopic():
+    return load_machine("free_stroke")
+
+
+def changed(parameters, **parts):
+    return MachineParameters.model_validate(parameters.model_dump(exclude_unset=True) | parts)
+
+
+def with_bushing(parameters, **numbers):
+    kind = parameters.bushing_types["connecting"].model_dump() | numbers
+    return changed(parameters, bushing_types={"connecting": kind})
+
+
+def with_tubes(parameters, built, outer_mass, about_axis, inner_mass=None):
+    """Tubes of other masses; `about_axis` is the outer tube's inertia about the damper's axis. [kg, kg m^2]"""
+    bodies = {}
+    for name in parameters.telescopic_dampers:
+        for part, mass in (("outer", outer_mass), ("inner", outer_mass * 0.75 if inner_mass is None else inner_mass)):
+            body = built.plant.GetBodyByName(f"damper_{name}_{part}")
+            inertia = body.default_spatial_inertia()
+            share = mass / inertia.get_mass()
+            central = inertia.Shift(inertia.get_com()).CalcRotationalInertia().CopyToFullMatrix3() * share
+            axis = built.set_up().telescopes[name].axis
+            if part == "outer" and about_axis is not None:
+                central = central + (about_axis - axis @ central @ axis) * np.outer(axis, axis)
+            keys = {
+                key: float(central["xyz".index(key[0]), "xyz".index(key[1])]) for key in ("xx", "yy", "zz", "xy", "xz", "yz")
+            }
+            bodies[body.name()] = {"mass": mass, "inertia": keys}
+    return changed(parameters, bodies=bodies)

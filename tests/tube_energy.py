@@ -1,0 +1,137 @@
+"""A plain second account of the energy of the machine with tubes, from its states alone: numpy, no law of the package."""
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial.transform import Rotation
+
+from wm_drake.bodies import add_bodies, add_load, set_bodies
+from wm_drake.kernel.histories import rates_history
+from wm_drake.kernel.integration import integrate_alone
+from wm_drake.kernel.mechanics import LINE_SIZE
+from wm_drake.kernel.packing import initial_state, pack
+from wm_drake.kernel.schedule import schedule_of
+
+
+def dense_states(setup, profile, step):
+    """States (n, size) at every step, torque of the motor, and the layout."""
+    p, layout = pack(setup)
+    schedule = schedule_of(profile, step, step)
+    x = initial_state(setup, profile)
+    samples = np.full((len(schedule.time), len(x)), np.nan)
+    samples[0] = x
+    work = (*(np.empty_like(x) for _ in range(3)), np.empty(LINE_SIZE))
+    integrate_alone(schedule.steps, 0, len(schedule.step), p, layout.elements, x, work, samples.ravel())
+    rates = np.empty((len(samples), 7))
+    rates_history(samples, schedule.sample_acceleration[:, None], p, layout.elements, rates)
+    return schedule.time, samples, rates[:, 6], layout
+
+
+class Motion:
+    """Of a body: rotation, position, velocities, at all samples."""
+
+    def __init__(self, states):
+        self.rotation = Rotation.from_euler("xyz", states[:, :3])
+        self.position, self.w, self.v = states[:, 3:6], states[:, 7:10], states[:, 10:13]
+
+    def point(self, p):
+        """Place and velocity of a point fixed to the body."""
+        arm = self.rotation.apply(p)
+        return self.position + arm, self.v + np.cross(self.w, arm)
+
+
+def still(count):
+    states = np.zeros((count, 14))
+    return Motion(states)
+
+
+def rotation_vector_rate(r, w):
+    """Inverse of the series for the angular velocity of a rotation vector."""
+    rates = np.empty_like(r)
+    for k, (a, b) in enumerate(zip(r, w, strict=True)):
+        x = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+        left = np.eye(3) + x / 2 + x @ x / 6 + x @ x @ x / 24 + x @ x @ x @ x / 120
+        rates[k] = np.linalg.solve(left, b)
+    return rates
+
+
+def havsin(v, v_t, p):
+    return p * np.where(np.abs(v) < v_t, np.sin(np.pi * v / (2 * v_t)), np.sign(v))
+
+
+def potential(curve, x):
+    """Elastic energy of a number or a table."""
+    if isinstance(curve, float):
+        return 0.5 * curve * x**2
+    pchip = PchipInterpolator(curve.displacement, curve.force)
+    assert np.abs(x).max() < max(curve.displacement)
+    integral = pchip.antiderivative()
+    return integral(x) - integral(0.0)
+
+
+def bushing(kind, a, p_a, r_a, b, p_b, r_b):
+    """Stored energy and dissipated power of a six-component bushing between two bodies; its ground side is on the second."""
+    ground = b.rotation * Rotation.from_matrix(r_b)
+    place, velocity = a.point(p_a)
+    ground_place = b.point(p_b)[0]
+    of_ground = b.v + np.cross(b.w, place - b.position)  # velocity there of what is fixed to the second
+    d, d_rate = ground.inv().apply(place - ground_place), ground.inv().apply(velocity - of_ground)
+    r = (ground.inv() * a.rotation * Rotation.from_matrix(r_a)).as_rotvec()
+    r_rate = rotation_vector_rate(r, ground.inv().apply(a.w - b.w))
+    stored, power = 0.0, 0.0
+    for k, axis in enumerate("xyz"):
+        stored = stored + potential(getattr(kind, f"stiffness_{axis}"), d[:, k])
+        stored = stored + potential(getattr(kind, f"rotational_stiffness_{axis}"), r[:, k])
+        power = power + getattr(kind, f"damping_{axis}") * d_rate[:, k] ** 2
+        power = power + getattr(kind, f"rotational_damping_{axis}") * r_rate[:, k] ** 2
+        rubbing = havsin(r_rate[:, k], getattr(kind, f"full_friction_rate_{axis}"), getattr(kind, f"friction_torque_{axis}"))
+        power = power + rubbing * r_rate[:, k]
+    return stored, power
+
+
+def balance(machine, setup, load, profile, step):
+    """Work of the drive, change of stored energy, dissipated energy. [J]"""
+    parameters = setup.parameters
+    time, samples, torque, layout = dense_states(setup, profile, step)
+    motion, deformation, tubes = layout.parts(samples)
+    tub, ground = Motion(motion), still(len(time))
+    stored, power = 0.0, 0.0
+    for name, spring in setup.springs.items():
+        length = np.linalg.norm(tub.point(spring.p_ToA_T)[0] - spring.p_WH, axis=1)
+        stretch = length - np.linalg.norm(spring.p_ToA_T - spring.p_WH)
+        stiffness = parameters.spring_types[parameters.springs[name].type].stiffness
+        stored = stored + spring.preload * stretch + 0.5 * stiffness * stretch**2
+    parts = [(parameters.gasket, tub, setup.bushings["gasket"], ground)]
+    for index, (name, damper) in enumerate(parameters.telescopic_dampers.items()):
+        placed, states = setup.telescopes[name], tubes[:, index]
+        outer, inner = Motion(states), Motion(states)
+        along = outer.rotation.apply(placed.axis)
+        extension, v, delta = states[:, 6], states[:, 13], deformation[:, index]
+        inner.position = outer.position + extension[:, None] * along
+        inner.v = outer.v + np.cross(outer.w, extension[:, None] * along) + v[:, None] * along
+        kinds = [parameters.bushing_types[kind] for kind in (damper.tub_bushing, damper.housing_bushing)]
+        parts += [(kinds[0], tub, placed.tub_bushing, outer), (kinds[1], inner, placed.housing_bushing, ground)]
+        law = parameters.damper_types[damper.type]
+        sponge = PchipInterpolator(law.sponge.displacement, law.sponge.force)
+        stored = stored + potential(law.sponge, delta)
+        slider = v - np.gradient(delta, time, edge_order=2)
+        power = power + havsin(v, law.basic_full_friction_velocity, law.basic_friction_force) * v + sponge(delta) * slider
+    for kind, a, placed, b in parts:
+        more_stored, more_power = bushing(kind, a, placed.p_ToB_T, placed.R_TB, b, placed.p_WG, placed.R_WG)
+        stored, power = stored + more_stored, power + more_power
+    plant = MultibodyPlant(0.0)
+    add_bodies(plant, parameters)
+    context = plant.CreateDefaultContext()
+    set_bodies(plant, context, parameters)
+    add_load(plant, context, load)
+    # without the drive's reflected inertia, which is a device and no energy of the machine
+    plant.get_joint_actuator(plant.GetJointActuatorIndices()[0]).SetRotorInertia(context, 0.0)
+    bodies = []
+    for sample in (0, -1):
+        state = np.zeros(plant.num_multibody_states())
+        for tree, block in zip(machine.tree_states(), (motion[sample], *tubes[sample]), strict=True):
+            state[tree] = block
+        plant.SetPositionsAndVelocities(context, state)
+        bodies.append(plant.CalcKineticEnergy(context) + plant.CalcPotentialEnergy(context))
+    drive = np.trapezoid(torque * motion[:, 13], time)
+    return drive, bodies[1] - bodies[0] + stored[-1] - stored[0], np.trapezoid(power, time)
