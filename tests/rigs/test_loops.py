@@ -11,6 +11,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer, Sine
 
 from wm_drake.errors import InputError
+from wm_drake.laws.damper import mstv_damper
 from wm_drake.parameters import (
     CoulombDamper,
     EndBushing,
@@ -23,6 +24,7 @@ from wm_drake.parameters import (
     load_machine,
 )
 from wm_drake.rigs import AXES, Harmonic, bushing_bench, damper_bench, force_loop, force_loops, measures_of
+from wm_drake.rigs.loops import steady_deformations
 from wm_drake.systems.friction_damper import FrictionDamper, FrictionDamperParameters, packed_damper_law
 
 MSTV = MstvDamper(  # fit of [C]; f_max assumed
@@ -39,6 +41,12 @@ FREE_STROKE = FreeStrokeDamper(  # [A] Table 1
     basic_full_friction_velocity=0.09,
     sponge=SPONGE,
 )
+
+
+@functools.cache
+def gasket():
+    return load_machine("reference").gasket
+
 
 forces, dampings = st.floats(0.0, 200.0), st.floats(0.0, 1e4)
 speeds, motions = st.floats(1e-4, 1.0), st.builds(Harmonic, st.floats(0.2, 20.0), st.floats(1e-4, 2e-2))
@@ -70,10 +78,8 @@ def test_voigt_element_has_its_dynamic_stiffness_and_loss_angle(axis):
     kind = "rotational_" if axis.startswith("about") else ""
     letter = axis[-1]
     stiffness, damping = 5e3, 40.0
-    gasket = load_machine("reference").gasket.model_copy(
-        update={f"{kind}stiffness_{letter}": stiffness, f"{kind}damping_{letter}": damping}
-    )
-    measures = measures_of(force_loop(bushing_bench(gasket, axis), motion))
+    voigt = gasket().model_copy(update={f"{kind}stiffness_{letter}": stiffness, f"{kind}damping_{letter}": damping})
+    measures = measures_of(force_loop(bushing_bench(voigt, axis), motion))
     c_omega = damping * motion.angular_frequency
     assert measures.dynamic_stiffness == pytest.approx(np.hypot(stiffness, c_omega), rel=1e-9)
     assert measures.loss_angle == pytest.approx(np.arctan2(c_omega, stiffness), rel=1e-9)
@@ -81,17 +87,17 @@ def test_voigt_element_has_its_dynamic_stiffness_and_loss_angle(axis):
 
 
 def test_a_jig_arm_does_the_work_of_the_moment():
-    gasket = load_machine("reference").gasket.model_copy(update={"rotational_stiffness_x": 70.0, "friction_torque_x": 0.5})
+    rubber = gasket().model_copy(update={"rotational_stiffness_x": 70.0, "friction_torque_x": 0.5})
     arm = 0.1  # m, [A] section 2.2
-    pushed = force_loop(bushing_bench(gasket, "about_x", arm), Harmonic(5.0, 4e-3))
+    pushed = force_loop(bushing_bench(rubber, "about_x", arm), Harmonic(5.0, 4e-3))
     assert not pushed.rotates
     angle = np.arcsin(pushed.displacement / arm)
-    moment = 70.0 * angle + gasket.rotational_damping_x * pushed.velocity / (arm * np.cos(angle))
+    moment = 70.0 * angle + rubber.rotational_damping_x * pushed.velocity / (arm * np.cos(angle))
     friction = pushed.force * arm * np.cos(angle) - moment
-    full = gasket.full_friction_rate_x
+    full = rubber.full_friction_rate_x
     rate = pushed.velocity / (arm * np.cos(angle))
     assert friction == pytest.approx(0.5 * np.sin(0.5 * np.pi * np.clip(rate / full, -1.0, 1.0)), abs=1e-9)
-    turned = force_loop(bushing_bench(gasket, "about_x"), Harmonic(5.0, 0.04))
+    turned = force_loop(bushing_bench(rubber, "about_x"), Harmonic(5.0, 0.04))
     assert np.max(np.abs(pushed.force)) * arm == pytest.approx(np.max(np.abs(turned.force)), rel=2e-3)  # as [A] reckons
 
 
@@ -115,12 +121,13 @@ def test_no_damper_gives_energy(f_max, damping, v, c1, c2, k, motion):
         assert measures_of(loop).energy_per_cycle >= -1e-6 * largest, damper.law
 
 
+@settings(max_examples=40)
 @given(k=st.floats(0.0, 1e6), c=dampings, p=st.floats(0.0, 10.0), v=speeds, axis=st.sampled_from(AXES), motion=motions)
 def test_no_bushing_gives_energy(k, c, p, v, axis, motion):
     kind, letter = ("rotational_" if axis.startswith("about") else ""), axis[-1]
     update = {f"{kind}stiffness_{letter}": k, f"{kind}damping_{letter}": c}
     update |= {f"friction_torque_{letter}": p, f"full_friction_rate_{letter}": v}
-    bench = bushing_bench(load_machine("reference").gasket.model_copy(update=update), axis)
+    bench = bushing_bench(gasket().model_copy(update=update), axis)
     loop = force_loop(bench, motion)
     assert measures_of(loop).energy_per_cycle >= -1e-12 * (1.0 + np.max(np.abs(loop.force)) * motion.amplitude)
 
@@ -236,10 +243,10 @@ def test_the_dampers_system_under_drakes_integrator_gives_the_loop_of_the_bench(
         (lambda: Harmonic(1.0, -1e-3), "amplitude: is -0.001; allowed is > 0"),
         (lambda: damper_bench(FREE_STROKE, 0.01), "sponge_mass: only the law mstv"),
         (lambda: damper_bench(MSTV, -0.01), "sponge_mass: is -0.01 kg"),
-        (lambda: bushing_bench(load_machine().gasket, "radial"), "axis: no axis 'radial'; allowed are x, y, z, about_x"),
-        (lambda: bushing_bench(load_machine().gasket, "x", arm=0.1), "arm: an arm drives a rotation"),
+        (lambda: bushing_bench(gasket(), "radial"), "axis: no axis 'radial'; allowed are x, y, z, about_x"),
+        (lambda: bushing_bench(gasket(), "x", arm=0.1), "arm: an arm drives a rotation"),
         (
-            lambda: force_loop(bushing_bench(load_machine().gasket, "about_x", arm=0.1), Harmonic(1.0, 0.1)),
+            lambda: force_loop(bushing_bench(gasket(), "about_x", arm=0.1), Harmonic(1.0, 0.1)),
             "amplitude: is 0.1 m; allowed is less than the arm",
         ),
     ],
@@ -248,3 +255,25 @@ def test_bad_input_is_told(make, message):
     with pytest.raises(InputError) as told:
         make()
     assert str(told.value).startswith(message)
+
+
+@pytest.mark.parametrize("amplitude", [0.3e-3, 0.5e-3, 1e-3])
+def test_mstv_higher_frequency_lower_friction(amplitude):
+    """[C] section 4.1 on its Figs. 7 and 12: faster deformation of the sponge, less friction and less of its work.
+
+    The measured force less the air resistance is the friction on the massless sponge; air resistance itself grows.
+    """
+    frictions, works = [], []
+    for frequency in (1.0, 3.0, 6.67, 10.0):
+        motion, bench = Harmonic(frequency, amplitude), damper_bench(MSTV)
+        loop = force_loop(bench, motion)
+        row = bench.packed[None]
+        deformation = steady_deformations(bench, row, np.array([amplitude]), np.array([motion.angular_frequency]))[0, :-1]
+        slider = loop.velocity - np.array(
+            [mstv_damper(v, d, *bench.packed[1:])[1] for v, d in zip(loop.velocity, deformation, strict=True)]
+        )
+        friction = loop.force - 400.0 * slider
+        frictions.append(np.mean(np.abs(friction)))
+        works.append(np.mean(friction * slider) / frequency)
+    assert frictions == sorted(frictions, reverse=True)
+    assert works == sorted(works, reverse=True)

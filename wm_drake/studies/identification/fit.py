@@ -169,7 +169,7 @@ def assess(
     bound[unseen] = 0  # it came there by chance
     free = np.flatnonzero(bound == 0)
     jacobian = jacobian[:, free]
-    variance = _variances(problem, residuals, len(free))
+    variance = _variances(problem, residuals, jacobian)
     spread = _Spread(jacobian, variance, np.maximum(variance, _resolution(problem) ** 2))
     p = len(problem.unknowns)
     covariance, resolved = np.full((p, p), np.nan), np.zeros(p)
@@ -275,15 +275,22 @@ def _degrees_of_freedom(problem: Problem, free: int) -> int:
     return sum(len(m.values) - m.basis.shape[1] for m in problem.measurements) - free
 
 
-def _variances(problem: Problem, residuals: FloatArray, free: int) -> FloatArray:
-    """Variance of each scaled residual (n,): its test's, with what estimating and correlation take from it."""
-    freedom = _degrees_of_freedom(problem, free)
-    lost = len(residuals) / freedom if freedom > 0 else np.inf
+def _variances(problem: Problem, residuals: FloatArray, jacobian: FloatArray) -> FloatArray:
+    """Variance of each scaled residual (n,), with what estimating and correlation take from it.
+
+    Samples of one test have a variance of their own, whose degrees of freedom are less what its baseline and its share of the
+    unknowns (its leverages) take; values that are no samples have one together.
+    """
+    leverage = np.sum(np.square(np.linalg.svd(jacobian, full_matrices=False)[0]), axis=1)
+    pooled = float(np.sum(np.square(residuals))) / max(_degrees_of_freedom(problem, jacobian.shape[1]), 1e-12)
     parts = []
     for where, m in zip(problem.slices, problem.measurements, strict=True):
         own = residuals[where]
-        mean_square = float(np.mean(np.square(own))) if m.correlated else float(np.mean(np.square(residuals)))
-        parts.append(np.full(len(own), mean_square * lost * (correlation_time(own) if m.correlated else 1.0)))
+        variance = pooled
+        if m.correlated:
+            freedom = max(len(own) - m.basis.shape[1] - float(np.sum(leverage[where])), 1e-12)
+            variance = float(np.sum(np.square(own))) / freedom * correlation_time(own)
+        parts.append(np.full(len(own), variance))
     return np.concatenate(parts)
 
 

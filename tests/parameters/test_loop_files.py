@@ -1,0 +1,132 @@
+"""Measured loops from files: units, columns in any order, and one clear message for each fault."""
+
+import numpy as np
+import pytest
+
+from wm_drake.errors import InputError
+from wm_drake.parameters import load_component, read_loop, read_loops, shipped_components
+
+TIME = np.linspace(0.0, 1.0, 40)
+DISPLACEMENT, FORCE = 5.0 * np.sin(TIME), 30.0 * np.cos(TIME)
+HEAD = "time [s], displacement [mm], force [N]"
+
+
+def rows(time=TIME, displacement=DISPLACEMENT, force=FORCE):
+    return [f"{t:.6f},{d:.6f},{f:.6f}" for t, d, f in zip(time, displacement, force, strict=True)]
+
+
+def written(folder, head=HEAD, lines=None, name="loop.csv"):
+    path = folder / name
+    path.write_text("\n".join(["# damper 7, bench 2", head, *(rows() if lines is None else lines)]) + "\n")
+    return path
+
+
+def changed(number, text):
+    lines = rows()
+    lines[number] = text
+    return lines
+
+
+@pytest.mark.parametrize(
+    ("head", "factor"),
+    [
+        (HEAD, (1.0, 1e-3, 1.0)),
+        ("time (ms),displacement (mm),force (kN)", (1e-3, 1e-3, 1e3)),
+        ("time_s,displacement_mm,force_N", (1.0, 1e-3, 1.0)),
+        ("T [s], X [m], F [N]", (1.0, 1.0, 1.0)),
+    ],
+)
+def test_units_of_the_header_are_turned_into_si(tmp_path, head, factor):
+    loop = read_loop(written(tmp_path, head))
+    assert loop.time == pytest.approx(factor[0] * TIME, abs=1e-6)
+    assert loop.displacement == pytest.approx(factor[1] * 5.0 * np.sin(TIME), abs=1e-6)
+    assert loop.force == pytest.approx(factor[2] * 30.0 * np.cos(TIME), abs=1e-3)
+    assert not loop.rotates
+
+
+def test_columns_may_stand_in_any_order_among_others(tmp_path):
+    lines = [f"{f};{k};{t};{d}" for k, (t, d, f) in enumerate(zip(TIME, 5.0 * np.sin(TIME), 30.0 * np.cos(TIME), strict=True))]
+    loop = read_loop(written(tmp_path, "force_N;sample;time_s;displacement_mm", lines))
+    assert loop.force[0] == 30.0
+    assert loop.time == pytest.approx(TIME)
+
+
+def test_units_may_come_from_the_command_line(tmp_path):
+    loop = read_loop(written(tmp_path, "time,displacement,force"), ("s", "mm", "N"))
+    assert loop.displacement[-1] == pytest.approx(5e-3 * np.sin(1.0), abs=1e-8)
+
+
+def test_angle_and_moment_are_a_rotation(tmp_path):
+    loop = read_loop(written(tmp_path, "time_s,angle_deg,moment_Nm"))
+    assert loop.rotates
+    assert loop.displacement[-1] == pytest.approx(np.deg2rad(5.0 * np.sin(1.0)), abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("head", "lines", "message"),
+    [
+        ("time [s], force [N]", None, ":2: no column displacement among 'time [s], force [N]'"),
+        ("time [s], displacement [mm], d [mm]", None, ":2: 'd [mm]' is a second column of displacement"),
+        ("time [s], displacement [mm], moment [N m]", None, ":2: mixes a rotation with a translation"),
+        ("time [s], displacement [mm], force", None, ":2: force: has no unit; write 'force [N]' in the header or use --units"),
+        (
+            "time [s], displacement [N], force [N]",
+            None,
+            ":2: displacement [N]: unit 'N' does not fit; allowed is a unit such as mm",
+        ),
+        ("time [s], displacement [furl], force [N]", None, ":2: displacement [furl]: unit 'furl' is not known"),
+        (HEAD, changed(3, "0.1,nan,2.0"), ":6: displacement [mm]: 'nan' is not a finite number"),
+        (HEAD, changed(3, "0.1,1.0,inf"), ":6: force [N]: 'inf' is not a finite number"),
+        (HEAD, changed(3, "0.1,1.0,-"), ":6: force [N]: '-' is not a number"),
+        (HEAD, changed(3, "0.1,5 mm,3.0"), ":6: displacement [mm]: '5 mm' is not a number"),
+        (HEAD, changed(3, "0.1,1.0"), ":6: has 2 values, the header 3 columns"),
+        (HEAD, changed(5, "0.01,1.0,2.0"), ":8: time [s]: time does not rise: 0.01 after 0.102564"),
+        (HEAD, rows(force=np.full(40, 7.0)), ":3: force [N]: is constant (7 on lines 3 to 42)"),
+        (HEAD, rows(displacement=np.zeros(40)), ":3: displacement [mm]: is constant"),
+        (HEAD, rows()[:19], ": has 19 samples; a loop needs at least 20"),
+    ],
+)
+def test_a_bad_file_gets_one_message_with_file_and_line(tmp_path, head, lines, message):
+    path = written(tmp_path, head, lines)
+    with pytest.raises(InputError) as told:
+        read_loop(path)
+    assert len(told.value.problems) == 1
+    assert str(told.value).startswith(f"{path}{message}")
+
+
+def test_units_that_contradict_are_told(tmp_path):
+    with pytest.raises(InputError, match=r":2: force \[N\]: is in N by the header, in kN by --units"):
+        read_loop(written(tmp_path), ("s", "mm", "kN"))
+
+
+def test_all_bad_files_are_told_at_once_and_kinds_are_not_mixed(tmp_path):
+    good, rotation = written(tmp_path), written(tmp_path, "time_s,angle_deg,moment_Nm", name="turned.csv")
+    bad = [written(tmp_path, lines=changed(3, "x,1,2"), name="x.csv"), tmp_path / "none.csv"]
+    with pytest.raises(InputError) as told:
+        read_loops([good, *bad])
+    assert [problem.where for problem in told.value.problems] == [f"{bad[0]}:6", str(bad[1])]
+    with pytest.raises(InputError, match=r"holds angles and moments, .* displacements and forces; a fit takes one kind"):
+        read_loops([good, rotation])
+
+
+def test_empty_file(tmp_path):
+    path = tmp_path / "empty.csv"
+    path.write_text("# nothing\n")
+    with pytest.raises(InputError, match="is empty; needs the columns time, displacement, force"):
+        read_loop(path)
+
+
+@pytest.mark.parametrize("name", shipped_components())
+def test_shipped_components_load_and_every_number_has_a_source(name):
+    component = load_component(name)
+    written_keys = component.parameters.model_fields_set - {"law", "tub_frame", "housing_frame"}
+    assert {key.split(".")[0] for key in component.sources} == written_keys
+
+
+def test_component_files_are_checked(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text("law: coulomb\nfriction_force: 60\n")
+    with pytest.raises(InputError, match="friction_force: '60' has no unit"):
+        load_component(str(path))
+    with pytest.raises(InputError, match=r"no shipped component of that name \(did you mean 'gasket'"):
+        load_component("gaskett")
