@@ -59,15 +59,15 @@ def compared(quick: bool) -> list[str]:
     """One line a case."""
     parameters = load_machine("free_stroke")
     raised, true = build_machine(parameters), build_machine(physical(parameters))
-    end, speed = (1.0, 8.0) if quick else (40.0, 37.0)
-    edges = np.linspace(0.0, end, 3 if quick else 9)
+    end, speed = (1.0, 8.0) if quick else (12.0, 37.0)
+    edges = np.linspace(0.0, end, 3 if quick else 7)
     regions = tuple(Region(name=f"R{k + 1}", begin=a, end=b) for k, (a, b) in enumerate(pairwise(edges)))
     profile = SpinProfile(time=(0.0, end), speed=(5.0, speed), regions=regions)
     lines = []
     for front, rear, phase in ((0.4, 0.0, 0.0),) if quick else ((0.4, 0.0, 0.0), (0.6, 0.6, 0.0), (0.4, 0.4, np.pi)):
         load = UnbalanceCase(name="case", front=front, rear=rear, phase=phase).load(parameters)
         case, begin = Case("case", load, profile), time.perf_counter()
-        _, implicit = by_radau(true, case, 1e-5 if quick else 1e-7)
+        _, implicit = by_radau(true, case, 1e-5 if quick else 1e-6)
         wall = time.perf_counter() - begin
         record = simulate(raised, case)
         pose = np.hstack([record.tub_angle, record.tub_position])

@@ -149,5 +149,6 @@ def dense_record(machine, case, step):
         for moment in np.linspace(begin, stop, int(np.ceil((stop - begin) / step)) + 1)[1:]:
             simulator.AdvanceTo(moment)
             sample(alpha)
-    trajectory = Trajectory(np.array(time), np.array(state), np.array(deformation), np.array(torque), np.array(acceleration))
+    arrays = map(np.array, (time, state, deformation, torque, acceleration))
+    trajectory = Trajectory(*arrays, tubes=np.empty((len(time), 0, 14)))
     return setup, as_record(setup, case, trajectory)

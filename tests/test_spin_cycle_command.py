@@ -56,6 +56,16 @@ def test_second_time_nothing_is_run_and_its_own_table_is_a_perfect_measurement(s
     assert "average error" in Path("out/report.html").read_text(encoding="utf-8")
 
 
+def test_drakes_engine_runs_a_case_too(study):
+    shown = {}
+    for engine in ("drake", "compiled"):
+        ended = study("--json", "--case", "front", "--engine", engine)
+        assert ended.code == 0
+        shown[engine] = json.loads(ended.out)["cases"][0]
+    for name in ("rms_mm", "rms_from_acceleration_mm", "smallest_gap_mm"):
+        np.testing.assert_allclose(shown["drake"][name], shown["compiled"][name], rtol=5e-3)
+
+
 def test_interrupted_it_keeps_what_had_ended(study, monkeypatch):
     with monkeypatch.context() as patched:
         patched.setattr("wm_drake.report.spin_cycle_report.spin_cycle_report", interrupted)

@@ -125,15 +125,19 @@ def largest_motion(record: Record) -> tuple[FloatArray, FloatArray]:
     """The stretch of a record around its largest displacement, thinned out for a replay.
 
     Returns:
-        Times (n,) [s] and positions of the plant (n, 7): roll, pitch, yaw, x, y, z, drum angle. [rad, m]
+        Times (n,) [s] and positions of the plant (n, 7 or more): roll, pitch, yaw, x, y, z, drum angle; of damper tubes, if
+        they are bodies, roll to z and the extension. [rad, m]
     """
     size = abs(record.displacement).max("sensor")
     moment = float(record.time[int(size.argmax("time"))])
     stretch = record.sel(time=slice(moment - REPLAY_SPAN / 2, moment + REPLAY_SPAN / 2))
     period = float(record.time[1] - record.time[0]) if record.sizes["time"] > 1 else 1.0 / REPLAY_RATE
     frames = stretch.isel(time=slice(None, None, max(1, round(1.0 / (REPLAY_RATE * period)))))
-    positions = np.column_stack([frames.tub_angle.values, frames.tub_position.values, frames.drum_angle.values])
-    return frames.time.values, positions
+    parts = [frames.tub_angle.values, frames.tub_position.values, frames.drum_angle.values]
+    for tube in frames.tube.values if "tube" in frames.dims else ():
+        one = frames.sel(tube=tube)
+        parts += [one.tube_angle.values, one.tube_position.values, one.tube_extension.values]
+    return frames.time.values, np.column_stack(parts)
 
 
 def measure(record: Record, scene: Scene | None = None) -> Measures:

@@ -69,12 +69,15 @@ def heat_map_figure(values: FloatArray, rows: Sequence[str], columns: Sequence[s
     return figure
 
 
-def bars_figure(computed: xr.DataArray, integrated: xr.DataArray | None, measured: xr.DataArray | None) -> Figure:
+def bars_figure(
+    computed: xr.DataArray, integrated: xr.DataArray | None, measured: xr.DataArray | None, name: str = "measured"
+) -> Figure:
     """RMS displacement per region, a panel for each axis (columns) of each sensor (rows), as [A] Figs. 24 to 26.
 
     Args:
         computed, integrated: (region, accelerometer, axis) of one case, direct and from acceleration, if wanted. [m]
         measured: The same, or None.
+        name: What the measurement is called.
     """
     sensors, axes_names = (list(map(str, computed[dim].values)) for dim in ("accelerometer", "axis"))
     regions = list(map(str, computed.region.values))
@@ -103,11 +106,12 @@ def bars_figure(computed: xr.DataArray, integrated: xr.DataArray | None, measure
                 panel.spines[side].set_visible(False)
             panel.spines["left"].set_color(QUIET)
         panels[row, 0].set_ylabel("RMS, mm", fontsize=9.5)
+    panels[0, 0].set_ylim(0.0, 1.25 * panels[0, 0].get_ylim()[1])  # room for the names of the panels
     handles: list[Artist] = [Patch(color=OURS, label="wm_drake" if integrated is None else "wm_drake, displacement")]
     if integrated is not None:
         line = Line2D([], [], color=MARK, marker="_", markersize=11, linestyle="none", label="wm_drake, from acceleration")
         handles.append(line)
     if measured is not None:
-        handles.insert(0, Patch(color=MEASURED, label="measured"))
+        handles.insert(0, Patch(color=MEASURED, label=name))
     figure.legend(handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=9.5, borderaxespad=0.2)
     return figure

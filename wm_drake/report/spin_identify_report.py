@@ -4,10 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
+from wm_drake.parameters.units import Unit
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.spin_cycle_figures import bars_figure, profile_figure
 from wm_drake.report.spin_cycle_report import case_words
-from wm_drake.report.tables import Group, Row, Table, readable
+from wm_drake.report.tables import Group, Row, Table
 from wm_drake.report.wording import MISSING, number
 from wm_drake.simulation import versions
 from wm_drake.studies.spin_cycle import average_errors, region_errors
@@ -70,9 +71,9 @@ def unknowns(result: SpinIdentification) -> Table:
     groups = []
     for k, (sought, estimate) in enumerate(zip(result.sought, result.fit.estimates, strict=True)):
         unit, half = sought.unknown.unit, 100.0 * float(result.uncertainty[k])
-        shown = [readable(_rounded(sought.unknown.start or np.nan), unit)]
-        shown += [readable(_rounded(float(result.planted[k])), unit)] if result.planted is not None else []
-        shown += [readable(_rounded(estimate.value), unit), number(half, 2) if np.isfinite(half) else "not determined"]
+        shown = [_with_unit(sought.unknown.start, unit)]
+        shown += [_with_unit(float(result.planted[k]), unit)] if result.planted is not None else []
+        shown += [_with_unit(estimate.value, unit), number(half, 2) if np.isfinite(half) else "not determined"]
         shown += [number(100.0 * float(result.recovered[k]), 2)] if result.recovered is not None else []
         others = ", ".join(key.rsplit(".", 1)[-1] for key in sought.keys[1:]) or MISSING
         groups.append(Group(sought.keys[0], (Row((others, *shown), "ours" if result.identifiable[k] else "other"),)))
@@ -80,8 +81,8 @@ def unknowns(result: SpinIdentification) -> Table:
     return Table(caption, tuple(header), tuple(groups), text_columns=2)
 
 
-def _rounded(value: float) -> float:
-    return float(f"{value:.5g}")
+def _with_unit(value: float | None, unit: Unit) -> str:
+    return MISSING if value is None else f"{unit.from_si(value):.5g} {unit.shown.replace('*', ' ')}"
 
 
 def directions(result: SpinIdentification) -> list[str]:
