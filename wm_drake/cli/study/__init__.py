@@ -2,9 +2,10 @@
 
 import typer
 
-from wm_drake.cli.study import gasket, spin_cycle, spin_identify
+from wm_drake.cli.study import gasket, gasket_damping, spin_cycle, spin_identify
 
 app = typer.Typer(help="Answer a question with many runs, and report.", no_args_is_help=True)
 app.command("gasket")(gasket.gasket)
+app.command("gasket-damping")(gasket_damping.gasket_damping)
 app.command("spin-cycle")(spin_cycle.spin_cycle)
 app.command("spin-identify")(spin_identify.spin_identify)
