@@ -146,6 +146,20 @@ def test_interrupt_keeps_what_had_finished(study, monkeypatch):
     assert tables("whole") == resumed
 
 
+def test_disk_that_is_full_at_the_end_costs_no_run(study, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as changed:
+        changed.setattr("wm_drake.studies.screening_tables.write_tables", full)
+        ended = study()
+    assert (ended.code, len(ended.err.strip().splitlines())) == (2, 1)
+    assert "out: cannot be written to: No space left on device; all runs are kept" in ended.err
+    assert [path.name for path in Path("out").iterdir()] == ["ledger.sqlite"]
+    no_runs(monkeypatch)
+    assert study().code == 0
+
+
 def test_other_study_in_the_folder_is_refused_and_kept(study):
     study()
     before = tables()

@@ -61,6 +61,7 @@ def test_wheel_holds_the_data_and_nothing_else(wheel):
         ("wm_drake", "machines/*"),
         ("wm_drake", "cycles/*"),
         ("wm_drake", "report/*"),
+        ("wm_drake", "parameters/*"),
         ("wm_drake", "**/*.py"),
     ):
         wanted = [path for path in (CHECKOUT / folder).glob(pattern) if path.is_file()]

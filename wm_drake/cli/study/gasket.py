@@ -3,7 +3,8 @@
 import shlex
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -60,6 +61,9 @@ def gasket(
     ] = "linear",
     profile: ProfileOption = None,
     workers: WorkersOption = None,
+    cluster: Annotated[
+        str | None, typer.Option(help="Run on the dask.distributed cluster of this scheduler.", metavar="ADDRESS")
+    ] = None,
     resume: ResumeOption = False,
     out: Annotated[Path, typer.Option(help="Folder for the results and the ledger of runs.", metavar="DIR")] = DEFAULT_OUT,
     as_json: JsonOption = False,
@@ -76,15 +80,15 @@ def gasket(
     middle = _at_middle(parameters, levels)
     check_buildable(machine, parameters)
     work = GasketTrials(middle, levels, cases)
-    with study_ledger(out, _identity(work, plan), resume) as ledger:
-        from wm_drake.batch import simulate_remembered
-        from wm_drake.machine import build_machine
-
-        run = partial(simulate_remembered, build_machine(middle), ledger=ledger, workers=workers)
-        screening = _run(work, plan, run)
+    with _runner(middle, workers, cluster) as run, study_ledger(out, _identity(work, plan), resume) as ledger:
+        screening = _run(work, plan, partial(run, ledger=ledger))
         ledger.mark_finished()
-        with result_folder(out) as folder:
-            _write(screening, work, folder, time.perf_counter() - begin)
+        try:
+            with result_folder(out) as folder:
+                _write(screening, work, folder, time.perf_counter() - begin)
+        except OSError as error:
+            message = f"cannot be written to: {error.strerror}; all runs are kept, so the same command only has to write again"
+            raise input_error(message, where=str(out)) from None
     _tell(screening, out, as_json, time.perf_counter() - begin)
 
 
@@ -148,6 +152,20 @@ def _identity(work: "GasketTrials", plan: "Design") -> dict[str, str]:
         "measures": ", ".join(MEASURES),
         "sources": sources_version(),
     }
+
+
+@contextmanager
+def _runner(parameters: "MachineParameters", workers: int | None, cluster: str | None) -> "Iterator[Callable[..., xr.Dataset]]":
+    """What runs cases: the cores of this computer, or a cluster."""
+    from wm_drake.batch import simulate_remembered
+    from wm_drake.batch.cluster import cluster_client, simulate_on_cluster
+    from wm_drake.machine import build_machine
+
+    if cluster is None:
+        yield partial(simulate_remembered, build_machine(parameters), workers=workers)
+    else:
+        with cluster_client(cluster) as client:
+            yield partial(simulate_on_cluster, build_machine(parameters), client=client)
 
 
 def _run(work: "GasketTrials", plan: "Design", run: "Callable[..., xr.Dataset]") -> "Screening":

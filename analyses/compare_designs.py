@@ -1,0 +1,83 @@
+"""Which design tells most about the gasket for its runs: D-optimal 1000, orthogonal 243 and 729, random 1000, or the full 6561?
+
+The full factorial of both loads is run once; every design is a part of it, so its contributions can be held against those of
+the full one, term by term. Seconds are those of making the design and its analysis; the runs cost the same each.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from wm_drake import build_machine, load_machine, progress_bar, simulate_many
+from wm_drake.parameters import GASKET_FACTORS, SpinProfile, levels_of, load_factors
+from wm_drake.simulation import Case
+from wm_drake.studies.doe import Design, make_design
+from wm_drake.studies.gasket import LOADS, MEASURES, GasketTrials
+from wm_drake.studies.screening import Responses, analyse, contributions
+
+LEAST_PERCENT = 1.0
+"""Terms that contribute more to a response of the full factorial are compared."""
+
+
+def designs(names: tuple[str, ...], trials: int) -> dict[str, tuple[Design, float]]:
+    """The designs by name, and the time it took to make each. [s]"""
+    full = make_design("full", names)
+    rows = np.sort(np.random.default_rng(0).choice(full.trials, trials, replace=False))
+    makers = {
+        f"D-optimal {trials}": lambda: make_design("d-optimal", names, trials=trials),
+        "orthogonal 243": lambda: make_design("orthogonal", names, trials=243),
+        "orthogonal 729": lambda: make_design("orthogonal", names, trials=729),
+        f"random {trials}": lambda: Design("random", names, full.levels[rows], full.model),
+        f"full {full.trials}": lambda: full,
+    }
+    made = {}
+    for name, make in makers.items():
+        begin = time.perf_counter()
+        made[name] = (make(), time.perf_counter() - begin)
+    return made
+
+
+def part_of(full: Responses, design: Design) -> Responses:
+    """What a design would have given, taken from the runs of the full factorial."""
+    places = (design.levels.astype(int) + 1) @ 3 ** np.arange(len(design.factors) - 1, -1, -1)
+    return Responses({load: values.iloc[places].reset_index(drop=True) for load, values in full.values.items()}, full.units, {})
+
+
+def main() -> None:
+    """Runs the full factorial, and prints a line a design."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="five factors and runs of 2 s")
+    parser.add_argument("--out", type=Path, help="also write the table to this file")
+    arguments = parser.parse_args()
+    machine = build_machine(load_machine("reference"))
+    profile, known, trials = machine.parameters.profile, load_factors(GASKET_FACTORS), 1000
+    if arguments.quick:
+        profile, trials = SpinProfile(time=(0.0, 2.0), speed=(0.0, 9.0)), 100
+        known = {name: known[name] for name in list(known)[:5]}
+    loads = [Case(name, machine.parameters.loads[name], profile) for name in LOADS]
+    study = GasketTrials(machine.parameters, levels_of(machine.parameters, known), loads)
+    made = designs(tuple(known), trials)
+    *_, (full, _) = made.values()
+    begin = time.perf_counter()
+    with progress_bar(full.trials * len(loads)) as progress:
+        runs = study.responses(full, lambda cases: simulate_many(machine, cases, measures=MEASURES, progress=progress))
+    each_s = (time.perf_counter() - begin) / full.trials
+    reference, rows = contributions(analyse(full, runs)), []
+    for name, (design, made_s) in made.items():
+        begin = time.perf_counter()
+        error = (contributions(analyse(design, part_of(runs, design))) - reference)[reference > LEAST_PERCENT].abs()
+        seconds = made_s + design.trials * each_s + time.perf_counter() - begin
+        errors = {f"largest error, {load}": error[load].max(axis=None) for load in LOADS}
+        efficiency = design.efficiency()
+        rows.append({"design": name, "runs": design.trials * len(loads), "s": seconds, "D-efficiency, %": efficiency} | errors)
+    text = pd.DataFrame(rows).round(2).to_string(index=False)
+    print(f"contributions above {LEAST_PERCENT:g} %, largest error in points of percent\n{text}")
+    if arguments.out:
+        arguments.out.write_text(text + "\n")
+
+
+if __name__ == "__main__":
+    main()
