@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake import build_machine, load_machine, progress_bar, simulate_many
-from wm_drake.parameters import GASKET_FACTORS, SpinProfile, levels_of, load_factors
+from wm_drake.parameters import GASKET_FACTORS, SpinProfile, at_levels, levels_of, load_factors
 from wm_drake.simulation import Case
 from wm_drake.studies.doe import Design, make_design
 from wm_drake.studies.gasket import LOADS, MEASURES, GasketTrials
@@ -52,17 +52,19 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="five factors and runs of 2 s")
     parser.add_argument("--out", type=Path, help="also write the table to this file")
     arguments = parser.parse_args()
-    machine = build_machine(load_machine("reference"))
-    profile, known, trials = machine.parameters.profile, load_factors(GASKET_FACTORS), 1000
+    reference = load_machine("reference")
+    profile, known, trials = reference.profile, load_factors(GASKET_FACTORS), 1000
     if arguments.quick:
         profile, trials = SpinProfile(time=(0.0, 2.0), speed=(0.0, 9.0)), 100
         known = {name: known[name] for name in list(known)[:5]}
-    loads = [Case(name, machine.parameters.loads[name], profile) for name in LOADS]
-    study = GasketTrials(machine.parameters, levels_of(machine.parameters, known), loads)
+    levels = levels_of(reference, known)
+    middle = at_levels(reference, levels, [0] * len(levels))  # where stiffnesses are tables, numbers stand in their place
+    machine = build_machine(middle)
+    study = GasketTrials(middle, levels, [Case(name, middle.loads[name], profile) for name in LOADS])
     made = designs(tuple(known), trials)
     *_, (full, _) = made.values()
     begin = time.perf_counter()
-    with progress_bar(full.trials * len(loads)) as progress:
+    with progress_bar(full.trials * len(LOADS)) as progress:
         runs = study.responses(full, lambda cases: simulate_many(machine, cases, measures=MEASURES, progress=progress))
     each_s = (time.perf_counter() - begin) / full.trials
     reference, rows = contributions(analyse(full, runs)), []
@@ -72,7 +74,7 @@ def main() -> None:
         seconds = made_s + design.trials * each_s + time.perf_counter() - begin
         errors = {f"largest error, {load}": error[load].max(axis=None) for load in LOADS}
         efficiency = design.efficiency()
-        rows.append({"design": name, "runs": design.trials * len(loads), "s": seconds, "D-efficiency, %": efficiency} | errors)
+        rows.append({"design": name, "runs": design.trials * len(LOADS), "s": seconds, "D-efficiency, %": efficiency} | errors)
     text = pd.DataFrame(rows).round(2).to_string(index=False)
     print(f"contributions above {LEAST_PERCENT:g} %, largest error in points of percent\n{text}")
     if arguments.out:

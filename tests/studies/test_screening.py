@@ -6,8 +6,9 @@ import pytest
 
 from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
+from wm_drake.machine import build_machine
 from wm_drake.measures import measure
-from wm_drake.parameters import GASKET_FACTORS, SpinProfile, factor_of_text, levels_of, load_factors
+from wm_drake.parameters import GASKET_FACTORS, SpinProfile, at_levels, factor_of_text, levels_of, load_factors
 from wm_drake.simulation import Case, simulate
 from wm_drake.studies.doe import Design, level_matrix, make_design
 from wm_drake.studies.gasket import RESPONSES, GasketTrials
@@ -99,12 +100,14 @@ def test_failed_runs_are_left_out_while_the_rest_will_do():
 SHORT = SpinProfile(time=(0.0, 2.0), speed=(5.0, 12.0))
 
 
-def test_trials_run_the_machine_at_their_levels(machine, reference):
+def test_trials_run_the_machine_at_their_levels(reference):
     texts = ("K_Lx", "loads.middle.unbalances.0.mass=80 %..120 %")
     known = load_factors(GASKET_FACTORS)
     factors = levels_of(reference, dict(factor_of_text(text, known) for text in texts))
+    middle = at_levels(reference, factors, [0, 0])
+    machine = build_machine(middle)
     loads = [Case(name, reference.loads[name], SHORT) for name in ("middle", "counter")]
-    trials = GasketTrials(reference, factors, loads)
+    trials = GasketTrials(middle, factors, loads)
     design = Design("own", texts, level_matrix(2), "main")
     responses = trials.responses(design, lambda cases: simulate_many(machine, cases, measures=("extremes",)))
     assert list(responses.values) == ["middle", "counter"]

@@ -103,7 +103,7 @@ def simulate_on_cluster(
         return client.submit(run_parcel, machine.parameters, parcel, wanted, step, pure=False, retries=DEATHS)
 
     ahead = AHEAD * max(1, sum(client.nthreads().values()))
-    running = as_completed([send(parcel) for parcel in itertools.islice(parcels, ahead)])
+    running = as_completed([send(parcel) for parcel in itertools.islice(parcels, ahead)], loop=client.loop)
     held = len(ledger)
     progress(held)
     try:
