@@ -68,16 +68,25 @@ def target_of(kind: str, machine: str, name: str | None, component: str | None, 
             raise input_error(f"machine '{parameters.name}' has no gasket", where="--machine")
         key, chosen = "gasket", parameters.gasket
     else:
-        table: dict[str, Any]
-        table, folder = (parameters.damper_types, "damper_types") if kind == "damper" else (parameters.bushings, "bushings")
+        folders = ("damper_types",) if kind == "damper" else ("bushing_types", "bushings")
+        table: dict[str, Any] = {}
+        place: dict[str, str] = {}
+        for folder in folders:
+            entries = getattr(parameters, folder)
+            table |= entries
+            place |= dict.fromkeys(entries, folder)
         if not table:
             shipped = ", ".join(shipped_components())
-            message = f"machine '{parameters.name}' has no {folder}; name a file or a shipped component ({shipped})"
-            raise input_error(message, where="--component")
+            message = (
+                f"'{parameters.name}' has no {folders[0]}; name another machine, or a component file or shipped one ({shipped})"
+            )
+            raise input_error(message, where="--machine")
         name = name or next(iter(table))
         if name not in table:
-            raise input_error(f"no '{name}' in {folder} of '{parameters.name}'{nearest_names(name, table)}", where="--name")
-        key, chosen = f"{folder}.{name}", table[name]
+            raise input_error(
+                f"no '{name}' in {' or '.join(folders)} of '{parameters.name}'{nearest_names(name, table)}", where="--name"
+            )
+        key, chosen = f"{place[name]}.{name}", table[name]
     sources = {field: text for field in type(chosen).model_fields if (text := source_of(parameters, f"{key}.{field}"))}
     return Target(Component(key.split(".")[-1], chosen, sources), machine, key)
 

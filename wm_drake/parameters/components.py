@@ -7,16 +7,13 @@ from typing import Any, TypeAlias
 from pydantic import TypeAdapter, ValidationError
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
-from wm_drake.parameters.elements import Bushing, DamperType, Frozen
+from wm_drake.parameters.elements import BushingType, DamperType, Frozen
 from wm_drake.parameters.files import read_mapping
 from wm_drake.parameters.problems import problems_of
 
 COMPONENTS_FOLDER = Path(__file__).parents[1] / "components"
 
-ComponentParameters: TypeAlias = DamperType | Bushing
-
-_NOWHERE = {"tub_frame": "bench", "housing_frame": "bench"}
-"""A component file does not say where its bushing sits."""
+ComponentParameters: TypeAlias = DamperType | BushingType
 
 
 @dataclass(frozen=True)
@@ -30,7 +27,7 @@ class Component:
     @property
     def is_damper(self) -> bool:
         """Whether it is a damper, not a bushing."""
-        return not isinstance(self.parameters, Bushing)
+        return not isinstance(self.parameters, BushingType)
 
 
 class _DamperFile(Frozen):
@@ -43,7 +40,7 @@ def shipped_components() -> dict[str, Path]:
 
 
 def load_component(name_or_path: str) -> Component:
-    """Reads a component file: the keys of a damper type (with `law`) or of a bushing (without its frames).
+    """Reads a component file: the keys of a damper type (with `law`) or of a bushing type.
 
     Raises:
         InputError: with one problem per fault.
@@ -62,8 +59,8 @@ def _validated(plain: dict[str, Any], path: Path) -> ComponentParameters:
     try:
         if "law" in plain:
             return TypeAdapter(_DamperFile).validate_python({"damper": plain}, context=context).damper
-        return Bushing.model_validate(_NOWHERE | plain, context=context)
+        return BushingType.model_validate(plain, context=context)
     except ValidationError as error:
-        root = _DamperFile if "law" in plain else Bushing
+        root = _DamperFile if "law" in plain else BushingType
         problems = problems_of(error, root)
         raise InputError(Problem(str(path), p.key.removeprefix("damper").lstrip("."), p.message) for p in problems) from None

@@ -7,8 +7,8 @@ import numpy as np
 
 from wm_drake.errors import input_error
 from wm_drake.laws.damper import MSTV
-from wm_drake.parameters import Bushing, DamperType
-from wm_drake.parameters.elements import FloatArray
+from wm_drake.parameters import DamperType
+from wm_drake.parameters.elements import BushingType, FloatArray
 from wm_drake.systems.friction_damper import has_sponge, packed_damper_law
 from wm_drake.systems.six_component_bushing import packed_bushing_law
 
@@ -111,6 +111,6 @@ def damper_bench(damper: DamperType, sponge_mass: float = 0.0) -> DamperBench:
     return DamperBench(packed_damper_law(damper), sponge_mass)
 
 
-def bushing_bench(bushing: Bushing, axis: str, arm: float = 0.0) -> BushingBench:
+def bushing_bench(bushing: BushingType, axis: str, arm: float = 0.0) -> BushingBench:
     """A bushing or gasket of a machine file on the bench."""
     return BushingBench(packed_bushing_law(bushing), axis, arm)

@@ -6,22 +6,26 @@ import numpy as np
 import pytest
 
 from wm_drake.errors import InputError
-from wm_drake.parameters import ForceTable, MeasuredLoop, StvSpongeDamper, load_component
+from wm_drake.parameters import ForceTable, MeasuredLoop, StvSpongeDamper, load_component, load_machine
 from wm_drake.rigs import Harmonic, bushing_bench, damper_bench, force_loops
 from wm_drake.rigs.measured import measured_motion
 from wm_drake.studies.component_fit import bushing_model, damper_model, fit_problem
 from wm_drake.studies.identification import METHODS, identify, least_squares
 
 MSTV = load_component("mstv_damper").parameters
-FREE_STROKE = load_component("free_stroke_damper").parameters.model_copy(  # a curve on the knots of the fit
-    update={
-        "sponge": ForceTable(
-            displacement=tuple(2e-3 * np.arange(-5, 6)),
-            force=(-70.0, -35.0, -12.0, -4.0, -2.0, 0.0, 2.0, 4.0, 12.0, 35.0, 70.0),
-        )
-    }
+FREE_STROKE = (
+    load_machine("free_stroke")
+    .damper_types["free_stroke"]
+    .model_copy(  # a curve on the knots of the fit
+        update={
+            "sponge": ForceTable(
+                displacement=tuple(2e-3 * np.arange(-5, 6)),
+                force=(-70.0, -35.0, -12.0, -4.0, -2.0, 0.0, 2.0, 4.0, 12.0, 35.0, 70.0),
+            )
+        }
+    )
 )
-GASKET, BUSHING = load_component("gasket").parameters, load_component("connecting_bushing").parameters
+GASKET, BUSHING = load_machine("free_stroke").gasket, load_machine("free_stroke").bushing_types["connecting"]
 
 
 def motions_mm(*pairs):

@@ -12,8 +12,8 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.parameters import Bushing, DamperType, ForceTable, TorqueTable
-from wm_drake.parameters.elements import FloatArray
+from wm_drake.parameters import DamperType, ForceTable, TorqueTable
+from wm_drake.parameters.elements import BushingType, FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.rigs import Bench, bushing_bench, damper_bench
 from wm_drake.rigs.measured import MeasuredMotion
@@ -153,7 +153,7 @@ def _damper(fields: dict[str, Any]) -> DamperType:
 def bushing_model(
     law: str,
     motions: Sequence[MeasuredMotion],
-    base: Bushing,
+    base: BushingType,
     axis: str,
     *,
     arm: float = 0.0,
