@@ -184,7 +184,10 @@ def _motions(asked: _Asked, *, rotates: bool) -> "list[MeasuredMotion]":
     from wm_drake.errors import InputError, Problem
     from wm_drake.parameters import read_loops
     from wm_drake.rigs.measured import measured_motion
+    from wm_drake.studies.identification import METHODS
 
+    if asked.method not in METHODS:
+        raise input_error(f"no method '{asked.method}'{nearest_names(asked.method, METHODS)}", where="--method")
     units = None
     if asked.units is not None:
         parts = [part.strip() for part in asked.units.split(",")]
