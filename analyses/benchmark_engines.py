@@ -28,9 +28,9 @@ from wm_drake.kernel.mechanics import LINE_SIZE, mass_properties, state_derivati
 from wm_drake.kernel.packing import initial_state, pack
 from wm_drake.laws.lanes import WIDTH
 from wm_drake.machine import Machine
-from wm_drake.parameters import SpinProfile
+from wm_drake.parameters import SpinProfile, quantities
 
-GASKET = ("stiffness_x", "stiffness_y", "stiffness_z", "damping_x", "rotational_stiffness_x", "rotational_damping_x")
+GASKET = tuple(f"gasket.{name}" for name in ("damping", "rotational_damping", "stiffness", "rotational_stiffness"))
 FIRST_CALL = """
 import time, wm_drake as wm
 machine = wm.build_machine(wm.load_machine("reference"))
@@ -72,11 +72,17 @@ def processor() -> str:
 def gasket_cases(machine: Machine, profile: SpinProfile, count: int) -> Iterator[Case]:
     """Two loads on each of count/2 random gaskets, half to one and a half times as stiff and damped."""
     rng = np.random.default_rng(0)
+    nominal = [
+        (key, value)
+        for key, value, _ in quantities(machine.parameters)
+        if key.startswith(GASKET) and not key.endswith(("displacement", "angle"))  # abscissas of tables stay
+    ]
     for _ in range(count // 2):
         changed = machine.parameters
-        for name in GASKET:
-            value = getattr(machine.parameters.gasket, name)
-            changed = with_value(changed, f"gasket.{name}", float(value * rng.uniform(0.5, 1.5)))
+        for key, value in nominal:
+            times = rng.uniform(0.5, 1.5)
+            scaled = tuple(times * part for part in value) if isinstance(value, tuple) else times * value
+            changed = with_value(changed, key, scaled)
         for load in ("middle", "counter"):
             yield Case(load, changed.loads[load], profile, parameters=changed)
 

@@ -3,6 +3,7 @@
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
 
 from wm_drake.bodies import add_bodies, add_load, set_bodies
@@ -11,8 +12,21 @@ from wm_drake.systems.speed_source import REFLECTED_INERTIA
 from wm_drake.trajectory import Trajectory
 
 
+def elastic_energy(stiffness, x):
+    """Energy of a stiffness, a number or a table, stretched from 0 to x: for a table the integral of the monotone cubic. [J]"""
+    if isinstance(stiffness, float):
+        return 0.5 * stiffness * x**2
+    at, force = stiffness.model_dump().values()
+    curve = PchipInterpolator(at, force)
+    slope = curve.derivative()
+    energy = curve.antiderivative()
+    inside = np.clip(x, at[0], at[-1])
+    beyond = x - inside  # a straight line there
+    return energy(inside) - energy(0.0) + beyond * curve(inside) + 0.5 * slope(inside) * beyond**2
+
+
 class EnergyBook:
-    """Stored energy and dissipated power of a machine with linear springs, MSTV dampers and one linear gasket. [J, W]"""
+    """Stored energy and dissipated power of a machine with linear springs, MSTV dampers and one gasket. [J, W]"""
 
     def __init__(self, setup, load, record):
         self.setup, self.parameters, self.time = setup, setup.parameters, record.time.values
@@ -62,13 +76,12 @@ class EnergyBook:
         d = self.position + arm - placed.p_WG
         d_rate = self.v + np.cross(self.w, arm)
         r = self.rotation.as_rotvec()
-        k = np.array([g.stiffness_x, g.stiffness_y, g.stiffness_z])
-        kr = np.array([g.rotational_stiffness_x, g.rotational_stiffness_y, g.rotational_stiffness_z])
         c = np.array([g.damping_x, g.damping_y, g.damping_z])
         cr = np.array([g.rotational_damping_x, g.rotational_damping_y, g.rotational_damping_z])
         # rate of the rotation vector, by the inverse of the series for the angular velocity
         r_rate = np.array([self._rotation_vector_rate(a, b) for a, b in zip(r, self.w, strict=True)])
-        stored = 0.5 * (d**2 @ k + r**2 @ kr)
+        stored = sum(elastic_energy(getattr(g, f"stiffness_{axis}"), d[:, i]) for i, axis in enumerate("xyz"))
+        stored += sum(elastic_energy(getattr(g, f"rotational_stiffness_{axis}"), r[:, i]) for i, axis in enumerate("xyz"))
         return stored, d_rate**2 @ c + r_rate**2 @ cr
 
     @staticmethod

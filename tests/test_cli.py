@@ -412,7 +412,7 @@ def test_loads_side_by_side(tmp_path):
 def test_faulty_input_in_a_process_of_its_own(tmp_path):
     ended = in_own_process("machine", "check", "nosuch.yaml", cwd=tmp_path)
     assert (ended.returncode, ended.stdout) == (2, "")
-    assert ended.stderr == "nosuch.yaml: no such file, and no shipped machine of that name (known: reference)\n"
+    assert ended.stderr == "nosuch.yaml: no such file, and no shipped machine of that name (known: free_stroke, reference)\n"
 
 
 @pytest.mark.parametrize("arguments", [("--help",), ("spin", "--help"), ("machine", "--help"), ("machine", "check", "--help")])

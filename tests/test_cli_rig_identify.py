@@ -37,16 +37,17 @@ def test_one_loop_as_json(wm_drake):
 
 
 def test_rotations_give_moments(wm_drake):
-    ended = wm_drake("rig", "gasket", "--axis", "tilt", "-f", "3Hz", "-a", "2 deg", "--json")
+    straight = ("--set", "gasket.rotational_stiffness_x=60 N m/rad")
+    ended = wm_drake("rig", "gasket", "--axis", "tilt", "-f", "3Hz", "-a", "2 deg", "--json", *straight)
     gasket = load_machine("reference").gasket
     loop = json.loads(ended.out)
-    stiffness = np.hypot(gasket.rotational_stiffness_x, gasket.rotational_damping_x * 2.0 * np.pi * 3.0)
+    stiffness = np.hypot(60.0, gasket.rotational_damping_x * 2.0 * np.pi * 3.0)
     assert loop["dynamic_stiffness_Nm_per_rad"] == pytest.approx(stiffness, rel=1e-6)
     assert loop["peak_moment_Nm"] == pytest.approx(stiffness * np.deg2rad(2.0), rel=1e-4)
 
 
 def test_the_machine_may_be_changed_on_the_command_line(wm_drake):
-    change = ("--set", "damper_types.friction.friction_force=100 N", "--sponge-mass", "10 g")
+    change = ("--set", "damper_types.friction.friction_force=200 N", "--sponge-mass", "10 g")
     plain, changed = (
         json.loads(wm_drake("rig", "damper", "-f", "1 Hz", "-a", "10 mm", "--json", *more).out) for more in ((), change)
     )

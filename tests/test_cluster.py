@@ -18,7 +18,7 @@ SHORT = SpinProfile(time=(0.0, 3.0), speed=(5.0, 20.0))
 
 def cases_of(reference, count):
     for index in range(count):
-        changed = with_value(reference, "gasket.stiffness_x", 3000.0 + 10.0 * index)
+        changed = with_value(reference, "gasket.damping_x", 10.0 + index)
         yield Case(f"case {index}", reference.loads["middle"], SHORT, parameters=changed)
 
 

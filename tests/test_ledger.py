@@ -249,9 +249,9 @@ def test_key_depends_on_content_not_on_order(parts):
 
 
 def test_key_sees_the_last_digit(reference):
-    stiffness = reference.gasket.stiffness_x
-    same = with_value(reference, "gasket.stiffness_x", stiffness)
-    near = with_value(reference, "gasket.stiffness_x", float(np.nextafter(stiffness, 0.0)))
+    damping = reference.gasket.damping_x
+    same = with_value(reference, "gasket.damping_x", damping)
+    near = with_value(reference, "gasket.damping_x", float(np.nextafter(damping, 0.0)))
     assert key_of(p=reference) == key_of(p=same) != key_of(p=near)
     assert key_of(a=np.array([1.0, 2.0])) == key_of(a=[1.0, 2.0])
     with pytest.raises(TypeError, match="Path"):

@@ -42,7 +42,7 @@ def test_preloads_carry_the_weight_and_its_moments(machine):
         ("bodies.motor.centre_of_mass", (0.02, 0.13, -0.28)),
         ("frames.damper_left_tub.position", (-0.22, -0.05, -0.17)),
         ("frames.spring_left_housing.position", (-0.2, -0.1, 0.40)),
-        ("gasket.stiffness_x", 2500.0),
+        ("gasket.stiffness_x.force", (-90.0, -40.0, 0.0, 40.0, 90.0)),
         ("damper_types.friction.friction_force", 40.0),
     ],
 )

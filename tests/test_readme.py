@@ -5,7 +5,9 @@ from pathlib import Path
 
 from wm_drake.machine import build_machine
 from wm_drake.parameters import load_machine
+from wm_drake.parameters.free import load_free
 from wm_drake.report.diagram import mermaid
+from wm_drake.studies.calibration.turning import turning_of
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 
@@ -54,6 +56,15 @@ def test_the_example_of_an_own_machine_is_in_order(tmp_path):
     assert setup.plant_context is not None
     assert mine.bodies["upper_counterweight"].mass == 11.0
     assert max(abs(setup.residual)) < 1e-9
+
+
+def test_the_example_of_a_free_file_fits_the_reference_machine(tmp_path, machine):
+    example = re.findall(r"```yaml\n(.*?)\n```", README, re.DOTALL)[1]
+    path = tmp_path / "free.yaml"
+    path.write_text(example)
+    turning = turning_of(machine, load_free(path))
+    made = turning.parameters_at(turning.expected)
+    assert made.frames["damper_left_housing"].position[0] == -made.frames["damper_right_rear_housing"].position[0] == -0.05
 
 
 def test_every_file_named_in_the_reading_order_exists():

@@ -18,7 +18,7 @@ IDENTITY = {"study": "test"}
 
 def cases_of(reference, count=20):
     for index in range(count):
-        changed = with_value(reference, "gasket.stiffness_x", 3000.0 + 100.0 * index)
+        changed = with_value(reference, "gasket.damping_x", 10.0 + index)
         yield Case(f"case {index}", reference.loads["middle"], SHORT, parameters=changed)
 
 

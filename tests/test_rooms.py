@@ -15,7 +15,7 @@ ORDER = (
     {"laws"},
     {"parameters"},
     {"systems"},
-    {"bodies", "rigs"},
+    {"bodies", "rigs", "sdf_text"},
     {"machine"},
     {"trajectory"},
     {"kernel"},

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from wm_drake.errors import InputError
-from wm_drake.parameters import SpinProfile, with_value
+from wm_drake.parameters import SpinProfile, load_machine, with_value
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.studies.spin_cycle import labels_of
@@ -28,6 +28,17 @@ PROFILE = SpinProfile(
 )
 CASES = tuple(load_unbalance_cases()[1:5:3])  # 400 g in front, at the rear
 KEYS = (("gasket.stiffness_x",), ("gasket.stiffness_y", "gasket.stiffness_z"), ("gasket.damping_x",))
+
+
+LINEAR = "extends: reference\ngasket: {stiffness_x: 4 N/mm, stiffness_y: 4 N/mm, stiffness_z: 4 N/mm}\n"
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    """The reference machine with numbers in place of tables."""
+    path = tmp_path_factory.mktemp("machine") / "linear.yaml"
+    path.write_text(LINEAR)
+    return load_machine(path)
 
 
 def made_up(reference, seen):
@@ -107,7 +118,8 @@ def identify(wm_drake):
     def run(*arguments):
         text = "time: (0, 4) s\nspeed: (80, 300) rpm\nregions: [{name: A, begin: 0 s, end: 2 s}, {name: B, begin: 2 s, end: 4 s}]\n"
         Path("p.yaml").write_text(text)
-        common = ("--machine", "reference", "--profile", "p.yaml", "--case", "2", "--case", "5", "--out", "out")
+        Path("linear.yaml").write_text(LINEAR)
+        common = ("--machine", "linear.yaml", "--profile", "p.yaml", "--case", "2", "--case", "5", "--out", "out")
         return wm_drake("study", "spin-identify", *common, *arguments)
 
     return run

@@ -21,7 +21,7 @@ from pydrake.multibody.tree import (
 )
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
-from wm_drake.parameters import BodyOverride, Load, MachineParameters
+from wm_drake.parameters import BodyOverride, Load, MachineParameters, with_value
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
 _PACKAGE = Path(__file__).parent
@@ -225,3 +225,38 @@ def _overridden(inertia: SpatialInertia, override: BodyOverride) -> SpatialInert
         matrix = override.inertia
         about_centre = RotationalInertia(matrix.xx, matrix.yy, matrix.zz, matrix.xy, matrix.xz, matrix.yz)
     return SpatialInertia.MakeFromCentralInertia(mass, centre, about_centre)
+
+
+def spelled_out(plant: MultibodyPlant, parameters: MachineParameters, keys: Iterable[str]) -> MachineParameters:
+    """A copy in which the values of the SDF that key paths reach into stand as overrides, so that parts of them can be changed.
+
+    Raises:
+        InputError: bodies or frames the SDF does not have.
+    """
+    changed = parameters
+    for table, name, part in dict.fromkeys(tuple([*key.split("."), "", ""][:3]) for key in keys):
+        if table == "frames" and name not in changed.frames:
+            known = frame_names(plant)
+            if name not in known or not isinstance(plant.GetFrameByName(name), FixedOffsetFrame):
+                raise input_error(f"no frame '{name}' in the SDF{nearest_names(name, known)}", key=f"frames.{name}")
+            position = plant.GetFrameByName(name).GetFixedPoseInBodyFrame().translation()
+            changed = with_value(changed, f"frames.{name}.position", tuple(map(float, position)))
+        if table == "bodies" and part in BodyOverride.model_fields:
+            value = _mass_properties(plant, name, changed.bodies.get(name, BodyOverride()))[part]
+            changed = with_value(changed, f"bodies.{name}.{part}", value)
+    return changed
+
+
+def _mass_properties(plant: MultibodyPlant, name: str, override: BodyOverride) -> dict[str, Any]:
+    """Mass, centre of mass and central inertia of a body under an override, as an override says them."""
+    if not plant.HasBodyNamed(name):
+        links = [plant.get_body(index).name() for index in plant.GetBodyIndices(plant.GetBodyByName("tub").model_instance())]
+        raise input_error(f"no link '{name}' in the SDF{nearest_names(name, links)}", key=f"bodies.{name}")
+    inertia = _overridden(plant.GetBodyByName(name).default_spatial_inertia(), override)
+    matrix = inertia.Shift(inertia.get_com()).CalcRotationalInertia().CopyToFullMatrix3()
+    places = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+    return {
+        "mass": float(inertia.get_mass()),
+        "centre_of_mass": tuple(map(float, inertia.get_com())),
+        "inertia": {axis: float(matrix[place]) for axis, place in places.items()},
+    }

@@ -122,12 +122,8 @@ class Machine:
         """
         parameters = parameters or self.parameters
         _check_same_elements(self.parameters, parameters)
-        if context is None:
-            context = self.diagram.CreateDefaultContext()
-        else:
-            context.SetTimeStateAndParametersFrom(self.blank)
+        context = self.set_up_bodies(None, parameters, context)
         plant_context = self.plant.GetMyContextFromRoot(context)
-        set_bodies(self.plant, plant_context, parameters)
         places = self._places(plant_context, parameters)
         bushings, placed_dampers = _placed_bushings(places, parameters), _placed_dampers(places, parameters)
         telescopes = _placed_telescopes(self.plant, places, parameters)
@@ -146,9 +142,7 @@ class Machine:
             self._set(context, self.telescopes, telescopes)
         rest_pose, residual = self._rest_pose(context)
         tube_rest = self.plant.GetPositions(plant_context)[7:].reshape(-1, 7)
-        if load is not None:
-            add_load(self.plant, plant_context, load)
-            add_load(self.plant, plant_context, Load(unbalances=(parameters.imperfections.residual_imbalance,)))
+        self._hang_in(plant_context, parameters, load)
         self.plant.SetPositions(plant_context, np.concatenate([rest_pose, [0.0], tube_rest.ravel()]))
         points = {name: places("tub", sensor.frame)[0] for name, sensor in parameters.sensors.items()}
         detergent_point = places("tub", parameters.clearance.detergent_frame)[0]
@@ -156,6 +150,23 @@ class Machine:
         elements = springs, placed_dampers, bushings, telescopes
         rest = rest_pose, residual, tube_rest
         return Setup(self, parameters, context, *elements, points, detergent_point, vibrations, *rest)
+
+    def set_up_bodies(self, load: Load | None, parameters: MachineParameters, context: Context | None = None) -> Context:
+        """A Context, fresh or used again, in which bodies, frames and load are set and nothing else; raises as `set_up`."""
+        if context is None:
+            context = self.diagram.CreateDefaultContext()
+        else:
+            context.SetTimeStateAndParametersFrom(self.blank)
+        plant_context = self.plant.GetMyContextFromRoot(context)
+        set_bodies(self.plant, plant_context, parameters)
+        self._hang_in(plant_context, parameters, load)
+        return context
+
+    def _hang_in(self, plant_context: Context, parameters: MachineParameters, load: Load | None) -> None:
+        """The load, and with it what the drum is out of balance by itself; neither in the empty machine."""
+        if load is not None:
+            add_load(self.plant, plant_context, load)
+            add_load(self.plant, plant_context, Load(unbalances=(parameters.imperfections.residual_imbalance,)))
 
     def _places(self, plant_context: Context, parameters: MachineParameters) -> "_Places":
         """Where frames are; remembered from the last set-up, if that had the same overrides."""
@@ -262,7 +273,7 @@ class Machine:
         if not np.all(np.isfinite(remains)):
             raise input_error("forces at rest are not finite numbers; some mass, stiffness or distance is out of all bounds")
         if np.max(np.abs(remains)) > EQUILIBRIUM_TOLERANCE and not self.telescopes:
-            pose = np.asarray(root(residual, pose, tol=1e-15).x)
+            pose = np.asarray(root(residual, pose, tol=1e-12).x)
             remains = residual(pose)
         far = np.max(np.abs(pose[:3])) > _FARTHEST_REST_ANGLE or np.max(np.abs(pose[3:])) > _FARTHEST_REST_POSITION
         if not np.max(np.abs(remains)) <= EQUILIBRIUM_TOLERANCE or far:

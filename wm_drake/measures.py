@@ -78,6 +78,15 @@ def _period(record: Record) -> float:
     return float(time[1] - time[0]) if len(time) > 1 else 1.0
 
 
+def power_means(displacement: FloatArray) -> FloatArray:
+    """Means of order 20, (mean |d|^20)^(1/20), of signals (n, k): near the largest value, but smooth in all parameters. (k)
+
+    Where another peak becomes the largest, an amplitude has a kink, which searches by slopes stumble on; this has none.
+    """
+    fourth = np.square(np.square(displacement))
+    return np.asarray(np.mean(np.square(np.square(fourth)) * fourth, axis=0) ** (1.0 / 20.0))
+
+
 def amplitudes(displacement: FloatArray) -> tuple[FloatArray, np.ndarray]:
     """Largest absolute value of the envelopes of signals (n, k), and the samples where it occurs, each (k,).
 

@@ -9,6 +9,7 @@ from wm_drake.errors import InputError
 from wm_drake.parameters import (
     DamperType,
     load_machine,
+    machine_file_with,
     machine_path,
     machine_yaml,
     quantities,
@@ -51,7 +52,8 @@ def test_written_machine_is_read_back_the_same(write, reference):
 
 def test_written_file_speaks_the_engineers_units(reference):
     text = machine_yaml(reference)
-    assert f"stiffness_x:\n    value: {reference.gasket.stiffness_x / 1e3:g} N/mm\n    source: fit; " in text
+    stiffness = reference.spring_types["suspension"].stiffness
+    assert f"stiffness:\n      value: {stiffness / 1e3:g} N/mm\n      source: 'fit: spring_stiffness" in text
     assert "value: 60 N*mm*s/deg" in text
     assert "sources" not in text
 
@@ -243,7 +245,7 @@ def test_machine_that_extends_itself_is_refused(write):
 
 def test_missing_machine_is_refused_with_the_nearest(tmp_path):
     assert refused("refrence") == [
-        "refrence: no such file, and no shipped machine of that name (did you mean 'reference'? known: reference)"
+        "refrence: no such file, and no shipped machine of that name (did you mean 'reference'? known: free_stroke, reference)"
     ]
     assert refused(tmp_path)[0].startswith(f"{tmp_path}: is a folder")
 
@@ -269,3 +271,19 @@ def test_copied_shipped_machine_is_the_same_machine(tmp_path, reference):
         shutil.copy(path, tmp_path)
     copy = load_machine(tmp_path / "reference.yaml")
     assert copy.model_copy(update={"measured": ()}) == reference.model_copy(update={"measured": ()})
+
+
+def test_numbers_are_written_into_a_file_that_stays_as_it_is_written(write, reference):
+    path = write(machine_path("reference").read_text(encoding="utf-8"))
+    changed = with_value(reference, "damper_types.friction.friction_force", 31.5)
+    changed = changed.model_copy(update={"sources": {**changed.sources, "damper_types.friction.friction_force": "fit: new"}})
+    text = machine_file_with(path, changed, ["damper_types.friction.friction_force"])
+    assert "friction_force: {value: 31.5 N, source: 'fit: new'}" in text
+    again = load_machine(write(text))
+    assert again.model_dump(exclude={"sources", "model", "measured"}) == changed.model_dump(
+        exclude={"sources", "model", "measured"}
+    )
+    before, after = (set(t.splitlines()) for t in (path.read_text(encoding="utf-8"), text))
+    comments = {line for line in before if line.startswith("#")}
+    assert comments
+    assert comments <= after

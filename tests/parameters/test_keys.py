@@ -13,8 +13,8 @@ KEYS = [key for key, _, _ in quantities(load_machine("reference"))]
     [
         ("gravity", 1.62, 1.62),
         ("gravity", "1.62 m/s^2", 1.62),
-        ("gasket.stiffness_x", 3200.0, 3200.0),
-        ("gasket.stiffness_x", "3.2 N/mm", 3200.0),
+        ("spring_types.suspension.stiffness", 3200.0, 3200.0),
+        ("spring_types.suspension.stiffness", "3.2 N/mm", 3200.0),
         ("gasket.friction_torque_x", "80 N mm", 0.08),  # a default, not written in the file
         ("damper_types.friction.end_bushing.stiffness", "750 N mm/rad", 0.75),
         ("loads.counter.unbalances.1.mass", "300 g", 0.3),
@@ -50,7 +50,8 @@ def test_every_number_can_be_set_to_its_own_text(reference, key):
 
 def test_numbers_are_listed_with_value_and_unit(reference):
     listed = {key: (value, unit.shown) for key, value, unit in quantities(reference)}
-    assert listed["gasket.stiffness_x"] == (reference.gasket.stiffness_x, "N/mm")
+    assert listed["gasket.stiffness_x.force"] == (reference.gasket.stiffness_x.force, "N")
+    assert listed["gasket.damping_x"] == (reference.gasket.damping_x, "N*s/mm")
     assert listed["loads.middle.unbalances.0.radius"] == (reference.loads["middle"].unbalances[0].radius, "mm")
     assert listed["profile.speed"] == (reference.profile.speed, "rpm")
     assert len(listed) == len(KEYS) >= 50

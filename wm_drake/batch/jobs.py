@@ -11,7 +11,7 @@ from wm_drake.kernel.mechanics import DRUM_RATE
 from wm_drake.kernel.packing import Layout, initial_state, pack_bodies, pack_elements
 from wm_drake.laws.lanes import WIDTH
 from wm_drake.machine import Machine, Setup
-from wm_drake.parameters import Load, SpinProfile
+from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.simulation import AXES, Case, point_positions
 
@@ -107,7 +107,9 @@ class Preparation:
         for known, bodies in self._known_bodies:
             if known == key:
                 return bodies
-        bodies = pack_bodies(self._set_up(case, case.load))
+        self._context = self.machine.set_up_bodies(case.load, parameters, self._context)
+        plant = self.machine.plant
+        bodies = pack_bodies(plant, plant.GetMyContextFromRoot(self._context), parameters.drive.joint)
         self._known_bodies = [(key, bodies), *self._known_bodies[: KEPT_BODIES - 1]]
         return bodies
 
@@ -118,13 +120,13 @@ class Preparation:
         if key not in self._known_numbers:
             if len(self._known_numbers) >= KEPT_NUMBERS:
                 del self._known_numbers[next(iter(self._known_numbers))]
-            setup = self._set_up(case, None)
+            setup = self._set_up(case)
             elements, layout = pack_elements(setup)
             self._known_numbers[key] = Numbers(setup, elements, layout, _points(setup), initial_state(setup, case.profile))
         return self._known_numbers[key]
 
-    def _set_up(self, case: Case, load: Load | None) -> Setup:
-        setup = self.machine.set_up(load, parameters=case.parameters, gasket=case.gasket, context=self._context)
+    def _set_up(self, case: Case) -> Setup:
+        setup = self.machine.set_up(parameters=case.parameters, gasket=case.gasket, context=self._context)
         if list(setup.sensors) != self.sensors:
             raise input_error(f"has sensors {', '.join(setup.sensors)}; the machine has {', '.join(self.sensors)}")
         self._context = setup.context

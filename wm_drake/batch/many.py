@@ -21,6 +21,7 @@ _VARIABLES = {
     "gasket_moment": ("axis", "N m", "largest moment of the gasket on the housing, M of [B]"),
     "amplitude": ("sensor", "m", "largest absolute value of the envelopes"),
     "critical_speed": ("sensor", "rad/s", "drum speed where it occurs"),
+    "power_mean": ("sensor", "m", "mean of order 20 of the filtered displacement: a smooth stand-in for the amplitude"),
     "smallest_gap": ("", "m", "smallest distance between tub group and housing"),
     "region_displacement": ("region accelerometer axis", "m", "RMS displacement in each region of the spin profile"),
     "region_displacement_integrated": ("region accelerometer axis", "m", "the same from acceleration, integrated twice"),
@@ -54,7 +55,8 @@ def simulate_many(
     Args:
         machine: A built machine.
         cases: What to run; taken one by one as they are needed, so a generator keeps memory flat.
-        measures: Keys of `MEASURES`: "extremes" are D, F, M of [B], "amplitudes" those of `measure` with their speeds, "gap"
+        measures: Keys of `MEASURES`: "extremes" are D, F, M of [B], "amplitudes" those of `measure` with their speeds, "power
+            means" are smooth stand-ins for them (`measures.power_means`), "gap"
             is the smallest distance between tub group and housing (NaN if the SDF has no shapes), "regions" the RMS
             displacements of the accelerometers in the regions of the profile, by number (`wm_drake.vibration`).
         step: As for `simulate`.

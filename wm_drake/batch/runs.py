@@ -14,7 +14,7 @@ from wm_drake.kernel.packing import Layout
 from wm_drake.kernel.schedule import Schedule, schedule_of
 from wm_drake.laws.lanes import WIDTH
 from wm_drake.machine import OUTPUT_PERIOD
-from wm_drake.measures import amplitudes, filtered
+from wm_drake.measures import amplitudes, filtered, power_means
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.scene import Scene
@@ -33,10 +33,14 @@ from wm_drake.vibration import region_displacements
 MEASURES = {
     "extremes": ("detergent_displacement", "gasket_force", "gasket_moment"),
     "amplitudes": ("amplitude", "critical_speed"),
+    "power means": ("power_mean",),
     "gap": ("smallest_gap",),
     "regions": ("region_displacement", "region_displacement_integrated"),
 }
 """What can be measured of each run, and the variables that gives."""
+
+_FILTERED = {"amplitudes", "power means"}
+"""Measures of the filtered displacements at the sensors."""
 
 PAUSE_STEPS = 4000
 """Steps between looks at the states: some ten milliseconds."""
@@ -74,7 +78,7 @@ class Runner:
         """Runs up to `WIDTH` jobs side by side and measures them; none if stopped on the way."""
         schedule = schedule_of(kind.profile, self.step, OUTPUT_PERIOD)
         # without amplitudes only the detergent point is followed, which comes last
-        first = 0 if "amplitudes" in self.measures else -3 * POINT_SIZE
+        first = 0 if _FILTERED & set(self.measures) else -3 * POINT_SIZE
         points = [job.numbers.points[first:] for job in jobs]
         size, count, rows = len(jobs[0].begin), len(points[0]) // POINT_SIZE, len(schedule.time)
         p, x = self._lanes("packed", [job.packed for job in jobs]), self._lanes("begin", [job.begin for job in jobs])
@@ -106,6 +110,8 @@ class Runner:
     def _ended(self, job: Job, schedule: Schedule, samples: FloatArray, moved: FloatArray, extremes: FloatArray) -> Ended:
         good, sensors = int(extremes[-1]), moved.shape[1] - 3  # the last three points are the detergent point's
         values: dict[str, FloatArray] = {}
+        if _FILTERED & set(self.measures):
+            displacement = filtered(moved[:good, :sensors], OUTPUT_PERIOD)
         for measure in self.measures:
             if measure == "extremes":
                 arrays: Iterable[FloatArray] = extremes[sensors:-1].reshape(3, 3).copy()
@@ -113,8 +119,10 @@ class Runner:
                 arrays = [self._gap(schedule.time[:good], samples[:good, :6], job.begin[:6])]
             elif measure == "regions":
                 arrays = self._regions(job, schedule, np.ascontiguousarray(samples[:good]))
+            elif measure == "power means":
+                arrays = [power_means(displacement)]
             else:
-                size, at = amplitudes(filtered(moved[:good, :sensors], OUTPUT_PERIOD))
+                size, at = amplitudes(displacement)
                 arrays = size, np.where(np.isnan(size), np.nan, samples[at, DRUM_RATE])
             values |= dict(zip(MEASURES[measure], arrays, strict=True))
         record = self._record(job, schedule, samples.copy()) if self.histories else None

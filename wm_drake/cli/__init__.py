@@ -4,7 +4,7 @@ import sys
 
 import typer
 
-from wm_drake.cli import identify, machine, rig, spin, study
+from wm_drake.cli import calibrate, identify, machine, rig, spin, study
 from wm_drake.errors import WmDrakeError
 
 app = typer.Typer(
@@ -18,6 +18,7 @@ app.add_typer(machine.app, name="machine")
 app.add_typer(rig.app, name="rig")
 app.add_typer(study.app, name="study")
 app.command()(spin.spin)
+app.command()(calibrate.calibrate)
 
 
 def main() -> None:

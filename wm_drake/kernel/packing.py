@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, ForceElementIndex, RevoluteJoint, SpatialInertia
+from pydrake.systems.framework import Context
 
 from wm_drake.errors import InputError, input_error
 from wm_drake.kernel.mechanics import BODIES_SIZE, DRUM_RATE, STATE_SIZE
@@ -54,7 +55,8 @@ def pack(setup: Setup) -> tuple[FloatArray, Layout]:
         InputError: the machine has something that the compiled engine does not represent.
     """
     elements, layout = pack_elements(setup)
-    return np.concatenate([pack_bodies(setup), elements]), layout
+    bodies = pack_bodies(setup.machine.plant, setup.plant_context, setup.parameters.drive.joint)
+    return np.concatenate([bodies, elements]), layout
 
 
 def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
@@ -122,10 +124,18 @@ def pack_tubes(setup: Setup, name: str) -> FloatArray:
     return np.concatenate([[1.0 / mass, m], a, _moment(outer_inertia) + s, s, *inertias])
 
 
-def pack_bodies(setup: Setup) -> FloatArray:
-    """The first part of `pack`: bodies and load, which no number of an element changes; raises as `pack` does."""
-    plant, context = setup.machine.plant, setup.plant_context
-    joint = drum_joint(plant, setup.parameters.drive.joint)
+def pack_bodies(plant: MultibodyPlant, context: Context, drive: str) -> FloatArray:
+    """The first part of `pack`: bodies and load in a plant Context, which no number of an element changes.
+
+    Args:
+        plant: The plant.
+        context: Its Context.
+        drive: Name of the joint that the drive turns.
+
+    Raises:
+        InputError: as `pack`.
+    """
+    joint = drum_joint(plant, drive)
     tub = plant.GetBodyByName("tub").body_frame()
     X_TF = plant.CalcRelativeTransform(context, tub, joint.frame_on_parent())
     axis, origin = X_TF.rotation() @ joint.revolute_axis(), X_TF.translation()

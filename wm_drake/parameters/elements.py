@@ -1,5 +1,6 @@
 """Force elements of a machine: springs, dampers, bushings. Frozen, SI; field names are the key paths of the machine file."""
 
+import functools
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
@@ -59,10 +60,13 @@ def check_curve(x_name: str, x: tuple[float, ...], y_name: str, y: tuple[float, 
         raise ValueError(f"{y_name} must not fall from point to point")
 
 
+@functools.lru_cache(maxsize=256)  # a study packs the same curve for each run
 def packed_curve(x: tuple[float, ...], y: tuple[float, ...]) -> FloatArray:
     """[n, x, y, slopes] of the monotone cubic (scipy's PCHIP) through the points."""
     slopes = np.maximum(PchipInterpolator(x, y).derivative()(x), 0.0)  # rounding can make a flat end fall by 1e-11
-    return np.concatenate([[len(x)], x, y, slopes])
+    packed = np.concatenate([[len(x)], x, y, slopes])
+    packed.flags.writeable = False
+    return packed
 
 
 def packed_stiffness(stiffness: "float | ForceTable | TorqueTable") -> FloatArray:

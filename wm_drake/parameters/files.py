@@ -1,6 +1,6 @@
 """Machine, load and profile files: YAML (profiles also CSV) in, YAML out. Every message names file, line and key path."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -71,6 +71,15 @@ def read_mapping(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     return _without_sources(read_yaml(path))
 
 
+def read_model(model: type[Model], path: Path) -> Model:
+    """Reads a YAML file of any other kind, as the model says.
+
+    Raises:
+        InputError: with one problem per fault, its line and key path.
+    """
+    return _validated(model, read_yaml(path), path)
+
+
 def shipped_profiles() -> dict[str, Path]:
     """Spin profiles that come with the package, by name."""
     return {path.stem: path for path in sorted(CYCLES_FOLDER.iterdir()) if path.stem.startswith("profile_")}
@@ -139,6 +148,34 @@ def machine_yaml(parameters: MachineParameters) -> str:
             continue
         source = source_of(parameters, key)
         node[name] = {"value": unit.text(value), "source": source} if source else unit.text(value)
+    text = _TextStream()
+    _yaml().dump(tree, text)
+    return text.text
+
+
+def machine_file_with(path: Path, parameters: MachineParameters, keys: Iterable[str]) -> str:
+    """A machine file as it is written, with comments and order, but some numbers and their sources those of `parameters`.
+
+    Args:
+        path: The file; the keys stand in it, not in one it extends.
+        parameters: Whose numbers and sources to write.
+        keys: Key paths of the numbers.
+    """
+    tree = read_yaml(path)
+    known = {key: (value, unit) for key, value, unit in quantities(parameters)}
+    for key in keys:
+        value, unit = known[key]
+        *parents, name = key.split(".")
+        node: Any = tree
+        for part in parents:
+            node = node[int(part)] if isinstance(node, list) else node[part]
+        if isinstance(value, tuple):  # of a table, which has one source
+            node[name], node["source"] = unit.text(value), source_of(parameters, key)
+            continue
+        if not isinstance(node[name], CommentedMap):
+            node[name] = CommentedMap()
+            node[name].fa.set_flow_style()
+        node[name]["value"], node[name]["source"] = unit.text(value), source_of(parameters, key)
     text = _TextStream()
     _yaml().dump(tree, text)
     return text.text

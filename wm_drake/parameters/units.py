@@ -84,6 +84,48 @@ def convert(magnitude: float, unit_text: str | None, unit: Unit) -> float:
     return value
 
 
+def split(text: str) -> tuple[list[float], str, bool]:
+    """``'(9, 12) kg'`` as numbers, unit text ("" for pure numbers), and whether it is a list.
+
+    Raises:
+        ValueError: not a number or a list of numbers, or an unknown unit.
+    """
+    match = _VECTOR.fullmatch(text)
+    parts = [part.strip() for part in match[1].split(",")] if match else []
+    if match is None:
+        match = _SCALAR.fullmatch(text)
+        parts = [match[1]] if match else []
+    if match is None or not all(_BARE.fullmatch(part) for part in parts):
+        raise ValueError(
+            f"'{text}' is not a number or a list of numbers with a unit; write for example '12 kg' or '(9, 12) kg'"
+        )
+    unit = match[2] or ""
+    dimension(unit)
+    return [float(part) for part in parts], unit, len(parts) > 1
+
+
+def dimension(unit: str) -> Any:
+    """What a unit measures; equal for units that convert into each other.
+
+    Raises:
+        ValueError: unknown unit.
+    """
+    try:
+        return registry().Quantity(1.0, unit).dimensionality
+    except Exception as error:  # pint raises tokenizer, attribute and assertion errors alike on text that is no unit
+        raise ValueError(f"unit '{unit}' is not known; write for example kg, mm or N/mm") from error
+
+
+def to_base(value: float, unit: str) -> float:
+    """A number of any unit in SI."""
+    return float(registry().Quantity(value, unit).to_base_units().magnitude)
+
+
+def from_base(value: float, unit: str) -> float:
+    """A number in SI, in a unit."""
+    return value / to_base(1.0, unit)
+
+
 def to_si(value: Any, info: ValidationInfo, unit: Unit) -> float:
     """Reads ``'3.2 N/mm'``; passes an SI float through unless it stands in a file, where every number needs its unit."""
     example = f"1 {unit.shown}"

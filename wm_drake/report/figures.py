@@ -165,7 +165,7 @@ def gaps_figure(results: Sequence[CaseResult]) -> Figure:
     axes.set(xlim=(low - 0.02 * span, high + 0.9 * span), ylim=(len(results) - 0.4, -0.6))
     axes.set_xlabel("smallest gap, mm (0: the parts touch)", fontsize=9.5, loc="left")
     axes.grid(axis="x", color=GRID)
-    _plain(axes)
+    plain(axes)
     axes.spines["left"].set_visible(False)
     axes.tick_params(axis="y", length=0)
     return figure
@@ -229,7 +229,7 @@ def _orbit(axes: Axes, path: FloatArray, window: BoolArray, turn: BoolArray, lar
     axes.plot(0.0, 0.0, "+", color=QUIET, markersize=10)
     axes.plot(path[largest, 0], path[largest, 2], "o", color=MARK, markersize=5)
     axes.grid(color=GRID)
-    _plain(axes)
+    plain(axes)
 
 
 def _panels(record: Record, count: int, labels: Sequence[str]) -> tuple[Figure, list[Axes]]:
@@ -245,7 +245,7 @@ def _panels(record: Record, count: int, labels: Sequence[str]) -> tuple[Figure, 
         axes.set_visible(index < count)
         axes.grid(color=GRID)
         axes.axhline(0.0, color=QUIET, linewidth=0.6)
-        _plain(axes)
+        plain(axes)
         if index < COLUMNS:
             _speed_axis(axes, record, ticks)
         if index + COLUMNS >= count:
@@ -266,7 +266,8 @@ def _speed_axis(axes: Axes, record: Record, ticks: FloatArray) -> None:
     top.spines["top"].set_color(QUIET)
 
 
-def _plain(axes: Axes) -> None:
+def plain(axes: Axes) -> None:
+    """Axes without what is not needed."""
     axes.set_axisbelow(True)
     axes.tick_params(labelsize=9)
     for side in ("top", "right"):

@@ -153,7 +153,7 @@ def _difference(changes: list[Difference], source: str) -> list[Row]:
 def critical_speeds(result: SpinResult) -> Table:
     """Drum speed at which each sensor moves most."""
     groups = [
-        _line(case_title(case), [number(RPM_PER_RAD_S * float(speed), 0) for speed in case.measures.critical_speed])
+        line(case_title(case), [number(RPM_PER_RAD_S * float(speed), 0) for speed in case.measures.critical_speed])
         for case in result.results
     ]
     header = ("load", *(f"{name}, rpm" for name in result.parameters.sensors))
@@ -167,7 +167,7 @@ def largest_values(result: SpinResult) -> Table:
         "gasket on the housing. Absolute values over the whole run, per axis."
     )
     header = ("load", *(f"{name}{axis}, {unit}" for name, unit in (("D", "mm"), ("F", "N"), ("M", "N m")) for axis in "xyz"))
-    return Table(caption, header, tuple(_line(case_title(case), _d_f_m(case)) for case in result.results))
+    return Table(caption, header, tuple(line(case_title(case), _d_f_m(case)) for case in result.results))
 
 
 def _d_f_m(case: CaseResult) -> list[str]:
@@ -193,11 +193,11 @@ def smallest_gaps(result: SpinResult) -> Table:
 def _gap(case: CaseResult) -> Group:
     gap = case.measures.smallest_gap
     if gap is None:
-        return _line(case_title(case), ["not measured", *[MISSING] * 7])
+        return line(case_title(case), ["not measured", *[MISSING] * 7])
     place = [number(MM_PER_M * value, 0) for value in gap.point]
     speed = number(speed_rpm(case, gap.time), 0)
     cells = [shape_name(gap.moving), shape_name(gap.fixed), number(MM_PER_M * gap.distance), speed, number(gap.time, 2), *place]
-    return _line(case_title(case), cells, "alarm" if gap.distance <= 0.0 else "")
+    return line(case_title(case), cells, "alarm" if gap.distance <= 0.0 else "")
 
 
 def loads(result: SpinResult) -> Table:
@@ -237,8 +237,7 @@ def _points(times: Sequence[float], speeds: Sequence[float]) -> tuple[Row, ...]:
 def parameter_table(parameters: MachineParameters) -> Table:
     """Every number of the machine: key path, value in the unit people read, source."""
     groups = (
-        _line(key, [readable(value, unit), source_of(parameters, key) or MISSING])
-        for key, value, unit in quantities(parameters)
+        line(key, [readable(value, unit), source_of(parameters, key) or MISSING]) for key, value, unit in quantities(parameters)
     )
     caption = "Numbers of the machine file. Masses, inertias, shapes and mounting points are in its SDF model."
     return Table(caption, ("key", "value", "source"), tuple(groups), text_columns=3)
@@ -250,7 +249,7 @@ def changed_numbers(result: SpinResult, case: CaseResult) -> Table | None:
         return None
     common = {key: value for key, value, _ in quantities(result.parameters)}
     groups = tuple(
-        _line(key, [readable(value, unit)]) for key, value, unit in quantities(case.case.parameters) if common.get(key) != value
+        line(key, [readable(value, unit)]) for key, value, unit in quantities(case.case.parameters) if common.get(key) != value
     )
     return Table("Numbers of this load that differ from the machine's.", ("key", "value"), groups, text_columns=2)
 
@@ -262,5 +261,6 @@ def readable(value: Any, unit: Unit) -> str:
     return unit.text(value).replace("*", " ").replace("^2", "²").replace("-", "−")
 
 
-def _line(heading: str, cells: Iterable[str], kind: str = "") -> Group:
+def line(heading: str, cells: Iterable[str], kind: str = "") -> Group:
+    """A group of one row."""
     return Group(heading, (Row(tuple(cells), kind),))

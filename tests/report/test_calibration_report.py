@@ -1,0 +1,88 @@
+"""The page of a calibration says what its numbers say."""
+
+import re
+
+import numpy as np
+import pytest
+
+from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.free import load_free
+from wm_drake.report.calibration_report import calibration_report, knowledge, summary
+from wm_drake.simulation import Case
+from wm_drake.studies.calibration.calibration import Calibration, Plan
+from wm_drake.studies.calibration.prediction import Prediction
+from wm_drake.studies.calibration.solutions import Solution
+from wm_drake.studies.calibration.targets import Targets
+from wm_drake.studies.calibration.turning import turning_of
+from wm_drake.studies.modal import natural_modes
+from wm_drake.studies.spin import run_spin
+
+FREE = """
+quantities:
+  friction: {bounds: "(10, 60) N", prior: "(30, 10) N", sets: damper_types.friction.friction_force, source: test}
+  motor: {bounds: "(4, 6) kg", prior: "(5, 0.5) kg", sets: bodies.motor.mass, source: test}
+  radius: {bounds: "(230, 250) mm", prior: "(240, 5) mm", sets: loads.middle.unbalances.0.radius, source: test}
+"""
+LOADS = (("middle", False), ("middle", True), ("back", True))
+
+
+@pytest.fixture(scope="module")
+def calibration(machine, tmp_path_factory):
+    path = tmp_path_factory.mktemp("free") / "free.yaml"
+    path.write_text(FREE)
+    turning = turning_of(machine, load_free(path))
+    sensors = tuple(machine.parameters.sensors)
+    measured = np.full((3, 6), 0.01)
+    targets = Targets(LOADS, sensors, measured, np.ones((3, 6)))
+    computed = measured.copy()
+    computed[1, 4] *= 0.75  # Yf, middle with gasket
+    point = np.array([40.0, 4.001, 0.24])
+    slopes = np.zeros((18, 3))
+    slopes[:2] = [[10.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    coordinates = (point - turning.expected) / turning.deviation
+    best = Solution(0, point, coordinates, computed, 20.0, 2.0, slopes, 123)
+    other = Solution(1, point, -coordinates, computed, 21.0, 2.0, slopes, 77)
+    bad = Solution(2, point, coordinates, 2.0 * computed, 2000.0, 2.0, slopes, 55)
+    return Calibration(turning, targets, Plan(starts=3), (best, other), (best, other, bad))
+
+
+@pytest.fixture(scope="module")
+def page(machine, calibration):
+    short = SpinProfile(time=(0.0, 3.0), speed=(5.0, 20.0))
+    cases = [Case(name, machine.parameters.loads[name], short, gasket) for name, gasket in LOADS]
+    predictions = [Prediction(("back",), np.full((1, 6), 0.02), np.full((1, 6), -0.31))]
+    modes = [("without gasket", natural_modes(machine, gasket=False))]
+    best = run_spin(machine.parameters, cases)
+    return calibration_report(calibration, predictions, best, modes, "wm-drake calibrate --free 'a<b'")
+
+
+def test_summary_has_mean_largest_and_their_place(calibration):
+    text = summary(calibration, [])
+    assert "18 measured amplitudes by 1.4 %" in text
+    assert "by −25 % at most: sensor Yf, load middle with gasket" in text
+    assert "3 searches ended in 2 distinct good solutions" in text
+
+
+def test_knowledge_sorts_the_quantities(calibration):
+    found = dict(knowledge(calibration))
+    assert found["Determined by the data"] == "friction"
+    assert found["At a bound"] == "motor"
+    assert found["By data and prior together"] == "radius"
+    assert found["By the prior only"] == "none"
+
+
+def test_page_needs_nothing_else_and_escapes_the_command(page):
+    assert not re.search(r'(src|href)="(?!data:|#)', page)
+    assert "a&lt;b" in page
+
+
+def test_page_shows_every_search_prediction_and_quantity(page):
+    for text in ("2000.0", "31.0", "4.001 ± ", "held by", "bound", "123", "back"):
+        assert text in page
+    assert page.count("<h3>Load ") == 3
+
+
+def test_page_compares_the_gasket_s_effect(page):
+    section = page[page.index('id="gasket"') : page.index('id="prediction"')]
+    assert "−25 %" in section  # Yf: computed falls, measured does not change
+    assert "0 %" in section

@@ -1,0 +1,310 @@
+"""Calibration of a machine: the free file's map, targets, planted machines recovered, interruption, what is known."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wm_drake.errors import InputError
+from wm_drake.ledger import open_ledger
+from wm_drake.machine import build_machine
+from wm_drake.parameters import SpinProfile, load_machine
+from wm_drake.parameters.free import load_free
+from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
+from wm_drake.studies.calibration.outcome import amplitude_rows, quantity_table, solved_machine
+from wm_drake.studies.calibration.prediction import check_left_out, predict
+from wm_drake.studies.calibration.solutions import Solution, distinct
+from wm_drake.studies.calibration.targets import Targets, amplitudes_at, targets_of
+from wm_drake.studies.calibration.turning import turning_of
+
+FREE = """
+quantities:
+  friction:
+    bounds: (10, 60) N
+    prior: (30, 10) N
+    sets: damper_types.friction.friction_force
+    source: test
+  lean:
+    bounds: (-60, 90) mm
+    prior: (20, 30) mm
+    sets: {frames.damper_left_housing.position.x: -1, frames.damper_right_rear_housing.position.x: 1}
+    source: test
+  motor:
+    bounds: (4, 6) kg
+    prior: (5, 0.5) kg
+    sets: {bodies.motor.mass: 1, bodies.motor.inertia.xx: 0.0024 m^2}
+    source: test
+"""
+TABLE = """
+  slope:
+    bounds: (1, 6) N/mm
+    prior: (3, 1) N/mm
+    sets: {gasket.stiffness_x.force: "(-30, 0, 30) mm"}
+    source: test
+  hardening:
+    bounds: (0, 80) N
+    prior: (20, 20) N
+    sets: {gasket.stiffness_x.force: "(-1, 0, 1)"}
+    source: test
+"""
+RUN_UP = SpinProfile(time=(0.0, 20.0), speed=(4.0, 28.0))
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory):
+    """The reference machine with a table for the gasket and a short run-up, built."""
+    path = tmp_path_factory.mktemp("machine") / "short.yaml"
+    path.write_text(
+        "extends: reference\nname: short\n"
+        "gasket: {stiffness_x: {displacement: '(-30, 0, 30) mm', force: '(-110, 0, 110) N'}}\n"
+        "profile: {time: '(0, 20) s', speed: '(40, 270) rpm'}\n"
+    )
+    return build_machine(load_machine(path))
+
+
+def free_file(tmp_path, text=FREE):
+    path = Path(tmp_path) / "free.yaml"
+    path.write_text(text)
+    return load_free(path)
+
+
+def planted(machine, turning, point, loads=(("middle", True), ("counter", True), ("counter", False))):
+    """Targets that a machine at a point gives."""
+    amplitude = amplitudes_at(machine, turning, loads, np.array([point]))[0, 0]
+    return Targets(loads, tuple(machine.parameters.sensors), amplitude, np.ones(amplitude.shape))
+
+
+def test_quantities_enter_their_values_linearly(short, tmp_path):
+    turning = turning_of(short, free_file(tmp_path, FREE + TABLE))
+    drawn = turning.base.frames
+    made = turning.parameters_at(np.array([40.0, 0.03, 5.5, 4000.0, 10.0]))
+    assert made.damper_types["friction"].friction_force == 40.0
+    assert made.frames["damper_left_housing"].position == (-0.03, *drawn["damper_left_housing"].position[1:])
+    assert made.frames["damper_right_rear_housing"].position[0] == 0.03
+    assert made.bodies["motor"].mass == 5.5
+    assert made.bodies["motor"].inertia.xx == pytest.approx(5.5 * 0.0024)
+    assert made.bodies["motor"].inertia.yy == turning.base.bodies["motor"].inertia.yy
+    assert made.gasket.stiffness_x.force == pytest.approx((-130.0, 0.0, 130.0))
+    assert made.gasket.stiffness_x.displacement == short.parameters.gasket.stiffness_x.displacement
+    assert turning.parameters_at(turning.expected).bodies["motor"].mass == 5.0  # the base was not written into
+
+
+def test_spelled_out_machine_is_the_drawn_one(short, tmp_path):
+    turning = turning_of(short, free_file(tmp_path))
+    one, other = short.set_up(), short.set_up(parameters=turning.base)
+    for name, damper in one.dampers.items():
+        assert np.array_equal(damper.packed(), other.dampers[name].packed())
+    masses = [short.plant.CalcTotalMass(setup.plant_context) for setup in (one, other)]
+    assert masses[0] == masses[1]
+
+
+FAULTS = {
+    "no bounds": (FREE.replace("    bounds: (10, 60) N\n", ""), "quantities.friction.bounds: is missing"),
+    "one bound": (FREE.replace("(10, 60) N", "10 N"), "is not two numbers with a unit"),
+    "falling bounds": (FREE.replace("(10, 60) N", "(60, 10) N"), "the bounds must rise"),
+    "prior outside": (FREE.replace("(30, 10) N", "(70, 10) N"), "the expected value is outside the bounds"),
+    "prior of no width": (FREE.replace("(30, 10) N", "(30, 0) N"), "standard deviation must be above 0"),
+    "prior in another dimension": (FREE.replace("(30, 10) N", "(30, 10) kg"), "the prior is in kg, the bounds in N"),
+    "unknown unit": (FREE.replace("(10, 60) N", "(10, 60) Nn"), "unit 'Nn' is not known"),
+    "unknown word": (FREE + "    colour: red\n", "unknown key 'colour'"),
+    "nothing free": ("quantities: {}\n", "quantities"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faulty_free_file_is_refused_with_its_line(fault, tmp_path):
+    text, message = FAULTS[fault]
+    with pytest.raises(InputError, match=r"free\.yaml") as refused:
+        free_file(tmp_path, text)
+    assert message in str(refused.value)
+
+
+MISFITS = {
+    "unknown key": (FREE.replace("friction_force", "fricton_force"), "is no number of the machine (did you mean"),
+    "unknown frame": (FREE.replace("damper_left_housing", "damper_lft_housing"), "no frame 'damper_lft_housing'"),
+    "unknown body": (FREE.replace("bodies.motor.mass", "bodies.motr.mass"), "no link 'motr'"),
+    "wrong dimension": (
+        FREE.replace("(10, 60) N", "(10, 60) kg").replace("(30, 10) N", "(30, 10) kg"),
+        "is in N, which kg does not",
+    ),
+    "factor for a table": (FREE + TABLE.replace('"(-30, 0, 30) mm"', '"(-30, 30) mm"'), "takes a list of 3 factors, not 2"),
+    "factor of the wrong dimension": (FREE.replace("0.0024 m^2", "0.0024 m"), "which kg times m does not give"),
+}
+
+
+@pytest.mark.parametrize("misfit", MISFITS)
+def test_free_file_that_does_not_fit_the_machine_is_refused(misfit, short, tmp_path):
+    text, message = MISFITS[misfit]
+    with pytest.raises(InputError) as refused:
+        turning_of(short, free_file(tmp_path, text))
+    assert message in str(refused.value)
+
+
+def measured(rows):
+    return pd.DataFrame(rows, columns=["load", "gasket", "source", "Xr", "Yr", "Zr", "Xf", "Yf", "Zf"])
+
+
+def test_targets_are_the_rows_of_the_experiment(reference):
+    rows = [["middle", "no", "experiment", *range(1, 7)], ["middle", "no", "another model", *range(6)]]
+    targets = targets_of(reference, measured(rows))
+    assert targets.loads == (("middle", False),)
+    assert targets.amplitude == pytest.approx(np.arange(1, 7)[None] * 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ([["midle", "no", "experiment", *range(1, 7)]], "no load 'midle' in the machine (did you mean 'middle'?"),
+        ([["back", "no", "experiment", *range(1, 7)]] * 2, "'back' is there twice"),
+        ([["back", "no", "experiment", *range(6)]], "not above 0"),
+        ([["back", "no", "a model", *range(1, 7)]], "has no row of source 'experiment'"),
+    ],
+)
+def test_targets_that_cannot_be_aimed_at_are_refused(rows, message, reference):
+    with pytest.raises(InputError) as refused:
+        targets_of(reference, measured(rows), "t.csv")
+    assert message in str(refused.value)
+    assert str(refused.value).startswith("t.csv")
+
+
+def test_point_that_is_no_machine_has_no_amplitudes_and_harms_no_other(short, tmp_path):
+    text = FREE.replace("{bodies.motor.mass: 1, bodies.motor.inertia.xx: 0.0024 m^2}", "bodies.motor.mass").replace(
+        "(4, 6)", "(-6, 6)"
+    )
+    turning = turning_of(short, free_file(tmp_path, text))
+    points = np.array([[30.0, 0.0, 5.0], [30.0, 0.0, -5.0], [30.0, 0.0, 5.0]])
+    values = amplitudes_at(short, turning, (("middle", True),), points)
+    assert np.isnan(values[:, 1]).all()
+    assert np.array_equal(values[:, 0], values[:, 2])
+    assert np.isfinite(values[:, 0]).all()
+
+
+def test_weights_go_by_load_by_sensor_and_by_both():
+    targets = Targets((("a", False), ("a", True), ("b", True)), ("X", "Y"), np.ones((3, 2)), np.ones((3, 2)))
+    weight = targets.weighted({"a": 2.0, "Y": 3.0, "b:X": 0.0}).weight
+    assert weight.tolist() == [[2.0, 6.0], [2.0, 6.0], [0.0, 3.0]]
+    assert targets.weight.all()
+    for key, factor, message in (("c", 1.0, "'c' is no load"), ("a:Q", 1.0, "'a:Q' is no load"), ("a", -1.0, "below 0")):
+        with pytest.raises(InputError, match=message):
+            targets.weighted({key: factor})
+
+
+def test_gasket_effect_is_the_change_the_gasket_makes():
+    amplitude = np.array([[2.0, 1.0], [3.0, 0.5], [9.0, 9.0]])
+    targets = Targets((("a", False), ("a", True), ("b", True)), ("X", "Y"), amplitude, np.ones((3, 2)))
+    effects = targets.gasket_effects(amplitude)
+    assert list(effects) == ["a"]
+    assert effects["a"] == pytest.approx([0.5, -0.5])
+
+
+@pytest.fixture(scope="module")
+def recovered(short, tmp_path_factory):
+    """A planted machine and its calibration."""
+    folder = tmp_path_factory.mktemp("calibration")
+    free = free_file(folder)
+    turning = turning_of(short, free)
+    truth = turning.expected + np.array([-0.7, 0.6, 0.9]) * turning.deviation
+    targets, plan = planted(short, turning, truth), Plan(starts=2, seed=4, iterations=12, deviation=0.002, resolution=0.0)
+    with open_ledger(folder / "ledger.sqlite", identity_of(short, free, targets, plan)) as ledger:
+        calibration = calibrate(short, free, targets, plan, ledger)
+        predictions = predict(short, free, calibration, [["middle"]], ledger)
+        ledger.mark_finished()
+    return truth, free, targets, plan, calibration, predictions, folder
+
+
+def test_planted_machine_is_recovered_within_what_the_data_are_said_to_know(recovered):
+    truth, _, targets, _, calibration, _, _ = recovered
+    best = calibration.solutions[0]
+    turning = calibration.turning
+    sure = best.spread() * turning.deviation
+    assert np.all(np.abs(best.point - truth) < 3.0 * sure + 0.02 * turning.deviation)
+    assert np.nanmax(np.abs(best.errors(targets))) < 0.01
+    assert np.all(best.spread()[:2] < 0.2)  # friction and lean move the tub, the weight of the motor hardly
+    assert np.sum(best.directions() > 1.0) >= 2
+
+
+def test_loads_that_were_not_seen_are_predicted_from_the_others(recovered):
+    (prediction,) = recovered[5]
+    assert prediction.loads == ("middle",)
+    assert prediction.predicted.shape == (1, 6)
+    assert np.abs(prediction.predicted).max() < 0.05
+    assert not np.array_equal(prediction.predicted, prediction.calibrated)
+
+
+def test_finished_calibration_is_read_back_without_a_run(recovered, short, monkeypatch):
+    _, free, targets, plan, calibration, _, folder = recovered
+
+    def no_run(*_, **__):
+        raise AssertionError("ran again")
+
+    monkeypatch.setattr("wm_drake.studies.calibration.calibration.amplitudes_at", no_run)
+    with open_ledger(folder / "ledger.sqlite", identity_of(short, free, targets, plan)) as ledger:
+        again = calibrate(short, free, targets, plan, ledger)
+    assert quantity_table(again).equals(quantity_table(calibration))
+
+
+def test_interrupted_calibration_goes_on_where_it_was(short, tmp_path, recovered):
+    _, free, targets, plan, calibration, _, _ = recovered
+    identity = identity_of(short, free, targets, plan)
+
+    def stop(_start, evaluations, _best):
+        if evaluations > 9:
+            raise KeyboardInterrupt
+
+    path = tmp_path / "ledger.sqlite"
+    with pytest.raises(KeyboardInterrupt), open_ledger(path, identity) as ledger:
+        calibrate(short, free, targets, plan, ledger, report=stop)
+    with open_ledger(path, identity, resume=True) as ledger:
+        assert len(ledger) > 5
+        resumed = calibrate(short, free, targets, plan, ledger, workers=1)
+    assert quantity_table(resumed).equals(quantity_table(calibration))  # also: any number of workers
+
+
+def test_solved_machine_carries_the_origin_of_each_number(recovered):
+    calibration = recovered[4]
+    solved = solved_machine(calibration.turning, calibration.solutions[0])
+    value = f"{solved.damper_types['friction'].friction_force:.10g}"
+    text = solved.sources["damper_types.friction.friction_force"]
+    assert text.startswith(f"fit: friction {value} ± ")
+    assert text.endswith("N (expected 30 ± 10 N)")
+    assert solved.damper_types["friction"].friction_force == pytest.approx(calibration.solutions[0].point[0], abs=0.01)
+    assert len(value) <= len("12.345")  # no digits that mean nothing
+    assert solved.sources["gravity"]  # others are kept
+
+
+def test_table_of_amplitudes_is_a_file_of_measured_amplitudes(recovered, short, tmp_path):
+    path = tmp_path / "again.csv"
+    amplitude_rows(recovered[4]).to_csv(path, index=False)
+    from wm_drake.parameters import measured_amplitudes
+
+    named = short.parameters.model_copy(update={"measured": (str(path),)})
+    assert targets_of(short.parameters, measured_amplitudes(named)).amplitude == pytest.approx(recovered[2].amplitude)
+
+
+def test_unknown_load_cannot_be_left_out_nor_all_of_them():
+    targets = Targets((("a", True), ("b", True)), ("X",), np.ones((2, 1)), np.ones((2, 1)))
+    with pytest.raises(InputError, match="no measured load 'c'"):
+        check_left_out(targets, [["c"]])
+    with pytest.raises(InputError, match="leaves no load"):
+        check_left_out(targets, [["a", "b"]])
+
+
+def solution(coordinates, amplitude, slopes, cost=1.0):
+    return Solution(0, np.array(coordinates), np.array(coordinates), np.array([amplitude]), cost, 0.0, np.array(slopes), 1)
+
+
+def test_spread_is_that_of_the_normal_distribution():
+    # the first quantity is measured as well as it was expected, the second not at all
+    one = solution([0.0, 0.0], [1.0], [[1.0, 0.0]])
+    assert one.spread() == pytest.approx([np.sqrt(0.5), 1.0])
+    assert one.directions() == pytest.approx([1.0])
+
+
+def test_distinct_solutions_are_good_and_far_apart():
+    targets = Targets((("a", True),), ("X",), np.array([[1.0]]), np.ones((1, 1)))
+    best, near, far, bad = (
+        solution(at, [1.0 + error], [[1.0, 0.0]], cost)
+        for at, error, cost in (([0, 0], 0.1, 1.0), ([0.1, 0], 0.1, 1.1), ([2, 0], 0.11, 1.2), ([-2, 0], 0.5, 9.0))
+    )
+    assert distinct([bad, far, near, best], targets) == [best, far]

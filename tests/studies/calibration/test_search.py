@@ -1,0 +1,122 @@
+"""The search on problems of known answer, without any machine."""
+
+import numpy as np
+import pytest
+
+from wm_drake.studies.calibration.search import METHODS, Problem, evolution_search, least_squares_search
+
+TRUTH = np.array([0.8, -0.5, 0.3])
+
+
+def curved(points):
+    """Residuals of a planted point, sharp against the prior, with a bend."""
+    offset = points - TRUTH
+    return 200.0 * np.column_stack([offset[:, 0], offset[:, 1] + offset[:, 0] ** 2, offset[:, 2] - 0.5 * offset[:, 1] ** 2])
+
+
+def problem(residuals=curved, bound=3.0, size=3):
+    return Problem(
+        lambda points: (residuals(points), residuals(points)), np.full(size, -bound), np.full(size, bound), np.zeros(size)
+    )
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_planted_point_is_found_from_a_far_start(method):
+    found = METHODS[method](problem(), np.array([-2.0, 2.0, -2.0]), 50, 3)
+    assert found.point == pytest.approx(TRUTH, abs=1e-3)
+    assert found.cost == pytest.approx(0.5 * np.sum(TRUTH**2), rel=1e-2)
+
+
+def test_prior_alone_holds_what_the_data_do_not_see():
+    found = least_squares_search(problem(lambda points: 50.0 * (points[:, :1] - 1.0)), np.array([0.0, 1.5, -1.0]), 30)
+    assert found.point == pytest.approx([1.0, 0.0, 0.0], abs=1e-3)
+
+
+def test_weight_between_data_and_prior_is_that_of_their_deviations():
+    # one datum that says 1 +- 1 against a prior that says 0 +- 1: the normal distributions' product is at 1/2
+    found = least_squares_search(problem(lambda points: points - 1.0, size=1), np.array([-1.0]), 30)
+    assert found.point == pytest.approx([0.5], abs=1e-5)
+
+
+@pytest.mark.parametrize("search", METHODS.values())
+def test_bounds_are_kept(search):
+    tried = []
+
+    def watched(points):
+        tried.append(points)
+        return curved(points)
+
+    found = search(problem(watched, bound=0.6), np.array([-0.5, 0.5, 0.0]), 40, 1)
+    assert np.all(np.abs(np.concatenate(tried)) <= 0.6 + 1e-12)
+    assert found.point[0] == pytest.approx(0.6, abs=1e-3)
+
+
+def test_search_goes_around_where_there_is_no_machine():
+    def with_a_hole(points):
+        values = curved(points)
+        values[np.linalg.norm(points - [-0.6, 0.8, -0.8], axis=1) < 0.4] = np.nan
+        return values
+
+    found = least_squares_search(problem(with_a_hole), np.array([-2.0, 2.0, -2.0]), 60)
+    assert found.point == pytest.approx(TRUTH, abs=1e-2)
+
+
+def test_evolution_takes_the_same_way_again_from_its_seed():
+    first, again, other = (evolution_search(problem(), np.zeros(3), 20, seed) for seed in (7, 7, 8))
+    assert np.array_equal(first.point, again.point)
+    assert not np.array_equal(first.point, other.point)
+
+
+def test_hops_go_on_where_slopes_are_caught_in_a_ripple():
+    def rippled(points):
+        x = points[:, :1]
+        values = 10.0 * (x - 0.5) + 8.0 * np.sin(9.0 * x)
+        return values, values
+
+    def search(method):
+        bounds = np.full(1, -3.0), np.full(1, 3.0)
+        return METHODS[method](Problem(rippled, *bounds, np.zeros(1)), np.array([-2.0]), 12, 0)
+
+    assert search("least-squares").cost > 2.0
+    assert search("basin-hopping").cost < 0.5
+
+
+def test_starts_are_the_expected_machine_and_draws_that_the_seed_fixes():
+    starts = [problem().start(number, 5) for number in range(4)]
+    assert not starts[0].any()
+    assert np.array_equal(starts[2], problem().start(2, 5))
+    assert not np.array_equal(starts[2], problem().start(2, 6))
+    assert len({tuple(start) for start in starts}) == 4
+
+
+def test_progress_tells_points_and_a_cost_that_only_falls():
+    told = []
+    watched = Problem(
+        lambda points: (curved(points), curved(points)),
+        np.full(3, -3.0),
+        np.full(3, 3.0),
+        np.zeros(3),
+        lambda count, best: told.append((count, best)),
+    )
+    found = least_squares_search(watched, np.zeros(3), 30)
+    counts, costs = zip(*told, strict=True)
+    assert list(counts) == sorted(counts)
+    assert counts[-1] == found.evaluations
+    assert list(costs) == sorted(costs, reverse=True)
+
+
+def kinked(points):
+    """Two peaks, of which the larger one counts, as an amplitude has; and their smooth mean of order 20."""
+    x, y = points.T
+    peaks = np.stack([np.exp(0.5 + x + 0.2 * y), np.exp(0.5 - x + 0.2 * y)])
+    hard, smooth = peaks.max(axis=0), np.mean(peaks**20, axis=0) ** (1 / 20)
+    other = np.exp(x - 0.3)
+    return 50.0 * np.log(np.stack([hard, other], axis=1)), 50.0 * np.log(np.stack([smooth, other], axis=1))
+
+
+def test_smooth_slopes_lead_past_a_kink():
+    wide = np.full(2, 6.0)
+    found = least_squares_search(Problem(kinked, -wide, wide, 0.0 * wide), np.array([-1.5, 1.0]), 60)
+    stuck = least_squares_search(Problem(lambda p: (kinked(p)[0],) * 2, -wide, wide, 0.0 * wide), np.array([-1.5, 1.0]), 60)
+    assert found.point == pytest.approx([0.3, -4.0], abs=0.1)
+    assert found.cost <= stuck.cost + 0.1

@@ -1,0 +1,112 @@
+"""Free files: which quantities of a machine a calibration may turn, within which bounds, and what is thought of them before."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from wm_drake.parameters import units as u
+from wm_drake.parameters.elements import Frozen
+from wm_drake.parameters.files import read_model
+from wm_drake.parameters.machine import Name
+
+
+class Measured(Frozen):
+    """One number or several with a unit, of whatever dimension: what ``12 kg`` or ``(-1, 0, 1) mm`` says.
+
+    Attributes:
+        values: In SI.
+        unit: As written.
+        is_list: Whether written in parentheses.
+    """
+
+    values: tuple[float, ...]
+    unit: str
+    is_list: bool
+
+    def in_unit(self, unit: str) -> tuple[float, ...]:
+        """The numbers in a unit of the same dimension."""
+        return tuple(u.from_base(value, unit) for value in self.values)
+
+
+def _measured(text: Any) -> Any:
+    if isinstance(text, int | float) and not isinstance(text, bool):
+        text = repr(text)
+    if not isinstance(text, str):
+        return text
+    magnitudes, unit, is_list = u.split(text)
+    return {"values": tuple(u.to_base(number, unit) for number in magnitudes), "unit": unit, "is_list": is_list}
+
+
+def _pair(text: Any) -> Any:
+    numbers = _measured(text)
+    if isinstance(numbers, dict) and len(numbers["values"]) != 2:
+        raise ValueError(f"'{text}' is not two numbers with a unit; write for example '(9, 12) kg'")
+    return numbers
+
+
+def _one_key(value: Any) -> Any:
+    return {value: "1"} if isinstance(value, str) else value
+
+
+_Pair = Annotated[Measured, BeforeValidator(_pair)]
+
+
+class FreeQuantity(Frozen):
+    """One number a calibration may turn.
+
+    Attributes:
+        bounds: Smallest and largest value allowed.
+        prior: Expected value and standard deviation: what is known of it before any measurement of the machine.
+        sets: Values of the machine it enters, by key path, each with a factor: a value is the sum of factor times quantity
+            over all quantities that enter it. A factor may have a unit, and one number for each point of a table.
+        source: Why these bounds and this prior.
+        start: Where searches begin; at the expected value if None.
+    """
+
+    bounds: _Pair
+    prior: _Pair
+    sets: Annotated[dict[str, Annotated[Measured, BeforeValidator(_measured)]], BeforeValidator(_one_key), Field(min_length=1)]
+    source: str
+    start: Annotated[Measured, BeforeValidator(_measured)] | None = None
+
+    @property
+    def unit(self) -> str:
+        """In which its numbers are written and shown."""
+        return self.bounds.unit
+
+    @model_validator(mode="after")
+    def _in_order(self) -> "FreeQuantity":
+        lower, upper = self.bounds.values
+        if u.dimension(self.prior.unit) != u.dimension(self.unit):
+            raise ValueError(
+                f"the prior is in {self.prior.unit or 'pure numbers'}, the bounds in {self.unit or 'pure numbers'}"
+            )
+        if not lower < upper:
+            raise ValueError("the bounds must rise")
+        if not lower <= self.prior.values[0] <= upper:
+            raise ValueError("the expected value is outside the bounds")
+        if not self.prior.values[1] > 0.0:
+            raise ValueError("the standard deviation must be above 0")
+        if self.start is not None:
+            if self.start.is_list or u.dimension(self.start.unit) != u.dimension(self.unit):
+                raise ValueError(f"the start is not one number with a unit such as {self.unit or 'none'}")
+            if not lower <= self.start.values[0] <= upper:
+                raise ValueError("the start is outside the bounds")
+        return self
+
+
+class FreeFile(Frozen):
+    """All free quantities of a calibration, by name."""
+
+    about: str = ""
+    quantities: dict[Name, FreeQuantity] = Field(min_length=1)
+
+
+def load_free(path: Path) -> FreeFile:
+    """Reads a free file.
+
+    Raises:
+        InputError: with one problem per fault, its line and key path.
+    """
+    return read_model(FreeFile, path)

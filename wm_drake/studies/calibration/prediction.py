@@ -1,0 +1,82 @@
+"""An honest test: calibrate without some loads, then see how well their amplitudes come out."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from wm_drake.errors import input_error, nearest_names
+from wm_drake.ledger import Ledger
+from wm_drake.machine import Machine
+from wm_drake.parameters.elements import FloatArray
+from wm_drake.parameters.free import FreeFile
+from wm_drake.studies.calibration.calibration import Calibration, calibrate
+from wm_drake.studies.calibration.targets import Targets
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Loads that a calibration had not seen.
+
+    Attributes:
+        loads: Their names.
+        calibrated: Relative errors of their amplitudes in the calibration that had seen them. (case, sensor)
+        predicted: The same in the calibration that had not. (case, sensor)
+    """
+
+    loads: tuple[str, ...]
+    calibrated: FloatArray
+    predicted: FloatArray
+
+
+def predict(
+    machine: Machine,
+    free: FreeFile,
+    calibration: Calibration,
+    left_out: Sequence[Sequence[str]],
+    ledger: Ledger,
+    *,
+    workers: int | None = None,
+    report: Callable[[int, int, float], None] = lambda start, evaluations, best: None,
+) -> list[Prediction]:
+    """Repeats a calibration once for each group of loads, without them, from the starts that had led to good solutions.
+
+    Args:
+        machine, free, ledger, workers, report: As for `calibrate`.
+        calibration: With all loads.
+        left_out: Groups of names of loads.
+
+    Raises:
+        InputError: a load that was not measured, or no load left.
+    """
+    check_left_out(calibration.targets, left_out)
+    return [_predict(machine, free, calibration, tuple(loads), ledger, workers, report) for loads in left_out]
+
+
+def check_left_out(targets: Targets, left_out: Sequence[Sequence[str]]) -> None:
+    """Refuses groups of loads that cannot be left out."""
+    known = {name for name, _ in targets.loads}
+    for loads in left_out:
+        for name in loads:
+            if name not in known:
+                raise input_error(f"no measured load '{name}'{nearest_names(name, known)}", key="left out")
+        if known <= set(loads):
+            raise input_error("leaves no load to calibrate with", key="left out")
+
+
+def _predict(
+    machine: Machine,
+    free: FreeFile,
+    calibration: Calibration,
+    loads: tuple[str, ...],
+    ledger: Ledger,
+    workers: int | None,
+    report: Callable[[int, int, float], None],
+) -> Prediction:
+    targets, plan = calibration.targets, calibration.plan
+    numbers = [solution.start for solution in calibration.solutions]
+    blind = calibrate(machine, free, targets.without(*loads), plan, ledger, numbers=numbers, workers=workers, report=report)
+    cases = targets.of(*loads)
+    errors = [
+        solution.amplitude[cases] / targets.amplitude[cases] - 1.0
+        for solution in (calibration.solutions[0], blind.solutions[0])
+    ]
+    return Prediction(loads, *errors)
