@@ -104,7 +104,7 @@ def test_peaks_of_a_fast_run_up_hold_at_a_fifth_of_the_step(machine, reference, 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("load", ["middle", "counter", "back", "front"])
-def test_peaks_of_the_run_up_hold_to_half_a_permille_at_a_tenth_of_the_step(machine, reference, engine, load):
+def test_peaks_of_the_run_up_hold_at_a_tenth_of_the_step(machine, reference, engine, load):
     case = case_of(reference, load)
     np.testing.assert_allclose(
         peaks(simulate(machine, case, engine)), peaks(simulate(machine, case, engine, step=2.5e-4)), rtol=PEAK_TOLERANCE[engine]
