@@ -22,13 +22,13 @@ import numba
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from wm_drake import Case, Scene, build_machine, load_machine, measure, simulate, simulate_many, with_value
+from wm_drake import Case, Scene, build_machine, load_machine, measure, simulate, simulate_many, with_values
 from wm_drake.kernel.integration import integrate_lanes
 from wm_drake.kernel.mechanics import LINE_SIZE, mass_properties, state_derivative
 from wm_drake.kernel.packing import initial_state, pack
 from wm_drake.laws.lanes import WIDTH
 from wm_drake.machine import Machine
-from wm_drake.parameters import SpinProfile, quantities
+from wm_drake.parameters import GASKET_FACTORS, SpinProfile, at_levels, levels_of, load_factors, quantities
 
 GASKET = tuple(f"gasket.{name}" for name in ("damping", "rotational_damping", "stiffness", "rotational_stiffness"))
 FIRST_CALL = """
@@ -78,11 +78,11 @@ def gasket_cases(machine: Machine, profile: SpinProfile, count: int) -> Iterator
         if key.startswith(GASKET) and not key.endswith(("displacement", "angle"))  # abscissas of tables stay
     ]
     for _ in range(count // 2):
-        changed = machine.parameters
+        numbers = {}
         for key, value in nominal:
             times = rng.uniform(0.5, 1.5)
-            scaled = tuple(times * part for part in value) if isinstance(value, tuple) else times * value
-            changed = with_value(changed, key, scaled)
+            numbers[key] = tuple(times * part for part in value) if isinstance(value, tuple) else times * value
+        changed = with_values(machine.parameters, numbers)
         for load in ("middle", "counter"):
             yield Case(load, changed.loads[load], profile, parameters=changed)
 
@@ -123,13 +123,19 @@ def by_lsoda(machine: Machine, case: Case) -> None:
 
 def many_runs(machine: Machine, size: Size) -> Iterator[str]:
     """Cost against the number of runs, and the peak of the process's memory."""
-    for measures in (("extremes",), ("extremes", "amplitudes")):
-        for count in size.many if measures == ("extremes",) else size.many[-2:-1]:
+    parameters = machine.parameters
+    constant = build_machine(at_levels(parameters, levels_of(parameters, load_factors(GASKET_FACTORS)), [0] * 8))
+    alone, both = ("extremes",), ("extremes", "amplitudes")
+    for what, kind, measures, counts in (
+        ("D, F, M, stiffness constant as in the study", constant, alone, size.many),
+        ("D, F, M and amplitudes, stiffness constant", constant, both, size.many[-2:-1]),
+        ("D, F, M, tables of stiffness", machine, alone, size.many[-2:-1]),
+    ):
+        for count in counts:
             begin = time.perf_counter()
-            simulate_many(machine, gasket_cases(machine, size.profile, count), measures=measures)
+            simulate_many(kind, gasket_cases(kind, size.profile, count), measures=measures)
             wall = time.perf_counter() - begin
             memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-            what = "D, F, M" if len(measures) == 1 else "D, F, M and amplitudes"
             yield f"{count} runs with {what}: {wall:.2f} s, {1e3 * wall / count:.2f} ms each; {memory:.0f} MB at most so far"
 
 

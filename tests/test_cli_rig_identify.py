@@ -143,7 +143,7 @@ def test_axial_curve_of_a_bushing_is_found_as_a_monotone_table(wm_drake, loops_o
     planted = load_machine("free_stroke").bushing_types["connecting"]
     at = np.array([-1e-3, 0.4e-3, 0.8e-3])
     expected = [stiffness_force(x, packed_stiffness(planted.stiffness_y), 0) for x in at]
-    assert [stiffness_force(x, table.packed(), 0) for x in at] == pytest.approx(expected, rel=0.05)
+    assert [stiffness_force(x, packed_stiffness(table), 0) for x in at] == pytest.approx(expected, rel=0.05)
     assert np.all(np.diff(table.force) >= 0.0)
 
 

@@ -31,6 +31,7 @@ _HOMES = {
     "simulate": "simulation",
     "simulate_many": "batch",
     "with_value": "parameters",
+    "with_values": "parameters",
 }
 
 __all__ = sorted(_HOMES)

@@ -85,7 +85,7 @@ def test_elastic_power_is_the_loss_of_stored_energy():
     for d, d_rate, r, r_rate in zip(*closed_path(7), strict=True):
         w = angular_velocity(r, r_rate)
         force, moment = bushing_force(tuple(d), tuple(d_rate), tuple(r), tuple(w), ELASTIC, 0)
-        along = [STIFFNESS[0] * d[0], stiffness_force(d[1], CURVE.packed(), 0), STIFFNESS[2] * d[2]]
+        along = [STIFFNESS[0] * d[0], stiffness_force(d[1], packed_stiffness(CURVE), 0), STIFFNESS[2] * d[2]]
         stored = np.dot(along, d_rate) + np.dot(np.multiply(ROTATIONAL_STIFFNESS, r), r_rate)  # W
         assert np.dot(force, d_rate) + np.dot(moment, w) == pytest.approx(-stored, rel=1e-11)
 

@@ -13,7 +13,7 @@ from wm_drake.laws.compilation import generic
 from wm_drake.laws.motion import TubMotion
 from wm_drake.parameters.elements import ForceTable, packed_stiffness
 
-CURVE = ForceTable(displacement=(-0.02, -0.008, 0.008, 0.02), force=(-90.0, 0.0, 0.0, 120.0)).packed()  # m, N
+CURVE = packed_stiffness(ForceTable(displacement=(-0.02, -0.008, 0.008, 0.02), force=(-90.0, 0.0, 0.0, 120.0)))  # m, N
 BUSHING = np.concatenate(
     [
         [50.0, 10.0, 50.0, 3.0, 5.0, 7.0, 3.7, 2.0, 1.0, 1.5, 1.0, 0.5],  # N s/m, N m s/rad, N m, rad/s
@@ -51,7 +51,7 @@ LAWS = {
     ),
     "spring_tension": (1, spring.spring_tension, lambda f, x: f(0.2 + 0.02 * x[0], 0.2, 110.0, CURVE, 0)),
     "stiffness_force": (1, table.stiffness_force, lambda f, x: f(0.015 * x[0], CURVE, 0)),
-    "hermite": (1, table.hermite, lambda f, x: f(x[0], -1.0, 2.0, 3.0, 5.0, 0.4, 0.9)),
+    "stiffness_force": (1, table.stiffness_force, lambda f, x: f(0.03 * x[0], CURVE, 0)),
     "bushing_force": (
         12,
         bushing.bushing_force,

@@ -23,15 +23,17 @@ from wm_drake.laws.damper import (
 )
 from wm_drake.laws.friction import mstv_friction, stv_friction
 from wm_drake.laws.table import stiffness_force
-from wm_drake.parameters.elements import ForceTable
+from wm_drake.parameters.elements import ForceTable, packed_stiffness
 
 K1, C1, C2 = 176e3, 90.0, 400.0  # N/m, N s/m, N s/m: fit of [C]
 F_MAX, C_M, P_B, V_B = 35.0, 60.0, 10.5, 0.09  # N, N s/m, N, m/s: [A] Table 1
 EPSILON = 1e-6  # m/s
-SPONGE = ForceTable(  # free stroke of 8 mm to either side, then progressive; assumed
-    displacement=(-0.02, -0.012, -0.008, 0.008, 0.012, 0.02),  # m
-    force=(-120.0, -25.0, 0.0, 0.0, 25.0, 120.0),  # N
-).packed()
+SPONGE = packed_stiffness(
+    ForceTable(  # free stroke of 8 mm to either side, then progressive; assumed
+        displacement=(-0.02, -0.012, -0.008, 0.008, 0.012, 0.02),  # m
+        force=(-120.0, -25.0, 0.0, 0.0, 25.0, 120.0),  # N
+    )
+)
 
 sponge_forces = st.floats(-500.0, 500.0)  # N
 velocities = st.just(0.0) | st.floats(-2.0, 2.0)  # m/s
@@ -214,7 +216,7 @@ def test_the_free_stroke_damper_never_gives_back_more_than_its_sponge_stores(rat
 
 
 def test_derivatives_of_a_free_stroke_damper_without_main_friction_are_finite():
-    sponge = ForceTable(displacement=(-0.02, -0.008, 0.008, 0.02), force=(-90.0, 0.0, 0.0, 120.0)).packed()  # m, N
+    sponge = packed_stiffness(ForceTable(displacement=(-0.02, -0.008, 0.008, 0.02), force=(-90.0, 0.0, 0.0, 120.0)))  # m, N
     rate, deformation = InitializeAutoDiff(np.array([0.1, 0.0])).ravel()  # m/s, m
     _, deformation_rate = generic(free_stroke_damper)(rate, deformation, 0.0, 60.0, 1e-6, 10.5, 0.09, sponge, 0)
     assert np.all(np.isfinite(ExtractGradient(np.array([[deformation_rate]]))))

@@ -8,7 +8,7 @@ from pydantic import TypeAdapter, ValidationError
 from ruamel.yaml import YAML
 from scipy.interpolate import PchipInterpolator
 
-from wm_drake.laws.table import packed_size, stiffness_force
+from wm_drake.laws.table import PIECE_SIZE, packed_size, stiffness_force
 from wm_drake.parameters import (
     Bushing,
     DamperType,
@@ -18,6 +18,7 @@ from wm_drake.parameters import (
     SpringType,
     TorqueTable,
     packed_stiffness,
+    packed_stiffnesses,
 )
 
 X, Y = (-0.02, -0.005, 0.0, 0.01, 0.03), (-90.0, -20.0, 0.0, 0.0, 150.0)
@@ -67,10 +68,10 @@ def test_table_from_a_file():
 def test_packed_table_is_scipys_monotone_cubic(table):
     packed = packed_stiffness(table)
     curve = PchipInterpolator(X, Y)
-    n = len(X)
-    assert packed[0] == n
-    assert packed[1 : 2 * n + 1] == pytest.approx([*X, *Y])
-    assert packed[2 * n + 1 :] == pytest.approx(curve.derivative()(X))
+    assert packed[0] == len(X)
+    pieces = packed[1:-2].reshape(len(X) - 1, PIECE_SIZE)
+    np.testing.assert_allclose(pieces, np.column_stack([X[:-1], curve.c[::-1].T]))
+    np.testing.assert_allclose(packed[-2:], [X[-1], curve.derivative()(X[-1])])
     assert packed_size(packed, 0) == len(packed)
     inside = np.linspace(X[0], X[-1], 201)
     assert [stiffness_force(x, packed, 0) for x in inside] == pytest.approx(curve(inside), abs=1e-9)
@@ -81,7 +82,7 @@ def test_packed_table_is_scipys_monotone_cubic(table):
 )
 def test_table_never_falls(steps):
     x, y = np.cumsum(steps, axis=0).T
-    packed = ForceTable(displacement=tuple(x), force=tuple(y)).packed()
+    packed = packed_stiffness(ForceTable(displacement=tuple(x), force=tuple(y)))
     forces = [stiffness_force(at, packed, 0) for at in np.linspace(x[0] - 1.0, x[-1] + 1.0, 101)]
     assert np.diff(forces).min() >= -1e-9
 
@@ -156,3 +157,15 @@ def test_bushing_takes_numbers_and_tables(reference):
 def test_elements_are_frozen(reference):
     with pytest.raises(ValidationError, match="frozen"):
         reference.gasket.stiffness_x = 1.0
+
+
+def test_tables_packed_together_are_those_packed_alone():
+    stiffnesses = [
+        ForceTable(displacement=X, force=Y),
+        300.0,
+        TorqueTable(angle=(-1.0, 1.0), torque=(-2.0, 3.0)),
+        ForceTable(displacement=X, force=tuple(1.7 * y for y in Y)),
+    ]
+    together = packed_stiffnesses(stiffnesses)
+    for stiffness, packed in zip(stiffnesses, together, strict=True):
+        assert packed.tolist() == packed_stiffness(stiffness).tolist()

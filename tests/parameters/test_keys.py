@@ -3,7 +3,16 @@
 import pytest
 
 from wm_drake.errors import InputError
-from wm_drake.parameters import BodyOverride, ForceTable, FrameOverride, load_machine, quantities, source_of, with_value
+from wm_drake.parameters import (
+    BodyOverride,
+    ForceTable,
+    FrameOverride,
+    load_machine,
+    quantities,
+    source_of,
+    with_value,
+    with_values,
+)
 
 KEYS = [key for key, _, _ in quantities(load_machine("reference"))]
 
@@ -129,3 +138,34 @@ def test_source_is_the_nearest_above(reference):
     assert source_of(reference, "profile.time") == source_of(reference, "profile") != ""
     assert source_of(reference, "gravity") == "standard value to three digits"
     assert source_of(reference, "drive.joint") == ""
+
+
+def test_several_values_at_once_are_those_one_after_another(reference):
+    values = {
+        "gasket.damping_x": "0.03 N s/mm",
+        "gasket.stiffness_x": {"displacement": "(-9, 0, 9) mm", "force": "(-20, 0, 30) N"},
+        "gasket.stiffness_x.force": "(-20, 0, 40) N",
+        "loads.counter.unbalances.0.mass": 0.3,
+        "loads.counter.unbalances.1.mass": 0.4,
+        "bodies.tub.mass": 9.0,
+        "bodies.tub.centre_of_mass": (0.0, 0.0, 0.1),
+        "frames.sensor_Xr.position": (0.0, 0.2, -0.2),
+    }
+    one_by_one = reference
+    for key, value in values.items():
+        one_by_one = with_value(one_by_one, key, value)
+    assert with_values(reference, values) == one_by_one
+    assert with_values(reference, {}) == reference
+
+
+def test_two_values_that_only_fit_together_are_set_together(reference):
+    longer = {"gasket.stiffness_x.displacement": (-0.01, 0.0, 0.01), "gasket.stiffness_x.force": (-9.0, 0.0, 9.0)}
+    with pytest.raises(InputError, match="needs as many values"):
+        with_value(reference, *next(iter(longer.items())))
+    assert with_values(reference, longer).gasket.stiffness_x.force == (-9.0, 0.0, 9.0)
+
+
+def test_every_fault_among_several_values_is_said_of_its_key(reference):
+    with pytest.raises(InputError) as refused:
+        with_values(reference, {"gasket.damping_x": -1.0, "gasket.damping_y": 2.0, "gasket.damping_z": "3 N"})
+    assert [problem.key for problem in refused.value.problems] == ["gasket.damping_x", "gasket.damping_z"]

@@ -9,7 +9,17 @@ import numpy as np
 from numba.extending import overload
 
 from wm_drake.laws.compilation import law
-from wm_drake.laws.lanes import WIDTH, LanesType, MaskType, lanes_any, lanes_floor, lanes_select, lanes_sqrt, number_array
+from wm_drake.laws.lanes import (
+    WIDTH,
+    LanesType,
+    MaskType,
+    lanes_all,
+    lanes_any,
+    lanes_floor,
+    lanes_select,
+    lanes_sqrt,
+    number_array,
+)
 
 
 def where(condition, a, b):
@@ -33,6 +43,18 @@ def anywhere(condition):
 def _compiled_anywhere(condition):
     if isinstance(condition, MaskType):
         return lambda condition: lanes_any(condition)
+    return lambda condition: condition
+
+
+def everywhere(condition):
+    """Whether the condition holds for all lanes."""
+    return condition
+
+
+@overload(everywhere)
+def _compiled_everywhere(condition):
+    if isinstance(condition, MaskType):
+        return lambda condition: lanes_all(condition)
     return lambda condition: condition
 
 

@@ -155,15 +155,24 @@ def lanes_select(typing_context, condition, a, b):
     return LANES(MASK, LANES, LANES), lambda context, builder, sig, args: builder.select(*args)
 
 
+def _mask_against(sign: str, bits: int) -> Callable[..., Any]:
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        mask = builder.bitcast(args[0], ir.IntType(WIDTH))
+        return builder.icmp_unsigned(sign, mask, ir.Constant(ir.IntType(WIDTH), bits))
+
+    return emit
+
+
 @intrinsic
 def lanes_any(typing_context, condition):
     """Whether the condition holds in any lane."""
+    return types.boolean(MASK), _mask_against("!=", 0)
 
-    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        bits = builder.bitcast(args[0], ir.IntType(WIDTH))
-        return builder.icmp_unsigned("!=", bits, ir.Constant(ir.IntType(WIDTH), 0))
 
-    return types.boolean(MASK), emit
+@intrinsic
+def lanes_all(typing_context, condition):
+    """Whether the condition holds in all lanes."""
+    return types.boolean(MASK), _mask_against("==", 2**WIDTH - 1)
 
 
 @intrinsic

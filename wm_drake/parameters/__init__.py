@@ -19,6 +19,7 @@ from wm_drake.parameters.elements import (
     TelescopicDamper,
     TorqueTable,
     packed_stiffness,
+    packed_stiffnesses,
 )
 from wm_drake.parameters.factors import (
     GASKET_FACTORS,
@@ -41,7 +42,7 @@ from wm_drake.parameters.files import (
     machine_yaml,
     shipped_machines,
 )
-from wm_drake.parameters.keys import quantities, source_of, with_value
+from wm_drake.parameters.keys import quantities, source_of, with_value, with_values
 from wm_drake.parameters.loop_files import MeasuredLoop, read_loop, read_loops
 from wm_drake.parameters.machine import (
     BodyOverride,
@@ -103,6 +104,7 @@ __all__ = [
     "measured_amplitudes",
     "nominal_stiffness",
     "packed_stiffness",
+    "packed_stiffnesses",
     "quantities",
     "read_loop",
     "read_loops",
@@ -110,4 +112,5 @@ __all__ = [
     "shipped_machines",
     "source_of",
     "with_value",
+    "with_values",
 ]

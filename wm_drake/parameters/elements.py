@@ -1,12 +1,15 @@
 """Force elements of a machine: springs, dampers, bushings. Frozen, SI; field names are the key paths of the machine file."""
 
 import functools
+import itertools
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from scipy.interpolate import PchipInterpolator
 
+from wm_drake.laws.table import PIECE_SIZE, packed_table_size
 from wm_drake.parameters import units as u
 
 FloatArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
@@ -29,9 +32,10 @@ class ForceTable(Frozen):
         check_curve("displacement", self.displacement, "force", self.force)
         return self
 
-    def packed(self) -> FloatArray:
-        """For `wm_drake.laws.table`."""
-        return packed_curve(self.displacement, self.force)
+    @property
+    def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Abscissas and ordinates."""
+        return self.displacement, self.force
 
 
 class TorqueTable(Frozen):
@@ -45,35 +49,50 @@ class TorqueTable(Frozen):
         check_curve("angle", self.angle, "torque", self.torque)
         return self
 
-    def packed(self) -> FloatArray:
-        """For `wm_drake.laws.table`."""
-        return packed_curve(self.angle, self.torque)
+    @property
+    def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Abscissas and ordinates."""
+        return self.angle, self.torque
 
 
 def check_curve(x_name: str, x: tuple[float, ...], y_name: str, y: tuple[float, ...]) -> None:
     """Refuses curves that are not functions of rising abscissa with never falling ordinate."""
     if len(x) != len(y) or len(x) < 2:
         raise ValueError(f"needs as many values of {x_name} as of {y_name}, at least two; has {len(x)} and {len(y)}")
-    if np.any(np.diff(x) <= 0.0):
+    if any(left >= right for left, right in itertools.pairwise(x)):
         raise ValueError(f"{x_name} must rise from point to point")
-    if np.any(np.diff(y) < 0.0):
+    if any(left > right for left, right in itertools.pairwise(y)):
         raise ValueError(f"{y_name} must not fall from point to point")
-
-
-@functools.lru_cache(maxsize=256)  # a study packs the same curve for each run
-def packed_curve(x: tuple[float, ...], y: tuple[float, ...]) -> FloatArray:
-    """[n, x, y, slopes] of the monotone cubic (scipy's PCHIP) through the points."""
-    slopes = np.maximum(PchipInterpolator(x, y).derivative()(x), 0.0)  # rounding can make a flat end fall by 1e-11
-    packed = np.concatenate([[len(x)], x, y, slopes])
-    packed.flags.writeable = False
-    return packed
 
 
 def packed_stiffness(stiffness: "float | ForceTable | TorqueTable") -> FloatArray:
     """A stiffness in the packed form of `wm_drake.laws.table`."""
-    if isinstance(stiffness, ForceTable | TorqueTable):
-        return stiffness.packed()
-    return np.array([0.0, stiffness])
+    return packed_stiffnesses([stiffness])[0]
+
+
+def packed_stiffnesses(stiffnesses: "Sequence[float | ForceTable | TorqueTable]") -> list[FloatArray]:
+    """Several at once: tables over the same points share one call of scipy, of which a study makes thousands."""
+    packed = [np.array([0.0, s]) if isinstance(s, float | int) else np.empty(0) for s in stiffnesses]
+    curves = {index: s.curve for index, s in enumerate(stiffnesses) if isinstance(s, ForceTable | TorqueTable)}
+    for points in dict.fromkeys(x for x, _ in curves.values()):
+        alike = [index for index, (x, _) in curves.items() if x == points]
+        for index, curve in zip(alike, _packed_curves(points, tuple(curves[index][1] for index in alike)), strict=True):
+            packed[index] = curve
+    return packed
+
+
+@functools.lru_cache(maxsize=256)  # a study packs the same curves for each run
+def _packed_curves(x: tuple[float, ...], ys: tuple[tuple[float, ...], ...]) -> FloatArray:
+    """One row for each curve: the monotone cubics (scipy's PCHIP) through the points, as `wm_drake.laws.table` takes them."""
+    cubics = PchipInterpolator(x, ys, axis=1).c[::-1]  # (4, pieces, curves)
+    h, (_, a, b, c) = x[-1] - x[-2], cubics[:, -1]
+    end_slopes = np.maximum(a + h * (2.0 * b + h * 3.0 * c), 0.0)  # rounding can make a flat end fall by 1e-11
+    packed = np.empty((len(ys), packed_table_size(len(x))))
+    packed[:, 0], packed[:, -2], packed[:, -1] = len(x), x[-1], end_slopes
+    pieces = packed[:, 1:-2].reshape(len(ys), -1, PIECE_SIZE)
+    pieces[:, :, 0], pieces[:, :, 1:] = x[:-1], cubics.transpose(2, 1, 0)
+    packed.flags.writeable = False
+    return packed
 
 
 def _form(value: Any) -> str:

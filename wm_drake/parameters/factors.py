@@ -13,7 +13,7 @@ from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.laws.table import stiffness_force
 from wm_drake.parameters.elements import ForceTable, Frozen, TorqueTable, packed_stiffness
 from wm_drake.parameters.files import read_yaml
-from wm_drake.parameters.keys import quantities, unit_of, with_value
+from wm_drake.parameters.keys import quantities, unit_of, with_value, with_values
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.units import Unit
@@ -131,10 +131,8 @@ def levels_of(parameters: MachineParameters, factors: Mapping[str, Factor], tabl
 
 def at_levels(parameters: MachineParameters, factors: Sequence[FactorLevels], levels: Sequence[int]) -> MachineParameters:
     """The machine with each factor at a level, -1, 0 or 1."""
-    for factor, level in zip(factors, levels, strict=True):
-        for key, value in factor.settings[int(level) + 1].items():
-            parameters = with_value(parameters, key, value)
-    return parameters
+    settings = [factor.settings[int(level) + 1] for factor, level in zip(factors, levels, strict=True)]
+    return with_values(parameters, {key: value for setting in settings for key, value in setting.items()})
 
 
 def nominal_stiffness(table: ForceTable | TorqueTable) -> float:

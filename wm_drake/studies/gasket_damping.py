@@ -11,7 +11,7 @@ from wm_drake.batch import Ended, simulate_many
 from wm_drake.errors import input_error
 from wm_drake.machine import OUTPUT_PERIOD, Machine, build_machine
 from wm_drake.measures import envelopes
-from wm_drake.parameters import GASKET_FACTORS, MachineParameters, SpinProfile, load_factors, with_value
+from wm_drake.parameters import GASKET_FACTORS, MachineParameters, SpinProfile, load_factors, with_values
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.simulation import Case, Record, simulate
 from wm_drake.studies.grid_search import Search, bounded_search, grid_search
@@ -91,10 +91,8 @@ def virtual_experiment(parameters: MachineParameters, truth: FloatArray, seed: i
 def with_damping(parameters: MachineParameters, damping: FloatArray) -> MachineParameters:
     """The machine with C_L and C_T on every axis of its gasket. [N s/m, N m s/rad]"""
     factors = load_factors(GASKET_FACTORS)
-    for name, value in zip(UNKNOWNS, damping, strict=True):
-        for key in factors[name].keys:
-            parameters = with_value(parameters, key, float(value))
-    return parameters
+    numbers = zip(UNKNOWNS, damping, strict=True)
+    return with_values(parameters, {key: float(value) for name, value in numbers for key in factors[name].keys})
 
 
 class EnvelopeDistance:

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.parameters import MachineParameters, SpinProfile, quantities, with_value
+from wm_drake.parameters import MachineParameters, SpinProfile, quantities, with_values
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.parameters.units import Unit
@@ -127,12 +127,9 @@ def unit_of_key(parameters: MachineParameters, key: str) -> Unit:
     return next((unit for known, _, unit in quantities(parameters) if known == key), Unit("m", "mm"))
 
 
-def with_values(parameters: MachineParameters, sought: Sequence[Sought], values: FloatArray) -> MachineParameters:
+def at_point(parameters: MachineParameters, sought: Sequence[Sought], values: FloatArray) -> MachineParameters:
     """The machine with the unknowns' numbers. [SI]"""
-    for unknown, value in zip(sought, values, strict=True):
-        for key in unknown.keys:
-            parameters = with_value(parameters, key, float(value))
-    return parameters
+    return with_values(parameters, {key: float(v) for s, v in zip(sought, values, strict=True) for key in s.keys})
 
 
 def planted_values(sought: Sequence[Sought], seed: int) -> FloatArray:
@@ -162,7 +159,7 @@ class SpinModel:
 
     def _runs(self, points: FloatArray) -> Iterator[Case]:
         for point in points:
-            parameters = with_values(self.parameters, self.sought, point)
+            parameters = at_point(self.parameters, self.sought, point)
             for run in runs_of(parameters, self.cases, self.profile):
                 yield replace(run, parameters=parameters)
 

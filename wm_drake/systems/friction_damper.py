@@ -25,6 +25,7 @@ from wm_drake.parameters.elements import (
     HavsinDamper,
     StvDamper,
     StvSpongeDamper,
+    packed_stiffness,
 )
 from wm_drake.systems.element import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE, SCALARS, ForceElement
 
@@ -44,7 +45,7 @@ def packed_damper_law(damper: DamperType) -> FloatArray:
     friction = [damper.friction_force, damper.friction_damping, damper.regularisation_velocity]
     if isinstance(damper, FreeStrokeDamper):
         basic = [damper.basic_friction_force, damper.basic_full_friction_velocity]
-        return np.concatenate([[FREE_STROKE], friction, basic, damper.sponge.packed()])
+        return np.concatenate([[FREE_STROKE], friction, basic, packed_stiffness(damper.sponge)])
     return np.array([MSTV, *friction, damper.sponge_stiffness, damper.sponge_damping, damper.slider_damping])
 
 

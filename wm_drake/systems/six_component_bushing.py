@@ -16,7 +16,7 @@ from wm_drake.laws.strut import wrench_at_origin
 from wm_drake.laws.table import packed_size
 from wm_drake.laws.vectors import add, compose, cross, rotate, rotate_back, rotation_vector, scale, subtract
 from wm_drake.laws.vectors import transpose as transposed
-from wm_drake.parameters.elements import BushingType, FloatArray, packed_stiffness
+from wm_drake.parameters.elements import BushingType, FloatArray, packed_stiffnesses
 from wm_drake.systems.element import PLANT_STATE_SIZE, SCALARS, ForceElement
 
 AXES = ("x", "y", "z")
@@ -27,7 +27,7 @@ def packed_bushing_law(bushing: BushingType) -> FloatArray:
     kinds = ("damping", "rotational_damping", "friction_torque", "full_friction_rate")
     constants = [getattr(bushing, f"{kind}_{axis}") for kind in kinds for axis in AXES]
     curves = [getattr(bushing, f"{kind}_{axis}") for kind in ("stiffness", "rotational_stiffness") for axis in AXES]
-    return np.concatenate([constants, *map(packed_stiffness, curves)])
+    return np.concatenate([constants, *packed_stiffnesses(curves)])
 
 
 @dataclass(frozen=True)

@@ -99,12 +99,11 @@ def _displacement(load_record: Any, path: Path) -> Any:
 def _planted(parameters: "MachineParameters", linear: str, torsional: str) -> "FloatArray":
     import numpy as np
 
-    from wm_drake.parameters import with_value
+    from wm_drake.parameters import with_values
 
     if parameters.gasket is None:
         raise input_error(f"machine '{parameters.name}' has no gasket", key="gasket")
-    changed = with_value(parameters, "gasket.damping_x", linear)
-    changed = with_value(changed, "gasket.rotational_damping_x", torsional)
+    changed = with_values(parameters, {"gasket.damping_x": linear, "gasket.rotational_damping_x": torsional})
     assert changed.gasket is not None  # as above
     return np.array([changed.gasket.damping_x, changed.gasket.rotational_damping_x])
 
