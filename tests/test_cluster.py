@@ -2,6 +2,7 @@
 
 import os
 import signal
+from pathlib import Path
 
 import pytest
 import xarray as xr
@@ -9,7 +10,7 @@ import xarray as xr
 from wm_drake.batch import simulate_many
 from wm_drake.batch.cluster import PARCEL, check_workers, cluster_client, run_parcel, simulate_on_cluster
 from wm_drake.errors import InputError
-from wm_drake.ledger import open_ledger
+from wm_drake.ledger import Ledger, open_ledger
 from wm_drake.parameters import SpinProfile, with_value
 from wm_drake.simulation import Case
 
@@ -68,3 +69,29 @@ def test_tables_are_the_same_though_a_worker_is_killed(reference, machine, tmp_p
     assert killed
     xr.testing.assert_identical(table, simulate_many(machine, cases_of(reference, count), measures=("extremes",)))
     xr.testing.assert_identical(table, again)
+
+
+@pytest.mark.slow
+def test_command_on_a_cluster_that_loses_a_worker_gives_the_same_tables(wm_drake, monkeypatch):
+    from distributed import LocalCluster
+
+    Path("p.yaml").write_text("time: (0, 8) s\nspeed: (0, 60) rpm\n")
+    factors = ("--factor", "K_Lx", "--factor", "C_L", "--factor", "K_Ty", "--factor", "C_T")
+    study = ("study", "gasket", "--design", "full", *factors, "--profile", "p.yaml")
+    assert wm_drake(*study, "--out", "here").code == 0
+    monkeypatch.setattr("wm_drake.batch.runs.integrate_lanes", None)  # this process runs nothing
+    put_all, killed = Ledger.put_all, []
+
+    def put_and_kill(ledger, results):
+        put_all(ledger, results)
+        if not killed:
+            killed.append(victim)
+            os.kill(victim, signal.SIGKILL)
+
+    monkeypatch.setattr(Ledger, "put_all", put_and_kill)
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0) as cluster:
+        victim = next(iter(cluster.workers.values())).pid
+        ended = wm_drake(*study, "--out", "there", "--cluster", cluster.scheduler_address)
+    assert (ended.code, killed) == (0, [victim])
+    for name in ("runs.csv", "contributions.csv", "effects.csv", "variance.csv", "leading_terms.csv"):
+        assert (Path("here") / name).read_bytes() == (Path("there") / name).read_bytes()

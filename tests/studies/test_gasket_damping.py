@@ -8,10 +8,11 @@ import pandas as pd
 import pytest
 import xarray as xr
 
+from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
 from wm_drake.machine import build_machine
 from wm_drake.parameters import SpinProfile
-from wm_drake.simulation import simulate
+from wm_drake.simulation import Case, simulate
 from wm_drake.studies.gasket_damping import LOWER, UPPER, EnvelopeDistance, as_measured, identify_damping, with_damping
 
 TRUTH = np.array([28.7, 4.98])  # N s/m, N m s/rad
@@ -29,8 +30,6 @@ def distance(fast):
     cases = EnvelopeDistance(fast, {}).profile
     planted = with_damping(fast, TRUTH)
     machine = build_machine(planted)
-    from wm_drake.simulation import Case
-
     records = {load: simulate(machine, Case(load, planted.loads[load], cases)).displacement for load in ("middle", "counter")}
     return EnvelopeDistance(fast, records)
 
@@ -105,6 +104,32 @@ def test_command_recovers_its_virtual_experiment_and_says_that_it_is_one(wm_drak
     page = Path("out/report.html").read_text()
     assert "virtual experiment" in page
     assert len(pd.read_csv("out/objective.csv")) == printed["grid"]["evaluations"]
+
+
+@pytest.mark.slow
+def test_damping_is_found_from_record_files(wm_drake, reference, machine):
+    planted = with_damping(reference, np.array([28.7, np.rad2deg(0.087)]))  # N s/m, N m s/rad: 0.0287 N s/mm, 87 N mm s/deg
+    records = {load: run_of(machine, planted, load) for load in ("middle", "counter")}
+    records["middle"].to_netcdf("middle.nc")
+    in_mm = 1e3 * records["counter"].displacement.to_pandas()
+    in_mm.rename_axis(index="time_s").to_csv("counter.csv")
+    ended = wm_drake(
+        "study", "gasket-damping", "--record", "middle=middle.nc", "--record", "counter=counter.csv", "--out", "out", "--json"
+    )
+    assert (ended.code, "virtual" in ended.err) == (0, False)
+    printed = json.loads(ended.out)
+    assert (printed["virtual_experiment"], printed["planted"]) == (False, None)
+    assert printed["scipy"]["C_L"] == pytest.approx(0.0287, rel=0.01)
+    assert printed["scipy"]["C_T"] == pytest.approx(87.0, rel=0.01)
+    assert "virtual experiment" not in Path("out/report.html").read_text()
+
+
+def run_of(machine, parameters, load):
+    """Record of a run of the built machine with other numbers."""
+    cases = [Case(load, parameters.loads[load], parameters.profile, parameters=parameters)]
+    ended = []
+    simulate_many(machine, cases, histories=True, finished=ended.append)
+    return ended[0].record
 
 
 def test_faults_of_the_command_are_refused(wm_drake):
