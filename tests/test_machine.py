@@ -5,8 +5,9 @@ import pytest
 from scipy.linalg import eigh
 
 from wm_drake.bodies import sdf_path
+from wm_drake.equilibrium import EQUILIBRIUM_TOLERANCE
 from wm_drake.errors import InputError
-from wm_drake.machine import EQUILIBRIUM_TOLERANCE, build_machine
+from wm_drake.machine import build_machine
 from wm_drake.parameters import Load, Unbalance, load_machine, with_value
 from wm_drake.studies.modal import natural_modes
 from wm_drake.systems.speed_source import REFLECTED_INERTIA

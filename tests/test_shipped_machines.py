@@ -6,7 +6,8 @@ import pytest
 from pydantic import BaseModel
 
 from wm_drake.bodies import SDF_FOLDER, sdf_path
-from wm_drake.machine import EQUILIBRIUM_TOLERANCE, build_machine
+from wm_drake.equilibrium import EQUILIBRIUM_TOLERANCE
+from wm_drake.machine import build_machine
 from wm_drake.parameters import load_machine, measured_amplitudes, quantities, shipped_machines, source_of
 from wm_drake.studies.description import oscillating_mass
 from wm_drake.studies.modal import natural_modes

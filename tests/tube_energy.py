@@ -129,7 +129,7 @@ def balance(machine, setup, load, profile, step):
     bodies = []
     for sample in (0, -1):
         state = np.zeros(plant.num_multibody_states())
-        for tree, block in zip(machine.tree_states(), (motion[sample], *tubes[sample]), strict=True):
+        for tree, block in zip(machine.coordinates.states(), (motion[sample], *tubes[sample]), strict=True):
             state[tree] = block
         plant.SetPositionsAndVelocities(context, state)
         bodies.append(plant.CalcKineticEnergy(context) + plant.CalcPotentialEnergy(context))

@@ -64,15 +64,16 @@ def _logged(setup: Setup, profile: SpinProfile, failure: str) -> Trajectory:
     count = min(log.num_samples() for log in logs.values())  # a run that failed may have ended between two logs
     time = np.array(logs["bodies"].sample_times()[:count])
     columns = {name: np.array(log.data()).T[:count] for name, log in logs.items()}
+    coordinates = setup.machine.coordinates
     # the drive's torque is what its reflected inertia does not take up: J alpha - J vdot
     segment = np.clip(np.searchsorted(profile.time, time, side="right") - 1, 0, len(profile.time) - 2)
-    torque = REFLECTED_INERTIA * (np.array(profile.acceleration())[segment] - columns["acceleration"][:, 6])
+    torque = REFLECTED_INERTIA * (np.array(profile.acceleration())[segment] - columns["acceleration"][:, coordinates.drum])
     dampers = [*setup.dampers, *setup.telescopes]
     deformation = np.zeros((len(time), len(dampers)))
     for index, name in enumerate(dampers):
         if name in columns:
             deformation[:, index] = columns[name][:, 0]
-    trees = [columns["bodies"][:, list(indices)] for indices in setup.machine.tree_states()]
+    trees = [columns["bodies"][:, indices] for indices in coordinates.states()]
     tubes = np.stack(trees[1:], axis=1) if trees[1:] else np.empty((len(time), 0, PLANT_STATE_SIZE))
-    accelerations = columns["acceleration"][:, :6]
+    accelerations = columns["acceleration"][:, coordinates.tub]
     return ended_where_it_diverged(Trajectory(time, trees[0], deformation, torque, accelerations, tubes), failure)

@@ -30,7 +30,7 @@ def built():
 
 def worst_difference(machine, setup, count, seed=5):
     """Largest relative difference of the derivative of Drake's state and the compiled machine's, per vector."""
-    rng, context, trees = np.random.default_rng(seed), setup.context, machine.tree_states()
+    rng, context, trees = np.random.default_rng(seed), setup.context, machine.coordinates.states()
     p, layout = pack(setup)
     tubes, scratch = len(setup.telescopes), np.empty(LINE_SIZE * max(1, len(setup.dampers)))
     worst = 0.0

@@ -1,0 +1,133 @@
+"""The machine at rest: preloads of the springs, and the pose at which no force is left, in a Context of the whole diagram."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import Context
+from scipy.optimize import root
+
+from wm_drake.coordinates import Coordinates
+from wm_drake.errors import InputError, Problem, input_error
+from wm_drake.parameters.elements import FloatArray
+from wm_drake.systems.spring_strut import SpringStrutParameters
+
+EQUILIBRIUM_TOLERANCE = 1e-9
+"""Largest force [N] or moment [N m] that may remain at the rest pose."""
+
+TUBES_TOLERANCE = 1e-6
+"""The same on the tubes of a damper: what is left turns them about their axis, by 1e-6 rad/s, where friction alone holds."""
+
+_FARTHEST_REST_POSITION = 0.02
+_FARTHEST_REST_ANGLE = np.deg2rad(3.0)
+
+
+def generalized_force(plant: MultibodyPlant, context: Context) -> FloatArray:
+    """All elements and gravity, at the pose of the plant's Context: moments and forces on bodies that float in W. [N m, N]"""
+    elements = plant.get_applied_generalized_force_input_port().Eval(context)
+    return np.asarray(elements + plant.CalcGravityGeneralizedForces(context))
+
+
+def preloaded(
+    plant: MultibodyPlant, context: Context, coordinates: Coordinates, unloaded: Mapping[str, SpringStrutParameters]
+) -> dict[str, SpringStrutParameters]:
+    """Springs with the preloads that balance the empty machine when T coincides with W, as well as they can.
+
+    Args:
+        plant, context: The plant and its Context, in which the springs have no preload.
+        coordinates: Of the plant. What hangs on the tub is moved to where it hangs.
+        unloaded: The springs.
+
+    Raises:
+        InputError: springs that would have to push, or nothing balances what hangs on the tub.
+    """
+    if coordinates.hanging.size:
+        _balance(plant, context, coordinates, coordinates.hanging)  # its weight is the tub's to bear
+    hooks = np.stack([spring.p_ToA_T for spring in unloaded.values()])
+    lines = np.stack([spring.p_WH for spring in unloaded.values()]) - hooks
+    pulls = lines / np.linalg.norm(lines, axis=1, keepdims=True)
+    wrenches = np.column_stack([np.cross(hooks, pulls), pulls]).T
+    solution = np.linalg.lstsq(wrenches, -generalized_force(plant, context)[coordinates.tub], rcond=None)[0]
+    preloads = dict(zip(unloaded, map(float, solution), strict=True))
+    weightless = not np.any(plant.gravity_field().gravity_vector())
+    slack = [name for name, preload in preloads.items() if preload <= 0.0 and not weightless]
+    if slack:
+        raise InputError(
+            Problem("", f"springs.{name}", f"would be pushed, not pulled, at rest (preload {preloads[name]:.1f} N); "
+                    "move its hooks or the centre of mass")
+            for name in slack
+        )  # fmt: skip
+    return {name: replace(spring, preload=preloads[name]) for name, spring in unloaded.items()}
+
+
+def put_to_rest(plant: MultibodyPlant, context: Context, coordinates: Coordinates) -> FloatArray:
+    """Moves all coordinates but the drum angle to equilibrium, near T = W, where springs alone may not quite balance the tub.
+
+    Returns:
+        What remains of moment about To and force on the tub, in W. [N m, N]
+
+    Raises:
+        InputError: no equilibrium there.
+    """
+    if coordinates.hanging.size:
+        _balance(plant, context, coordinates, np.setdiff1d(np.arange(coordinates.size), coordinates.drum))
+    q = plant.GetPositions(context)
+
+    def residual(pose: FloatArray) -> FloatArray:
+        if not np.all(np.abs(pose) < 10.0):  # a step of the root solver into nowhere, which Drake would abort on
+            return np.full(6, 1e9)
+        q[coordinates.tub] = pose
+        plant.SetPositions(context, q)
+        return generalized_force(plant, context)[coordinates.tub]
+
+    pose = q[coordinates.tub]
+    remains = residual(pose)
+    if not np.all(np.isfinite(remains)):
+        raise input_error("forces at rest are not finite numbers; some mass, stiffness or distance is out of all bounds")
+    if np.max(np.abs(remains)) > EQUILIBRIUM_TOLERANCE and not coordinates.hanging.size:
+        pose = np.asarray(root(residual, pose, tol=1e-12).x)
+        remains = residual(pose)
+    far = np.max(np.abs(pose[:3])) > _FARTHEST_REST_ANGLE or np.max(np.abs(pose[3:])) > _FARTHEST_REST_POSITION
+    if not np.max(np.abs(remains)) <= EQUILIBRIUM_TOLERANCE or far:
+        plant.SetPositions(context, np.zeros(coordinates.size))
+        m_x, m_y, m_z, f_x, f_y, f_z = generalized_force(plant, context)[coordinates.tub]
+        raise input_error(
+            "the springs cannot hold the empty machine near its drawn pose: there remain force "
+            f"({f_x:.3g}, {f_y:.3g}, {f_z:.3g}) N and moment ({m_x:.3g}, {m_y:.3g}, {m_z:.3g}) N m; "
+            "move hooks or masses so that they balance"
+        )
+    return remains
+
+
+def _balance(plant: MultibodyPlant, context: Context, coordinates: Coordinates, chosen: FloatArray) -> None:
+    """Moves the chosen coordinates to where no force is left on them.
+
+    Newton's method; a tube that may spin freely stays as it is, by least squares.
+
+    Raises:
+        InputError: it finds no such place nearby.
+    """
+
+    def forces(q: FloatArray) -> FloatArray:
+        if not np.all(np.abs(q) < 1.0):
+            return np.full(len(chosen), np.inf)
+        plant.SetPositions(context, q)
+        return generalized_force(plant, context)[chosen]
+
+    q = plant.GetPositions(context)
+    steps = 1e-6 * np.eye(len(q))[chosen]
+    remains = forces(q)
+    for number in range(100):
+        if not 0.1 * EQUILIBRIUM_TOLERANCE < np.max(np.abs(remains)) < np.inf:
+            break
+        if number % 10 == 0:  # springs are nearly linear: one stiffness serves for several steps
+            stiffness = np.linalg.pinv(np.column_stack([(forces(q + step) - remains) / 1e-6 for step in steps]), rcond=1e-9)
+        q[chosen] -= stiffness @ remains
+        remains = forces(q)
+    if not np.max(np.abs(remains[np.isin(chosen, coordinates.hanging)])) <= TUBES_TOLERANCE:
+        raise input_error(
+            "their bushings cannot hold the tubes near where they are drawn: nothing resists a turn about the damper's "
+            "axis, say, of a tube whose centre of mass is beside it",
+            key="telescopic_dampers",
+        )
