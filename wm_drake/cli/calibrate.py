@@ -1,8 +1,6 @@
 """`wm-drake calibrate`: turn a machine's unknown numbers until it moves as was measured."""
 
 import json
-import shlex
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wm_drake.cli.common import JsonOption, MachineOption, SetOption, check_buildable, existing_file, load_parameters
+from wm_drake.cli.common import (
+    JsonOption,
+    MachineOption,
+    SetOption,
+    check_buildable,
+    command_line,
+    existing_file,
+    interruptible,
+    load_parameters,
+)
 from wm_drake.errors import InputError, input_error
 from wm_drake.outputs import result_folder
 
@@ -62,11 +69,8 @@ def calibrate(
     check_buildable(machine, parameters)
     plan = Plan(method, starts, seed, iterations, deviation / 100.0, 1e-3 * resolution)
     groups = [entry.split(",") for entry in leave_out or []]
-    try:
+    with interruptible(f"what was evaluated is in {out}: go on with --resume"):
         calibration, predictions = _run(parameters, free, wanted, plan, groups, out, workers, resume)
-    except KeyboardInterrupt:
-        typer.echo(f"interrupted; what was evaluated is in {out}: go on with --resume", err=True)
-        raise typer.Exit(130) from None
     with result_folder(out) as folder:
         _write(parameters, calibration, predictions, folder)
     if as_json:
@@ -169,7 +173,7 @@ def _write(parameters: "MachineParameters", calibration: "Calibration", predicti
     quantity_table(calibration).to_csv(folder / "quantities.csv", index=False, float_format="%.6g")
     amplitude_rows(calibration).to_csv(folder / "amplitudes.csv", index=False, float_format="%.4f")
     best, modes = _shown(parameters, calibration)
-    page = calibration_report(calibration, predictions, best, modes, shlex.join(["wm-drake", *sys.argv[1:]]))
+    page = calibration_report(calibration, predictions, best, modes, command_line())
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 

@@ -1,6 +1,8 @@
 """What commands share: options, and the way from their texts to parameters."""
 
-from collections.abc import Iterator
+import shlex
+import sys
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,6 +13,7 @@ from wm_drake.errors import InputError, Problem, input_error, nearest_names
 
 if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
     from wm_drake.parameters import MachineParameters
+    from wm_drake.parameters.keys import Tree
     from wm_drake.simulation import Case
 
 MachineOption = Annotated[str, typer.Option("--machine", help="Shipped machine or machine file.", metavar="NAME|FILE")]
@@ -19,6 +22,21 @@ SetOption = Annotated[
     typer.Option("--set", help="Change a number: gasket.stiffness_x='5 N/mm'. Repeatable.", metavar="KEY=VALUE"),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output and nothing else there.")]
+
+
+def command_line() -> str:
+    """This command as a user would type it."""
+    return shlex.join(["wm-drake", *sys.argv[1:]])
+
+
+@contextmanager
+def interruptible(kept: str = "nothing was written") -> Iterator[None]:
+    """Ends the command on Ctrl-C, with a word on what is kept."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        typer.echo(f"interrupted; {kept}", err=True)
+        raise typer.Exit(130) from None
 
 
 @contextmanager
@@ -34,19 +52,36 @@ def located_in(file: str) -> Iterator[None]:
 
 def load_parameters(file: str, sets: list[str] | None) -> "MachineParameters":
     """The machine of a file or a shipped name, with the numbers that `--set` changes."""
-    from wm_drake.parameters import load_machine, with_value
+    from wm_drake.parameters import load_machine
 
     parameters = load_machine(file)
-    for entry in sets or []:
-        key, separator, value = entry.partition("=")
-        if not separator:
-            raise input_error(f"'{entry}' is not KEY=VALUE", where="--set")
+    changed, sources = with_sets(parameters, parameters.sources, sets)
+    return changed.model_copy(update={"sources": sources})
+
+
+def with_sets(parameters: "Tree", sources: Mapping[str, str], sets: list[str] | None) -> "tuple[Tree, dict[str, str]]":
+    """Parameters and sources of numbers, with what `--set` changes."""
+    from wm_drake.parameters import with_value
+
+    changed = dict(sources)
+    for key, text in pairs_of(sets, "--set"):
         try:
-            changed = with_value(parameters, key.strip(), value.strip())
+            parameters = with_value(parameters, key, text)
         except InputError as error:
             raise InputError(Problem("--set", p.key, p.message) for p in error.problems) from None
-        parameters = changed.model_copy(update={"sources": {**changed.sources, key.strip(): "set on the command line"}})
-    return parameters
+        changed[key] = "set on the command line"
+    return parameters, changed
+
+
+def pairs_of(entries: list[str] | None, option: str) -> list[tuple[str, str]]:
+    """Keys and values of a repeatable option."""
+    found = []
+    for entry in entries or []:
+        key, separator, text = entry.partition("=")
+        if not separator:
+            raise input_error(f"'{entry}' is not KEY=VALUE", where=option)
+        found.append((key.strip(), text.strip()))
+    return found
 
 
 def cases_of(parameters: "MachineParameters", loads: list[str] | None, gasket: bool, profile: Path | None) -> "list[Case]":

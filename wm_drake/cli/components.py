@@ -3,15 +3,15 @@
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wm_drake.cli.common import load_parameters
+from wm_drake.cli.common import load_parameters, with_sets
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 
 if TYPE_CHECKING:
-    from wm_drake.parameters import Component
+    from wm_drake.parameters import Component, MachineParameters
     from wm_drake.parameters.units import Unit
 
 NameOption = Annotated[
@@ -52,59 +52,52 @@ def target_of(kind: str, machine: str, name: str | None, component: str | None, 
     Raises:
         InputError: it is not there, or of another kind.
     """
-    from wm_drake.parameters import Component, load_component, shipped_components, source_of
-
     if component is not None:
-        found = load_component(component)
-        if found.is_damper != (kind == "damper"):
-            kinds = ("a damper", "a bushing")
-            is_one, wanted = kinds if found.is_damper else kinds[::-1]
-            raise input_error(f"'{component}' is {is_one}, needs {wanted}", where="--component")
-        return Target(_with_sets(found, sets), "", "")
+        return Target(_of_file(kind, component, sets), "", "")
+    from wm_drake.parameters import Component, source_of
+
     parameters = load_parameters(machine, sets)
-    chosen: Any
-    if kind == "gasket":
-        if parameters.gasket is None:
-            raise input_error(f"machine '{parameters.name}' has no gasket", where="--machine")
-        key, chosen = "gasket", parameters.gasket
-    else:
-        folders = ("damper_types",) if kind == "damper" else ("bushing_types", "bushings")
-        table: dict[str, Any] = {}
-        place: dict[str, str] = {}
-        for folder in folders:
-            entries = getattr(parameters, folder)
-            table |= entries
-            place |= dict.fromkeys(entries, folder)
-        if not table:
-            shipped = ", ".join(shipped_components())
-            message = (
-                f"'{parameters.name}' has no {folders[0]}; name another machine, or a component file or shipped one ({shipped})"
-            )
-            raise input_error(message, where="--machine")
-        name = name or next(iter(table))
-        if name not in table:
-            raise input_error(
-                f"no '{name}' in {' or '.join(folders)} of '{parameters.name}'{nearest_names(name, table)}", where="--name"
-            )
-        key, chosen = f"{place[name]}.{name}", table[name]
+    key = _key_of(kind, parameters, name)
+    table, _, entry = key.partition(".")
+    chosen = getattr(parameters, table)[entry] if entry else getattr(parameters, table)
     sources = {field: text for field in type(chosen).model_fields if (text := source_of(parameters, f"{key}.{field}"))}
     return Target(Component(key.split(".")[-1], chosen, sources), machine, key)
 
 
-def _with_sets(component: "Component", sets: list[str] | None) -> "Component":
-    from wm_drake.parameters import with_value
+def _of_file(kind: str, component: str, sets: list[str] | None) -> "Component":
+    from wm_drake.parameters import load_component
 
-    for entry in sets or []:
-        key, separator, value = entry.partition("=")
-        if not separator:
-            raise input_error(f"'{entry}' is not KEY=VALUE", where="--set")
-        try:
-            changed = with_value(component.parameters, key.strip(), value.strip())
-        except InputError as error:
-            raise InputError(Problem("--set", p.key, p.message) for p in error.problems) from None
-        sources = {**component.sources, key.strip(): "set on the command line"}
-        component = replace(component, parameters=changed, sources=sources)
-    return component
+    found = load_component(component)
+    if found.is_damper != (kind == "damper"):
+        kinds = ("a damper", "a bushing")
+        is_one, wanted = kinds if found.is_damper else kinds[::-1]
+        raise input_error(f"'{component}' is {is_one}, needs {wanted}", where="--component")
+    changed, sources = with_sets(found.parameters, found.sources, sets)
+    return replace(found, parameters=changed, sources=sources)
+
+
+def _key_of(kind: str, parameters: "MachineParameters", name: str | None) -> str:
+    """Key path of a component of a machine; of its first of that kind without a name."""
+    from wm_drake.parameters import shipped_components
+
+    if kind == "gasket":
+        if parameters.gasket is None:
+            raise input_error(f"machine '{parameters.name}' has no gasket", where="--machine")
+        return "gasket"
+    tables = ("damper_types",) if kind == "damper" else ("bushing_types", "bushings")
+    keys = {entry: f"{table}.{entry}" for table in tables for entry in getattr(parameters, table)}
+    if not keys:
+        shipped = ", ".join(shipped_components())
+        message = (
+            f"'{parameters.name}' has no {tables[0]}; name another machine, or a component file or shipped one ({shipped})"
+        )
+        raise input_error(message, where="--machine")
+    name = name or next(iter(keys))
+    if name not in keys:
+        raise input_error(
+            f"no '{name}' in {' or '.join(tables)} of '{parameters.name}'{nearest_names(name, keys)}", where="--name"
+        )
+    return keys[name]
 
 
 def axes_of(word: str) -> tuple[str, ...]:

@@ -1,15 +1,13 @@
 """`wm-drake identify`: the numbers of a component from measured loops."""
 
 import json
-import shlex
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wm_drake.cli.common import JsonOption, MachineOption, SetOption
+from wm_drake.cli.common import JsonOption, MachineOption, SetOption, command_line, interruptible, pairs_of
 from wm_drake.cli.components import (
     ArmOption,
     AxisOption,
@@ -221,19 +219,9 @@ def _kept_fields(target: Target, law: str) -> dict[str, float]:
     return {key: value for key, value, _ in quantities(parameters) if "." not in key and key not in free}
 
 
-def _pairs(entries: list[str] | None, option: str) -> list[tuple[str, str]]:
-    found = []
-    for entry in entries or []:
-        key, separator, text = entry.partition("=")
-        if not separator:
-            raise input_error(f"'{entry}' is not KEY=VALUE", where=option)
-        found.append((key.strip(), text.strip()))
-    return found
-
-
 def _ranges(entries: list[str] | None) -> dict[str, tuple[float, float]]:
     found = {}
-    for key, text in _pairs(entries, "--bounds"):
+    for key, text in pairs_of(entries, "--bounds"):
         values = quantities_of(text, _unit_of_field(key, "--bounds"), "--bounds")
         if len(values) != 2:
             raise input_error(f"'{text}' is not a range; write for example '(50, 300) N/mm'", where="--bounds", key=key)
@@ -242,7 +230,7 @@ def _ranges(entries: list[str] | None) -> dict[str, tuple[float, float]]:
 
 
 def _single(entries: list[str] | None, option: str) -> dict[str, float]:
-    return {key: quantities_of(text, _unit_of_field(key, option), option)[0] for key, text in _pairs(entries, option)}
+    return {key: quantities_of(text, _unit_of_field(key, option), option)[0] for key, text in pairs_of(entries, option)}
 
 
 def _unit_of_field(key: str, option: str) -> "Unit":
@@ -267,26 +255,22 @@ def _run(
     from wm_drake.studies.component_fit import fit_problem, fragment
     from wm_drake.studies.identification import identify
 
-    try:
-        with result_folder(asked.out) as folder:
-            with progress_bar(PER_CENT, "identify") as bar:
-                fit = identify(
-                    fit_problem(model, motions),
-                    asked.method,
-                    seed=asked.seed,
-                    progress=lambda fraction, least: bar(int(PER_CENT * fraction)),
-                )
-            text = fragment(fit, model, target.component, target.machine, target.key, copies, asked.out)
-            (folder / "identified.yaml").write_text(text, encoding="utf-8")
-            estimates_table(fit).to_csv(folder / "parameters.csv", index=False)
-            errors_table(fit, motions).to_csv(folder / "errors.csv", index=False)
-            fitted_loops(fit, motions).to_csv(folder / "loops.csv", index=False, float_format="%.7g")
-            (folder / "fit.json").write_text(json.dumps(fit.as_dict(), indent=1), encoding="utf-8")
-            command = shlex.join(["wm-drake", *sys.argv[1:]])
-            (folder / "report.html").write_text(identify_report(title, fit, motions, command), encoding="utf-8")
-    except KeyboardInterrupt:
-        typer.echo("interrupted; nothing was written", err=True)
-        raise typer.Exit(130) from None
+    with interruptible(), result_folder(asked.out) as folder:
+        with progress_bar(PER_CENT, "identify") as bar:
+            fit = identify(
+                fit_problem(model, motions),
+                asked.method,
+                seed=asked.seed,
+                progress=lambda fraction, least: bar(int(PER_CENT * fraction)),
+            )
+        text = fragment(fit, model, target.component, target.machine, target.key, copies, asked.out)
+        (folder / "identified.yaml").write_text(text, encoding="utf-8")
+        estimates_table(fit).to_csv(folder / "parameters.csv", index=False)
+        errors_table(fit, motions).to_csv(folder / "errors.csv", index=False)
+        fitted_loops(fit, motions).to_csv(folder / "loops.csv", index=False, float_format="%.7g")
+        (folder / "fit.json").write_text(json.dumps(fit.as_dict(), indent=1), encoding="utf-8")
+        command = command_line()
+        (folder / "report.html").write_text(identify_report(title, fit, motions, command), encoding="utf-8")
     if asked.as_json:
         typer.echo(json.dumps({"component": title, **fit.as_dict()}))
     else:

@@ -1,14 +1,12 @@
 """`wm-drake rig`: a component on a bench, its force loops, and what is read off them."""
 
 import json
-import shlex
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wm_drake.cli.common import JsonOption, MachineOption, SetOption
+from wm_drake.cli.common import JsonOption, MachineOption, SetOption, command_line, interruptible
 from wm_drake.cli.components import ArmOption, AxisOption, ComponentOption, NameOption, axes_of, quantities_of, target_of
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.outputs import progress_bar, result_folder
@@ -148,18 +146,14 @@ def _run(title: str, bench: "Bench", motions: "list[Harmonic]", chosen: "Compone
     from wm_drake.report.rig_report import loop_file, loop_table, measures_table, rig_report
     from wm_drake.rigs import run_rig
 
-    try:
-        with result_folder(out) as folder:
-            with progress_bar(len(motions), "loops") as progress:
-                run = run_rig(title, bench, motions, _numbers(chosen), progress)
-            for loop in run.loops:
-                loop_table(loop).to_csv(folder / loop_file(loop), index=False, float_format="%.9g")
-            measures_table(run).to_csv(folder / "measures.csv", index=False, float_format="%.9g")
-            command = shlex.join(["wm-drake", *sys.argv[1:]])
-            (folder / "report.html").write_text(rig_report(run, command), encoding="utf-8")
-    except KeyboardInterrupt:
-        typer.echo("interrupted; nothing was written", err=True)
-        raise typer.Exit(130) from None
+    with interruptible(), result_folder(out) as folder:
+        with progress_bar(len(motions), "loops") as progress:
+            run = run_rig(title, bench, motions, _numbers(chosen), progress)
+        for loop in run.loops:
+            loop_table(loop).to_csv(folder / loop_file(loop), index=False, float_format="%.9g")
+        measures_table(run).to_csv(folder / "measures.csv", index=False, float_format="%.9g")
+        command = command_line()
+        (folder / "report.html").write_text(rig_report(run, command), encoding="utf-8")
     if as_json:
         typer.echo(json.dumps(_as_json(run)))
     else:

@@ -2,14 +2,21 @@
 
 import json
 import logging
-import shlex
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wm_drake.cli.common import JsonOption, MachineOption, SetOption, cases_of, check_buildable, load_parameters
+from wm_drake.cli.common import (
+    JsonOption,
+    MachineOption,
+    SetOption,
+    cases_of,
+    check_buildable,
+    command_line,
+    interruptible,
+    load_parameters,
+)
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.outputs import result_folder
 
@@ -46,13 +53,9 @@ def spin(
     parameters = load_parameters(machine, sets)
     cases = cases_of(parameters, load, not no_gasket, profile)
     check_buildable(machine, parameters)
-    try:
-        with result_folder(out) as folder:
-            result = _run(parameters, cases, engine)
-            _write(result, folder, replay)
-    except KeyboardInterrupt:
-        typer.echo("interrupted; nothing was written", err=True)
-        raise typer.Exit(130) from None
+    with interruptible(), result_folder(out) as folder:
+        result = _run(parameters, cases, engine)
+        _write(result, folder, replay)
     diverged = [f"{r.case.name}: {r.record.attrs['diverged']}" for r in result.results if r.record.attrs["diverged"]]
     if as_json:
         typer.echo(json.dumps(_as_json(result)))
@@ -85,7 +88,7 @@ def _write(result: "SpinResult", folder: Path, replay: bool) -> None:
         if replay:
             (folder / f"replay_{case.case.name}.html").write_text(_replay(result, case), encoding="utf-8")
     amplitude_table(result).to_csv(folder / "amplitudes.csv", index=False, float_format="%.4f")
-    command = shlex.join(["wm-drake", *sys.argv[1:]])
+    command = command_line()
     (folder / "report.html").write_text(spin_report(result, command), encoding="utf-8")
 
 

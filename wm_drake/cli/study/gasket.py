@@ -1,7 +1,5 @@
 """`wm-drake study gasket`: how stiffness and damping of the gasket act on the tub and on the housing."""
 
-import shlex
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -11,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wm_drake.cli.common import JsonOption, MachineOption, SetOption, cases_of, check_buildable, existing_file, load_parameters
+from wm_drake.cli.common import (
+    JsonOption,
+    MachineOption,
+    SetOption,
+    cases_of,
+    check_buildable,
+    command_line,
+    existing_file,
+    load_parameters,
+)
 from wm_drake.cli.study.common import ProfileOption, ResumeOption, WorkersOption, study_ledger
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.outputs import progress_bar, result_folder
@@ -181,7 +188,7 @@ def _write(screening: "Screening", work: "GasketTrials", folder: Path, wall_s: f
     from wm_drake.studies.screening_tables import write_tables
 
     write_tables(screening, folder)
-    command = shlex.join(["wm-drake", *sys.argv[1:]])
+    command = command_line()
     (folder / "report.html").write_text(gasket_report(screening, work, command, wall_s), encoding="utf-8")
 
 

@@ -1,14 +1,21 @@
 """`wm-drake study gasket-damping`: damping of the gasket from measured displacements."""
 
 import json
-import shlex
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wm_drake.cli.common import JsonOption, MachineOption, SetOption, check_buildable, existing_file, load_parameters
+from wm_drake.cli.common import (
+    JsonOption,
+    MachineOption,
+    SetOption,
+    check_buildable,
+    command_line,
+    existing_file,
+    interruptible,
+    load_parameters,
+)
 from wm_drake.errors import input_error
 from wm_drake.outputs import result_folder
 
@@ -42,19 +49,15 @@ def gasket_damping(
 
     parameters = load_parameters(machine, sets)
     check_buildable(machine, parameters)
-    try:
-        with result_folder(out) as folder:
-            truth = None
-            if record:
-                measured: Measured = _read(parameters, record)
-            else:
-                truth = _planted(parameters, planted_linear, planted_torsional)
-                measured = _virtual(parameters, truth, seed)
-            result = identify_damping(parameters, measured, truth)
-            _write(result, parameters, folder)
-    except KeyboardInterrupt:
-        typer.echo("interrupted; nothing was written", err=True)
-        raise typer.Exit(130) from None
+    with interruptible(), result_folder(out) as folder:
+        truth = None
+        if record:
+            measured: Measured = _read(parameters, record)
+        else:
+            truth = _planted(parameters, planted_linear, planted_torsional)
+            measured = _virtual(parameters, truth, seed)
+        result = identify_damping(parameters, measured, truth)
+        _write(result, parameters, folder)
     if as_json:
         typer.echo(json.dumps(_as_json(result)))
     else:
@@ -124,7 +127,7 @@ def _write(result: "Damping", parameters: "MachineParameters", folder: Path) -> 
     from wm_drake.report.gasket_damping_report import gasket_damping_report, points_table
 
     points_table(result).to_csv(folder / "objective.csv", index=False, float_format="%.9g")
-    command = shlex.join(["wm-drake", *sys.argv[1:]])
+    command = command_line()
     (folder / "report.html").write_text(gasket_damping_report(result, parameters, command), encoding="utf-8")
 
 

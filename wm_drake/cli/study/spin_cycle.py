@@ -1,8 +1,6 @@
 """`wm-drake study spin-cycle`: vibration per region of a spin cycle, over a table of unbalance cases."""
 
 import json
-import shlex
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wm_drake.cli.common import JsonOption, MachineOption, SetOption, check_buildable, existing_file, load_parameters
+from wm_drake.cli.common import (
+    JsonOption,
+    MachineOption,
+    SetOption,
+    check_buildable,
+    command_line,
+    existing_file,
+    interruptible,
+    load_parameters,
+)
 from wm_drake.cli.study.common import LEDGER, WorkersOption
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.outputs import progress_bar, result_folder
@@ -61,15 +68,12 @@ def spin_cycle(
     table = cases_of_table(cases, case)
     comparison = measurement(parameters, table, spin_profile, measured, accelerations)
     check_buildable(machine, parameters)
-    try:
-        with result_folder(out) as folder, open_runs(out) as ledger:
-            result = _run(parameters, table, spin_profile, engine, ledger, workers)
-            result = result if comparison is None else _with(result, comparison)
-            _write(result, folder, engine)
-            ledger.mark_finished()
-    except KeyboardInterrupt:
-        typer.echo("interrupted; cases that had ended are kept, the same command goes on from there", err=True)
-        raise typer.Exit(130) from None
+    kept = "cases that had ended are kept, the same command goes on from there"
+    with interruptible(kept), result_folder(out) as folder, open_runs(out) as ledger:
+        result = _run(parameters, table, spin_profile, engine, ledger, workers)
+        result = result if comparison is None else _with(result, comparison)
+        _write(result, folder, engine)
+        ledger.mark_finished()
     diverged = [f"case {c.name}: {text}" for c, text in zip(result.cases, result.diverged, strict=True) if text]
     typer.echo(json.dumps(_as_json(result, engine))) if as_json else _print_table(result, out)
     for message in diverged:
@@ -153,7 +157,7 @@ def _write(result: "SpinCycleResult", folder: Path, engine: str) -> None:
 
     rms_table(result.displacement).to_csv(folder / "rms.csv", index=False, float_format="%.6g")
     case_table(result).to_csv(folder / "cases.csv", index=False, float_format="%.4g")
-    command = shlex.join(["wm-drake", *sys.argv[1:]])
+    command = command_line()
     (folder / "report.html").write_text(spin_cycle_report(result, engine, command), encoding="utf-8")
 
 

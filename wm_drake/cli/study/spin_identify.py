@@ -1,15 +1,21 @@
 """`wm-drake study spin-identify`: numbers of a machine from vibrations of the whole of it in a spin cycle."""
 
 import json
-import shlex
-import sys
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wm_drake.cli.common import JsonOption, MachineOption, SetOption, check_buildable, load_parameters
+from wm_drake.cli.common import (
+    JsonOption,
+    MachineOption,
+    SetOption,
+    check_buildable,
+    command_line,
+    interruptible,
+    load_parameters,
+)
 from wm_drake.cli.study.common import WorkersOption
 from wm_drake.cli.study.spin_cycle import cases_of_table, measurement, open_runs
 from wm_drake.errors import input_error
@@ -67,14 +73,11 @@ def spin_identify(
     sought = unknowns_of(parameters, unknown)
     check_buildable(machine, parameters)
     model = partial(SpinModel, parameters, spin_profile, tuple(table), sought)
-    try:
-        with result_folder(out) as folder, open_runs(out) as ledger:
-            result = _identify(model, given, noise, seed, ledger, workers)
-            _write(result, folder)
-            ledger.mark_finished()
-    except KeyboardInterrupt:
-        typer.echo("interrupted; runs that had ended are kept, the same command goes on from there", err=True)
-        raise typer.Exit(130) from None
+    kept = "runs that had ended are kept, the same command goes on from there"
+    with interruptible(kept), result_folder(out) as folder, open_runs(out) as ledger:
+        result = _identify(model, given, noise, seed, ledger, workers)
+        _write(result, folder)
+        ledger.mark_finished()
     if as_json:
         typer.echo(json.dumps(_as_json(result)))
     else:
@@ -141,7 +144,7 @@ def _write(result: "SpinIdentification", folder: Path) -> None:
 
     rms_table(result.measured).to_csv(folder / "measured.csv", index=False, float_format="%.6g")
     rms_table(result.after).to_csv(folder / "rms.csv", index=False, float_format="%.6g")
-    command = shlex.join(["wm-drake", *sys.argv[1:]])
+    command = command_line()
     (folder / "report.html").write_text(spin_identify_report(result, command), encoding="utf-8")
 
 
