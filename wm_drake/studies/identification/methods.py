@@ -22,6 +22,9 @@ STEP = 1e-5
 SAME_END = 1e-3
 """Searches whose RMSE differ by less than this part came to the same end."""
 
+AGREEING = 2
+"""Searches from different starts that came to the same least end: no more are made."""
+
 
 def silent(fraction: float, least: float) -> None:
     """Progress that nobody looks at."""
@@ -59,15 +62,15 @@ def least_squares(
     *,
     seed: int = 0,
     starts: int = 4,
-    screened: int = 64,
+    screened: int = 32,
     progress: Progress = silent,
 ) -> Fit:
-    """Trust-region least squares from the problem's start and the best of many scattered points.
+    """Trust-region least squares from the problem's start and the best of many scattered points, until two agree.
 
     Args:
         problem: What to find.
         seed: Of the scattered points.
-        starts: Searches.
+        starts: Searches at most.
         screened: Points that are looked at (a power of two), of which the best become starts.
         progress: Told after every step.
     """
@@ -77,21 +80,28 @@ def least_squares(
     order = np.argsort(count.errors(scattered), kind="stable")
     begins = [problem.start, *scattered[order[: starts - 1]]]
     count.history.append(count.least)
-    ends = []
+    ends: list[tuple[FloatArray, float]] = []
     for index, begin in enumerate(begins):
+        if _agreeing(problem, ends) >= AGREEING:
+            break
 
         def step_done(fraction: float, index: int = index) -> None:
             progress((index + fraction) / len(begins), count.least)
 
         ends.append(_descend(count, begin, step_done))
         count.history.append(count.least)
-    errors = np.array([error for _, error in ends])
-    best = int(np.argmin(errors))
-    floor = SAME_END * errors[best] + 1e-9 * float(rmse(np.concatenate([m.values / m.scale for m in problem.measurements])))
-    agreeing = int(np.sum(errors <= errors[best] + floor))
-    note = f"{agreeing} of {len(begins)} starts came to the same least RMSE"
+    note = f"{_agreeing(problem, ends)} of {len(ends)} starts came to the same least RMSE"
     progress(1.0, count.least)
-    return count.fit(ends[best][0], "least-squares", seed, (note,))
+    return count.fit(min(ends, key=lambda end: end[1])[0], "least-squares", seed, (note,))
+
+
+def _agreeing(problem: Problem, ends: list[tuple[FloatArray, float]]) -> int:
+    """How many searches came to the least RMSE of all."""
+    if not ends:
+        return 0
+    errors = np.array([error for _, error in ends])
+    floor = 1e-9 * float(rmse(np.concatenate([m.values / m.scale for m in problem.measurements])))
+    return int(np.sum(errors <= (1.0 + SAME_END) * errors.min() + floor))
 
 
 def _scattered(p: int, number: int, seed: int) -> FloatArray:
