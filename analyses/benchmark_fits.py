@@ -1,7 +1,7 @@
 """How long does a fit to twelve measured loops take, by law and method?
 
-The loops are computed, with noise of 2 %, at frequencies and amplitudes of [C] and [A]. Prints seconds, the RMSE in parts of the
-noise (1: nothing is left to fit), and how often the model was asked.
+The loops are computed, with noise of 2 %, at frequencies and amplitudes of [C] and [A]. Prints seconds, the RMSE in parts of
+the noise (1: nothing is left to fit), and how often the model was asked.
 """
 
 import argparse
