@@ -27,6 +27,9 @@ class Modes:
     shape: FloatArray
 
 
+_SLOWEST = 2.0 * np.pi * 0.01
+"""What is slower is held by nothing but rounding: the turn of a damper's tubes about its axis. [rad/s]"""
+
 _ANGLE_ARM = 0.25
 """Weighs angles against translations in a mode shape: about the radius of the tub. [m]"""
 
@@ -45,7 +48,7 @@ def natural_modes(machine: Machine, parameters: MachineParameters | None = None,
     setup = machine.set_up(parameters=parameters, gasket=gasket, dampers=False)
     system = Linearize(machine.diagram, setup.context, InputPortSelection.kNoInput, OutputPortSelection.kNoOutput)
     values, vectors = np.linalg.eig(system.A())
-    oscillating = np.flatnonzero(values.imag > 1e-6 * np.abs(values).max())
+    oscillating = np.flatnonzero(values.imag > max(_SLOWEST, 1e-6 * np.abs(values).max()))
     order = oscillating[np.argsort(np.abs(values[oscillating]))][:6]
     shapes = [_real_shape(vectors[:6, index]) for index in order]
     size = np.abs(values[order])
