@@ -163,5 +163,5 @@ def dense_record(machine, case, step):
             simulator.AdvanceTo(moment)
             sample(alpha)
     arrays = map(np.array, (time, state, deformation, torque, acceleration))
-    trajectory = Trajectory(*arrays, tubes=np.empty((len(time), 0, 14)))
+    trajectory = Trajectory(*arrays, tubes=np.empty((len(time), 0, 14)), carrier=np.empty((len(time), 0)))
     return setup, as_record(setup, case, trajectory)

@@ -196,7 +196,7 @@ def test_shown_machine_is_complete(wm_drake, reference):
     assert (ended.code, ended.err) == (0, "")
     assert set(shown) == {
         *("machine", "units", "gravity_W", "bodies", "oscillating_mass_kg", "drum_joint", "springs", "dampers", "bushings"),
-        "telescopic_dampers",
+        *("telescopic_dampers", "drum_bearing"),
         *("sensors", "detergent_point_T", "loads", "profile", "rest_pose", "equilibrium_residual"),
         *("natural_frequencies_hz", "mode_damping_ratios"),
     }

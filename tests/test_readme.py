@@ -4,9 +4,10 @@ import re
 from pathlib import Path
 
 from wm_drake.machine import build_machine
-from wm_drake.parameters import load_machine
+from wm_drake.parameters import SpinProfile, load_machine
 from wm_drake.parameters.free import load_free
 from wm_drake.report.diagram import mermaid
+from wm_drake.simulation import Case, simulate
 from wm_drake.studies.calibration.turning import turning_of
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
@@ -65,6 +66,17 @@ def test_the_example_of_a_free_file_fits_the_reference_machine(tmp_path, machine
     turning = turning_of(machine, load_free(path))
     made = turning.parameters_at(turning.expected)
     assert made.frames["damper_left_housing"].position[0] == -made.frames["damper_right_rear_housing"].position[0] == -0.05
+
+
+def test_the_example_of_a_bearing_runs(tmp_path):
+    path = tmp_path / "whirling.yaml"
+    path.write_text(re.findall(r"```yaml\n(.*?)\n```", README, re.DOTALL)[2])
+    whirling = load_machine(path)
+    record = simulate(
+        build_machine(whirling), Case("front", whirling.loads["front"], SpinProfile(time=(0.0, 1.0), speed=(8.0, 12.0)))
+    )
+    assert {"drum_displacement", "drum_tilt", "bearing_force", "bearing_moment"} <= set(record.data_vars)
+    assert 1e-6 < float(abs(record.drum_displacement).max()) < 1e-4  # m
 
 
 def test_every_file_named_in_the_reading_order_exists():

@@ -17,7 +17,7 @@ ORDER = (
     {"systems"},
     {"coordinates"},
     {"bodies", "rigs", "sdf_text"},
-    {"places", "equilibrium", "wiring"},
+    {"places", "equilibrium", "wiring", "whirl"},
     {"machine"},
     {"trajectory"},
     {"kernel"},

@@ -93,7 +93,7 @@ def balance(machine, setup, load, profile, step):
     """Work of the drive, change of stored energy, dissipated energy. [J]"""
     parameters = setup.parameters
     time, samples, torque, layout = dense_states(setup, profile, step)
-    motion, deformation, tubes = layout.parts(samples)
+    motion, deformation, tubes, _ = layout.parts(samples)
     tub, ground = Motion(motion), still(len(time))
     stored, power = 0.0, 0.0
     for name, spring in setup.springs.items():

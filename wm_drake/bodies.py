@@ -13,6 +13,7 @@ from pydrake.multibody.tree import (
     FixedOffsetFrame,
     JointActuator,
     PrismaticJoint,
+    RevoluteJoint,
     RigidBody,
     RotationalInertia,
     RpyFloatingJoint,
@@ -20,6 +21,7 @@ from pydrake.multibody.tree import (
     UnitInertia,
 )
 
+from wm_drake.coordinates import CARRIER
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.parameters import BodyOverride, Load, MachineParameters, with_value
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
@@ -42,7 +44,8 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
     """Parses the SDF strictly into `plant`, lets the tub float, couples the drive to the drum, finalizes.
 
     The tub gets an RpyFloatingJoint (7 positions and 7 velocities with the drum), which SDF cannot say. The drive's reflected
-    inertia makes the drum follow its speed source (`wm_drake.systems.speed_source`).
+    inertia makes the drum follow its speed source (`wm_drake.systems.speed_source`). If its bearing gives, the drum turns in
+    a massless body that floats as well (`wm_drake.coordinates.CARRIER`), whose frame is T when drawn.
 
     Raises:
         InputError: no such file, not valid SDF, or not the bodies this machine needs.
@@ -65,6 +68,8 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
     for body in floating:
         plant.AddJoint(RpyFloatingJoint(f"{body.name()}_floating", plant.world_frame(), body.body_frame()))
     actuator = _drive_actuator(plant, parameters.drive.joint)
+    if parameters.imperfections.bearing:
+        actuator = _hung_in_a_carrier(plant, actuator)
     actuator.set_default_rotor_inertia(REFLECTED_INERTIA)
     actuator.set_default_gear_ratio(1.0)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -parameters.gravity])
@@ -99,18 +104,38 @@ def _drive_actuator(plant: MultibodyPlant, joint_name: str) -> JointActuator:
     return actuators[0]
 
 
+def _hung_in_a_carrier(plant: MultibodyPlant, actuator: JointActuator) -> JointActuator:
+    """Puts a massless body that floats in the tub's place as the parent of the drum's joint.
+
+    Returns:
+        The new joint's actuator.
+
+    Raises:
+        InputError: the joint is not a revolute one from tub to drum.
+    """
+    joint, key = actuator.joint(), "imperfections.bearing"
+    if not isinstance(joint, RevoluteJoint) or joint.parent_body().name() != "tub":
+        what = f"joint '{joint.name()}' is {joint.type_name()}, from '{joint.parent_body().name()}'"
+        raise input_error(f"a bearing that gives asks for a revolute joint from 'tub' to 'drum'; {what}", key=key)
+    name, axis, damping = joint.name(), joint.revolute_axis(), joint.default_damping_vector()[0]
+    X_TF, on_drum = joint.frame_on_parent().GetFixedPoseInBodyFrame(), joint.frame_on_child()
+    plant.RemoveJointActuator(actuator)
+    plant.RemoveJoint(joint)
+    carrier = plant.AddRigidBody(CARRIER, plant.AddModelInstance("bearing"), SpatialInertia.Zero())
+    frame = plant.AddFrame(FixedOffsetFrame(f"{CARRIER}_axis", carrier.body_frame(), X_TF))
+    plant.AddJoint(RpyFloatingJoint(f"{CARRIER}_floating", plant.world_frame(), carrier.body_frame()))
+    return plant.AddJointActuator(name, plant.AddJoint(RevoluteJoint(name, frame, on_drum, axis, damping)))
+
+
 def _check_freedoms(plant: MultibodyPlant, parameters: MachineParameters) -> None:
-    floating, drive = plant.GetJointByName("tub_floating"), plant.GetJointByName(parameters.drive.joint)
-    dampers = len(parameters.telescopic_dampers)
-    if plant.num_velocities() != 7 + 7 * dampers or floating.velocity_start() != 0 or drive.velocity_start() != 6:
+    dampers, carriers = len(parameters.telescopic_dampers), 1 if parameters.imperfections.bearing else 0
+    if plant.num_velocities() != 7 + 7 * dampers + 6 * carriers or plant.num_positions() != plant.num_velocities():
         tubes = ", seven for each damper with tubes" if dampers else ""
         raise input_error(
             f"SDF '{parameters.model}' has {plant.num_velocities()} freedoms; a machine has the tub's six and the drum's one"
             f"{tubes}, all else on fixed joints",
             key="model",
         )
-    for index, damper in enumerate(parameters.telescopic_dampers.values()):  # Drake counts trees in the order of their joints
-        assert plant.GetJointByName(damper.joint).position_start() == 13 + 7 * index
 
 
 def tubes_of(plant: MultibodyPlant, joint: str) -> tuple[RigidBody, RigidBody]:

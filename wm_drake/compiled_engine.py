@@ -47,5 +47,5 @@ def run_compiled(setup: Setup, profile: SpinProfile, step: float, progress: Call
         progress(done / len(schedule.step))
     rates = np.empty((len(samples), 7))
     rates_history(samples, schedule.sample_acceleration[:, None], p, layout.elements, rates)
-    motion, deformation, tubes = layout.parts(samples)
-    return ended_where_it_diverged(Trajectory(schedule.time, motion, deformation, rates[:, 6], rates[:, :6], tubes))
+    motion, deformation, tubes, carrier = layout.parts(samples)
+    return ended_where_it_diverged(Trajectory(schedule.time, motion, deformation, rates[:, 6], rates[:, :6], tubes, carrier))

@@ -9,41 +9,42 @@ from wm_drake.parameters import MachineParameters
 
 Indices = np.ndarray
 
+CARRIER = "drum_carrier"
+"""Name of the massless body that the drum turns in where its bearing gives."""
+
 
 @dataclass(frozen=True)
 class Coordinates:
     """Indices of positions; velocities have the same ones, behind all positions.
 
-    A tree is a body that floats and the one on its joint: tub and drum, outer and inner tube of a damper. Each has seven
-    positions: roll, pitch, yaw, x, y, z, and that of its joint.
+    A tree is a body that floats and one on a joint of its: tub and drum, outer and inner tube of a damper. Each has seven
+    positions: roll, pitch, yaw, x, y, z, and that of the joint. Where the drum's bearing gives, the drum turns in a carrier
+    that floats too. Elements on the tub go on to see tub and drum; what holds the carrier sees carrier and drum besides.
 
     Attributes:
         size: How many positions there are.
-        trees: Seven indices for each tree: tub and drum, then each telescopic damper's tubes.
+        tub: Six: roll, pitch, yaw, x, y, z.
+        drum: Of the drum angle.
+        tubes: (telescopic dampers, 7)
+        carrier: Six as of the tub, or none.
     """
 
     size: int
-    trees: tuple[Indices, ...]
+    tub: Indices
+    drum: int
+    tubes: Indices
+    carrier: Indices
 
     @property
-    def tub(self) -> Indices:
-        """Six: roll, pitch, yaw, x, y, z."""
-        return self.trees[0][:6]
-
-    @property
-    def drum(self) -> int:
-        """Of the drum angle."""
-        return int(self.trees[0][6])
-
-    @property
-    def tubes(self) -> Indices:
-        """(telescopic dampers, 7)"""
-        return np.array(self.trees[1:], dtype=int).reshape(-1, 7)
+    def trees(self) -> list[Indices]:
+        """Seven indices each: tub and drum, then each telescopic damper's tubes, then carrier and drum, if there is one."""
+        carriers = [np.append(self.carrier, self.drum)] if self.carrier.size else []
+        return [np.append(self.tub, self.drum), *self.tubes, *carriers]
 
     @property
     def hanging(self) -> Indices:
         """What hangs on the tub and finds its own place there: all but tub and drum angle."""
-        return np.setdiff1d(np.arange(self.size), self.trees[0])
+        return np.setdiff1d(np.arange(self.size), [*self.tub, self.drum])
 
     def states(self) -> list[Indices]:
         """Fourteen indices in the state of the plant for each tree: its positions, its velocities."""
@@ -53,12 +54,13 @@ class Coordinates:
 def coordinates_of(plant: MultibodyPlant, parameters: MachineParameters) -> Coordinates:
     """Of a finalized plant with the joints that `wm_drake.bodies.add_bodies` gives it."""
 
-    def tree(floating: str, joint: str) -> Indices:
-        begin = plant.GetJointByName(floating).position_start()
-        return np.append(begin + np.arange(6), plant.GetJointByName(joint).position_start())
+    def floating(body: str) -> Indices:
+        return np.asarray(plant.GetJointByName(f"{body}_floating").position_start() + np.arange(6))
 
-    trees = [tree("tub_floating", parameters.drive.joint)]
-    for damper in parameters.telescopic_dampers.values():
-        outer = plant.GetJointByName(damper.joint).parent_body().name()
-        trees.append(tree(f"{outer}_floating", damper.joint))
-    return Coordinates(plant.num_positions(), tuple(trees))
+    tubes = np.zeros((len(parameters.telescopic_dampers), 7), dtype=int)
+    for row, damper in zip(tubes, parameters.telescopic_dampers.values(), strict=True):
+        joint = plant.GetJointByName(damper.joint)
+        row[:] = *floating(joint.parent_body().name()), joint.position_start()
+    drum = plant.GetJointByName(parameters.drive.joint).position_start()
+    carrier = floating(CARRIER) if parameters.imperfections.bearing else np.zeros(0, dtype=int)
+    return Coordinates(plant.num_positions(), floating("tub"), drum, tubes, carrier)

@@ -73,7 +73,9 @@ def _logged(setup: Setup, profile: SpinProfile, failure: str) -> Trajectory:
     for index, name in enumerate(dampers):
         if name in columns:
             deformation[:, index] = columns[name][:, 0]
+    count = len(setup.telescopes)
     trees = [columns["bodies"][:, indices] for indices in coordinates.states()]
-    tubes = np.stack(trees[1:], axis=1) if trees[1:] else np.empty((len(time), 0, PLANT_STATE_SIZE))
-    accelerations = columns["acceleration"][:, coordinates.tub]
-    return ended_where_it_diverged(Trajectory(time, trees[0], deformation, torque, accelerations, tubes), failure)
+    tubes = np.stack(trees[1 : 1 + count], axis=1) if count else np.empty((len(time), 0, PLANT_STATE_SIZE))
+    carrier = columns["bodies"][:, [*coordinates.carrier, *(coordinates.size + coordinates.carrier)]]
+    trajectory = Trajectory(time, trees[0], deformation, torque, columns["acceleration"][:, coordinates.tub], tubes, carrier)
+    return ended_where_it_diverged(trajectory, failure)

@@ -8,7 +8,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 from scipy.optimize import root
 
-from wm_drake.coordinates import Coordinates
+from wm_drake.coordinates import Coordinates, Indices
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.systems.spring_strut import SpringStrutParameters
@@ -70,8 +70,10 @@ def put_to_rest(plant: MultibodyPlant, context: Context, coordinates: Coordinate
     Raises:
         InputError: no equilibrium there.
     """
+    tolerance = EQUILIBRIUM_TOLERANCE
     if coordinates.hanging.size:
-        _balance(plant, context, coordinates, np.setdiff1d(np.arange(coordinates.size), coordinates.drum))
+        every = np.setdiff1d(np.arange(coordinates.size), coordinates.drum)
+        tolerance = max(tolerance, _balance(plant, context, coordinates, every))
     q = plant.GetPositions(context)
 
     def residual(pose: FloatArray) -> FloatArray:
@@ -89,7 +91,7 @@ def put_to_rest(plant: MultibodyPlant, context: Context, coordinates: Coordinate
         pose = np.asarray(root(residual, pose, tol=1e-12).x)
         remains = residual(pose)
     far = np.max(np.abs(pose[:3])) > _FARTHEST_REST_ANGLE or np.max(np.abs(pose[3:])) > _FARTHEST_REST_POSITION
-    if not np.max(np.abs(remains)) <= EQUILIBRIUM_TOLERANCE or far:
+    if not np.max(np.abs(remains)) <= tolerance or far:
         plant.SetPositions(context, np.zeros(coordinates.size))
         m_x, m_y, m_z, f_x, f_y, f_z = generalized_force(plant, context)[coordinates.tub]
         raise input_error(
@@ -100,32 +102,54 @@ def put_to_rest(plant: MultibodyPlant, context: Context, coordinates: Coordinate
     return remains
 
 
-def _balance(plant: MultibodyPlant, context: Context, coordinates: Coordinates, chosen: FloatArray) -> None:
+def _balance(plant: MultibodyPlant, context: Context, coordinates: Coordinates, chosen: Indices) -> float:
     """Moves the chosen coordinates to where no force is left on them.
 
-    Newton's method; a tube that may spin freely stays as it is, by least squares.
+    Newton's method; a tube that may spin freely stays as it is, by least squares. The drum's carrier goes with the tub, so
+    that a bearing of any stiffness does not hide what little the springs give.
+
+    Returns:
+        The largest force or moment that rounding may leave. [N, N m]
 
     Raises:
         InputError: it finds no such place nearby.
     """
+    ways = np.eye(coordinates.size)[chosen]
+    if coordinates.carrier.size:
+        ways[np.ix_(np.isin(chosen, coordinates.tub), coordinates.carrier)] = np.eye(6)[np.isin(coordinates.tub, chosen)]
 
     def forces(q: FloatArray) -> FloatArray:
         if not np.all(np.abs(q) < 1.0):
             return np.full(len(chosen), np.inf)
         plant.SetPositions(context, q)
-        return generalized_force(plant, context)[chosen]
+        return np.asarray(ways @ generalized_force(plant, context))
 
     q = plant.GetPositions(context)
-    steps = 1e-6 * np.eye(len(q))[chosen]
-    remains = forces(q)
+    remains, finest = forces(q), 0.0
     for number in range(100):
-        if not 0.1 * EQUILIBRIUM_TOLERANCE < np.max(np.abs(remains)) < np.inf:
+        if not max(0.1 * EQUILIBRIUM_TOLERANCE, finest) < np.max(np.abs(remains)) < np.inf:
             break
         if number % 10 == 0:  # springs are nearly linear: one stiffness serves for several steps
-            stiffness = np.linalg.pinv(np.column_stack([(forces(q + step) - remains) / 1e-6 for step in steps]), rcond=1e-9)
-        q[chosen] -= stiffness @ remains
+            slopes = np.column_stack([(forces(q + step) - remains) / 1e-6 for step in 1e-6 * ways])
+            stiffness = np.linalg.pinv(slopes, rcond=1e-9)
+            finest = np.finfo(float).eps * float(np.max(np.abs(slopes)))  # of places of a metre
+        q += ways.T @ -(stiffness @ remains)
         remains = forces(q)
-    if not np.max(np.abs(remains[np.isin(chosen, coordinates.hanging)])) <= TUBES_TOLERANCE:
+    _check_held(q, remains[np.isin(chosen, coordinates.hanging)], coordinates)
+    return finest
+
+
+def _check_held(q: FloatArray, remains: FloatArray, coordinates: Coordinates) -> None:
+    """Refuses what does not come to rest where it hangs."""
+    if coordinates.carrier.size:
+        sag = np.abs(q[coordinates.carrier] - q[coordinates.tub])
+        if not (np.max(sag[3:]) <= _FARTHEST_REST_POSITION and np.max(sag[:3]) <= _FARTHEST_REST_ANGLE):
+            raise input_error(
+                "cannot hold the drum: at rest it would sag by more than "
+                f"{1e3 * _FARTHEST_REST_POSITION:g} mm or tilt by more than {np.rad2deg(_FARTHEST_REST_ANGLE):g} deg",
+                key="imperfections.bearing",
+            )
+    if not np.max(np.abs(remains)) <= TUBES_TOLERANCE:
         raise input_error(
             "their bushings cannot hold the tubes near where they are drawn: nothing resists a turn about the damper's "
             "axis, say, of a tube whose centre of mass is beside it",

@@ -13,12 +13,14 @@ from wm_drake.equilibrium import generalized_force, preloaded, put_to_rest
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters import Load, MachineParameters, Sensor
 from wm_drake.parameters.elements import FloatArray
-from wm_drake.places import Places, placed_bushings, placed_dampers, placed_springs, placed_telescopes
+from wm_drake.places import Places, placed_bearing, placed_bushings, placed_dampers, placed_springs, placed_telescopes
+from wm_drake.systems.drum_bearing import DrumBearing
 from wm_drake.systems.friction_damper import FrictionDamper, FrictionDamperParameters
 from wm_drake.systems.six_component_bushing import SixComponentBushing, SixComponentBushingParameters
 from wm_drake.systems.speed_source import SpeedSource
 from wm_drake.systems.spring_strut import SpringStrut, SpringStrutParameters
 from wm_drake.systems.telescopic_damper import TelescopicDamper, TelescopicDamperParameters
+from wm_drake.whirl import fastest_rate
 from wm_drake.wiring import Link, connect
 
 OUTPUT_PERIOD = 5e-3
@@ -34,12 +36,15 @@ class Setup:
         parameters: The numbers in force.
         context: Root Context of the diagram.
         springs, dampers, bushings, telescopes: The elements in their places, by name.
+        bearing: That of the drum, if it gives: between what carries the drum and the tub, which is its ground side.
         sensor_points: By sensor name, the point in T. [m]
         detergent_point: Tub point nearest the detergent box, in T. [m]
         accelerometer_points: By name of the vibration sensor, the point in T. [m]
         rest_pose: Equilibrium of the empty machine: roll, pitch, yaw, x, y, z. [rad, m]
         residual: What remains there of moment about To and force on the tub, in W. [N m, N]
         tube_rest: (telescopic dampers, 7) angles and position of each outer tube and extension of the damper there. [rad, m]
+        carrier_rest: Angles and position there of what carries the drum in its bearing, if that gives; else empty. [rad, m]
+        bearing_rate: Fastest motion of the empty drum in its bearing; 0 if that does not give. [rad/s]
     """
 
     machine: "Machine"
@@ -49,12 +54,15 @@ class Setup:
     dampers: dict[str, FrictionDamperParameters]
     bushings: dict[str, SixComponentBushingParameters]
     telescopes: dict[str, TelescopicDamperParameters]
+    bearing: SixComponentBushingParameters | None
     sensor_points: dict[str, FloatArray]
     detergent_point: FloatArray
     accelerometer_points: dict[str, FloatArray]
     rest_pose: FloatArray
     residual: FloatArray
     tube_rest: FloatArray
+    carrier_rest: FloatArray
+    bearing_rate: float
 
     @property
     def plant_context(self) -> Context:
@@ -83,6 +91,7 @@ class Machine:
     dampers: dict[str, FrictionDamper]
     bushings: dict[str, SixComponentBushing]
     telescopes: dict[str, TelescopicDamper]
+    bearing: DrumBearing | None
     logs: dict[str, VectorLogSink]
     blank: Context
     places: list[Places] = field(default_factory=list, repr=False, compare=False)
@@ -116,9 +125,11 @@ class Machine:
         places = self._places(plant_context, parameters)
         bushings, friction_dampers = placed_bushings(places, parameters), placed_dampers(places, parameters)
         telescopes = placed_telescopes(self.plant, places, parameters)
+        bearing = placed_bearing(self.plant, parameters)
         self._set(context, self.bushings, bushings)
         self._set(context, self.dampers, friction_dampers)
         self._set(context, self.telescopes, telescopes)
+        self._set(context, self._bearings, {"bearing": bearing})
         unloaded = placed_springs(places, parameters)
         self._set(context, self.springs, unloaded)
         springs = preloaded(self.plant, plant_context, self.coordinates, unloaded)
@@ -132,14 +143,16 @@ class Machine:
             telescopes = {name: telescope.without_friction() for name, telescope in telescopes.items()}
             self._set(context, self.telescopes, telescopes)
         residual = put_to_rest(self.plant, plant_context, self.coordinates)
+        fastest = fastest_rate(self.plant, plant_context, self.coordinates, bearing) if bearing else 0.0
         self._hang_in(plant_context, parameters, load)
         positions = self.plant.GetPositions(plant_context)
         points = {name: places("tub", sensor.frame)[0] for name, sensor in parameters.sensors.items()}
         detergent_point = places("tub", parameters.clearance.detergent_frame)[0]
         vibrations = {name: places("tub", frame)[0] for name, frame in parameters.accelerometer_frames().items()}
         elements = springs, friction_dampers, bushings, telescopes
-        rest = positions[self.coordinates.tub], residual, positions[self.coordinates.tubes]
-        return Setup(self, parameters, context, *elements, points, detergent_point, vibrations, *rest)
+        whole = self.coordinates
+        rest = positions[whole.tub], residual, positions[whole.tubes], positions[whole.carrier]
+        return Setup(self, parameters, context, *elements, bearing, points, detergent_point, vibrations, *rest, fastest)
 
     def set_up_bodies(self, load: Load | None, parameters: MachineParameters, context: Context | None = None) -> Context:
         """A Context, fresh or used again, in which bodies, frames and load are set and nothing else; raises as `set_up`."""
@@ -171,8 +184,13 @@ class Machine:
 
     def handles(self, context: Context) -> list[Any]:
         """Handles of all elements' Contexts; holding them through a run makes it a tenth faster."""
-        elements = [*self.springs.values(), *self.dampers.values(), *self.bushings.values(), *self.telescopes.values()]
+        tables = (self.springs, self.dampers, self.bushings, self.telescopes, self._bearings)
+        elements = [element for table in tables for element in table.values()]
         return [element.handles(element.GetMyContextFromRoot(context)) for element in elements]
+
+    @property
+    def _bearings(self) -> dict[str, DrumBearing]:
+        return {"bearing": self.bearing} if self.bearing else {}
 
     def elastic_and_gravity_force(self, context: Context) -> FloatArray:
         """Moment about To and force on the tub in W at the Context's pose: all elements and gravity. [N m, N]"""
@@ -209,6 +227,10 @@ def build_machine(parameters: MachineParameters) -> Machine:
     elements = {"spring": springs, "damper": dampers, "bushing": bushings}
     labels = [(_label(kind, name), system) for kind, systems in elements.items() for name, system in systems.items()]
     links = [Link(f"damper_{name}", name, system, 1 + index) for index, (name, system) in enumerate(telescopes.items())]
+    placed = placed_bearing(plant, parameters)
+    bearing = DrumBearing(placed.packed()) if placed else None
+    if bearing:
+        links.append(Link("drum_bearing", "drum_bearing", bearing, len(coordinates.trees) - 1))
     connect(builder, plant, coordinates, labels, links)
     builder.Connect(source.get_output_port(), plant.get_actuation_input_port())
     logged = {"bodies": plant.get_state_output_port(), "acceleration": plant.get_generalized_acceleration_output_port()}
@@ -220,7 +242,9 @@ def build_machine(parameters: MachineParameters) -> Machine:
     diagram = builder.Build()
     diagram.set_name(parameters.name)
     context = diagram.CreateDefaultContext()
-    return Machine(parameters, diagram, plant, coordinates, source, springs, dampers, bushings, telescopes, sinks, context)
+    return Machine(
+        parameters, diagram, plant, coordinates, source, springs, dampers, bushings, telescopes, bearing, sinks, context
+    )
 
 
 def _label(kind: str, name: str) -> str:
@@ -242,6 +266,9 @@ def _check_same_elements(built: MachineParameters, wanted: MachineParameters) ->
                 f"'{other}' is not in both machines{nearest_names(other, names[0])}; build a new machine",
                 key=table.removeprefix("all_"),
             )
+    if (wanted.imperfections.bearing is None) != (built.imperfections.bearing is None):
+        given, other = ("gives", "does not") if wanted.imperfections.bearing else ("does not give", "does")
+        raise input_error(f"{given}; that of the built machine {other}: build a new one", key="imperfections.bearing")
     for table in ("dampers", "telescopic_dampers"):
         for name, damper in getattr(wanted, table).items():
             built_damper = getattr(built, table)[name]

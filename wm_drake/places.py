@@ -102,3 +102,19 @@ def placed_telescopes(
         axis, law = X_OF.rotation() @ joint.translation_axis(), packed_damper_law(parameters.damper_types[damper.type])
         placed[name] = TelescopicDamperParameters(axis, at_tub, at_housing, law)
     return placed
+
+
+def placed_bearing(plant: MultibodyPlant, parameters: MachineParameters) -> SixComponentBushingParameters | None:
+    """What the drum's carrier is held by, the tub being its ground side; None for a drum that turns in a perfect joint."""
+    bearing = parameters.imperfections.bearing
+    if bearing is None:
+        return None
+    joint = plant.GetJointByName(parameters.drive.joint)
+    X_TF = joint.frame_on_parent().GetFixedPoseInBodyFrame()
+    axis = X_TF.rotation() @ joint.revolute_axis()
+    point = X_TF.translation() + bearing.y * axis
+    across = np.eye(3)[int(abs(axis[0]) > 0.9)]  # x, if the axis is not near it
+    x = across - (across @ axis) * axis
+    x /= np.linalg.norm(x)
+    rotation = np.column_stack([x, axis, np.cross(x, axis)])
+    return SixComponentBushingParameters(point, rotation, point, rotation, packed_bushing_law(bearing.as_bushing()))

@@ -70,7 +70,12 @@ class Scene:
     """The shapes of a machine, to be put into any pose."""
 
     def __init__(self, parameters: MachineParameters, meshcat: Meshcat | None = None) -> None:
-        """Builds plant and geometry of a machine; with a Meshcat to show them in, if given."""
+        """Builds plant and geometry of a machine; with a Meshcat to show them in, if given.
+
+        The drum is shown on its axis even if its bearing gives: by hundredths of a millimetre.
+        """
+        perfect = parameters.imperfections.model_copy(update={"bearing": None})
+        parameters = parameters.model_copy(update={"imperfections": perfect})
         builder = DiagramBuilder()
         self.plant, self._scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
         add_bodies(self.plant, parameters)

@@ -2,6 +2,7 @@
 
 import functools
 import importlib.metadata
+import itertools
 import json
 import warnings
 from collections.abc import Callable
@@ -20,6 +21,8 @@ from wm_drake.machine import OUTPUT_PERIOD, Machine, Setup
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.parameters.machine import DEFAULT_STEP as DEFAULT_STEP
+from wm_drake.systems.drum_bearing import FORCE_SIZE as BEARING_FORCE_SIZE
+from wm_drake.systems.drum_bearing import drum_bearing_history
 from wm_drake.systems.friction_damper import friction_damper_history
 from wm_drake.systems.six_component_bushing import six_component_bushing_history
 from wm_drake.systems.spring_strut import spring_strut_history
@@ -36,6 +39,10 @@ ENGINES: dict[str, Engine] = {"compiled": run_compiled, "drake": run_drake}
 DEFAULT_ENGINE = "compiled"
 
 AXES = ("x", "y", "z")
+
+
+_LONGEST_BEARING_STEP = 1.0
+"""Of the phase of the drum's fastest motion in a bearing that gives. [rad]"""
 
 
 class DivergenceWarning(UserWarning):
@@ -96,6 +103,7 @@ def simulate(
     if isinstance(case, str):
         case = case_of(machine.parameters, case)
     setup = machine.set_up(case.load, parameters=case.parameters, gasket=case.gasket)
+    check_bearing(setup, step)
     trajectory = ENGINES[engine](setup, case.profile, step, progress)
     record = as_record(setup, case, trajectory)
     record.attrs |= {"engine": engine, "step_s": step}
@@ -114,6 +122,33 @@ def checked_step(parameters: MachineParameters, step: float | None) -> float:
     if not step > 0.0 or abs(OUTPUT_PERIOD / step - round(OUTPUT_PERIOD / step)) > 1e-9 or step > OUTPUT_PERIOD:
         raise input_error(f"{step:g} s is not a whole part of the output period {OUTPUT_PERIOD:g} s", key="step")
     return step
+
+
+def check_bearing(setup: Setup, step: float) -> None:
+    """Refuses a step that is too long for the drum's motion in its bearing.
+
+    A sixth of the fastest period: the engines' schemes are stable up to 0.45 (RK4) and 0.27 of it (RK3), and RK4 takes at most
+    0.6 % of that motion's amplitude away in a step then.
+
+    Args:
+        setup: A machine, set up.
+        step: Integration step. [s]
+
+    Raises:
+        InputError: the step is too long.
+    """
+    if step * setup.bearing_rate > _LONGEST_BEARING_STEP:
+        frequency_hz = setup.bearing_rate / (2.0 * np.pi)
+        pieces = int(np.ceil(OUTPUT_PERIOD * setup.bearing_rate / _LONGEST_BEARING_STEP))
+        longest = f"{1e3 * OUTPUT_PERIOD / pieces:.4g} ms"
+        if 10**9 % pieces:  # no step that can be written out
+            pieces = next(more for more in itertools.count(pieces) if 10**9 % more == 0)
+            longest += f", such as {1e3 * OUTPUT_PERIOD / pieces:g} ms"
+        raise input_error(
+            f"{1e3 * step:g} ms is too long for the drum in its bearing, whose fastest motion is at {frequency_hz:.4g} Hz; "
+            f"allowed are up to {longest}",
+            key="step",
+        )
 
 
 def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
@@ -162,21 +197,25 @@ def _motion(setup: Setup, trajectory: Trajectory) -> _Variables:
     displaced = point_displacements(state, np.stack([*points, setup.detergent_point]), setup.rest_pose)
     moved = [displaced[:, index, axis] for index, axis in enumerate(axes)]
     detergent = displaced[:, -1]
-    return _tubes(trajectory) | {
-        "tub_angle": (("time", "angle"), state[:, 0:3], "rad", "roll, pitch, yaw of T in W (3-2-1 Euler angles)"),
-        "tub_position": (("time", "axis"), state[:, 3:6], "m", "position of To in W"),
-        "tub_angular_velocity": (("time", "axis"), state[:, 7:10], "rad/s", "angular velocity of T in W"),
-        "tub_velocity": (("time", "axis"), state[:, 10:13], "m/s", "velocity of To in W"),
-        "tub_angular_acceleration": (("time", "axis"), trajectory.acceleration[:, :3], "rad/s^2", "rate of it in W"),
-        "tub_acceleration": (("time", "axis"), trajectory.acceleration[:, 3:], "m/s^2", "acceleration of To in W"),
-        "drum_angle": (("time",), state[:, 6], "rad", "angle of the drum against the tub"),
-        "drum_speed": (("time",), state[:, 13], "rad/s", "speed of the drum against the tub"),
-        "displacement": (("time", "sensor"), np.stack(moved, axis=1), "m", "displacement at the sensors, along their axes"),
-        "sensor_point": (("sensor", "axis"), np.stack(points), "m", "points of the sensors in T"),
-        "accelerometer_point": (("accelerometer", "axis"), accelerometers, "m", "points of the vibration sensors in T"),
-        "detergent_displacement": (("time", "axis"), detergent, "m", "displacement of the point nearest the detergent box"),
-        "damper_deformation": (("time", "damper"), trajectory.deformation, "m", "deformation of the damper's sponge"),
-    }
+    return (
+        _tubes(trajectory)
+        | _whirl(setup, trajectory)
+        | {
+            "tub_angle": (("time", "angle"), state[:, 0:3], "rad", "roll, pitch, yaw of T in W (3-2-1 Euler angles)"),
+            "tub_position": (("time", "axis"), state[:, 3:6], "m", "position of To in W"),
+            "tub_angular_velocity": (("time", "axis"), state[:, 7:10], "rad/s", "angular velocity of T in W"),
+            "tub_velocity": (("time", "axis"), state[:, 10:13], "m/s", "velocity of To in W"),
+            "tub_angular_acceleration": (("time", "axis"), trajectory.acceleration[:, :3], "rad/s^2", "rate of it in W"),
+            "tub_acceleration": (("time", "axis"), trajectory.acceleration[:, 3:], "m/s^2", "acceleration of To in W"),
+            "drum_angle": (("time",), state[:, 6], "rad", "angle of the drum against the tub"),
+            "drum_speed": (("time",), state[:, 13], "rad/s", "speed of the drum against the tub"),
+            "displacement": (("time", "sensor"), np.stack(moved, axis=1), "m", "displacement at the sensors, along their axes"),
+            "sensor_point": (("sensor", "axis"), np.stack(points), "m", "points of the sensors in T"),
+            "accelerometer_point": (("accelerometer", "axis"), accelerometers, "m", "points of the vibration sensors in T"),
+            "detergent_displacement": (("time", "axis"), detergent, "m", "displacement of the point nearest the detergent box"),
+            "damper_deformation": (("time", "damper"), trajectory.deformation, "m", "deformation of the damper's sponge"),
+        }
+    )
 
 
 def _tubes(trajectory: Trajectory) -> _Variables:
@@ -188,6 +227,23 @@ def _tubes(trajectory: Trajectory) -> _Variables:
         "tube_angle": (("time", "tube", "angle"), tubes[:, :, :3], "rad", "roll, pitch, yaw of the outer tubes in W"),
         "tube_position": (("time", "tube", "axis"), tubes[:, :, 3:6], "m", "displacement of their link frames in W"),
         "tube_extension": (("time", "tube"), tubes[:, :, 6], "m", "by how much the damper is longer than drawn"),
+    }
+
+
+def _whirl(setup: Setup, trajectory: Trajectory) -> _Variables:
+    """Of machines whose drum can whirl in its bearing."""
+    if setup.bearing is None:
+        return {}
+    carrier, none = trajectory.carrier, np.zeros((len(trajectory.time), 1))
+    own = np.empty((len(carrier), BEARING_FORCE_SIZE))
+    both = np.hstack([trajectory.state, carrier[:, :6], none, carrier[:, 6:], none])
+    drum_bearing_history(both, np.empty((len(carrier), 0)), setup.bearing.packed(), own)
+    dims, where = ("time", "axis"), "in the tub's frame, y along the drum axis"
+    return {
+        "drum_displacement": (dims, own[:, 0:3], "m", f"displacement of the drum axis in the bearing, {where}"),
+        "drum_tilt": (dims, own[:, 3:6], "rad", f"rotation of the drum axis against the tub as a vector, {where}"),
+        "bearing_force": (dims, own[:, 6:9], "N", f"force of the drum on the tub in the bearing, {where}"),
+        "bearing_moment": (dims, own[:, 9:12], "N m", f"moment of the drum on the tub in the bearing, {where}"),
     }
 
 

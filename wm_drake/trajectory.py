@@ -45,6 +45,8 @@ class Trajectory:
         acceleration: (n, 6) angular acceleration of the tub and acceleration of To, in W. [rad/s^2, m/s^2]
         tubes: (n, number of telescopic dampers, 14) position of the outer tube and extension, their velocities; as `state`
             for tub and drum.
+        carrier: (n, 12) position of what carries the drum in its bearing, and its velocity, as of the tub; (n, 0) if that
+            does not give.
         divergence: None if the run came to its end.
     """
 
@@ -54,6 +56,7 @@ class Trajectory:
     motor_torque: FloatArray
     acceleration: FloatArray
     tubes: FloatArray
+    carrier: FloatArray
     divergence: Divergence | None = None
 
 
@@ -84,6 +87,7 @@ def _cut(trajectory: Trajectory, length: int, divergence: Divergence) -> Traject
         trajectory.motor_torque[:length],
         trajectory.acceleration[:length],
         trajectory.tubes[:length],
+        trajectory.carrier[:length],
         divergence,
     )
 

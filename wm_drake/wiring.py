@@ -77,4 +77,10 @@ def _connect_trees(
         builder.Connect(split.get_output_port(0), total.get_input_port(len(elements) + index))
         builder.Connect(split.get_output_port(1), all_forces.get_input_port(link.tree))
     builder.Connect(total.get_output_port(), all_forces.get_input_port(0))
-    builder.Connect(all_forces.get_output_port(), plant.get_applied_generalized_force_input_port())
+    forces = all_forces.get_output_port()
+    if not np.array_equal(np.concatenate(coordinates.trees), np.arange(coordinates.size)):
+        gathered = np.eye(coordinates.size)[:, np.concatenate(coordinates.trees)]
+        in_order = builder.AddNamedSystem("forces_in_order", MatrixGain(gathered))
+        builder.Connect(forces, in_order.get_input_port())
+        forces = in_order.get_output_port()
+    builder.Connect(forces, plant.get_applied_generalized_force_input_port())

@@ -13,7 +13,7 @@ from wm_drake.laws.lanes import WIDTH
 from wm_drake.machine import Machine, Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.elements import FloatArray
-from wm_drake.simulation import AXES, Case, point_positions
+from wm_drake.simulation import AXES, Case, check_bearing, point_positions
 
 KEPT_BODIES, KEPT_NUMBERS = 64, 2048
 """How many sets of bodies with a load, and of other numbers, are remembered for cases to come."""
@@ -67,9 +67,9 @@ class Kind:
 class Preparation:
     """Packs cases of one machine. To set it up takes a good part of the time of a run, so that is done as rarely as can be."""
 
-    def __init__(self, machine: Machine) -> None:
-        """For a built machine."""
-        self.machine = machine
+    def __init__(self, machine: Machine, step: float) -> None:
+        """For a built machine, and the step that it will run with. [s]"""
+        self.machine, self.step = machine, step
         self.sensors = list(machine.parameters.sensors)
         self._context: Context | None = None
         self._known_bodies: list[tuple[object, FloatArray]] = []
@@ -130,6 +130,7 @@ class Preparation:
         if list(setup.sensors) != self.sensors:
             raise input_error(f"has sensors {', '.join(setup.sensors)}; the machine has {', '.join(self.sensors)}")
         self._context = setup.context
+        check_bearing(setup, self.step)
         return setup
 
 

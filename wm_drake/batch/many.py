@@ -89,7 +89,7 @@ def simulate_many(
 
     try:
         runner = Runner(machine.parameters, step, wanted, histories)
-        _run_all(Preparation(machine), runner, cases, workers or os.cpu_count() or 1, collect)
+        _run_all(Preparation(machine, step), runner, cases, workers or os.cpu_count() or 1, collect)
     except KeyboardInterrupt:
         raise SimulationInterrupted(as_table(machine.parameters, wanted, results)) from None
     return as_table(machine.parameters, wanted, results)

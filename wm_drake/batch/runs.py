@@ -130,8 +130,8 @@ class Runner:
 
     def _record(self, job: Job, schedule: Schedule, samples: FloatArray) -> Record:
         rates = self._rates(job, schedule, samples)
-        motion, deformation, tubes = job.numbers.layout.parts(samples)
-        trajectory = Trajectory(schedule.time, motion, deformation, rates[:, 6], rates[:, :6], tubes)
+        motion, deformation, tubes, carrier = job.numbers.layout.parts(samples)
+        trajectory = Trajectory(schedule.time, motion, deformation, rates[:, 6], rates[:, :6], tubes, carrier)
         record = as_record(job.numbers.setup, job.case, ended_where_it_diverged(trajectory))
         return record.assign_attrs(engine="compiled", step_s=self.step)
 

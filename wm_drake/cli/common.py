@@ -117,7 +117,9 @@ def check_buildable(file: str, parameters: "MachineParameters") -> None:
     """Finds the faults that show only in the built machine."""
     from wm_drake.machine import build_machine
     from wm_drake.parameters import measured_amplitudes
+    from wm_drake.simulation import check_bearing, checked_step
 
     with located_in(file):
         measured_amplitudes(parameters)
-        build_machine(parameters).set_up()
+        step = checked_step(parameters, None)
+        check_bearing(build_machine(parameters).set_up(), step)

@@ -17,12 +17,14 @@ times its mean, cosine, sine, double cosine and double sine part; damping of the
 
 from collections import namedtuple
 
+from wm_drake.kernel.bearing import TUB_SIZE, carrier_motion, carrier_size, tub_accelerations
 from wm_drake.kernel.matrices import about_centre, inverse, plus, six, three, times
 from wm_drake.kernel.tubes import TUBES_STATE_SIZE, count_of, with_telescopes
 from wm_drake.laws.compilation import law
 from wm_drake.laws.elementary import anywhere, sine_cosine
 from wm_drake.laws.motion import motion_from_sines, rpy_rates
 from wm_drake.laws.vectors import add, cross, dot, rotate, rotate_back, scale, subtract
+from wm_drake.systems.drum_bearing import drum_bearing_forces
 from wm_drake.systems.element import PLANT_STATE_SIZE
 from wm_drake.systems.friction_damper import friction_damper_line, friction_damper_tension, friction_damper_wrench
 from wm_drake.systems.six_component_bushing import six_component_bushing_wrench
@@ -34,7 +36,8 @@ JOINT_DAMPING, BODIES_SIZE = 58, 59
 LINE_SIZE = 13
 """Numbers kept of a damper between the rounds of `state_derivative`."""
 STATE_SIZE = PLANT_STATE_SIZE
-"""The state of tub and drum comes first; the deformations of the strut dampers follow, then what `kernel.tubes` says."""
+"""The state of tub and drum comes first; then deformations of the strut dampers, what `kernel.tubes` says, and
+`kernel.bearing`."""
 DRUM_RATE = 13
 """Where the state has it."""
 
@@ -122,13 +125,13 @@ def state_derivative(x, dx, masses, rate, acceleration, p, elements, scratch):
         x, dx: State and its derivative, laid out as `STATE_SIZE` says; x[6] and x[13] are not read.
         masses, rate, acceleration, p: As for `accelerations`.
         elements: Indices in p where springs, dampers, bushings and telescopic dampers begin: four arrays, the last None
-            without any.
+            without any; and where the bearing does, None where the drum turns in a perfect joint.
         scratch: At least `LINE_SIZE` numbers a damper to work in.
 
     Returns:
         Torque of the motor on the drum. [N m]
     """
-    springs, dampers, bushings, telescopes = elements
+    springs, dampers, bushings, telescopes, bearing = elements
     roll, pitch, yaw = sine_cosine(x[0]), sine_cosine(x[1]), sine_cosine(x[2])
     motion = motion_from_sines(x, 0, roll, pitch, yaw)
     zero = 0.0 * x[0]
@@ -149,8 +152,10 @@ def state_derivative(x, dx, masses, rate, acceleration, p, elements, scratch):
         wrench, _ = six_component_bushing_wrench(motion, p, bushings[i])
         total = plus(total, wrench)
     gravity = three(p, GRAVITY)
-    total = with_telescopes(x, dx, motion, gravity, p, telescopes, STATE_SIZE + len(dampers), total)
-    w_rate, v_rate, torque = accelerations(motion, masses, rate, acceleration, total, p)
+    tubes = STATE_SIZE + len(dampers)
+    total = with_telescopes(x, dx, motion, gravity, p, telescopes, tubes, total)
+    carrier = tubes + TUBES_STATE_SIZE * count_of(telescopes)
+    w_rate, v_rate, torque = with_bearing(x, dx, motion, masses, rate, acceleration, total, p, bearing, carrier)
     dx[0], dx[1], dx[2] = rpy_rates(motion.angular_velocity, pitch, yaw)
     dx[3], dx[4], dx[5] = motion.velocity
     dx[6] = zero + rate
@@ -161,9 +166,32 @@ def state_derivative(x, dx, masses, rate, acceleration, p, elements, scratch):
 
 
 @law
+def with_bearing(x, dx, motion, masses, rate, acceleration, total, p, bearing, first):
+    """As `accelerations`, of a drum in a bearing that gives if there is one; writes the derivative of its carrier's state.
+
+    Args:
+        x, dx: State and its derivative.
+        motion, masses, rate, acceleration: As there. With a bearing the packed bodies are those of carrier and drum.
+        total: Moment about To and force of all other elements on the tub, in W, without gravity. [N m, N]
+        p: Packed numbers.
+        bearing: Where those of the bearing begin (`wm_drake.kernel.bearing`); None without.
+        first: Where the state of the carrier begins.
+    """
+    if bearing is None:
+        return accelerations(motion, masses, rate, acceleration, total, p)
+    carrier = carrier_motion(x, dx, first)
+    on_tub, on_carrier, _ = drum_bearing_forces(motion, carrier, p, bearing + TUB_SIZE)
+    w_rate, v_rate, torque = accelerations(carrier, masses, rate, acceleration, on_carrier, p)
+    dx[first + 6], dx[first + 7], dx[first + 8] = w_rate
+    dx[first + 9], dx[first + 10], dx[first + 11] = v_rate
+    w_rate, v_rate = tub_accelerations(motion, plus(total, on_tub), three(p, GRAVITY), p, bearing)
+    return w_rate, v_rate, torque
+
+
+@law
 def state_size(elements):
     """How many numbers the state of a machine with these elements has."""
-    return STATE_SIZE + len(elements[1]) + TUBES_STATE_SIZE * count_of(elements[3])
+    return STATE_SIZE + len(elements[1]) + TUBES_STATE_SIZE * count_of(elements[3]) + carrier_size(elements[4])
 
 
 @law

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import BodyIndex, ForceElementIndex, RevoluteJoint, SpatialInertia
+from pydrake.multibody.tree import ForceElementIndex, RevoluteJoint, SpatialInertia
 from pydrake.systems.framework import Context
 
+from wm_drake.coordinates import CARRIER
 from wm_drake.errors import InputError, input_error
 from wm_drake.kernel.mechanics import BODIES_SIZE, DRUM_RATE, STATE_SIZE
 from wm_drake.kernel.tubes import TUBES_STATE_SIZE
@@ -22,6 +23,7 @@ class Layout:
     Attributes:
         springs, dampers, bushings, telescopes: Index of each element.
         gasket: Index of the gasket, -1 without one.
+        bearing: Index of the drum's bearing, -1 if it does not give.
         structure: Number of each damper's law, and of the points of every table, in order.
     """
 
@@ -30,22 +32,30 @@ class Layout:
     bushings: tuple[int, ...]
     telescopes: tuple[int, ...]
     gasket: int
+    bearing: int
     structure: tuple[int, ...]
 
     @property
-    def elements(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]:
-        """As compiled functions take them; None lets them be compiled without tubes."""
+    def elements(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None, int | None]:
+        """As compiled functions take them; None lets them be compiled without tubes, or without a bearing."""
         springs, dampers, bushings, telescopes = (
             np.array(indices, dtype=np.int64) for indices in (self.springs, self.dampers, self.bushings, self.telescopes)
         )
-        return springs, dampers, bushings, telescopes if self.telescopes else None
+        bearing = self.bearing if self.bearing >= 0 else None
+        return springs, dampers, bushings, telescopes if self.telescopes else None, bearing
 
-    def parts(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Of states (n, size): those of the plant's first 14, deformations of all dampers, states of the tubes (n, k, 14)."""
+    def parts(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Of states (n, size).
+
+        Returns:
+            Those of the plant's first 14, deformations of all dampers, states of the tubes (n, k, 14), state of the drum's
+            carrier (n, 12), or (n, 0) without one.
+        """
         tubes_begin = STATE_SIZE + len(self.dampers)
-        tubes = states[:, tubes_begin:].reshape(len(states), len(self.telescopes), TUBES_STATE_SIZE)
+        tubes_end = tubes_begin + TUBES_STATE_SIZE * len(self.telescopes)
+        tubes = states[:, tubes_begin:tubes_end].reshape(len(states), len(self.telescopes), TUBES_STATE_SIZE)
         deformation = np.hstack([states[:, STATE_SIZE:tubes_begin], tubes[:, :, -1]])
-        return states[:, :STATE_SIZE], deformation, tubes[:, :, :-1]
+        return states[:, :STATE_SIZE], deformation, tubes[:, :, :-1], states[:, tubes_end:]
 
 
 def pack(setup: Setup) -> tuple[FloatArray, Layout]:
@@ -82,7 +92,11 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
     indices["telescopes"] = tuple(begins)
     names = list(setup.bushings)
     gasket = indices["bushings"][names.index("gasket")] if "gasket" in names else -1
-    return np.concatenate(parts), Layout(**indices, gasket=gasket, structure=tuple(structure))
+    if setup.bearing:
+        parts += [pack_tub(setup), setup.bearing.packed()]
+        structure += setup.bearing.structure
+    bearing = size if setup.bearing else -1
+    return np.concatenate(parts), Layout(**indices, gasket=gasket, bearing=bearing, structure=tuple(structure))
 
 
 def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
@@ -92,7 +106,8 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     x[DRUM_RATE] = profile.speed[0]
     tubes = np.zeros((len(setup.telescopes), TUBES_STATE_SIZE))
     tubes[:, :7] = setup.tube_rest
-    return np.append(x, tubes)
+    carrier = np.append(setup.carrier_rest, np.zeros_like(setup.carrier_rest))
+    return np.concatenate([x, tubes.ravel(), carrier])
 
 
 def pack_tubes(setup: Setup, name: str) -> FloatArray:
@@ -124,8 +139,19 @@ def pack_tubes(setup: Setup, name: str) -> FloatArray:
     return np.concatenate([[1.0 / mass, m], a, _moment(outer_inertia) + s, s, *inertias])
 
 
+def pack_tub(setup: Setup) -> FloatArray:
+    """The tub without the drum, as `wm_drake.kernel.bearing` says."""
+    plant, context = setup.machine.plant, setup.plant_context
+    tub = plant.GetBodyByName("tub")
+    group = [body.index() for body in plant.GetBodiesWeldedTo(tub)]
+    inertia = plant.CalcSpatialInertia(context, tub.body_frame(), group)
+    return np.concatenate([[1.0 / inertia.get_mass()], _moment(inertia), _six(_matrix(inertia))])
+
+
 def pack_bodies(plant: MultibodyPlant, context: Context, drive: str) -> FloatArray:
     """The first part of `pack`: bodies and load in a plant Context, which no number of an element changes.
+
+    Where the drum's bearing gives, what turns in the tub turns in its carrier, and the tub is no part of it.
 
     Args:
         plant: The plant.
@@ -136,12 +162,12 @@ def pack_bodies(plant: MultibodyPlant, context: Context, drive: str) -> FloatArr
         InputError: as `pack`.
     """
     joint = drum_joint(plant, drive)
-    tub = plant.GetBodyByName("tub").body_frame()
-    X_TF = plant.CalcRelativeTransform(context, tub, joint.frame_on_parent())
+    tub = plant.GetBodyByName(CARRIER if plant.HasBodyNamed(CARRIER) else "tub")
+    X_TF = plant.CalcRelativeTransform(context, tub.body_frame(), joint.frame_on_parent())
     axis, origin = X_TF.rotation() @ joint.revolute_axis(), X_TF.translation()
-    tub_group, drum_group = _groups(plant, joint)
-    tub_inertia = plant.CalcSpatialInertia(context, tub, tub_group).Shift(origin)
-    drum_inertia = plant.CalcSpatialInertia(context, tub, drum_group).Shift(origin)
+    tub_group, drum_group = ([part.index() for part in plant.GetBodiesWeldedTo(body)] for body in (tub, joint.child_body()))
+    tub_inertia = plant.CalcSpatialInertia(context, tub.body_frame(), tub_group).Shift(origin)
+    drum_inertia = plant.CalcSpatialInertia(context, tub.body_frame(), drum_group).Shift(origin)
     gravity = plant.gravity_field().gravity_vector()
     mass = tub_inertia.get_mass() + drum_inertia.get_mass()
     damping = joint.GetDampingVector(context)
@@ -160,7 +186,7 @@ def drum_joint(plant: MultibodyPlant, name: str) -> RevoluteJoint:
     if not isinstance(joint, RevoluteJoint):
         raise _not_represented(f"joint '{name}' is {joint.type_name()}, not revolute", "drive.joint")
     tub = plant.GetBodiesWeldedTo(plant.GetBodyByName("tub"))
-    if not any(body.index() == joint.parent_body().index() for body in tub):
+    if not plant.HasBodyNamed(CARRIER) and not any(body.index() == joint.parent_body().index() for body in tub):
         raise _not_represented(f"joint '{name}' has the tub as its child, not as its parent", "drive.joint")
     if plant.num_force_elements() > 1:  # the first is gravity
         force = plant.get_force_element(ForceElementIndex(1))
@@ -170,12 +196,6 @@ def drum_joint(plant: MultibodyPlant, name: str) -> RevoluteJoint:
 
 def _not_represented(what: str, key: str) -> InputError:
     return input_error(f"the compiled engine does not represent this: {what}; use the drake engine", key=key)
-
-
-def _groups(plant: MultibodyPlant, joint: RevoluteJoint) -> tuple[list[BodyIndex], list[BodyIndex]]:
-    """Bodies that move with the tub, and with the drum."""
-    groups = [plant.GetBodiesWeldedTo(body) for body in (plant.GetBodyByName("tub"), joint.child_body())]
-    return [body.index() for body in groups[0]], [body.index() for body in groups[1]]
 
 
 def _moment(inertia: SpatialInertia) -> FloatArray:

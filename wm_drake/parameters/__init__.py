@@ -2,6 +2,7 @@
 
 from wm_drake.parameters.components import Component, load_component, shipped_components
 from wm_drake.parameters.elements import (
+    Bearing,
     Bushing,
     BushingType,
     CoulombDamper,
@@ -59,6 +60,7 @@ from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
 __all__ = [
     "GASKET_FACTORS",
     "TABLES",
+    "Bearing",
     "BodyOverride",
     "Bushing",
     "BushingType",

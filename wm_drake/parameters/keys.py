@@ -67,6 +67,9 @@ def _replaced(node: Any, changes: list[_Change]) -> Any:
                 raise input_error(f"unknown key '{name}'" + nearest_names(name, node), key=inner[0].key)
         return {**node, **{name: _replaced(node[name], inner) for name, inner in parts.items()}}
     for name, inner in parts.items():
+        if node is None:
+            whole = inner[0].key.removesuffix("." + ".".join([name, *inner[0].path]))
+            raise input_error(f"the machine has none; a machine file describes '{whole}' whole", key=inner[0].key)
         if not (isinstance(node, tuple) and name.isdigit() and int(name) < len(node)):
             raise input_error(f"'{name}' leads nowhere: the path ends before it", key=inner[0].key)
     return tuple(_replaced(entry, parts[str(i)]) if str(i) in parts else entry for i, entry in enumerate(node))

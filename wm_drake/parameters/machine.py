@@ -7,7 +7,17 @@ from pydantic import Field, StringConstraints, ValidationInfo, field_validator, 
 
 from wm_drake.errors import nearest_names
 from wm_drake.parameters import units as u
-from wm_drake.parameters.elements import Bushing, BushingType, Damper, DamperType, Frozen, Spring, SpringType, TelescopicDamper
+from wm_drake.parameters.elements import (
+    Bearing,
+    Bushing,
+    BushingType,
+    Damper,
+    DamperType,
+    Frozen,
+    Spring,
+    SpringType,
+    TelescopicDamper,
+)
 from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
@@ -96,15 +106,17 @@ class UnbalancePlanes(Frozen):
 
 
 class Imperfections(Frozen):
-    """What [A] section 4.2 names as causes of error, as far as it is a matter of loads. None by default.
+    """What [A] section 4.2 names as causes of error. None by default.
 
     Attributes:
         residual_imbalance: Mass that a drum is out of balance by itself; in every run beside the load.
         phase_error: By how much the rear mass of the spin cycle's cases is farther ahead than said.
+        bearing: What the drum turns in, if it gives so that the drum can whirl; None for a perfect revolute joint.
     """
 
     residual_imbalance: Unbalance = Unbalance(mass=0.0, radius=0.0, y=0.0)
     phase_error: u.Angle = 0.0
+    bearing: Bearing | None = None
 
 
 class MachineParameters(Frozen):

@@ -138,6 +138,11 @@ def warnings_of(result: SpinCycleResult) -> list[str]:
         found.append(f"The drum has a residual imbalance of {number(1e3 * faults.residual_imbalance.mass)} g.")
     if faults.phase_error != 0.0:
         found.append(f"Phases between front and rear are {number(float(np.rad2deg(faults.phase_error)))}° off.")
+    if faults.bearing:
+        radial, tilting = 1e-3 * faults.bearing.radial_stiffness, faults.bearing.tilting_stiffness
+        found.append(
+            f"The drum can whirl: its bearing gives by {number(radial)} N/mm across its axis and {number(tilting)} N m/rad."
+        )
     return found
 
 

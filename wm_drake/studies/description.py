@@ -5,12 +5,16 @@ from typing import Any
 import numpy as np
 
 from wm_drake.bodies import tubes_of
+from wm_drake.coordinates import CARRIER
 from wm_drake.laws.compilation import generic
 from wm_drake.laws.vectors import rotation_from_rpy
 from wm_drake.machine import Machine, Setup
 from wm_drake.parameters import ForceTable, TorqueTable
 from wm_drake.studies.modal import natural_modes
 
+_BEARING_NUMBERS = [
+    f"{kind}_{axis}" for kind in ("stiffness", "rotational_stiffness", "damping", "rotational_damping") for axis in "xyz"
+]
 PRODUCTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
@@ -30,6 +34,7 @@ def describe(machine: Machine) -> dict[str, Any]:
         "bodies": _bodies(setup),
         "oscillating_mass_kg": oscillating_mass(setup),
         "drum_joint": {"name": parameters.drive.joint, **_drum_axis(setup)},
+        "drum_bearing": _drum_bearing(setup),
         "springs": {name: _spring(setup, name) for name in setup.springs},
         "dampers": {name: _damper(setup, name) for name in setup.dampers},
         "bushings": {name: _bushing(setup, name) for name in setup.bushings},
@@ -61,9 +66,10 @@ def _bodies(setup: Setup) -> dict[str, Any]:
     described = {}
     moving = [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]
     groups = {part.name(): "drum" if part.name() == "drum" else "tub" for part in moving}
+    carriers = {"drum": plant.GetBodyByName(CARRIER).body_frame()} if setup.bearing else {}  # T, as drawn
     tubes = [body for damper in setup.parameters.telescopic_dampers.values() for body in tubes_of(plant, damper.joint)]
     for part in [*moving, *tubes]:
-        X_TB = plant.CalcRelativeTransform(context, tub, part.body_frame())
+        X_TB = plant.CalcRelativeTransform(context, carriers.get(part.name(), tub), part.body_frame())
         M_B = part.CalcSpatialInertiaInBodyFrame(context)
         central = M_B.Shift(M_B.get_com()).CalcRotationalInertia().ReExpress(X_TB.rotation())
         matrix = central.CopyToFullMatrix3()
@@ -81,6 +87,23 @@ def _drum_axis(setup: Setup) -> dict[str, list[float]]:
     X_TF = joint.frame_on_parent().CalcPoseInBodyFrame(setup.plant_context)
     axis = X_TF.rotation() @ joint.revolute_axis()
     return {"axis_T": list(map(float, axis)), "through_T": list(map(float, X_TF.translation()))}
+
+
+def _drum_bearing(setup: Setup) -> dict[str, Any] | None:
+    """Where it acts and its six components along x, y, z of a frame whose y axis is the drum's; None for a perfect joint."""
+    placed, bearing = setup.bearing, setup.parameters.imperfections.bearing
+    if placed is None or bearing is None:
+        return None
+    kind = bearing.as_bushing().model_dump(include=set(_BEARING_NUMBERS))
+    sag = setup.carrier_rest[3:] - setup.rest_pose[3:]
+    rate = {"fastest_motion_hz": setup.bearing_rate / (2.0 * np.pi)}
+    return {
+        "point_T": placed.p_WG.tolist(),
+        "rotation_T": placed.R_WG.tolist(),
+        **kind,
+        "sag_of_Do_at_rest_W": sag.tolist(),
+        **rate,
+    }
 
 
 def _line(setup: Setup, element: Any) -> dict[str, Any]:

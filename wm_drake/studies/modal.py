@@ -38,8 +38,8 @@ def natural_modes(machine: Machine, parameters: MachineParameters | None = None,
     """The empty tub's modes about its rest pose with the dampers free, by Drake's `Linearize` of the whole diagram.
 
     Dampers are taken out because friction at rest is no spring and no dashpot: a smoothed law would linearize to a huge one.
-    The drum stands still. Overdamped motions are not among the modes, nor are those of damper tubes on their bushings, which
-    are faster than the tub's six.
+    The drum stands still. Overdamped motions are not among the modes, nor are those of damper tubes on their bushings and of
+    a drum in its bearing, which are faster than the tub's six.
 
     Args:
         machine: A built machine.
@@ -50,7 +50,7 @@ def natural_modes(machine: Machine, parameters: MachineParameters | None = None,
     values, vectors = np.linalg.eig(system.A())
     oscillating = np.flatnonzero(values.imag > max(_SLOWEST, 1e-6 * np.abs(values).max()))
     order = oscillating[np.argsort(np.abs(values[oscillating]))][:6]
-    shapes = [_real_shape(vectors[:6, index]) for index in order]
+    shapes = [_real_shape(vectors[machine.coordinates.tub, index]) for index in order]
     size = np.abs(values[order])
     return Modes(size / (2.0 * np.pi), -values[order].real / size, np.array(shapes))
 

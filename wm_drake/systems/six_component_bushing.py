@@ -93,14 +93,9 @@ def six_component_bushing_between(motion, ground, p, at):
     Returns:
         Moment about its origin and force on each body (six numbers, W), and force and moment on the second, in G.
     """
-    r_ground = compose(ground.rotation, nine(p, at + 15))
-    arm = rotate(motion.rotation, (p[at], p[at + 1], p[at + 2]))
-    place = add(motion.position, arm)
-    ground_arm = subtract(place, ground.position)
-    displaced = subtract(ground_arm, rotate(ground.rotation, (p[at + 12], p[at + 13], p[at + 14])))
+    arm, ground_arm, r_ground, displaced, relative = motion_between(motion, ground, p, at)
     v_B = add(motion.velocity, cross(motion.angular_velocity, arm))
     v_ground = add(ground.velocity, cross(ground.angular_velocity, ground_arm))
-    relative = compose(transposed(r_ground), compose(motion.rotation, nine(p, at + 3)))
     f, m = bushing_force(
         rotate_back(r_ground, displaced),
         rotate_back(r_ground, subtract(v_B, v_ground)),
@@ -114,6 +109,23 @@ def six_component_bushing_between(motion, ground, p, at):
     force, moment = rotate(r_ground, f), rotate(r_ground, m)
     on_ground = wrench_at_origin(ground_arm, scale(-1.0, force), scale(-1.0, moment))
     return wrench_at_origin(arm, force, moment), on_ground, (-f[0], -f[1], -f[2], -m[0], -m[1], -m[2])
+
+
+@law
+def motion_between(motion, ground, p, at):
+    """Where the bushing of `six_component_bushing_between` is; arguments as there.
+
+    Returns:
+        From the origins of the two bodies to its point on the first, in W [m]; rotation of its frame G on the second;
+        displacement of the first's frame from G, in W [m]; rotation of the first's frame in G.
+    """
+    r_ground = compose(ground.rotation, nine(p, at + 15))
+    arm = rotate(motion.rotation, (p[at], p[at + 1], p[at + 2]))
+    place = add(motion.position, arm)
+    ground_arm = subtract(place, ground.position)
+    displaced = subtract(ground_arm, rotate(ground.rotation, (p[at + 12], p[at + 13], p[at + 14])))
+    relative = compose(transposed(r_ground), compose(motion.rotation, nine(p, at + 3)))
+    return arm, ground_arm, r_ground, displaced, relative
 
 
 @law
