@@ -3,14 +3,15 @@
 from wm_drake.parameters import MachineParameters
 
 BEARING = {
-    "radial_stiffness": 4e6,  # N/m
+    "radial_stiffness": 4e6,
     "axial_stiffness": 6e6,
-    "tilting_stiffness": 5e4,  # N m/rad
-    "radial_damping": 600.0,  # N s/m
+    "tilting_stiffness": 5e4,
+    "radial_damping": 600.0,
     "axial_damping": 500.0,
-    "tilting_damping": 8.0,  # N m s/rad
-    "y": 0.15,  # m, towards the rear
+    "tilting_damping": 8.0,
+    "y": 0.15,  # towards the rear
 }
+UNITS = dict(zip(BEARING, ("N/m", "N/m", "N m/rad", "N s/m", "N s/m", "N m s/rad", "m"), strict=True))
 
 
 def with_bearing(parameters, step=2.5e-4, **numbers):

@@ -159,11 +159,13 @@ def test_energy_of_a_run_is_balanced():
     assert abs(drive - (kinetic[1] - kinetic[0]) - (stored[-1] - stored[0]) - dissipated) < 1e-5 * dissipated
 
 
-def test_runs_side_by_side_are_those_of_simulate(whirling):
-    parameters = whirling.parameters
+@pytest.mark.parametrize("name", ["reference", pytest.param("free_stroke", marks=pytest.mark.slow)])
+def test_runs_side_by_side_are_those_of_simulate(name):
+    parameters = with_bearing(load_machine(name))
+    whirling = build_machine(parameters)
     cases = [
         Case(f"{load} {k:g}", parameters.loads[load], RUN_UP, parameters=with_value(parameters, key, k))
-        for load in ("front", "middle")
+        for load in list(parameters.loads)[-2:]
         for key, k in (("imperfections.bearing.radial_stiffness", 2e6), ("imperfections.residual_imbalance.mass", 0.1))
     ]
     ended = []

@@ -21,7 +21,7 @@ ORDER = (
     {"machine"},
     {"trajectory"},
     {"kernel"},
-    {"scene", "drake_engine", "compiled_engine"},
+    {"scene", "drake_engine", "compiled_engine", "readings"},
     {"simulation"},
     {"measures", "vibration"},
     {"batch"},

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from machine_with_bearing import BEARING, UNITS
 
 from wm_drake.simulation import versions
 
@@ -26,6 +27,14 @@ def study(wm_drake):
         return wm_drake("study", "spin-cycle", *INPUT, "--out", "out", *arguments)
 
     return run
+
+
+@pytest.fixture
+def whirling_file(tmp_path):
+    numbers = "\n".join(f"    {key}: {value} {UNITS[key]}" for key, value in BEARING.items())
+    path = tmp_path / "whirling.yaml"
+    path.write_text(f"name: whirling\nextends: reference\nstep: 0.5 ms\nimperfections:\n  bearing:\n{numbers}\n")
+    return path
 
 
 def test_prints_one_json_object_and_writes_what_it_says(study):
@@ -126,3 +135,22 @@ def test_measured_accelerations_are_integrated(study):
     (front,) = (np.array(case["rms_mm"][1]) for case in shown["cases"] if case["case"] == "front")
     expected = np.linalg.norm(front - 2.0 / np.sqrt(2.0)) / np.linalg.norm(np.full(9, 2.0 / np.sqrt(2.0)))
     assert error == pytest.approx(expected, rel=0.02)
+
+
+def test_a_drum_that_can_whirl_is_run_and_said(study, whirling_file):
+    shown = json.loads(study("--machine", whirling_file, "--json").out)
+    plain = json.loads(study("--out", "perfect", "--json").out)
+    rms, perfect = (np.array([case["rms_mm"] for case in told["cases"]]) for told in (shown, plain))
+    assert 1e-5 < np.abs(rms / perfect - 1.0).max() < 0.05
+    page = Path("out/report.html").read_text(encoding="utf-8")
+    assert "The drum can whirl: its bearing gives by 4000 N/mm across its axis and 50000 N m/rad." in page
+
+
+def test_a_step_too_long_for_the_bearing_is_refused(wm_drake, whirling_file):
+    whirling_file.write_text(whirling_file.read_text().replace("step: 0.5 ms", "step: 2.5 ms"))
+    for command in (("machine", "check", whirling_file), ("study", "spin-cycle", "--machine", whirling_file, "--out", "out")):
+        ended = wm_drake(*command)
+        assert (ended.code, ended.out) == (2, "")
+        assert f"{whirling_file}:3" in ended.err
+        assert "step: 2.5 ms is too long for the drum in its bearing, whose fastest motion is at 150.5 Hz" in ended.err
+        assert not Path("out").exists()

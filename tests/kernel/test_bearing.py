@@ -125,7 +125,7 @@ def test_a_joint_that_is_no_revolute_one_from_the_tub_is_refused(tmp_path):
         build_machine(sliding)
 
 
-@pytest.mark.parametrize("name", ["reference", "free_stroke"])
+@pytest.mark.parametrize("name", ["reference", pytest.param("free_stroke", marks=pytest.mark.slow)])
 def test_a_run_moves_as_in_drake(name):
     machine = build_machine(MACHINES[name])
     case = Case("two", LOAD, SpinProfile(time=(0.0, 0.301, 1.0), speed=(8.0, 16.0, 40.0)))

@@ -1,8 +1,8 @@
 """Numbers enter here: frozen types of a machine, a load, a spin profile, in SI; files and units are read and checked."""
 
+from wm_drake.parameters.bearing import Bearing
 from wm_drake.parameters.components import Component, load_component, shipped_components
 from wm_drake.parameters.elements import (
-    Bearing,
     Bushing,
     BushingType,
     CoulombDamper,

@@ -141,7 +141,8 @@ def warnings_of(result: SpinCycleResult) -> list[str]:
     if faults.bearing:
         radial, tilting = 1e-3 * faults.bearing.radial_stiffness, faults.bearing.tilting_stiffness
         found.append(
-            f"The drum can whirl: its bearing gives by {number(radial)} N/mm across its axis and {number(tilting)} N m/rad."
+            f"The drum can whirl: its bearing gives by {number(radial, 0)} N/mm across its axis and "
+            f"{number(tilting, 0)} N m/rad."
         )
     return found
 
