@@ -23,7 +23,7 @@ from wm_drake.studies.calibration.targets import targets_of
 
 FREE = Path(__file__).with_name("reference_free.yaml")
 LEFT_OUT = (("back", "front"), ("middle",), ("counter",), ("back",), ("front",))
-PLAN = Plan(method="basin-hopping", starts=3, iterations=2, deviation=0.03)
+PLAN = Plan(method="basin-hopping", starts=3, iterations=2, deviation=0.025)
 PREDICTION = replace(PLAN, method="least-squares", iterations=14)
 
 

@@ -30,9 +30,15 @@ def sdf_with(text: str, parameters: MachineParameters) -> str:
             for shape in _shapes(link, f"{name}_block"):
                 _set_position(_only(shape, "pose"), body.centre_of_mass)
         parts = ("mass", "centre_of_mass", "inertia")
-        texts = [source_of(parameters, f"bodies.{name}.{part}") for part in parts if getattr(body, part) is not None]
+        given = [f"bodies.{name}.{part}" for part in parts if getattr(body, part) is not None]
+        texts = [text for key in given for text in _sources(parameters, key)]
         _comment(document, _only(link, "inertial"), "; ".join(dict.fromkeys(filter(None, texts))))
     return str(document.toxml()).replace('<?xml version="1.0" ?>', '<?xml version="1.0"?>\n') + "\n"
+
+
+def _sources(parameters: MachineParameters, key: str) -> list[str]:
+    """Where a group of numbers comes from: the sources of its own, or the nearest one above."""
+    return [text for known, text in parameters.sources.items() if known.startswith(f"{key}.")] or [source_of(parameters, key)]
 
 
 def _named(document: Document, tag: str, name: str) -> Any:
