@@ -96,10 +96,31 @@ class FreeQuantity(Frozen):
         return self
 
 
+class ExpectedPreload(Frozen):
+    """What is known of the springs' preloads, which are no numbers of the machine file but follow from the weight.
+
+    Attributes:
+        prior: Expected value and standard deviation, the same for each spring.
+        source: Why.
+    """
+
+    prior: _Pair
+    source: str
+
+    @model_validator(mode="after")
+    def _force(self) -> "ExpectedPreload":
+        if u.dimension(self.prior.unit) != u.dimension("N"):
+            raise ValueError(f"the prior is in {self.prior.unit or 'pure numbers'}, a preload in N")
+        if not self.prior.values[1] > 0.0:
+            raise ValueError("the standard deviation must be above 0")
+        return self
+
+
 class FreeFile(Frozen):
-    """All free quantities of a calibration, by name."""
+    """All free quantities of a calibration, by name, and what the springs should carry."""
 
     about: str = ""
+    spring_preload: ExpectedPreload | None = None
     quantities: dict[Name, FreeQuantity] = Field(min_length=1)
 
 

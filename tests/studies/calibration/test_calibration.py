@@ -15,7 +15,7 @@ from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_o
 from wm_drake.studies.calibration.outcome import amplitude_rows, quantity_table, solved_machine
 from wm_drake.studies.calibration.prediction import check_left_out, predict
 from wm_drake.studies.calibration.solutions import Solution, distinct
-from wm_drake.studies.calibration.targets import Targets, amplitudes_at, targets_of
+from wm_drake.studies.calibration.targets import Targets, amplitudes_at, preload_residuals, targets_of
 from wm_drake.studies.calibration.turning import turning_of
 
 FREE = """
@@ -47,6 +47,11 @@ TABLE = """
     prior: (20, 20) N
     sets: {gasket.stiffness_x.force: "(-1, 0, 1)"}
     source: test
+"""
+PRELOAD = """
+spring_preload:
+  prior: (100, 20) N
+  source: test
 """
 RUN_UP = SpinProfile(time=(0.0, 20.0), speed=(4.0, 28.0))
 
@@ -109,6 +114,7 @@ FAULTS = {
     "unknown unit": (FREE.replace("(10, 60) N", "(10, 60) Nn"), "unit 'Nn' is not known"),
     "unknown word": (FREE + "    colour: red\n", "unknown key 'colour'"),
     "nothing free": ("quantities: {}\n", "quantities"),
+    "preload that is no force": (PRELOAD.replace(") N", ") kg") + FREE, "the prior is in kg, a preload in N"),
 }
 
 
@@ -178,6 +184,28 @@ def test_point_that_is_no_machine_has_no_amplitudes_and_harms_no_other(short, tm
     assert np.isnan(values[:, 1]).all()
     assert np.array_equal(values[:, 0], values[:, 2])
     assert np.isfinite(values[:, 0]).all()
+
+
+def test_preloads_of_the_springs_are_held_against_what_is_expected(short, tmp_path):
+    turning = turning_of(short, free_file(tmp_path, PRELOAD + FREE))
+    points = np.array([[30.0, 0.02, 5.0], [30.0, 0.02, 500.0]])  # the second has a motor that no spring holds
+    springs = short.set_up(parameters=turning.parameters_at(points[0])).springs.values()
+    expected = [(spring.preload - 100.0) / 20.0 for spring in springs]
+    residuals = preload_residuals(short, turning, points)
+    assert residuals[0] == pytest.approx(expected)
+    assert np.isnan(residuals[1]).all()
+    assert preload_residuals(short, turning_of(short, free_file(tmp_path, FREE)), points).shape == (2, 0)
+
+
+def test_expected_preload_is_prior_not_data(short, tmp_path):
+    free = free_file(tmp_path, PRELOAD + FREE)
+    targets = Targets((("middle", True),), ("Xr",) * 6, np.full((1, 6), 0.01), np.ones((1, 6)))
+    with open_ledger(tmp_path / "ledger.sqlite", {"study": "test"}) as ledger:
+        (found,) = calibrate(short, free, targets, Plan(starts=1, iterations=1), ledger).ended
+    assert found.slopes.shape == (6, 3)
+    turning = turning_of(short, free)
+    rows = preload_residuals(short, turning, found.point[None])[0]
+    assert found.prior_cost == pytest.approx(0.5 * (np.sum(rows**2) + np.sum(found.coordinates**2)))
 
 
 def test_weights_go_by_load_by_sensor_and_by_both():

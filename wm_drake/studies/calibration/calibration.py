@@ -13,7 +13,7 @@ from wm_drake.parameters.elements import FloatArray
 from wm_drake.parameters.free import FreeFile
 from wm_drake.studies.calibration.search import METHODS, Problem
 from wm_drake.studies.calibration.solutions import Solution, distinct
-from wm_drake.studies.calibration.targets import Targets, amplitudes_at
+from wm_drake.studies.calibration.targets import Targets, amplitudes_at, preload_residuals
 from wm_drake.studies.calibration.turning import Turning, turning_of
 
 RELATIVE_DEVIATION = 0.05
@@ -146,7 +146,8 @@ def _search(
         computed = amplitudes(turning.expected + coordinates * turning.deviation)
         logarithms = np.log(computed / targets.amplitude) * scale
         hard, smooth = logarithms[..., targets.weight > 0.0]
-        return hard, smooth
+        preloads = preload_residuals(amplitudes.machine, turning, turning.expected + coordinates * turning.deviation)
+        return np.hstack([hard, preloads]), np.hstack([smooth, preloads])
 
     lower, upper = ((bound - turning.expected) / turning.deviation for bound in (turning.lower, turning.upper))
     first = (turning.start - turning.expected) / turning.deviation
@@ -154,9 +155,10 @@ def _search(
     iterations = plan.iterations or ITERATIONS[plan.method]
     found = METHODS[plan.method](problem, problem.start(number, plan.seed), iterations, plan.seed + number)
     point = turning.expected + found.point * turning.deviation
-    data = 0.5 * float(np.sum(residuals(found.point[None])[0] ** 2))
-    slopes = problem.jacobian(found.point)
-    prior = 0.5 * float(np.sum(found.point**2))
+    measured = np.count_nonzero(targets.weight)  # residuals behind these are of preloads: what is expected, not data
+    squares = residuals(found.point[None])[0][0] ** 2
+    data, prior = 0.5 * float(np.sum(squares[:measured])), 0.5 * float(np.sum(squares[measured:]) + np.sum(found.point**2))
+    slopes = problem.jacobian(found.point)[:measured]
     return Solution(number, point, found.point, amplitudes(point[None])[0, 0], data, prior, slopes, problem.evaluations)
 
 

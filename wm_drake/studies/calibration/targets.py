@@ -1,6 +1,6 @@
 """Measured amplitudes -> what a calibration aims at; points of a search -> amplitudes."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,7 +8,7 @@ import pandas as pd
 
 from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
-from wm_drake.machine import Machine
+from wm_drake.machine import Machine, Setup
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.parameters.units import Unit
@@ -132,14 +132,29 @@ def amplitudes_at(
     return result
 
 
+def preload_residuals(machine: Machine, turning: Turning, points: FloatArray) -> FloatArray:
+    """(preload - expected) / deviation at points (point, spring); no springs if nothing is expected, NaN without a machine."""
+    if turning.preload is None:
+        return np.empty((len(points), 0))
+    expected, deviation = turning.preload
+    result = np.full((len(points), len(machine.springs)), np.nan)
+    for index, setup in _set_up(machine, turning, points):
+        result[index] = [(spring.preload - expected) / deviation for spring in setup.springs.values()]
+    return result
+
+
 def _machines(machine: Machine, turning: Turning, points: FloatArray) -> dict[int, MachineParameters]:
     """The machines at points, by number of the point; without those that cannot be or cannot stand."""
-    made, context = {}, None
+    return {index: setup.parameters for index, setup in _set_up(machine, turning, points)}
+
+
+def _set_up(machine: Machine, turning: Turning, points: FloatArray) -> Iterator[tuple[int, Setup]]:
+    """Set-ups at points, one after the other in the same Context; without those that cannot be or cannot stand."""
+    context = None
     for index, point in enumerate(points):
         try:
-            parameters = turning.parameters_at(point)
-            context = machine.set_up(parameters=parameters, context=context).context
+            setup = machine.set_up(parameters=turning.parameters_at(point), context=context)
         except InputError:
             continue
-        made[index] = parameters
-    return made
+        context = setup.context
+        yield index, setup

@@ -48,6 +48,7 @@ class Turning:
         expected, deviation: Prior.
         start: Where searches begin.
         values: What they set.
+        preload: Expected preload of each spring and its standard deviation; None if nothing is expected. [N]
     """
 
     base: MachineParameters
@@ -59,6 +60,7 @@ class Turning:
     deviation: FloatArray
     start: FloatArray
     values: tuple[Value, ...]
+    preload: tuple[float, float] | None
     _tree: dict[str, Any]
 
     def parameters_at(self, point: FloatArray) -> MachineParameters:
@@ -102,7 +104,10 @@ def turning_of(machine: Machine, free: FreeFile) -> Turning:
     lower, upper, expected, deviation = pairs.T
     start = np.array([(q.start or q.prior).values[0] for q in entries])
     tree = base.model_dump(exclude_unset=True)
-    return Turning(base, names, units, lower, upper, expected, deviation, start, tuple(values), tree)
+    preload = None
+    if free.spring_preload is not None:
+        preload = (free.spring_preload.prior.values[0], free.spring_preload.prior.values[1])
+    return Turning(base, names, units, lower, upper, expected, deviation, start, tuple(values), preload, tree)
 
 
 def _value(key: str, known: Mapping[str, tuple[Any, Unit]], free: Mapping[str, FreeQuantity]) -> Value:
