@@ -135,21 +135,23 @@ def _balance(plant: MultibodyPlant, context: Context, coordinates: Coordinates, 
             finest = np.finfo(float).eps * float(np.max(np.abs(slopes)))  # of places of a metre
         q += ways.T @ -(stiffness @ remains)
         remains = forces(q)
-    _check_held(q, remains[np.isin(chosen, coordinates.hanging)], coordinates)
+    _check_held(q, remains[np.isin(chosen, coordinates.hanging)], max(TUBES_TOLERANCE, finest), coordinates)
     return finest
 
 
-def _check_held(q: FloatArray, remains: FloatArray, coordinates: Coordinates) -> None:
+def _check_held(q: FloatArray, remains: FloatArray, tolerance: float, coordinates: Coordinates) -> None:
     """Refuses what does not come to rest where it hangs."""
+    held = np.max(np.abs(remains)) <= tolerance
     if coordinates.carrier.size:
         sag = np.abs(q[coordinates.carrier] - q[coordinates.tub])
-        if not (np.max(sag[3:]) <= _FARTHEST_REST_POSITION and np.max(sag[:3]) <= _FARTHEST_REST_ANGLE):
+        near = np.max(sag[3:]) <= _FARTHEST_REST_POSITION and np.max(sag[:3]) <= _FARTHEST_REST_ANGLE
+        if not near or not (held or coordinates.tubes.size):
             raise input_error(
                 "cannot hold the drum: at rest it would sag by more than "
                 f"{1e3 * _FARTHEST_REST_POSITION:g} mm or tilt by more than {np.rad2deg(_FARTHEST_REST_ANGLE):g} deg",
                 key="imperfections.bearing",
             )
-    if not np.max(np.abs(remains)) <= TUBES_TOLERANCE:
+    if not held:
         raise input_error(
             "their bushings cannot hold the tubes near where they are drawn: nothing resists a turn about the damper's "
             "axis, say, of a tube whose centre of mass is beside it",
