@@ -14,11 +14,11 @@ from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.studies.spin_cycle import labels_of
 from wm_drake.studies.spin_identification import (
     SpinModel,
+    at_point,
     identify_from_spin,
     planted_values,
     sought_of,
     virtual_experiment,
-    with_values,
 )
 
 PROFILE = SpinProfile(
@@ -95,7 +95,7 @@ def test_noise_widens_intervals_until_a_number_is_not_identified(reference):
 
 def test_numbers_that_are_one_unknown_change_together(reference):
     sought = (sought_of(reference, ("gasket.stiffness_x", "gasket.stiffness_z")),)
-    changed = with_values(reference, sought, np.array([5e3]))
+    changed = at_point(reference, sought, np.array([5e3]))
     assert (changed.gasket.stiffness_x, changed.gasket.stiffness_z) == (5e3, 5e3)
     assert changed == with_value(with_value(reference, "gasket.stiffness_x", 5e3), "gasket.stiffness_z", 5e3)
 

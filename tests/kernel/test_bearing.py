@@ -26,7 +26,7 @@ OTHER_NUMBERS = {"radial_stiffness": 3e5, "torsional_stiffness": 7e3, "torsional
 def machines():
     crooked = MachineParameters.model_validate(
         load_machine("reference").model_dump()
-        | {"bodies": {"drum": {"mass": 14.0, "centre_of_mass": (0.03, 0.05, -0.02)}, "motor": {"mass": 3.0}}}
+        | {"bodies": {"drum": {"mass": 11.0, "centre_of_mass": (0.03, 0.05, -0.02)}, "motor": {"mass": 3.0}}}
     )
     found = {name: load_machine(name) for name in ("reference", "free_stroke")}
     found |= {"crooked": crooked, "springs only": machines_of_each_kind()["springs only"]}
