@@ -38,7 +38,8 @@ class Trajectory:
     Attributes:
         time: (n,) [s]
         state: (n, 14) positions and velocities of the plant: roll, pitch, yaw, x, y, z of T in W, drum angle; angular
-            velocity and velocity of To in W, drum rate. [rad, m, rad/s, m/s]
+            velocity and velocity of To in W, drum rate. The drum's are against the tub; if its bearing gives, against what
+            carries it there. [rad, m, rad/s, m/s]
         deformation: (n, number of dampers) deformation of each damper's sponge, those of telescopic ones last; 0 where it
             has none. [m]
         motor_torque: (n,) torque of the motor on the drum, its reaction on the tub. [N m]
