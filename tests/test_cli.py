@@ -61,7 +61,7 @@ FAULTY_MACHINES = {
     "times that fall": (in_machine("profile: {time: '(0, 2, 1) s', speed: '(0, 1, 2) rpm'}"), "times must rise"),
     "missing measured table": (in_machine("measured: [nosuch.csv]"), "measured: cannot be read as CSV"),
     "spring that would push": (
-        in_machine("frames: {spring_left_housing: {position: '(-600, -100, 350) mm'}}"),
+        in_machine("frames: {spring_left_housing: {position: '(-250, 0, -600) mm'}}"),
         "springs.left: would be pushed, not pulled",
     ),
 }
