@@ -186,6 +186,7 @@ def test_a_bad_case_is_named_and_what_had_ended_is_not_lost(machine, reference, 
     assert len(ended) >= WIDTH
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_number_of_runs(reference, machine):
     profile = SpinProfile(time=(0.0, 0.1), speed=(0.0, 1.0))
 

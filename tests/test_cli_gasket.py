@@ -71,6 +71,7 @@ def test_finished_study_is_not_run_again(study, monkeypatch):
     assert tables() == before
 
 
+@pytest.mark.slow
 def test_own_design_gives_the_same_as_the_made_one(study, wm_drake):
     study()
     before = tables()
@@ -80,6 +81,7 @@ def test_own_design_gives_the_same_as_the_made_one(study, wm_drake):
     assert tables("other") == before
 
 
+@pytest.mark.slow
 def test_factor_file_and_one_worker_give_the_same(study, wm_drake):
     study()
     Path("factors.yaml").write_text(

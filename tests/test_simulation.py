@@ -85,7 +85,7 @@ def test_energy_balances_over_a_fast_run_up(machine, reference):
 
 @pytest.mark.slow
 def test_energy_balances_over_the_run_up_of_70_s(machine, reference):
-    assert check_energy(machine, case_of(reference, "middle"), 3.125e-4) < 1e-5
+    assert check_energy(machine, case_of(reference, "middle"), 2.5e-4) < 1e-5
 
 
 def peaks(record):
@@ -103,7 +103,9 @@ def test_peaks_of_a_fast_run_up_hold_at_a_fifth_of_the_step(machine, reference, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("load", ["middle", "counter", "back", "front"])
+@pytest.mark.parametrize(
+    ("engine", "load"), [*(("compiled", load) for load in ("middle", "counter", "back", "front")), ("drake", "middle")]
+)
 def test_peaks_of_the_run_up_hold_at_a_tenth_of_the_step(machine, reference, engine, load):
     case = case_of(reference, load)
     np.testing.assert_allclose(
