@@ -1,5 +1,7 @@
 """The core of identification on functions of known answer."""
 
+import json
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,7 +12,7 @@ from wm_drake.errors import InputError
 from wm_drake.parameters.units import Unit
 from wm_drake.studies.identification import METHODS, Measurement, Problem, Unknown, identify, point_by_point
 from wm_drake.studies.identification.fit import correlation_time
-from wm_drake.studies.identification.methods import QuadraticSurface, surface_design
+from wm_drake.studies.identification.methods import QuadraticSurface, response_surface, surface_design
 
 TIME = np.linspace(0.0, 2.0, 200)
 TRUTH = np.array([2.0, 1.5, 0.7])
@@ -58,6 +60,15 @@ def test_intervals_hold_the_truth_in_95_of_100_noisy_repeats(method):
         inside += [e.lower <= truth <= e.upper for e, truth in zip(fit.estimates, TRUTH, strict=True)]
     assert inside.min() >= 90
     assert inside.max() <= 99  # they are not simply wide
+
+
+def test_a_search_that_had_not_come_to_an_end_claims_no_interval():
+    fit = response_surface(planted(0.05), rounds=2)
+    assert all(np.isnan([estimate.lower, estimate.upper]).all() for estimate in fit.estimates)
+    assert np.isnan(fit.covariance).all()
+    assert "had not come to an end" in fit.notes[-1]
+    assert all(unknown["interval_95"] is None for unknown in fit.as_dict()["unknowns"].values())
+    json.dumps(fit.as_dict(), allow_nan=False)
 
 
 def test_covariance_is_that_of_scipys_curve_fit():

@@ -1,7 +1,7 @@
 """What an identification found, and how well the data determine it."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -108,6 +108,11 @@ class Fit:
     evaluations: int
     history: tuple[float, ...]
     notes: tuple[str, ...]
+
+    def without_intervals(self, reason: str) -> "Fit":
+        """The same, claiming no interval of any unknown."""
+        bare = tuple(replace(estimate, lower=np.nan, upper=np.nan) for estimate in self.estimates)
+        return replace(self, estimates=bare, covariance=np.full_like(self.covariance, np.nan), notes=(*self.notes, reason))
 
     @property
     def values(self) -> FloatArray:

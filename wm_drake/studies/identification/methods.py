@@ -22,6 +22,9 @@ STEP = 1e-5
 SAME_END = 1e-3
 """Searches whose RMSE differ by less than this part came to the same end."""
 
+ENDED = 1e-4
+"""A search by response surfaces has come to an end if its last region is at most this part of the ranges to either side."""
+
 AGREEING = 2
 """Searches from different starts that came to the same least end: no more are made."""
 
@@ -229,7 +232,10 @@ def response_surface(
         progress(done / rounds, count.least)
     progress(1.0, count.least)
     note = f"{done} rounds, last region {2.0 * half.max():.2g} of the ranges"
-    return count.fit(centre, "response-surface", seed, (note,))
+    fit = count.fit(centre, "response-surface", seed, (note,))
+    if half.max() > ENDED:
+        return fit.without_intervals("the search had not come to an end: no optimum, and no intervals are claimed")
+    return fit
 
 
 def _resize(centre: FloatArray, half: FloatArray, target: FloatArray, better: bool) -> float:
