@@ -11,8 +11,8 @@ from scipy.optimize import curve_fit
 from wm_drake.errors import InputError
 from wm_drake.parameters.units import Unit
 from wm_drake.studies.identification import METHODS, Measurement, Problem, Unknown, identify, point_by_point
-from wm_drake.studies.identification.fit import correlation_time
-from wm_drake.studies.identification.methods import QuadraticSurface, response_surface, surface_design
+from wm_drake.studies.identification.assessment import correlation_time
+from wm_drake.studies.identification.surfaces import QuadraticSurface, Region, response_surface, surface_design
 
 TIME = np.linspace(0.0, 2.0, 200)
 TRUTH = np.array([2.0, 1.5, 0.7])
@@ -60,6 +60,62 @@ def test_intervals_hold_the_truth_in_95_of_100_noisy_repeats(method):
         inside += [e.lower <= truth <= e.upper for e, truth in zip(fit.estimates, TRUTH, strict=True)]
     assert inside.min() >= 90
     assert inside.max() <= 99  # they are not simply wide
+
+
+def straight_valley(p):
+    """Seen through p combinations of the numbers, of which one moves what is measured a hundred times less than the others."""
+    axes = np.linalg.qr(np.random.default_rng(0).normal(size=(p, p)))[0]
+    strength = np.where(np.arange(p) == 0, 0.01, 1.0)
+    unknowns = tuple(Unknown(f"x{k}", 0.0, 2.0, start=1.8) for k in range(p))
+    measured = (Measurement("zero", np.zeros(p)),)
+    return Problem(unknowns, measured, lambda x: np.sinh((1.5 * (x - 1.0)) @ axes * strength))
+
+
+def bent_valley(p):
+    """Rosenbrock's, whose floor is ten times flatter than its sides; least at 1."""
+    unknowns = tuple(Unknown(f"x{k}", -2.0, 2.0, start=(-1.2, 1.0)[k % 2]) for k in range(p))
+    measured = (Measurement("zero", np.zeros(2 * (p - 1))),)
+    model = lambda x: np.concatenate([10.0 * (x[:, 1:] - x[:, :-1] ** 2), 1.0 - x[:, :-1]], axis=1)  # noqa: E731
+    return Problem(unknowns, measured, model)
+
+
+@pytest.mark.parametrize("problem", [straight_valley(9), bent_valley(2), bent_valley(4)])
+def test_response_surfaces_come_to_the_end_of_narrow_valleys(problem):
+    fit = response_surface(problem)
+    assert fit.values == pytest.approx(np.ones(len(problem.unknowns)), abs=1e-4)
+    assert "had not come to an end" not in fit.notes[-1]
+
+
+def test_points_of_a_region_keep_to_the_ranges_and_fill_it():
+    rng = np.random.default_rng(4)
+    for p in (1, 2, 5):
+        design = surface_design(p)
+        for _ in range(50):
+            axes = np.linalg.qr(rng.normal(size=(p, p)))[0] * rng.uniform(0.01, 0.5, p)
+            region = Region(rng.uniform(0.0, 1.0, p).round(), 0.0, axes)  # its centre is a corner of the ranges
+            points = region.designed(design)
+            assert points.min() >= 0.0
+            assert points.max() <= 1.0
+            assert region.points(region.places(points)) == pytest.approx(points, abs=1e-12)
+            gradient = rng.normal(size=p)
+            least = QuadraticSurface(region.places(points), region.places(points) @ gradient, 0.0).least_place(region)
+            inside = region.centre + least @ region.axes.T
+            assert inside == pytest.approx(np.clip(inside, 0.0, 1.0), abs=1e-6)
+            assert np.abs(least).max() <= 1.0
+
+
+def tone(phase=0.7):
+    """A frequency among many local minima."""
+    model = lambda x: x[:, :1] * np.sin(x[:, 1:2] * TIME + x[:, 2:3])  # noqa: E731
+    unknowns = (Unknown("amplitude", 0.0, 5.0), Unknown("frequency", 1.0, 60.0), Unknown("phase", 0.0, 3.0))
+    return Problem(unknowns, (Measurement("tone", model(np.array([[2.0, 23.0, phase]]))[0]),), model)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_evolution_finds_a_frequency_among_many_minima(seed):
+    fit = identify(tone(), "evolution", seed=seed)
+    assert fit.values == pytest.approx([2.0, 23.0, 0.7], rel=1e-4)
+    assert "2 came to the same least RMSE" in fit.notes[0]
 
 
 def test_a_search_that_had_not_come_to_an_end_claims_no_interval():
@@ -182,7 +238,7 @@ def test_a_quadratic_is_its_own_surface(p):
     assert len(design) >= p + p * (p + 1) // 2
     surface = QuadraticSurface(design, value(design), float(value(np.zeros((1, p)))[0]))
     assert surface.hessian == pytest.approx(hessian, abs=1e-9)
-    assert surface.least_point(-np.ones(p), np.ones(p)) == pytest.approx(least, abs=1e-4)
+    assert surface.least_place(Region(np.full(p, 0.5), 0.0, 0.1 * np.eye(p))) == pytest.approx(least, abs=1e-4)
 
 
 @pytest.mark.parametrize(

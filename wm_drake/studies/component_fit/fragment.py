@@ -11,7 +11,8 @@ from ruamel.yaml import YAML
 from wm_drake.errors import input_error
 from wm_drake.parameters import Component, quantities, shipped_machines
 from wm_drake.parameters.units import Unit
-from wm_drake.studies.component_fit.models import DAMPER_LAWS, FORCE, TORQUE, ComponentModel
+from wm_drake.studies.component_fit.models import DAMPER_LAWS, ComponentModel
+from wm_drake.studies.component_fit.scales import FORCE, TORQUE
 from wm_drake.studies.identification import Fit
 
 _LENGTH, _ANGLE = Unit("m", "mm"), Unit("rad", "deg")

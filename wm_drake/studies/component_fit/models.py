@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from wm_drake.errors import input_error, nearest_names
@@ -17,12 +16,19 @@ from wm_drake.parameters.elements import BushingType, FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.rigs import Bench, bushing_bench, damper_bench
 from wm_drake.rigs.measured import MeasuredMotion
+from wm_drake.studies.component_fit.scales import (
+    ABOUT,
+    ALONG,
+    FORCE,
+    SPEED,
+    TORQUE,
+    check_names,
+    scale_of,
+    unknowns_of,
+    with_bounds,
+)
+from wm_drake.studies.component_fit.tables import OddTable, TwoSidedTable
 from wm_drake.studies.identification import Unknown
-
-FORCE, TORQUE = Unit("N", "N"), Unit("N*m", "N*mm")
-STIFFNESS, DAMPING, SPEED = Unit("N/m", "N/mm"), Unit("N*s/m", "N*s/mm"), Unit("m/s", "mm/s")
-ROTATIONAL_STIFFNESS, ROTATIONAL_DAMPING = Unit("N*m/rad", "N*mm/rad"), Unit("N*m*s/rad", "N*mm*s/rad")
-RATE = Unit("rad/s", "rad/s")
 
 KNOTS = 5
 """Of a table on each side of zero."""
@@ -57,11 +63,9 @@ its value (of MSTV the growth of friction and the regularisation), unless the us
 OPTIONAL = {"mstv": {"friction_damping": "damping"}}
 """What may be unknown if the user asks."""
 
-BUSHING_LAWS = ("voigt", "table", "voigt_havsin")
-"""Stiffness and damping; monotone table and damping; for rotations, stiffness, damping and HAVSIN friction."""
-
-DASHPOT = 1e-4
-"""Lowest damping that is searched, in the highest: from there on it does nothing that can be measured."""
+BUSHING_LAWS = {"voigt": slice(0, 2), "table": slice(1, 2), "voigt_havsin": slice(0, 4)}
+"""Stiffness and damping; monotone table and damping; for rotations, stiffness, damping and HAVSIN friction. Which of
+`_bushing_kinds` are numbers to be found."""
 
 
 @dataclass(frozen=True)
@@ -79,27 +83,6 @@ class ComponentModel:
     unknowns: tuple[Unknown, ...]
     fields: Callable[[FloatArray], dict[str, Any]]
     bench: Callable[[FloatArray], Bench]
-
-
-@dataclass(frozen=True)
-class _Scale:
-    """Orders of magnitude of measured loops: largest force, steepest loop, speeds, strokes."""
-
-    force: float
-    stiffness: float
-    damping: float
-    slowest: float
-    fastest: float
-    stroke: float
-
-    def bounds(self, kind: str) -> tuple[float, float, bool]:
-        """Lower and upper default bound of a kind of number, and whether its order of magnitude is unknown."""
-        return {
-            "force": (0.0, 1.5 * self.force, False),
-            "stiffness": (0.1 * self.stiffness, 10.0 * self.stiffness, True),
-            "damping": (DASHPOT * self.damping, self.damping, True),
-            "speed": (1e-3 * self.fastest, 2.0 * self.fastest, True),
-        }[kind]
 
 
 def damper_model(
@@ -123,22 +106,15 @@ def damper_model(
     """
     if law not in DAMPER_LAWS:
         raise input_error(f"no law '{law}' of a damper{nearest_names(law, DAMPER_LAWS)}", where="--law")
-    kinds, scale = DAMPER_LAWS[law] | OPTIONAL.get(law, {}), _scale(motions)
+    kinds, scale = DAMPER_LAWS[law] | OPTIONAL.get(law, {}), scale_of(motions)
     kept = ["regularisation_velocity"] if law in ("mstv", "free_stroke") else []
-    units = {"force": FORCE, "stiffness": STIFFNESS, "damping": DAMPING, "speed": SPEED}
-    searched = [name for name in kinds if name in DAMPER_LAWS[law] or name in (bounds or {})]
-    unknowns = _unknowns({name: kinds[name] for name in searched}, units, scale, bounds, fixed)
-    constants = dict(fixed or {})
-    table = _OddTable("sponge", scale, knots) if law == "free_stroke" else None
-    steps = _bounded(table.unknowns, bounds) if table else ()
-    _check_names([*kinds, *kept, *(u.name for u in steps)], bounds, fixed)
-
-    def fields(point: FloatArray) -> dict[str, Any]:
-        named = {u.name: float(value) for u, value in zip(unknowns, point, strict=False)}
-        curve = {"sponge": table.curve(point[len(unknowns) :])} if table else {}
-        return {"law": law, **constants, **named, **curve}
-
-    return ComponentModel(law, (*unknowns, *steps), fields, lambda point: damper_bench(_damper(fields(point))))
+    table = OddTable("sponge", scale, knots) if law == "free_stroke" else None
+    check_names([*kinds, *kept, *_rises(table)], bounds, fixed)
+    searched = {name: kind for name, kind in kinds.items() if name in DAMPER_LAWS[law] or name in (bounds or {})}
+    numbers = unknowns_of(searched, ALONG, scale, bounds, fixed)
+    fields = _Fields({"law": law, **(fixed or {})}, numbers, table)
+    unknowns = (*numbers, *with_bounds(table.unknowns if table else (), bounds))
+    return ComponentModel(law, unknowns, fields, lambda point: damper_bench(_damper(fields(point))))
 
 
 def _damper(fields: dict[str, Any]) -> DamperType:
@@ -178,128 +154,59 @@ def bushing_model(
     about = axis.startswith("about")
     if law == "voigt_havsin" and not about:
         raise input_error("voigt_havsin is a law about an axis; along one, take voigt or table", where="--law")
-    prefix, letter = ("rotational_" if about else ""), axis[-1]
-    scale = _scale(motions, arm)
-    stiffness, damping = f"{prefix}stiffness_{letter}", f"{prefix}damping_{letter}"
-    kinds = {} if law == "table" else {stiffness: "stiffness"}
-    kinds[damping] = "damping"
-    if law == "voigt_havsin":
-        kinds |= {f"friction_torque_{letter}": "force", f"full_friction_rate_{letter}": "speed"}
-    units = {
-        "force": TORQUE if about else FORCE,
-        "stiffness": ROTATIONAL_STIFFNESS if about else STIFFNESS,
-        "damping": ROTATIONAL_DAMPING if about else DAMPING,
-        "speed": RATE if about else SPEED,
-    }
-    unknowns = _unknowns(kinds, units, scale, bounds, fixed)
-    table = _TwoSidedTable(stiffness, scale, knots, about) if law == "table" else None
-    steps = _bounded(table.unknowns, bounds) if table else ()
-    _check_names([*kinds, *(u.name for u in steps)], bounds, fixed)
-    constants = dict(fixed or {})
-
-    def fields(point: FloatArray) -> dict[str, Any]:
-        named = {u.name: float(value) for u, value in zip(unknowns, point, strict=False)}
-        curve = {stiffness: table.curve(point[len(unknowns) :])} if table else {}
-        return {**constants, **named, **curve}
+    scale, kinds = scale_of(motions, arm), _bushing_kinds(axis)
+    stiffness = next(iter(kinds))
+    table = TwoSidedTable(stiffness, scale, knots, about) if law == "table" else None
+    searched = {name: kinds[name] for name in list(kinds)[BUSHING_LAWS[law]]}
+    check_names([*searched, *_rises(table)], bounds, fixed)
+    numbers = unknowns_of(searched, ABOUT if about else ALONG, scale, bounds, fixed)
+    fields = _Fields(fixed or {}, numbers, table)
 
     def bench(point: FloatArray) -> Bench:
-        found = fields(point)
         kind = TorqueTable if about else ForceTable
-        values = {name: kind(**value) if isinstance(value, dict) else value for name, value in found.items()}
+        values = {name: kind(**value) if isinstance(value, dict) else value for name, value in fields(point).items()}
         return bushing_bench(base.model_copy(update=values), axis, arm)
 
-    return ComponentModel(law, (*unknowns, *steps), fields, bench)
+    return ComponentModel(law, (*numbers, *with_bounds(table.unknowns if table else (), bounds)), fields, bench)
 
 
-class _OddTable:
-    """A curve through zero, the same to either side: its rises from knot to knot are the unknowns, so it never falls."""
-
-    def __init__(self, name: str, scale: _Scale, knots: int) -> None:
-        self.displacement = scale.stroke * np.arange(1, knots + 1) / knots
-        self.unknowns = tuple(Unknown(f"{name}.rise_{k + 1}", 0.0, scale.force, FORCE) for k in range(knots))
-
-    def curve(self, rises: FloatArray) -> dict[str, tuple[float, ...]]:
-        force = np.cumsum(rises)
-        return {
-            "displacement": (*(-self.displacement[::-1]), 0.0, *self.displacement),
-            "force": (*(-force[::-1]), 0.0, *force),
-        }
+def _bushing_kinds(axis: str) -> dict[str, str]:
+    """Fields of a bushing along or about an axis, and of what kind: stiffness, damping, and those of its friction."""
+    prefix, letter = ("rotational_" if axis.startswith("about") else ""), axis[-1]
+    return {
+        f"{prefix}stiffness_{letter}": "stiffness",
+        f"{prefix}damping_{letter}": "damping",
+        f"friction_torque_{letter}": "force",
+        f"full_friction_rate_{letter}": "speed",
+    }
 
 
-class _TwoSidedTable:
-    """A curve through zero with its own rises on each side."""
+@dataclass(frozen=True)
+class _Fields:
+    """Fields of a component at a point (p,): those that are known, its unknown numbers, then the rises of its table."""
 
-    def __init__(self, name: str, scale: _Scale, knots: int, about: bool) -> None:
-        self.position = scale.stroke * np.arange(1, knots + 1) / knots
-        self._names = ("angle", "torque") if about else ("displacement", "force")
-        unit = TORQUE if about else FORCE
-        self.unknowns = tuple(
-            Unknown(f"{name}.rise_{side}{k + 1}", 0.0, scale.force, unit) for side in ("plus_", "minus_") for k in range(knots)
-        )
+    known: Mapping[str, Any]
+    numbers: tuple[Unknown, ...]
+    table: OddTable | TwoSidedTable | None
 
-    def curve(self, rises: FloatArray) -> dict[str, tuple[float, ...]]:
-        plus, minus = (np.cumsum(part) for part in np.split(rises, 2))
-        ends = ((*(-self.position[::-1]), 0.0, *self.position), (*(-minus[::-1]), 0.0, *plus))
-        return dict(zip(self._names, ends, strict=True))
+    def __call__(self, point: FloatArray) -> dict[str, Any]:
+        named = {u.name: float(value) for u, value in zip(self.numbers, point, strict=False)}
+        curve = {self.table.name: self.table.curve(point[len(self.numbers) :])} if self.table else {}
+        return {**self.known, **named, **curve}
 
 
-def _scale(motions: Sequence[MeasuredMotion], arm: float = 0.0) -> _Scale:
-    force, stiffness, damping, speeds, strokes = [], [], [], [], []
-    for measured in motions:
-        size = 0.5 * float(np.ptp(measured.loop.force)) * (arm or 1.0)
-        stroke = float(np.arcsin(measured.motion.amplitude / arm)) if arm else measured.motion.amplitude
-        speed = stroke * measured.motion.angular_frequency
-        force.append(size)
-        stiffness.append(size / stroke)
-        damping.append(size / speed)
-        speeds.append(speed)
-        strokes.append(stroke)
-    return _Scale(max(force), max(stiffness), max(damping), min(speeds), max(speeds), max(strokes))
-
-
-def _unknowns(
-    kinds: Mapping[str, str],
-    units: Mapping[str, Unit],
-    scale: _Scale,
-    bounds: Mapping[str, tuple[float, float]] | None,
-    fixed: Mapping[str, float] | None,
-) -> tuple[Unknown, ...]:
-    found = []
-    for name, kind in kinds.items():
-        if name in (fixed or {}):
-            continue
-        lower, upper, logarithmic = scale.bounds(kind)
-        if name in (bounds or {}):
-            lower, upper = (bounds or {})[name]
-            logarithmic = lower > 0.0 and upper > 30.0 * lower
-        found.append(Unknown(name, lower, upper, units[kind], logarithmic=logarithmic))
-    return tuple(found)
-
-
-def _bounded(unknowns: tuple[Unknown, ...], bounds: Mapping[str, tuple[float, float]] | None) -> tuple[Unknown, ...]:
-    given = bounds or {}
-    return tuple(Unknown(u.name, *given.get(u.name, (u.lower, u.upper)), u.unit) for u in unknowns)
-
-
-def _check_names(known: list[str], bounds: Mapping[str, tuple[float, float]] | None, fixed: Mapping[str, float] | None) -> None:
-    for option, given in (("--bounds", bounds), ("--fix", fixed)):
-        for name in given or {}:
-            if name not in known:
-                raise input_error(f"unknown number '{name}'{nearest_names(name, known)}", where=option)
-    for name in fixed or {}:
-        if name in (bounds or {}):
-            raise input_error(f"'{name}' has bounds and is fixed", where="--fix")
+def _rises(table: OddTable | TwoSidedTable | None) -> list[str]:
+    return [unknown.name for unknown in table.unknowns] if table else []
 
 
 def units_of_fields() -> dict[str, Unit]:
     """Unit of every number of a component that can be unknown or fixed."""
-    kinds = {"force": FORCE, "stiffness": STIFFNESS, "damping": DAMPING, "speed": SPEED}
-    found = {name: kinds[kind] for law in (*DAMPER_LAWS.values(), *OPTIONAL.values()) for name, kind in law.items()}
+    found = {name: ALONG[kind] for law in (*DAMPER_LAWS.values(), *OPTIONAL.values()) for name, kind in law.items()}
     found["regularisation_velocity"] = SPEED
     for letter in "xyz":
-        found |= {f"stiffness_{letter}": STIFFNESS, f"damping_{letter}": DAMPING}
-        found |= {f"rotational_stiffness_{letter}": ROTATIONAL_STIFFNESS, f"rotational_damping_{letter}": ROTATIONAL_DAMPING}
-        found |= {f"friction_torque_{letter}": TORQUE, f"full_friction_rate_{letter}": RATE}
+        along, about = _bushing_kinds(letter), _bushing_kinds(f"about_{letter}")
+        found |= {name: ALONG[kind] for name, kind in list(along.items())[:2]}
+        found |= {name: ABOUT[kind] for name, kind in about.items()}
     return found
 
 
