@@ -50,7 +50,7 @@ def calibration(machine, tmp_path_factory):
 def page(machine, calibration):
     short = SpinProfile(time=(0.0, 3.0), speed=(5.0, 20.0))
     cases = [Case(name, machine.parameters.loads[name], short, gasket) for name, gasket in LOADS]
-    predictions = [Prediction(("back",), np.full((1, 6), 0.02), np.full((1, 6), -0.31))]
+    predictions = [Prediction(("back",), np.full((1, 6), 0.02), np.full((1, 6), -0.31), np.full((1, 6), 0.04))]
     modes = [("without gasket", natural_modes(machine, gasket=False))]
     best = run_spin(machine.parameters, cases)
     return calibration_report(calibration, predictions, best, modes, "wm-drake calibrate --free 'a<b'")

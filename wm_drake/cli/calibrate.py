@@ -135,7 +135,7 @@ def _run(
     with open_ledger(out / "ledger.sqlite", identity_of(built, free_file, targets, plan), resume=resume) as ledger:
         with _progress(plan.starts) as report:
             calibration = calibrate(built, free_file, targets, plan, ledger, workers=workers, report=report)
-        with _progress(len(left_out) * len(calibration.solutions)) as report:
+        with _progress(len(left_out) * plan.starts) as report:
             predictions = predict(built, free_file, calibration, left_out, ledger, workers=workers, report=report)
         ledger.mark_finished()
     return calibration, predictions
@@ -200,9 +200,10 @@ def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Pat
     typer.echo(f"{len(calibration.ended)} searches, {len(calibration.solutions)} distinct good solutions")
     typer.echo(f"best: amplitudes differ by {100 * mean:.1f} % in the mean, {100 * largest:.1f} % at most")
     for prediction in predictions:
-        pairs = [mean_and_largest(errors) for errors in (prediction.calibrated, prediction.predicted)]
-        seen, unseen = (f"{100 * mean:.1f} % in the mean, {100 * largest:.1f} % at most" for mean, largest in pairs)
-        typer.echo(f"{', '.join(prediction.loads)}: {seen} when calibrated with; {unseen} when predicted")
+        pairs = [mean_and_largest(errors) for errors in (prediction.calibrated, prediction.predicted, prediction.seen)]
+        known, blind, others = (f"{100 * mean:.1f} % in the mean, {100 * largest:.1f} % at most" for mean, largest in pairs)
+        loads = ", ".join(prediction.loads)
+        typer.echo(f"{loads}: {known} when calibrated with; {blind} when predicted from the others ({others})")
     typer.echo(f"Results in {out}: report.html, machine_<n>.yaml, quantities.csv, amplitudes.csv")
 
 
@@ -221,6 +222,7 @@ def _as_json(calibration: "Calibration", predictions: "list[Prediction]") -> dic
         ],
         "quantities": json.loads(quantity_table(calibration).to_json(orient="records")),
         "predictions": [
-            {"loads": list(p.loads), "calibrated": errors(p.calibrated), "predicted": errors(p.predicted)} for p in predictions
+            {"loads": list(p.loads)} | {kind: errors(getattr(p, kind)) for kind in ("calibrated", "predicted", "seen")}
+            for p in predictions
         ],
     }

@@ -123,6 +123,11 @@ class FreeFile(Frozen):
     spring_preload: ExpectedPreload | None = None
     quantities: dict[Name, FreeQuantity] = Field(min_length=1)
 
+    def without_starts(self) -> "FreeFile":
+        """The same, with searches that begin at the expected values."""
+        quantities = {name: quantity.model_copy(update={"start": None}) for name, quantity in self.quantities.items()}
+        return self.model_copy(update={"quantities": quantities})
+
 
 def load_free(path: Path) -> FreeFile:
     """Reads a free file.

@@ -149,10 +149,16 @@ def predictions_table(predictions: Sequence[Prediction]) -> Table:
     """Errors of loads when they were part of the calibration and when they were not."""
     groups = []
     for prediction in predictions:
-        cells = [number(100 * v) for errors in (prediction.calibrated, prediction.predicted) for v in mean_and_largest(errors)]
+        kinds = (prediction.calibrated, prediction.predicted, prediction.seen)
+        cells = [number(100 * v) for errors in kinds for v in mean_and_largest(errors)]
         groups.append(line(", ".join(prediction.loads), cells))
-    header = ("loads left out", "calibrated: mean, %", "largest, %", "predicted: mean, %", "largest, %")
-    return Table("Absolute differences from the experiment of the loads that were left out.", header, tuple(groups))
+    errors = ("mean, %", "largest, %")
+    header = ("loads left out", *(f"{kind}: {error}" for kind in ("calibrated", "predicted", "others") for error in errors))
+    caption = (
+        "Absolute differences from the experiment: of the loads left out in the calibration above and where they were "
+        "predicted, and of the others there."
+    )
+    return Table(caption, header, tuple(groups))
 
 
 def quantities_of(calibration: Calibration) -> Table:

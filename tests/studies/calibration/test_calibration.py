@@ -10,7 +10,7 @@ from wm_drake.errors import InputError
 from wm_drake.ledger import open_ledger
 from wm_drake.machine import build_machine
 from wm_drake.parameters import SpinProfile, load_machine
-from wm_drake.parameters.free import load_free
+from wm_drake.parameters.free import Measured, load_free
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
 from wm_drake.studies.calibration.outcome import amplitude_rows, quantity_table, solved_machine
 from wm_drake.studies.calibration.prediction import check_left_out, predict
@@ -250,6 +250,19 @@ def test_planted_machine_is_recovered_within_what_the_data_are_said_to_know(reco
     assert np.nanmax(np.abs(best.errors(targets))) < 0.01
     assert np.all(best.spread()[:2] < 0.2)  # friction and lean move the tub, the weight of the motor hardly
     assert np.sum(best.directions() > 1.0) >= 2
+
+
+def test_starting_values_which_may_have_seen_a_load_do_not_help_to_predict_it(short, recovered, tmp_path):
+    truth, free, targets, plan, calibration, predictions, _ = recovered
+    knowing = {
+        name: quantity.model_copy(update={"start": Measured(values=(float(value),), unit=quantity.unit, is_list=False)})
+        for (name, quantity), value in zip(free.quantities.items(), truth, strict=True)
+    }
+    told = free.model_copy(update={"quantities": knowing})
+    assert np.array_equal(turning_of(short, told).start, truth)
+    with open_ledger(tmp_path / "ledger.sqlite", identity_of(short, told, targets, plan)) as ledger:
+        (again,) = predict(short, told, calibration, [["middle"]], ledger)
+    assert np.array_equal(again.predicted, predictions[0].predicted)
 
 
 def test_loads_that_were_not_seen_are_predicted_from_the_others(recovered):

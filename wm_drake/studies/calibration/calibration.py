@@ -1,6 +1,6 @@
 """calibrate(machine, free, targets): searches from several starts, each evaluation remembered."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,7 +100,6 @@ def calibrate(
     plan: Plan,
     ledger: Ledger,
     *,
-    numbers: Sequence[int] | None = None,
     workers: int | None = None,
     report: Callable[[int, int, float], None] = lambda start, evaluations, best: None,
 ) -> Calibration:
@@ -115,7 +114,6 @@ def calibrate(
         targets: Measured amplitudes.
         plan: How to search.
         ledger: Open, of this calibration.
-        numbers: Which of the plan's starts to search from; all of them by default.
         workers: Threads; as many as cores by default.
         report: Called with the number of the start, how many points it evaluated, and the least cost of it.
 
@@ -125,10 +123,7 @@ def calibrate(
     plan.check()
     turning = turning_of(machine, free)
     amplitudes = _Remembered(machine, turning, targets, ledger, workers)
-    ended = [
-        _search(number, turning, targets, plan, amplitudes, report)
-        for number in (range(plan.starts) if numbers is None else numbers)
-    ]
+    ended = [_search(number, turning, targets, plan, amplitudes, report) for number in range(plan.starts)]
     return Calibration(turning, targets, plan, tuple(distinct(ended, targets)), tuple(ended))
 
 

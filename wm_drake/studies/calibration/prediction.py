@@ -8,7 +8,7 @@ from wm_drake.ledger import Ledger
 from wm_drake.machine import Machine
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.parameters.free import FreeFile
-from wm_drake.studies.calibration.calibration import Calibration, calibrate
+from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate
 from wm_drake.studies.calibration.targets import Targets
 
 
@@ -20,11 +20,13 @@ class Prediction:
         loads: Their names.
         calibrated: Relative errors of their amplitudes in the calibration that had seen them. (case, sensor)
         predicted: The same in the calibration that had not. (case, sensor)
+        seen: Of the loads which that calibration had seen. (case, sensor)
     """
 
     loads: tuple[str, ...]
     calibrated: FloatArray
     predicted: FloatArray
+    seen: FloatArray
 
 
 def predict(
@@ -34,21 +36,35 @@ def predict(
     left_out: Sequence[Sequence[str]],
     ledger: Ledger,
     *,
+    plan: Plan | None = None,
     workers: int | None = None,
     report: Callable[[int, int, float], None] = lambda start, evaluations, best: None,
 ) -> list[Prediction]:
-    """Repeats a calibration once for each group of loads, without them, from the starts that had led to good solutions.
+    """Repeats a calibration once for each group of loads, without them.
+
+    The searches begin at what is expected of each quantity, or about it: starting values of a free file may come from a
+    calibration that had seen all loads.
 
     Args:
         machine, free, ledger, workers, report: As for `calibrate`.
         calibration: With all loads.
         left_out: Groups of names of loads.
+        plan: How to search without them; as with all loads if None.
 
     Raises:
         InputError: a load that was not measured, or no load left.
     """
     check_left_out(calibration.targets, left_out)
-    return [_predict(machine, free, calibration, tuple(loads), ledger, workers, report) for loads in left_out]
+    targets, plan, found = calibration.targets, plan or calibration.plan, []
+    for loads in map(tuple, left_out):
+        seen = targets.without(*loads)
+        blind = calibrate(machine, free.without_starts(), seen, plan, ledger, workers=workers, report=report)
+        cases = targets.of(*loads)
+        calibrated, predicted = (
+            best.amplitude[cases] / targets.amplitude[cases] - 1.0 for best in (calibration.solutions[0], blind.solutions[0])
+        )
+        found.append(Prediction(loads, calibrated, predicted, blind.solutions[0].errors(seen)[~cases]))
+    return found
 
 
 def check_left_out(targets: Targets, left_out: Sequence[Sequence[str]]) -> None:
@@ -60,23 +76,3 @@ def check_left_out(targets: Targets, left_out: Sequence[Sequence[str]]) -> None:
                 raise input_error(f"no measured load '{name}'{nearest_names(name, known)}", key="left out")
         if known <= set(loads):
             raise input_error("leaves no load to calibrate with", key="left out")
-
-
-def _predict(
-    machine: Machine,
-    free: FreeFile,
-    calibration: Calibration,
-    loads: tuple[str, ...],
-    ledger: Ledger,
-    workers: int | None,
-    report: Callable[[int, int, float], None],
-) -> Prediction:
-    targets, plan = calibration.targets, calibration.plan
-    numbers = [solution.start for solution in calibration.solutions]
-    blind = calibrate(machine, free, targets.without(*loads), plan, ledger, numbers=numbers, workers=workers, report=report)
-    cases = targets.of(*loads)
-    errors = [
-        solution.amplitude[cases] / targets.amplitude[cases] - 1.0
-        for solution in (calibration.solutions[0], blind.solutions[0])
-    ]
-    return Prediction(loads, *errors)
