@@ -23,9 +23,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from wm_drake import Case, Scene, build_machine, load_machine, measure, simulate, simulate_many, with_values
+from wm_drake.kernel.alone import Alone
 from wm_drake.kernel.integration import integrate_lanes
-from wm_drake.kernel.mechanics import LINE_SIZE, mass_properties, state_derivative
-from wm_drake.kernel.packing import initial_state, pack
+from wm_drake.kernel.packing import initial_state
 from wm_drake.laws.lanes import WIDTH
 from wm_drake.machine import Machine
 from wm_drake.parameters import GASKET_FACTORS, SpinProfile, at_levels, levels_of, load_factors, quantities
@@ -104,15 +104,10 @@ def one_run(machine: Machine, size: Size) -> Iterator[str]:
 def by_lsoda(machine: Machine, case: Case) -> None:
     """The motion by scipy's stiff integrator, piece by piece of the profile."""
     setup = machine.set_up(case.load)
-    p, layout = pack(setup)
-    elements, scratch = layout.elements, np.empty(LINE_SIZE * len(layout.dampers))
-    x = initial_state(setup, case.profile)
+    alone, x = Alone(setup), initial_state(setup, case.profile)
 
     def rate(_: float, x: np.ndarray, acceleration: float) -> np.ndarray:
-        dx = np.empty_like(x)
-        masses = mass_properties(p, np.cos(x[6]), np.sin(x[6]))
-        state_derivative(x, dx, masses, x[13], acceleration, p, elements, scratch)
-        return dx
+        return alone.derivative(x, acceleration)
 
     corners = case.profile.time
     for begin, end, acceleration in zip(corners, corners[1:], case.profile.acceleration(), strict=False):

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from wm_drake import Case, build_machine, load_machine, simulate
-from wm_drake.kernel.mechanics import LINE_SIZE, mass_properties, state_derivative
-from wm_drake.kernel.packing import initial_state, pack
+from wm_drake.kernel.alone import Alone
+from wm_drake.kernel.packing import initial_state
 from wm_drake.machine import Machine
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.spin import Region
@@ -30,16 +30,11 @@ PERIOD = 5e-3
 def by_radau(machine: Machine, case: Case, rtol: float) -> tuple[np.ndarray, np.ndarray]:
     """States every 5 ms, and displacements of the accelerometers."""
     setup = machine.set_up(case.load)
-    p, layout = pack(setup)
-    elements, scratch = layout.elements, np.empty(LINE_SIZE)
-    x = initial_state(setup, case.profile)
+    alone, x = Alone(setup), initial_state(setup, case.profile)
     (acceleration,) = case.profile.acceleration()
 
     def rate(_: float, x: np.ndarray) -> np.ndarray:
-        dx = np.empty_like(x)
-        masses = mass_properties(p, np.cos(x[6]), np.sin(x[6]))
-        state_derivative(x, dx, masses, x[13], acceleration, p, elements, scratch)
-        return dx
+        return alone.derivative(x, acceleration)
 
     samples = np.arange(round(case.profile.duration / PERIOD) + 1) * PERIOD
     limits = {"rtol": rtol, "atol": 1e-3 * rtol, "max_step": 0.01}

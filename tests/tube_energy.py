@@ -6,25 +6,18 @@ from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
 
 from wm_drake.bodies import add_bodies, add_load, set_bodies
-from wm_drake.kernel.histories import rates_history
-from wm_drake.kernel.integration import integrate_alone
-from wm_drake.kernel.mechanics import LINE_SIZE
-from wm_drake.kernel.packing import initial_state, pack
+from wm_drake.kernel.alone import Alone
+from wm_drake.kernel.packing import initial_state
 from wm_drake.kernel.schedule import schedule_of
 
 
 def dense_states(setup, profile, step):
     """States (n, size) at every step, torque of the motor, and the layout."""
-    p, layout = pack(setup)
-    schedule = schedule_of(profile, step, step)
-    x = initial_state(setup, profile)
+    machine, schedule, x = Alone(setup), schedule_of(profile, step, step), initial_state(setup, profile)
     samples = np.full((len(schedule.time), len(x)), np.nan)
     samples[0] = x
-    work = (*(np.empty_like(x) for _ in range(3)), np.empty(LINE_SIZE))
-    integrate_alone(schedule.steps, 0, len(schedule.step), p, layout.elements, x, work, samples.ravel())
-    rates = np.empty((len(samples), 7))
-    rates_history(samples, schedule.sample_acceleration[:, None], p, layout.elements, rates)
-    return schedule.time, samples, rates[:, 6], layout
+    machine.integrate(schedule, 0, len(schedule.step), x, samples)
+    return schedule.time, samples, machine.rates(schedule, samples)[:, 6], machine.layout
 
 
 class Motion:

@@ -4,10 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wm_drake.kernel.histories import rates_history
-from wm_drake.kernel.integration import integrate_alone
-from wm_drake.kernel.mechanics import LINE_SIZE
-from wm_drake.kernel.packing import initial_state, pack
+from wm_drake.kernel.alone import Alone
+from wm_drake.kernel.packing import initial_state
 from wm_drake.kernel.schedule import schedule_of
 from wm_drake.machine import OUTPUT_PERIOD, Setup
 from wm_drake.parameters import SpinProfile
@@ -34,18 +32,14 @@ def run_compiled(setup: Setup, profile: SpinProfile, step: float, progress: Call
     Raises:
         InputError: the machine has something that this engine does not represent.
     """
-    p, layout = pack(setup)
-    schedule = schedule_of(profile, step, OUTPUT_PERIOD)
-    x = initial_state(setup, profile)
+    machine, schedule, x = Alone(setup), schedule_of(profile, step, OUTPUT_PERIOD), initial_state(setup, profile)
     samples = np.full((len(schedule.time), len(x)), np.nan)
     samples[0] = x
-    work = (*(np.empty_like(x) for _ in range(3)), np.empty(LINE_SIZE * len(layout.dampers)))
     done = 0
     while done < len(schedule.step) and diverging_coordinate(x) is None:
         begin, done = done, min(done + PAUSE_STEPS, len(schedule.step))
-        integrate_alone(schedule.steps, begin, done, p, layout.elements, x, work, samples.ravel())
+        machine.integrate(schedule, begin, done, x, samples)
         progress(done / len(schedule.step))
-    rates = np.empty((len(samples), 7))
-    rates_history(samples, schedule.sample_acceleration[:, None], p, layout.elements, rates)
-    motion, deformation, tubes, carrier = layout.parts(samples)
+    rates = machine.rates(schedule, samples)
+    motion, deformation, tubes, carrier = machine.layout.parts(samples)
     return ended_where_it_diverged(Trajectory(schedule.time, motion, deformation, rates[:, 6], rates[:, :6], tubes, carrier))

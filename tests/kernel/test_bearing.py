@@ -9,8 +9,8 @@ from machines_of_each_kind import machines_of_each_kind
 
 from wm_drake.bodies import sdf_path
 from wm_drake.errors import InputError
-from wm_drake.kernel.mechanics import DRUM_RATE, LINE_SIZE, mass_properties, state_derivative
-from wm_drake.kernel.packing import pack
+from wm_drake.kernel.alone import Alone
+from wm_drake.kernel.mechanics import DRUM_RATE
 from wm_drake.machine import build_machine
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, load_machine
 from wm_drake.simulation import Case, simulate
@@ -48,9 +48,9 @@ def random_states(rng, coordinates, sponges):
 def worst_difference(machine, setup, count=1000, seed=5):
     """Largest relative difference of the derivative of Drake's state and the compiled machine's, per vector."""
     rng, context, trees = np.random.default_rng(seed), setup.context, machine.coordinates.states()
-    p, layout = pack(setup)
+    alone = Alone(setup)
     struts, tubes = len(setup.dampers), len(setup.telescopes)
-    scratch, worst = np.empty(LINE_SIZE * max(1, struts)), 0.0
+    worst = 0.0
     without_joint = np.delete(np.arange(14), (6, 13))
     for _ in range(count):
         blocks, sponges = random_states(rng, machine.coordinates, struts + tubes)
@@ -69,9 +69,7 @@ def worst_difference(machine, setup, count=1000, seed=5):
         x = [blocks[0], sponges[:struts]]
         x += [np.append(block, delta) for block, delta in zip(blocks[1:-1], sponges[struts:], strict=True)]
         x = np.concatenate([*x, blocks[-1][without_joint]])
-        dx = np.full(len(x), np.nan)
-        masses = mass_properties(p, np.cos(x[6]), np.sin(x[6]))
-        state_derivative(x, dx, masses, x[DRUM_RATE], told[trees[0]][DRUM_RATE], p, layout.elements, scratch)
+        dx = alone.derivative(x, told[trees[0]][DRUM_RATE])
         compiled = np.split(dx, np.cumsum([len(part) for part in drake])[:-1])
         compiled[-1] = np.insert(compiled[-1], (6, 12), (told[trees[0]][6], told[trees[0]][13]))
         for mine, its in zip(compiled, drake, strict=True):

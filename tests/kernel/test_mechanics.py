@@ -9,8 +9,8 @@ from machines_of_each_kind import changed, machines_of_each_kind
 from wm_drake.bodies import sdf_path
 from wm_drake.compiled_engine import run_compiled
 from wm_drake.errors import InputError
-from wm_drake.kernel.mechanics import DRUM_RATE, LINE_SIZE, mass_properties, state_derivative
-from wm_drake.kernel.packing import pack
+from wm_drake.kernel.alone import Alone
+from wm_drake.kernel.mechanics import DRUM_RATE
 from wm_drake.machine import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance
 
@@ -36,11 +36,7 @@ def both_derivatives(machine, setup, state, acceleration):
     sponges = [index for index, damper in enumerate(setup.dampers.values()) if damper.has_sponge]
     x = np.concatenate([state[:14], np.zeros(len(setup.dampers))])
     x[14 + np.array(sponges, dtype=int)] = state[14:]
-    p, layout = pack(setup)
-    dx = np.full(len(x), np.nan)
-    scratch = np.empty(LINE_SIZE * len(setup.dampers))
-    masses = mass_properties(p, np.cos(x[6]), np.sin(x[6]))
-    state_derivative(x, dx, masses, x[DRUM_RATE], by_drake[DRUM_RATE], p, layout.elements, scratch)
+    dx = Alone(setup).derivative(x, by_drake[DRUM_RATE])
     assert not dx[14:][~np.isin(np.arange(len(setup.dampers)), sponges)].any()
     return by_drake, np.concatenate([dx[:14], dx[14 + np.array(sponges, dtype=int)]])
 

@@ -9,8 +9,8 @@ from telescopic_machine import RUN_UP, changed, telescopic, with_bushing
 from wm_drake.bodies import sdf_path
 from wm_drake.compiled_engine import run_compiled
 from wm_drake.errors import InputError
-from wm_drake.kernel.mechanics import DRUM_RATE, LINE_SIZE, mass_properties, state_derivative
-from wm_drake.kernel.packing import pack
+from wm_drake.kernel.alone import Alone
+from wm_drake.kernel.mechanics import DRUM_RATE
 from wm_drake.machine import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance
 from wm_drake.simulation import Case, simulate
@@ -31,8 +31,7 @@ def built():
 def worst_difference(machine, setup, count, seed=5):
     """Largest relative difference of the derivative of Drake's state and the compiled machine's, per vector."""
     rng, context, trees = np.random.default_rng(seed), setup.context, machine.coordinates.states()
-    p, layout = pack(setup)
-    tubes, scratch = len(setup.telescopes), np.empty(LINE_SIZE * max(1, len(setup.dampers)))
+    alone, tubes = Alone(setup), len(setup.telescopes)
     worst = 0.0
     for _ in range(count):
         blocks = [rng.uniform(-1.0, 1.0, 14) * TUB, *(rng.uniform(-1.0, 1.0, 14) * TUBES for _ in range(tubes))]
@@ -46,9 +45,7 @@ def worst_difference(machine, setup, count, seed=5):
         told = machine.diagram.EvalTimeDerivatives(context).CopyToVector()
         drake = [told[trees[0]], *(np.append(told[tree], told[k - tubes]) for k, tree in enumerate(trees[1:]))]
         x = np.concatenate([blocks[0], *(np.append(block, delta) for block, delta in zip(blocks[1:], sponges, strict=True))])
-        dx = np.full(len(x), np.nan)
-        masses = mass_properties(p, np.cos(x[6]), np.sin(x[6]))
-        state_derivative(x, dx, masses, x[DRUM_RATE], told[trees[0]][DRUM_RATE], p, layout.elements, scratch)
+        dx = alone.derivative(x, told[trees[0]][DRUM_RATE])
         for mine, its in zip(np.split(dx, 14 + 15 * np.arange(tubes)), drake, strict=True):
             for part in VECTORS:
                 scale = np.max(np.abs(its[part]), initial=1e-3)

@@ -10,7 +10,7 @@ from wm_drake.batch.jobs import Job, Kind
 from wm_drake.kernel.histories import POINT_SIZE, measure_samples_lanes, rates_history
 from wm_drake.kernel.integration import integrate_lanes
 from wm_drake.kernel.mechanics import DRUM_RATE, LINE_SIZE, STATE_SIZE
-from wm_drake.kernel.packing import Layout
+from wm_drake.kernel.packing import Layout, aligned
 from wm_drake.kernel.schedule import Schedule, schedule_of
 from wm_drake.laws.lanes import WIDTH
 from wm_drake.machine import OUTPUT_PERIOD
@@ -162,12 +162,10 @@ class Runner:
         return lanes
 
     def _array(self, name: str, size: int) -> FloatArray:
-        """An array of lanes of this thread, used again from batch to batch, at an address vectors are loaded from in one go."""
+        """An array of lanes of this thread, used again from batch to batch."""
         kept = self._memory.__dict__
         if name not in kept or len(kept[name]) != size * WIDTH:
-            raw = np.zeros(size * WIDTH + WIDTH)
-            begin = (-raw.ctypes.data // raw.itemsize) % WIDTH
-            kept[name] = raw[begin : begin + size * WIDTH]
+            kept[name] = aligned(size * WIDTH)
         return kept[name]
 
 

@@ -29,7 +29,7 @@ def rates_history(samples, acceleration, p, elements, rates):
     size = samples.shape[1] * WIDTH
     x_numbers, drum_numbers, numbers = np.empty(size), np.empty(WIDTH), np.empty(7 * WIDTH)
     x, drum, answer = lane_array(x_numbers), lane_array(drum_numbers), lane_array(numbers)
-    dx_numbers, scratch_numbers = np.empty(size), np.empty(LINE_SIZE * WIDTH * len(elements[1]))
+    dx_numbers, scratch_numbers = np.empty(size), np.empty(LINE_SIZE * WIDTH * len(elements.dampers))
     p_numbers = in_each_lane(p)
     dx, scratch, q = lane_array(dx_numbers), lane_array(scratch_numbers), lane_array(p_numbers)
     for begin in range(0, len(rates), WIDTH):
@@ -37,7 +37,7 @@ def rates_history(samples, acceleration, p, elements, rates):
         rows_to_lanes(acceleration, begin, drum_numbers)
         sine, cosine = sine_cosine(x[6])
         masses = mass_properties(q, cosine, sine)
-        answer[6] = state_derivative(x, dx, masses, x[13], drum[0], q, elements, scratch)
+        answer[6] = state_derivative(x, dx, masses, x[13], drum[0], q, q, elements, scratch)
         for k in range(6):
             answer[k] = dx[7 + k]
         lanes_to_rows(numbers, begin, rates)

@@ -1,18 +1,19 @@
 """The classical fourth-order Runge-Kutta scheme at fixed steps, for one machine or for several side by side."""
 
-from wm_drake.kernel.mechanics import mass_properties, state_derivative, state_size
+from wm_drake.kernel.mechanics import DRUM_RATE, mass_properties, state_derivative, state_size
 from wm_drake.laws.compilation import law, long_running
-from wm_drake.laws.lanes import align_stack, lane_array, number_array
+from wm_drake.laws.elementary import sine_cosine
+from wm_drake.laws.lanes import align_stack, lane_array, number_array, quad_array
 
 
 @law
-def integrate(steps, begin, end, p, elements, x, work, history):
+def integrate(steps, begin, end, p, struts, elements, x, work, history):
     """Steps a state from the begin of step `begin` to the begin of step `end`.
 
     Args:
         steps: Length, drum acceleration, drum motion and sample number of each step: four fields of a `Schedule`.
         begin, end: Numbers of steps.
-        p, elements: As for `state_derivative`.
+        p, struts, elements: As for `state_derivative`.
         x: State, which is advanced.
         work: Three arrays of the size of the state, to work in, and `state_derivative`'s scratch.
         history: States at the samples, one after the other; written at the end of steps that have a sample.
@@ -29,7 +30,7 @@ def integrate(steps, begin, end, p, elements, x, work, history):
             node = 2 * i + (stage + 1) // 2
             if stage == 1 or stage == 3:
                 masses = mass_properties(p, drum[node, 1], drum[node, 2])
-            state_derivative(y, dx, masses, drum[node, 0], acceleration[i], p, elements, scratch)
+            state_derivative(y, dx, masses, drum[node, 0], acceleration[i], p, struts, elements, scratch)
             inner = stage == 1 or stage == 2
             weight = h / 3.0 if inner else h / 6.0
             ahead = h if stage == 2 else 0.5 * h
@@ -49,15 +50,28 @@ def integrate(steps, begin, end, p, elements, x, work, history):
 
 
 @long_running
-def integrate_alone(steps, begin, end, p, elements, x, work, history):
-    """`integrate` of one machine; flat arrays of floats."""
-    numbers_of_work = (number_array(work[0]), number_array(work[1]), number_array(work[2]), number_array(work[3]))
-    integrate(steps, begin, end, number_array(p), elements, number_array(x), numbers_of_work, number_array(history))
+def integrate_alone(steps, begin, end, p, struts, elements, x, work, history):
+    """`integrate` of one machine, springs and dampers side by side; flat arrays of floats.
+
+    The arrays to work in have room for `lanes.QUAD` numbers more than the state.
+    """
+    of_work = (number_array(work[0]), number_array(work[1]), number_array(work[2]), quad_array(work[3]))
+    numbers = number_array(p), quad_array(struts), elements, number_array(x)
+    integrate(steps, begin, end, *numbers, of_work, number_array(history))
+
+
+@long_running
+def derivative_alone(x, dx, acceleration, p, struts, elements, scratch):
+    """`state_derivative` of one machine at an acceleration of the drum [rad/s^2]; arrays as in `integrate_alone`."""
+    numbers, state = number_array(p), number_array(x)
+    sine, cosine = sine_cosine(state[6])
+    drum = mass_properties(numbers, cosine, sine), state[DRUM_RATE], acceleration
+    state_derivative(state, number_array(dx), *drum, numbers, quad_array(struts), elements, quad_array(scratch))
 
 
 @long_running
 def integrate_lanes(steps, begin, end, p, elements, x, work, history):
     """`integrate` of `lanes.WIDTH` machines side by side: each array holds, for each number, that of every machine."""
     align_stack()
-    lanes_of_work = (lane_array(work[0]), lane_array(work[1]), lane_array(work[2]), lane_array(work[3]))
-    integrate(steps, begin, end, lane_array(p), elements, lane_array(x), lanes_of_work, lane_array(history))
+    of_work = (lane_array(work[0]), lane_array(work[1]), lane_array(work[2]), lane_array(work[3]))
+    integrate(steps, begin, end, lane_array(p), lane_array(p), elements, lane_array(x), of_work, lane_array(history))

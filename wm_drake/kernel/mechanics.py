@@ -19,6 +19,7 @@ from collections import namedtuple
 
 from wm_drake.kernel.bearing import TUB_SIZE, carrier_motion, carrier_size, tub_accelerations
 from wm_drake.kernel.matrices import about_centre, inverse, plus, six, three, times
+from wm_drake.kernel.side_by_side import deformation_at, together, write_rate
 from wm_drake.kernel.tubes import TUBES_STATE_SIZE, count_of, with_telescopes
 from wm_drake.laws.compilation import law
 from wm_drake.laws.elementary import anywhere, sine_cosine
@@ -40,6 +41,11 @@ STATE_SIZE = PLANT_STATE_SIZE
 `kernel.bearing`."""
 DRUM_RATE = 13
 """Where the state has it."""
+
+Elements = namedtuple("Elements", ("springs", "dampers", "deformations", "bushings", "telescopes", "bearing", "tubes"))
+"""Of a machine: indices where the packed numbers of each spring, damper, bushing and telescopic damper begin, arrays, the last
+None without any; of the deformation of each damper in the state (array); where the bearing's numbers begin, None where the drum
+turns in a perfect joint; where the states of the telescopic dampers' tubes begin in the state."""
 
 MassProperties = namedtuple("MassProperties", ("drum_moment", "drum_inertia", "moment", "inverse_inertia"))
 """At one drum angle: s_d, J_d, S, and the inverse of the inertia about the common centre of mass."""
@@ -118,41 +124,44 @@ def accelerations(motion, masses, rate, acceleration, wrench, p):
 
 
 @law
-def state_derivative(x, dx, masses, rate, acceleration, p, elements, scratch):
+def state_derivative(x, dx, masses, rate, acceleration, p, struts, elements, scratch):
     """Writes the derivative of the state into `dx`.
 
     Args:
         x, dx: State and its derivative, laid out as `STATE_SIZE` says; x[6] and x[13] are not read.
         masses, rate, acceleration, p: As for `accelerations`.
-        elements: Indices in p where springs, dampers, bushings and telescopic dampers begin: four arrays, the last None
-            without any; and where the bearing does, None where the drum turns in a perfect joint.
-        scratch: At least `LINE_SIZE` numbers a damper to work in.
+        struts: Array that holds the packed numbers of springs and dampers: p itself, or what
+            `wm_drake.kernel.side_by_side` made of them.
+        elements: `Elements`, springs and dampers in `struts`, all others in p.
+        scratch: At least `LINE_SIZE` entries a damper to work in, of the kind of `struts`.
 
     Returns:
         Torque of the motor on the drum. [N m]
     """
-    springs, dampers, bushings, telescopes, bearing = elements
+    springs, dampers, deformations, bushings, telescopes, bearing, tubes = elements
     roll, pitch, yaw = sine_cosine(x[0]), sine_cosine(x[1]), sine_cosine(x[2])
     motion = motion_from_sines(x, 0, roll, pitch, yaw)
     zero = 0.0 * x[0]
     total = (zero, zero, zero, zero, zero, zero)
-    for i in range(len(springs)):
-        wrench, _ = spring_strut_wrench(motion, p, springs[i])
-        total = plus(total, wrench)
+    for at in springs:
+        wrench, _ = spring_strut_wrench(motion, struts, at)
+        total = plus(total, together(wrench, struts, at))
     # dampers in three rounds: each is a long chain of roots and quotients, and short rounds let the processor overlap them
     for i in range(len(dampers)):
-        write_line(scratch, LINE_SIZE * i, *friction_damper_line(motion, p, dampers[i]))
+        write_line(scratch, LINE_SIZE * i, *friction_damper_line(motion, struts, dampers[i]))
     for i in range(len(dampers)):
-        rate_i = scratch[LINE_SIZE * i + 4]
-        scratch[LINE_SIZE * i + 12], dx[STATE_SIZE + i] = friction_damper_tension(rate_i, x[STATE_SIZE + i], p, dampers[i])
+        deformation = deformation_at(x, deformations[i], struts)
+        tension, its_rate = friction_damper_tension(scratch[LINE_SIZE * i + 4], deformation, struts, dampers[i])
+        scratch[LINE_SIZE * i + 12] = tension
+        write_rate(dx, deformations[i], its_rate)
     for i in range(len(dampers)):
         arm, line = read_line(scratch, LINE_SIZE * i)
-        total = plus(total, friction_damper_wrench(motion, arm, line, scratch[LINE_SIZE * i + 12], p, dampers[i]))
+        wrench = friction_damper_wrench(motion, arm, line, scratch[LINE_SIZE * i + 12], struts, dampers[i])
+        total = plus(total, together(wrench, struts, dampers[i]))
     for i in range(len(bushings)):
         wrench, _ = six_component_bushing_wrench(motion, p, bushings[i])
         total = plus(total, wrench)
     gravity = three(p, GRAVITY)
-    tubes = STATE_SIZE + len(dampers)
     total = with_telescopes(x, dx, motion, gravity, p, telescopes, tubes, total)
     carrier = tubes + TUBES_STATE_SIZE * count_of(telescopes)
     w_rate, v_rate, torque = with_bearing(x, dx, motion, masses, rate, acceleration, total, p, bearing, carrier)
@@ -191,7 +200,7 @@ def with_bearing(x, dx, motion, masses, rate, acceleration, total, p, bearing, f
 @law
 def state_size(elements):
     """How many numbers the state of a machine with these elements has."""
-    return STATE_SIZE + len(elements[1]) + TUBES_STATE_SIZE * count_of(elements[3]) + carrier_size(elements[4])
+    return elements.tubes + TUBES_STATE_SIZE * count_of(elements.telescopes) + carrier_size(elements.bearing)
 
 
 @law

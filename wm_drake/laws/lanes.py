@@ -22,16 +22,28 @@ from numba.extending import intrinsic, lower_builtin, lower_cast, models, regist
 WIDTH = 8
 """Runs side by side: one register of 512 bits, two of 256."""
 
-_VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
+QUAD = 4
+"""Elements of one machine side by side."""
+
 _FIRST = ir.Constant(ir.IntType(32), 0)
 
 
-class LanesType(types.Type):
-    """Type of `WIDTH` floats; a plain number that meets it becomes the same number in each lane."""
+class _OfLanes(types.Type):
+    """Types by the number of lanes, and their vectors."""
 
-    def __init__(self) -> None:
-        """One type, by its name."""
-        super().__init__("Lanes")
+    def __init__(self, width: int) -> None:
+        """One type for each width, by its name."""
+        self.width = width
+        super().__init__(f"{type(self).__name__.removesuffix('Type')}{width}")
+
+    @property
+    def vector(self) -> ir.VectorType:
+        """LLVM's."""
+        return ir.VectorType(ir.DoubleType(), self.width)
+
+
+class LanesType(_OfLanes):
+    """Type of several floats; a plain number that meets it becomes the same number in each lane."""
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Conversion | None:
         """Numbers convert."""
@@ -42,20 +54,12 @@ class LanesType(types.Type):
         return self if isinstance(other, types.Float | types.Integer) else None
 
 
-class MaskType(types.Type):
+class MaskType(_OfLanes):
     """Type of the answer to a comparison of lanes: yes or no for each."""
 
-    def __init__(self) -> None:
-        """One type, by its name."""
-        super().__init__("Mask")
 
-
-class LaneArrayType(types.Type):
-    """Type of an array of lanes: entry i is the numbers [i * WIDTH, (i + 1) * WIDTH) of a contiguous array of floats."""
-
-    def __init__(self) -> None:
-        """One type, by its name."""
-        super().__init__("LaneArray")
+class LaneArrayType(_OfLanes):
+    """Type of an array of lanes: entry i is the numbers [i * width, (i + 1) * width) of a contiguous array of floats."""
 
 
 class NumberArrayType(types.Type):
@@ -66,20 +70,24 @@ class NumberArrayType(types.Type):
         super().__init__("NumberArray")
 
 
-LANES, MASK, LANE_ARRAY, NUMBER_ARRAY = LanesType(), MaskType(), LaneArrayType(), NumberArrayType()
-_ENTRIES = {LANE_ARRAY: LANES, NUMBER_ARRAY: types.float64}
+NUMBER_ARRAY = NumberArrayType()
+_WIDTHS = (WIDTH, QUAD)
+_LANES = {width: LanesType(width) for width in _WIDTHS}
+_MASKS = {width: MaskType(width) for width in _WIDTHS}
+_LANE_ARRAYS = {width: LaneArrayType(width) for width in _WIDTHS}
+_ENTRIES = {NUMBER_ARRAY: types.float64} | {_LANE_ARRAYS[width]: _LANES[width] for width in _WIDTHS}
 
 
 @register_model(LanesType)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _VECTOR)
+        super().__init__(manager, kind, kind.vector)
 
 
 @register_model(MaskType)
 class _MaskModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, ir.VectorType(ir.IntType(1), WIDTH))
+        super().__init__(manager, kind, ir.VectorType(ir.IntType(1), kind.width))
 
 
 @register_model(LaneArrayType)
@@ -91,10 +99,10 @@ class _PointerModel(models.PrimitiveModel):
 
 @lower_cast(types.Float, LanesType)
 @lower_cast(types.Integer, LanesType)
-def _in_each_lane(context: Any, builder: Any, given: Any, _: Any, value: Any) -> Any:
+def _in_each_lane(context: Any, builder: Any, given: Any, lanes: Any, value: Any) -> Any:
     number = context.cast(builder, value, given, types.float64)
-    nothing = ir.Constant(_VECTOR, ir.Undefined)
-    order = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+    nothing = ir.Constant(lanes.vector, ir.Undefined)
+    order = ir.Constant(ir.VectorType(ir.IntType(32), lanes.width), [0] * lanes.width)
     return builder.shuffle_vector(builder.insert_element(nothing, number, _FIRST), nothing, order)
 
 
@@ -102,9 +110,9 @@ def _declare(operation: Any, kinds: tuple[Any, ...], result: Any, emit: Callable
     """Teaches the compiler an operation on `kinds`; `mixed` lets plain numbers stand for some of the lanes."""
 
     def fits(given: tuple[Any, ...]) -> bool:
-        if not mixed or LANES not in given:
+        if not mixed or kinds[0] not in given:
             return given == kinds
-        return len(given) == len(kinds) and all(kind == LANES or isinstance(kind, types.Number) for kind in given)
+        return len(given) == len(kinds) and all(kind == kinds[0] or isinstance(kind, types.Number) for kind in given)
 
     @infer_global(operation)
     class _Template(AbstractTemplate):
@@ -120,45 +128,53 @@ def _compare(sign: str) -> Callable[..., Any]:
     return lambda builder, a, b: builder.fcmp_ordered(sign, a, b)
 
 
-for _operation, _name in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"), (operator.truediv, "fdiv")):
-    _declare(_operation, (LANES, LANES), LANES, lambda builder, a, b, name=_name: getattr(builder, name)(a, b), mixed=True)
-for _operation, _sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">=")):
-    _declare(_operation, (LANES, LANES), MASK, _compare(_sign), mixed=True)
-_declare(operator.and_, (MASK, MASK), MASK, lambda builder, a, b: builder.and_(a, b))
-_declare(operator.or_, (MASK, MASK), MASK, lambda builder, a, b: builder.or_(a, b))
-_declare(operator.neg, (LANES,), LANES, lambda builder, a: builder.fneg(a))
-_declare(abs, (LANES,), LANES, lambda builder, a: _llvm(builder, "fabs", a))
-_declare(int, (LANES,), types.int64, lambda builder, a: builder.fptosi(builder.extract_element(a, _FIRST), ir.IntType(64)))
+def _declare_all(lanes: LanesType, mask: MaskType) -> None:
+    """Teaches the compiler arithmetic of one kind of lanes."""
+    both = (lanes, lanes)
+    for operation, name in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"), (operator.truediv, "fdiv")):
+        _declare(operation, both, lanes, lambda builder, a, b, name=name: getattr(builder, name)(a, b), mixed=True)
+    for operation, sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">=")):
+        _declare(operation, both, mask, _compare(sign), mixed=True)
+    _declare(operator.and_, (mask, mask), mask, lambda builder, a, b: builder.and_(a, b))
+    _declare(operator.or_, (mask, mask), mask, lambda builder, a, b: builder.or_(a, b))
+    _declare(operator.neg, (lanes,), lanes, lambda builder, a: builder.fneg(a))
+    _declare(abs, (lanes,), lanes, lambda builder, a: _llvm(builder, "fabs", a))
+    _declare(int, (lanes,), types.int64, lambda builder, a: builder.fptosi(builder.extract_element(a, _FIRST), ir.IntType(64)))
+
+
+for _width in _WIDTHS:
+    _declare_all(_LANES[_width], _MASKS[_width])
 
 
 def _llvm(builder: Any, name: str, lanes: Any) -> Any:
     """One of LLVM's functions of a vector."""
-    kind = ir.FunctionType(_VECTOR, [_VECTOR])
-    return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{WIDTH}f64"), [lanes])
+    kind = ir.FunctionType(lanes.type, [lanes.type])
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{lanes.type.count}f64"), [lanes])
 
 
 @intrinsic
 def lanes_sqrt(typing_context, x):
     """Square root in each lane."""
-    return LANES(LANES), lambda context, builder, sig, args: _llvm(builder, "sqrt", args[0])
+    return x(x), lambda context, builder, sig, args: _llvm(builder, "sqrt", args[0])
 
 
 @intrinsic
 def lanes_floor(typing_context, x):
     """Largest whole number not above, in each lane."""
-    return LANES(LANES), lambda context, builder, sig, args: _llvm(builder, "floor", args[0])
+    return x(x), lambda context, builder, sig, args: _llvm(builder, "floor", args[0])
 
 
 @intrinsic
 def lanes_select(typing_context, condition, a, b):
     """`a` where the condition holds, else `b`, in each lane."""
-    return LANES(MASK, LANES, LANES), lambda context, builder, sig, args: builder.select(*args)
+    lanes = _LANES[condition.width]
+    return lanes(condition, lanes, lanes), lambda context, builder, sig, args: builder.select(*args)
 
 
 def _mask_against(sign: str, bits: int) -> Callable[..., Any]:
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        mask = builder.bitcast(args[0], ir.IntType(WIDTH))
-        return builder.icmp_unsigned(sign, mask, ir.Constant(ir.IntType(WIDTH), bits))
+        whole = ir.IntType(sig.args[0].width)
+        return builder.icmp_unsigned(sign, builder.bitcast(args[0], whole), ir.Constant(whole, bits))
 
     return emit
 
@@ -166,19 +182,25 @@ def _mask_against(sign: str, bits: int) -> Callable[..., Any]:
 @intrinsic
 def lanes_any(typing_context, condition):
     """Whether the condition holds in any lane."""
-    return types.boolean(MASK), _mask_against("!=", 0)
+    return types.boolean(condition), _mask_against("!=", 0)
 
 
 @intrinsic
 def lanes_all(typing_context, condition):
     """Whether the condition holds in all lanes."""
-    return types.boolean(MASK), _mask_against("==", 2**WIDTH - 1)
+    return types.boolean(condition), _mask_against("==", 2**condition.width - 1)
 
 
 @intrinsic
 def lane_array(typing_context, array):
     """An array of lanes over a contiguous array of floats, which must outlive it; nothing checks its bounds."""
-    return (LANE_ARRAY(array), _address_of) if _is_flat(array) else None
+    return (_LANE_ARRAYS[WIDTH](array), _address_of) if _is_flat(array) else None
+
+
+@intrinsic
+def quad_array(typing_context, array):
+    """The same of lanes of elements of one machine."""
+    return (_LANE_ARRAYS[QUAD](array), _address_of) if _is_flat(array) else None
 
 
 @intrinsic
@@ -201,10 +223,10 @@ def align_stack(typing_context):
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         with builder.goto_entry_block():
-            slot = builder.alloca(_VECTOR)
+            slot = builder.alloca(_LANES[WIDTH].vector)
             slot.align = 64
         # an address that leaves for an (empty) piece of assembly cannot be optimised away
-        kind = ir.FunctionType(ir.VoidType(), [_VECTOR.as_pointer()])
+        kind = ir.FunctionType(ir.VoidType(), [slot.type])
         builder.asm(kind, "", "r", [slot], side_effect=True)
         return context.get_dummy_value()
 
@@ -225,19 +247,19 @@ class _SetItem(AbstractTemplate):
         return signature(types.none, args[0], types.intp, _ENTRIES[args[0]]) if fits else None
 
 
-def _place(builder: Any, array: Any, index: Any) -> Any:
-    begin = builder.gep(array, [builder.mul(index, ir.Constant(index.type, WIDTH))])
-    return builder.bitcast(begin, _VECTOR.as_pointer())
+def _place(builder: Any, lanes: LanesType, array: Any, index: Any) -> Any:
+    begin = builder.gep(array, [builder.mul(index, ir.Constant(index.type, lanes.width))])
+    return builder.bitcast(begin, lanes.vector.as_pointer())
 
 
 @lower_builtin(operator.getitem, LaneArrayType, types.intp)
 def _get_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.load(_place(builder, *args), align=8)
+    return builder.load(_place(builder, sig.return_type, *args), align=8)
 
 
 @lower_builtin(operator.setitem, LaneArrayType, types.intp, LanesType)
 def _set_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    builder.store(args[2], _place(builder, *args[:2]), align=8)
+    builder.store(args[2], _place(builder, sig.args[2], *args[:2]), align=8)
     return context.get_dummy_value()
 
 
@@ -250,3 +272,39 @@ def _get_number(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 def _set_number(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     builder.store(args[2], builder.gep(args[0], [args[1]]))
     return context.get_dummy_value()
+
+
+@intrinsic
+def quad_at(typing_context, array, index):
+    """Four neighbours of an array of numbers as lanes."""
+
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.load(_quad_place(builder, *args), align=8)
+
+    return _LANES[QUAD](array, types.intp), emit
+
+
+@intrinsic
+def put_quad_at(typing_context, array, index, quad):
+    """Lanes as four neighbours of an array of numbers."""
+
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        builder.store(args[2], _quad_place(builder, *args[:2]), align=8)
+        return context.get_dummy_value()
+
+    return types.none(array, types.intp, quad), emit
+
+
+def _quad_place(builder: Any, array: Any, index: Any) -> Any:
+    return builder.bitcast(builder.gep(array, [index]), _LANES[QUAD].vector.as_pointer())
+
+
+@intrinsic
+def sum_of_quad(typing_context, quad):
+    """Sum of four lanes."""
+
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        parts = [builder.extract_element(args[0], ir.Constant(ir.IntType(32), k)) for k in range(QUAD)]
+        return builder.fadd(builder.fadd(parts[0], parts[1]), builder.fadd(parts[2], parts[3]))
+
+    return types.float64(quad), emit
