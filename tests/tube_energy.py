@@ -8,16 +8,17 @@ from scipy.spatial.transform import Rotation
 from wm_drake.bodies import add_bodies, add_load, set_bodies
 from wm_drake.kernel.alone import Alone
 from wm_drake.kernel.packing import initial_state
+from wm_drake.kernel.samples import trajectory_of
 from wm_drake.kernel.schedule import schedule_of
 
 
 def dense_states(setup, profile, step):
     """States (n, size) at every step, torque of the motor, and the layout."""
     machine, schedule, x = Alone(setup), schedule_of(profile, step, step), initial_state(setup, profile)
-    samples = np.full((len(schedule.time), len(x)), np.nan)
-    samples[0] = x
+    samples = np.full((len(schedule.time), len(x) + machine.layout.rates_size), np.nan)
     machine.integrate(schedule, 0, len(schedule.step), x, samples)
-    return schedule.time, samples, machine.rates(schedule, samples)[:, 6], machine.layout
+    torque = trajectory_of(samples, schedule, machine.p, machine.layout).motor_torque
+    return schedule.time, samples[:, : len(x)], torque, machine.layout
 
 
 class Motion:

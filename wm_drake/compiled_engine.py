@@ -6,10 +6,11 @@ import numpy as np
 
 from wm_drake.kernel.alone import Alone
 from wm_drake.kernel.packing import initial_state
+from wm_drake.kernel.samples import trajectory_of
 from wm_drake.kernel.schedule import schedule_of
 from wm_drake.machine import OUTPUT_PERIOD, Setup
 from wm_drake.parameters import SpinProfile
-from wm_drake.trajectory import Trajectory, diverging_coordinate, ended_where_it_diverged
+from wm_drake.trajectory import Trajectory, diverging_coordinate
 
 PAUSE_STEPS = 2000
 """Steps between looks at the state and reports of progress: some milliseconds."""
@@ -33,13 +34,11 @@ def run_compiled(setup: Setup, profile: SpinProfile, step: float, progress: Call
         InputError: the machine has something that this engine does not represent.
     """
     machine, schedule, x = Alone(setup), schedule_of(profile, step, OUTPUT_PERIOD), initial_state(setup, profile)
-    samples = np.full((len(schedule.time), len(x)), np.nan)
-    samples[0] = x
-    done = 0
-    while done < len(schedule.step) and diverging_coordinate(x) is None:
-        begin, done = done, min(done + PAUSE_STEPS, len(schedule.step))
+    samples = np.full((len(schedule.time), len(x) + machine.layout.rates_size), np.nan)
+    done, steps, over = 0, len(schedule.step), False
+    while done < steps and not over:
+        over = diverging_coordinate(x) is not None
+        begin, done = done, done + 1 if over else min(done + PAUSE_STEPS, steps)  # one more: writes the state out of bounds
         machine.integrate(schedule, begin, done, x, samples)
-        progress(done / len(schedule.step))
-    rates = machine.rates(schedule, samples)
-    motion, deformation, tubes, carrier = machine.layout.parts(samples)
-    return ended_where_it_diverged(Trajectory(schedule.time, motion, deformation, rates[:, 6], rates[:, :6], tubes, carrier))
+        progress(done / steps)
+    return trajectory_of(samples, schedule, machine.p, machine.layout)

@@ -121,7 +121,8 @@ class Scene:
 
     def _nearest(self, pose: FloatArray, pair: tuple[GeometryId, GeometryId]) -> tuple[float, FloatArray, FloatArray]:
         """`distance`, and the unit vector in W along which the first is to move away from the second."""
-        self._put(np.append(pose, 0.0))
+        # Drake stops when near enough, a micrometre or so: poses that differ in rounding only should get the same answer
+        self._put(np.append(np.round(pose, 9), 0.0))
         query = self._scene_graph.get_query_output_port().Eval(self._scene_graph.GetMyContextFromRoot(self._context))
         nearest = query.ComputeSignedDistancePairClosestPoints(*pair)
         first = nearest.id_A == pair[0]  # Drake may swap the pair

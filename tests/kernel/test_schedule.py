@@ -28,14 +28,16 @@ def angle_at(profile, time):
 def test_steps_end_at_corners_and_samples_and_are_no_longer_than_asked(profile, step):
     schedule = schedule_of(profile, step, PERIOD)
     ends = np.cumsum(schedule.step)
-    assert np.all(schedule.step > 0.0)
+    begins = ends - schedule.step
+    assert np.all(schedule.step[:-1] > 0.0)
+    assert schedule.step[-1] == 0.0
     assert np.all(schedule.step <= step * (1.0 + 1e-9))
     assert ends[-1] == pytest.approx(profile.duration, abs=1e-12)
     for corner in profile.time[1:]:
         assert np.min(np.abs(ends - corner)) < 1e-10
     sampled = schedule.row >= 0
-    np.testing.assert_array_equal(schedule.row[sampled], np.arange(1, len(schedule.time)))
-    np.testing.assert_allclose(ends[sampled], schedule.time[1:], atol=1e-10)
+    np.testing.assert_array_equal(schedule.row[sampled], np.arange(len(schedule.time)))
+    np.testing.assert_allclose(begins[sampled], schedule.time, atol=1e-10)
     np.testing.assert_allclose(schedule.time, PERIOD * np.arange(len(schedule.time)))
     assert profile.duration - schedule.time[-1] < PERIOD * (1.0 + 1e-9)
 
@@ -59,4 +61,4 @@ def test_acceleration_at_a_sample_is_that_of_the_piece_that_begins_there():
     profile = PROFILES["corners on samples"]
     schedule = schedule_of(profile, 2.5e-3, PERIOD)
     expected = [profile.acceleration()[i] for i in (0, 0, 1, 2, 2)]
-    np.testing.assert_allclose(schedule.sample_acceleration[[0, 99, 100, 101, -1]], expected)
+    np.testing.assert_allclose(schedule.acceleration[schedule.row >= 0][[0, 99, 100, 101, -1]], expected)

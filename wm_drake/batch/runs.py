@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from wm_drake.batch.jobs import Job, Kind
-from wm_drake.kernel.histories import POINT_SIZE, measure_samples_lanes, rates_history
+from wm_drake.kernel.histories import POINT_SIZE, measure_samples_lanes
 from wm_drake.kernel.integration import integrate_lanes
-from wm_drake.kernel.mechanics import DRUM_RATE, LINE_SIZE, STATE_SIZE
+from wm_drake.kernel.mechanics import DRUM_RATE, LINE_SIZE, RATES_SIZE, STATE_SIZE
 from wm_drake.kernel.packing import Layout, aligned
+from wm_drake.kernel.samples import trajectory_of
 from wm_drake.kernel.schedule import Schedule, schedule_of
 from wm_drake.laws.lanes import WIDTH
 from wm_drake.machine import OUTPUT_PERIOD
@@ -23,10 +24,8 @@ from wm_drake.trajectory import (
     LARGEST_ANGLE,
     LARGEST_DISPLACEMENT,
     Divergence,
-    Trajectory,
     divergence_text,
     diverging_coordinate,
-    ended_where_it_diverged,
 )
 from wm_drake.vibration import region_displacements
 
@@ -80,17 +79,16 @@ class Runner:
         # without amplitudes only the detergent point is followed, which comes last
         first = 0 if _FILTERED & set(self.measures) else -3 * POINT_SIZE
         points = [job.numbers.points[first:] for job in jobs]
-        size, count, rows = len(jobs[0].begin), len(points[0]) // POINT_SIZE, len(schedule.time)
+        size, count, rows = len(jobs[0].begin) + kind.layout.rates_size, len(points[0]) // POINT_SIZE, len(schedule.time)
         p, x = self._lanes("packed", [job.packed for job in jobs]), self._lanes("begin", [job.begin for job in jobs])
         samples, moved, extremes = (
             self._array(name, length)
             for name, length in (("samples", rows * size), ("moved", rows * count), ("extremes", count + 7))
         )
-        samples[: x.size] = x.ravel()
         self._integrate(schedule, kind.layout, p.ravel(), x, samples)
         if self.stopped.is_set():
             return []
-        measured = self._lanes("points", points).ravel(), count, self._array("work", size), moved, extremes
+        measured = self._lanes("points", points).ravel(), count, self._array("work", STATE_SIZE), moved, extremes
         bounds = LARGEST_ANGLE, LARGEST_DISPLACEMENT
         measure_samples_lanes(samples, rows, size, bounds, p.ravel(), kind.layout.gasket, *measured)
         histories = samples.reshape(rows, size, WIDTH), moved.reshape(rows, count, WIDTH), extremes.reshape(-1, WIDTH)
@@ -99,13 +97,12 @@ class Runner:
     def _integrate(self, schedule: Schedule, layout: Layout, p: FloatArray, x: FloatArray, samples: FloatArray) -> None:
         sizes = (len(x), len(x), len(x), LINE_SIZE * len(layout.dampers))
         work = tuple(self._array(f"stage {i}", size) for i, size in enumerate(sizes))
-        done, count = 0, len(schedule.step)
-        while done < count and not self.stopped.is_set():
-            begin, done = done, min(done + PAUSE_STEPS, count)
+        done, steps, over = 0, len(schedule.step), False
+        while done < steps and not over and not self.stopped.is_set():
+            over = all(diverging_coordinate(lane) for lane in x.T)
+            begin, done = done, done + 1 if over else min(done + PAUSE_STEPS, steps)  # one more: writes states out of bounds
             integrate_lanes(schedule.steps, begin, done, p, layout.elements, x.ravel(), work, samples)
-            if all(diverging_coordinate(lane) for lane in x.T):
-                samples[(np.max(schedule.row[:done]) + 1) * x.size :] = np.nan
-                return
+        samples[(schedule.row[:done].max(initial=-1) + 1) * (x.size + layout.rates_size * WIDTH) :] = np.nan
 
     def _ended(self, job: Job, schedule: Schedule, samples: FloatArray, moved: FloatArray, extremes: FloatArray) -> Ended:
         good, sensors = int(extremes[-1]), moved.shape[1] - 3  # the last three points are the detergent point's
@@ -118,7 +115,7 @@ class Runner:
             elif measure == "gap":
                 arrays = [self._gap(schedule.time[:good], samples[:good, :6], job.begin[:6])]
             elif measure == "regions":
-                arrays = self._regions(job, schedule, np.ascontiguousarray(samples[:good]))
+                arrays = self._regions(job, np.ascontiguousarray(samples[:good]))
             elif measure == "power means":
                 arrays = [power_means(displacement)]
             else:
@@ -129,23 +126,14 @@ class Runner:
         return Ended(job.number, job.case, values, _divergence(schedule.time, samples, good), record)
 
     def _record(self, job: Job, schedule: Schedule, samples: FloatArray) -> Record:
-        rates = self._rates(job, schedule, samples)
-        motion, deformation, tubes, carrier = job.numbers.layout.parts(samples)
-        trajectory = Trajectory(schedule.time, motion, deformation, rates[:, 6], rates[:, :6], tubes, carrier)
-        record = as_record(job.numbers.setup, job.case, ended_where_it_diverged(trajectory))
+        trajectory = trajectory_of(samples, schedule, job.packed, job.numbers.layout)
+        record = as_record(job.numbers.setup, job.case, trajectory)
         return record.assign_attrs(engine="compiled", step_s=self.step)
 
-    def _rates(self, job: Job, schedule: Schedule, samples: FloatArray) -> FloatArray:
-        rates = np.empty((len(samples), 7))
-        acceleration = schedule.sample_acceleration[: len(samples), None]
-        rates_history(samples, acceleration, job.packed, job.numbers.layout.elements, rates)
-        return rates
-
-    def _regions(self, job: Job, schedule: Schedule, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _regions(self, job: Job, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
         setup = job.numbers.setup
         points = np.stack(list(setup.accelerometer_points.values()))
-        acceleration = self._rates(job, schedule, samples)[:, :6]
-        motion = samples[:, :STATE_SIZE]
+        motion, acceleration = samples[:, :STATE_SIZE], samples[:, len(job.begin) :][:, :RATES_SIZE]
         return region_displacements(motion, acceleration, points, setup.rest_pose, OUTPUT_PERIOD, job.case.profile)
 
     def _gap(self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray) -> FloatArray:

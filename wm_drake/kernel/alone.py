@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from wm_drake.kernel.histories import rates_history
 from wm_drake.kernel.integration import derivative_alone, integrate_alone
 from wm_drake.kernel.mechanics import LINE_SIZE
 from wm_drake.kernel.packing import aligned, pack, struts_side_by_side
@@ -16,7 +15,7 @@ class Alone:
     """A machine as it is set up, which no other runs beside.
 
     Attributes:
-        layout: Of its state and packed numbers.
+        p, layout: Packed numbers, from `pack`.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -25,7 +24,7 @@ class Alone:
         Raises:
             InputError: it has something that the compiled engine does not represent.
         """
-        self._p, self.layout = pack(setup)
+        self.p, self.layout = pack(setup)
         self._struts, self._elements = struts_side_by_side(setup, self.layout.elements)
         self._scratch = aligned(QUAD * LINE_SIZE * max(1, len(self._elements.dampers)))
 
@@ -33,7 +32,7 @@ class Alone:
         """Derivative of a state (size,) at an acceleration of the drum [rad/s^2], for integrators of others."""
         padded = np.append(x, np.zeros(QUAD))
         dx = np.empty_like(padded)
-        derivative_alone(padded, dx, acceleration, self._p, self._struts, self._elements, self._scratch)
+        derivative_alone(padded, dx, acceleration, self.p, self._struts, self._elements, self._scratch)
         return dx[: len(x)]
 
     def integrate(self, schedule: Schedule, begin: int, end: int, x: FloatArray, samples: FloatArray) -> None:
@@ -43,14 +42,8 @@ class Alone:
             schedule: The steps.
             begin, end: Numbers of steps.
             x: State (size,), which is advanced.
-            samples: States at the samples (rows, size); those between are written.
+            samples: (rows, size + `Layout.rates_size`) states and accelerations; those on the way are written.
         """
         work = (*(aligned(len(x) + QUAD) for _ in range(3)), self._scratch)
-        numbers = self._p, self._struts, self._elements
+        numbers = self.p, self._struts, self._elements
         integrate_alone(schedule.steps, begin, end, *numbers, x, work, samples.reshape(-1))
-
-    def rates(self, schedule: Schedule, samples: FloatArray) -> FloatArray:
-        """Accelerations of the tub and torque of the motor at samples, as `rates_history`. (rows, 7)"""
-        rates = np.empty((len(samples), 7))
-        rates_history(samples, schedule.sample_acceleration[:, None], self._p, self.layout.elements, rates)
-        return rates

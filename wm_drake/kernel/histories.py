@@ -2,12 +2,14 @@
 
 import numpy as np
 
-from wm_drake.kernel.mechanics import LINE_SIZE, mass_properties, state_derivative
+from wm_drake.kernel.matrices import three
+from wm_drake.kernel.mechanics import mass_properties, motor_torque
 from wm_drake.laws.compilation import law, long_running
 from wm_drake.laws.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, sine_cosine, where
 from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
 from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.vectors import add, dot, rotate, rotation_from_rpy
+from wm_drake.systems.element import PLANT_STATE_SIZE
 from wm_drake.systems.six_component_bushing import six_component_bushing_wrench
 
 POINT_SIZE = 7
@@ -15,32 +17,29 @@ POINT_SIZE = 7
 
 
 @long_running
-def rates_history(samples, acceleration, p, elements, rates):
-    """What follows from the state at each sample: accelerations of the tub, torque of the motor.
+def torque_history(motions, rates, acceleration, p, torque):
+    """Torque of the motor on the drum at samples.
 
     Args:
-        samples: States, (n, size).
-        acceleration: Of the drum at each sample, (n, 1). [rad/s^2]
-        p, elements: As for `state_derivative`.
-        rates: (n, 7), written: angular acceleration of the tub and acceleration of To, in W [rad/s^2, m/s^2]; torque of the
-            motor on the drum [N m].
+        motions: (n, 14) motion of what carries the drum, and the drum's, as `TubMotion` is read.
+        rates: (n, 6) its angular acceleration and that of its origin, in W. [rad/s^2, m/s^2]
+        acceleration: Of the drum, (n, 1). [rad/s^2]
+        p: Packed numbers of the bodies.
+        torque: (n, 1), written. [N m]
     """
     align_stack()
-    size = samples.shape[1] * WIDTH
-    x_numbers, drum_numbers, numbers = np.empty(size), np.empty(WIDTH), np.empty(7 * WIDTH)
-    x, drum, answer = lane_array(x_numbers), lane_array(drum_numbers), lane_array(numbers)
-    dx_numbers, scratch_numbers = np.empty(size), np.empty(LINE_SIZE * WIDTH * len(elements.dampers))
-    p_numbers = in_each_lane(p)
-    dx, scratch, q = lane_array(dx_numbers), lane_array(scratch_numbers), lane_array(p_numbers)
-    for begin in range(0, len(rates), WIDTH):
-        rows_to_lanes(samples, begin, x_numbers)
+    x_numbers, rates_numbers = np.empty(PLANT_STATE_SIZE * WIDTH), np.empty(6 * WIDTH)
+    drum_numbers, numbers, p_numbers = np.empty(WIDTH), np.empty(WIDTH), in_each_lane(p)
+    x, dx, drum = lane_array(x_numbers), lane_array(rates_numbers), lane_array(drum_numbers)
+    answer, q = lane_array(numbers), lane_array(p_numbers)
+    for begin in range(0, len(torque), WIDTH):
+        rows_to_lanes(motions, begin, x_numbers)
+        rows_to_lanes(rates, begin, rates_numbers)
         rows_to_lanes(acceleration, begin, drum_numbers)
         sine, cosine = sine_cosine(x[6])
         masses = mass_properties(q, cosine, sine)
-        answer[6] = state_derivative(x, dx, masses, x[13], drum[0], q, q, elements, scratch)
-        for k in range(6):
-            answer[k] = dx[7 + k]
-        lanes_to_rows(numbers, begin, rates)
+        answer[0] = motor_torque(tub_motion(x), three(dx, 0), three(dx, 3), masses, x[13], drum[0], q)
+        lanes_to_rows(numbers, begin, torque)
 
 
 @long_running
@@ -77,12 +76,12 @@ def measure_samples(samples, rows, size, bounds, p, gasket, points, count, x, mo
     """Displacements at measured points, and the largest values of a run up to the first sample out of bounds.
 
     Args:
-        samples: States, one after the other.
+        samples: Samples, one after the other, each with the state first.
         rows, size: How many they are, and how many numbers each has.
         bounds: Largest angle and displacement of the tub at which a run goes on. [rad, m]
         p, gasket: Packed numbers and where the gasket begins in them, -1 without one.
         points, count: Measured points, one after the other, and how many they are.
-        x: A state to work in.
+        x: The plant's part of a state, to work in.
         moved: Displacement at each sample and point, written. [m]
         extremes: Written: largest absolute displacement at each point [m]; largest absolute force and moment of the
             gasket on the housing, x, y, z [N, N m]; number of samples in bounds.
@@ -92,7 +91,7 @@ def measure_samples(samples, rows, size, bounds, p, gasket, points, count, x, mo
         extremes[k] = zero
     good = zero + 1.0
     for row in range(rows):
-        for k in range(size):
+        for k in range(PLANT_STATE_SIZE):
             x[k] = samples[row * size + k]
         good = good * in_bounds(x, bounds[0], bounds[1])
         motion = tub_motion(x)

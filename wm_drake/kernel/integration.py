@@ -1,6 +1,6 @@
 """The classical fourth-order Runge-Kutta scheme at fixed steps, for one machine or for several side by side."""
 
-from wm_drake.kernel.mechanics import DRUM_RATE, mass_properties, state_derivative, state_size
+from wm_drake.kernel.mechanics import DRUM_RATE, mass_properties, rates_size, state_derivative, state_size, write_rates
 from wm_drake.laws.compilation import law, long_running
 from wm_drake.laws.elementary import sine_cosine
 from wm_drake.laws.lanes import align_stack, lane_array, number_array, quad_array
@@ -16,7 +16,8 @@ def integrate(steps, begin, end, p, struts, elements, x, work, history):
         p, struts, elements: As for `state_derivative`.
         x: State, which is advanced.
         work: Three arrays of the size of the state, to work in, and `state_derivative`'s scratch.
-        history: States at the samples, one after the other; written at the end of steps that have a sample.
+        history: Samples, one after the other: the state, then `rates_size` numbers of its derivative; written at the begin of
+            steps that have one.
     """
     length, acceleration, drum, row = steps
     y, dx, total, scratch = work
@@ -26,11 +27,17 @@ def integrate(steps, begin, end, p, struts, elements, x, work, history):
         y[k] = total[k] = x[k]
     for i in range(begin, end):
         h = length[i]
+        sample = row[i] * (size + rates_size(elements))  # below 0 for none
+        if sample >= 0:
+            for k in range(size):
+                history[sample + k] = x[k]
         for stage in range(4):
             node = 2 * i + (stage + 1) // 2
             if stage == 1 or stage == 3:
                 masses = mass_properties(p, drum[node, 1], drum[node, 2])
             state_derivative(y, dx, masses, drum[node, 0], acceleration[i], p, struts, elements, scratch)
+            if stage == 0 and sample >= 0:
+                write_rates(history, sample + size, dx, elements)
             inner = stage == 1 or stage == 2
             weight = h / 3.0 if inner else h / 6.0
             ahead = h if stage == 2 else 0.5 * h
@@ -43,10 +50,6 @@ def integrate(steps, begin, end, p, struts, elements, x, work, history):
         for k in range(size):
             x[k] = total[k]
             y[k] = total[k]
-        if row[i] >= 0:
-            at = row[i] * size
-            for k in range(size):
-                history[at + k] = x[k]
 
 
 @long_running

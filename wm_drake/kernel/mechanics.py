@@ -41,6 +41,8 @@ STATE_SIZE = PLANT_STATE_SIZE
 `kernel.bearing`."""
 DRUM_RATE = 13
 """Where the state has it."""
+RATES_SIZE = 6
+"""Accelerations of a body that samples keep."""
 
 Elements = namedtuple("Elements", ("springs", "dampers", "deformations", "bushings", "telescopes", "bearing", "tubes"))
 """Of a machine: indices where the packed numbers of each spring, damper, bushing and telescopic damper begin, arrays, the last
@@ -96,7 +98,7 @@ def accelerations(motion, masses, rate, acceleration, wrench, p):
         p: Packed numbers of the bodies.
 
     Returns:
-        Angular acceleration of the tub and acceleration of To, in W [rad/s^2, m/s^2], torque of the motor on the drum [N m].
+        Angular acceleration of the tub and acceleration of To, in W. [rad/s^2, m/s^2]
     """
     a, o, tub_moment = three(p, AXIS), three(p, ORIGIN), three(p, TUB_MOMENT)
     q = p[INVERSE_MASS]
@@ -106,8 +108,7 @@ def accelerations(motion, masses, rate, acceleration, wrench, p):
     if apart:
         moment = subtract(moment, cross(o, applied))
     w = rotate_back(motion.rotation, motion.angular_velocity)
-    w_drum = add(w, scale(rate, a))
-    b = add(scale(acceleration, a), scale(rate, cross(w, a)))
+    w_drum, b = drum_motion(w, rate, acceleration, a)
     drum_flow = add(cross(b, masses.drum_moment), cross(w_drum, cross(w_drum, masses.drum_moment)))
     force = subtract(applied, add(cross(w, cross(w, tub_moment)), drum_flow))
     gyration = add(times(masses.drum_inertia, b), cross(w_drum, times(masses.drum_inertia, w_drum)))
@@ -115,12 +116,35 @@ def accelerations(motion, masses, rate, acceleration, wrench, p):
     # gravity accelerates all alike: it turns nothing, and comes in at the end
     w_rate = times(masses.inverse_inertia, subtract(moment, scale(q, cross(masses.moment, force))))
     a_O = scale(q, subtract(force, cross(w_rate, masses.moment)))
-    on_drum = add(gyration, add(times(masses.drum_inertia, w_rate), cross(masses.drum_moment, a_O)))
     a_To = a_O
     if apart:
         a_To = subtract(a_O, add(cross(w_rate, o), cross(w, cross(w, o))))
-    v_rate = add(rotate(motion.rotation, a_To), three(p, GRAVITY))
-    return rotate(motion.rotation, w_rate), v_rate, dot(a, on_drum) + p[JOINT_DAMPING] * rate
+    return rotate(motion.rotation, w_rate), add(rotate(motion.rotation, a_To), three(p, GRAVITY))
+
+
+@law
+def motor_torque(motion, w_rate, v_rate, masses, rate, acceleration, p):
+    """Torque of the motor on the drum: its balance of moments about the axis. [N m]
+
+    Args:
+        motion: `TubMotion` of the tub, or of the drum's carrier in a bearing that gives.
+        w_rate, v_rate: What `accelerations` answers for it.
+        masses, rate, acceleration, p: As there.
+    """
+    a, o = three(p, AXIS), three(p, ORIGIN)
+    w, w_rate = rotate_back(motion.rotation, motion.angular_velocity), rotate_back(motion.rotation, w_rate)
+    w_drum, b = drum_motion(w, rate, acceleration, a)
+    a_To = rotate_back(motion.rotation, subtract(v_rate, three(p, GRAVITY)))
+    a_O = add(a_To, add(cross(w_rate, o), cross(w, cross(w, o))))
+    turning = times(masses.drum_inertia, add(b, w_rate))
+    on_drum = add(add(turning, cross(w_drum, times(masses.drum_inertia, w_drum))), cross(masses.drum_moment, a_O))
+    return dot(a, on_drum) + p[JOINT_DAMPING] * rate
+
+
+@law
+def drum_motion(w, rate, acceleration, a):
+    """w_D and b of the drum; all in T."""
+    return add(w, scale(rate, a)), add(scale(acceleration, a), scale(rate, cross(w, a)))
 
 
 @law
@@ -134,19 +158,14 @@ def state_derivative(x, dx, masses, rate, acceleration, p, struts, elements, scr
             `wm_drake.kernel.side_by_side` made of them.
         elements: `Elements`, springs and dampers in `struts`, all others in p.
         scratch: At least `LINE_SIZE` entries a damper to work in, of the kind of `struts`.
-
-    Returns:
-        Torque of the motor on the drum. [N m]
     """
     springs, dampers, deformations, bushings, telescopes, bearing, tubes = elements
     roll, pitch, yaw = sine_cosine(x[0]), sine_cosine(x[1]), sine_cosine(x[2])
     motion = motion_from_sines(x, 0, roll, pitch, yaw)
     zero = 0.0 * x[0]
     total = (zero, zero, zero, zero, zero, zero)
-    for at in springs:
-        wrench, _ = spring_strut_wrench(motion, struts, at)
-        total = plus(total, together(wrench, struts, at))
-    # dampers in three rounds: each is a long chain of roots and quotients, and short rounds let the processor overlap them
+    # dampers in rounds, the last behind all else: each is a long chain of roots and quotients, which the processor overlaps
+    # with what stands between (a quarter of the time of one machine alone)
     for i in range(len(dampers)):
         write_line(scratch, LINE_SIZE * i, *friction_damper_line(motion, struts, dampers[i]))
     for i in range(len(dampers)):
@@ -154,24 +173,26 @@ def state_derivative(x, dx, masses, rate, acceleration, p, struts, elements, scr
         tension, its_rate = friction_damper_tension(scratch[LINE_SIZE * i + 4], deformation, struts, dampers[i])
         scratch[LINE_SIZE * i + 12] = tension
         write_rate(dx, deformations[i], its_rate)
+    for at in springs:
+        wrench, _ = spring_strut_wrench(motion, struts, at)
+        total = plus(total, together(wrench, struts, at))
+    for i in range(len(bushings)):
+        wrench, _ = six_component_bushing_wrench(motion, p, bushings[i])
+        total = plus(total, wrench)
     for i in range(len(dampers)):
         arm, line = read_line(scratch, LINE_SIZE * i)
         wrench = friction_damper_wrench(motion, arm, line, scratch[LINE_SIZE * i + 12], struts, dampers[i])
         total = plus(total, together(wrench, struts, dampers[i]))
-    for i in range(len(bushings)):
-        wrench, _ = six_component_bushing_wrench(motion, p, bushings[i])
-        total = plus(total, wrench)
     gravity = three(p, GRAVITY)
     total = with_telescopes(x, dx, motion, gravity, p, telescopes, tubes, total)
-    carrier = tubes + TUBES_STATE_SIZE * count_of(telescopes)
-    w_rate, v_rate, torque = with_bearing(x, dx, motion, masses, rate, acceleration, total, p, bearing, carrier)
+    carrier = carrier_begin(elements)
+    w_rate, v_rate = with_bearing(x, dx, motion, masses, rate, acceleration, total, p, bearing, carrier)
     dx[0], dx[1], dx[2] = rpy_rates(motion.angular_velocity, pitch, yaw)
     dx[3], dx[4], dx[5] = motion.velocity
     dx[6] = zero + rate
     dx[7], dx[8], dx[9] = w_rate
     dx[10], dx[11], dx[12] = v_rate
     dx[13] = zero + acceleration
-    return torque
 
 
 @law
@@ -190,17 +211,39 @@ def with_bearing(x, dx, motion, masses, rate, acceleration, total, p, bearing, f
         return accelerations(motion, masses, rate, acceleration, total, p)
     carrier = carrier_motion(x, dx, first)
     on_tub, on_carrier, _ = drum_bearing_forces(motion, carrier, p, bearing + TUB_SIZE)
-    w_rate, v_rate, torque = accelerations(carrier, masses, rate, acceleration, on_carrier, p)
+    w_rate, v_rate = accelerations(carrier, masses, rate, acceleration, on_carrier, p)
     dx[first + 6], dx[first + 7], dx[first + 8] = w_rate
     dx[first + 9], dx[first + 10], dx[first + 11] = v_rate
-    w_rate, v_rate = tub_accelerations(motion, plus(total, on_tub), three(p, GRAVITY), p, bearing)
-    return w_rate, v_rate, torque
+    return tub_accelerations(motion, plus(total, on_tub), three(p, GRAVITY), p, bearing)
 
 
 @law
 def state_size(elements):
     """How many numbers the state of a machine with these elements has."""
-    return elements.tubes + TUBES_STATE_SIZE * count_of(elements.telescopes) + carrier_size(elements.bearing)
+    return carrier_begin(elements) + carrier_size(elements.bearing)
+
+
+@law
+def rates_size(elements):
+    """How many numbers of the derivative a sample keeps."""
+    return RATES_SIZE if elements.bearing is None else 2 * RATES_SIZE
+
+
+@law
+def write_rates(history, at, dx, elements):
+    """Keeps accelerations: angular one of the tub and that of To, in W [rad/s^2, m/s^2]; in a bearing, also the carrier's."""
+    for k in range(RATES_SIZE):
+        history[at + k] = dx[7 + k]
+    if elements.bearing is not None:
+        first = carrier_begin(elements) + 6
+        for k in range(RATES_SIZE):
+            history[at + RATES_SIZE + k] = dx[first + k]
+
+
+@law
+def carrier_begin(elements):
+    """Where the state of the drum's carrier begins, if it has one."""
+    return elements.tubes + TUBES_STATE_SIZE * count_of(elements.telescopes)
 
 
 @law

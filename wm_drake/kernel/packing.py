@@ -12,7 +12,7 @@ from pydrake.systems.framework import Context
 
 from wm_drake.coordinates import CARRIER
 from wm_drake.errors import InputError, input_error
-from wm_drake.kernel.mechanics import BODIES_SIZE, DRUM_RATE, STATE_SIZE, Elements
+from wm_drake.kernel.mechanics import BODIES_SIZE, DRUM_RATE, RATES_SIZE, STATE_SIZE, Elements
 from wm_drake.kernel.tubes import TUBES_STATE_SIZE
 from wm_drake.laws.lanes import QUAD, WIDTH
 from wm_drake.machine import Setup
@@ -49,6 +49,11 @@ class Layout:
         bearing = self.bearing if self.bearing >= 0 else None
         tubes = STATE_SIZE + len(dampers)
         return Elements(springs, dampers, deformations, bushings, telescopes if self.telescopes else None, bearing, tubes)
+
+    @property
+    def rates_size(self) -> int:
+        """How many numbers of the derivative a sample keeps behind the state."""
+        return RATES_SIZE if self.bearing < 0 else 2 * RATES_SIZE
 
     def parts(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Of states (n, size).

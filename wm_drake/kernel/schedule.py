@@ -14,13 +14,12 @@ class Schedule:
     """Steps that end at every output time and at every corner of the profile, so that no step sees the acceleration jump.
 
     Attributes:
-        step: (n,) length of each step. [s]
+        step: (n,) length of each step; the last is of no length, for the sample at the end. [s]
         acceleration: (n,) of the drum in each step. [rad/s^2]
         drum: (2 n + 1, 4) rate, cosine and sine of the angle, and the angle, at begin and middle of each step and at the
             end of the last. [rad/s, 1, 1, rad]
-        row: (n,) number of the sample at the end of each step, or -1.
+        row: (n,) number of the sample at the begin of each step, or -1.
         time: (rows,) times of the samples, from 0. [s]
-        sample_acceleration: (rows,) of the drum just after each sample. [rad/s^2]
     """
 
     step: FloatArray
@@ -28,7 +27,6 @@ class Schedule:
     drum: FloatArray
     row: np.ndarray
     time: FloatArray
-    sample_acceleration: FloatArray
 
     @property
     def steps(self) -> tuple[FloatArray, FloatArray, FloatArray, np.ndarray]:
@@ -43,28 +41,22 @@ def schedule_of(profile: SpinProfile, step: float, period: float) -> Schedule:
     corners, acceleration = np.array(profile.time), np.array(profile.acceleration())
     marks = np.union1d(time, corners)
     marks = np.delete(marks, np.flatnonzero(np.diff(marks) < 1e-9 * period) + 1)  # a corner that is a sample, but for rounding
-    pieces = np.ceil(np.diff(marks) / step * (1.0 - 1e-9)).astype(int)
-    lengths = np.repeat(np.diff(marks) / pieces, pieces)
-    number = np.arange(len(lengths)) - np.repeat(np.cumsum(pieces) - pieces, pieces)  # of a step between two marks
-    begins = np.repeat(marks[:-1], pieces) + number * lengths
+    pieces = np.append(np.ceil(np.diff(marks) / step * (1.0 - 1e-9)).astype(int), 1)
+    lengths = np.repeat(np.diff(marks, append=marks[-1]) / pieces, pieces)
+    first = np.cumsum(pieces) - pieces  # step from each mark
+    begins = np.repeat(marks, pieces) + (np.arange(len(lengths)) - np.repeat(first, pieces)) * lengths
     middles = begins + 0.5 * lengths
+    row = np.full(len(lengths), -1, dtype=np.int64)
+    nearest = np.rint(marks / period).astype(int)
+    sampled = np.abs(marks - period * nearest) < 1e-9 * period
+    row[first[sampled]] = nearest[sampled]
     return Schedule(
         step=lengths,
         acceleration=acceleration[_piece(corners, middles)],
         drum=_drum_motion(profile, np.append(np.column_stack([begins, middles]).ravel(), marks[-1])),
-        row=_rows(marks, pieces, period),
+        row=row,
         time=time,
-        sample_acceleration=acceleration[_piece(corners, time)],
     )
-
-
-def _rows(marks: FloatArray, pieces: np.ndarray, period: float) -> np.ndarray:
-    """Number of the sample that each step ends with, or -1."""
-    row = np.full(np.sum(pieces), -1, dtype=np.int64)
-    nearest = np.rint(marks[1:] / period).astype(int)
-    sampled = np.abs(marks[1:] - period * nearest) < 1e-9 * period
-    row[(np.cumsum(pieces) - 1)[sampled]] = nearest[sampled]
-    return row
 
 
 def _piece(corners: FloatArray, time: FloatArray) -> np.ndarray:
