@@ -156,31 +156,30 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
         record: From `wm_drake.simulation.simulate`.
         scene: The machine's shapes, for the smallest gap; it is left out if None.
     """
-    size, samples = amplitudes(filtered(record.displacement.values, _period(record)))
-    speed = record.drum_speed.values[samples] if record.sizes["time"] else size
-    by_sensor = {"sensor": record.sensor.values}
-    pose = np.column_stack([record.tub_angle.values, record.tub_position.values])
-    gap = scene.smallest_gap(record.time.values, pose, np.asarray(record.attrs["rest_pose"])) if scene else None
+    values = {name: variable.values for name, variable in record.variables.items()}  # attributes of a dataset take longer
+    size, samples = amplitudes(filtered(values["displacement"], _period(record)))
+    speed = values["drum_speed"][samples] if record.sizes["time"] else size
+    pose = np.column_stack([values["tub_angle"], values["tub_position"]])
+    gap = scene.smallest_gap(values["time"], pose, np.asarray(record.attrs["rest_pose"])) if scene else None
+    by_sensor, by_axis = record.coords["sensor"].coords, record.coords["axis"].coords
+    force, moment = (_of_gasket(values["bushing"], values[f"bushing_{kind}"]) for kind in ("force", "moment"))
     return Measures(
         amplitude=xr.DataArray(size, by_sensor),
         critical_speed=xr.DataArray(np.where(np.isnan(size), np.nan, speed), by_sensor),
-        detergent_displacement=_largest(record.detergent_displacement.values, record.axis.values),
-        gasket_force=_largest_of_gasket(record.bushing_force),
-        gasket_moment=_largest_of_gasket(record.bushing_moment),
+        detergent_displacement=xr.DataArray(_largest(values["detergent_displacement"]), by_axis),
+        gasket_force=xr.DataArray(_largest(force), by_axis),
+        gasket_moment=xr.DataArray(_largest(moment), by_axis),
         smallest_gap=gap,
     )
 
 
-def _largest(history: FloatArray, axes: FloatArray) -> xr.DataArray:
-    """Largest absolute value over time (time, axis); NaN of no samples."""
+def _largest(history: FloatArray) -> list[float]:
+    """Largest absolute value over time (time, axis) along each axis; NaN of no samples."""
     # column by column: numpy is slow along the long side of a narrow table
-    size = [np.max(np.abs(column)) if len(column) else np.nan for column in history.T]
-    return xr.DataArray(size, {"axis": axes})
+    return [np.max(np.abs(column)) if len(column) else np.nan for column in history.T]
 
 
-def _largest_of_gasket(history: xr.DataArray) -> xr.DataArray:
-    """The same of (time, bushing, axis) for the gasket; zero without one."""
-    names, axes = list(history.bushing.values), history.axis.values
-    if "gasket" not in names:
-        return xr.DataArray(np.zeros(len(axes)), {"axis": axes})
-    return _largest(history.values[:, names.index("gasket")], axes)
+def _of_gasket(bushings: FloatArray, history: FloatArray) -> FloatArray:
+    """The part (time, axis) of (time, bushing, axis) that is the gasket's; zero without one."""
+    found = np.flatnonzero(bushings == "gasket")
+    return history[:, found[0]] if len(found) else np.zeros((1, history.shape[2]))
