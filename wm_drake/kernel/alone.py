@@ -1,10 +1,14 @@
 """One machine by itself: packed numbers, its struts side by side, and memory to integrate in."""
 
+import itertools
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 
 from wm_drake.kernel.integration import derivative_alone, integrate_alone
-from wm_drake.kernel.mechanics import LINE_SIZE
-from wm_drake.kernel.packing import aligned, pack, struts_side_by_side
+from wm_drake.kernel.mechanics import LINE_SIZE, STATE_SIZE, Elements
+from wm_drake.kernel.packing import aligned, pack
 from wm_drake.kernel.schedule import Schedule
 from wm_drake.laws.lanes import QUAD
 from wm_drake.machine import Setup
@@ -47,3 +51,35 @@ class Alone:
         work = (*(aligned(len(x) + QUAD) for _ in range(3)), self._scratch)
         numbers = self.p, self._struts, self._elements
         integrate_alone(schedule.steps, begin, end, *numbers, x, work, samples.reshape(-1))
+
+
+def struts_side_by_side(setup: Setup, elements: Elements) -> tuple[FloatArray, Elements]:
+    """Springs and dampers of one machine once more, neighbours of one structure together in lanes.
+
+    Returns:
+        Their packed numbers as an array of quads, before each group the weights that `kernel.side_by_side` speaks of; and where
+        things begin with these in place of those of `pack`.
+    """
+    springs, dampers = (list(_alike(list(struts.values()))) for struts in (setup.springs, setup.dampers))
+    groups = [*springs, *dampers]
+    sizes = [1 + len(group[0].packed()) for group in groups]
+    begins = np.cumsum([1, *sizes])[:-1]  # behind the weights
+    struts = aligned(QUAD * sum(sizes))
+    struts[:] = np.concatenate([_in_lanes(group) for group in groups]) if groups else 0.0
+    deformations = STATE_SIZE + np.cumsum([0, *map(len, dampers)])[:-1]
+    return struts, elements._replace(springs=begins[: len(springs)], dampers=begins[len(springs) :], deformations=deformations)
+
+
+def _alike(struts: list[Any]) -> Iterator[list[Any]]:
+    """Neighbours of one structure, up to `QUAD` at a time."""
+    for _, neighbours in itertools.groupby(struts, key=lambda strut: strut.structure):
+        group = list(neighbours)
+        yield from (group[begin : begin + QUAD] for begin in range(0, len(group), QUAD))
+
+
+def _in_lanes(group: list[Any]) -> FloatArray:
+    """Weights and packed numbers of a group of struts, each number of all of them together. (flat)"""
+    idle = QUAD - len(group)
+    rows = [strut.packed() for strut in group]
+    weights = np.repeat([1.0, 0.0], [len(group), idle])
+    return np.concatenate([weights, np.column_stack([*rows, *rows[-1:] * idle]).ravel()])

@@ -1,9 +1,6 @@
 """Setup -> flat numbers and indices that the compiled engine runs on; everything is read from the built machine."""
 
-import itertools
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -14,7 +11,7 @@ from wm_drake.coordinates import CARRIER
 from wm_drake.errors import InputError, input_error
 from wm_drake.kernel.mechanics import BODIES_SIZE, DRUM_RATE, RATES_SIZE, STATE_SIZE, Elements
 from wm_drake.kernel.tubes import TUBES_STATE_SIZE
-from wm_drake.laws.lanes import QUAD, WIDTH
+from wm_drake.laws.lanes import WIDTH
 from wm_drake.machine import Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.elements import FloatArray
@@ -108,38 +105,6 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
         structure += setup.bearing.structure
     bearing = size if setup.bearing else -1
     return np.concatenate(parts), Layout(**indices, gasket=gasket, bearing=bearing, structure=tuple(structure))
-
-
-def struts_side_by_side(setup: Setup, elements: Elements) -> tuple[FloatArray, Elements]:
-    """Springs and dampers of one machine once more, neighbours of one structure together in lanes.
-
-    Returns:
-        Their packed numbers as an array of quads, before each group the weights that `kernel.side_by_side` speaks of; and where
-        things begin with these in place of those of `pack`.
-    """
-    springs, dampers = (list(_alike(list(struts.values()))) for struts in (setup.springs, setup.dampers))
-    groups = [*springs, *dampers]
-    sizes = [1 + len(group[0].packed()) for group in groups]
-    begins = np.cumsum([1, *sizes])[:-1]  # behind the weights
-    struts = aligned(QUAD * sum(sizes))
-    struts[:] = np.concatenate([_in_lanes(group) for group in groups]) if groups else 0.0
-    deformations = STATE_SIZE + np.cumsum([0, *map(len, dampers)])[:-1]
-    return struts, elements._replace(springs=begins[: len(springs)], dampers=begins[len(springs) :], deformations=deformations)
-
-
-def _alike(struts: list[Any]) -> Iterator[list[Any]]:
-    """Neighbours of one structure, up to `QUAD` at a time."""
-    for _, neighbours in itertools.groupby(struts, key=lambda strut: strut.structure):
-        group = list(neighbours)
-        yield from (group[begin : begin + QUAD] for begin in range(0, len(group), QUAD))
-
-
-def _in_lanes(group: list[Any]) -> FloatArray:
-    """Weights and packed numbers of a group of struts, each number of all of them together. (flat)"""
-    idle = QUAD - len(group)
-    rows = [strut.packed() for strut in group]
-    weights = np.repeat([1.0, 0.0], [len(group), idle])
-    return np.concatenate([weights, np.column_stack([*rows, *rows[-1:] * idle]).ravel()])
 
 
 def aligned(size: int) -> FloatArray:

@@ -1,6 +1,6 @@
 """Struts side by side: what `kernel.mechanics` is written with so that those of one machine may be the lanes of a vector.
 
-A run alone has no other runs to fill lanes with, but its struts are alike: `packing.struts_side_by_side` packs up to four
+A run alone has no other runs to fill lanes with, but its struts are alike: `alone.struts_side_by_side` packs up to four
 neighbours of one structure as a strut whose numbers are lanes, behind a weight of 1 for a lane in use and of 0 for an idle one.
 The same source takes struts one after the other, as lanes of several runs; these functions have nothing to do then.
 """

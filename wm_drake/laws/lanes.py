@@ -1,10 +1,10 @@
-"""Lanes: a scalar type of the compiler that carries several runs side by side through the processor's vector units.
+"""Lanes: a scalar type of the compiler that carries several numbers side by side through the processor's vector units.
 
-A law that is compiled for floats can be compiled for `LANES` as well: every number in it is then `WIDTH` numbers, one a run,
-and every operation acts on each of them alone. Operations are those of IEEE arithmetic, one by one, none fused or
-reordered; so each lane gives bit for bit what the law gives for floats, whatever its neighbours hold. A law qualifies
-if it chooses with `elementary.where` in place of `if`; what holds for all lanes alike (number of a law, points of a table)
-may be asked with `int`, which reads the first lane.
+A law that is compiled for floats can be compiled for lanes as well: every number in it is then `WIDTH` numbers, one a run, or
+`QUAD` numbers, one a strut of one machine, and every operation acts on each of them alone. Operations are those of IEEE
+arithmetic, none reordered, products and sums fused where the processor can; so each lane gives what the law gives for floats,
+whatever its neighbours hold. A law qualifies if it chooses with `elementary.where` in place of `if`; what holds for all lanes
+alike (number of a law, points of a table) may be asked with `int`, which reads the first lane.
 
 The vectors are LLVM's: on a processor with narrower units the same code takes several instructions for one.
 """
@@ -23,7 +23,7 @@ WIDTH = 8
 """Runs side by side: one register of 512 bits, two of 256."""
 
 QUAD = 4
-"""Elements of one machine side by side."""
+"""Struts of one machine side by side: half such a register; four of one kind are rarely exceeded."""
 
 _FIRST = ir.Constant(ir.IntType(32), 0)
 
@@ -199,7 +199,7 @@ def lane_array(typing_context, array):
 
 @intrinsic
 def quad_array(typing_context, array):
-    """The same of lanes of elements of one machine."""
+    """The same of quads."""
     return (_LANE_ARRAYS[QUAD](array), _address_of) if _is_flat(array) else None
 
 
@@ -276,7 +276,7 @@ def _set_number(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 @intrinsic
 def quad_at(typing_context, array, index):
-    """Four neighbours of an array of numbers as lanes."""
+    """Four neighbours of an array of numbers as a quad; nothing checks its bounds."""
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.load(_quad_place(builder, *args), align=8)
@@ -286,7 +286,7 @@ def quad_at(typing_context, array, index):
 
 @intrinsic
 def put_quad_at(typing_context, array, index, quad):
-    """Lanes as four neighbours of an array of numbers."""
+    """Writes a quad to four neighbours of an array of numbers."""
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         builder.store(args[2], _quad_place(builder, *args[:2]), align=8)
@@ -301,7 +301,7 @@ def _quad_place(builder: Any, array: Any, index: Any) -> Any:
 
 @intrinsic
 def sum_of_quad(typing_context, quad):
-    """Sum of four lanes."""
+    """Sum of the lanes of a quad."""
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         parts = [builder.extract_element(args[0], ir.Constant(ir.IntType(32), k)) for k in range(QUAD)]
