@@ -1,11 +1,13 @@
 """What all report pages share: layout and style, pictures, and what stands under "What was run"."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from wm_drake.report.figures import inline_svg_or_png
@@ -39,7 +41,13 @@ def render(template: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(template).render(**values)
+    return environment.get_template(template).render(**values, sections=sections)
+
+
+def sections(body: str) -> list[tuple[str, Markup]]:
+    """Anchor and heading of each section of a page's text, for its contents; a heading up to its colon."""
+    found = re.findall(r'<section id="([^"]+)">\s*<h2>(.*?)</h2>', body, re.DOTALL)
+    return [(anchor, Markup(heading.split(":")[0])) for anchor, heading in found]  # out of a page: escaped
 
 
 def versions_of(attrs: Mapping[str, Any]) -> str:
