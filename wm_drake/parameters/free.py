@@ -24,10 +24,6 @@ class Measured(Frozen):
     unit: str
     is_list: bool
 
-    def in_unit(self, unit: str) -> tuple[float, ...]:
-        """The numbers in a unit of the same dimension."""
-        return tuple(u.from_base(value, unit) for value in self.values)
-
 
 def _measured(text: Any) -> Any:
     if isinstance(text, int | float) and not isinstance(text, bool):
