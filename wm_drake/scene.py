@@ -149,8 +149,10 @@ class Scene:
         """
         if not self._pairs or not len(time):
             return None
-        roll, pitch, yaw, x, y, z = (poses - rest_pose).T
-        shift = np.sqrt(x * x + y * y + z * z) + (np.abs(roll) + np.abs(pitch) + np.abs(yaw)) * self._reach
+        away = poses - rest_pose
+        roll, pitch, yaw, x, y, z = away.T
+        turned = (np.abs(roll) + np.abs(pitch) + np.abs(yaw)) * self._reach
+        shift = np.sqrt(x * x + y * y + z * z) + turned
         at_rest = self._at_rest(tuple(map(float, rest_pose)))
         farthest = int(np.argmax(shift))
         best = self._measured(at_rest[0][2], time[farthest], poses[farthest])[0]
@@ -158,7 +160,8 @@ class Scene:
             for distance, direction, pair in at_rest:
                 if distance - shift[farthest] >= best.distance:  # nor can any pair that is farther apart at rest
                     break
-                near = stride * np.flatnonzero(distance - shift[::stride] < best.distance)  # a gap shrinks by no more
+                least = distance + away[::stride, 3:] @ direction - turned[::stride]  # a gap shrinks by no more
+                near = stride * np.flatnonzero(least < best.distance)
                 best = self._smallest_of_pair(pair, direction, best, time[near], poses[near])
         return best
 
