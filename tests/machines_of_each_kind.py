@@ -68,4 +68,13 @@ def machines_of_each_kind():
             )
         },
     )
+    machines["more struts of a kind than stand side by side"] = changed(
+        gasket=None,
+        spring_types=reference["spring_types"] | {"table": {"stiffness": LINEAR_TABLE}},
+        springs={f"{name}_{k}": spring for k in range(2) for name, spring in reference["springs"].items()}
+        | {f"{name}_table": spring | {"type": "table"} for name, spring in list(reference["springs"].items())[:2]},
+        damper_types={law: {"law": law, **DAMPERS[law], **end_bushing} for law in ("mstv", "havsin")},
+        dampers={f"{name}_{k}": damper | {"type": "mstv"} for k in range(2) for name, damper in reference["dampers"].items()}
+        | {f"{name}_havsin": damper | {"type": "havsin"} for name, damper in list(reference["dampers"].items())[:1]},
+    )
     return machines
