@@ -11,7 +11,7 @@ from scipy import optimize
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.studies.identification.fit import Fit
 from wm_drake.studies.identification.problem import Problem, Progress
-from wm_drake.studies.identification.search import Count, End, agreeing, descend, scattered, silent
+from wm_drake.studies.identification.search import Count, End, agreeing, descend, scattered, silent, underway
 from wm_drake.studies.identification.surfaces import response_surface
 
 AGREEING = 2
@@ -83,7 +83,7 @@ def evolution(
 
     def generation_done(intermediate_result: optimize.OptimizeResult) -> bool:
         count.round_done()
-        progress(min(0.95, intermediate_result.nit / generations), count.least)
+        progress(underway(intermediate_result.nit, 2 * POLISHED_EVERY), count.least)
         best = intermediate_result.x
         if intermediate_result.nit % POLISHED_EVERY or np.array_equal(best, begins[-1]):
             return False
@@ -105,7 +105,7 @@ def evolution(
         rng=np.random.default_rng(seed),
     )
     if agreeing(problem, ends) < AGREEING and not np.array_equal(found.x, begins[-1]):
-        ends.append(descend(count, found.x, lambda fraction: progress(0.95 + 0.05 * fraction, count.least)))
+        ends.append(descend(count, found.x, lambda fraction: None))
     count.round_done()
     progress(1.0, count.least)
     note = (

@@ -27,6 +27,11 @@ def silent(fraction: float, least: float) -> None:
     """Progress that nobody looks at."""
 
 
+def underway(done: int, usual: int) -> float:
+    """Fraction shown of a search that may end any time: 2/3 after as many rounds as it usually takes."""
+    return done / (done + 0.5 * usual)
+
+
 @dataclass
 class Count:
     """The problem, with a count of what it is asked and the best point so far."""

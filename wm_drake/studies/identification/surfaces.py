@@ -14,7 +14,7 @@ from scipy import optimize
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.studies.identification.fit import Fit
 from wm_drake.studies.identification.problem import Problem, Progress
-from wm_drake.studies.identification.search import Count, scattered, silent
+from wm_drake.studies.identification.search import Count, scattered, silent, underway
 
 WIDEST = 0.5
 """Longest half axis of a region, in ranges; the first region has it everywhere."""
@@ -28,6 +28,8 @@ mean square error per value: the region is then a tenth of a standard error to e
 
 STRETCH = 3.0
 """Most by which an axis is stretched or shortened against the others in a round."""
+
+USUAL_ROUNDS = 20
 
 SLENDEREST = 1e3
 """Longest by shortest axis, at most."""
@@ -62,7 +64,7 @@ def response_surface(
         done += 1
         region, ended = _round(count, region, design)
         count.round_done()
-        progress(done / rounds, count.least)
+        progress(underway(done, USUAL_ROUNDS), count.least)
     progress(1.0, count.least)
     notes = (f"{done} rounds, last region {2.0 * region.longest:.2g} of the ranges",)
     fit = count.fit(region.centre, "response-surface", seed, notes)
