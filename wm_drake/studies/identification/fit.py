@@ -1,6 +1,5 @@
 """What an identification found."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -104,11 +103,6 @@ class Fit:
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of an unknown."""
         return next(estimate for estimate in self.estimates if estimate.name == name)
-
-    def test_curves(self) -> Iterator[tuple[str, FloatArray, FloatArray]]:
-        """Name, measured and computed values of each test."""
-        for where, measurement in zip(self.problem.slices, self.problem.measurements, strict=True):
-            yield measurement.name, measurement.values, self.computed[where]
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON, in SI: numbers that are not finite become null, as does the value of an unknown not determined."""
