@@ -20,21 +20,17 @@ def test_every_kind_of_machine_moves_as_in_drake(name):
     case = Case(
         "two", Load(unbalances=(Unbalance(mass=0.8, radius=0.25, y=-0.1), Unbalance(mass=0.4, radius=0.2, y=0.1))), RUN_UP
     )
-    jumps = name in (
-        "coulomb",
-        "two bushings, five dampers of three laws",
-    )  # friction that jumps at rest chatters with the step
-    step = 2.5e-4 if jumps else 1.25e-3
-    drake, compiled = (simulate(machine, case, engine, step=step) for engine in ("drake", "compiled"))
+    jumps = name in ("coulomb", "two bushings, five dampers of three laws")  # friction that jumps at rest grows what is rounded
+    drake, compiled = (simulate(machine, case, engine, step=2.5e-4 if jumps else None) for engine in ("drake", "compiled"))
     assert compiled.attrs["engine"] == "compiled"
     assert list(drake.data_vars) == list(compiled.data_vars)
     motion = float(np.abs(drake.displacement).max())
     assert motion > 1e-3
-    tolerance = 2e-2 if jumps else 1e-3
+    tolerance = 2e-2 if jumps else 1e-6
     for variable in ("displacement", "tub_position", "detergent_displacement"):
         np.testing.assert_allclose(compiled[variable], drake[variable], atol=tolerance * motion)
     np.testing.assert_allclose(compiled.drum_speed, drake.drum_speed, atol=1e-6)
-    np.testing.assert_allclose(compiled.drum_angle, drake.drum_angle, atol=1e-4)
+    np.testing.assert_allclose(compiled.drum_angle, drake.drum_angle, atol=1e-5)
     np.testing.assert_allclose(
         compiled.spring_tension, drake.spring_tension, atol=tolerance * float(drake.spring_tension.max())
     )
@@ -44,7 +40,7 @@ def test_without_gasket_and_with_other_numbers(machine, reference):
     for changes in ({"gasket": False}, {"parameters": MACHINES["reference"].model_copy(update={"name": "other"})}):
         case = Case("middle", reference.loads["middle"], RUN_UP, **changes)
         drake, compiled = (simulate(machine, case, engine) for engine in ("drake", "compiled"))
-        np.testing.assert_allclose(compiled.displacement, drake.displacement, atol=1e-5)
+        np.testing.assert_allclose(compiled.displacement, drake.displacement, rtol=0.0, atol=1e-7)  # m
         assert compiled.attrs["gasket"] == drake.attrs["gasket"]
 
 
@@ -52,7 +48,7 @@ def test_without_gasket_and_with_other_numbers(machine, reference):
 @pytest.mark.parametrize(("load", "gasket"), [("middle", True), ("counter", False)])
 def test_70_s_trajectories_agree_to_a_micrometre_at_refined_steps(machine, reference, load, gasket):
     case = case_of(reference, load, gasket=gasket)
-    drake, compiled = (simulate(machine, case, engine, step=6.25e-4) for engine in ("drake", "compiled"))
+    drake, compiled = (simulate(machine, case, engine, step=1.25e-3) for engine in ("drake", "compiled"))
     for variable in ("displacement", "tub_position", "detergent_displacement", "damper_deformation"):
         np.testing.assert_allclose(compiled[variable], drake[variable], rtol=0.0, atol=1e-6)  # m
 
@@ -62,13 +58,12 @@ def test_70_s_trajectories_agree_to_a_micrometre_at_refined_steps(machine, refer
     ("load", "gasket"),
     [(load, True) for load in ("middle", "counter", "back", "front")] + [("middle", False), ("counter", False)],
 )
-def test_peaks_at_default_steps_agree_to_a_thousandth(machine, reference, load, gasket):
+def test_peaks_at_default_steps_agree(machine, reference, load, gasket):
     case = case_of(reference, load, gasket=gasket)
     drake, compiled = (measure(simulate(machine, case, engine)) for engine in ("drake", "compiled"))
     for peak in PEAKS:
-        # RK4 and RK3; 0.071 % at most was seen, and 0.13 % in Yf without gasket: 1.1 mm, at a kink
-        np.testing.assert_allclose(getattr(compiled, peak), getattr(drake, peak), rtol=1e-3, atol=2e-6)
-    np.testing.assert_allclose(compiled.critical_speed, drake.critical_speed, rtol=5e-3)
+        np.testing.assert_allclose(getattr(compiled, peak), getattr(drake, peak), rtol=5e-4)
+    np.testing.assert_allclose(compiled.critical_speed, drake.critical_speed, rtol=5e-4)
 
 
 def test_a_run_that_diverges_says_what_drakes_says(machine):

@@ -19,7 +19,7 @@ ORDER = (
     {"bodies", "rigs", "sdf_text"},
     {"places", "equilibrium", "wiring", "whirl"},
     {"machine"},
-    {"trajectory"},
+    {"trajectory", "schedule"},
     {"kernel"},
     {"scene", "drake_engine", "compiled_engine", "readings"},
     {"simulation"},

@@ -9,7 +9,7 @@ from wm_drake.bodies import add_bodies, add_load, set_bodies
 from wm_drake.kernel.alone import Alone
 from wm_drake.kernel.packing import initial_state
 from wm_drake.kernel.samples import trajectory_of
-from wm_drake.kernel.schedule import schedule_of
+from wm_drake.schedule import schedule_of
 
 
 def dense_states(setup, profile, step):

@@ -7,9 +7,9 @@ import numpy as np
 from wm_drake.kernel.alone import Alone
 from wm_drake.kernel.packing import initial_state
 from wm_drake.kernel.samples import trajectory_of
-from wm_drake.kernel.schedule import schedule_of
 from wm_drake.machine import OUTPUT_PERIOD, Setup
 from wm_drake.parameters import SpinProfile
+from wm_drake.schedule import schedule_of
 from wm_drake.trajectory import Trajectory, diverging_coordinate
 
 PAUSE_STEPS = 2000

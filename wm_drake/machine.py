@@ -5,7 +5,6 @@ from typing import Any
 
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
-from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
 from wm_drake.bodies import add_bodies, add_load, set_bodies
 from wm_drake.coordinates import Coordinates, coordinates_of
@@ -92,7 +91,6 @@ class Machine:
     bushings: dict[str, SixComponentBushing]
     telescopes: dict[str, TelescopicDamper]
     bearing: DrumBearing | None
-    logs: dict[str, VectorLogSink]
     blank: Context
     places: list[Places] = field(default_factory=list, repr=False, compare=False)
 
@@ -233,18 +231,10 @@ def build_machine(parameters: MachineParameters) -> Machine:
         links.append(Link("drum_bearing", "drum_bearing", bearing, len(coordinates.trees) - 1))
     connect(builder, plant, coordinates, labels, links)
     builder.Connect(source.get_output_port(), plant.get_actuation_input_port())
-    logged = {"bodies": plant.get_state_output_port(), "acceleration": plant.get_generalized_acceleration_output_port()}
-    with_state = {name: damper for name, damper in (dampers | telescopes).items() if damper.state_size}
-    logged |= {name: damper.GetOutputPort("state") for name, damper in with_state.items()}
-    sinks = {name: LogVectorOutput(port, builder, publish_period=OUTPUT_PERIOD) for name, port in logged.items()}
-    for name, sink in sinks.items():
-        sink.set_name(f"log_{name}")
     diagram = builder.Build()
     diagram.set_name(parameters.name)
     context = diagram.CreateDefaultContext()
-    return Machine(
-        parameters, diagram, plant, coordinates, source, springs, dampers, bushings, telescopes, bearing, sinks, context
-    )
+    return Machine(parameters, diagram, plant, coordinates, source, springs, dampers, bushings, telescopes, bearing, context)
 
 
 def _label(kind: str, name: str) -> str:

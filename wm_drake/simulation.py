@@ -121,8 +121,8 @@ def checked_step(parameters: MachineParameters, step: float | None) -> float:
 def check_bearing(setup: Setup, step: float) -> None:
     """Refuses a step that is too long for the drum's motion in its bearing.
 
-    A sixth of the fastest period: the engines' schemes are stable up to 0.45 (RK4) and 0.27 of it (RK3), and RK4 takes at most
-    0.6 % of that motion's amplitude away in a step then.
+    A sixth of the fastest period: RK4 is stable up to 0.45 of it, and takes at most 0.6 % of that motion's amplitude away in a
+    step then.
 
     Args:
         setup: A machine, set up.

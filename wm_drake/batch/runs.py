@@ -12,13 +12,13 @@ from wm_drake.kernel.integration import integrate_lanes
 from wm_drake.kernel.mechanics import DRUM_RATE, LINE_SIZE, RATES_SIZE, STATE_SIZE
 from wm_drake.kernel.packing import Layout, aligned
 from wm_drake.kernel.samples import trajectory_of
-from wm_drake.kernel.schedule import Schedule, schedule_of
 from wm_drake.laws.lanes import WIDTH
 from wm_drake.machine import OUTPUT_PERIOD
 from wm_drake.measures import amplitudes, filtered, power_means
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.scene import Scene
+from wm_drake.schedule import Schedule, schedule_of
 from wm_drake.simulation import Case, Record, as_record
 from wm_drake.trajectory import (
     LARGEST_ANGLE,

@@ -9,10 +9,10 @@ import numpy as np
 from wm_drake.kernel.integration import derivative_alone, integrate_alone
 from wm_drake.kernel.mechanics import LINE_SIZE, STATE_SIZE, Elements
 from wm_drake.kernel.packing import aligned, pack
-from wm_drake.kernel.schedule import Schedule
 from wm_drake.laws.lanes import QUAD
 from wm_drake.machine import Setup
 from wm_drake.parameters.elements import FloatArray
+from wm_drake.schedule import Schedule
 
 
 class Alone:

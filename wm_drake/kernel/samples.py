@@ -4,8 +4,8 @@ import numpy as np
 
 from wm_drake.kernel.histories import torque_history
 from wm_drake.kernel.packing import Layout
-from wm_drake.kernel.schedule import Schedule
 from wm_drake.parameters.elements import FloatArray
+from wm_drake.schedule import Schedule
 from wm_drake.trajectory import Trajectory, ended_where_it_diverged
 
 

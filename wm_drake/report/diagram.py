@@ -1,25 +1,23 @@
 """The diagram of a machine as a picture in text."""
 
 from pydrake.systems.framework import Diagram
-from pydrake.systems.primitives import VectorLogSink
 
 
 def mermaid(diagram: Diagram) -> str:
-    """The systems of a diagram and what flows between them, as a Mermaid flow chart; logs are left out.
+    """The systems of a diagram and what flows between them, as a Mermaid flow chart.
 
     Args:
         diagram: Of a built machine.
     """
-    systems = [system for system in diagram.GetSystems() if not isinstance(system, VectorLogSink)]
+    systems = diagram.GetSystems()
     lines = ["flowchart LR"]
     for system in systems:
         kind = type(system).__name__.split("_")[0]
         lines.append(f'  {system.get_name()}["{system.get_name().replace("_", " ")}<br/><i>{kind}</i>"]')
     arrows = []
     for (to_system, to_port), (from_system, from_port) in diagram.connection_map().items():
-        if to_system in systems:
-            port = from_system.get_output_port(from_port)
-            into = to_system.get_input_port(to_port).get_name().replace("_", " ")
-            label = port.get_name().replace("_", " ") if port.get_name().startswith("generalized") else into
-            arrows.append(f"  {from_system.get_name()} -- {label} --> {to_system.get_name()}")
+        port = from_system.get_output_port(from_port)
+        into = to_system.get_input_port(to_port).get_name().replace("_", " ")
+        label = port.get_name().replace("_", " ") if port.get_name().startswith("generalized") else into
+        arrows.append(f"  {from_system.get_name()} -- {label} --> {to_system.get_name()}")
     return "\n".join(lines + sorted(arrows))

@@ -35,7 +35,7 @@ def compiled_runs(
 
 
 def drake_runs(parameters: MachineParameters, *, progress: Callable[[int], None] = lambda done: None) -> Evaluate:
-    """Runs cases with Drake's simulator, in a process each; they take minutes."""
+    """Runs cases by the Drake engine, in a process each; they take minutes."""
 
     def evaluate(cases: Iterable[Case]) -> xr.Dataset:
         runs = list(cases)

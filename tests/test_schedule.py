@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from wm_drake.kernel.schedule import schedule_of
 from wm_drake.parameters import SpinProfile
+from wm_drake.schedule import schedule_of
 
 PERIOD = 5e-3  # s
 PROFILES = {
