@@ -35,26 +35,35 @@ def run_drake(setup: Setup, profile: SpinProfile, step: float, progress: Callabl
     machine = setup.machine
     machine.plant.GetJointByName(setup.parameters.drive.joint).set_angular_rate(setup.plant_context, profile.speed[0])
     schedule = schedule_of(profile, step, OUTPUT_PERIOD)
-    _held = machine.handles(setup.context)  # until this function returns
     motion, steps = _Motion(setup), len(schedule.step)
     samples = np.full((2, len(schedule.time), len(motion.state)), np.nan)
     done, failure = 0, ""
     try:
-        while done < steps and diverging_coordinate(machine.plant.GetPositions(setup.plant_context)) is None:
-            begin, done = done, min(done + PAUSE_STEPS, steps)
-            _integrate(setup, motion, schedule, begin, done, samples)
-            progress(done / steps)
+        with machine.held(setup.context):
+            while done < steps and diverging_coordinate(machine.plant.GetPositions(setup.plant_context)) is None:
+                begin, done = done, min(done + PAUSE_STEPS, steps)
+                _integrate(motion, schedule, begin, done, samples)
+                progress(done / steps)
     except RuntimeError as error:  # Drake refuses a state that is not a number
         failure = str(error).splitlines()[0]
     return _trajectory(setup, schedule, samples, failure)
 
 
 class _Motion:
-    """Continuous state of a diagram, and its derivative."""
+    """Continuous state of a diagram, its derivative, and the acceleration of the drum."""
 
     def __init__(self, setup: Setup) -> None:
         self._context, self._derivatives = setup.context, setup.machine.diagram.EvalTimeDerivatives
+        self._source = setup.machine.source
+        self._source_context = self._source.GetMyContextFromRoot(self._context)
+        self._acceleration = np.nan
         self.state = self._context.get_continuous_state_vector().CopyToVector()
+
+    def accelerate(self, acceleration: float) -> None:
+        """Sets the drum's acceleration. [rad/s^2]"""
+        if acceleration != self._acceleration:
+            self._source.set_acceleration(self._source_context, acceleration)
+            self._acceleration = acceleration
 
     def derivative(self, state: FloatArray) -> FloatArray:
         """Of any state."""
@@ -63,25 +72,23 @@ class _Motion:
 
     def advance(self, rate: FloatArray, h: float) -> None:
         """By a step h, from its derivative here. [s]"""
-        x, derivative = self.state, self.derivative
-        second = derivative(x + 0.5 * h * rate)
-        third = derivative(x + 0.5 * h * second)
+        x, derivative, half = self.state, self.derivative, 0.5 * h
+        second = derivative(x + half * rate)
+        third = derivative(x + half * second)
         fourth = derivative(x + h * third)
         self.state = x + h / 6.0 * (rate + 2.0 * (second + third) + fourth)
 
 
-def _integrate(setup: Setup, motion: _Motion, schedule: Schedule, begin: int, end: int, samples: FloatArray) -> None:
+def _integrate(motion: _Motion, schedule: Schedule, begin: int, end: int, samples: FloatArray) -> None:
     """Steps a motion from the begin of one step of a schedule to that of another; writes the samples on the way."""
-    source = setup.machine.source
-    source_context = source.GetMyContextFromRoot(setup.context)
-    for index in range(begin, end):
-        source.set_acceleration(source_context, schedule.acceleration[index])
+    columns = schedule.step, schedule.acceleration, schedule.row
+    for h, acceleration, row in zip(*(column[begin:end].tolist() for column in columns), strict=True):
+        motion.accelerate(acceleration)
         rate = motion.derivative(motion.state)
-        row = schedule.row[index]
         if row >= 0:
             samples[0, row], samples[1, row] = motion.state, rate
-        if schedule.step[index] > 0.0:
-            motion.advance(rate, schedule.step[index])
+        if h > 0.0:
+            motion.advance(rate, h)
 
 
 def _trajectory(setup: Setup, schedule: Schedule, samples: FloatArray, failure: str) -> Trajectory:

@@ -375,6 +375,24 @@ def test_the_ports_follow_what_changes_in_a_context(element):
 
 
 @every_element
+def test_parameters_at_hand_are_those_of_their_context_as_it_is(element):
+    system, x = element.system(), random_plant_states(1, seed=30)[0]
+    moved = element.packed.copy()
+    moved[:3] += [0.01, -0.02, 0.03]  # m; first stands the point on the tub
+    held, other = (context_of(system, x, element.state) for _ in range(2))
+    before = computed(system, other)
+    system.hold(held)
+    assert np.array_equal(computed(system, held), before)
+    system.set_parameters(held, moved)
+    after = computed(system, held)
+    assert not np.array_equal(after, before)
+    assert np.array_equal(computed(system, context_of(system, x, element.state)), before)
+    system.release()
+    system.set_parameters(held, element.packed)
+    assert np.array_equal(computed(system, held), before)
+
+
+@every_element
 def test_parameters_of_another_length_are_refused(element):
     system = element.system()
     system.set_name("left")

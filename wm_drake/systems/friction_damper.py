@@ -207,9 +207,13 @@ class DamperWithSponge(Diagram):
         """Puts packed parameters into the damper's Context; as `ForceElement.set_parameters`."""
         self._force.set_parameters(self.GetMutableSubsystemContext(self._force, context), parameters, self.get_name())
 
-    def handles(self, context: Any) -> list[Any]:
-        """As `ForceElement.handles`, of the force inside."""
-        return self._force.handles(self.GetSubsystemContext(self._force, context))
+    def hold(self, context: Any) -> None:
+        """As `ForceElement.hold`, of the force inside."""
+        self._force.hold(self.GetSubsystemContext(self._force, context))
+
+    def release(self) -> None:
+        """As `ForceElement.release`."""
+        self._force.release()
 
 
 class FrictionDamper(DamperWithSponge):
