@@ -170,6 +170,7 @@ BAD_FILE = "time_s,displacement_mm,force_N\n" + "\n".join(f"{0.1 * k},{k % 5},{k
             "--machine: 'reference' has no bushing_types; name another machine",
         ),
         (("rig", "gasket", "--axis", "round", "--matrix", "A"), "--axis: no axis 'round'"),
+        (("rig", "gasket", "--axis", "x", "--name", "old", "--matrix", "A"), "--name: a machine has one gasket"),
         (("rig", "gasket", "--axis", "x", "--arm", "100 mm", "-f", "1Hz", "-a", "1mm"), "arm: an arm drives a rotation"),
         (("identify", "damper", "none.csv"), "none.csv: no such file"),
         (("identify", "damper", "bad.csv"), "bad.csv: displacement is not harmonic"),

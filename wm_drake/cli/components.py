@@ -81,6 +81,8 @@ def _key_of(kind: str, parameters: "MachineParameters", name: str | None) -> str
     from wm_drake.parameters import shipped_components
 
     if kind == "gasket":
+        if name is not None:
+            raise input_error("a machine has one gasket; leave the name out", where="--name")
         if parameters.gasket is None:
             raise input_error(f"machine '{parameters.name}' has no gasket", where="--machine")
         return "gasket"

@@ -1,6 +1,7 @@
 """`wm-drake identify`: the numbers of a component from measured loops."""
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -96,85 +97,52 @@ def identify_damper(
     _run(asked, f"damper {target.component.name}, law {model.law}", target, model, motions, {})
 
 
-@app.command("bushing")
-def identify_bushing(
-    files: FilesArgument,
-    axis: AxisOption,
-    law: Annotated[str, typer.Option(help="voigt, table (monotone curve) or, about an axis, voigt_havsin.")] = "voigt",
-    arm: ArmOption = None,
-    method: MethodOption = "least-squares",
-    bounds: BoundsOption = None,
-    fix: FixOption = None,
-    units: UnitsOption = None,
-    knots: KnotsOption = 5,
-    seed: SeedOption = 0,
-    machine: MachineOption = "reference",
-    name: NameOption = None,
-    component: ComponentOption = None,
-    out: OutOption = DEFAULT_OUT,
-    as_json: JsonOption = False,
-    sets: SetOption = None,
-) -> None:
-    """One axis of a six-component bushing."""
-    target = target_of("bushing", machine, name, component, sets)
-    asked = _Asked(files, units, method, seed, out, as_json)
-    _identify_bushing(asked, target, axis, law, arm, bounds, fix, knots)
+def _axis_command(kind: str) -> Callable[..., None]:
+    """The command of a component that is tested axis by axis: bushing or gasket."""
+
+    def identify_axis(
+        files: FilesArgument,
+        axis: AxisOption,
+        law: Annotated[str, typer.Option(help="voigt, table (monotone curve) or, about an axis, voigt_havsin.")] = "voigt",
+        arm: ArmOption = None,
+        method: MethodOption = "least-squares",
+        bounds: BoundsOption = None,
+        fix: FixOption = None,
+        units: UnitsOption = None,
+        knots: KnotsOption = 5,
+        seed: SeedOption = 0,
+        machine: MachineOption = "reference",
+        name: NameOption = None,
+        component: ComponentOption = None,
+        out: OutOption = DEFAULT_OUT,
+        as_json: JsonOption = False,
+        sets: SetOption = None,
+    ) -> None:
+        from wm_drake.parameters.units import Unit
+        from wm_drake.studies.component_fit import bushing_model
+
+        target = target_of(kind, machine, name, component, sets)
+        asked = _Asked(files, units, method, seed, out, as_json)
+        axes = axes_of(axis)
+        radius = quantities_of(arm, Unit("m", "mm"), "--arm")[0] if arm else 0.0
+        motions = _motions(asked, rotates=axes[0].startswith("about") and not radius)
+        options = {"arm": radius, "bounds": _ranges(bounds), "fixed": _single(fix, "--fix"), "knots": knots}
+        model = bushing_model(law, motions, target.component.parameters, axes[0], **options)  # type: ignore[arg-type]
+        title = f"{target.component.name}, {axis.replace('_', ' ')}, law {law}"
+        _run(asked, title, target, model, motions, _copies(model, axes))
+
+    return identify_axis
 
 
-@app.command("gasket")
-def identify_gasket(
-    files: FilesArgument,
-    axis: AxisOption,
-    law: Annotated[str, typer.Option(help="voigt, table (monotone curve) or, about an axis, voigt_havsin.")] = "voigt",
-    arm: ArmOption = None,
-    method: MethodOption = "least-squares",
-    bounds: BoundsOption = None,
-    fix: FixOption = None,
-    units: UnitsOption = None,
-    knots: KnotsOption = 5,
-    seed: SeedOption = 0,
-    machine: MachineOption = "reference",
-    component: ComponentOption = None,
-    out: OutOption = DEFAULT_OUT,
-    as_json: JsonOption = False,
-    sets: SetOption = None,
-) -> None:
-    """One axis of the gasket."""
-    target = target_of("gasket", machine, None, component, sets)
-    asked = _Asked(files, units, method, seed, out, as_json)
-    _identify_bushing(asked, target, axis, law, arm, bounds, fix, knots)
+app.command("bushing", help="One axis of a six-component bushing.")(_axis_command("bushing"))
+app.command("gasket", help="One axis of the gasket.")(_axis_command("gasket"))
 
 
-def _identify_bushing(
-    asked: _Asked,
-    target: Target,
-    axis: str,
-    law: str,
-    arm: str | None,
-    bounds: list[str] | None,
-    fix: list[str] | None,
-    knots: int,
-) -> None:
-    from wm_drake.parameters.units import Unit
-    from wm_drake.studies.component_fit import bushing_model
-
-    axes = axes_of(axis)
-    radius = quantities_of(arm, Unit("m", "mm"), "--arm")[0] if arm else 0.0
-    motions = _motions(asked, rotates=axes[0].startswith("about") and not radius)
-    model = bushing_model(
-        law,
-        motions,
-        target.component.parameters,  # type: ignore[arg-type]
-        axes[0],
-        arm=radius,
-        bounds=_ranges(bounds),
-        fixed=_single(fix, "--fix"),
-        knots=knots,
-    )
+def _copies(model: "ComponentModel", axes: tuple[str, ...]) -> dict[str, str]:
+    """Fields of a bushing that what was found on the first of some axes alike holds for, and those they are copied from."""
     ours, others = axes[0][-1], [other[-1] for other in axes[1:]]
     fields = [unknown.name.split(".")[0] for unknown in model.unknowns]
-    copies = {f"{field[: -len(ours)]}{other}": field for field in fields for other in others}
-    _run(asked, f"{target.component.name}, {axis.replace('_', ' ')}, law {law}", target, model, motions, copies)
+    return {f"{field[: -len(ours)]}{other}": field for field in fields for other in others}
 
 
 def _motions(asked: _Asked, *, rotates: bool) -> "list[MeasuredMotion]":

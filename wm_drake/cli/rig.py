@@ -1,6 +1,7 @@
 """`wm-drake rig`: a component on a bench, its force loops, and what is read off them."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -59,66 +60,41 @@ def rig_damper(
     _run(title, bench, motions, chosen, out, as_json)
 
 
-@app.command("bushing")
-def rig_bushing(
-    axis: AxisOption,
-    frequency: FrequencyOption = None,
-    amplitude: AmplitudeOption = None,
-    matrix: MatrixOption = None,
-    arm: ArmOption = None,
-    machine: MachineOption = "reference",
-    name: NameOption = None,
-    component: ComponentOption = None,
-    out: OutOption = DEFAULT_OUT,
-    as_json: JsonOption = False,
-    sets: SetOption = None,
-) -> None:
-    """One axis of a six-component bushing."""
-    chosen = target_of("bushing", machine, name, component, sets).component
-    _rig_of_bushing("bushing", chosen, axis, frequency, amplitude, matrix, arm, out, as_json)
+def _axis_command(kind: str) -> Callable[..., None]:
+    """The command of a component that is tested axis by axis: bushing or gasket."""
+
+    def rig_axis(
+        axis: AxisOption,
+        frequency: FrequencyOption = None,
+        amplitude: AmplitudeOption = None,
+        matrix: MatrixOption = None,
+        arm: ArmOption = None,
+        machine: MachineOption = "reference",
+        name: NameOption = None,
+        component: ComponentOption = None,
+        out: OutOption = DEFAULT_OUT,
+        as_json: JsonOption = False,
+        sets: SetOption = None,
+    ) -> None:
+        from wm_drake.parameters.units import Unit
+        from wm_drake.rigs import JIG_ARM, bushing_bench
+
+        chosen = target_of(kind, machine, name, component, sets).component
+        turned = axes_of(axis)[0]
+        radius = quantities_of(arm, Unit("m", "mm"), "--arm")[0] if arm else 0.0
+        if matrix is not None and turned.startswith("about") and not arm:
+            radius = JIG_ARM
+        bench = bushing_bench(chosen.parameters, turned, radius)  # type: ignore[arg-type]
+        motions = _motions(kind, bench, frequency, amplitude, matrix)
+        what = kind if chosen.name == kind else f"{kind} {chosen.name}"
+        title = f"{what}, axis {turned.replace('_', ' ')}{f', through an arm of {1e3 * radius:g} mm' if radius else ''}"
+        _run(title, bench, motions, chosen, out, as_json)
+
+    return rig_axis
 
 
-@app.command("gasket")
-def rig_gasket(
-    axis: AxisOption,
-    frequency: FrequencyOption = None,
-    amplitude: AmplitudeOption = None,
-    matrix: MatrixOption = None,
-    arm: ArmOption = None,
-    machine: MachineOption = "reference",
-    component: ComponentOption = None,
-    out: OutOption = DEFAULT_OUT,
-    as_json: JsonOption = False,
-    sets: SetOption = None,
-) -> None:
-    """One axis of the gasket."""
-    chosen = target_of("gasket", machine, None, component, sets).component
-    _rig_of_bushing("gasket", chosen, axis, frequency, amplitude, matrix, arm, out, as_json)
-
-
-def _rig_of_bushing(
-    kind: str,
-    chosen: "Component",
-    axis: str,
-    frequency: str | None,
-    amplitude: str | None,
-    matrix: str | None,
-    arm: str | None,
-    out: Path,
-    as_json: bool,
-) -> None:
-    from wm_drake.parameters.units import Unit
-    from wm_drake.rigs import JIG_ARM, bushing_bench
-
-    turned = axes_of(axis)[0]
-    radius = quantities_of(arm, Unit("m", "mm"), "--arm")[0] if arm else 0.0
-    if matrix is not None and turned.startswith("about") and not arm:
-        radius = JIG_ARM
-    bench = bushing_bench(chosen.parameters, turned, radius)  # type: ignore[arg-type]
-    motions = _motions(kind, bench, frequency, amplitude, matrix)
-    name = kind if chosen.name == kind else f"{kind} {chosen.name}"
-    title = f"{name}, axis {turned.replace('_', ' ')}{f', through an arm of {1e3 * radius:g} mm' if radius else ''}"
-    _run(title, bench, motions, chosen, out, as_json)
+app.command("bushing", help="One axis of a six-component bushing.")(_axis_command("bushing"))
+app.command("gasket", help="One axis of the gasket.")(_axis_command("gasket"))
 
 
 def _motions(kind: str, bench: "Bench", frequency: str | None, amplitude: str | None, matrix: str | None) -> "list[Harmonic]":
