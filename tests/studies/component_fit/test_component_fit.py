@@ -167,32 +167,22 @@ def held(name, search):
     return inside
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=() if name == "gasket, radial" else pytest.mark.slow)
-        for name in COMPONENTS
-        if name != "free-stroke damper"  # four minutes; 92 to 98 of 100 were seen
-    ],
-)
-def test_intervals_hold_the_truth_in_at_least_90_of_100_noisy_repeats(name):
-    inside = held(name, lambda problem, _: least_squares(problem, starts=1, screened=16))
-    assert min(inside.values()) >= 90, inside
+def mark_of(name, method):
+    """By the time of 100 fits: a second, half a minute, minutes to most of an hour."""
+    if (name, method) == ("gasket, radial", "least-squares"):
+        return ()
+    long = {("bushing, axial table", "evolution")} | LONG
+    return pytest.mark.hours if (name, method) in long else pytest.mark.slow
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "method"),
-    [
-        ("gasket, radial", "response-surface"),
-        ("bushing, axial table", "response-surface"),
-        ("bushing, tilt", "response-surface"),
-        ("gasket, radial", "evolution"),
-        ("bushing, tilt", "evolution"),
-    ],  # MSTV takes minutes: 92 to 94 of 100 were seen by either method
+    ("name", "method"), [pytest.param(name, m, marks=mark_of(name, m)) for name in COMPONENTS for m in METHODS]
 )
-def test_intervals_of_other_methods_hold_the_truth_as_often(name, method):
-    inside = held(name, lambda problem, seed: identify(problem, method, seed=seed))
+def test_intervals_hold_the_truth_in_at_least_90_of_100_noisy_repeats(name, method):
+    if method == "least-squares":  # one start is enough where the truth is known to be the only minimum
+        inside = held(name, lambda problem, _: least_squares(problem, starts=1, screened=16))
+    else:
+        inside = held(name, lambda problem, seed: identify(problem, method, seed=seed))
     assert min(inside.values()) >= 90, inside
 
 
