@@ -62,8 +62,8 @@ def test_peaks_at_default_steps_agree(machine, reference, load, gasket):
     case = case_of(reference, load, gasket=gasket)
     drake, compiled = (measure(simulate(machine, case, engine)) for engine in ("drake", "compiled"))
     for peak in PEAKS:
-        np.testing.assert_allclose(getattr(compiled, peak), getattr(drake, peak), rtol=5e-4)
-    np.testing.assert_allclose(compiled.critical_speed, drake.critical_speed, rtol=5e-4)
+        np.testing.assert_allclose(getattr(compiled, peak), getattr(drake, peak), rtol=1e-5)
+    np.testing.assert_allclose(compiled.critical_speed, drake.critical_speed, rtol=1e-5)
 
 
 def test_a_run_that_diverges_says_what_drakes_says(machine):

@@ -71,8 +71,10 @@ def test_drakes_engine_runs_a_case_too(study):
         ended = study("--json", "--case", "front", "--engine", engine)
         assert ended.code == 0
         shown[engine] = json.loads(ended.out)["cases"][0]
-    for name in ("rms_mm", "rms_from_acceleration_mm", "smallest_gap_mm"):
-        np.testing.assert_allclose(shown["drake"][name], shown["compiled"][name], rtol=5e-3)
+    for name in ("rms_mm", "rms_from_acceleration_mm"):
+        np.testing.assert_allclose(shown["drake"][name], shown["compiled"][name], rtol=1e-6)
+    # Drake's distance of two shapes is good to some micrometres
+    np.testing.assert_allclose(shown["drake"]["smallest_gap_mm"], shown["compiled"]["smallest_gap_mm"], atol=1e-2)
 
 
 def test_interrupted_it_keeps_what_had_ended(study, monkeypatch):
