@@ -92,11 +92,9 @@ def peaks(record):
     return np.concatenate([measure(record).amplitude.values, np.abs(record.bushing_force).max("time").values.ravel()])
 
 
-def test_peaks_of_a_fast_run_up_hold_at_a_fifth_of_the_step(machine, reference, engine):
+def test_peaks_of_a_fast_run_up_hold_at_a_fifth_of_the_step(machine, reference):
     case = fast(reference, "middle")
-    np.testing.assert_allclose(
-        peaks(simulate(machine, case, engine)), peaks(simulate(machine, case, engine, step=5e-4)), rtol=5e-4
-    )
+    np.testing.assert_allclose(peaks(simulate(machine, case)), peaks(simulate(machine, case, step=5e-4)), rtol=5e-4)
 
 
 @pytest.mark.slow

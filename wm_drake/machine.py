@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
@@ -26,6 +26,15 @@ from wm_drake.wiring import Link, connect
 
 OUTPUT_PERIOD = 5e-3
 """Time between samples of a record, as the measurements of [B]. [s]"""
+
+
+class _Elements(NamedTuple):
+    """Elements in their places, by name."""
+
+    springs: dict[str, SpringStrutParameters]
+    dampers: dict[str, FrictionDamperParameters]
+    bushings: dict[str, SixComponentBushingParameters]
+    telescopes: dict[str, TelescopicDamperParameters]
 
 
 @dataclass(frozen=True)
@@ -123,25 +132,13 @@ class Machine:
         context = self.set_up_bodies(None, parameters, context)
         plant_context = self.plant.GetMyContextFromRoot(context)
         places = self._places(plant_context, parameters)
-        bushings, friction_dampers = placed_bushings(places, parameters), placed_dampers(places, parameters)
-        telescopes = placed_telescopes(self.plant, places, parameters)
         bearing = placed_bearing(self.plant, parameters)
-        self._set(context, self.bushings, bushings)
-        self._set(context, self.dampers, friction_dampers)
-        self._set(context, self.telescopes, telescopes)
         self._set(context, self._bearings, {"bearing": bearing})
-        unloaded = placed_springs(places, parameters)
-        self._set(context, self.springs, unloaded)
-        springs = preloaded(self.plant, plant_context, self.coordinates, unloaded)
-        self._set(context, self.springs, springs)
-        if not gasket and "gasket" in bushings:
-            bushings["gasket"] = replace(bushings["gasket"], engaged=0.0)
-            self._set(context, self.bushings, bushings)
+        elements = self._put_in(context, places, parameters)
+        if not gasket:
+            self._take_gasket_out(context, elements)
         if not dampers:
-            friction_dampers = {name: replace(damper, engaged=0.0) for name, damper in friction_dampers.items()}
-            self._set(context, self.dampers, friction_dampers)
-            telescopes = {name: telescope.without_friction() for name, telescope in telescopes.items()}
-            self._set(context, self.telescopes, telescopes)
+            self._take_friction_out(context, elements)
         residual = put_to_rest(self.plant, plant_context, self.coordinates)
         fastest = fastest_rate(self.plant, plant_context, self.coordinates, bearing) if bearing else 0.0
         self._hang_in(plant_context, parameters, load)
@@ -149,10 +146,40 @@ class Machine:
         points = {name: places("tub", sensor.frame)[0] for name, sensor in parameters.sensors.items()}
         detergent_point = places("tub", parameters.clearance.detergent_frame)[0]
         vibrations = {name: places("tub", frame)[0] for name, frame in parameters.accelerometer_frames().items()}
-        elements = springs, friction_dampers, bushings, telescopes
         whole = self.coordinates
         rest = positions[whole.tub], residual, positions[whole.tubes], positions[whole.carrier]
         return Setup(self, parameters, context, *elements, bearing, points, detergent_point, vibrations, *rest, fastest)
+
+    def _put_in(self, context: Context, places: Places, parameters: MachineParameters) -> _Elements:
+        """Elements in their places, their numbers in the Context; springs with the preload that the empty machine needs."""
+        bushings, dampers = placed_bushings(places, parameters), placed_dampers(places, parameters)
+        telescopes = placed_telescopes(self.plant, places, parameters)
+        unloaded = placed_springs(places, parameters)
+        for systems, placed in (
+            (self.bushings, bushings),
+            (self.dampers, dampers),
+            (self.telescopes, telescopes),
+            (self.springs, unloaded),
+        ):
+            self._set(context, systems, placed)
+        springs = preloaded(self.plant, self.plant.GetMyContextFromRoot(context), self.coordinates, unloaded)
+        self._set(context, self.springs, springs)
+        return _Elements(springs, dampers, bushings, telescopes)
+
+    def _take_gasket_out(self, context: Context, elements: _Elements) -> None:
+        """Of a machine that has one."""
+        if "gasket" in elements.bushings:
+            elements.bushings["gasket"] = replace(elements.bushings["gasket"], engaged=0.0)
+            self._set(context, self.bushings, elements.bushings)
+
+    def _take_friction_out(self, context: Context, elements: _Elements) -> None:
+        """Dampers; of telescopic ones, their laws and the friction in their bushings."""
+        for name, damper in elements.dampers.items():
+            elements.dampers[name] = replace(damper, engaged=0.0)
+        for name, telescope in elements.telescopes.items():
+            elements.telescopes[name] = telescope.without_friction()
+        self._set(context, self.dampers, elements.dampers)
+        self._set(context, self.telescopes, elements.telescopes)
 
     def set_up_bodies(self, load: Load | None, parameters: MachineParameters, context: Context | None = None) -> Context:
         """A Context, fresh or used again, in which bodies, frames and load are set and nothing else; raises as `set_up`."""
