@@ -198,6 +198,17 @@ def test_a_run_that_diverges_stops_keeps_its_record_and_says_when_and_why(machin
     assert np.max(np.abs(record.tub_position)) <= 0.5
 
 
+def test_a_run_that_ends_in_no_number_says_so_too(machine, reference, engine):
+    # a sponge so stiff that the second sample is NaN already; Drake says so itself
+    parameters = with_value(reference, "damper_types.friction.sponge_stiffness", 1e15)
+    case = Case("stiff", reference.loads["middle"], FAST_RUN_UP, parameters=parameters)
+    why = {"compiled": "roll = nan rad", "drake": "Detected NaN"}[engine]
+    with pytest.warns(DivergenceWarning, match=f"diverged at 0.005 s: {why}"):
+        record = simulate(machine, case, engine)
+    assert record.sizes["time"] == 1
+    assert np.isfinite(record.displacement).all()
+
+
 def test_records_are_reproducible_and_survive_the_disk(machine, reference, engine, tmp_path):
     case = Case("middle", reference.loads["middle"], SpinProfile(time=(0.0, 1.0), speed=(0.0, 20.0)), gasket=False)
     record = simulate(machine, case, engine)

@@ -1,6 +1,6 @@
 """What an engine hands over: the motion, sampled, and why it ended early if it did."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -65,19 +65,18 @@ def ended_where_it_diverged(trajectory: Trajectory, failure: str = "") -> Trajec
     """Cuts a trajectory before its first sample out of bounds, and says why.
 
     Args:
-        trajectory: As an engine sampled it.
+        trajectory: As an engine sampled it; NaN where it did not come to.
         failure: What stopped the engine, if something did.
     """
     bad = np.flatnonzero(~np.all(np.abs(trajectory.state[:, :6]) <= _BOUNDS, axis=1))  # a NaN is not <= anything
-    if len(bad):
-        index = int(bad[0])
-        reason = diverging_coordinate(trajectory.state[index])
-        assert reason is not None  # the same question, of this sample
-        return _cut(trajectory, index, Divergence(float(trajectory.time[index]), *reason))
-    if failure:  # it went from a good sample to no number at all within one output period
-        last = float(trajectory.time[-1]) if len(trajectory.time) else 0.0
-        return replace(trajectory, divergence=Divergence(last, "state", failure))
-    return trajectory
+    if not len(bad):
+        return trajectory
+    index = int(bad[0])
+    reason = diverging_coordinate(trajectory.state[index])
+    assert reason is not None  # the same question, of this sample
+    if failure and np.isnan(trajectory.state[index]).all():  # from a good sample to no number within one output period
+        reason = "state", failure
+    return _cut(trajectory, index, Divergence(float(trajectory.time[index]), *reason))
 
 
 def _cut(trajectory: Trajectory, length: int, divergence: Divergence) -> Trajectory:
