@@ -339,11 +339,15 @@ def test_autodiff_gives_the_same_values_and_the_derivatives_of_finite_difference
         assert np.max(np.abs(ExtractGradient(answer) * steps - expected) / (size + 1e-15)) < 1e-6
 
 
+def moved_on_the_tub(element):
+    """Its packed parameters, of which the first three are the point on the tub, with that elsewhere. [m]"""
+    return element.packed + np.pad([0.01, -0.02, 0.03], (0, len(element.packed) - 3))
+
+
 @every_element
 def test_numbers_set_in_a_context_act_there_only_and_go_with_it_to_autodiff(element):
     system, x = element.system(), random_plant_states(1, seed=30)[0]
-    moved = element.packed.copy()
-    moved[:3] += [0.01, -0.02, 0.03]  # m; first stands the point on the tub
+    moved = moved_on_the_tub(element)
     changed, unchanged = (context_of(system, x, element.state) for _ in range(2))
     system.set_parameters(changed, moved)
     rebuilt = element.system(moved)
@@ -377,8 +381,7 @@ def test_the_ports_follow_what_changes_in_a_context(element):
 @every_element
 def test_parameters_at_hand_are_those_of_their_context_as_it_is(element):
     system, x = element.system(), random_plant_states(1, seed=30)[0]
-    moved = element.packed.copy()
-    moved[:3] += [0.01, -0.02, 0.03]  # m; first stands the point on the tub
+    moved = moved_on_the_tub(element)
     held, other = (context_of(system, x, element.state) for _ in range(2))
     before = computed(system, other)
     system.hold(held)

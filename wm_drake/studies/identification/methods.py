@@ -9,6 +9,7 @@ import numpy as np
 from scipy import optimize
 
 from wm_drake.errors import input_error, nearest_names
+from wm_drake.parameters.elements import FloatArray
 from wm_drake.studies.identification.fit import Fit
 from wm_drake.studies.identification.problem import Problem, Progress
 from wm_drake.studies.identification.search import Count, End, agreeing, descend, scattered, silent, underway
@@ -79,17 +80,12 @@ def evolution(
         progress: Told after every generation.
     """
     count = Count(problem)
-    begins, ends = [np.full(len(problem.unknowns), np.nan)], list[End]()
+    polish = _Polish(problem, count)
 
     def generation_done(intermediate_result: optimize.OptimizeResult) -> bool:
         count.round_done()
         progress(underway(intermediate_result.nit, 2 * POLISHED_EVERY), count.least)
-        best = intermediate_result.x
-        if intermediate_result.nit % POLISHED_EVERY or np.array_equal(best, begins[-1]):
-            return False
-        begins.append(best.copy())
-        ends.append(descend(count, best, lambda fraction: None))
-        return agreeing(problem, ends) >= AGREEING
+        return intermediate_result.nit % POLISHED_EVERY == 0 and polish.agrees_from(intermediate_result.x)
 
     found = optimize.differential_evolution(
         lambda points: count.errors(points.T),
@@ -104,15 +100,40 @@ def evolution(
         callback=generation_done,
         rng=np.random.default_rng(seed),
     )
-    if agreeing(problem, ends) < AGREEING and not np.array_equal(found.x, begins[-1]):
-        ends.append(descend(count, found.x, lambda fraction: None))
+    polish.agrees_from(found.x)
     count.round_done()
     progress(1.0, count.least)
     note = (
-        f"least squares from the best of {len(ends)} of {found.nit} generations: "
-        f"{agreeing(problem, ends)} came to the same least RMSE"
+        f"least squares from the best of {len(polish.ends)} of {found.nit} generations: "
+        f"{polish.agreeing} came to the same least RMSE"
     )
-    return count.fit(min(ends, key=lambda end: end[1])[0], "evolution", seed, (note,))
+    return count.fit(polish.best, "evolution", seed, (note,))
+
+
+class _Polish:
+    """Least squares from the best points of an evolution, until two searches agree."""
+
+    def __init__(self, problem: Problem, count: Count) -> None:
+        self._problem, self._count = problem, count
+        self._last: FloatArray | None = None
+        self.ends: list[End] = []
+
+    def agrees_from(self, point: FloatArray) -> bool:
+        """Searches from one more point, unless that is the last one again or enough agree already; whether they do now."""
+        if self.agreeing < AGREEING and not (self._last is not None and np.array_equal(point, self._last)):
+            self._last = point.copy()
+            self.ends.append(descend(self._count, point, lambda fraction: None))
+        return self.agreeing >= AGREEING
+
+    @property
+    def agreeing(self) -> int:
+        """How many came to the least end."""
+        return agreeing(self._problem, self.ends)
+
+    @property
+    def best(self) -> FloatArray:
+        """The least end."""
+        return min(self.ends, key=lambda end: end[1])[0]
 
 
 METHODS: dict[str, Callable[..., Fit]] = {
