@@ -19,7 +19,7 @@ PAUSE_STEPS = 200
 def run_drake(setup: Setup, profile: SpinProfile, step: float, progress: Callable[[float], None]) -> Trajectory:
     """Runs a machine through a spin profile with Drake's model of it.
 
-    Drake's Simulator has no scheme of fourth order at fixed steps that costs less than seven derivatives a step. With that of
+    Drake's Simulator has no scheme of fourth order at fixed steps that takes fewer than six derivatives a step. With that of
     the compiled engine, four, the engines differ by their mechanics alone. Steps end at every output time and at every corner
     of the profile, so no step sees the acceleration jump.
 

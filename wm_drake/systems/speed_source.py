@@ -24,7 +24,7 @@ def SpeedSource_(T: type) -> Any:
               parameter: angular acceleration [rad/s^2]
 
         A profile jumps from piece to piece. An explicit integrator must not see a jump inside a step, so whoever runs the
-        simulation ends a step there and sets the next piece's acceleration (`wm_drake.simulation`).
+        simulation ends a step there and sets the next piece's acceleration (`wm_drake.drake_engine`).
         """
 
         def _construct(self, converter: Any = None) -> None:
