@@ -13,7 +13,7 @@ from wm_drake.systems.speed_source import REFLECTED_INERTIA
 from wm_drake.trajectory import Trajectory, diverging_coordinate, ended_where_it_diverged
 
 PAUSE_STEPS = 200
-"""Steps between looks at the state and reports of progress: some tenths of a second."""
+"""Steps between looks at the state and reports of progress: half a second of motion at the default step."""
 
 
 def run_drake(setup: Setup, profile: SpinProfile, step: float, progress: Callable[[float], None]) -> Trajectory:

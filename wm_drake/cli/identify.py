@@ -126,8 +126,16 @@ def _axis_command(kind: str) -> Callable[..., None]:
         axes = axes_of(axis)
         radius = quantities_of(arm, Unit("m", "mm"), "--arm")[0] if arm else 0.0
         motions = _motions(asked, rotates=axes[0].startswith("about") and not radius)
-        options = {"arm": radius, "bounds": _ranges(bounds), "fixed": _single(fix, "--fix"), "knots": knots}
-        model = bushing_model(law, motions, target.component.parameters, axes[0], **options)  # type: ignore[arg-type]
+        model = bushing_model(
+            law,
+            motions,
+            target.component.parameters,  # type: ignore[arg-type]
+            axes[0],
+            arm=radius,
+            bounds=_ranges(bounds),
+            fixed=_single(fix, "--fix"),
+            knots=knots,
+        )
         title = f"{target.component.name}, {axis.replace('_', ' ')}, law {law}"
         _run(asked, title, target, model, motions, _copies(model, axes))
 
