@@ -4,14 +4,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from wm_drake.kernel.histories import position_history
+from wm_drake.kernel.histories import position_history, reading_history
+from wm_drake.kernel.packing import pack_on_tub
 from wm_drake.machine import Setup
 from wm_drake.parameters.elements import FloatArray
 from wm_drake.systems.drum_bearing import FORCE_SIZE as BEARING_FORCE_SIZE
 from wm_drake.systems.drum_bearing import drum_bearing_history
-from wm_drake.systems.friction_damper import friction_damper_history
-from wm_drake.systems.six_component_bushing import six_component_bushing_history
-from wm_drake.systems.spring_strut import spring_strut_history
 from wm_drake.systems.telescopic_damper import FORCE_SIZE, telescopic_damper_history
 from wm_drake.trajectory import Trajectory
 
@@ -21,34 +19,39 @@ Variables: TypeAlias = dict[str, tuple[tuple[str, ...], FloatArray, str, str]]
 """By name: dimensions, values, unit, what it is."""
 
 
-def motion_variables(setup: Setup, trajectory: Trajectory) -> Variables:
-    """Of tub, drum, sensors, and of bodies that only some machines have."""
-    state = trajectory.state
-    axes = [AXES.index(sensor.axis) for sensor in setup.sensors.values()]
-    points = list(setup.sensor_points.values())
-    accelerometers = np.stack(list(setup.accelerometer_points.values()))
-    displaced = point_displacements(state, np.stack([*points, setup.detergent_point]), setup.rest_pose)
-    moved = [displaced[:, index, axis] for index, axis in enumerate(axes)]
-    detergent = displaced[:, -1]
+def variables_of(setup: Setup, trajectory: Trajectory) -> Variables:
+    """All that a record holds of a motion."""
+    displacements, *forces = readings(setup, trajectory)
+    if setup.telescopes:
+        forces = _with_telescopes(setup, trajectory, *forces)
     return (
         _tubes(trajectory)
         | _whirl(setup, trajectory)
-        | {
-            "tub_angle": (("time", "angle"), state[:, 0:3], "rad", "roll, pitch, yaw of T in W (3-2-1 Euler angles)"),
-            "tub_position": (("time", "axis"), state[:, 3:6], "m", "position of To in W"),
-            "tub_angular_velocity": (("time", "axis"), state[:, 7:10], "rad/s", "angular velocity of T in W"),
-            "tub_velocity": (("time", "axis"), state[:, 10:13], "m/s", "velocity of To in W"),
-            "tub_angular_acceleration": (("time", "axis"), trajectory.acceleration[:, :3], "rad/s^2", "rate of it in W"),
-            "tub_acceleration": (("time", "axis"), trajectory.acceleration[:, 3:], "m/s^2", "acceleration of To in W"),
-            "drum_angle": (("time",), state[:, 6], "rad", "angle of the drum against the tub"),
-            "drum_speed": (("time",), state[:, 13], "rad/s", "speed of the drum against the tub"),
-            "displacement": (("time", "sensor"), np.stack(moved, axis=1), "m", "displacement at the sensors, along their axes"),
-            "sensor_point": (("sensor", "axis"), np.stack(points), "m", "points of the sensors in T"),
-            "accelerometer_point": (("accelerometer", "axis"), accelerometers, "m", "points of the vibration sensors in T"),
-            "detergent_displacement": (("time", "axis"), detergent, "m", "displacement of the point nearest the detergent box"),
-            "damper_deformation": (("time", "damper"), trajectory.deformation, "m", "deformation of the damper's sponge"),
-        }
+        | _motion(setup, trajectory, displacements)
+        | _forces(trajectory, *forces)
     )
+
+
+def _motion(setup: Setup, trajectory: Trajectory, displacements: FloatArray) -> Variables:
+    """Of tub, drum and sensors; `displacements` of `measured_points`."""
+    state, acceleration, deformation = trajectory.state, trajectory.acceleration, trajectory.deformation
+    points, accelerometers = (np.stack(list(places.values())) for places in (setup.sensor_points, setup.accelerometer_points))
+    sensors, detergent = np.split(displacements, [len(points)], axis=1)
+    return {
+        "tub_angle": (("time", "angle"), state[:, 0:3], "rad", "roll, pitch, yaw of T in W (3-2-1 Euler angles)"),
+        "tub_position": (("time", "axis"), state[:, 3:6], "m", "position of To in W"),
+        "tub_angular_velocity": (("time", "axis"), state[:, 7:10], "rad/s", "angular velocity of T in W"),
+        "tub_velocity": (("time", "axis"), state[:, 10:13], "m/s", "velocity of To in W"),
+        "tub_angular_acceleration": (("time", "axis"), acceleration[:, :3], "rad/s^2", "rate of it in W"),
+        "tub_acceleration": (("time", "axis"), acceleration[:, 3:], "m/s^2", "acceleration of To in W"),
+        "drum_angle": (("time",), state[:, 6], "rad", "angle of the drum against the tub"),
+        "drum_speed": (("time",), state[:, 13], "rad/s", "speed of the drum against the tub"),
+        "displacement": (("time", "sensor"), sensors, "m", "displacement at the sensors, along their axes"),
+        "sensor_point": (("sensor", "axis"), points, "m", "points of the sensors in T"),
+        "accelerometer_point": (("accelerometer", "axis"), accelerometers, "m", "points of the vibration sensors in T"),
+        "detergent_displacement": (("time", "axis"), detergent, "m", "displacement of the point nearest the detergent box"),
+        "damper_deformation": (("time", "damper"), deformation, "m", "deformation of the damper's sponge"),
+    }
 
 
 def _tubes(trajectory: Trajectory) -> Variables:
@@ -80,9 +83,8 @@ def _whirl(setup: Setup, trajectory: Trajectory) -> Variables:
     }
 
 
-def force_variables(setup: Setup, trajectory: Trajectory) -> Variables:
+def _forces(trajectory: Trajectory, springs: FloatArray, dampers: FloatArray, bushings: FloatArray) -> Variables:
     """Of the motor and the elements."""
-    springs, dampers, bushings = element_forces(setup, trajectory)
     dims = ("time", "bushing", "axis")
     return {
         "motor_torque": (("time",), trajectory.motor_torque, "N m", "torque of the motor on the drum"),
@@ -93,31 +95,42 @@ def force_variables(setup: Setup, trajectory: Trajectory) -> Variables:
     }
 
 
-def element_forces(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Own forces of the elements along a trajectory.
+def readings(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, ...]:
+    """What is read off the motion of the tub.
 
     Returns:
-        Spring tensions (n, springs), damper tensions (n, dampers) [N], and force and moment of the bushings on the housing
-        (n, bushings, 6) [N, N m]. Of a telescopic damper, its bushing at the tub (on the outer tube), that at the housing.
+        Displacements at `measured_points` (n, points) [m]; tensions of the springs (n, springs) and of the strut dampers
+        (n, dampers) [N]; force and moment of the bushings on the housing (n, bushings, 6) [N, N m].
     """
-    states, none = trajectory.state, np.empty((len(trajectory.time), 0))
-    springs = np.empty((len(states), len(setup.springs)))
-    dampers = np.empty((len(states), len(setup.dampers) + len(setup.telescopes)))
-    bushings = np.empty((len(states), len(setup.bushings) + 2 * len(setup.telescopes), 6))
-    for index, spring in enumerate(setup.springs.values()):
-        spring_strut_history(states, none, spring.packed(), springs[:, index : index + 1])
-    for index, damper in enumerate(setup.dampers.values()):
-        own = trajectory.deformation[:, index : index + 1]
-        friction_damper_history(states, own, damper.packed(), dampers[:, index : index + 1])
-    for index, bushing in enumerate(setup.bushings.values()):
-        six_component_bushing_history(states, none, bushing.packed(), bushings[:, index])
+    points, (p, indices) = measured_points(setup), pack_on_tub(setup)
+    begins = [np.array(indices[kind], dtype=np.int64) for kind in ("springs", "dampers", "bushings")]
+    sizes = [len(points), len(begins[0]), len(begins[1]), 6 * len(begins[2])]
+    columns = np.empty((len(trajectory.time), sum(sizes)))
+    reading_history(trajectory.state, trajectory.deformation, points.ravel(), p, *begins, columns)
+    displacements, springs, dampers, bushings = np.split(columns, np.cumsum(sizes)[:-1], axis=1)
+    return displacements, springs, dampers, bushings.reshape(len(columns), len(begins[2]), 6)
+
+
+def _with_telescopes(
+    setup: Setup, trajectory: Trajectory, springs: FloatArray, dampers: FloatArray, bushings: FloatArray
+) -> list[FloatArray]:
+    """Forces of the elements, and behind them those of telescopic dampers: bushings of each at the tub, then at the housing."""
     for index, telescope in enumerate(setup.telescopes.values()):
-        column, first = len(setup.dampers) + index, len(setup.bushings) + 2 * index
-        forces, both = np.empty((len(states), FORCE_SIZE)), np.hstack([states, trajectory.tubes[:, index]])
-        telescopic_damper_history(both, trajectory.deformation[:, column : column + 1], telescope.packed(), forces)
-        dampers[:, column] = forces[:, 0]
-        bushings[:, first : first + 2] = forces[:, 1:].reshape(-1, 2, 6)
-    return springs, dampers, bushings
+        column = len(setup.dampers) + index
+        both, own = np.hstack([trajectory.state, trajectory.tubes[:, index]]), trajectory.deformation[:, column : column + 1]
+        forces = np.empty((len(both), FORCE_SIZE))
+        telescopic_damper_history(both, own, telescope.packed(), forces)
+        dampers = np.hstack([dampers, forces[:, :1]])
+        bushings = np.hstack([bushings, forces[:, 1:].reshape(-1, 2, 6)])
+    return [springs, dampers, bushings]
+
+
+def measured_points(setup: Setup) -> FloatArray:
+    """Points that are measured, packed for `kernel.histories`: the sensors, then the detergent point along x, y, z. (k, 7)"""
+    places = np.array([*setup.sensor_points.values(), *[setup.detergent_point] * 3])
+    axes = [*(AXES.index(sensor.axis) for sensor in setup.sensors.values()), 0, 1, 2]
+    at_rest = point_positions(setup.rest_pose[None, :], places)[0, range(len(axes)), axes]
+    return np.column_stack([places, np.eye(3)[axes], at_rest])
 
 
 def point_displacements(state: FloatArray, points: FloatArray, rest_pose: FloatArray) -> FloatArray:

@@ -20,9 +20,9 @@ from wm_drake.machine import OUTPUT_PERIOD, Machine, Setup
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.machine import DEFAULT_STEP as DEFAULT_STEP
 from wm_drake.readings import AXES as AXES
-from wm_drake.readings import force_variables, motion_variables
 from wm_drake.readings import point_displacements as point_displacements
 from wm_drake.readings import point_positions as point_positions
+from wm_drake.readings import variables_of
 from wm_drake.trajectory import COORDINATES, Trajectory, divergence_text
 
 Record: TypeAlias = xr.Dataset
@@ -152,9 +152,7 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
     """
     variables = {
         name: (dims, values, {"units": unit, "long_name": text})
-        for name, (dims, values, unit, text) in (
-            motion_variables(setup, trajectory) | force_variables(setup, trajectory)
-        ).items()
+        for name, (dims, values, unit, text) in variables_of(setup, trajectory).items()
     }
     labels = {
         "time": ("time", trajectory.time, {"units": "s"}),

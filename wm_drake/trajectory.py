@@ -68,10 +68,10 @@ def ended_where_it_diverged(trajectory: Trajectory, failure: str = "") -> Trajec
         trajectory: As an engine sampled it; NaN where it did not come to.
         failure: What stopped the engine, if something did.
     """
-    bad = np.flatnonzero(~np.all(np.abs(trajectory.state[:, :6]) <= _BOUNDS, axis=1))  # a NaN is not <= anything
-    if not len(bad):
+    inside = np.abs(trajectory.state[:, :6]) <= _BOUNDS  # a NaN is not
+    if inside.all():
         return trajectory
-    index = int(bad[0])
+    index = int(np.argmin(inside.all(axis=1)))
     reason = diverging_coordinate(trajectory.state[index])
     assert reason is not None  # the same question, of this sample
     if failure and np.isnan(trajectory.state[index]).all():  # from a good sample to no number within one output period

@@ -10,6 +10,7 @@ from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RollPitchYaw, RotationMatrix
 from scipy.interpolate import PchipInterpolator
 
+from wm_drake.kernel.histories import reading_history
 from wm_drake.parameters.elements import (
     Bushing,
     CoulombDamper,
@@ -21,20 +22,10 @@ from wm_drake.parameters.elements import (
     StvDamper,
     packed_stiffness,
 )
-from wm_drake.systems.friction_damper import (
-    FrictionDamper,
-    FrictionDamperParameters,
-    friction_damper_history,
-    packed_damper_law,
-)
-from wm_drake.systems.six_component_bushing import (
-    SixComponentBushing,
-    SixComponentBushingParameters,
-    packed_bushing_law,
-    six_component_bushing_history,
-)
+from wm_drake.systems.friction_damper import FrictionDamper, FrictionDamperParameters, packed_damper_law
+from wm_drake.systems.six_component_bushing import SixComponentBushing, SixComponentBushingParameters, packed_bushing_law
 from wm_drake.systems.speed_source import REFLECTED_INERTIA, SpeedSource
-from wm_drake.systems.spring_strut import SpringStrut, SpringStrutParameters, spring_strut_history
+from wm_drake.systems.spring_strut import SpringStrut, SpringStrutParameters
 
 SPRING_CURVE = ForceTable(displacement=(-0.03, -0.01, 0.0, 0.01, 0.04), force=(-200.0, -50.0, 0.0, 60.0, 300.0))  # m, N
 SPONGE = ForceTable(displacement=(-0.02, -0.01, -0.003, 0.003, 0.01, 0.02), force=(-130.0, -40.0, 0.0, 0.0, 40.0, 130.0))
@@ -139,7 +130,6 @@ class Element:
 
     kind: Any
     packed: np.ndarray
-    history: Any
     state: tuple[float, ...] = ()
 
     def system(self, packed=None):
@@ -148,14 +138,14 @@ class Element:
 
 
 ELEMENTS = {
-    "spring": Element(SpringStrut, spring_parameters().packed(), spring_strut_history),
-    "spring with a table": Element(SpringStrut, spring_parameters(SPRING_CURVE).packed(), spring_strut_history),
-    "bushing": Element(SixComponentBushing, bushing_parameters().packed(), six_component_bushing_history),
+    "spring": Element(SpringStrut, spring_parameters().packed()),
+    "spring with a table": Element(SpringStrut, spring_parameters(SPRING_CURVE).packed()),
+    "bushing": Element(SixComponentBushing, bushing_parameters().packed()),
 }
 SPONGE_STATES = {"mstv": (2.3e-4,), "free_stroke": (0.012,)}  # m
 for _name, _damper in DAMPERS.items():
     _packed = damper_parameters(_damper).packed()
-    ELEMENTS[_name] = Element(FrictionDamper, _packed, friction_damper_history, SPONGE_STATES.get(_name, ()))
+    ELEMENTS[_name] = Element(FrictionDamper, _packed, SPONGE_STATES.get(_name, ()))
 every_element = pytest.mark.parametrize("element", ELEMENTS.values(), ids=ELEMENTS)
 
 
@@ -305,13 +295,14 @@ def test_the_logged_force_of_a_bushing_is_the_reaction_to_what_acts_on_the_tub()
 
 
 @every_element
-def test_a_history_repeats_the_ports_row_by_row(element):
+def test_readings_repeat_the_force_port_row_by_row(element):
     system = element.system()
-    states = random_plant_states(6, seed=28)
-    own_states = np.outer(np.linspace(0.5, 1.5, len(states)), element.state)
+    states = random_plant_states(11, seed=28)  # more than go side by side, and not a multiple
+    sponges = np.outer(np.linspace(0.5, 1.5, len(states)), element.state or [0.0])
+    begins = [np.zeros(int(element.kind is kind), dtype=int) for kind in (SpringStrut, FrictionDamper, SixComponentBushing)]
     forces = np.empty((len(states), system.GetOutputPort("force").size()))
-    element.history(states, own_states, element.packed, forces)
-    for x, own, force in zip(states, own_states, forces, strict=True):
+    reading_history(states, sponges, np.empty(0), element.packed, *begins, forces)
+    for x, own, force in zip(states, sponges[:, : len(element.state)], forces, strict=True):
         assert np.array_equal(port(system, context_of(system, x, own), "force"), force)
 
 

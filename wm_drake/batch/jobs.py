@@ -13,7 +13,8 @@ from wm_drake.laws.lanes import WIDTH
 from wm_drake.machine import Machine, Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.elements import FloatArray
-from wm_drake.simulation import AXES, Case, check_bearing, point_positions
+from wm_drake.readings import measured_points
+from wm_drake.simulation import Case, check_bearing
 
 KEPT_BODIES, KEPT_NUMBERS = 64, 2048
 """How many sets of bodies with a load, and of other numbers, are remembered for cases to come."""
@@ -26,7 +27,7 @@ class Numbers:
     Attributes:
         setup: From which it was packed, without load; its Context has been used again since.
         elements, layout: From `pack_elements`.
-        points: What is measured of the motion, for `measure_samples`: the sensors, then the detergent point along x, y, z.
+        points: What is measured of the motion, `readings.measured_points` one after the other.
         rest: State of rest.
     """
 
@@ -122,7 +123,8 @@ class Preparation:
                 del self._known_numbers[next(iter(self._known_numbers))]
             setup = self._set_up(case)
             elements, layout = pack_elements(setup)
-            self._known_numbers[key] = Numbers(setup, elements, layout, _points(setup), initial_state(setup, case.profile))
+            points, rest = measured_points(setup).ravel(), initial_state(setup, case.profile)
+            self._known_numbers[key] = Numbers(setup, elements, layout, points, rest)
         return self._known_numbers[key]
 
     def _set_up(self, case: Case) -> Setup:
@@ -132,11 +134,3 @@ class Preparation:
         self._context = setup.context
         check_bearing(setup, self.step)
         return setup
-
-
-def _points(setup: Setup) -> FloatArray:
-    """What is measured of the motion, packed for `measure_samples`: the sensors, then the detergent point along x, y, z."""
-    places = [*setup.sensor_points.values(), *[setup.detergent_point] * 3]
-    axes = [*(AXES.index(sensor.axis) for sensor in setup.sensors.values()), 0, 1, 2]
-    at_rest = point_positions(setup.rest_pose[None, :], np.array(places))[0, range(len(axes)), axes]
-    return np.column_stack([places, np.eye(3)[axes], at_rest]).ravel()

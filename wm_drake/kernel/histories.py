@@ -10,7 +10,9 @@ from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
 from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.vectors import add, dot, rotate, rotation_from_rpy
 from wm_drake.systems.element import PLANT_STATE_SIZE
+from wm_drake.systems.friction_damper import ENGAGED, friction_damper_line, friction_damper_tension
 from wm_drake.systems.six_component_bushing import six_component_bushing_wrench
+from wm_drake.systems.spring_strut import spring_strut_wrench
 
 POINT_SIZE = 7
 """Numbers of a measured point: its place in T, the direction in W along which it is measured, its value at rest. [m]"""
@@ -63,6 +65,56 @@ def position_history(samples, points, positions):
         lanes_to_rows(numbers, begin, positions)
 
 
+@long_running
+def reading_history(state, deformation, points, p, springs, dampers, bushings, readings):
+    """What is read off a motion at each sample: displacements at points, own forces of springs, dampers and bushings.
+
+    The forces are those of the elements' ports in Drake, from the same functions.
+
+    Args:
+        state: (n, 14) states of the plant.
+        deformation: (n, >= dampers) of the dampers' sponges. [m]
+        points: Measured points, one after the other (`POINT_SIZE` numbers each).
+        p: Packed numbers of springs, dampers and bushings.
+        springs, dampers, bushings: Where each begins in them, arrays.
+        readings: (n, k) written: displacement at each point [m], tension of each spring and each damper [N], force and moment
+            of each bushing on the housing [N, N m].
+    """
+    align_stack()
+    state_numbers, own_numbers = np.empty(PLANT_STATE_SIZE * WIDTH), np.empty(deformation.shape[1] * WIDTH)
+    numbers, p_numbers, point_numbers = np.empty(readings.shape[1] * WIDTH), in_each_lane(p), in_each_lane(points)
+    x, own, answer = lane_array(state_numbers), lane_array(own_numbers), lane_array(numbers)
+    q, measured = lane_array(p_numbers), lane_array(point_numbers)
+    for begin in range(0, len(state), WIDTH):
+        rows_to_lanes(state, begin, state_numbers)
+        rows_to_lanes(deformation, begin, own_numbers)
+        motion = tub_motion(x)
+        column = len(points) // POINT_SIZE
+        for k in range(column):
+            answer[k] = displacement_at(motion, measured, k * POINT_SIZE)
+        for at in springs:
+            _, answer[column] = spring_strut_wrench(motion, q, at)
+            column += 1
+        for i, at in enumerate(dampers):
+            _, line = friction_damper_line(motion, q, at)
+            tension, _ = friction_damper_tension(line[1], own[i], q, at)
+            answer[column] = q[at + ENGAGED] * tension
+            column += 1
+        for at in bushings:
+            _, on_housing = six_component_bushing_wrench(motion, q, at)
+            for k in range(6):
+                answer[column + k] = on_housing[k]
+            column += 6
+        lanes_to_rows(numbers, begin, readings)
+
+
+@law
+def displacement_at(motion, points, at):
+    """Displacement at the measured point whose numbers begin at `at`, along its direction. [m]"""
+    moved_to = add(motion.position, rotate(motion.rotation, three(points, at)))
+    return dot(three(points, at + 3), moved_to) - points[at + 6]
+
+
 @law
 def in_bounds(x, angle, displacement):
     """Whether a tub is within the bounds where a run may go on: 1 or 0."""
@@ -96,10 +148,7 @@ def measure_samples(samples, rows, size, bounds, p, gasket, points, count, x, mo
         good = good * in_bounds(x, bounds[0], bounds[1])
         motion = tub_motion(x)
         for k in range(count):
-            at = k * POINT_SIZE
-            place = (points[at], points[at + 1], points[at + 2])
-            direction = (points[at + 3], points[at + 4], points[at + 5])
-            value = dot(direction, add(motion.position, rotate(motion.rotation, place))) - points[at + 6]
+            value = displacement_at(motion, points, k * POINT_SIZE)
             moved[row * count + k] = value
             extremes[k] = larger(extremes[k], value, good)
         if gasket >= 0:

@@ -16,6 +16,8 @@ from wm_drake.machine import Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.elements import FloatArray
 
+_ON_TUB = ("springs", "dampers", "bushings")
+
 
 @dataclass(frozen=True)
 class Layout:
@@ -79,18 +81,9 @@ def pack(setup: Setup) -> tuple[FloatArray, Layout]:
 
 def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
     """The part of `pack` that follows the bodies: springs, dampers, bushings; no load changes it."""
-    parts: list[FloatArray] = []
-    size = BODIES_SIZE
-    indices: dict[str, tuple[int, ...]] = {}
-    structure: list[int] = []
-    for kind in ("springs", "dampers", "bushings"):
-        begins = []
-        for element in getattr(setup, kind).values():
-            begins.append(size)
-            parts.append(element.packed())
-            size += len(parts[-1])
-            structure += element.structure
-        indices[kind] = tuple(begins)
+    on_tub, indices = pack_on_tub(setup, BODIES_SIZE)
+    parts, size = [on_tub], BODIES_SIZE + len(on_tub)
+    structure = [number for kind in _ON_TUB for element in getattr(setup, kind).values() for number in element.structure]
     begins = []
     for name, telescope in setup.telescopes.items():
         begins.append(size)
@@ -105,6 +98,25 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
         structure += setup.bearing.structure
     bearing = size if setup.bearing else -1
     return np.concatenate(parts), Layout(**indices, gasket=gasket, bearing=bearing, structure=tuple(structure))
+
+
+def pack_on_tub(setup: Setup, size: int = 0) -> tuple[FloatArray, dict[str, tuple[int, ...]]]:
+    """Springs, dampers and bushings, whose forces the motion of the tub decides; and by kind where each begins.
+
+    Args:
+        setup: The machine.
+        size: How many numbers come before.
+    """
+    packed: list[FloatArray] = []
+    indices: dict[str, tuple[int, ...]] = {}
+    for kind in _ON_TUB:
+        begins = []
+        for element in getattr(setup, kind).values():
+            begins.append(size)
+            packed.append(element.packed())
+            size += len(packed[-1])
+        indices[kind] = tuple(begins)
+    return np.concatenate([[], *packed]), indices
 
 
 def aligned(size: int) -> FloatArray:

@@ -184,15 +184,15 @@ def in_each_lane(array):
 @law
 def rows_to_lanes(rows, begin, numbers):
     """Writes `WIDTH` rows of a table, from row `begin`, side by side for an array of lanes; past its end, the last row."""
-    for lane in range(WIDTH):
-        row = min(begin + lane, len(rows) - 1)
-        for k in range(rows.shape[1]):
-            numbers[k * WIDTH + lane] = rows[row, k]
+    last = len(rows) - 1
+    for k in range(rows.shape[1]):  # the long way round, which the compiler makes one loop of vectors
+        for lane in range(WIDTH):
+            numbers[k * WIDTH + lane] = rows[min(begin + lane, last), k]
 
 
 @law
 def lanes_to_rows(numbers, begin, rows):
     """The way back of `rows_to_lanes`."""
-    for lane in range(min(WIDTH, len(rows) - begin)):
-        for k in range(rows.shape[1]):
+    for k in range(rows.shape[1]):
+        for lane in range(min(WIDTH, len(rows) - begin)):
             rows[begin + lane, k] = numbers[k * WIDTH + lane]

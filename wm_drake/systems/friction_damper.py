@@ -11,8 +11,7 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.laws.compilation import law
 from wm_drake.laws.damper import COULOMB, FREE_STROKE, HAVSIN, MSTV, STV, STV_SPONGE, damper_response
-from wm_drake.laws.elementary import in_each_lane, lanes_to_rows, numbers, rows_to_lanes
-from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
+from wm_drake.laws.elementary import numbers
 from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.strut import bending_moment, strut_line, transverse, transverse_couple, wrench_at_origin
 from wm_drake.laws.vectors import add, cross, rotate, scale, subtract
@@ -27,7 +26,7 @@ from wm_drake.parameters.elements import (
     StvSpongeDamper,
     packed_stiffness,
 )
-from wm_drake.systems.element import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE, SCALARS, ForceElement
+from wm_drake.systems.element import GENERALIZED_FORCE_SIZE, SCALARS, ForceElement
 
 
 def packed_damper_law(damper: DamperType) -> FloatArray:
@@ -58,6 +57,10 @@ def law_structure(packed_law: FloatArray) -> list[int]:
     """Number of a packed law, and of the points of its sponge's table if it has one."""
     number = int(packed_law[0])
     return [number, int(packed_law[6])] if number == FREE_STROKE else [number]
+
+
+ENGAGED = 13
+"""Where the packed parameters say whether the damper is in the machine."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +113,7 @@ def friction_damper_tension(elongation_rate, deformation, p, at):
 def friction_damper_wrench(motion, arm, line, tension, p, at):
     """Moment about To and force on the tub (six numbers, W) of a damper under a tension; arguments as above."""
     _, _, direction, v_A, inverse_length = line
-    axis, engaged = (p[at + 6], p[at + 7], p[at + 8]), p[at + 13]
+    axis, engaged = (p[at + 6], p[at + 7], p[at + 8]), p[at + ENGAGED]
     bushing = (p[at + 9], p[at + 10], p[at + 11], p[at + 12])
     w_strut = scale(inverse_length, cross(direction, v_A))
     against_tub = subtract(w_strut, transverse(motion.angular_velocity, direction))
@@ -132,26 +135,9 @@ def evaluate_friction_damper(x, state, p, generalized_force, force, rate):
     for i in range(6):
         generalized_force[i] = wrench[i]
     generalized_force[6] = 0.0 * tension
-    force[0] = p[13] * tension
+    force[0] = p[ENGAGED] * tension
     if len(rate) > 0:
         rate[0] = deformation_rate
-
-
-@law
-def friction_damper_history(states, own_states, p, forces):
-    """Own force at each row of a sampled motion: `evaluate_friction_damper` without Drake, for records."""
-    align_stack()
-    x_numbers, own_numbers, force_numbers = np.empty(PLANT_STATE_SIZE * WIDTH), np.empty(WIDTH), np.empty(WIDTH)
-    x, own, own_force = lane_array(x_numbers), lane_array(own_numbers), lane_array(force_numbers)
-    p_numbers = in_each_lane(p)
-    q = lane_array(p_numbers)
-    for begin in range(0, len(states), WIDTH):
-        rows_to_lanes(states, begin, x_numbers)
-        rows_to_lanes(own_states, begin, own_numbers)
-        _, line = friction_damper_line(tub_motion(x), q, 0)
-        tension, _ = friction_damper_tension(line[1], own[0], q, 0)
-        own_force[0] = q[13] * tension
-        lanes_to_rows(force_numbers, begin, forces)
 
 
 @TemplateSystem.define("DamperForce_", T_list=SCALARS)

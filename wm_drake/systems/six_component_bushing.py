@@ -9,15 +9,14 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.laws.bushing import bushing_force
 from wm_drake.laws.compilation import law
-from wm_drake.laws.elementary import in_each_lane, lanes_to_rows, numbers, rows_to_lanes
-from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
+from wm_drake.laws.elementary import numbers
 from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.strut import wrench_at_origin
 from wm_drake.laws.table import packed_size
 from wm_drake.laws.vectors import add, compose, cross, rotate, rotate_back, rotation_vector, scale, subtract
 from wm_drake.laws.vectors import transpose as transposed
 from wm_drake.parameters.elements import BushingType, FloatArray, packed_stiffnesses
-from wm_drake.systems.element import PLANT_STATE_SIZE, SCALARS, ForceElement
+from wm_drake.systems.element import SCALARS, ForceElement
 
 AXES = ("x", "y", "z")
 
@@ -142,20 +141,6 @@ def evaluate_six_component_bushing(x, state, p, generalized_force, force, rate):
         generalized_force[i] = wrench[i]
         force[i] = on_housing[i]
     generalized_force[6] = 0.0 * wrench[0]
-
-
-@law
-def six_component_bushing_history(states, own_states, p, forces):
-    """Own force at each row of a sampled motion: `evaluate_six_component_bushing` without Drake, for records."""
-    align_stack()
-    x_numbers, force_numbers, p_numbers = np.empty(PLANT_STATE_SIZE * WIDTH), np.empty(6 * WIDTH), in_each_lane(p)
-    x, own_force, q = lane_array(x_numbers), lane_array(force_numbers), lane_array(p_numbers)
-    for begin in range(0, len(states), WIDTH):
-        rows_to_lanes(states, begin, x_numbers)
-        _, on_housing = six_component_bushing_wrench(tub_motion(x), q, 0)
-        for k in range(6):
-            own_force[k] = on_housing[k]
-        lanes_to_rows(force_numbers, begin, forces)
 
 
 @TemplateSystem.define("SixComponentBushing_", T_list=SCALARS)

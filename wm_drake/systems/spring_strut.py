@@ -9,14 +9,13 @@ from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.laws.compilation import law
-from wm_drake.laws.elementary import in_each_lane, lanes_to_rows, numbers, rows_to_lanes
-from wm_drake.laws.lanes import WIDTH, align_stack, lane_array
+from wm_drake.laws.elementary import numbers
 from wm_drake.laws.motion import tub_motion
 from wm_drake.laws.spring import spring_tension
 from wm_drake.laws.strut import strut_line, wrench_at_origin
 from wm_drake.laws.vectors import rotate, scale
 from wm_drake.parameters.elements import FloatArray
-from wm_drake.systems.element import PLANT_STATE_SIZE, SCALARS, ForceElement
+from wm_drake.systems.element import SCALARS, ForceElement
 
 
 @dataclass(frozen=True)
@@ -65,18 +64,6 @@ def evaluate_spring_strut(x, state, p, generalized_force, force, rate):
         generalized_force[i] = wrench[i]
     generalized_force[6] = 0.0 * tension
     force[0] = tension
-
-
-@law
-def spring_strut_history(states, own_states, p, forces):
-    """Own force at each row of a sampled motion: `evaluate_spring_strut` without Drake, for records."""
-    align_stack()
-    x_numbers, force_numbers, p_numbers = np.empty(PLANT_STATE_SIZE * WIDTH), np.empty(WIDTH), in_each_lane(p)
-    x, own_force, q = lane_array(x_numbers), lane_array(force_numbers), lane_array(p_numbers)
-    for begin in range(0, len(states), WIDTH):
-        rows_to_lanes(states, begin, x_numbers)
-        _, own_force[0] = spring_strut_wrench(tub_motion(x), q, 0)
-        lanes_to_rows(force_numbers, begin, forces)
 
 
 @TemplateSystem.define("SpringStrut_", T_list=SCALARS)
