@@ -11,13 +11,15 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
 from wm_drake.bodies import add_bodies, set_bodies
-from wm_drake.laws.compilation import generic
-from wm_drake.laws.vectors import rotation_from_rpy
+from wm_drake.laws.outline import support_history
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.elements import FloatArray
 
 _FIRST_LOOK = 16
 """Every so many poses are looked at first for the smallest gap."""
+
+_AT_ORIGIN = np.zeros((1, 6))
+"""Pose of the housing."""
 
 REPLAY_RATE = 32.0
 """Frames of a replay per simulated second. [Hz]"""
@@ -42,7 +44,7 @@ class Gap:
 
 
 @dataclass(frozen=True)
-class _Outline:
+class Outline:
     """What a shape fills at most: a cylinder, or a box; in the frame of the body it rides on.
 
     Attributes:
@@ -57,13 +59,11 @@ class _Outline:
     half: FloatArray
     is_round: bool
 
-    def reach(self, direction: FloatArray) -> FloatArray:
-        """How far it extends from its centre in directions (..., 3) given in the body's frame (its support function). [m]"""
-        along = direction @ self.axes.T
-        if self.is_round:
-            across = np.sqrt(np.maximum(0.0, 1.0 - along[..., 2] ** 2))
-            return self.half[2] * np.abs(along[..., 2]) + self.half[0] * across
-        return np.abs(along) @ self.half
+    def begins(self, direction: FloatArray, poses: FloatArray) -> FloatArray:
+        """How far along a direction in W (3,) it begins, in poses (n, 6) of its body: roll, pitch, yaw, x, y, z. (n,) [m]"""
+        nearest = np.empty((len(poses), 1))
+        support_history(poses, direction, self.centre, self.axes.ravel(), self.half, self.is_round, nearest)
+        return nearest[:, 0]
 
 
 class Scene:
@@ -95,7 +95,7 @@ class Scene:
         welded = self.plant.GetBodiesWeldedTo(self.plant.GetBodyByName(body))
         return [shape for part in welded for shape in self.plant.GetCollisionGeometriesForBody(part)]
 
-    def _outline(self, shape: GeometryId) -> _Outline:
+    def _outline(self, shape: GeometryId) -> Outline:
         inspector = self._scene_graph.model_inspector()
         body = self.plant.GetBodyFromFrameId(inspector.GetFrameId(shape))
         grounded = self.plant.GetBodiesWeldedTo(self.plant.world_body())
@@ -106,11 +106,11 @@ class Scene:
         kind = inspector.GetShape(shape)
         if isinstance(kind, Cylinder):
             half = np.array([kind.radius(), kind.radius(), 0.5 * kind.length()])
-            return _Outline(X_CS.translation(), X_CS.rotation().matrix().T, half, is_round=True)
+            return Outline(X_CS.translation(), X_CS.rotation().matrix().T, half, is_round=True)
         box = inspector.GetObbInGeometryFrame(shape)
         assert box is not None  # only unbounded shapes have none, and those cannot ride on a tub
         X_CO = X_CS.multiply(box.pose())
-        return _Outline(X_CO.translation(), X_CO.rotation().matrix().T, np.array(box.half_width()), is_round=False)
+        return Outline(X_CO.translation(), X_CO.rotation().matrix().T, np.array(box.half_width()), is_round=False)
 
     def _name(self, shape: GeometryId) -> str:
         return str(self._scene_graph.model_inspector().GetName(shape)).split("::")[-1]
@@ -149,8 +149,8 @@ class Scene:
         """
         if not self._pairs or not len(time):
             return None
-        away = poses - rest_pose
-        roll, pitch, yaw, x, y, z = away.T
+        away = np.ascontiguousarray((poses - rest_pose).T)
+        roll, pitch, yaw, x, y, z = away
         turned = (np.abs(roll) + np.abs(pitch) + np.abs(yaw)) * self._reach
         shift = np.sqrt(x * x + y * y + z * z) + turned
         at_rest = self._at_rest(tuple(map(float, rest_pose)))
@@ -160,7 +160,7 @@ class Scene:
             for distance, direction, pair in at_rest:
                 if distance - shift[farthest] >= best.distance:  # nor can any pair that is farther apart at rest
                     break
-                least = distance + away[::stride, 3:] @ direction - turned[::stride]  # a gap shrinks by no more
+                least = distance + direction @ away[3:, ::stride] - turned[::stride]  # a gap shrinks by no more
                 near = stride * np.flatnonzero(least < best.distance)
                 best = self._smallest_of_pair(pair, direction, best, time[near], poses[near])
         return best
@@ -190,11 +190,11 @@ class Scene:
         """The smallest gap after this pair was looked at; `direction` is a first guess of where it is narrowest."""
         if not len(time):
             return best
-        rotations = np.stack(generic(rotation_from_rpy)(*poses[:, :3].T), axis=1).reshape(-1, 3, 3)
         moving, fixed = (self._outlines[shape] for shape in pair)
         bound = np.full(len(time), -np.inf)
         while True:
-            bound = np.maximum(bound, _free_between(moving, fixed, direction, poses[:, 3:], rotations))
+            free = moving.begins(direction, poses) + fixed.begins(-direction, _AT_ORIGIN)  # < 0 if they overlap there
+            bound = np.maximum(bound, free)
             index = int(np.argmin(bound))
             if not bound[index] < best.distance:
                 return best
@@ -211,15 +211,6 @@ class Scene:
             self._diagram.ForcedPublish(self._context)
         meshcat.StopRecording()
         meshcat.PublishRecording()
-
-
-def _free_between(
-    moving: _Outline, fixed: _Outline, away: FloatArray, positions: FloatArray, rotations: FloatArray
-) -> FloatArray:
-    """What is left free between two outlines along a direction in W, < 0 if they overlap there, at each pose. (n,) [m]"""
-    in_tub = away @ rotations
-    place = positions @ away + in_tub @ moving.centre - away @ fixed.centre
-    return place - moving.reach(-in_tub) - fixed.reach(away)
 
 
 def replay_page(parameters: MachineParameters, time: FloatArray, positions: FloatArray) -> str:
