@@ -19,10 +19,10 @@ from collections import namedtuple
 
 from wm_drake.kernel.bearing import TUB_SIZE, carrier_motion, carrier_size, tub_accelerations
 from wm_drake.kernel.matrices import about_centre, inverse, plus, six, three, times
-from wm_drake.kernel.side_by_side import deformation_at, together, write_rate
+from wm_drake.kernel.side_by_side import deformation_at, sines_of_angles, together, write_rate
 from wm_drake.kernel.tubes import TUBES_STATE_SIZE, count_of, with_telescopes
 from wm_drake.laws.compilation import law
-from wm_drake.laws.elementary import anywhere, sine_cosine
+from wm_drake.laws.elementary import anywhere
 from wm_drake.laws.motion import motion_from_sines, rpy_rates
 from wm_drake.laws.vectors import add, cross, dot, rotate, rotate_back, scale, subtract
 from wm_drake.systems.drum_bearing import drum_bearing_forces
@@ -160,7 +160,7 @@ def state_derivative(x, dx, masses, rate, acceleration, p, struts, elements, scr
         scratch: At least `LINE_SIZE` entries a damper to work in, of the kind of `struts`.
     """
     springs, dampers, deformations, bushings, telescopes, bearing, tubes = elements
-    roll, pitch, yaw = sine_cosine(x[0]), sine_cosine(x[1]), sine_cosine(x[2])
+    roll, pitch, yaw = sines_of_angles(x)
     motion = motion_from_sines(x, 0, roll, pitch, yaw)
     zero = 0.0 * x[0]
     total = (zero, zero, zero, zero, zero, zero)

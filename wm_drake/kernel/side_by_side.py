@@ -7,11 +7,39 @@ The same source takes struts one after the other, as lanes of several runs; thes
 
 from numba.extending import overload
 
-from wm_drake.laws.lanes import QUAD, LaneArrayType, LanesType, NumberArrayType, put_quad_at, quad_at, sum_of_quad
+from wm_drake.laws.elementary import sine_cosine
+from wm_drake.laws.lanes import (
+    QUAD,
+    LaneArrayType,
+    LanesType,
+    NumberArrayType,
+    numbers_of_quad,
+    put_quad_at,
+    quad_at,
+    sum_of_quad,
+)
 
 
 def _is_quads(kind):
     return isinstance(kind, LaneArrayType | LanesType) and kind.width == QUAD
+
+
+def sines_of_angles(x):
+    """Sine and cosine of each of the first three numbers of a state: roll, pitch, yaw."""
+    return sine_cosine(x[0]), sine_cosine(x[1]), sine_cosine(x[2])
+
+
+@overload(sines_of_angles)
+def _compiled_sines_of_angles(x):
+    if not isinstance(x, NumberArrayType):
+        return sines_of_angles
+
+    def at_once(x):  # the fourth lane goes along for nothing
+        sines, cosines = sine_cosine(quad_at(x, 0))
+        s, c = numbers_of_quad(sines), numbers_of_quad(cosines)
+        return (s[0], c[0]), (s[1], c[1]), (s[2], c[2])
+
+    return at_once
 
 
 def together(wrench, struts, at):

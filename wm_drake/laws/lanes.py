@@ -16,6 +16,7 @@ from typing import Any
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.typeconv import Conversion
+from numba.core.types.containers import UniTuple
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
@@ -297,6 +298,17 @@ def put_quad_at(typing_context, array, index, quad):
 
 def _quad_place(builder: Any, array: Any, index: Any) -> Any:
     return builder.bitcast(builder.gep(array, [index]), _LANES[QUAD].vector.as_pointer())
+
+
+@intrinsic
+def numbers_of_quad(typing_context, quad):
+    """The lanes of a quad as a tuple of four numbers."""
+
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        parts = [builder.extract_element(args[0], ir.Constant(ir.IntType(32), k)) for k in range(QUAD)]
+        return context.make_tuple(builder, sig.return_type, parts)
+
+    return UniTuple(types.float64, QUAD)(quad), emit
 
 
 @intrinsic
