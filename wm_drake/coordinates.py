@@ -1,5 +1,6 @@
 """Where the plant of a machine keeps what: the one description of its state that all others go by."""
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +42,7 @@ class Coordinates:
         carriers = [np.append(self.carrier, self.drum)] if self.carrier.size else []
         return [np.append(self.tub, self.drum), *self.tubes, *carriers]
 
-    @property
+    @functools.cached_property
     def hanging(self) -> Indices:
         """What hangs on the tub and finds its own place there: all but tub and drum angle."""
         return np.setdiff1d(np.arange(self.size), [*self.tub, self.drum])

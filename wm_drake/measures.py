@@ -173,10 +173,10 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
     )
 
 
-def _largest(history: FloatArray) -> list[float]:
+def _largest(history: FloatArray) -> FloatArray:
     """Largest absolute value over time (time, axis) along each axis; NaN of no samples."""
-    # column by column: numpy is slow along the long side of a narrow table
-    return [np.max(np.abs(column)) if len(column) else np.nan for column in history.T]
+    rows = np.ascontiguousarray(history.T)  # numpy is slow along the long side of a narrow table
+    return np.abs(rows).max(axis=1) if len(history) else np.full(len(rows), np.nan)
 
 
 def _of_gasket(bushings: FloatArray, history: FloatArray) -> FloatArray:

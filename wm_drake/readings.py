@@ -105,7 +105,7 @@ def readings(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, ...]:
     points, (p, indices) = measured_points(setup), pack_on_tub(setup)
     begins = [np.array(indices[kind], dtype=np.int64) for kind in ("springs", "dampers", "bushings")]
     sizes = [len(points), len(begins[0]), len(begins[1]), 6 * len(begins[2])]
-    columns = np.empty((len(trajectory.time), sum(sizes)))
+    columns = np.empty((len(trajectory.time), sum(sizes)), order="F")
     reading_history(trajectory.state, trajectory.deformation, points.ravel(), p, *begins, columns)
     displacements, springs, dampers, bushings = np.split(columns, np.cumsum(sizes)[:-1], axis=1)
     return displacements, springs, dampers, bushings.reshape(len(columns), len(begins[2]), 6)
