@@ -221,6 +221,17 @@ def test_records_are_reproducible_and_survive_the_disk(machine, reference, engin
     assert not record.bushing_force.any()
 
 
+def test_what_is_changed_in_one_record_is_not_in_the_next(machine, reference):
+    case = Case("middle", reference.loads["middle"], SpinProfile(time=(0.0, 0.1), speed=(0.0, 1.0)))
+    record = simulate(machine, case)
+    for name in record.coords:
+        record[name].attrs["note"] = "mine"
+    record = record.assign_coords(sensor=[f"new {name}" for name in record.sensor.values])
+    another = simulate(machine, case)
+    assert not any("note" in another[name].attrs for name in another.coords)
+    assert list(another.sensor.values) == list(reference.sensors)
+
+
 @pytest.mark.parametrize("arguments", [{"engine": "adams"}, {"step": 3e-3}, {"step": 0.0}, {"step": 1e-2}])
 def test_unknown_engine_or_unfit_step_is_refused(machine, arguments):
     with pytest.raises(InputError):

@@ -2,7 +2,8 @@
 
 A run alone has no other runs to fill lanes with, but its struts are alike: `alone.struts_side_by_side` packs up to four
 neighbours of one structure as a strut whose numbers are lanes, behind a weight of 1 for a lane in use and of 0 for an idle one.
-The same source takes struts one after the other, as lanes of several runs; these functions have nothing to do then.
+So are its three angles. The same source takes struts and angles one after the other, as lanes of several runs; these functions
+have nothing to do then.
 """
 
 from numba.extending import overload
