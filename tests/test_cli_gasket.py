@@ -27,6 +27,13 @@ def study(wm_drake):
     return lambda *arguments: wm_drake("study", "gasket", *SMALL, "--out", "out", *arguments)
 
 
+@pytest.fixture
+def study_without_page(study, monkeypatch):
+    """The same without figures, which take most of its time, for what depends on runs and tables alone."""
+    monkeypatch.setattr("wm_drake.report.gasket_report.gasket_report", lambda *_: "")
+    return study
+
+
 def tables(folder="out"):
     return {name: (Path(folder) / name).read_bytes() for name in TABLES}
 
@@ -62,18 +69,18 @@ def test_json_is_one_object_of_the_promised_form(study):
     assert set(response["terms"][0]["effects"]) == {"-1", "0", "1"}
 
 
-def test_finished_study_is_not_run_again(study, monkeypatch):
-    study()
+def test_finished_study_is_not_run_again(study_without_page, monkeypatch):
+    study_without_page()
     before = tables()
     no_runs(monkeypatch)
-    assert study().code == 0
-    assert study("--resume").code == 0
+    assert study_without_page().code == 0
+    assert study_without_page("--resume").code == 0
     assert tables() == before
 
 
 @pytest.mark.slow
-def test_own_design_gives_the_same_as_the_made_one(study, wm_drake):
-    study()
+def test_own_design_gives_the_same_as_the_made_one(study_without_page, wm_drake):
+    study_without_page()
     before = tables()
     Path("out/design.csv").rename("mine.csv")
     ended = wm_drake("study", "gasket", *FACTORS, "--design", "mine.csv", "--profile", "p.yaml", "--out", "other")
@@ -82,8 +89,8 @@ def test_own_design_gives_the_same_as_the_made_one(study, wm_drake):
 
 
 @pytest.mark.slow
-def test_factor_file_and_one_worker_give_the_same(study, wm_drake):
-    study()
+def test_factor_file_and_one_worker_give_the_same(study_without_page, wm_drake):
+    study_without_page()
     Path("factors.yaml").write_text(
         "K_Lx: {keys: [gasket.stiffness_x]}\n"
         "C_L: {keys: [gasket.damping_x, gasket.damping_y, gasket.damping_z]}\n"
@@ -132,65 +139,65 @@ def interrupted_after(count, monkeypatch, mishap):
     monkeypatch.setattr(Ledger, "put", failing)
 
 
-def test_interrupt_keeps_what_had_finished(study, monkeypatch):
+def test_interrupt_keeps_what_had_finished(study_without_page, monkeypatch):
     with monkeypatch.context() as changed:
         interrupted_after(10, changed, KeyboardInterrupt())
-        ended = study()
+        ended = study_without_page()
     assert ended.code == 130
     assert "finished runs are kept in out/ledger.sqlite: go on with --resume" in ended.err
     assert [path.name for path in Path("out").iterdir()] == ["ledger.sqlite"]
-    ended = study()
+    ended = study_without_page()
     assert ended.code == 2
     assert "go on from there with --resume" in ended.err
-    assert study("--resume").code == 0
+    assert study_without_page("--resume").code == 0
     resumed = tables()
-    assert study("--out", "whole").code == 0
+    assert study_without_page("--out", "whole").code == 0
     assert tables("whole") == resumed
 
 
-def test_disk_that_is_full_at_the_end_costs_no_run(study, monkeypatch):
+def test_disk_that_is_full_at_the_end_costs_no_run(study_without_page, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as changed:
         changed.setattr("wm_drake.studies.screening_tables.write_tables", full)
-        ended = study()
+        ended = study_without_page()
     assert (ended.code, len(ended.err.strip().splitlines())) == (2, 1)
     assert "out: cannot be written to: No space left on device; all runs are kept" in ended.err
     assert [path.name for path in Path("out").iterdir()] == ["ledger.sqlite"]
     no_runs(monkeypatch)
-    assert study().code == 0
+    assert study_without_page().code == 0
 
 
-def test_other_study_in_the_folder_is_refused_and_kept(study):
-    study()
+def test_other_study_in_the_folder_is_refused_and_kept(study_without_page):
+    study_without_page()
     before = tables()
     for arguments, word in (
         (("--load", "middle"), "loads is"),
         (("--set", "gravity=9.8 m/s^2"), "machine is"),
         (("--factor", "K_Ty"), "design is"),
     ):
-        ended = study(*arguments, "--resume")
+        ended = study_without_page(*arguments, "--resume")
         assert ended.code == 2
         assert "out/ledger.sqlite: belongs to another study or version" in ended.err
         assert word in ended.err
     assert tables() == before
 
 
-def test_other_version_of_the_sources_is_refused(study, monkeypatch):
-    study()
+def test_other_version_of_the_sources_is_refused(study_without_page, monkeypatch):
+    study_without_page()
     monkeypatch.setattr("wm_drake.batch.sources_version", lambda: "0123")
-    ended = study("--resume")
+    ended = study_without_page("--resume")
     assert ended.code == 2
     assert "and '0123' here" in ended.err
 
 
-def test_damaged_ledger_is_refused_and_left(study):
-    study()
+def test_damaged_ledger_is_refused_and_left(study_without_page):
+    study_without_page()
     path = Path("out/ledger.sqlite")
     damaged = b"x" * 200 + path.read_bytes()[200:]
     path.write_bytes(damaged)
-    ended = study("--resume")
+    ended = study_without_page("--resume")
     assert (ended.code, len(ended.messages)) == (2, 1)
     assert "out/ledger.sqlite: is damaged" in ended.err
     assert path.read_bytes() == damaged
