@@ -103,7 +103,7 @@ def readings(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, ...]:
         (n, dampers) [N]; force and moment of the bushings on the housing (n, bushings, 6) [N, N m].
     """
     points, (p, indices) = measured_points(setup), pack_on_tub(setup)
-    begins = [np.array(indices[kind], dtype=np.int64) for kind in ("springs", "dampers", "bushings")]
+    begins = [np.array(of_kind, dtype=np.int64) for of_kind in indices.values()]
     sizes = [len(points), len(begins[0]), len(begins[1]), 6 * len(begins[2])]
     columns = np.empty((len(trajectory.time), sum(sizes)), order="F")
     reading_history(trajectory.state, trajectory.deformation, points.ravel(), p, *begins, columns)

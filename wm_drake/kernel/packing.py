@@ -101,7 +101,7 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
 
 
 def pack_on_tub(setup: Setup, size: int = 0) -> tuple[FloatArray, dict[str, tuple[int, ...]]]:
-    """Springs, dampers and bushings, whose forces the motion of the tub decides; and by kind where each begins.
+    """Springs, dampers and bushings, whose forces the motion of the tub decides; and by kind, in this order, where each begins.
 
     Args:
         setup: The machine.
