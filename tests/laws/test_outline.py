@@ -1,3 +1,5 @@
+"""What an outline begins with along a direction, against corners and rims."""
+
 import itertools
 
 import numpy as np
