@@ -22,15 +22,34 @@ import numba
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from wm_drake import Case, Scene, build_machine, load_machine, measure, simulate, simulate_many, with_values
-from wm_drake.kernel.alone import Alone
-from wm_drake.kernel.integration import integrate_lanes
-from wm_drake.kernel.packing import initial_state
-from wm_drake.laws.lanes import WIDTH
-from wm_drake.machine import Machine
-from wm_drake.parameters import GASKET_FACTORS, SpinProfile, at_levels, levels_of, load_factors, quantities
+from wm_drake import (
+    Case,
+    Scene,
+    build_machine,
+    load_machine,
+    measure,
+    simulate,
+    simulate_many,
+    with_values,
+)
+from wm_drake.compiler.lanes import WIDTH
+from wm_drake.engines.compiled.alone import Alone
+from wm_drake.engines.compiled.integration import integrate_lanes
+from wm_drake.engines.compiled.packing import initial_state
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import (
+    GASKET_FACTORS,
+    SpinProfile,
+    at_levels,
+    levels_of,
+    load_factors,
+    quantities,
+)
 
-GASKET = tuple(f"gasket.{name}" for name in ("damping", "rotational_damping", "stiffness", "rotational_stiffness"))
+GASKET = tuple(
+    f"gasket.{name}"
+    for name in ("damping", "rotational_damping", "stiffness", "rotational_stiffness")
+)
 FIRST_CALL = """
 import time, wm_drake as wm
 machine = wm.build_machine(wm.load_machine("reference"))
@@ -75,13 +94,16 @@ def gasket_cases(machine: Machine, profile: SpinProfile, count: int) -> Iterator
     nominal = [
         (key, value)
         for key, value, _ in quantities(machine.parameters)
-        if key.startswith(GASKET) and not key.endswith(("displacement", "angle"))  # abscissas of tables stay
+        if key.startswith(GASKET)
+        and not key.endswith(("displacement", "angle"))  # abscissas of tables stay
     ]
     for _ in range(count // 2):
         numbers = {}
         for key, value in nominal:
             times = rng.uniform(0.5, 1.5)
-            numbers[key] = tuple(times * part for part in value) if isinstance(value, tuple) else times * value
+            numbers[key] = (
+                tuple(times * part for part in value) if isinstance(value, tuple) else times * value
+            )
         changed = with_values(machine.parameters, numbers)
         for load in ("middle", "counter"):
             yield Case(load, changed.loads[load], profile, parameters=changed)
@@ -89,12 +111,21 @@ def gasket_cases(machine: Machine, profile: SpinProfile, count: int) -> Iterator
 
 def one_run(machine: Machine, size: Size) -> Iterator[str]:
     """The engines on one run, and scipy's LSODA on the right-hand side of the compiled one."""
-    case, scene = Case("middle", machine.parameters.loads["middle"], size.profile), Scene(machine.parameters)
-    run = {engine: lambda engine=engine: simulate(machine, case, engine) for engine in ("compiled", "drake")}
+    case, scene = (
+        Case("middle", machine.parameters.loads["middle"], size.profile),
+        Scene(machine.parameters),
+    )
+    run = {
+        engine: lambda engine=engine: simulate(machine, case, engine)
+        for engine in ("compiled", "drake")
+    }
     record = run["compiled"]()
     measure(record, scene)
     measured = median_s(lambda: measure(run["compiled"](), scene), size.repeats)
-    compiled, drake = median_s(run["compiled"], size.repeats), median_s(run["drake"], size.drake_repeats)
+    compiled, drake = (
+        median_s(run["compiled"], size.repeats),
+        median_s(run["drake"], size.drake_repeats),
+    )
     lsoda = median_s(lambda: by_lsoda(machine, case), size.drake_repeats)
     yield f"one run of {case.profile.duration:g} s: {1e3 * compiled:.0f} ms compiled, {1e3 * measured:.0f} ms with all measures"
     yield f"the same, Drake engine: {drake:.2f} s, {drake / compiled:.0f} times as long"
@@ -110,16 +141,22 @@ def by_lsoda(machine: Machine, case: Case) -> None:
         return alone.derivative(x, acceleration)
 
     corners = case.profile.time
-    for begin, end, acceleration in zip(corners, corners[1:], case.profile.acceleration(), strict=False):
+    for begin, end, acceleration in zip(
+        corners, corners[1:], case.profile.acceleration(), strict=False
+    ):
         samples = np.arange(begin, end, 5e-3)
         options = {"method": "LSODA", "rtol": 1e-6, "atol": 1e-9, "max_step": 0.02}
-        x = solve_ivp(rate, (begin, end), x, t_eval=np.append(samples, end), args=(acceleration,), **options).y[:, -1]
+        x = solve_ivp(
+            rate, (begin, end), x, t_eval=np.append(samples, end), args=(acceleration,), **options
+        ).y[:, -1]
 
 
 def many_runs(machine: Machine, size: Size) -> Iterator[str]:
     """Cost against the number of runs, and the peak of the process's memory."""
     parameters = machine.parameters
-    constant = build_machine(at_levels(parameters, levels_of(parameters, load_factors(GASKET_FACTORS)), [0] * 8))
+    constant = build_machine(
+        at_levels(parameters, levels_of(parameters, load_factors(GASKET_FACTORS)), [0] * 8)
+    )
     alone, both = ("extremes",), ("extremes", "amplitudes")
     for what, kind, measures, counts in (
         ("D, F, M, stiffness constant as in the study", constant, alone, size.many),
@@ -136,12 +173,17 @@ def many_runs(machine: Machine, size: Size) -> Iterator[str]:
 
 def assembly() -> str:
     """What the lanes were compiled to, from a copy compiled here."""
-    fresh = numba.njit(error_model="numpy", nogil=True, fastmath={"contract", "nsz"})(integrate_lanes.py_func)
+    fresh = numba.njit(error_model="numpy", nogil=True, fastmath={"contract", "nsz"})(
+        integrate_lanes.py_func
+    )
     fresh.compile(integrate_lanes.signatures[0])
     text = fresh.inspect_asm(fresh.signatures[0])
-    arithmetic = re.findall(r"^\s+v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d+)(pd|sd)\s(.*)$", text, re.MULTILINE)
+    arithmetic = re.findall(
+        r"^\s+v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d+)(pd|sd)\s(.*)$", text, re.MULTILINE
+    )
     wide = {
-        name: sum(f"%{name}" in operands for kind, operands in arithmetic if kind == "pd") for name in ("zmm", "ymm", "xmm")
+        name: sum(f"%{name}" in operands for kind, operands in arithmetic if kind == "pd")
+        for name in ("zmm", "ymm", "xmm")
     }
     counts = ", ".join(f"{count} on {name}" for name, count in wide.items())
     return f"{WIDTH} lanes compiled to arithmetic: {counts}, {sum(kind == 'sd' for kind, _ in arithmetic)} on one number"
@@ -153,21 +195,27 @@ def first_calls() -> Iterator[str]:
         environment = os.environ | {"NUMBA_CACHE_DIR": folder}
         for what in ("nothing compiled yet", "compiled before"):
             command = [sys.executable, "-c", FIRST_CALL]
-            told = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
+            told = subprocess.run(
+                command, env=environment, capture_output=True, text=True, check=True
+            ).stdout.split()
             yield f"first run of a process, {what}: simulate {float(told[0]):.1f} s, then simulate_many {float(told[1]):.1f} s"
 
 
 def main() -> None:
     """Runs the benchmark and prints one line a figure."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="runs of 2 s instead of 70 s, a few dozen of them")
+    parser.add_argument(
+        "--quick", action="store_true", help="runs of 2 s instead of 70 s, a few dozen of them"
+    )
     parser.add_argument("--out", type=Path, help="also write the lines to this file")
     arguments = parser.parse_args()
     machine = build_machine(load_machine("reference"))
     size = Size(machine.parameters.profile, 15, 3, (100, 1000, 2000, 10_000))
     if arguments.quick:
         size = Size(SpinProfile(time=(0.0, 2.0), speed=(0.0, 9.0)), 3, 1, (16, 32))
-    simulate_many(machine, gasket_cases(machine, size.profile, 2))  # warms up: compiles, or reads from the cache
+    simulate_many(
+        machine, gasket_cases(machine, size.profile, 2)
+    )  # warms up: compiles, or reads from the cache
     lines = [f"processor: {processor()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.2f}"]
     print(lines[0])
     parts = [one_run(machine, size), many_runs(machine, size)]

@@ -16,8 +16,8 @@ from wm_drake import load_machine
 from wm_drake.parameters import DamperType, MeasuredLoop, load_component
 from wm_drake.rigs import Harmonic, damper_bench, force_loops
 from wm_drake.rigs.measured import MeasuredMotion, measured_motion
-from wm_drake.studies.component_fit import damper_model, fit_problem
-from wm_drake.studies.identification import METHODS, identify
+from wm_drake.studies.fitting import METHODS, identify
+from wm_drake.studies.identification import damper_model, fit_problem
 
 NOISE = 0.02
 SAMPLES = 400
@@ -27,7 +27,10 @@ def dampers() -> dict[str, tuple[DamperType, list[Harmonic]]]:
     """What is fitted, and the motions it is tested with."""
     free_stroke = load_machine("free_stroke").damper_types["free_stroke"]
     tests = {
-        "mstv": (load_component("mstv_damper").parameters, ((1.0, 3.0, 6.67, 10.0), (0.3, 0.5, 1.0))),
+        "mstv": (
+            load_component("mstv_damper").parameters,
+            ((1.0, 3.0, 6.67, 10.0), (0.3, 0.5, 1.0)),
+        ),
         "free_stroke": (free_stroke, ((1.0, 3.0, 5.0, 7.0), (3.0, 6.0, 10.0))),
     }
     return {
@@ -39,13 +42,21 @@ def dampers() -> dict[str, tuple[DamperType, list[Harmonic]]]:
 def measured(damper: DamperType, motions: list[Harmonic]) -> list[MeasuredMotion]:
     """Noisy loops over three periods."""
     rng, found = np.random.default_rng(0), []
-    for number, (motion, loop) in enumerate(zip(motions, force_loops(damper_bench(damper), motions), strict=True)):
+    for number, (motion, loop) in enumerate(
+        zip(motions, force_loops(damper_bench(damper), motions), strict=True)
+    ):
         t = np.linspace(0.0, 3.0 / motion.frequency, SAMPLES)
         phase = (2.0 * np.pi * motion.frequency * t) % (2.0 * np.pi)
-        force = np.interp(phase, loop.time * motion.angular_frequency, loop.force, period=2.0 * np.pi)
+        force = np.interp(
+            phase, loop.time * motion.angular_frequency, loop.force, period=2.0 * np.pi
+        )
         force += NOISE * np.max(np.abs(force)) * rng.normal(size=SAMPLES)
         name = f"loop {number}"
-        found.append(measured_motion(MeasuredLoop(name, name, t, motion.amplitude * np.sin(phase), force, False)))
+        found.append(
+            measured_motion(
+                MeasuredLoop(name, name, t, motion.amplitude * np.sin(phase), force, False)
+            )
+        )
     return found
 
 
@@ -53,7 +64,12 @@ def main() -> None:
     """Fits, and prints a line a fit."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="two loops, one law, least squares")
-    parser.add_argument("--method", choices=list(METHODS), action="append", help="least-squares by default; repeatable")
+    parser.add_argument(
+        "--method",
+        choices=list(METHODS),
+        action="append",
+        help="least-squares by default; repeatable",
+    )
     parser.add_argument("--out", type=Path, help="also write the lines to this file")
     arguments = parser.parse_args()
     chosen = dampers()
@@ -61,7 +77,9 @@ def main() -> None:
         chosen = {"mstv": (chosen["mstv"][0], chosen["mstv"][1][:2])}
     lines = [f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.2f}"]
     print(lines[0])
-    for (law, (damper, motions)), method in itertools.product(chosen.items(), arguments.method or ["least-squares"]):
+    for (law, (damper, motions)), method in itertools.product(
+        chosen.items(), arguments.method or ["least-squares"]
+    ):
         loops = measured(damper, motions)
         problem = fit_problem(damper_model(law, loops), loops)
         begin = time.perf_counter()

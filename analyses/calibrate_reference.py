@@ -9,13 +9,13 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from wm_drake.bodies import sdf_path
-from wm_drake.ledger import open_ledger
-from wm_drake.machine import build_machine
-from wm_drake.outputs import progress_bar
+from wm_drake.batch.ledger import open_ledger
+from wm_drake.cli.progress import progress_bar
+from wm_drake.model.bodies import sdf_path
+from wm_drake.model.machine import build_machine
+from wm_drake.model.sdf_text import sdf_with
 from wm_drake.parameters import load_machine, machine_file_with, machine_path, measured_amplitudes
 from wm_drake.parameters.free import FreeFile, load_free
-from wm_drake.sdf_text import sdf_with
 from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate, identity_of
 from wm_drake.studies.calibration.outcome import mean_and_largest, solved_machine
 from wm_drake.studies.calibration.prediction import Prediction, predict
@@ -39,11 +39,15 @@ def main() -> None:
         few = dict(list(free.quantities.items())[:3])
         free, left_out = FreeFile(quantities=few), LEFT_OUT[:1]
         plan = blind = Plan(starts=1, iterations=1)
-    targets = targets_of(machine.parameters, measured_amplitudes(machine.parameters)).weighted(WEIGHTS)
+    targets = targets_of(machine.parameters, measured_amplitudes(machine.parameters)).weighted(
+        WEIGHTS
+    )
     ledger_path = arguments.out.with_suffix(".sqlite")
     with open_ledger(ledger_path, identity_of(machine, free, targets, plan), resume=True) as ledger:
         with progress_bar(plan.starts, "searches") as done:
-            calibration = calibrate(machine, free, targets, plan, ledger, report=lambda start, *_: done(start))
+            calibration = calibrate(
+                machine, free, targets, plan, ledger, report=lambda start, *_: done(start)
+            )
         if arguments.write:
             _write(calibration)
         predictions = []
@@ -58,28 +62,50 @@ def main() -> None:
 
 
 def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="three quantities, one step: only to see that it runs")
-    parser.add_argument("--out", type=Path, default=Path("calibrate_reference.txt"), help="text; evaluations go beside it")
-    parser.add_argument("--write", action="store_true", help="put the best machine into the shipped files")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="three quantities, one step: only to see that it runs"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("calibrate_reference.txt"),
+        help="text; evaluations go beside it",
+    )
+    parser.add_argument(
+        "--write", action="store_true", help="put the best machine into the shipped files"
+    )
     return parser.parse_args()
 
 
 def _lines(calibration: Calibration, predictions: list[Prediction]) -> list[str]:
     targets, best = calibration.targets, calibration.solutions[0]
     errors = 100.0 * best.errors(targets)
-    lines = [f"{len(calibration.ended)} searches, {len(calibration.solutions)} distinct good solutions"]
+    lines = [
+        f"{len(calibration.ended)} searches, {len(calibration.solutions)} distinct good solutions"
+    ]
     for (load, gasket), row in zip(targets.loads, errors, strict=True):
-        shown = "  ".join(f"{name} {value:+5.1f}" for name, value in zip(targets.sensors, row, strict=True))
-        lines.append(f"{load:8s} {'with' if gasket else 'without':7s} gasket, difference in %: {shown}")
+        shown = "  ".join(
+            f"{name} {value:+5.1f}" for name, value in zip(targets.sensors, row, strict=True)
+        )
+        lines.append(
+            f"{load:8s} {'with' if gasket else 'without':7s} gasket, difference in %: {shown}"
+        )
     with_gasket = [gasket for _, gasket in targets.loads]
     for name, part in (("all", errors), ("with gasket", errors[with_gasket])):
         mean, largest = mean_and_largest(part)
         lines.append(f"{name}: {mean:.1f} % in the mean, {largest:.1f} % at most")
     for prediction in predictions:
         parts = (prediction.calibrated, prediction.predicted, prediction.seen)
-        texts = ["{:.1f} % in the mean, {:.1f} % at most".format(*mean_and_largest(100.0 * part)) for part in parts]
-        lines.append(f"{', '.join(prediction.loads)}: calibrated {texts[0]}; predicted {texts[1]} (the others: {texts[2]})")
+        texts = [
+            "{:.1f} % in the mean, {:.1f} % at most".format(*mean_and_largest(100.0 * part))
+            for part in parts
+        ]
+        lines.append(
+            f"{', '.join(prediction.loads)}: calibrated {texts[0]}; predicted {texts[1]} (the others: {texts[2]})"
+        )
     return lines
 
 
@@ -88,7 +114,10 @@ def _write(calibration: Calibration) -> None:
     path, model = machine_path("reference"), sdf_path(solved.model)
     keys = [".".join(value.path) for value in calibration.turning.values]
     own = [key for key in dict.fromkeys(keys) if not key.startswith(("bodies.", "frames."))]
-    texts = {path: machine_file_with(path, solved, own), model: sdf_with(model.read_text(encoding="utf-8"), solved)}
+    texts = {
+        path: machine_file_with(path, solved, own),
+        model: sdf_with(model.read_text(encoding="utf-8"), solved),
+    }
     for file, text in texts.items():
         file.write_text(text, encoding="utf-8")
 

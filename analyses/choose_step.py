@@ -12,7 +12,7 @@ import pandas as pd
 
 from wm_drake import Case, build_machine, load_machine, measure, simulate
 from wm_drake.parameters import MachineParameters, SpinProfile
-from wm_drake.simulation import DEFAULT_STEP, DivergenceWarning
+from wm_drake.simulation.runs import DEFAULT_STEP, DivergenceWarning
 
 STEPS_MS = (5.0, 2.5, 1.25, 0.5)
 CONVERGED_MS = 0.125
@@ -20,7 +20,11 @@ BOUND_PERCENT = 0.05
 PEAKS = ("amplitude", "detergent_displacement", "gasket_force", "gasket_moment")
 DAMPERS = {
     "MSTV (reference)": None,
-    "HAVSIN, full friction from 0.1 m/s": {"law": "havsin", "friction_force": 25.0, "full_friction_velocity": 0.1},
+    "HAVSIN, full friction from 0.1 m/s": {
+        "law": "havsin",
+        "friction_force": 25.0,
+        "full_friction_velocity": 0.1,
+    },
     "free stroke": {  # stroke and curve: assumptions of the order that [A] describes
         "law": "free_stroke",
         "friction_force": 25.0,
@@ -45,16 +49,24 @@ def machine_with(damper: dict[str, object] | None) -> MachineParameters:
     return MachineParameters.model_validate(tree | {"damper_types": {"friction": damper | bushing}})
 
 
-def errors_percent(parameters: MachineParameters, profile: SpinProfile, steps_ms: tuple[float, ...]) -> pd.DataFrame:
+def errors_percent(
+    parameters: MachineParameters, profile: SpinProfile, steps_ms: tuple[float, ...]
+) -> pd.DataFrame:
     """Largest difference of any peak from the converged one, by step and load. [%]"""
     machine = build_machine(parameters)
     rows = []
-    for load, gasket in [*((load, True) for load in parameters.loads), ("middle", False), ("counter", False)]:
+    for load, gasket in [
+        *((load, True) for load in parameters.loads),
+        ("middle", False),
+        ("counter", False),
+    ]:
         case = Case(load, parameters.loads[load], profile, gasket)
         peaks = {}
         for step in (*steps_ms, CONVERGED_MS):
             measures = measure(simulate(machine, case, step=1e-3 * step))
-            peaks[step] = np.concatenate([getattr(measures, peak) for peak in PEAKS[: 4 if gasket else 2]])
+            peaks[step] = np.concatenate(
+                [getattr(measures, peak) for peak in PEAKS[: 4 if gasket else 2]]
+            )
         for step in steps_ms:
             error = 100.0 * np.abs(peaks[step] / peaks[CONVERGED_MS] - 1.0)
             name = load if gasket else f"{load}, no gasket"
@@ -76,11 +88,16 @@ def main() -> None:
     text = []
     for name, damper in DAMPERS.items():
         table = errors_percent(machine_with(damper), profile, steps)
-        worst = table.pivot_table(index="step, ms", columns="load", values="largest error, %").sort_index(ascending=False)
+        worst = table.pivot_table(
+            index="step, ms", columns="load", values="largest error, %"
+        ).sort_index(ascending=False)
         with_gasket = worst[[load for load in worst.columns if "," not in load]].max(axis=1)
         good = [step for step in steps if with_gasket[step] <= BOUND_PERCENT]
         text += [f"{name}: largest error of any peak, %", worst.round(4).to_string()]
-        text += [f"longest step within {BOUND_PERCENT} % with gasket: {max(good, default=float('nan')):g} ms", ""]
+        text += [
+            f"longest step within {BOUND_PERCENT} % with gasket: {max(good, default=float('nan')):g} ms",
+            "",
+        ]
         print("\n".join(text[-4:]), flush=True)
     text.append(f"default step: {1e3 * DEFAULT_STEP:g} ms")
     print(text[-1])

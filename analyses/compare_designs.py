@@ -13,10 +13,10 @@ import pandas as pd
 
 from wm_drake import build_machine, load_machine, progress_bar, simulate_many
 from wm_drake.parameters import GASKET_FACTORS, SpinProfile, at_levels, levels_of, load_factors
-from wm_drake.simulation import Case
+from wm_drake.simulation.runs import Case
 from wm_drake.studies.doe import Design, make_design
-from wm_drake.studies.gasket import LOADS, MEASURES, GasketTrials
-from wm_drake.studies.screening import Responses, analyse, contributions
+from wm_drake.studies.gasket.screening import Responses, analyse, contributions
+from wm_drake.studies.gasket.study import LOADS, MEASURES, GasketTrials
 
 LEAST_PERCENT = 1.0
 """Terms that contribute more to a response of the full factorial are compared."""
@@ -43,7 +43,11 @@ def designs(names: tuple[str, ...], trials: int) -> dict[str, tuple[Design, floa
 def part_of(full: Responses, design: Design) -> Responses:
     """What a design would have given, taken from the runs of the full factorial."""
     places = (design.levels.astype(int) + 1) @ 3 ** np.arange(len(design.factors) - 1, -1, -1)
-    return Responses({load: values.iloc[places].reset_index(drop=True) for load, values in full.values.items()}, full.units, {})
+    return Responses(
+        {load: values.iloc[places].reset_index(drop=True) for load, values in full.values.items()},
+        full.units,
+        {},
+    )
 
 
 def main() -> None:
@@ -58,23 +62,39 @@ def main() -> None:
         profile, trials = SpinProfile(time=(0.0, 2.0), speed=(0.0, 9.0)), 100
         known = {name: known[name] for name in list(known)[:5]}
     levels = levels_of(reference, known)
-    middle = at_levels(reference, levels, [0] * len(levels))  # where stiffnesses are tables, numbers stand in their place
+    middle = at_levels(
+        reference, levels, [0] * len(levels)
+    )  # where stiffnesses are tables, numbers stand in their place
     machine = build_machine(middle)
-    study = GasketTrials(middle, levels, [Case(name, middle.loads[name], profile) for name in LOADS])
+    study = GasketTrials(
+        middle, levels, [Case(name, middle.loads[name], profile) for name in LOADS]
+    )
     made = designs(tuple(known), trials)
     *_, (full, _) = made.values()
     begin = time.perf_counter()
     with progress_bar(full.trials * len(LOADS)) as progress:
-        runs = study.responses(full, lambda cases: simulate_many(machine, cases, measures=MEASURES, progress=progress))
+        runs = study.responses(
+            full, lambda cases: simulate_many(machine, cases, measures=MEASURES, progress=progress)
+        )
     each_s = (time.perf_counter() - begin) / full.trials
     reference, rows = contributions(analyse(full, runs)), []
     for name, (design, made_s) in made.items():
         begin = time.perf_counter()
-        error = (contributions(analyse(design, part_of(runs, design))) - reference)[reference > LEAST_PERCENT].abs()
+        error = (contributions(analyse(design, part_of(runs, design))) - reference)[
+            reference > LEAST_PERCENT
+        ].abs()
         seconds = made_s + design.trials * each_s + time.perf_counter() - begin
         errors = {f"largest error, {load}": error[load].max(axis=None) for load in LOADS}
         efficiency = design.efficiency()
-        rows.append({"design": name, "runs": design.trials * len(LOADS), "s": seconds, "D-efficiency, %": efficiency} | errors)
+        rows.append(
+            {
+                "design": name,
+                "runs": design.trials * len(LOADS),
+                "s": seconds,
+                "D-efficiency, %": efficiency,
+            }
+            | errors
+        )
     text = pd.DataFrame(rows).round(2).to_string(index=False)
     print(f"contributions above {LEAST_PERCENT:g} %, largest error in points of percent\n{text}")
     if arguments.out:

@@ -17,11 +17,14 @@ from wm_drake.parameters import MeasuredLoop, load_component
 from wm_drake.parameters.components import COMPONENTS_FOLDER
 from wm_drake.rigs import Harmonic, damper_bench, force_loops
 from wm_drake.rigs.measured import measured_motion
-from wm_drake.studies.component_fit import damper_model, fit_problem
-from wm_drake.studies.identification import least_squares
+from wm_drake.studies.fitting import least_squares
+from wm_drake.studies.identification import damper_model, fit_problem
 
 F_MAX = (20.0, 30.0, 35.0, 40.0, 45.0, 50.0, 60.0, 80.0, 120.0)  # N
-BOUNDS = {"sponge_stiffness": (50e3, 300e3), "sponge_damping": (0.0, 10e3)}  # N/m, N s/m: [C] section 3.3
+BOUNDS = {
+    "sponge_stiffness": (50e3, 300e3),
+    "sponge_damping": (0.0, 10e3),
+}  # N/m, N s/m: [C] section 3.3
 MM = 1e-3
 
 
@@ -29,10 +32,16 @@ def coulomb_fits(table: pd.DataFrame, f_max: float) -> pd.DataFrame:
     """The table with k1 and c1 (N/mm, N s/mm) of the Coulomb model at each of its points, and the fit's error."""
     mstv = load_component("mstv_damper").parameters.model_copy(update={"friction_force": f_max})
     motions = [Harmonic(row.frequency_hz, row.amplitude_mm * MM) for row in table.itertuples()]
-    known = {"friction_force": f_max, "transition_velocity": 0.0, "slider_damping": mstv.slider_damping}
+    known = {
+        "friction_force": f_max,
+        "transition_velocity": 0.0,
+        "slider_damping": mstv.slider_damping,
+    }
     rows = []
     for loop in force_loops(damper_bench(mstv), motions):
-        measured = measured_motion(MeasuredLoop("mstv", "mstv", loop.time, loop.displacement, loop.force, False))
+        measured = measured_motion(
+            MeasuredLoop("mstv", "mstv", loop.time, loop.displacement, loop.force, False)
+        )
         model = damper_model("stv_sponge", [measured], BOUNDS, known)
         fit = least_squares(fit_problem(model, [measured]), starts=3, screened=16)
         k1, c1 = (fit[name].value * MM for name in ("sponge_stiffness", "sponge_damping"))
@@ -42,9 +51,14 @@ def coulomb_fits(table: pd.DataFrame, f_max: float) -> pd.DataFrame:
 
 def agreement(found: pd.DataFrame) -> dict[str, float]:
     """Rank correlations with the printed table, root mean square of the logarithms of the ratios, and how often c1 falls."""
-    c1 = found.pivot_table(index="frequency_hz", columns="amplitude_mm", values="c1 fitted").to_numpy()
+    c1 = found.pivot_table(
+        index="frequency_hz", columns="amplitude_mm", values="c1 fitted"
+    ).to_numpy()
     falls = np.concatenate([np.diff(c1, axis=0).ravel(), np.diff(c1, axis=1).ravel()]) <= 1e-3
-    ratio = {name: np.log(found[f"{name} fitted"].clip(lower=1e-3) / found[name]) for name in ("k1", "c1")}
+    ratio = {
+        name: np.log(found[f"{name} fitted"].clip(lower=1e-3) / found[name])
+        for name in ("k1", "c1")
+    }
     return {
         "rank correlation c1": float(spearmanr(found["c1"], found["c1 fitted"])[0]),
         "rank correlation k1": float(spearmanr(found["k1"], found["k1 fitted"])[0]),
@@ -56,8 +70,14 @@ def agreement(found: pd.DataFrame) -> dict[str, float]:
 
 def main() -> None:
     """Prints the agreement for each f_max, and the table for the one that agrees best."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="four corners of the table and two values of f_max only")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="four corners of the table and two values of f_max only",
+    )
     parser.add_argument("--out", type=Path, help="also write the result to this file")
     arguments = parser.parse_args()
     table = pd.read_csv(COMPONENTS_FOLDER / "mstv_table2_coulomb.csv", comment="#")
@@ -68,7 +88,9 @@ def main() -> None:
     found = {f_max: coulomb_fits(table, f_max) for f_max in candidates}
     scores = pd.DataFrame({f"{f_max:g} N": agreement(fits) for f_max, fits in found.items()}).T
     best = candidates[int(np.argmax(scores["rank correlation c1"]))]
-    shown = found[best].assign(k1_ratio=lambda t: t["k1 fitted"] / t["k1"], c1_ratio=lambda t: t["c1 fitted"] / t["c1"])
+    shown = found[best].assign(
+        k1_ratio=lambda t: t["k1 fitted"] / t["k1"], c1_ratio=lambda t: t["c1 fitted"] / t["c1"]
+    )
     text = [
         "agreement of Coulomb fits to MSTV loops with [C] Table 2, by f_max",
         scores.round(3).to_string(),

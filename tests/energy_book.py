@@ -6,10 +6,10 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
 
-from wm_drake.bodies import add_bodies, add_load, set_bodies
-from wm_drake.simulation import as_record
+from wm_drake.engines.trajectory import Trajectory
+from wm_drake.model.bodies import add_bodies, add_load, set_bodies
+from wm_drake.simulation.runs import as_record
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
-from wm_drake.trajectory import Trajectory
 
 
 def elastic_energy(stiffness, x):
@@ -50,7 +50,9 @@ class EnergyBook:
              self.w[index], self.v[index], [self.record.drum_speed.values[index]]]
         )  # fmt: skip
         self.plant.SetPositionsAndVelocities(self.context, state)
-        return self.plant.CalcKineticEnergy(self.context) + self.plant.CalcPotentialEnergy(self.context)
+        return self.plant.CalcKineticEnergy(self.context) + self.plant.CalcPotentialEnergy(
+            self.context
+        )
 
     def _strut(self, element):
         arm = self.rotation.apply(element.p_ToA_T)
@@ -79,15 +81,24 @@ class EnergyBook:
         c = np.array([g.damping_x, g.damping_y, g.damping_z])
         cr = np.array([g.rotational_damping_x, g.rotational_damping_y, g.rotational_damping_z])
         # rate of the rotation vector, by the inverse of the series for the angular velocity
-        r_rate = np.array([self._rotation_vector_rate(a, b) for a, b in zip(r, self.w, strict=True)])
-        stored = sum(elastic_energy(getattr(g, f"stiffness_{axis}"), d[:, i]) for i, axis in enumerate("xyz"))
-        stored += sum(elastic_energy(getattr(g, f"rotational_stiffness_{axis}"), r[:, i]) for i, axis in enumerate("xyz"))
+        r_rate = np.array(
+            [self._rotation_vector_rate(a, b) for a, b in zip(r, self.w, strict=True)]
+        )
+        stored = sum(
+            elastic_energy(getattr(g, f"stiffness_{axis}"), d[:, i]) for i, axis in enumerate("xyz")
+        )
+        stored += sum(
+            elastic_energy(getattr(g, f"rotational_stiffness_{axis}"), r[:, i])
+            for i, axis in enumerate("xyz")
+        )
         return stored, d_rate**2 @ c + r_rate**2 @ cr
 
     @staticmethod
     def _rotation_vector_rate(r, w):
         x = np.array([[0, -r[2], r[1]], [r[2], 0, -r[0]], [-r[1], r[0], 0]])
-        left_jacobian = np.eye(3) + x / 2 + x @ x / 6 + x @ x @ x / 24 + x @ x @ x @ x / 120  # w = J r'
+        left_jacobian = (
+            np.eye(3) + x / 2 + x @ x / 6 + x @ x @ x / 24 + x @ x @ x @ x / 120
+        )  # w = J r'
         return np.linalg.solve(left_jacobian, w)
 
     def dampers(self):
@@ -104,13 +115,22 @@ class EnergyBook:
             w = rate - deformation_rate
             friction = tension - kind.slider_damping * w
             stored = stored + 0.5 * kind.sponge_stiffness * deformation**2
-            power = power + kind.sponge_damping * deformation_rate**2 + kind.slider_damping * w**2 + friction * w
+            power = (
+                power
+                + kind.sponge_damping * deformation_rate**2
+                + kind.slider_damping * w**2
+                + friction * w
+            )
             line = placed.p_ToA_T - placed.p_WH
             axis = line / np.linalg.norm(line)
             w_strut = np.cross(direction, velocity) / length[:, None]
-            for body_axis, body_w in ((self.rotation.apply(axis), self.w), (np.broadcast_to(axis, direction.shape), 0.0)):
+            for body_axis, body_w in (
+                (self.rotation.apply(axis), self.w),
+                (np.broadcast_to(axis, direction.shape), 0.0),
+            ):
                 angle = np.arctan2(
-                    np.linalg.norm(np.cross(body_axis, direction), axis=1), np.sum(body_axis * direction, axis=1)
+                    np.linalg.norm(np.cross(body_axis, direction), axis=1),
+                    np.sum(body_axis * direction, axis=1),
                 )
                 relative = w_strut - body_w
                 bend = relative - np.sum(relative * direction, axis=1)[:, None] * direction
@@ -118,7 +138,11 @@ class EnergyBook:
                 b = kind.end_bushing
                 full = np.minimum(speed / b.full_friction_rate, 1.0)
                 stored = stored + 0.5 * b.stiffness * angle**2
-                power = power + b.damping * speed**2 + b.friction_torque * np.sin(np.pi / 2 * full) * speed
+                power = (
+                    power
+                    + b.damping * speed**2
+                    + b.friction_torque * np.sin(np.pi / 2 * full) * speed
+                )
         return stored, power
 
     def balance(self):
@@ -155,7 +179,9 @@ def dense_record(machine, case, step):
         torque.append(REFLECTED_INERTIA * (alpha - rates[6]))
         acceleration.append(rates[:6])
 
-    for begin, stop, alpha in zip(profile.time, profile.time[1:], profile.acceleration(), strict=False):
+    for begin, stop, alpha in zip(
+        profile.time, profile.time[1:], profile.acceleration(), strict=False
+    ):
         machine.source.set_acceleration(source_context, alpha)
         simulator.Initialize()
         sample(alpha)
@@ -163,5 +189,7 @@ def dense_record(machine, case, step):
             simulator.AdvanceTo(moment)
             sample(alpha)
     arrays = map(np.array, (time, state, deformation, torque, acceleration))
-    trajectory = Trajectory(*arrays, tubes=np.empty((len(time), 0, 14)), carrier=np.empty((len(time), 0)))
+    trajectory = Trajectory(
+        *arrays, tubes=np.empty((len(time), 0, 14)), carrier=np.empty((len(time), 0))
+    )
     return setup, as_record(setup, case, trajectory)

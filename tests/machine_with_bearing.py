@@ -11,7 +11,9 @@ BEARING = {
     "tilting_damping": 8.0,
     "y": 0.15,  # towards the rear
 }
-UNITS = dict(zip(BEARING, ("N/m", "N/m", "N m/rad", "N s/m", "N s/m", "N m s/rad", "m"), strict=True))
+UNITS = dict(
+    zip(BEARING, ("N/m", "N/m", "N m/rad", "N s/m", "N s/m", "N m s/rad", "m"), strict=True)
+)
 
 
 def with_bearing(parameters, step=2.5e-4, **numbers):

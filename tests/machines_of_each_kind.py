@@ -2,10 +2,21 @@
 
 from wm_drake.parameters import MachineParameters, load_machine
 
-END_BUSHING = {"stiffness": 90.0, "damping": 0.2, "friction_torque": 0.4, "full_friction_rate": 0.8}  # N m/rad, N m s/rad, N m
-LINEAR_TABLE = {"displacement": (-0.05, -0.01, 0.0, 0.01, 0.04), "force": (-900.0, -50.0, 0.0, 60.0, 300.0)}  # m, N
+END_BUSHING = {
+    "stiffness": 90.0,
+    "damping": 0.2,
+    "friction_torque": 0.4,
+    "full_friction_rate": 0.8,
+}  # N m/rad, N m s/rad, N m
+LINEAR_TABLE = {
+    "displacement": (-0.05, -0.01, 0.0, 0.01, 0.04),
+    "force": (-900.0, -50.0, 0.0, 60.0, 300.0),
+}  # m, N
 TORQUE_TABLE = {"angle": (-0.5, -0.1, 0.0, 0.2), "torque": (-60.0, -9.0, 0.0, 30.0)}  # rad, N m
-SPONGE = {"displacement": (-0.02, -0.01, -0.003, 0.003, 0.01, 0.02), "force": (-130.0, -40.0, 0.0, 0.0, 40.0, 130.0)}
+SPONGE = {
+    "displacement": (-0.02, -0.01, -0.003, 0.003, 0.01, 0.02),
+    "force": (-130.0, -40.0, 0.0, 0.0, 40.0, 130.0),
+}
 DAMPERS = {
     "coulomb": {"friction_force": 60.0, "damping": 20.0},
     "stv": {"friction_force": 60.0, "transition_velocity": 0.2, "damping": 20.0},
@@ -32,7 +43,9 @@ DAMPERS = {
         "sponge": SPONGE,
     },
 }
-FRICTION = {f"friction_torque_{axis}": 0.5 for axis in "xyz"} | {f"full_friction_rate_{axis}": 1.5 for axis in "xyz"}
+FRICTION = {f"friction_torque_{axis}": 0.5 for axis in "xyz"} | {
+    f"full_friction_rate_{axis}": 1.5 for axis in "xyz"
+}
 TABLES = {f"stiffness_{axis}": LINEAR_TABLE for axis in "xyz"} | {
     f"rotational_stiffness_{axis}": TORQUE_TABLE for axis in "xyz"
 }
@@ -49,14 +62,21 @@ def machines_of_each_kind():
     end_bushing = {"end_bushing": END_BUSHING}
     machines = {"reference": load_machine("reference")}
     for law, numbers in DAMPERS.items():
-        machines[law] = changed(damper_types={"friction": {"law": law, **numbers, **end_bushing}}, gasket=None)
+        machines[law] = changed(
+            damper_types={"friction": {"law": law, **numbers, **end_bushing}}, gasket=None
+        )
     machines["springs only"] = changed(dampers={}, gasket=None)
-    machines["spring tables"] = changed(spring_types={"suspension": {"stiffness": LINEAR_TABLE}}, dampers={}, gasket=None)
+    machines["spring tables"] = changed(
+        spring_types={"suspension": {"stiffness": LINEAR_TABLE}}, dampers={}, gasket=None
+    )
     machines["gasket tables"] = changed(gasket=reference["gasket"] | TABLES | FRICTION, dampers={})
     second = reference["gasket"] | {"stiffness_x": LINEAR_TABLE} | FRICTION
     machines["two bushings, five dampers of three laws"] = changed(
         bushings={"rear": second},
-        damper_types={law: {"law": law, **DAMPERS[law], **end_bushing} for law in ("coulomb", "mstv", "free_stroke")},
+        damper_types={
+            law: {"law": law, **DAMPERS[law], **end_bushing}
+            for law in ("coulomb", "mstv", "free_stroke")
+        },
         dampers={
             f"{place}_{law}": reference["dampers"][place] | {"type": law}
             for place, law in (
@@ -71,10 +91,24 @@ def machines_of_each_kind():
     machines["more struts of a kind than stand side by side"] = changed(
         gasket=None,
         spring_types=reference["spring_types"] | {"table": {"stiffness": LINEAR_TABLE}},
-        springs={f"{name}_{k}": spring for k in range(2) for name, spring in reference["springs"].items()}
-        | {f"{name}_table": spring | {"type": "table"} for name, spring in list(reference["springs"].items())[:2]},
-        damper_types={law: {"law": law, **DAMPERS[law], **end_bushing} for law in ("mstv", "havsin")},
-        dampers={f"{name}_{k}": damper | {"type": "mstv"} for k in range(2) for name, damper in reference["dampers"].items()}
-        | {f"{name}_havsin": damper | {"type": "havsin"} for name, damper in list(reference["dampers"].items())[:1]},
+        springs={
+            f"{name}_{k}": spring for k in range(2) for name, spring in reference["springs"].items()
+        }
+        | {
+            f"{name}_table": spring | {"type": "table"}
+            for name, spring in list(reference["springs"].items())[:2]
+        },
+        damper_types={
+            law: {"law": law, **DAMPERS[law], **end_bushing} for law in ("mstv", "havsin")
+        },
+        dampers={
+            f"{name}_{k}": damper | {"type": "mstv"}
+            for k in range(2)
+            for name, damper in reference["dampers"].items()
+        }
+        | {
+            f"{name}_havsin": damper | {"type": "havsin"}
+            for name, damper in list(reference["dampers"].items())[:1]
+        },
     )
     return machines

@@ -11,10 +11,21 @@ MASS = 6 * 7.0  # kg, six bodies
 def isotropic_machine(stiffness=STIFFNESS, damping=DAMPING, rotational_stiffness=4000.0):
     """All bodies' centres at To, one linear bushing there: translation is three equal oscillators."""
     reference = load_machine("reference")
-    ball = BodyOverride(mass=7.0, centre_of_mass=(0.0, 0.0, 0.0), inertia=InertiaMatrix(xx=0.3, yy=0.3, zz=0.3))
-    bodies = ("tub", "drum", "motor", "upper_counterweight", "front_counterweight_left", "front_counterweight_right")
+    ball = BodyOverride(
+        mass=7.0, centre_of_mass=(0.0, 0.0, 0.0), inertia=InertiaMatrix(xx=0.3, yy=0.3, zz=0.3)
+    )
+    bodies = (
+        "tub",
+        "drum",
+        "motor",
+        "upper_counterweight",
+        "front_counterweight_left",
+        "front_counterweight_right",
+    )
     origin = {"position": (0.0, 0.0, 0.0)}
-    linear = {f"stiffness_{axis}": stiffness for axis in "xyz"} | {f"damping_{axis}": damping for axis in "xyz"}
+    linear = {f"stiffness_{axis}": stiffness for axis in "xyz"} | {
+        f"damping_{axis}": damping for axis in "xyz"
+    }
     rotational = {f"rotational_stiffness_{axis}": rotational_stiffness for axis in "xyz"}
     tree = reference.model_dump() | {
         "gravity": 0.0,
@@ -22,7 +33,9 @@ def isotropic_machine(stiffness=STIFFNESS, damping=DAMPING, rotational_stiffness
         "frames": {"gasket_tub": origin, "gasket_housing": origin},
         "spring_types": {"suspension": {"stiffness": 0.0}},
         "dampers": {},
-        "gasket": {"tub_frame": "gasket_tub", "housing_frame": "gasket_housing"} | linear | rotational,
+        "gasket": {"tub_frame": "gasket_tub", "housing_frame": "gasket_housing"}
+        | linear
+        | rotational,
     }
     return type(reference).model_validate(tree)
 

@@ -30,16 +30,22 @@ def with_tubes(parameters, built, outer_mass, about_axis, inner_mass=None):
     """Tubes of other masses; `about_axis` is the outer tube's inertia about the damper's axis. [kg, kg m^2]"""
     bodies = {}
     for name in parameters.telescopic_dampers:
-        for part, mass in (("outer", outer_mass), ("inner", outer_mass * 0.75 if inner_mass is None else inner_mass)):
+        for part, mass in (
+            ("outer", outer_mass),
+            ("inner", outer_mass * 0.75 if inner_mass is None else inner_mass),
+        ):
             body = built.plant.GetBodyByName(f"damper_{name}_{part}")
             inertia = body.default_spatial_inertia()
             share = mass / inertia.get_mass()
-            central = inertia.Shift(inertia.get_com()).CalcRotationalInertia().CopyToFullMatrix3() * share
+            central = (
+                inertia.Shift(inertia.get_com()).CalcRotationalInertia().CopyToFullMatrix3() * share
+            )
             axis = built.set_up().telescopes[name].axis
             if part == "outer" and about_axis is not None:
                 central = central + (about_axis - axis @ central @ axis) * np.outer(axis, axis)
             keys = {
-                key: float(central["xyz".index(key[0]), "xyz".index(key[1])]) for key in ("xx", "yy", "zz", "xy", "xz", "yz")
+                key: float(central["xyz".index(key[0]), "xyz".index(key[1])])
+                for key in ("xx", "yy", "zz", "xy", "xz", "yz")
             }
             bodies[body.name()] = {"mass": mass, "inertia": keys}
     return changed(parameters, bodies=bodies)

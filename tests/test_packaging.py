@@ -16,13 +16,22 @@ CHECKOUT = Path(__file__).parents[1]
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(shutil.which("git") is None or not (CHECKOUT / ".git").exists(), reason="needs a git checkout"),
+    pytest.mark.skipif(
+        shutil.which("git") is None or not (CHECKOUT / ".git").exists(),
+        reason="needs a git checkout",
+    ),
 ]
 
 
 def run(*command, cwd):
-    environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")}
-    ended = subprocess.run([*map(str, command)], cwd=cwd, env=environment, capture_output=True, text=True, check=False)
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")
+    }
+    ended = subprocess.run(
+        [*map(str, command)], cwd=cwd, env=environment, capture_output=True, text=True, check=False
+    )
     assert ended.returncode == 0, ended.stdout + ended.stderr
     return ended.stdout
 
@@ -31,7 +40,9 @@ def run(*command, cwd):
 def wheel(tmp_path_factory):
     """Built from a copy of what git knows or would take in, so that old build folders cannot help."""
     copy = tmp_path_factory.mktemp("copy")
-    listed = run("git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", cwd=CHECKOUT)
+    listed = run(
+        "git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", cwd=CHECKOUT
+    )
     for name in filter(None, listed.split("\0")):
         if (CHECKOUT / name).is_file():
             (copy / name).parent.mkdir(parents=True, exist_ok=True)
@@ -47,8 +58,23 @@ def python(wheel, tmp_path_factory):
     home = tmp_path_factory.mktemp("environment")
     venv.create(home, with_pip=False, symlinks=True)
     python = home / "bin" / "python"
-    run(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index", wheel, cwd=home)
-    own = Path(run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=home).strip())
+    run(
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        python,
+        "install",
+        "--no-deps",
+        "--no-index",
+        wheel,
+        cwd=home,
+    )
+    own = Path(
+        run(
+            python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=home
+        ).strip()
+    )
     borrowed = {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")}
     (own / "borrowed.pth").write_text("".join(f"{folder}\n" for folder in borrowed))
     return python
@@ -67,13 +93,15 @@ def test_wheel_holds_the_data_and_nothing_else(wheel):
         wanted = [path for path in (CHECKOUT / folder).glob(pattern) if path.is_file()]
         prefix = "wm_drake/" if folder == "sdf" else ""
         assert wanted
-        assert [path for path in wanted if prefix + path.relative_to(CHECKOUT).as_posix() not in names] == []
+        assert [
+            path for path in wanted if prefix + path.relative_to(CHECKOUT).as_posix() not in names
+        ] == []
     assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"wm_drake"}
     assert [name for name in names if name.endswith((".pyc", ".nbi", ".nbc"))] == []
 
 
 def test_package_and_bodies_come_from_the_wheel(python, tmp_path):
-    code = "import wm_drake, wm_drake.bodies as b; print(wm_drake.__file__); print(b.SDF_FOLDER); print(b.sdf_path('oscillating_group.sdf'))"
+    code = "import wm_drake, wm_drake.model.bodies as b; print(wm_drake.__file__); print(b.SDF_FOLDER); print(b.sdf_path('oscillating_group.sdf'))"
     for line in run(python, "-c", code, cwd=tmp_path).split():
         assert Path(line).is_relative_to(python.parents[1])
         assert Path(line).exists()
@@ -81,12 +109,29 @@ def test_package_and_bodies_come_from_the_wheel(python, tmp_path):
 
 def test_command_checks_and_shows_the_shipped_machine(python, tmp_path):
     command = python.parent / "wm-drake"
-    assert run(command, "machine", "check", "reference", cwd=tmp_path) == "reference: machine 'reference' is in order\n"
+    assert (
+        run(command, "machine", "check", "reference", cwd=tmp_path)
+        == "reference: machine 'reference' is in order\n"
+    )
     shown = json.loads(run(command, "machine", "show", "--json", cwd=tmp_path))
     assert len(shown["natural_frequencies_hz"]) == 6
 
 
 def test_command_runs_and_reports(python, tmp_path):
     (tmp_path / "short.yaml").write_text("time: (0, 1) s\nspeed: (0, 60) rpm\n")
-    run(python.parent / "wm-drake", "spin", "--profile", "short.yaml", "--load", "middle", "--out", "out", cwd=tmp_path)
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"record_middle.nc", "amplitudes.csv", "report.html"}
+    run(
+        python.parent / "wm-drake",
+        "spin",
+        "--profile",
+        "short.yaml",
+        "--load",
+        "middle",
+        "--out",
+        "out",
+        cwd=tmp_path,
+    )
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "record_middle.nc",
+        "amplitudes.csv",
+        "report.html",
+    }

@@ -3,12 +3,12 @@
 import re
 from pathlib import Path
 
-from wm_drake.machine import build_machine
+from wm_drake.model.machine import build_machine
 from wm_drake.parameters import SpinProfile, load_machine
 from wm_drake.parameters.free import load_free
 from wm_drake.report.diagram import mermaid
-from wm_drake.simulation import Case, simulate
-from wm_drake.studies.calibration.turning import turning_of
+from wm_drake.simulation.runs import Case, simulate
+from wm_drake.studies.calibration.parameter_map import turning_of
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 
@@ -26,7 +26,12 @@ def test_the_short_python_way_runs():
 
     matplotlib.use("Agg")
     names = {}
-    exec(code.replace('"middle"', "case").replace("import wm_drake as wm", "import wm_drake as wm\n" + SHORT_CASE), names)
+    exec(
+        code.replace('"middle"', "case").replace(
+            "import wm_drake as wm", "import wm_drake as wm\n" + SHORT_CASE
+        ),
+        names,
+    )
     assert names["record"].sizes["time"] == 401
 
 
@@ -34,10 +39,17 @@ def test_the_python_way_to_many_runs_runs():
     code = re.findall(r"```python\n(.*?)\n```", README, re.DOTALL)[1]
     code = code.replace("parameters.profile", "short").replace("range(0, 40, 5)", "(0, 30)")
     names = {}
-    exec("import wm_drake as wm\nfrom wm_drake.parameters import SpinProfile\n" + SHORT_PROFILE + code, names)
+    exec(
+        "import wm_drake as wm\nfrom wm_drake.parameters import SpinProfile\n"
+        + SHORT_PROFILE
+        + code,
+        names,
+    )
     assert names["table"].sizes["run"] == 2
     assert names["table"].case.values[1] == "30 % softer"
-    assert names["table"].gasket_force.sel(axis="x")[1] < names["table"].gasket_force.sel(axis="x")[0]
+    assert (
+        names["table"].gasket_force.sel(axis="x")[1] < names["table"].gasket_force.sel(axis="x")[0]
+    )
 
 
 SHORT_PROFILE = "short = SpinProfile(time=(0.0, 6.0), speed=(0.0, 12.0))\n"
@@ -65,7 +77,11 @@ def test_the_example_of_a_free_file_fits_the_reference_machine(tmp_path, machine
     path.write_text(example)
     turning = turning_of(machine, load_free(path))
     made = turning.parameters_at(turning.expected)
-    assert made.frames["damper_left_housing"].position[0] == -made.frames["damper_right_rear_housing"].position[0] == -0.05
+    assert (
+        made.frames["damper_left_housing"].position[0]
+        == -made.frames["damper_right_rear_housing"].position[0]
+        == -0.05
+    )
 
 
 def test_the_example_of_a_bearing_runs(tmp_path):
@@ -73,9 +89,12 @@ def test_the_example_of_a_bearing_runs(tmp_path):
     path.write_text(re.findall(r"```yaml\n(.*?)\n```", README, re.DOTALL)[2])
     whirling = load_machine(path)
     record = simulate(
-        build_machine(whirling), Case("front", whirling.loads["front"], SpinProfile(time=(0.0, 1.0), speed=(8.0, 12.0)))
+        build_machine(whirling),
+        Case("front", whirling.loads["front"], SpinProfile(time=(0.0, 1.0), speed=(8.0, 12.0))),
     )
-    assert {"drum_displacement", "drum_tilt", "bearing_force", "bearing_moment"} <= set(record.data_vars)
+    assert {"drum_displacement", "drum_tilt", "bearing_force", "bearing_moment"} <= set(
+        record.data_vars
+    )
     assert 1e-6 < float(abs(record.drum_displacement).max()) < 1e-4  # m
 
 

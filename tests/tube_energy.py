@@ -5,16 +5,20 @@ from pydrake.multibody.plant import MultibodyPlant
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
 
-from wm_drake.bodies import add_bodies, add_load, set_bodies
-from wm_drake.kernel.alone import Alone
-from wm_drake.kernel.packing import initial_state
-from wm_drake.kernel.samples import trajectory_of
-from wm_drake.schedule import schedule_of
+from wm_drake.engines.compiled.alone import Alone
+from wm_drake.engines.compiled.packing import initial_state
+from wm_drake.engines.compiled.samples import trajectory_of
+from wm_drake.engines.schedule import schedule_of
+from wm_drake.model.bodies import add_bodies, add_load, set_bodies
 
 
 def dense_states(setup, profile, step):
     """States (n, size) at every step, torque of the motor, and the layout."""
-    machine, schedule, x = Alone(setup), schedule_of(profile, step, step), initial_state(setup, profile)
+    machine, schedule, x = (
+        Alone(setup),
+        schedule_of(profile, step, step),
+        initial_state(setup, profile),
+    )
     samples = np.full((len(schedule.time), len(x) + machine.layout.rates_size), np.nan)
     machine.integrate(schedule, 0, len(schedule.step), x, samples)
     torque = trajectory_of(samples, schedule, machine.p, machine.layout).motor_torque
@@ -68,7 +72,9 @@ def bushing(kind, a, p_a, r_a, b, p_b, r_b):
     ground = b.rotation * Rotation.from_matrix(r_b)
     place, velocity = a.point(p_a)
     ground_place = b.point(p_b)[0]
-    of_ground = b.v + np.cross(b.w, place - b.position)  # velocity there of what is fixed to the second
+    of_ground = b.v + np.cross(
+        b.w, place - b.position
+    )  # velocity there of what is fixed to the second
     d, d_rate = ground.inv().apply(place - ground_place), ground.inv().apply(velocity - of_ground)
     r = (ground.inv() * a.rotation * Rotation.from_matrix(r_a)).as_rotvec()
     r_rate = rotation_vector_rate(r, ground.inv().apply(a.w - b.w))
@@ -78,7 +84,11 @@ def bushing(kind, a, p_a, r_a, b, p_b, r_b):
         stored = stored + potential(getattr(kind, f"rotational_stiffness_{axis}"), r[:, k])
         power = power + getattr(kind, f"damping_{axis}") * d_rate[:, k] ** 2
         power = power + getattr(kind, f"rotational_damping_{axis}") * r_rate[:, k] ** 2
-        rubbing = havsin(r_rate[:, k], getattr(kind, f"full_friction_rate_{axis}"), getattr(kind, f"friction_torque_{axis}"))
+        rubbing = havsin(
+            r_rate[:, k],
+            getattr(kind, f"full_friction_rate_{axis}"),
+            getattr(kind, f"friction_torque_{axis}"),
+        )
         power = power + rubbing * r_rate[:, k]
     return stored, power
 
@@ -103,15 +113,26 @@ def balance(machine, setup, load, profile, step):
         extension, v, delta = states[:, 6], states[:, 13], deformation[:, index]
         inner.position = outer.position + extension[:, None] * along
         inner.v = outer.v + np.cross(outer.w, extension[:, None] * along) + v[:, None] * along
-        kinds = [parameters.bushing_types[kind] for kind in (damper.tub_bushing, damper.housing_bushing)]
-        parts += [(kinds[0], tub, placed.tub_bushing, outer), (kinds[1], inner, placed.housing_bushing, ground)]
+        kinds = [
+            parameters.bushing_types[kind] for kind in (damper.tub_bushing, damper.housing_bushing)
+        ]
+        parts += [
+            (kinds[0], tub, placed.tub_bushing, outer),
+            (kinds[1], inner, placed.housing_bushing, ground),
+        ]
         law = parameters.damper_types[damper.type]
         sponge = PchipInterpolator(law.sponge.displacement, law.sponge.force)
         stored = stored + potential(law.sponge, delta)
         slider = v - np.gradient(delta, time, edge_order=2)
-        power = power + havsin(v, law.basic_full_friction_velocity, law.basic_friction_force) * v + sponge(delta) * slider
+        power = (
+            power
+            + havsin(v, law.basic_full_friction_velocity, law.basic_friction_force) * v
+            + sponge(delta) * slider
+        )
     for kind, a, placed, b in parts:
-        more_stored, more_power = bushing(kind, a, placed.p_ToB_T, placed.R_TB, b, placed.p_WG, placed.R_WG)
+        more_stored, more_power = bushing(
+            kind, a, placed.p_ToB_T, placed.R_TB, b, placed.p_WG, placed.R_WG
+        )
         stored, power = stored + more_stored, power + more_power
     plant = MultibodyPlant(0.0)
     add_bodies(plant, parameters)
@@ -123,7 +144,9 @@ def balance(machine, setup, load, profile, step):
     bodies = []
     for sample in (0, -1):
         state = np.zeros(plant.num_multibody_states())
-        for tree, block in zip(machine.coordinates.states(), (motion[sample], *tubes[sample]), strict=True):
+        for tree, block in zip(
+            machine.state_layout.states(), (motion[sample], *tubes[sample]), strict=True
+        ):
             state[tree] = block
         plant.SetPositionsAndVelocities(context, state)
         bodies.append(plant.CalcKineticEnergy(context) + plant.CalcPotentialEnergy(context))

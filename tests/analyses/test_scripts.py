@@ -14,7 +14,9 @@ ANALYSES = Path(__file__).parents[2] / "analyses"
 def test_script_runs_quickly_and_writes_its_output(script, tmp_path):
     out = tmp_path / "out.txt"
     command = [sys.executable, str(ANALYSES / script), "--quick", "--out", str(out)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=os.environ, check=False)
+    done = subprocess.run(
+        command, capture_output=True, text=True, cwd=tmp_path, env=os.environ, check=False
+    )
     assert done.returncode == 0, done.stderr
     assert out.read_text().strip() in done.stdout
     assert script in (ANALYSES / "README.md").read_text()

@@ -16,7 +16,9 @@ DAMPING = (50.0, 10.0, 50.0)  # N s/m
 ROTATIONAL_DAMPING = (3.0, 5.0, 7.0)  # N m s/rad
 FRICTION_TORQUE = (3.7, 2.0, 1.0)  # N m
 FULL_FRICTION_RATE = (1.5, 1.0, 0.5)  # rad/s
-CURVE = ForceTable(displacement=(-0.01, -0.002, 0.003, 0.01), force=(-60.0, -4.0, 5.0, 80.0))  # m, N
+CURVE = ForceTable(
+    displacement=(-0.01, -0.002, 0.003, 0.01), force=(-60.0, -4.0, 5.0, 80.0)
+)  # m, N
 
 vectors = st.tuples(*[st.floats(-2.0, 2.0)] * 3)
 
@@ -49,8 +51,12 @@ def closed_path(count=400):
 
 def test_hand_values_along_and_about_one_axis():
     p = packed(DAMPING, ROTATIONAL_DAMPING, FRICTION_TORQUE, (*STIFFNESS, *ROTATIONAL_STIFFNESS))
-    force, moment = bushing_force((0.01, 0.0, 0.0), (0.2, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.5, 0.0), p, 0)
-    assert force == pytest.approx((-80.0 - 10.0, 0.0, 0.0))  # N: 8 N/mm * 10 mm, 0.05 N s/mm * 200 mm/s
+    force, moment = bushing_force(
+        (0.01, 0.0, 0.0), (0.2, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.5, 0.0), p, 0
+    )
+    assert force == pytest.approx(
+        (-80.0 - 10.0, 0.0, 0.0)
+    )  # N: 8 N/mm * 10 mm, 0.05 N s/mm * 200 mm/s
     friction = 2.0 * np.sin(np.pi / 4)  # N m: half the rate of full friction
     assert moment == pytest.approx((0.0, -89.0 - 2.5 - friction, 0.0))  # N m
 
@@ -64,7 +70,10 @@ def test_curves_of_different_length_serve_their_own_axis():
     curves = (CURVE, 1e3, CURVE, 50.0, 60.0, 70.0)
     p = np.concatenate([[9.9, 9.9], packed(curves=curves)])
     force, moment = bushing_force((0.005, 0.006, -0.007), ZERO, (0.0, 0.0, 0.02), ZERO, p, 2)
-    expected = [-stiffness_force(x, packed_stiffness(c), 0) for x, c in zip((0.005, 0.006, -0.007), curves[:3], strict=True)]
+    expected = [
+        -stiffness_force(x, packed_stiffness(c), 0)
+        for x, c in zip((0.005, 0.006, -0.007), curves[:3], strict=True)
+    ]
     assert force == pytest.approx(expected)
     assert moment == pytest.approx((0.0, 0.0, -1.4))  # N m
 
@@ -77,15 +86,23 @@ def test_elastic_energy_comes_back_around_a_closed_path_of_large_rotations():
         powers.append(np.dot(force, d_rate) + np.dot(moment, w))
         naive_powers.append(-np.dot(np.multiply(ROTATIONAL_STIFFNESS, r), w))
     exchanged = np.mean(np.abs(powers))
-    assert abs(np.mean(powers)) < 1e-6 * exchanged  # the curve has jumps of curvature: the sum is not exact to rounding
-    assert abs(np.mean(naive_powers)) > 1e-2 * exchanged  # the torque on the rotation vector taken for a moment would leak
+    assert (
+        abs(np.mean(powers)) < 1e-6 * exchanged
+    )  # the curve has jumps of curvature: the sum is not exact to rounding
+    assert (
+        abs(np.mean(naive_powers)) > 1e-2 * exchanged
+    )  # the torque on the rotation vector taken for a moment would leak
 
 
 def test_elastic_power_is_the_loss_of_stored_energy():
     for d, d_rate, r, r_rate in zip(*closed_path(7), strict=True):
         w = angular_velocity(r, r_rate)
         force, moment = bushing_force(tuple(d), tuple(d_rate), tuple(r), tuple(w), ELASTIC, 0)
-        along = [STIFFNESS[0] * d[0], stiffness_force(d[1], packed_stiffness(CURVE), 0), STIFFNESS[2] * d[2]]
+        along = [
+            STIFFNESS[0] * d[0],
+            stiffness_force(d[1], packed_stiffness(CURVE), 0),
+            STIFFNESS[2] * d[2],
+        ]
         stored = np.dot(along, d_rate) + np.dot(np.multiply(ROTATIONAL_STIFFNESS, r), r_rate)  # W
         assert np.dot(force, d_rate) + np.dot(moment, w) == pytest.approx(-stored, rel=1e-11)
 

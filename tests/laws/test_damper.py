@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 from scipy.optimize import brentq
 
-from wm_drake.laws.compilation import generic
+from wm_drake.compiler.compilation import generic
 from wm_drake.laws.damper import (
     COULOMB,
     FREE_STROKE,
@@ -35,7 +35,8 @@ SPONGE = packed_stiffness(
     )
 )
 
-sponge_forces = st.floats(-500.0, 500.0)  # N
+# N; a force of 1e-300 N gives a slider rate below the smallest normal float
+sponge_forces = st.just(0.0) | st.floats(1e-9, 500.0) | st.floats(-500.0, -1e-9)
 velocities = st.just(0.0) | st.floats(-2.0, 2.0)  # m/s
 full_forces = st.just(0.0) | st.floats(0.1, 200.0)  # N
 dampings = st.just(0.0) | st.floats(1e-2, 1e4)  # N s/m
@@ -45,14 +46,19 @@ epsilons = st.floats(1e-8, 1e-3)  # m/s
 @st.composite
 def sliders(draw):
     """Velocity, dashpot, friction parameters of a slider whose rate is finite."""
-    v, c, f_max, c_m, epsilon = (draw(s) for s in (velocities, dampings, full_forces, dampings, epsilons))
+    v, c, f_max, c_m, epsilon = (
+        draw(s) for s in (velocities, dampings, full_forces, dampings, epsilons)
+    )
     assume(c + c_m > 0.0)
     return v, c, f_max, c_m, epsilon
 
 
 def least_and_largest_load(w, v, c, f_max, c_m, epsilon):
     """Loads b that hold the slider at w; they differ only where MSTV friction jumps, at |w| = |v - w|."""
-    loads = [c * w - mstv_friction(w, (v - w) * (1.0 + turn), f_max, c_m, epsilon) for turn in (-1e-12, 1e-12)]
+    loads = [
+        c * w - mstv_friction(w, (v - w) * (1.0 + turn), f_max, c_m, epsilon)
+        for turn in (-1e-12, 1e-12)
+    ]
     return min(loads), max(loads)
 
 
@@ -90,7 +96,14 @@ def test_slider_rate_is_no_more_sensitive_to_load_than_the_dashpot_allows(loads,
 
 @pytest.mark.parametrize(
     ("b", "v"),
-    [(30.0, 0.1), (100.0, 0.1), (20.0, -0.1), (300.0, -0.1), (-30.0, 0.02), (-90.0, -0.05)],  # N, m/s
+    [
+        (30.0, 0.1),
+        (100.0, 0.1),
+        (20.0, -0.1),
+        (300.0, -0.1),
+        (-30.0, 0.02),
+        (-90.0, -0.05),
+    ],  # N, m/s
 )
 @pytest.mark.parametrize("c_m", [0.0, 60.0, 900.0])  # N s/m; the last exceeds c1 + c2
 def test_slider_rate_is_the_root_that_bisection_finds(b, v, c_m):
@@ -99,7 +112,9 @@ def test_slider_rate_is_the_root_that_bisection_finds(b, v, c_m):
     def balance(w):
         return c * w - mstv_friction(w, v - w, 60.0, c_m, EPSILON) - b
 
-    assert slider_rate(b, v, c, 60.0, c_m, EPSILON) == pytest.approx(brentq(balance, -2.0, 2.0, xtol=1e-15), rel=1e-9)
+    assert slider_rate(b, v, c, 60.0, c_m, EPSILON) == pytest.approx(
+        brentq(balance, -2.0, 2.0, xtol=1e-15), rel=1e-9
+    )
 
 
 def test_slider_keeps_half_the_velocity_where_the_friction_jumps():
@@ -107,7 +122,11 @@ def test_slider_keeps_half_the_velocity_where_the_friction_jumps():
     low, high = least_and_largest_load(0.5 * v, v, c, f_max, 0.0, epsilon)
     assert high - low == pytest.approx(f_max * epsilon / (0.5 * v + epsilon))
     assert slider_rate(0.5 * (low + high), v, c, f_max, 0.0, epsilon) == 0.5 * v
-    assert slider_rate(low - 0.1, v, c, f_max, 0.0, epsilon) < 0.5 * v < slider_rate(high + 0.1, v, c, f_max, 0.0, epsilon)
+    assert (
+        slider_rate(low - 0.1, v, c, f_max, 0.0, epsilon)
+        < 0.5 * v
+        < slider_rate(high + 0.1, v, c, f_max, 0.0, epsilon)
+    )
 
 
 def test_the_damper_slips_at_constant_rate_with_full_friction_and_air_resistance():
@@ -127,8 +146,12 @@ def test_a_damper_at_constant_rate_comes_to_slip_and_no_further():
 
 
 @given(rate=st.floats(-0.5, 0.5), deformation=st.floats(-0.008, 0.008))
-def test_in_its_free_stroke_a_damper_has_basic_friction_only_and_the_sponge_stays(rate, deformation):
-    tension, deformation_rate = free_stroke_damper(rate, deformation, F_MAX, C_M, EPSILON, P_B, V_B, SPONGE, 0)
+def test_in_its_free_stroke_a_damper_has_basic_friction_only_and_the_sponge_stays(
+    rate, deformation
+):
+    tension, deformation_rate = free_stroke_damper(
+        rate, deformation, F_MAX, C_M, EPSILON, P_B, V_B, SPONGE, 0
+    )
     basic = P_B * np.sin(0.5 * np.pi * np.clip(rate / V_B, -1.0, 1.0))
     assert tension == pytest.approx(basic, rel=1e-12, abs=1e-14)
     assert deformation_rate == rate
@@ -138,7 +161,9 @@ def test_beyond_its_free_stroke_the_sponge_slips_as_its_force_exceeds_friction()
     force = stiffness_force(0.014, SPONGE, 0)  # N
     slip = (force - F_MAX) / C_M  # m/s; [A] Eq. (4) turned round
     rate = 1.5 * slip  # less than twice: slips
-    tension, deformation_rate = free_stroke_damper(rate, 0.014, F_MAX, C_M, EPSILON, P_B, V_B, SPONGE, 0)
+    tension, deformation_rate = free_stroke_damper(
+        rate, 0.014, F_MAX, C_M, EPSILON, P_B, V_B, SPONGE, 0
+    )
     assert force > F_MAX
     assert deformation_rate == pytest.approx(0.5 * slip)
     assert tension == pytest.approx(force + P_B)  # rate > v_b
@@ -163,10 +188,24 @@ def direct_response(law_number, v, deformation):
     if law_number == HAVSIN:
         return 25.0 * v + P_B * np.sin(0.5 * np.pi * np.clip(v / V_B, -1.0, 1.0)), 0.0
     if law_number == MSTV:
-        w = brentq(lambda w: C2 * w - mstv_friction(w, v - w, 60.0, 30.0, EPSILON) - K1 * deformation - C1 * (v - w), -9.0, 9.0)
+        w = brentq(
+            lambda w: (
+                C2 * w
+                - mstv_friction(w, v - w, 60.0, 30.0, EPSILON)
+                - K1 * deformation
+                - C1 * (v - w)
+            ),
+            -9.0,
+            9.0,
+        )
         return K1 * deformation + C1 * (v - w), v - w
     if law_number == STV_SPONGE:
-        w = brentq(lambda w: C2 * w - stv_friction(w, 0.01, 60.0) - K1 * deformation - C1 * (v - w), -9.0, 9.0, xtol=1e-15)
+        w = brentq(
+            lambda w: C2 * w - stv_friction(w, 0.01, 60.0) - K1 * deformation - C1 * (v - w),
+            -9.0,
+            9.0,
+            xtol=1e-15,
+        )
         return K1 * deformation + C1 * (v - w), v - w
     f_d = stiffness_force(deformation, SPONGE, 0)
     w = brentq(lambda w: -mstv_friction(w, v - w, F_MAX, C_M, EPSILON) - f_d, -9.0, 9.0)
@@ -179,19 +218,39 @@ def test_each_law_answers_through_the_common_face_as_its_formula_does(law_number
     packed = np.array([9.9, 9.9, 9.9, *PACKED[law_number]])
     for deformation in (-0.013, -3.1e-4, 2.2e-4, 0.015):  # m
         response = damper_response(law_number, rate, deformation, packed, 3)
-        assert response == pytest.approx(direct_response(law_number, rate, deformation), rel=1e-9, abs=1e-9)
+        assert response == pytest.approx(
+            direct_response(law_number, rate, deformation), rel=1e-9, abs=1e-9
+        )
 
 
-@given(rate=velocities, deformation=st.floats(-2e-3, 2e-3), f_max=full_forces, c_m=dampings, c1=dampings, c2=dampings)
-def test_the_mstv_damper_never_gives_back_more_than_its_sponge_stores(rate, deformation, f_max, c_m, c1, c2):
+@given(
+    rate=velocities,
+    deformation=st.floats(-2e-3, 2e-3),
+    f_max=full_forces,
+    c_m=dampings,
+    c1=dampings,
+    c2=dampings,
+)
+def test_the_mstv_damper_never_gives_back_more_than_its_sponge_stores(
+    rate, deformation, f_max, c_m, c1, c2
+):
     assume(c1 + c2 + c_m > 0.0)
     tension, deformation_rate = mstv_damper(rate, deformation, f_max, c_m, EPSILON, K1, c1, c2)
     stored = K1 * deformation * deformation_rate  # W: rate of k1 delta^2/2
     assert tension * rate - stored >= -1e-10 * (abs(tension * rate) + abs(stored))
 
 
-@given(rate=velocities, deformation=st.floats(-2e-3, 2e-3), f_max=full_forces, v_st=velocities, c1=dampings, c2=dampings)
-def test_the_damper_with_stv_sponge_never_gives_back_more_than_its_sponge_stores(rate, deformation, f_max, v_st, c1, c2):
+@given(
+    rate=velocities,
+    deformation=st.floats(-2e-3, 2e-3),
+    f_max=full_forces,
+    v_st=velocities,
+    c1=dampings,
+    c2=dampings,
+)
+def test_the_damper_with_stv_sponge_never_gives_back_more_than_its_sponge_stores(
+    rate, deformation, f_max, v_st, c1, c2
+):
     assume(c1 + c2 > 0.0)
     tension, deformation_rate = stv_sponge_damper(rate, deformation, f_max, abs(v_st), K1, c1, c2)
     stored = K1 * deformation * deformation_rate  # W
@@ -202,7 +261,12 @@ def test_the_damper_with_stv_sponge_never_gives_back_more_than_its_sponge_stores
 
 
 def test_under_coulomb_friction_the_slider_holds_up_to_full_friction_and_then_slips():
-    for deformation, w in ((59.9 / K1, 0.0), (-60.0 / K1, 0.0), (70.0 / K1, 10.0 / 490.0), (-109.0 / K1, -0.1)):  # m, m/s
+    for deformation, w in (
+        (59.9 / K1, 0.0),
+        (-60.0 / K1, 0.0),
+        (70.0 / K1, 10.0 / 490.0),
+        (-109.0 / K1, -0.1),
+    ):  # m, m/s
         tension, deformation_rate = stv_sponge_damper(0.0, deformation, 60.0, 0.0, K1, C1, C2)
         assert -deformation_rate == pytest.approx(w, abs=1e-12)
         assert tension == pytest.approx(K1 * deformation - C1 * w)
@@ -210,13 +274,19 @@ def test_under_coulomb_friction_the_slider_holds_up_to_full_friction_and_then_sl
 
 @given(rate=velocities, deformation=st.floats(-0.03, 0.03))
 def test_the_free_stroke_damper_never_gives_back_more_than_its_sponge_stores(rate, deformation):
-    tension, deformation_rate = free_stroke_damper(rate, deformation, F_MAX, C_M, EPSILON, P_B, V_B, SPONGE, 0)
+    tension, deformation_rate = free_stroke_damper(
+        rate, deformation, F_MAX, C_M, EPSILON, P_B, V_B, SPONGE, 0
+    )
     stored = stiffness_force(deformation, SPONGE, 0) * deformation_rate  # W
     assert tension * rate - stored >= -1e-10 * (abs(tension * rate) + abs(stored))
 
 
 def test_derivatives_of_a_free_stroke_damper_without_main_friction_are_finite():
-    sponge = packed_stiffness(ForceTable(displacement=(-0.02, -0.008, 0.008, 0.02), force=(-90.0, 0.0, 0.0, 120.0)))  # m, N
+    sponge = packed_stiffness(
+        ForceTable(displacement=(-0.02, -0.008, 0.008, 0.02), force=(-90.0, 0.0, 0.0, 120.0))
+    )  # m, N
     rate, deformation = InitializeAutoDiff(np.array([0.1, 0.0])).ravel()  # m/s, m
-    _, deformation_rate = generic(free_stroke_damper)(rate, deformation, 0.0, 60.0, 1e-6, 10.5, 0.09, sponge, 0)
+    _, deformation_rate = generic(free_stroke_damper)(
+        rate, deformation, 0.0, 60.0, 1e-6, 10.5, 0.09, sponge, 0
+    )
     assert np.all(np.isfinite(ExtractGradient(np.array([[deformation_rate]]))))

@@ -33,10 +33,18 @@ def havsin_of_the_paper(x, x0, h0, x1, h1):
 def test_hand_values():
     assert coulomb_friction(0.1, 60.0) == -60.0  # N
     assert coulomb_friction(0.0, 60.0) == 0.0
-    assert stv_friction(0.03, 0.09, 60.0) == pytest.approx(-20.0)  # a third of the transition velocity
-    assert havsin_friction(0.03, 0.09, 10.5) == pytest.approx(-5.25)  # [A] Table 1: sin(30 deg) of 10.5 N
-    assert mstv_friction(0.1, 0.05, 35.0, 60.0, 1e-6) == pytest.approx(-41.0)  # slips: 35 N + 60 N s/m * 0.1 m/s
-    assert mstv_friction(0.05, 0.199999, 35.0, 60.0, 1e-6) == pytest.approx(-9.5)  # sticks: 38 N * 0.05/0.2
+    assert stv_friction(0.03, 0.09, 60.0) == pytest.approx(
+        -20.0
+    )  # a third of the transition velocity
+    assert havsin_friction(0.03, 0.09, 10.5) == pytest.approx(
+        -5.25
+    )  # [A] Table 1: sin(30 deg) of 10.5 N
+    assert mstv_friction(0.1, 0.05, 35.0, 60.0, 1e-6) == pytest.approx(
+        -41.0
+    )  # slips: 35 N + 60 N s/m * 0.1 m/s
+    assert mstv_friction(0.05, 0.199999, 35.0, 60.0, 1e-6) == pytest.approx(
+        -9.5
+    )  # sticks: 38 N * 0.05/0.2
 
 
 @every_law
@@ -56,7 +64,9 @@ def test_is_full_beyond_the_transition(law, v, v_t, f_max):
 
 
 @given(w=velocities, u=velocities, f_max=forces, c_m=dampings, epsilon=epsilons)
-def test_mstv_is_odd_in_both_velocities_dissipates_and_stays_below_the_full_force(w, u, f_max, c_m, epsilon):
+def test_mstv_is_odd_in_both_velocities_dissipates_and_stays_below_the_full_force(
+    w, u, f_max, c_m, epsilon
+):
     f = mstv_friction(w, u, f_max, c_m, epsilon)
     assert mstv_friction(-w, -u, f_max, c_m, epsilon) == -f
     assert mstv_friction(w, -u, f_max, c_m, epsilon) == f
@@ -66,14 +76,20 @@ def test_mstv_is_odd_in_both_velocities_dissipates_and_stays_below_the_full_forc
 
 @given(v=velocities, v_t=transitions, p=forces)
 def test_havsin_equals_the_corrected_formula_of_the_paper(v, v_t, p):
-    assert havsin_friction(v, v_t, p) == pytest.approx(havsin_of_the_paper(v, -v_t, p, v_t, -p), rel=1e-12, abs=1e-14 * p)
+    assert havsin_friction(v, v_t, p) == pytest.approx(
+        havsin_of_the_paper(v, -v_t, p, v_t, -p), rel=1e-12, abs=1e-14 * p
+    )
 
 
 @given(v_t=transitions, p=forces)
 def test_havsin_meets_its_full_force_smoothly(v_t, p):
     inside, outside = v_t * (1.0 - 1e-6), v_t * (1.0 + 1e-6)
-    assert havsin_friction(inside, v_t, p) == pytest.approx(havsin_friction(outside, v_t, p), rel=2e-12)
-    slope = (havsin_friction(outside, v_t, p) - havsin_friction(inside, v_t, p)) / (outside - inside)
+    assert havsin_friction(inside, v_t, p) == pytest.approx(
+        havsin_friction(outside, v_t, p), rel=2e-12
+    )
+    slope = (havsin_friction(outside, v_t, p) - havsin_friction(inside, v_t, p)) / (
+        outside - inside
+    )
     assert abs(slope) <= 1e-5 * p / v_t
 
 
@@ -91,7 +107,11 @@ def test_mstv_without_growth_equals_the_corrected_formula_of_the_paper(w, u, f_m
 
 
 @given(u=st.floats(0.01, 2.0), f_max=forces, c_m=dampings, epsilon=epsilons)
-def test_mstv_jumps_by_epsilon_over_the_deformation_rate_where_it_begins_to_slip(u, f_max, c_m, epsilon):
+def test_mstv_jumps_by_epsilon_over_the_deformation_rate_where_it_begins_to_slip(
+    u, f_max, c_m, epsilon
+):
     sticks = mstv_friction(u * (1.0 - 1e-15), u, f_max, c_m, epsilon)
     slips = mstv_friction(u, u, f_max, c_m, epsilon)
-    assert slips - sticks == pytest.approx(slips * epsilon / (u + epsilon), abs=1e-12 * (f_max + c_m * u))
+    assert slips - sticks == pytest.approx(
+        slips * epsilon / (u + epsilon), abs=1e-12 * (f_max + c_m * u)
+    )

@@ -6,9 +6,15 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from wm_drake.elements.motion import TubMotion
 from wm_drake.laws.friction import havsin_friction
-from wm_drake.laws.motion import TubMotion
-from wm_drake.laws.strut import bending_moment, strut_line, transverse, transverse_couple, wrench_at_origin
+from wm_drake.laws.strut import (
+    bending_moment,
+    strut_line,
+    transverse,
+    transverse_couple,
+    wrench_at_origin,
+)
 
 ZERO = (0.0, 0.0, 0.0)
 K, C, P, V_T = 12.0, 0.3, 0.9, 0.5  # N m/rad, N m s/rad, N m, rad/s
@@ -31,7 +37,11 @@ def angle_between(a, b):
 
 
 def test_strut_line_gives_length_direction_and_their_rates():
-    arm, p_WT, p_WH = np.array([0.2, -0.1, -0.25]), np.array([0.01, -0.02, 0.03]), np.array([0.3, -0.1, -0.6])  # m
+    arm, p_WT, p_WH = (
+        np.array([0.2, -0.1, -0.25]),
+        np.array([0.01, -0.02, 0.03]),
+        np.array([0.3, -0.1, -0.6]),
+    )  # m
     w, v = np.array([0.3, -0.2, 0.5]), np.array([0.4, 0.1, -0.3])  # rad/s, m/s
     length, rate, direction, v_A, inverse_length = strut_line(
         TubMotion((), tuple(p_WT), tuple(w), tuple(v)), tuple(arm), tuple(p_WH)
@@ -56,7 +66,11 @@ def test_no_moment_at_rest():
 
 def test_a_bent_strut_is_pushed_back_with_stiffness_times_angle():
     for angle in (1e-6, 0.02, 0.6, 2.0):  # rad
-        direction = (float(np.sin(angle)), 0.0, float(np.cos(angle)))  # turned by angle about y, away from z
+        direction = (
+            float(np.sin(angle)),
+            0.0,
+            float(np.cos(angle)),
+        )  # turned by angle about y, away from z
         moment = bending_moment(direction, ZERO, (0.0, 0.0, 1.0), K, 0.0, 0.0, SLOPE)
         assert moment == pytest.approx((0.0, -K * angle, 0.0), rel=1e-12, abs=1e-18)
 
@@ -65,13 +79,20 @@ def test_hand_values_of_damping_and_friction():
     z = (0.0, 0.0, 1.0)
     slow = bending_moment(z, (V_T / 2, 0.0, 0.0), z, 0.0, C, P, SLOPE)
     assert slow == pytest.approx((-0.3 * 0.25 - 0.9 * np.sin(np.pi / 4), 0.0, 0.0))
-    fast = bending_moment(z, (0.0, -2.0, 0.0), z, 0.0, C, P, SLOPE)  # the body turns under a strut at rest
+    fast = bending_moment(
+        z, (0.0, -2.0, 0.0), z, 0.0, C, P, SLOPE
+    )  # the body turns under a strut at rest
     assert fast == pytest.approx((0.0, 0.3 * 2.0 + 0.9, 0.0))
 
 
 @given(axis=directions, direction=directions, w_strut=rates, w_body=rates)
 def test_elastic_power_is_minus_the_rate_of_half_k_angle_squared(axis, direction, w_strut, w_body):
-    axis, direction, w_strut, w_body = unit(axis), unit(direction), np.array(w_strut), np.array(w_body)
+    axis, direction, w_strut, w_body = (
+        unit(axis),
+        unit(direction),
+        np.array(w_strut),
+        np.array(w_body),
+    )
     assume(angle_between(axis, direction) < 3.0)
     w_strut = w_strut - (w_strut @ direction) * direction
     rate = transverse(tuple(w_strut - w_body), tuple(direction))
@@ -79,9 +100,13 @@ def test_elastic_power_is_minus_the_rate_of_half_k_angle_squared(axis, direction
     h = 1e-5  # s
 
     def energy(t):
-        return 0.5 * K * angle_between(turned(axis, w_body * t), turned(direction, w_strut * t)) ** 2
+        return (
+            0.5 * K * angle_between(turned(axis, w_body * t), turned(direction, w_strut * t)) ** 2
+        )
 
-    assert np.dot(moment, w_strut - w_body) == pytest.approx((energy(-h) - energy(h)) / (2.0 * h), rel=1e-6, abs=1e-6)
+    assert np.dot(moment, w_strut - w_body) == pytest.approx(
+        (energy(-h) - energy(h)) / (2.0 * h), rel=1e-6, abs=1e-6
+    )
 
 
 @given(axis=directions, direction=directions, w=rates)
@@ -100,7 +125,9 @@ def test_spin_about_the_struts_own_axis_is_free(direction, spin):
     assert moment == pytest.approx(ZERO, abs=1e-13)
 
 
-@pytest.mark.parametrize("rate", [0.0, 1e-9, 0.3 * V_T, 0.999999 * V_T, V_T, 1.000001 * V_T, 5.0 * V_T])  # rad/s
+@pytest.mark.parametrize(
+    "rate", [0.0, 1e-9, 0.3 * V_T, 0.999999 * V_T, V_T, 1.000001 * V_T, 5.0 * V_T]
+)  # rad/s
 def test_bending_friction_is_that_of_havsin(rate):
     z = (0.0, 0.0, 1.0)
     assert bending_moment(z, (rate, 0.0, 0.0), z, 0.0, 0.0, P, SLOPE)[0] == pytest.approx(
@@ -108,10 +135,14 @@ def test_bending_friction_is_that_of_havsin(rate):
     )
 
 
-@pytest.mark.parametrize("angle", [0.0999999, 0.1001674, 0.1001675, 0.11])  # rad; the series gives way at sin = 0.1
+@pytest.mark.parametrize(
+    "angle", [0.0999999, 0.1001674, 0.1001675, 0.11]
+)  # rad; the series gives way at sin = 0.1
 def test_bending_is_smooth_where_the_series_gives_way_to_the_arctangent(angle):
     direction = (float(np.sin(angle)), 0.0, float(np.cos(angle)))
-    assert bending_moment(direction, ZERO, (0.0, 0.0, 1.0), K, 0.0, 0.0, SLOPE)[1] == pytest.approx(-K * angle, rel=1e-14)
+    assert bending_moment(direction, ZERO, (0.0, 0.0, 1.0), K, 0.0, 0.0, SLOPE)[1] == pytest.approx(
+        -K * angle, rel=1e-14
+    )
 
 
 @given(direction=directions, m_tub=rates, m_housing=rates, length=st.floats(0.05, 0.5))
@@ -121,10 +152,14 @@ def test_transverse_couple_balances_the_moments_on_the_strut(direction, m_tub, m
     moments = moments - (moments @ e) * e  # N m, transverse as those of the end bushings
     on_tub = np.array(transverse_couple(tuple(moments), tuple(e), 1.0 / length))
     on_strut = -on_tub  # at the tub end, L e from the housing end
-    np.testing.assert_allclose(moments + np.cross(length * e, on_strut), 0.0, atol=1e-14 * (1.0 + np.linalg.norm(moments)))
+    np.testing.assert_allclose(
+        moments + np.cross(length * e, on_strut), 0.0, atol=1e-14 * (1.0 + np.linalg.norm(moments))
+    )
     assert on_tub @ e == pytest.approx(0.0, abs=1e-12)
 
 
 def test_wrench_at_origin_is_moment_about_to_then_force():
     arm, force, moment = (0.1, 0.2, -0.3), (5.0, -7.0, 11.0), (0.5, 0.6, 0.7)  # m, N, N m
-    assert wrench_at_origin(arm, force, moment) == pytest.approx((*(np.cross(arm, force) + moment), *force))
+    assert wrench_at_origin(arm, force, moment) == pytest.approx(
+        (*(np.cross(arm, force) + moment), *force)
+    )

@@ -20,7 +20,9 @@ def tables(draw):
     """Rising displacements from -10 mm on, never falling forces, some of them flat."""
     n = draw(st.integers(2, 7))
     steps = draw(st.lists(st.floats(1e-4, 5e-3), min_size=n - 1, max_size=n - 1))  # m
-    rises = draw(st.lists(st.just(0.0) | st.floats(1e-2, 50.0), min_size=n - 1, max_size=n - 1))  # N
+    rises = draw(
+        st.lists(st.just(0.0) | st.floats(1e-2, 50.0), min_size=n - 1, max_size=n - 1)
+    )  # N
     x = np.concatenate([[0.0], np.cumsum(steps)]) - 0.01
     y = np.concatenate([[0.0], np.cumsum(rises)]) - 20.0
     return ForceTable(displacement=tuple(map(float, x)), force=tuple(map(float, y)))
@@ -36,7 +38,9 @@ def test_inside_a_table_is_the_monotone_cubic_of_scipy(table, fraction):
     x = table.displacement[0] + fraction * (table.displacement[-1] - table.displacement[0])
     expected = PchipInterpolator(table.displacement, table.force)(x)
     span = table.force[-1] - table.force[0]  # N
-    assert stiffness_force(x, packed_stiffness(table), 0) == pytest.approx(expected, rel=1e-11, abs=1e-11 * span)
+    assert stiffness_force(x, packed_stiffness(table), 0) == pytest.approx(
+        expected, rel=1e-11, abs=1e-11 * span
+    )
 
 
 @given(table=tables())
@@ -51,8 +55,12 @@ def test_outside_a_table_is_a_straight_line_with_the_slope_of_its_end(table, bey
     first, last = table.displacement[0], table.displacement[-1]
     below = table.force[0] - slope(first) * beyond
     above = table.force[-1] + slope(last) * beyond
-    assert stiffness_force(first - beyond, packed_stiffness(table), 0) == pytest.approx(below, rel=1e-9, abs=1e-9)
-    assert stiffness_force(last + beyond, packed_stiffness(table), 0) == pytest.approx(above, rel=1e-9, abs=1e-9)
+    assert stiffness_force(first - beyond, packed_stiffness(table), 0) == pytest.approx(
+        below, rel=1e-9, abs=1e-9
+    )
+    assert stiffness_force(last + beyond, packed_stiffness(table), 0) == pytest.approx(
+        above, rel=1e-9, abs=1e-9
+    )
 
 
 @given(table=tables(), pair=st.tuples(st.floats(-0.02, 0.04), st.floats(-0.02, 0.04)))
@@ -68,13 +76,19 @@ def test_a_flat_zero_zone_stays_zero(x):
 
 def test_force_and_slope_are_continuous_at_the_ends_of_a_flat_zone_and_of_a_table():
     for x in PROGRESSIVE.displacement:
-        left, at, right = (stiffness_force(x + h, packed_stiffness(PROGRESSIVE), 0) for h in (-1e-7, 0.0, 1e-7))
-        assert at - left == pytest.approx(right - at, abs=1e-5)  # N; a kink of 1 N/mm would show as 1e-4 N
+        left, at, right = (
+            stiffness_force(x + h, packed_stiffness(PROGRESSIVE), 0) for h in (-1e-7, 0.0, 1e-7)
+        )
+        assert at - left == pytest.approx(
+            right - at, abs=1e-5
+        )  # N; a kink of 1 N/mm would show as 1e-4 N
 
 
 def test_packed_stiffnesses_stand_one_after_another_in_one_array():
     torque = TorqueTable(angle=(-0.1, 0.1), torque=(-3.0, 3.0))  # rad, N m
-    packed = np.concatenate([[7.0], packed_stiffness(PROGRESSIVE), packed_stiffness(500.0), packed_stiffness(torque)])
+    packed = np.concatenate(
+        [[7.0], packed_stiffness(PROGRESSIVE), packed_stiffness(500.0), packed_stiffness(torque)]
+    )
     number = 1 + packed_size(packed, 1)
     last = number + packed_size(packed, number)
     assert stiffness_force(0.012, packed, 1) == pytest.approx(25.0)  # N

@@ -35,13 +35,19 @@ DAMPERS = {
 
 
 def in_file(kind, text):
-    return TypeAdapter(kind).validate_python(YAML(typ="safe").load(text), context={"units_required": True})
+    return TypeAdapter(kind).validate_python(
+        YAML(typ="safe").load(text), context={"units_required": True}
+    )
 
 
 @pytest.mark.parametrize(
     ("x", "y", "message"),
     [
-        ((0.0, 1.0, 2.0), (0.0, 1.0), "as many values of displacement as of force, at least two; has 3 and 2"),
+        (
+            (0.0, 1.0, 2.0),
+            (0.0, 1.0),
+            "as many values of displacement as of force, at least two; has 3 and 2",
+        ),
         ((0.0,), (0.0,), "at least two; has 1 and 1"),
         ((0.0, 1.0, 1.0), (0.0, 1.0, 2.0), "displacement must rise"),
         ((0.0, 2.0, 1.0), (0.0, 1.0, 2.0), "displacement must rise"),
@@ -60,11 +66,15 @@ def test_bad_torque_table_is_refused():
 
 
 def test_table_from_a_file():
-    table = in_file(SpringType, "stiffness: {displacement: '(-1, 0, 2) mm', force: '(-8, 0, 16) N'}").stiffness
+    table = in_file(
+        SpringType, "stiffness: {displacement: '(-1, 0, 2) mm', force: '(-8, 0, 16) N'}"
+    ).stiffness
     assert table == ForceTable(displacement=(-0.001, 0.0, 0.002), force=(-8.0, 0.0, 16.0))
 
 
-@pytest.mark.parametrize("table", [ForceTable(displacement=X, force=Y), TorqueTable(angle=X, torque=Y)])
+@pytest.mark.parametrize(
+    "table", [ForceTable(displacement=X, force=Y), TorqueTable(angle=X, torque=Y)]
+)
 def test_packed_table_is_scipys_monotone_cubic(table):
     packed = packed_stiffness(table)
     curve = PchipInterpolator(X, Y)
@@ -99,7 +109,9 @@ def test_every_damper_law_is_read_from_a_mapping(law):
     assert damper.end_bushing == EndBushing(stiffness=0.75 if law == "havsin" else 0.0)
 
 
-@pytest.mark.parametrize("name", ["friction_force", "sponge_stiffness", "sponge_damping", "slider_damping"])
+@pytest.mark.parametrize(
+    "name", ["friction_force", "sponge_stiffness", "sponge_damping", "slider_damping"]
+)
 def test_required_number_of_a_damper_is_missed(name):
     mapping = YAML(typ="safe").load(DAMPERS["mstv"])
     del mapping[name]
@@ -108,7 +120,13 @@ def test_required_number_of_a_damper_is_missed(name):
 
 
 def test_mstv_damper_needs_some_damping():
-    numbers = {"law": "mstv", "friction_force": 20.0, "sponge_stiffness": 1e5, "sponge_damping": 0.0, "slider_damping": 0.0}
+    numbers = {
+        "law": "mstv",
+        "friction_force": 20.0,
+        "sponge_stiffness": 1e5,
+        "sponge_damping": 0.0,
+        "slider_damping": 0.0,
+    }
     with pytest.raises(ValidationError, match="a massless slider needs one"):
         MstvDamper(**numbers)
     assert MstvDamper(**numbers | {"friction_damping": 1.0}).friction_damping == 1.0
@@ -146,7 +164,10 @@ def test_negative_stiffness_is_refused():
 
 
 def test_bushing_takes_numbers_and_tables(reference):
-    mapping = reference.gasket.model_dump() | {"stiffness_y": {"displacement": X, "force": Y}, "rotational_stiffness_x": 5.0}
+    mapping = reference.gasket.model_dump() | {
+        "stiffness_y": {"displacement": X, "force": Y},
+        "rotational_stiffness_x": 5.0,
+    }
     bushing = Bushing(**mapping)
     assert bushing.stiffness_y == ForceTable(displacement=X, force=Y)
     assert bushing.rotational_stiffness_x == 5.0

@@ -21,7 +21,9 @@ from wm_drake.parameters import (
 
 KNOWN = load_factors(GASKET_FACTORS)
 STIFFNESSES = [f"{kind}stiffness_{axis}" for kind in ("", "rotational_") for axis in "xyz"]
-HARDENING = ForceTable(displacement=(-0.03, -0.01, 0.0, 0.01, 0.03), force=(-150.0, -40.0, 0.0, 40.0, 150.0))
+HARDENING = ForceTable(
+    displacement=(-0.03, -0.01, 0.0, 0.01, 0.03), force=(-150.0, -40.0, 0.0, 40.0, 150.0)
+)
 
 
 @pytest.fixture
@@ -38,16 +40,29 @@ def one(parameters, text, tables="linear"):
 
 def test_gasket_factors_move_every_stiffness_and_damping_once(plain):
     levels = levels_of(plain, KNOWN)
-    assert [factor.name for factor in levels] == ["C_L", "C_T", "K_Lx", "K_Ly", "K_Lz", "K_Tx", "K_Ty", "K_Tz"]
+    assert [factor.name for factor in levels] == [
+        "C_L",
+        "C_T",
+        "K_Lx",
+        "K_Ly",
+        "K_Lz",
+        "K_Tx",
+        "K_Ty",
+        "K_Tz",
+    ]
     moved = [key for factor in levels for key in factor.settings[0]]
     expected = [
-        key for key, _, _ in quantities(plain) if key.startswith("gasket.") and ("stiffness" in key or "damping" in key)
+        key
+        for key, _, _ in quantities(plain)
+        if key.startswith("gasket.") and ("stiffness" in key or "damping" in key)
     ]
     assert sorted(moved) == sorted(expected)
     for factor in levels:
         for key in factor.settings[0]:
             nominal = getattr(plain.gasket, key.removeprefix("gasket."))
-            assert [setting[key] for setting in factor.settings] == pytest.approx([0.5 * nominal, nominal, 1.5 * nominal])
+            assert [setting[key] for setting in factor.settings] == pytest.approx(
+                [0.5 * nominal, nominal, 1.5 * nominal]
+            )
 
 
 def test_levels_are_set_and_nothing_else(plain):
@@ -66,8 +81,16 @@ def test_levels_are_set_and_nothing_else(plain):
 @pytest.mark.parametrize(
     ("text", "key", "expected"),
     [
-        ("damper_types.friction.friction_force=20 N..30 N", "damper_types.friction.friction_force", [20.0, 25.0, 30.0]),
-        ("loads.middle.unbalances.0.mass=90 %..120 %", "loads.middle.unbalances.0.mass", [0.9, 1.05, 1.2]),
+        (
+            "damper_types.friction.friction_force=20 N..30 N",
+            "damper_types.friction.friction_force",
+            [20.0, 25.0, 30.0],
+        ),
+        (
+            "loads.middle.unbalances.0.mass=90 %..120 %",
+            "loads.middle.unbalances.0.mass",
+            [0.9, 1.05, 1.2],
+        ),
         ("K_Lx=2 N/mm..4000 N/m", "gasket.stiffness_x", [2000.0, 3000.0, 4000.0]),
         ("bodies.tub.mass=9 kg..11 kg", "bodies.tub.mass", [9.0, 10.0, 11.0]),
         ("gravity", "gravity", [4.905, 9.81, 14.715]),
@@ -104,13 +127,23 @@ def test_tables_become_numbers_or_are_scaled(reference):
 
 
 def test_curve_that_cannot_be_a_number_is_scaled(reference):
-    sponge = {"displacement": (-0.02, -0.01, -0.004, 0.004, 0.01, 0.02), "force": (-120.0, -40.0, 0.0, 0.0, 40.0, 120.0)}
-    damper = {"law": "free_stroke", "friction_force": 25.0, "friction_damping": 60.0, "basic_friction_force": 5.0}
+    sponge = {
+        "displacement": (-0.02, -0.01, -0.004, 0.004, 0.01, 0.02),
+        "force": (-120.0, -40.0, 0.0, 0.0, 40.0, 120.0),
+    }
+    damper = {
+        "law": "free_stroke",
+        "friction_force": 25.0,
+        "friction_damping": 60.0,
+        "basic_friction_force": 5.0,
+    }
     damper |= {"basic_full_friction_velocity": 0.09, "sponge": sponge}
     tree = reference.model_dump() | {"damper_types": {"friction": damper}}
     parameters = type(reference).model_validate(tree)
     (factor,) = one(parameters, "damper_types.friction.sponge")
-    assert factor.settings[2]["damper_types.friction.sponge"].force == pytest.approx([1.5 * force for force in sponge["force"]])
+    assert factor.settings[2]["damper_types.friction.sponge"].force == pytest.approx(
+        [1.5 * force for force in sponge["force"]]
+    )
 
 
 FAULTS = {

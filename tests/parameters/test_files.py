@@ -30,7 +30,10 @@ def write(tmp_path):
 
 
 def numbers(parameters):
-    return {key: (value, unit, source_of(parameters, key)) for key, value, unit in quantities(parameters)}
+    return {
+        key: (value, unit, source_of(parameters, key))
+        for key, value, unit in quantities(parameters)
+    }
 
 
 def refused(path):
@@ -53,15 +56,27 @@ def test_written_machine_is_read_back_the_same(write, reference):
 def test_written_file_speaks_the_engineers_units(reference):
     text = machine_yaml(reference)
     stiffness = reference.spring_types["suspension"].stiffness
-    assert f"stiffness:\n      value: {stiffness / 1e3:g} N/mm\n      source: 'fit: spring_stiffness" in text
+    assert (
+        f"stiffness:\n      value: {stiffness / 1e3:g} N/mm\n      source: 'fit: spring_stiffness"
+        in text
+    )
     assert "value: 60 N*mm*s/deg" in text
     assert "sources" not in text
 
 
-def test_written_machine_with_tables_overrides_and_another_damper_is_read_back_the_same(write, reference):
+def test_written_machine_with_tables_overrides_and_another_damper_is_read_back_the_same(
+    write, reference
+):
     table = {"displacement": "(-9, -5, 5, 9) mm", "force": "(-200, 0, 0, 200) N"}
-    law = {"law": "free_stroke", "friction_force": "80 N", "friction_damping": "0.1 N s/mm", "basic_friction_force": "5 N"}
-    damper = TypeAdapter(DamperType).validate_python({**law, "basic_full_friction_velocity": "2 mm/s", "sponge": table})
+    law = {
+        "law": "free_stroke",
+        "friction_force": "80 N",
+        "friction_damping": "0.1 N s/mm",
+        "basic_friction_force": "5 N",
+    }
+    damper = TypeAdapter(DamperType).validate_python(
+        {**law, "basic_full_friction_velocity": "2 mm/s", "sponge": table}
+    )
     changed = with_value(reference, "damper_types", {"friction": damper})
     changed = with_value(changed, "gasket.stiffness_y", table)
     changed = with_value(changed, "gasket.friction_torque_x", "80 N mm")
@@ -78,16 +93,22 @@ def test_written_machine_without_gasket_is_read_back_the_same(write, reference):
 
 @pytest.mark.parametrize("name", ["1.5kg", "a/b"])
 def test_name_that_breaks_key_paths_or_file_names_is_refused(write, name):
-    path = write(f"extends: reference\nloads:\n  {name}: {{unbalances: [{{mass: 1 kg, radius: 1 mm, y: 0 mm}}]}}\n")
+    path = write(
+        f"extends: reference\nloads:\n  {name}: {{unbalances: [{{mass: 1 kg, radius: 1 mm, y: 0 mm}}]}}\n"
+    )
     (problem,) = refused(path)
     assert problem.startswith(f"{path}:")
     assert f"'{name}'" in problem
 
 
 def test_extended_machine_changes_what_it_names(write, reference):
-    path = write("extends: reference\nname: heavy\nbodies:\n  upper_counterweight:\n    mass: {value: 12 kg, source: guess}\n")
+    path = write(
+        "extends: reference\nname: heavy\nbodies:\n  upper_counterweight:\n    mass: {value: 12 kg, source: guess}\n"
+    )
     heavy = load_machine(path)
-    expected = with_value(with_value(reference, "name", "heavy"), "bodies.upper_counterweight.mass", 12.0)
+    expected = with_value(
+        with_value(reference, "name", "heavy"), "bodies.upper_counterweight.mass", 12.0
+    )
     assert heavy.model_dump(exclude={"sources"}) == expected.model_dump(exclude={"sources"})
     assert source_of(heavy, "bodies.upper_counterweight.mass") == "guess"
     assert source_of(heavy, "gravity") == source_of(reference, "gravity")
@@ -105,13 +126,17 @@ def test_changed_number_drops_the_old_source(write):
 
 
 def test_new_profile_replaces_the_old_one_whole(write):
-    machine = load_machine(write("extends: reference\nprofile: {time: '(0, 1) s', speed: '(0, 60) rpm'}\n"))
+    machine = load_machine(
+        write("extends: reference\nprofile: {time: '(0, 1) s', speed: '(0, 60) rpm'}\n")
+    )
     assert machine.profile.time == (0.0, 1.0)
     assert source_of(machine, "profile.time") == ""
 
 
 def test_null_removes_an_entry(write, reference):
-    machine = load_machine(write("extends: reference\ngasket: null\nloads: {back: null}\nmeasured: null\n"))
+    machine = load_machine(
+        write("extends: reference\ngasket: null\nloads: {back: null}\nmeasured: null\n")
+    )
     assert machine.gasket is None
     assert list(machine.loads) == [name for name in reference.loads if name != "back"]
     assert machine.measured == ()
@@ -126,7 +151,9 @@ def test_measured_paths_are_relative_to_the_file(write, tmp_path, reference):
 
 def test_model_path_is_relative_to_the_file(write, tmp_path):
     write("<sdf/>", "bodies.sdf")
-    assert load_machine(write("extends: reference\nmodel: bodies.sdf\n")).model == str(tmp_path / "bodies.sdf")
+    assert load_machine(write("extends: reference\nmodel: bodies.sdf\n")).model == str(
+        tmp_path / "bodies.sdf"
+    )
     (tmp_path / "sub").mkdir()
     write("extends: ../machine.yaml\n", "sub/next.yaml")
     assert load_machine(tmp_path / "sub" / "next.yaml").model == str(tmp_path / "bodies.sdf")
@@ -136,8 +163,16 @@ def test_model_path_is_relative_to_the_file(write, tmp_path):
     ("text", "line", "message"),
     [
         ("name: x\nname: y\n", 2, 'is not YAML: found duplicate key "name"'),
-        ("name: x\ngasket:\n  tub_frame: a\n  tub_frame: b\n", 4, 'is not YAML: found duplicate key "tub_frame"'),
-        ("name: x\n\tgravity: 1\n", 2, "is not YAML: found character '\\t' that cannot start any token"),
+        (
+            "name: x\ngasket:\n  tub_frame: a\n  tub_frame: b\n",
+            4,
+            'is not YAML: found duplicate key "tub_frame"',
+        ),
+        (
+            "name: x\n\tgravity: 1\n",
+            2,
+            "is not YAML: found character '\\t' that cannot start any token",
+        ),
         ("name: x\nloads: [1,\n  }\n", 3, "is not YAML: "),
         ("name: x\n---\nname: y\n", 2, "is not YAML: but found another document"),
         ("name: *nobody\n", 1, "is not YAML: found undefined alias"),
@@ -168,7 +203,9 @@ def test_file_that_is_no_mapping_is_refused(tmp_path, content, message):
 
 
 @pytest.mark.parametrize(
-    "value", ["9" * 400, "9" * 5000, "2020-13-45", "1e400", ".nan", ".inf", "true", "nan m/s^2"], ids=lambda v: v[:12]
+    "value",
+    ["9" * 400, "9" * 5000, "2020-13-45", "1e400", ".nan", ".inf", "true", "nan m/s^2"],
+    ids=lambda v: v[:12],
 )
 def test_strange_scalar_is_refused_with_its_line(write, value):
     path = write(f"extends: reference\ngravity: {value}\n")
@@ -179,7 +216,10 @@ def test_strange_scalar_is_refused_with_its_line(write, value):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("gasket:\n  stifness_x: 3 N/mm\n", ":3: gasket.stifness_x: unknown key 'stifness_x' (did you mean 'stiffness_x'?"),
+        (
+            "gasket:\n  stifness_x: 3 N/mm\n",
+            ":3: gasket.stifness_x: unknown key 'stifness_x' (did you mean 'stiffness_x'?",
+        ),
         ("gravty: 9 m/s^2\n", ":2: gravty: unknown key 'gravty' (did you mean 'gravity'?"),
         (
             "damper_types:\n  friction:\n    sponge_stifness: 3 N/mm\n",
@@ -197,14 +237,29 @@ def test_strange_scalar_is_refused_with_its_line(write, value):
             "loads:\n  middle:\n    unbalances:\n    - {mass: 1 kg, radius: 1 mm, y: 1 mm, fase: 1 deg}\n",
             ":5: loads.middle.unbalances.0.fase: unknown key 'fase' (did you mean 'phase'?",
         ),
-        ("damper_types: {friction: {law: glue}}\n", ":2: damper_types.friction: 'glue' is not known; allowed are 'coulomb', "),
-        ("springs:\n  left: {type: nosuch}\n", "springs: left.type: 'nosuch' is not in spring_types (known: suspension)"),
+        (
+            "damper_types: {friction: {law: glue}}\n",
+            ":2: damper_types.friction: 'glue' is not known; allowed are 'coulomb', ",
+        ),
+        (
+            "springs:\n  left: {type: nosuch}\n",
+            "springs: left.type: 'nosuch' is not in spring_types (known: suspension)",
+        ),
         ("gravity: -1 m/s^2\n", ":2: gravity: '-1 m/s^2' is out of range; allowed is >= 0"),
         ("gravity: 9.81\n", ":2: gravity: '9.81' has no unit; write for example '1 m/s^2'"),
-        ("gasket:\n  rotational_stiffness_x: 5 N mm\n", ":3: gasket.rotational_stiffness_x: unit 'N mm' does not fit; allowed"),
-        ("frames: {sensor_Xr: {position: '(1, 2, 3) N'}}\n", "position: unit 'N' does not fit; allowed is a unit such as mm"),
+        (
+            "gasket:\n  rotational_stiffness_x: 5 N mm\n",
+            ":3: gasket.rotational_stiffness_x: unit 'N mm' does not fit; allowed",
+        ),
+        (
+            "frames: {sensor_Xr: {position: '(1, 2, 3) N'}}\n",
+            "position: unit 'N' does not fit; allowed is a unit such as mm",
+        ),
         ("loads: null\n", ":2: loads: is missing"),
-        ("sensors: {Xr: null, Yr: null, Zr: null, Xf: null, Yf: null, Zf: null}\n", ":2: sensors: needs at least one entry"),
+        (
+            "sensors: {Xr: null, Yr: null, Zr: null, Xf: null, Yf: null, Zf: null}\n",
+            ":2: sensors: needs at least one entry",
+        ),
     ],
 )
 def test_bad_entry_is_refused_with_its_line_and_key(write, text, message):
@@ -226,13 +281,28 @@ def test_several_problems_are_several_lines(write):
         "gravity:",
         "profile:",
     ]
-    assert sorted(int(problem.removeprefix(f"{path}:").split(":")[0]) for problem in problems) == [2, 4, 5, 6, 7]
+    assert sorted(int(problem.removeprefix(f"{path}:").split(":")[0]) for problem in problems) == [
+        2,
+        4,
+        5,
+        6,
+        7,
+    ]
 
 
 def test_everything_missing_is_several_lines(write):
     problems = refused(write("name: x\n"))
     assert [problem.split(": ", 1)[1] for problem in problems] == [
-        f"{key}: is missing" for key in ("gravity", "spring_types", "springs", "sensors", "clearance", "loads", "profile")
+        f"{key}: is missing"
+        for key in (
+            "gravity",
+            "spring_types",
+            "springs",
+            "sensors",
+            "clearance",
+            "loads",
+            "profile",
+        )
     ]
 
 
@@ -257,7 +327,9 @@ def test_problem_in_an_extended_file_names_that_file(write):
 
 
 def test_unknown_frames_are_reported_with_file_and_line(write, wm_drake):
-    path = write("extends: reference\nsprings:\n  left:\n    tub_frame: spring_lft_tub\nsensors:\n  Xr: {frame: housing}\n")
+    path = write(
+        "extends: reference\nsprings:\n  left:\n    tub_frame: spring_lft_tub\nsensors:\n  Xr: {frame: housing}\n"
+    )
     ended = wm_drake("machine", "check", path)
     assert ended.code == 2
     assert ended.messages == [
@@ -276,7 +348,9 @@ def test_copied_shipped_machine_is_the_same_machine(tmp_path, reference):
 def test_numbers_are_written_into_a_file_that_stays_as_it_is_written(write, reference):
     path = write(machine_path("reference").read_text(encoding="utf-8"))
     changed = with_value(reference, "damper_types.friction.friction_force", 31.5)
-    changed = changed.model_copy(update={"sources": {**changed.sources, "damper_types.friction.friction_force": "fit: new"}})
+    changed = changed.model_copy(
+        update={"sources": {**changed.sources, "damper_types.friction.friction_force": "fit: new"}}
+    )
     text = machine_file_with(path, changed, ["damper_types.friction.friction_force"])
     assert "friction_force: {value: 31.5 N, source: 'fit: new'}" in text
     again = load_machine(write(text))

@@ -61,7 +61,10 @@ def test_numbers_are_listed_with_value_and_unit(reference):
     listed = {key: (value, unit.shown) for key, value, unit in quantities(reference)}
     assert listed["gasket.stiffness_x.force"] == (reference.gasket.stiffness_x.force, "N")
     assert listed["gasket.damping_x"] == (reference.gasket.damping_x, "N*s/mm")
-    assert listed["loads.middle.unbalances.0.radius"] == (reference.loads["middle"].unbalances[0].radius, "mm")
+    assert listed["loads.middle.unbalances.0.radius"] == (
+        reference.loads["middle"].unbalances[0].radius,
+        "mm",
+    )
     assert listed["profile.speed"] == (reference.profile.speed, "rpm")
     assert len(listed) == len(KEYS) >= 50
 
@@ -70,7 +73,9 @@ def test_override_of_a_body_comes_into_being(reference):
     changed = with_value(reference, "bodies.upper_counterweight.mass", "12 kg")
     assert changed.bodies == {"upper_counterweight": BodyOverride(mass=12.0)}
     again = with_value(changed, "bodies.upper_counterweight.centre_of_mass", (0.0, 0.0, 0.2))
-    assert again.bodies == {"upper_counterweight": BodyOverride(mass=12.0, centre_of_mass=(0.0, 0.0, 0.2))}
+    assert again.bodies == {
+        "upper_counterweight": BodyOverride(mass=12.0, centre_of_mass=(0.0, 0.0, 0.2))
+    }
     assert ("bodies.upper_counterweight.mass", 12.0) in [(k, v) for k, v, _ in quantities(again)]
 
 
@@ -82,7 +87,9 @@ def test_override_of_a_frame_comes_into_being(reference):
 def test_number_may_become_a_table(reference):
     table = {"displacement": "(0, 1) mm", "force": "(0, 8) N"}
     changed = with_value(reference, "spring_types.suspension.stiffness", table)
-    assert changed.spring_types["suspension"].stiffness == ForceTable(displacement=(0.0, 0.001), force=(0.0, 8.0))
+    assert changed.spring_types["suspension"].stiffness == ForceTable(
+        displacement=(0.0, 0.001), force=(0.0, 8.0)
+    )
     steeper = with_value(changed, "spring_types.suspension.stiffness.force", "(0, 9) N")
     assert steeper.spring_types["suspension"].stiffness.force == (0.0, 9.0)
 
@@ -159,7 +166,10 @@ def test_several_values_at_once_are_those_one_after_another(reference):
 
 
 def test_two_values_that_only_fit_together_are_set_together(reference):
-    longer = {"gasket.stiffness_x.displacement": (-0.01, 0.0, 0.01), "gasket.stiffness_x.force": (-9.0, 0.0, 9.0)}
+    longer = {
+        "gasket.stiffness_x.displacement": (-0.01, 0.0, 0.01),
+        "gasket.stiffness_x.force": (-9.0, 0.0, 9.0),
+    }
     with pytest.raises(InputError, match="needs as many values"):
         with_value(reference, *next(iter(longer.items())))
     assert with_values(reference, longer).gasket.stiffness_x.force == (-9.0, 0.0, 9.0)
@@ -167,5 +177,11 @@ def test_two_values_that_only_fit_together_are_set_together(reference):
 
 def test_every_fault_among_several_values_is_said_of_its_key(reference):
     with pytest.raises(InputError) as refused:
-        with_values(reference, {"gasket.damping_x": -1.0, "gasket.damping_y": 2.0, "gasket.damping_z": "3 N"})
-    assert [problem.key for problem in refused.value.problems] == ["gasket.damping_x", "gasket.damping_z"]
+        with_values(
+            reference,
+            {"gasket.damping_x": -1.0, "gasket.damping_y": 2.0, "gasket.damping_z": "3 N"},
+        )
+    assert [problem.key for problem in refused.value.problems] == [
+        "gasket.damping_x",
+        "gasket.damping_z",
+    ]

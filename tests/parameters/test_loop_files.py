@@ -17,7 +17,9 @@ def rows(time=TIME, displacement=DISPLACEMENT, force=FORCE):
 
 def written(folder, head=HEAD, lines=None, name="loop.csv"):
     path = folder / name
-    path.write_text("\n".join(["# damper 7, bench 2", head, *(rows() if lines is None else lines)]) + "\n")
+    path.write_text(
+        "\n".join(["# damper 7, bench 2", head, *(rows() if lines is None else lines)]) + "\n"
+    )
     return path
 
 
@@ -45,7 +47,12 @@ def test_units_of_the_header_are_turned_into_si(tmp_path, head, factor):
 
 
 def test_columns_may_stand_in_any_order_among_others(tmp_path):
-    lines = [f"{f};{k};{t};{d}" for k, (t, d, f) in enumerate(zip(TIME, 5.0 * np.sin(TIME), 30.0 * np.cos(TIME), strict=True))]
+    lines = [
+        f"{f};{k};{t};{d}"
+        for k, (t, d, f) in enumerate(
+            zip(TIME, 5.0 * np.sin(TIME), 30.0 * np.cos(TIME), strict=True)
+        )
+    ]
     loop = read_loop(written(tmp_path, "force_N;sample;time_s;displacement_mm", lines))
     assert loop.force[0] == 30.0
     assert loop.time == pytest.approx(TIME)
@@ -66,15 +73,31 @@ def test_angle_and_moment_are_a_rotation(tmp_path):
     ("head", "lines", "message"),
     [
         ("time [s], force [N]", None, ":2: no column displacement among 'time [s], force [N]'"),
-        ("time [s], displacement [mm], d [mm]", None, ":2: 'd [mm]' is a second column of displacement"),
-        ("time [s], displacement [mm], moment [N m]", None, ":2: mixes a rotation with a translation"),
-        ("time [s], displacement [mm], force", None, ":2: force: has no unit; write 'force [N]' in the header or use --units"),
+        (
+            "time [s], displacement [mm], d [mm]",
+            None,
+            ":2: 'd [mm]' is a second column of displacement",
+        ),
+        (
+            "time [s], displacement [mm], moment [N m]",
+            None,
+            ":2: mixes a rotation with a translation",
+        ),
+        (
+            "time [s], displacement [mm], force",
+            None,
+            ":2: force: has no unit; write 'force [N]' in the header or use --units",
+        ),
         (
             "time [s], displacement [N], force [N]",
             None,
             ":2: displacement [N]: unit 'N' does not fit; allowed is a unit such as mm",
         ),
-        ("time [s], displacement [furl], force [N]", None, ":2: displacement [furl]: unit 'furl' is not known"),
+        (
+            "time [s], displacement [furl], force [N]",
+            None,
+            ":2: displacement [furl]: unit 'furl' is not known",
+        ),
         (HEAD, changed(3, "0.1,nan,2.0"), ":6: displacement [mm]: 'nan' is not a finite number"),
         (HEAD, changed(3, "0.1,1.0,inf"), ":6: force [N]: 'inf' is not a finite number"),
         (HEAD, changed(3, "0.1,1.0,-"), ":6: force [N]: '-' is not a number"),
@@ -95,17 +118,25 @@ def test_a_bad_file_gets_one_message_with_file_and_line(tmp_path, head, lines, m
 
 
 def test_units_that_contradict_are_told(tmp_path):
-    with pytest.raises(InputError, match=r":2: force \[N\]: is in N by the header, in kN by --units"):
+    with pytest.raises(
+        InputError, match=r":2: force \[N\]: is in N by the header, in kN by --units"
+    ):
         read_loop(written(tmp_path), ("s", "mm", "kN"))
 
 
 def test_all_bad_files_are_told_at_once_and_kinds_are_not_mixed(tmp_path):
-    good, rotation = written(tmp_path), written(tmp_path, "time_s,angle_deg,moment_Nm", name="turned.csv")
+    good, rotation = (
+        written(tmp_path),
+        written(tmp_path, "time_s,angle_deg,moment_Nm", name="turned.csv"),
+    )
     bad = [written(tmp_path, lines=changed(3, "x,1,2"), name="x.csv"), tmp_path / "none.csv"]
     with pytest.raises(InputError) as told:
         read_loops([good, *bad])
     assert [problem.where for problem in told.value.problems] == [f"{bad[0]}:6", str(bad[1])]
-    with pytest.raises(InputError, match=r"holds angles and moments, .* displacements and forces; a fit takes one kind"):
+    with pytest.raises(
+        InputError,
+        match=r"holds angles and moments, .* displacements and forces; a fit takes one kind",
+    ):
         read_loops([good, rotation])
 
 
@@ -128,5 +159,7 @@ def test_component_files_are_checked(tmp_path):
     path.write_text("law: coulomb\nfriction_force: 60\n")
     with pytest.raises(InputError, match="friction_force: '60' has no unit"):
         load_component(str(path))
-    with pytest.raises(InputError, match=r"no shipped component of that name \(did you mean 'mstv_damper'"):
+    with pytest.raises(
+        InputError, match=r"no shipped component of that name \(did you mean 'mstv_damper'"
+    ):
         load_component("mstv_dampr")

@@ -21,7 +21,9 @@ def machine(tmp_path, reference):
 
 
 def test_tables_are_put_together(machine):
-    table = measured_amplitudes(machine("# source: me\n" + HEADER + ROW, HEADER + ROW.replace("yes", "no") + ROW))
+    table = measured_amplitudes(
+        machine("# source: me\n" + HEADER + ROW, HEADER + ROW.replace("yes", "no") + ROW)
+    )
     assert table["gasket"].tolist() == ["yes", "no", "yes"]
     assert table["Zr"].tolist() == [3.5, 3.5, 3.5]
     assert table.columns.tolist() == HEADER.strip().split(",")
@@ -37,7 +39,10 @@ def test_no_tables_give_the_columns_alone(machine):
     ("text", "message"),
     [
         ("", "cannot be read as CSV"),
-        (HEADER.replace(",Zf", "") + ROW, "needs the columns load,gasket,source,Xr,Yr,Zr,Xf,Yf,Zf, has load"),
+        (
+            HEADER.replace(",Zf", "") + ROW,
+            "needs the columns load,gasket,source,Xr,Yr,Zr,Xf,Yf,Zf, has load",
+        ),
         (HEADER.replace("Zf", "Zg") + ROW, "needs the columns"),
         (HEADER.replace("\n", ",extra\n") + ROW.replace("\n", ",1\n"), "needs the columns"),
         (HEADER + ROW.replace("\n", ",1\n"), "a row has more values than columns"),

@@ -33,14 +33,19 @@ def test_ramp_and_hold_of_the_paper(tmp_path):
 
 def test_ramp_down_and_backwards(tmp_path):
     profile = from_steps(
-        tmp_path, "{ramp_to: 60 rpm, rate: 30 rpm/s}", "{hold_until: 5 s}", "{ramp_to: -30 rpm, rate: 45 rpm/s}"
+        tmp_path,
+        "{ramp_to: 60 rpm, rate: 30 rpm/s}",
+        "{hold_until: 5 s}",
+        "{ramp_to: -30 rpm, rate: 45 rpm/s}",
     )
     assert profile.time == pytest.approx((0.0, 2.0, 5.0, 7.0))
     assert np.array(profile.speed) / RPM == pytest.approx([0.0, 60.0, 60.0, -30.0])
 
 
 def test_points(tmp_path):
-    profile = from_text(tmp_path, "source: me\ntime: {value: '(0, 2) s', source: clock}\nspeed: (0, 60) rpm\n")
+    profile = from_text(
+        tmp_path, "source: me\ntime: {value: '(0, 2) s', source: clock}\nspeed: (0, 60) rpm\n"
+    )
     assert profile == SpinProfile(time=(0.0, 2.0), speed=(0.0, 60.0 * RPM))
 
 
@@ -76,7 +81,10 @@ def test_points(tmp_path):
 def test_bad_profile_is_refused(tmp_path, text, message):
     with pytest.raises(InputError, match=message) as refused:
         from_text(tmp_path, text)
-    assert all(problem.where.startswith(str(tmp_path / "profile.yaml")) for problem in refused.value.problems)
+    assert all(
+        problem.where.startswith(str(tmp_path / "profile.yaml"))
+        for problem in refused.value.problems
+    )
 
 
 def test_misspelt_key_of_a_step_is_answered_with_the_keys_of_a_step(tmp_path):
@@ -113,7 +121,10 @@ def test_profile_from_csv(tmp_path):
         ("time_s,speed_rpm\n0,0\n1,nan\n", "row 2 of the data is not two finite numbers"),
         ("time_s,speed_rpm\n0,0\ninf,1\n", "row 2 of the data is not two finite numbers"),
         ("time_s,speed_rpm\n0,0\n1,1e400\n", "row 2 of the data is not two finite numbers"),
-        ("time_s,speed_rpm\n0,0,5\n1,7,5\n", "columns|cannot be read|numbers"),  # three values under two names
+        (
+            "time_s,speed_rpm\n0,0,5\n1,7,5\n",
+            "columns|cannot be read|numbers",
+        ),  # three values under two names
         ("time_s,speed_rpm\n0,0\n1,7,5\n", "cannot be read as CSV"),
         ("time_s,speed_rpm\n0,0\n2,1\n1,2\n", "times must rise"),
         ("time_s,speed_rpm\n1,0\n2,1\n", "must begin at time 0 s"),
@@ -137,23 +148,38 @@ def test_csv_that_is_no_text_is_refused(tmp_path):
     [(0.0, (0.0, 0.1, 0.25)), (math.pi / 2.0, (0.25, 0.1, 0.0)), (math.pi, (0.0, 0.1, -0.25))],
 )
 def test_unbalance_goes_round_from_above_to_the_right(phase, place):
-    assert Unbalance(mass=1.0, radius=0.25, y=0.1, phase=phase).position() == pytest.approx(place, abs=1e-15)
+    assert Unbalance(mass=1.0, radius=0.25, y=0.1, phase=phase).position() == pytest.approx(
+        place, abs=1e-15
+    )
 
 
 def test_load_file(tmp_path):
     path = tmp_path / "towels.yaml"
-    path.write_text("unbalances:\n  - {mass: {value: 300 g, source: scale}, radius: 24 cm, y: -32 mm, phase: 90 deg}\n")
-    assert load_load(path) == Load(unbalances=({"mass": 0.3, "radius": 0.24, "y": -0.032, "phase": math.pi / 2.0},))
+    path.write_text(
+        "unbalances:\n  - {mass: {value: 300 g, source: scale}, radius: 24 cm, y: -32 mm, phase: 90 deg}\n"
+    )
+    assert load_load(path) == Load(
+        unbalances=({"mass": 0.3, "radius": 0.24, "y": -0.032, "phase": math.pi / 2.0},)
+    )
 
 
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
-        ("{mass: -1 kg, radius: 1 mm, y: 0 mm}", ":2: unbalances.0.mass: '-1 kg' is out of range; allowed is >= 0"),
-        ("{mass: 1 kg, radius: -1 mm, y: 0 mm}", ":2: unbalances.0.radius: '-1 mm' is out of range"),
+        (
+            "{mass: -1 kg, radius: 1 mm, y: 0 mm}",
+            ":2: unbalances.0.mass: '-1 kg' is out of range; allowed is >= 0",
+        ),
+        (
+            "{mass: 1 kg, radius: -1 mm, y: 0 mm}",
+            ":2: unbalances.0.radius: '-1 mm' is out of range",
+        ),
         ("{mass: 1 kg, radius: 1 mm}", ":2: unbalances.0.y: is missing"),
         ("{mass: 1, radius: 1 mm, y: 0 mm}", ":2: unbalances.0.mass: '1' has no unit"),
-        ("{mas: 1 kg, mass: 1 kg, radius: 1 mm, y: 0 mm}", "unknown key 'mas' .did you mean 'mass'"),
+        (
+            "{mas: 1 kg, mass: 1 kg, radius: 1 mm, y: 0 mm}",
+            "unknown key 'mas' .did you mean 'mass'",
+        ),
     ],
 )
 def test_bad_load_file_is_refused(tmp_path, entry, message):

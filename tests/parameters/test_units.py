@@ -18,7 +18,8 @@ ROTATIONAL_STIFFNESS = Unit("N*m/rad", "N*mm/rad")
 LENGTH = Unit("m", "mm")
 MASS = Unit("kg", "kg")
 ALL_UNITS = sorted(
-    {kind.__metadata__[0] for kind in vars(units).values() if hasattr(kind, "__metadata__")}, key=lambda unit: unit.shown
+    {kind.__metadata__[0] for kind in vars(units).values() if hasattr(kind, "__metadata__")},
+    key=lambda unit: unit.shown,
 )
 
 
@@ -50,11 +51,15 @@ def test_text_becomes_si(text, si, value):
 
 
 def test_gasket_torsional_damping_of_the_paper_in_si():
-    assert to_si("60 N mm s/deg", IN_FILE, Unit("N*m*s/rad", "N*mm*s/deg")) == pytest.approx(3.4377, abs=5e-5)
+    assert to_si("60 N mm s/deg", IN_FILE, Unit("N*m*s/rad", "N*mm*s/deg")) == pytest.approx(
+        3.4377, abs=5e-5
+    )
 
 
 def test_vector_becomes_si():
-    assert to_si_vector("(1, -2.5, 3e1) mm", IN_FILE, LENGTH) == pytest.approx((0.001, -0.0025, 0.03))
+    assert to_si_vector("(1, -2.5, 3e1) mm", IN_FILE, LENGTH) == pytest.approx(
+        (0.001, -0.0025, 0.03)
+    )
 
 
 @pytest.mark.parametrize(
@@ -82,27 +87,42 @@ def test_refusal_of_a_vector_names_a_fitting_unit():
 
 
 @pytest.mark.parametrize(
-    ("value", "read"), [("1", to_si), (1, to_si), (1.0, to_si), ("(1, 2)", to_si_vector), ([1, 2], to_si_vector)]
+    ("value", "read"),
+    [("1", to_si), (1, to_si), (1.0, to_si), ("(1, 2)", to_si_vector), ([1, 2], to_si_vector)],
 )
 def test_missing_unit_is_refused_in_a_file(value, read):
     with pytest.raises(ValueError, match="has no unit; write for example"):
         read(value, IN_FILE, LENGTH)
 
 
-@pytest.mark.parametrize("text", ["1 foo", "1 2 mm", "1 mm)", "1,5 mm", "1_000 mm", "1 __import__('os')"])
+@pytest.mark.parametrize(
+    "text", ["1 foo", "1 2 mm", "1 mm)", "1,5 mm", "1_000 mm", "1 __import__('os')"]
+)
 def test_unknown_unit_is_refused(text):
     with pytest.raises(ValueError, match="is not known; write for example '1 mm'"):
         to_si(text, IN_FILE, LENGTH)
 
 
-@pytest.mark.parametrize("text", ["nan mm", "inf mm", "-inf mm", "1e400 mm", "-1e400 mm", "1e308 Gm"])
+@pytest.mark.parametrize(
+    "text", ["nan mm", "inf mm", "-inf mm", "1e400 mm", "-1e400 mm", "1e308 Gm"]
+)
 def test_not_finite_text_is_refused(text):
     with pytest.raises(ValueError, match="not a"):
         to_si(text, IN_FILE, LENGTH)
 
 
 @pytest.mark.parametrize(
-    "text", ["(1, nan) mm", "(inf, 1) mm", "(1, 1e400) mm", "(1,, 2) mm", "(1 mm, 2 mm)", "() mm", "1 mm", "[1, 2] mm"]
+    "text",
+    [
+        "(1, nan) mm",
+        "(inf, 1) mm",
+        "(1, 1e400) mm",
+        "(1,, 2) mm",
+        "(1 mm, 2 mm)",
+        "() mm",
+        "1 mm",
+        "[1, 2] mm",
+    ],
 )
 def test_bad_vector_is_refused(text):
     with pytest.raises(ValueError, match="not a"):
@@ -110,7 +130,9 @@ def test_bad_vector_is_refused(text):
 
 
 @pytest.mark.parametrize(
-    "value", [math.nan, math.inf, 10**400, True, None, [], {}, "", "mm", "long"], ids=lambda v: repr(v)[:9]
+    "value",
+    [math.nan, math.inf, 10**400, True, None, [], {}, "", "mm", "long"],
+    ids=lambda v: repr(v)[:9],
 )
 def test_what_is_no_finite_number_is_refused_in_code_too(value):
     with pytest.raises(ValueError, match="number"):
@@ -128,12 +150,19 @@ def test_shown_value():
     assert LENGTH.text((0.001, -0.0025)) == "(1, -2.5) mm"
 
 
-@given(unit=st.sampled_from(ALL_UNITS), value=st.floats(-1e9, 1e9).filter(lambda x: x == 0.0 or abs(x) > 1e-12))
+@given(
+    unit=st.sampled_from(ALL_UNITS),
+    value=st.floats(-1e9, 1e9).filter(lambda x: x == 0.0 or abs(x) > 1e-12),
+)
 def test_text_is_read_back_as_the_very_same_number(unit, value):
     assert to_si(unit.text(value), IN_FILE, unit) == value
 
 
-@given(values=st.lists(st.floats(-1e3, 1e3).filter(lambda x: x == 0.0 or abs(x) > 1e-12), min_size=1, max_size=4).map(tuple))
+@given(
+    values=st.lists(
+        st.floats(-1e3, 1e3).filter(lambda x: x == 0.0 or abs(x) > 1e-12), min_size=1, max_size=4
+    ).map(tuple)
+)
 def test_text_of_a_vector_is_read_back_as_the_very_same_numbers(values):
     unit = Unit("rad/s", "rpm")
     assert to_si_vector(unit.text(values), IN_FILE, unit) == values

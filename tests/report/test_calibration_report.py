@@ -7,15 +7,15 @@ import pytest
 
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.free import load_free
-from wm_drake.report.calibration_report import calibration_report, knowledge, summary
-from wm_drake.simulation import Case
+from wm_drake.report.calibration.report import calibration_report, knowledge, summary
+from wm_drake.simulation.runs import Case
 from wm_drake.studies.calibration.calibration import Calibration, Plan
+from wm_drake.studies.calibration.parameter_map import turning_of
 from wm_drake.studies.calibration.prediction import Prediction
 from wm_drake.studies.calibration.solutions import Solution
 from wm_drake.studies.calibration.targets import Targets
-from wm_drake.studies.calibration.turning import turning_of
-from wm_drake.studies.modal import natural_modes
-from wm_drake.studies.spin import run_spin
+from wm_drake.studies.description.modal import natural_modes
+from wm_drake.studies.spin.study import run_spin
 
 FREE = """
 quantities:
@@ -50,10 +50,14 @@ def calibration(machine, tmp_path_factory):
 def page(machine, calibration):
     short = SpinProfile(time=(0.0, 3.0), speed=(5.0, 20.0))
     cases = [Case(name, machine.parameters.loads[name], short, gasket) for name, gasket in LOADS]
-    predictions = [Prediction(("back",), np.full((1, 6), 0.02), np.full((1, 6), -0.31), np.full((1, 6), 0.04))]
+    predictions = [
+        Prediction(("back",), np.full((1, 6), 0.02), np.full((1, 6), -0.31), np.full((1, 6), 0.04))
+    ]
     modes = [("without gasket", natural_modes(machine, gasket=False))]
     best = run_spin(machine.parameters, cases)
-    return calibration_report(calibration, predictions, best, modes, "wm-drake calibrate --free 'a<b'")
+    return calibration_report(
+        calibration, predictions, best, modes, "wm-drake calibrate --free 'a<b'"
+    )
 
 
 def test_summary_has_mean_largest_and_their_place(calibration):

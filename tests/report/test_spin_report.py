@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from wm_drake.measures import measure
+from wm_drake.model.scene import Gap
 from wm_drake.parameters import MachineParameters, SpinProfile, load_machine, quantities
 from wm_drake.parameters.units import Unit
 from wm_drake.report.figures import outline, revolution_starts
-from wm_drake.report.spin_report import amplitude_table, spin_report
+from wm_drake.report.spin.report import amplitude_table, spin_report
 from wm_drake.report.tables import differences, profiles, readable
 from wm_drake.report.wording import number, percent
-from wm_drake.scene import Gap
-from wm_drake.simulation import Case, Record, point_displacements
-from wm_drake.studies.spin import CaseResult, SpinResult
+from wm_drake.simulation.measures import measure
+from wm_drake.simulation.runs import Case, Record, point_displacements
+from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 SENSOR_POINTS = {
     "Xr": (0.0, 0.2, -0.2),
@@ -32,7 +32,9 @@ DIVERGED = "the run diverged at 1.234 s: x = 0.6 m, bound 0.5 m"
 VOID = ("meta", "img", "br", "hr", "link", "input")
 
 
-def harmonic_record(parameters: MachineParameters, load: str, gasket: bool, size: float, samples: int = 400) -> Record:
+def harmonic_record(
+    parameters: MachineParameters, load: str, gasket: bool, size: float, samples: int = 400
+) -> Record:
     """2 s of a tub that swings at 4 Hz, its drum at 240 rpm: every variable that as_record makes, by hand."""
     time = 5e-3 * np.arange(samples)
     wave = np.sin(2.0 * np.pi * 4.0 * time)[:, None]
@@ -40,7 +42,8 @@ def harmonic_record(parameters: MachineParameters, load: str, gasket: bool, size
     pose = np.column_stack([angle, position])
     axes = {name: "xyz".index(sensor.axis) for name, sensor in parameters.sensors.items()}
     displacement = [
-        point_displacements(pose, np.array([SENSOR_POINTS[n]]), np.zeros(6))[:, 0, axis] for n, axis in axes.items()
+        point_displacements(pose, np.array([SENSOR_POINTS[n]]), np.zeros(6))[:, 0, axis]
+        for n, axis in axes.items()
     ]
     force = 1000.0 * position[:, None, :] * float(gasket)
     variables = {
@@ -95,8 +98,12 @@ def case_result(
     **record: int,
 ) -> CaseResult:
     made = harmonic_record(parameters, load, gasket, size, **record)
-    measures = replace(measure(made), smallest_gap=Gap(gap, 0.5, "tub_shell", "wall_right", (0.28, 0.16, 0.0)))
-    return CaseResult(Case(load, parameters.loads[load], parameters.profile, gasket), made, measures, 1.5)
+    measures = replace(
+        measure(made), smallest_gap=Gap(gap, 0.5, "tub_shell", "wall_right", (0.28, 0.16, 0.0))
+    )
+    return CaseResult(
+        Case(load, parameters.loads[load], parameters.profile, gasket), made, measures, 1.5
+    )
 
 
 def spin_result(parameters: MachineParameters, results: Sequence[CaseResult]) -> SpinResult:
@@ -110,7 +117,9 @@ def machine() -> MachineParameters:
 
 @pytest.fixture(scope="module")
 def result(machine: MachineParameters) -> SpinResult:
-    return spin_result(machine, [case_result(machine, "middle"), case_result(machine, "back", size=0.01, gap=0.03)])
+    return spin_result(
+        machine, [case_result(machine, "middle"), case_result(machine, "back", size=0.01, gap=0.03)]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -121,7 +130,9 @@ def page(result: SpinResult) -> str:
 @pytest.fixture
 def without_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests of words and tables: the figures are made, but not drawn, which is what takes long."""
-    monkeypatch.setattr("wm_drake.report.page.inline_svg_or_png", lambda figure: "data:image/png;base64,")
+    monkeypatch.setattr(
+        "wm_drake.report.page.inline_svg_or_png", lambda figure: "data:image/png;base64,"
+    )
 
 
 class Tags(HTMLParser):
@@ -160,7 +171,12 @@ def test_page_is_one_html_document_with_balanced_tags(page: str) -> None:
 
 def test_page_loads_nothing_from_elsewhere(page: str) -> None:
     tags = Tags(page)
-    addresses = [value or "" for _, attrs in tags.found for name, value in attrs.items() if name in ("src", "href")]
+    addresses = [
+        value or ""
+        for _, attrs in tags.found
+        for name, value in attrs.items()
+        if name in ("src", "href")
+    ]
     assert addresses
     assert all(address.startswith(("data:image/", "#")) for address in addresses)
     assert not tags.all("script")
@@ -187,7 +203,9 @@ def test_page_has_each_sensors_amplitude_as_in_the_table(result: SpinResult, pag
     table = amplitude_table(result)
     for _, row in table.iterrows():
         cells = [number(row[name]) for name in result.parameters.sensors]
-        assert any(words_from(words, i, len(cells)) == cells for i in range(len(words))), f"{row['load']}, {row['source']}"
+        assert any(words_from(words, i, len(cells)) == cells for i in range(len(words))), (
+            f"{row['load']}, {row['source']}"
+        )
 
 
 def words_from(words: list[str], start: int, count: int) -> list[str]:
@@ -195,7 +213,12 @@ def words_from(words: list[str], start: int, count: int) -> list[str]:
 
 
 def test_page_names_what_was_run(page: str, machine: MachineParameters) -> None:
-    for text in ("drake 9.9.9", "2.5 ms", "wm-drake spin --set &#39;a=&lt;b&gt;&#39;", "oscillating_group.sdf"):
+    for text in (
+        "drake 9.9.9",
+        "2.5 ms",
+        "wm-drake spin --set &#39;a=&lt;b&gt;&#39;",
+        "oscillating_group.sdf",
+    ):
         assert text in page
     assert f"{machine.spring_types['suspension'].stiffness / 1e3:g} N/mm" in page
     assert all(f">{html.escape(key)}</th>" in page for key, _, _ in quantities(machine))
@@ -219,7 +242,10 @@ def test_no_warning_where_all_is_well(page: str) -> None:
 
 @pytest.mark.usefixtures("without_drawing")
 def test_diverged_case_is_warned_of_and_left_out_of_the_summary(machine: MachineParameters) -> None:
-    good, bad = case_result(machine, "back", size=0.01), case_result(machine, "middle", size=0.3, samples=12)
+    good, bad = (
+        case_result(machine, "back", size=0.01),
+        case_result(machine, "middle", size=0.3, samples=12),
+    )
     bad.record.attrs["diverged"] = DIVERGED
     page = spin_report(spin_result(machine, [bad, good]))
     assert Tags(page).open == []
@@ -251,16 +277,23 @@ def test_overlap_and_foreign_profile_are_warned_of(machine: MachineParameters) -
 
 def test_names_cannot_inject_markup(machine: MachineParameters) -> None:
     evil = "<script>alert('$x$')</script>"
-    parameters = machine.model_copy(update={"name": evil, "about": evil, "loads": {evil: machine.loads["middle"]}})
+    parameters = machine.model_copy(
+        update={"name": evil, "about": evil, "loads": {evil: machine.loads["middle"]}}
+    )
     page = spin_report(
-        spin_result(parameters, [case_result(parameters, evil), case_result(parameters, evil, gasket=False)]), evil
+        spin_result(
+            parameters, [case_result(parameters, evil), case_result(parameters, evil, gasket=False)]
+        ),
+        evil,
     )
     assert "<script" not in page
     assert page.count(html.escape(evil, quote=False).replace("'", "&#39;")) > 5
     assert Tags(page).open == []
 
 
-def test_amplitude_table_has_only_measured_rows_that_match_a_case(result: SpinResult, machine: MachineParameters) -> None:
+def test_amplitude_table_has_only_measured_rows_that_match_a_case(
+    result: SpinResult, machine: MachineParameters
+) -> None:
     table = amplitude_table(result)
     assert list(table.columns) == ["load", "gasket", "source", *machine.sensors]
     assert table[["load", "gasket", "source"]].to_numpy().tolist() == [
@@ -273,18 +306,25 @@ def test_amplitude_table_has_only_measured_rows_that_match_a_case(result: SpinRe
     ]
     assert table.loc[0, "Xr"] == 29.1  # [B] Table 1, middle load with gasket
     expected = 1e3 * result.results[0].measures.amplitude.values
-    np.testing.assert_allclose(table.loc[2, list(machine.sensors)].to_numpy(float), expected, rtol=1e-12)
+    np.testing.assert_allclose(
+        table.loc[2, list(machine.sensors)].to_numpy(float), expected, rtol=1e-12
+    )
 
 
 def test_amplitude_table_tells_gasket_from_none(machine: MachineParameters) -> None:
     both = [case_result(machine, "counter", gasket) for gasket in (False, True)]
     table = amplitude_table(spin_result(machine, both))
     experiment = table[table["source"] == "experiment"]
-    assert experiment[["gasket", "Xr"]].to_numpy().tolist() == [["no", 12.6], ["yes", 9.6]]  # [B] Table 1
+    assert experiment[["gasket", "Xr"]].to_numpy().tolist() == [
+        ["no", 12.6],
+        ["yes", 9.6],
+    ]  # [B] Table 1
 
 
 @pytest.mark.usefixtures("without_drawing")
-def test_amplitude_table_without_measurements_has_our_rows_alone(machine: MachineParameters) -> None:
+def test_amplitude_table_without_measurements_has_our_rows_alone(
+    machine: MachineParameters,
+) -> None:
     parameters = machine.model_copy(update={"measured": ()})
     result = spin_result(parameters, [case_result(parameters)])
     table = amplitude_table(result)
@@ -296,11 +336,17 @@ def test_amplitude_table_without_measurements_has_our_rows_alone(machine: Machin
 @pytest.mark.usefixtures("without_drawing")
 def test_percent_difference_row_by_hand(machine: MachineParameters) -> None:
     case = case_result(machine, "middle")
-    amplitude = case.measures.amplitude.copy(data=1e-3 * np.array([34.92, 8.7, 9.45, 23.9, 4.0, 2.3]))
-    result = spin_result(machine, [replace(case, measures=replace(case.measures, amplitude=amplitude))])
+    amplitude = case.measures.amplitude.copy(
+        data=1e-3 * np.array([34.92, 8.7, 9.45, 23.9, 4.0, 2.3])
+    )
+    result = spin_result(
+        machine, [replace(case, measures=replace(case.measures, amplitude=amplitude))]
+    )
     # experiment 29.1, 8.7, 18.9, 23.9, 8.0, 23.0 mm: 34.92 / 29.1 = 1.2, 9.45 / 18.9 = 0.5, 4 / 8 = 0.5, 2.3 / 23 = 0.1
     found = differences(amplitude_table(result), result.results[0])
-    np.testing.assert_allclose([change.percent for change in found], [20.0, 0.0, -50.0, 0.0, -50.0, -90.0], atol=1e-9)
+    np.testing.assert_allclose(
+        [change.percent for change in found], [20.0, 0.0, -50.0, 0.0, -50.0, -90.0], atol=1e-9
+    )
     page = spin_report(result)
     row = re.search(r"wm_drake vs. experiment</td>(.*?)</tr>", page, re.DOTALL)
     assert row is not None
@@ -324,7 +370,9 @@ def test_same_result_gives_the_same_page(result: SpinResult, page: str) -> None:
 
 
 def test_page_is_small(page: str) -> None:
-    assert len(page.encode()) < 7 * 270_000  # LARGEST_SVG in base64 is the most a figure of lines may take
+    assert (
+        len(page.encode()) < 7 * 270_000
+    )  # LARGEST_SVG in base64 is the most a figure of lines may take
 
 
 def test_outline_keeps_corners_within_tolerance() -> None:
@@ -338,7 +386,9 @@ def test_outline_keeps_corners_within_tolerance() -> None:
 
 
 def test_revolutions_start_where_the_drum_has_turned_once() -> None:
-    turning = xr.Dataset({"drum_angle": ("time", -2.0 * np.pi * np.arange(1000) / 25.3)})  # 39.5 turns, backwards
+    turning = xr.Dataset(
+        {"drum_angle": ("time", -2.0 * np.pi * np.arange(1000) / 25.3)}
+    )  # 39.5 turns, backwards
     starts = revolution_starts(turning)
     assert set(np.diff(starts)) == {25, 26}
     assert len(starts) == 39  # the last is not complete
@@ -347,7 +397,8 @@ def test_revolutions_start_where_the_drum_has_turned_once() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(12.34, "+12 %"), (-3.6, "−4 %"), (-0.4, "0 %"), (0.4, "0 %"), (float("nan"), "–")]
+    ("value", "text"),
+    [(12.34, "+12 %"), (-3.6, "−4 %"), (-0.4, "0 %"), (0.4, "0 %"), (float("nan"), "–")],
 )
 def test_percent_is_written_with_its_sign(value: float, text: str) -> None:
     assert percent(value) == text
@@ -364,4 +415,9 @@ def test_long_lists_are_shown_by_their_ends(machine: MachineParameters) -> None:
 
 
 def test_numbers_are_rounded_with_a_true_minus() -> None:
-    assert [number(-1.25), number(-0.04), number(float("inf")), number(2.0, 0)] == ["−1.2", "0.0", "–", "2"]
+    assert [number(-1.25), number(-0.04), number(float("inf")), number(2.0, 0)] == [
+        "−1.2",
+        "0.0",
+        "–",
+        "2",
+    ]

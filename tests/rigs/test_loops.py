@@ -10,6 +10,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer, Sine
 
+from wm_drake.elements.friction_damper import FrictionDamperParameters, packed_damper_law
 from wm_drake.errors import InputError
 from wm_drake.laws.damper import mstv_damper
 from wm_drake.parameters import (
@@ -23,15 +24,28 @@ from wm_drake.parameters import (
     StvSpongeDamper,
     load_machine,
 )
-from wm_drake.rigs import AXES, Harmonic, bushing_bench, damper_bench, force_loop, force_loops, measures_of
+from wm_drake.rigs import (
+    AXES,
+    Harmonic,
+    bushing_bench,
+    damper_bench,
+    force_loop,
+    force_loops,
+    measures_of,
+)
 from wm_drake.rigs.loops import steady_deformations
-from wm_drake.systems.friction_damper import FrictionDamper, FrictionDamperParameters, packed_damper_law
+from wm_drake.systems.friction_damper import FrictionDamper
 
 MSTV = MstvDamper(  # fit of [C]; f_max assumed
-    law="mstv", friction_force=60.0, sponge_stiffness=176e3, sponge_damping=90.0, slider_damping=400.0
+    law="mstv",
+    friction_force=60.0,
+    sponge_stiffness=176e3,
+    sponge_damping=90.0,
+    slider_damping=400.0,
 )
 SPONGE = ForceTable(  # assumed
-    displacement=(-0.02, -0.01, -0.004, 0.004, 0.01, 0.02), force=(-120.0, -40.0, 0.0, 0.0, 40.0, 120.0)
+    displacement=(-0.02, -0.01, -0.004, 0.004, 0.01, 0.02),
+    force=(-120.0, -40.0, 0.0, 0.0, 40.0, 120.0),
 )
 FREE_STROKE = FreeStrokeDamper(  # [A] Table 1
     law="free_stroke",
@@ -49,7 +63,10 @@ def gasket():
 
 
 forces, dampings = st.floats(0.0, 200.0), st.floats(0.0, 1e4)
-speeds, motions = st.floats(1e-4, 1.0), st.builds(Harmonic, st.floats(0.2, 20.0), st.floats(1e-4, 2e-2))
+speeds, motions = (
+    st.floats(1e-4, 1.0),
+    st.builds(Harmonic, st.floats(0.2, 20.0), st.floats(1e-4, 2e-2)),
+)
 
 
 def energy(bench, motion):
@@ -78,12 +95,16 @@ def test_voigt_element_has_its_dynamic_stiffness_and_loss_angle(axis):
     kind = "rotational_" if axis.startswith("about") else ""
     letter = axis[-1]
     stiffness, damping = 5e3, 40.0
-    voigt = gasket().model_copy(update={f"{kind}stiffness_{letter}": stiffness, f"{kind}damping_{letter}": damping})
+    voigt = gasket().model_copy(
+        update={f"{kind}stiffness_{letter}": stiffness, f"{kind}damping_{letter}": damping}
+    )
     measures = measures_of(force_loop(bushing_bench(voigt, axis), motion))
     c_omega = damping * motion.angular_frequency
     assert measures.dynamic_stiffness == pytest.approx(np.hypot(stiffness, c_omega), rel=1e-9)
     assert measures.loss_angle == pytest.approx(np.arctan2(c_omega, stiffness), rel=1e-9)
-    assert measures.energy_per_cycle == pytest.approx(np.pi * c_omega * motion.amplitude**2, rel=1e-9)
+    assert measures.energy_per_cycle == pytest.approx(
+        np.pi * c_omega * motion.amplitude**2, rel=1e-9
+    )
 
 
 def test_a_jig_arm_does_the_work_of_the_moment():
@@ -96,16 +117,33 @@ def test_a_jig_arm_does_the_work_of_the_moment():
     friction = pushed.force * arm * np.cos(angle) - moment
     full = rubber.full_friction_rate_x
     rate = pushed.velocity / (arm * np.cos(angle))
-    assert friction == pytest.approx(0.5 * np.sin(0.5 * np.pi * np.clip(rate / full, -1.0, 1.0)), abs=1e-9)
+    assert friction == pytest.approx(
+        0.5 * np.sin(0.5 * np.pi * np.clip(rate / full, -1.0, 1.0)), abs=1e-9
+    )
     turned = force_loop(bushing_bench(rubber, "about_x"), Harmonic(5.0, 0.04))
-    assert np.max(np.abs(pushed.force)) * arm == pytest.approx(np.max(np.abs(turned.force)), rel=2e-3)  # as [A] reckons
+    assert np.max(np.abs(pushed.force)) * arm == pytest.approx(
+        np.max(np.abs(turned.force)), rel=2e-3
+    )  # as [A] reckons
 
 
 @settings(max_examples=25)
-@given(f_max=forces, damping=dampings, v=speeds, c1=dampings, c2=dampings, k=st.floats(1e3, 3e5), motion=motions)
+@given(
+    f_max=forces,
+    damping=dampings,
+    v=speeds,
+    c1=dampings,
+    c2=dampings,
+    k=st.floats(1e3, 3e5),
+    motion=motions,
+)
 def test_no_damper_gives_energy(f_max, damping, v, c1, c2, k, motion):
     assume(c1 + c2 > 1.0)
-    sponge = {"friction_force": f_max, "sponge_stiffness": k, "sponge_damping": c1, "slider_damping": c2}
+    sponge = {
+        "friction_force": f_max,
+        "sponge_stiffness": k,
+        "sponge_damping": c1,
+        "slider_damping": c2,
+    }
     dampers = [
         CoulombDamper(law="coulomb", friction_force=f_max, damping=damping),
         StvDamper(law="stv", friction_force=f_max, transition_velocity=v, damping=damping),
@@ -122,14 +160,23 @@ def test_no_damper_gives_energy(f_max, damping, v, c1, c2, k, motion):
 
 
 @settings(max_examples=40)
-@given(k=st.floats(0.0, 1e6), c=dampings, p=st.floats(0.0, 10.0), v=speeds, axis=st.sampled_from(AXES), motion=motions)
+@given(
+    k=st.floats(0.0, 1e6),
+    c=dampings,
+    p=st.floats(0.0, 10.0),
+    v=speeds,
+    axis=st.sampled_from(AXES),
+    motion=motions,
+)
 def test_no_bushing_gives_energy(k, c, p, v, axis, motion):
     kind, letter = ("rotational_" if axis.startswith("about") else ""), axis[-1]
     update = {f"{kind}stiffness_{letter}": k, f"{kind}damping_{letter}": c}
     update |= {f"friction_torque_{letter}": p, f"full_friction_rate_{letter}": v}
     bench = bushing_bench(gasket().model_copy(update=update), axis)
     loop = force_loop(bench, motion)
-    assert measures_of(loop).energy_per_cycle >= -1e-12 * (1.0 + np.max(np.abs(loop.force)) * motion.amplitude)
+    assert measures_of(loop).energy_per_cycle >= -1e-12 * (
+        1.0 + np.max(np.abs(loop.force)) * motion.amplitude
+    )
 
 
 @functools.cache
@@ -144,7 +191,9 @@ def largest_difference(mass):
 def test_the_mstv_loop_is_a_friction_loop():
     loop = mstv_force(0.0)
     assert np.max(loop) == pytest.approx(-np.min(loop), rel=1e-3)
-    assert 60.0 < np.max(loop) < 60.0 + 400.0 * 2.0 * np.pi * 3.0 * 1e-3  # full friction, less than all the air resistance
+    assert (
+        60.0 < np.max(loop) < 60.0 + 400.0 * 2.0 * np.pi * 3.0 * 1e-3
+    )  # full friction, less than all the air resistance
 
 
 @pytest.mark.parametrize("mass", [0.04, 0.02])  # kg
@@ -170,16 +219,22 @@ def test_sponge_without_friction_is_a_linear_solid():
 
 def test_coulomb_friction_behind_a_spring_is_masings_loop():
     """Slider with hardly a dashpot: sticks, then slips at f_max; energy 4 f_max (A - f_max / k)."""
-    damper = StvSpongeDamper(law="stv_sponge", friction_force=60.0, sponge_stiffness=176e3, sponge_damping=1.0)
+    damper = StvSpongeDamper(
+        law="stv_sponge", friction_force=60.0, sponge_stiffness=176e3, sponge_damping=1.0
+    )
     for amplitude in (0.5e-3, 1e-3, 5e-3):
         expected = 4.0 * 60.0 * (amplitude - 60.0 / 176e3)
-        assert energy(damper_bench(damper), Harmonic(0.1, amplitude)) == pytest.approx(expected, rel=2e-3)
+        assert energy(damper_bench(damper), Harmonic(0.1, amplitude)) == pytest.approx(
+            expected, rel=2e-3
+        )
 
 
 def test_stv_with_sponge_tends_to_coulomb():
     def loop(v_st):
         sponge = {"sponge_stiffness": 176e3, "sponge_damping": 90.0, "slider_damping": 400.0}
-        damper = StvSpongeDamper(law="stv_sponge", friction_force=60.0, transition_velocity=v_st, **sponge)
+        damper = StvSpongeDamper(
+            law="stv_sponge", friction_force=60.0, transition_velocity=v_st, **sponge
+        )
         return force_loop(damper_bench(damper), Harmonic(3.0, 1e-3)).force
 
     differences = [np.max(np.abs(loop(v_st) - loop(0.0))) for v_st in (4e-3, 1e-3, 1e-4)]
@@ -188,7 +243,9 @@ def test_stv_with_sponge_tends_to_coulomb():
 
 
 def test_free_stroke_loop_has_basic_friction_inside_and_sponge_beyond():
-    inside, beyond = force_loops(damper_bench(FREE_STROKE), [Harmonic(1.0, 3e-3), Harmonic(1.0, 0.01)])
+    inside, beyond = force_loops(
+        damper_bench(FREE_STROKE), [Harmonic(1.0, 3e-3), Harmonic(1.0, 0.01)]
+    )
     basic = 10.5 * np.sin(0.5 * np.pi * inside.velocity / 0.09)
     assert inside.force == pytest.approx(basic, abs=1e-9)
     assert 35.0 < np.max(beyond.force) < 40.0 + 10.5
@@ -197,7 +254,9 @@ def test_free_stroke_loop_has_basic_friction_inside_and_sponge_beyond():
 @pytest.mark.parametrize("frequency", [1.0, 3.0, 6.67, 10.0])
 def test_mstv_smaller_amplitude_smaller_loop(frequency):
     """[C] section 2.3 on its Fig. 6."""
-    loops = force_loops(damper_bench(MSTV), [Harmonic(frequency, a) for a in (0.3e-3, 0.5e-3, 1e-3, 1.5e-3)])
+    loops = force_loops(
+        damper_bench(MSTV), [Harmonic(frequency, a) for a in (0.3e-3, 0.5e-3, 1e-3, 1.5e-3)]
+    )
     areas = [measures_of(loop).energy_per_cycle for loop in loops]
     peaks = [measures_of(loop).peak_force for loop in loops]
     assert areas == sorted(areas)
@@ -207,16 +266,24 @@ def test_mstv_smaller_amplitude_smaller_loop(frequency):
 def test_motions_side_by_side_are_motions_alone():
     motions = [Harmonic(f, a) for f in (1.0, 10.0) for a in (0.3e-3, 1.5e-3)]
     for together, motion in zip(force_loops(damper_bench(MSTV), motions), motions, strict=True):
-        assert together.force == pytest.approx(force_loop(damper_bench(MSTV), motion).force, abs=2e-5 * 60.0)
+        assert together.force == pytest.approx(
+            force_loop(damper_bench(MSTV), motion).force, abs=2e-5 * 60.0
+        )
 
 
-@pytest.mark.parametrize("damper", [MSTV, FREE_STROKE, CoulombDamper(law="coulomb", friction_force=60.0, damping=20.0)])
+@pytest.mark.parametrize(
+    "damper", [MSTV, FREE_STROKE, CoulombDamper(law="coulomb", friction_force=60.0, damping=20.0)]
+)
 def test_the_dampers_system_under_drakes_integrator_gives_the_loop_of_the_bench(damper):
     """The tub moves up and down above an upright damper; the rig is no part of the system, nor the system of the rig."""
     motion = Harmonic(3.0, 9e-3)
-    parameters = FrictionDamperParameters(np.zeros(3), np.array([0.0, 0.0, -0.3]), EndBushing(), packed_damper_law(damper))
+    parameters = FrictionDamperParameters(
+        np.zeros(3), np.array([0.0, 0.0, -0.3]), EndBushing(), packed_damper_law(damper)
+    )
     builder = DiagramBuilder()
-    sine = builder.AddSystem(Sine(np.eye(7)[5] * motion.amplitude, np.full(7, motion.angular_frequency), np.zeros(7)))
+    sine = builder.AddSystem(
+        Sine(np.eye(7)[5] * motion.amplitude, np.full(7, motion.angular_frequency), np.zeros(7))
+    )
     state = builder.AddSystem(Multiplexer([7, 7]))
     system = builder.AddSystem(FrictionDamper(parameters.packed(), int(parameters.has_sponge)))
     builder.Connect(sine.get_output_port(0), state.get_input_port(0))
@@ -232,7 +299,9 @@ def test_the_dampers_system_under_drakes_integrator_gives_the_loop_of_the_bench(
     force = log.data()[0, -361:-1]
     bench = force_loop(damper_bench(damper), motion).force[::4]
     assert np.max(np.abs(bench)) > 30.0
-    turning = np.isclose(np.abs(np.sin(np.linspace(0.0, 2.0 * np.pi, 361)[:-1])), 1.0)  # a jump of Coulomb friction
+    turning = np.isclose(
+        np.abs(np.sin(np.linspace(0.0, 2.0 * np.pi, 361)[:-1])), 1.0
+    )  # a jump of Coulomb friction
     assert force[~turning] == pytest.approx(bench[~turning], abs=2e-3 * np.max(np.abs(bench)))
 
 
@@ -243,7 +312,10 @@ def test_the_dampers_system_under_drakes_integrator_gives_the_loop_of_the_bench(
         (lambda: Harmonic(1.0, -1e-3), "amplitude: is -0.001; allowed is > 0"),
         (lambda: damper_bench(FREE_STROKE, 0.01), "sponge_mass: only the law mstv"),
         (lambda: damper_bench(MSTV, -0.01), "sponge_mass: is -0.01 kg"),
-        (lambda: bushing_bench(gasket(), "radial"), "axis: no axis 'radial'; allowed are x, y, z, about_x"),
+        (
+            lambda: bushing_bench(gasket(), "radial"),
+            "axis: no axis 'radial'; allowed are x, y, z, about_x",
+        ),
         (lambda: bushing_bench(gasket(), "x", arm=0.1), "arm: an arm drives a rotation"),
         (
             lambda: force_loop(bushing_bench(gasket(), "about_x", arm=0.1), Harmonic(1.0, 0.1)),
@@ -268,9 +340,14 @@ def test_mstv_higher_frequency_lower_friction(amplitude):
         motion, bench = Harmonic(frequency, amplitude), damper_bench(MSTV)
         loop = force_loop(bench, motion)
         row = bench.packed[None]
-        deformation = steady_deformations(bench, row, np.array([amplitude]), np.array([motion.angular_frequency]))[0, :-1]
+        deformation = steady_deformations(
+            bench, row, np.array([amplitude]), np.array([motion.angular_frequency])
+        )[0, :-1]
         slider = loop.velocity - np.array(
-            [mstv_damper(v, d, *bench.packed[1:])[1] for v, d in zip(loop.velocity, deformation, strict=True)]
+            [
+                mstv_damper(v, d, *bench.packed[1:])[1]
+                for v, d in zip(loop.velocity, deformation, strict=True)
+            ]
         )
         friction = loop.force - 400.0 * slider
         frictions.append(np.mean(np.abs(friction)))

@@ -16,8 +16,9 @@ from pydrake.multibody.tree import (
     SpatialInertia,
 )
 
+from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bushing_law
 from wm_drake.parameters.elements import Bushing
-from wm_drake.systems.six_component_bushing import SixComponentBushing, SixComponentBushingParameters, packed_bushing_law
+from wm_drake.systems.six_component_bushing import SixComponentBushing
 
 STIFFNESS = np.array([8e3, 3e3, 6e3])  # N/m
 ROTATIONAL_STIFFNESS = np.array([73.0, 890.0, 150.0])  # N m/rad
@@ -38,7 +39,12 @@ def drake_plant(stiffness_only):
     damping = 0.0 if stiffness_only else 1.0
     plant.AddForceElement(
         LinearBushingRollPitchYaw(
-            ground, tub_side, ROTATIONAL_STIFFNESS, damping * ROTATIONAL_DAMPING, STIFFNESS, damping * DAMPING
+            ground,
+            tub_side,
+            ROTATIONAL_STIFFNESS,
+            damping * ROTATIONAL_DAMPING,
+            STIFFNESS,
+            damping * DAMPING,
         )
     )
     plant.Finalize()
@@ -63,7 +69,9 @@ def our_bushing(stiffness_only):
         numbers[f"damping_{axis}"] = damping * DAMPING[i]
         numbers[f"rotational_damping_{axis}"] = damping * ROTATIONAL_DAMPING[i]
     law = packed_bushing_law(Bushing(tub_frame="tub_side", housing_frame="ground_side", **numbers))
-    return SixComponentBushing(SixComponentBushingParameters(P_WG, R_WG.matrix(), P_WG, R_WG.matrix(), law).packed())
+    return SixComponentBushing(
+        SixComponentBushingParameters(P_WG, R_WG.matrix(), P_WG, R_WG.matrix(), law).packed()
+    )
 
 
 def our_wrench(bushing, x):
@@ -75,15 +83,22 @@ def our_wrench(bushing, x):
 def relative_difference(amplitude, stiffness_only):
     """Largest, of moment or force, in ten random motions of tub angles [rad] and displacements [10 cm] of an amplitude."""
     rng = np.random.default_rng(41)
-    sizes = np.array([1.0] * 3 + [0.1] * 3 + [0.0] + [1.0] * 3 + [0.1] * 3 + [0.0])  # rad, m, rad/s, m/s
+    sizes = np.array(
+        [1.0] * 3 + [0.1] * 3 + [0.0] + [1.0] * 3 + [0.1] * 3 + [0.0]
+    )  # rad, m, rad/s, m/s
     plant, bushing = drake_plant(stiffness_only), our_bushing(stiffness_only)
     states = amplitude * rng.uniform(-1.0, 1.0, (10, 14)) * sizes
-    ours, theirs = (np.array([w(s, x) for x in states]) for w, s in ((our_wrench, bushing), (wrench_of_drake, plant)))
+    ours, theirs = (
+        np.array([w(s, x) for x in states])
+        for w, s in ((our_wrench, bushing), (wrench_of_drake, plant))
+    )
     ours, theirs = ours.reshape(20, 3), theirs.reshape(20, 3)  # moments and forces, one by one
     return np.max(np.linalg.norm(ours - theirs, axis=1) / np.linalg.norm(theirs, axis=1))
 
 
-@pytest.mark.parametrize("stiffness_only", [True, False], ids=["stiffness", "stiffness and damping"])
+@pytest.mark.parametrize(
+    "stiffness_only", [True, False], ids=["stiffness", "stiffness and damping"]
+)
 def test_the_difference_shrinks_with_the_amplitude(stiffness_only):
     amplitudes = np.array([1e-2, 1e-3, 1e-4, 1e-5])
     differences = np.array([relative_difference(a, stiffness_only) for a in amplitudes])
@@ -95,6 +110,10 @@ def test_along_one_axis_without_rotation_they_are_equal():
     plant, bushing = drake_plant(False), our_bushing(False)
     along = R_WG.matrix() @ [0.0, 0.01, 0.0]  # m
     x = np.concatenate([[0.0] * 3, along, [0.0] * 4, 3.0 * along, [0.0]])
-    np.testing.assert_allclose(our_wrench(bushing, x), wrench_of_drake(plant, x), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        our_wrench(bushing, x), wrench_of_drake(plant, x), rtol=1e-12, atol=1e-12
+    )
     force = -(3e3 * 0.01 + 10.0 * 0.03)  # N
-    np.testing.assert_allclose(our_wrench(bushing, x)[3:], R_WG.matrix() @ [0.0, force, 0.0], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        our_wrench(bushing, x)[3:], R_WG.matrix() @ [0.0, force, 0.0], rtol=1e-12, atol=1e-12
+    )

@@ -10,7 +10,9 @@ from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RollPitchYaw, RotationMatrix
 from scipy.interpolate import PchipInterpolator
 
-from wm_drake.kernel.histories import reading_history
+from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bushing_law
+from wm_drake.elements.friction_damper import FrictionDamperParameters, packed_damper_law
+from wm_drake.elements.spring import SpringStrutParameters
 from wm_drake.parameters.elements import (
     Bushing,
     CoulombDamper,
@@ -22,19 +24,29 @@ from wm_drake.parameters.elements import (
     StvDamper,
     packed_stiffness,
 )
-from wm_drake.systems.friction_damper import FrictionDamper, FrictionDamperParameters, packed_damper_law
-from wm_drake.systems.six_component_bushing import SixComponentBushing, SixComponentBushingParameters, packed_bushing_law
+from wm_drake.simulation.histories import reading_history
+from wm_drake.systems.friction_damper import FrictionDamper
+from wm_drake.systems.six_component_bushing import SixComponentBushing
 from wm_drake.systems.speed_source import REFLECTED_INERTIA, SpeedSource
-from wm_drake.systems.spring_strut import SpringStrut, SpringStrutParameters
+from wm_drake.systems.spring_strut import SpringStrut
 
-SPRING_CURVE = ForceTable(displacement=(-0.03, -0.01, 0.0, 0.01, 0.04), force=(-200.0, -50.0, 0.0, 60.0, 300.0))  # m, N
-SPONGE = ForceTable(displacement=(-0.02, -0.01, -0.003, 0.003, 0.01, 0.02), force=(-130.0, -40.0, 0.0, 0.0, 40.0, 130.0))
-END_BUSHING = EndBushing(stiffness=6.0, damping=0.2, friction_torque=0.4, full_friction_rate=0.8)  # N m/rad, N m s/rad, N m
+SPRING_CURVE = ForceTable(
+    displacement=(-0.03, -0.01, 0.0, 0.01, 0.04), force=(-200.0, -50.0, 0.0, 60.0, 300.0)
+)  # m, N
+SPONGE = ForceTable(
+    displacement=(-0.02, -0.01, -0.003, 0.003, 0.01, 0.02),
+    force=(-130.0, -40.0, 0.0, 0.0, 40.0, 130.0),
+)
+END_BUSHING = EndBushing(
+    stiffness=6.0, damping=0.2, friction_torque=0.4, full_friction_rate=0.8
+)  # N m/rad, N m s/rad, N m
 GASKET = Bushing(
     tub_frame="tub_front",
     housing_frame="housing_front",
     stiffness_x=8e3,  # N/m
-    stiffness_y=ForceTable(displacement=(-0.02, -0.005, 0.004, 0.02), force=(-90.0, -10.0, 9.0, 80.0)),
+    stiffness_y=ForceTable(
+        displacement=(-0.02, -0.005, 0.004, 0.02), force=(-90.0, -10.0, 9.0, 80.0)
+    ),
     stiffness_z=5e3,
     rotational_stiffness_x=73.0,  # N m/rad
     rotational_stiffness_y=890.0,
@@ -53,10 +65,22 @@ GASKET = Bushing(
     full_friction_rate_z=0.9,
 )
 DAMPERS = {
-    "coulomb": CoulombDamper(law="coulomb", friction_force=60.0, damping=20.0, end_bushing=END_BUSHING),
-    "stv": StvDamper(law="stv", friction_force=60.0, transition_velocity=0.2, damping=20.0, end_bushing=END_BUSHING),
+    "coulomb": CoulombDamper(
+        law="coulomb", friction_force=60.0, damping=20.0, end_bushing=END_BUSHING
+    ),
+    "stv": StvDamper(
+        law="stv",
+        friction_force=60.0,
+        transition_velocity=0.2,
+        damping=20.0,
+        end_bushing=END_BUSHING,
+    ),
     "havsin": HavsinDamper(
-        law="havsin", friction_force=60.0, full_friction_velocity=0.2, damping=20.0, end_bushing=END_BUSHING
+        law="havsin",
+        friction_force=60.0,
+        full_friction_velocity=0.2,
+        damping=20.0,
+        end_bushing=END_BUSHING,
     ),
     "mstv": MstvDamper(
         law="mstv",
@@ -82,19 +106,32 @@ every_damper = pytest.mark.parametrize("damper", DAMPERS.values(), ids=DAMPERS)
 
 def spring_parameters(stiffness=5200.0, preload=240.0):
     return SpringStrutParameters(
-        np.array([0.2, -0.05, 0.22]), np.array([0.28, -0.05, 0.4]), preload, packed_stiffness(stiffness)
+        np.array([0.2, -0.05, 0.22]),
+        np.array([0.28, -0.05, 0.4]),
+        preload,
+        packed_stiffness(stiffness),
     )
 
 
 def damper_parameters(damper, end_bushing=None, engaged=1.0):
     ends = np.array([0.15, 0.08, -0.24]), np.array([0.25, 0.1, -0.42])  # m
-    return FrictionDamperParameters(*ends, end_bushing or damper.end_bushing, packed_damper_law(damper), engaged)
+    return FrictionDamperParameters(
+        *ends, end_bushing or damper.end_bushing, packed_damper_law(damper), engaged
+    )
 
 
 def bushing_parameters(engaged=1.0):
-    R_TB, R_WG = (RotationMatrix(RollPitchYaw(rpy)).matrix() for rpy in ([0.02, -0.03, 0.5], [-0.01, 0.02, 0.52]))
+    R_TB, R_WG = (
+        RotationMatrix(RollPitchYaw(rpy)).matrix()
+        for rpy in ([0.02, -0.03, 0.5], [-0.01, 0.02, 0.52])
+    )
     return SixComponentBushingParameters(
-        np.array([0.01, -0.16, 0.02]), R_TB, np.array([0.0, -0.17, 0.015]), R_WG, packed_bushing_law(GASKET), engaged
+        np.array([0.01, -0.16, 0.02]),
+        R_TB,
+        np.array([0.0, -0.17, 0.015]),
+        R_WG,
+        packed_bushing_law(GASKET),
+        engaged,
     )
 
 
@@ -134,7 +171,9 @@ class Element:
 
     def system(self, packed=None):
         packed = self.packed if packed is None else packed
-        return self.kind(packed, len(self.state)) if self.kind is FrictionDamper else self.kind(packed)
+        return (
+            self.kind(packed, len(self.state)) if self.kind is FrictionDamper else self.kind(packed)
+        )
 
 
 ELEMENTS = {
@@ -159,7 +198,9 @@ def test_a_spring_pulls_its_hooks_together(stiffness):
         line = p_WA - placed.p_WH
         length = np.linalg.norm(line)
         stretch = length - np.linalg.norm(placed.p_ToA_T - placed.p_WH)
-        tension = 240.0 + (stiffness * stretch if isinstance(stiffness, float) else curve(stretch))  # N
+        tension = 240.0 + (
+            stiffness * stretch if isinstance(stiffness, float) else curve(stretch)
+        )  # N
         force = -tension * line / length
         context = context_of(spring, x)
         assert port(spring, context, "force") == pytest.approx([tension])
@@ -171,7 +212,9 @@ def test_a_spring_pulls_its_hooks_together(stiffness):
 
 def test_a_spring_at_rest_has_its_preload():
     spring = SpringStrut(spring_parameters().packed())
-    assert port(spring, context_of(spring, np.zeros(14)), "force") == pytest.approx([240.0], rel=1e-15)
+    assert port(spring, context_of(spring, np.zeros(14)), "force") == pytest.approx(
+        [240.0], rel=1e-15
+    )
 
 
 def line_of(damper, x):
@@ -196,7 +239,9 @@ def test_a_damper_without_sponge_resists_its_elongation_rate(name, full_force, t
         context = context_of(damper, x)
         assert context.num_continuous_states() == 0
         assert port(damper, context, "force") == pytest.approx([tension])
-        assert port(damper, context, "generalized_force") == pytest.approx([*np.cross(arm, -tension * e), *(-tension * e), 0.0])
+        assert port(damper, context, "generalized_force") == pytest.approx(
+            [*np.cross(arm, -tension * e), *(-tension * e), 0.0]
+        )
 
 
 def test_an_mstv_damper_pulls_with_its_sponge():
@@ -213,7 +258,9 @@ def test_an_mstv_damper_pulls_with_its_sponge():
         friction = full * np.sign(w) if abs(w) >= abs(u) else full * w / (abs(u) + 1e-6)
         assert tension == pytest.approx(400.0 * w + friction)  # [C] Eq. (3) without mass
         assert port(damper, context, "force") == pytest.approx([tension])
-        assert port(damper, context, "generalized_force") == pytest.approx([*np.cross(arm, -tension * e), *(-tension * e), 0.0])
+        assert port(damper, context, "generalized_force") == pytest.approx(
+            [*np.cross(arm, -tension * e), *(-tension * e), 0.0]
+        )
         assert port(damper, context, "state") == [deformation]
 
 
@@ -237,7 +284,10 @@ def test_a_free_stroke_damper_pulls_with_its_sponge_and_basic_friction():
 def test_end_bushings_bend_back_a_strut_and_their_moments_are_balanced(damper):
     placed = damper_parameters(damper)
     state = [0.0] * int(placed.has_sponge)
-    bent, free = (FrictionDamper(p.packed(), len(state)) for p in (placed, damper_parameters(damper, EndBushing())))
+    bent, free = (
+        FrictionDamper(p.packed(), len(state))
+        for p in (placed, damper_parameters(damper, EndBushing()))
+    )
     axis = placed.p_ToA_T - placed.p_WH
     axis /= np.linalg.norm(axis)
     for x in random_plant_states(10, seed=25):
@@ -249,12 +299,22 @@ def test_end_bushings_bend_back_a_strut_and_their_moments_are_balanced(damper):
             angle = bend / np.linalg.norm(bend) * np.arcsin(np.linalg.norm(bend))
             rate = (np.eye(3) - np.outer(e, e)) @ (w_strut - w_body)
             speed = np.linalg.norm(rate)
-            moments.append(-6.0 * angle - 0.2 * rate - 0.4 * np.sin(np.pi / 2 * min(speed / 0.8, 1.0)) * rate / speed)
+            moments.append(
+                -6.0 * angle
+                - 0.2 * rate
+                - 0.4 * np.sin(np.pi / 2 * min(speed / 0.8, 1.0)) * rate / speed
+            )
         couple = np.cross(sum(moments), e) / length
-        np.testing.assert_allclose(sum(moments) + np.cross(length * e, -couple), 0.0, atol=1e-13)  # balance of the strut
-        with_bushings, without = (port(d, context_of(d, x, state), "generalized_force") for d in (bent, free))
+        np.testing.assert_allclose(
+            sum(moments) + np.cross(length * e, -couple), 0.0, atol=1e-13
+        )  # balance of the strut
+        with_bushings, without = (
+            port(d, context_of(d, x, state), "generalized_force") for d in (bent, free)
+        )
         extra = with_bushings - without
-        np.testing.assert_allclose(extra, [*(np.cross(arm, couple) - moments[0]), *couple, 0.0], rtol=1e-9, atol=1e-11)
+        np.testing.assert_allclose(
+            extra, [*(np.cross(arm, couple) - moments[0]), *couple, 0.0], rtol=1e-9, atol=1e-11
+        )
         power = moments[0] @ (w_strut - x[7:10]) + moments[1] @ w_strut  # of the bushings, W
         assert extra @ x[7:14] == pytest.approx(power)
 
@@ -271,15 +331,23 @@ def test_a_bushing_acts_at_its_tub_side_point_along_the_axes_of_its_housing_fram
         r = rotation.angle() * rotation.axis()
         # rate of the rotation vector and the moment that does its work, through the 3 x 3 matrix of the Bortz equation
         angle, cross_r = rotation.angle(), np.cross(np.eye(3), r)
-        B = np.eye(3) - 0.5 * cross_r + (1.0 / angle**2 - 0.5 / (angle * np.tan(0.5 * angle))) * cross_r @ cross_r
+        B = (
+            np.eye(3)
+            - 0.5 * cross_r
+            + (1.0 / angle**2 - 0.5 / (angle * np.tan(0.5 * angle))) * cross_r @ cross_r
+        )
         r_rate = B @ w
         friction = [3.7, 1.7, 2.7] * np.sin(np.pi / 2 * np.clip(r_rate / [1.5, 0.6, 0.9], -1, 1))
         force = -np.array([8e3 * d[0], curve(d[1]), 5e3 * d[2]]) - [50.0, 10.0, 40.0] * d_rate
         moment = B.T @ (-np.array([73.0, 890.0, 150.0]) * r - [3.0, 5.0, 4.0] * r_rate - friction)
         context = context_of(bushing, x)
         expected = [*(np.cross(arm, R_WG @ force) + R_WG @ moment), *(R_WG @ force), 0.0]
-        np.testing.assert_allclose(port(bushing, context, "generalized_force"), expected, rtol=1e-9, atol=1e-10)
-        np.testing.assert_allclose(port(bushing, context, "force"), [*-force, *-moment], rtol=1e-9, atol=1e-10)
+        np.testing.assert_allclose(
+            port(bushing, context, "generalized_force"), expected, rtol=1e-9, atol=1e-10
+        )
+        np.testing.assert_allclose(
+            port(bushing, context, "force"), [*-force, *-moment], rtol=1e-9, atol=1e-10
+        )
 
 
 def test_the_logged_force_of_a_bushing_is_the_reaction_to_what_acts_on_the_tub():
@@ -288,10 +356,15 @@ def test_the_logged_force_of_a_bushing_is_the_reaction_to_what_acts_on_the_tub()
     for x in random_plant_states(5, seed=27):
         _, arm, _, _ = tub_motion(x, placed.p_ToB_T)
         context = context_of(bushing, x)
-        on_tub, on_housing = port(bushing, context, "generalized_force"), port(bushing, context, "force")
+        on_tub, on_housing = (
+            port(bushing, context, "generalized_force"),
+            port(bushing, context, "force"),
+        )
         force, moment = placed.R_WG @ on_housing[:3], placed.R_WG @ on_housing[3:]
         np.testing.assert_allclose(on_tub[3:6], -force, rtol=1e-12)
-        np.testing.assert_allclose(on_tub[0:3] - np.cross(arm, on_tub[3:6]), -moment, rtol=1e-9, atol=1e-11)
+        np.testing.assert_allclose(
+            on_tub[0:3] - np.cross(arm, on_tub[3:6]), -moment, rtol=1e-9, atol=1e-11
+        )
 
 
 @every_element
@@ -299,7 +372,10 @@ def test_readings_repeat_the_force_port_row_by_row(element):
     system = element.system()
     states = random_plant_states(11, seed=28)  # more than go side by side, and not a multiple
     sponges = np.outer(np.linspace(0.5, 1.5, len(states)), element.state or [0.0])
-    begins = [np.zeros(int(element.kind is kind), dtype=int) for kind in (SpringStrut, FrictionDamper, SixComponentBushing)]
+    begins = [
+        np.zeros(int(element.kind is kind), dtype=int)
+        for kind in (SpringStrut, FrictionDamper, SixComponentBushing)
+    ]
     forces = np.empty((len(states), system.GetOutputPort("force").size()))
     reading_history(states, sponges, np.empty(0), element.packed, *begins, forces)
     for x, own, force in zip(states, sponges[:, : len(element.state)], forces, strict=True):
@@ -308,8 +384,14 @@ def test_readings_repeat_the_force_port_row_by_row(element):
 
 def computed(system, context):
     """All that a system computes, as one array: generalized force, own force, rate of its state."""
-    rate = system.EvalTimeDerivatives(context).CopyToVector() if context.num_continuous_states() else []
-    return np.array([*port(system, context, "generalized_force"), *port(system, context, "force"), *rate])
+    rate = (
+        system.EvalTimeDerivatives(context).CopyToVector()
+        if context.num_continuous_states()
+        else []
+    )
+    return np.array(
+        [*port(system, context, "generalized_force"), *port(system, context, "force"), *rate]
+    )
 
 
 @every_element
@@ -323,9 +405,13 @@ def test_autodiff_gives_the_same_values_and_the_derivatives_of_finite_difference
     for x in random_plant_states(3, seed=29):
         xs = np.array([*x, *element.state])
         duals = InitializeAutoDiff(xs).ravel()
-        answer = computed(differentiable, context_of(differentiable, duals[:14], duals[14:])).reshape(-1, 1)
+        answer = computed(
+            differentiable, context_of(differentiable, duals[:14], duals[14:])
+        ).reshape(-1, 1)
         np.testing.assert_allclose(ExtractValue(answer).ravel(), values(xs), rtol=1e-12, atol=1e-12)
-        expected = np.column_stack([(values(xs + step) - values(xs - step)) / 2.0 for step in np.diag(steps)])
+        expected = np.column_stack(
+            [(values(xs + step) - values(xs - step)) / 2.0 for step in np.diag(steps)]
+        )
         size = np.max(np.abs(expected), axis=1, keepdims=True) + 1e-7 * np.abs(values(xs))[:, None]
         assert np.max(np.abs(ExtractGradient(answer) * steps - expected) / (size + 1e-15)) < 1e-6
 
@@ -342,7 +428,9 @@ def test_numbers_set_in_a_context_act_there_only_and_go_with_it_to_autodiff(elem
     changed, unchanged = (context_of(system, x, element.state) for _ in range(2))
     system.set_parameters(changed, moved)
     rebuilt = element.system(moved)
-    assert np.array_equal(computed(system, changed), computed(rebuilt, context_of(rebuilt, x, element.state)))
+    assert np.array_equal(
+        computed(system, changed), computed(rebuilt, context_of(rebuilt, x, element.state))
+    )
     assert not np.array_equal(computed(system, unchanged), computed(system, changed))
     differentiable = system.ToAutoDiffXd()
     context = differentiable.CreateDefaultContext()

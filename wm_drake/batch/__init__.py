@@ -1,7 +1,15 @@
-"""Many runs of one machine: cases -> jobs -> ended runs -> a table."""
+"""Many runs of one machine: cases -> work_items -> ended runs -> a table."""
 
 from wm_drake.batch.many import SimulationInterrupted, simulate_many
 from wm_drake.batch.remembered import run_keys, simulate_remembered, sources_version
-from wm_drake.batch.runs import MEASURES, Ended
+from wm_drake.batch.runs import MEASURES, RunResult
 
-__all__ = ["MEASURES", "Ended", "SimulationInterrupted", "run_keys", "simulate_many", "simulate_remembered", "sources_version"]
+__all__ = [
+    "MEASURES",
+    "RunResult",
+    "SimulationInterrupted",
+    "run_keys",
+    "simulate_many",
+    "simulate_remembered",
+    "sources_version",
+]

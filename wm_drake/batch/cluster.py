@@ -11,14 +11,14 @@ from typing import Any
 
 import xarray as xr
 
+from wm_drake.batch.ledger import Ledger, Result
 from wm_drake.batch.many import as_table, simulate_many
 from wm_drake.batch.remembered import run_keys, sources_version
 from wm_drake.batch.runs import MEASURES
 from wm_drake.errors import WmDrakeError, input_error
-from wm_drake.ledger import Ledger, Result
-from wm_drake.machine import Machine, build_machine
+from wm_drake.model.machine import Machine, build_machine
 from wm_drake.parameters import MachineParameters
-from wm_drake.simulation import DEFAULT_STEP, Case
+from wm_drake.simulation.runs import DEFAULT_STEP, Case
 
 PARCEL = 32
 """Runs a parcel: a fifth of a second of work, against some milliseconds to send it."""
@@ -40,11 +40,15 @@ def cluster_client(address: str) -> Iterator[Any]:
     try:
         from distributed import Client
     except ImportError:
-        raise input_error("needs the extra 'cluster': pip install 'wm-drake[cluster]'", where="--cluster") from None
+        raise input_error(
+            "needs the extra 'cluster': pip install 'wm-drake[cluster]'", where="--cluster"
+        ) from None
     try:
         client = Client(address, timeout=10, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise input_error(f"no scheduler answers at '{address}' ({type(error).__name__})", where="--cluster") from None
+        raise input_error(
+            f"no scheduler answers at '{address}' ({type(error).__name__})", where="--cluster"
+        ) from None
     try:
         check_workers(client)
         yield client
@@ -97,13 +101,19 @@ def simulate_on_cluster(
                 yield key, case
 
     queue = missing()
-    parcels: Iterator[tuple[tuple[str, Case], ...]] = iter(lambda: tuple(itertools.islice(queue, PARCEL)), ())
+    parcels: Iterator[tuple[tuple[str, Case], ...]] = iter(
+        lambda: tuple(itertools.islice(queue, PARCEL)), ()
+    )
 
     def send(parcel: tuple[tuple[str, Case], ...]) -> Any:
-        return client.submit(run_parcel, machine.parameters, parcel, wanted, step, pure=False, retries=DEATHS)
+        return client.submit(
+            run_parcel, machine.parameters, parcel, wanted, step, pure=False, retries=DEATHS
+        )
 
     ahead = AHEAD * max(1, sum(client.nthreads().values()))
-    running = as_completed([send(parcel) for parcel in itertools.islice(parcels, ahead)], loop=client.loop)
+    running = as_completed(
+        [send(parcel) for parcel in itertools.islice(parcels, ahead)], loop=client.loop
+    )
     held = len(ledger)
     progress(held)
     try:
@@ -115,16 +125,25 @@ def simulate_on_cluster(
     except WmDrakeError:
         raise
     except Exception as error:  # of a worker or of the way to it; the cluster has many kinds
-        raise WmDrakeError(f"--cluster: {type(error).__name__}: {error}; finished runs are kept, go on with --resume") from None
+        raise WmDrakeError(
+            f"--cluster: {type(error).__name__}: {error}; finished runs are kept, go on with --resume"
+        ) from None
     rows = {}
     for number, (name, key) in enumerate(zip(names, keys, strict=True)):
         result = ledger.get(key)
-        rows[number] = (name, result.note, [result.values[n] for measure in wanted for n in MEASURES[measure]])
+        rows[number] = (
+            name,
+            result.note,
+            [result.values[n] for measure in wanted for n in MEASURES[measure]],
+        )
     return as_table(machine.parameters, wanted, rows)
 
 
 def run_parcel(
-    parameters: MachineParameters, parcel: tuple[tuple[str, Case], ...], measures: tuple[str, ...], step: float
+    parameters: MachineParameters,
+    parcel: tuple[tuple[str, Case], ...],
+    measures: tuple[str, ...],
+    step: float,
 ) -> dict[str, Result]:
     """What a worker does: runs a parcel of cases in its own process, and gives the results by key."""
     cases = [case for _, case in parcel]
@@ -135,7 +154,9 @@ def run_parcel(
         measures=measures,
         step=step,
         workers=1,
-        finished=lambda run: results.update({parcel[run.number][0]: Result(run.values, run.diverged)}),
+        finished=lambda run: results.update(
+            {parcel[run.number][0]: Result(run.values, run.diverged)}
+        ),
     )
     return results
 

@@ -7,24 +7,40 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 import numpy as np
 import xarray as xr
 
-from wm_drake.batch.jobs import Preparation
-from wm_drake.batch.runs import MEASURES, Ended, Runner
+from wm_drake.batch.runs import MEASURES, Runner, RunResult
+from wm_drake.batch.work_items import Preparation
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.machine import Machine
+from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
-from wm_drake.parameters.elements import FloatArray
-from wm_drake.simulation import AXES, Case, checked_step
+from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.runs import AXES, Case, checked_step
 
 _VARIABLES = {
-    "detergent_displacement": ("axis", "m", "largest displacement of the tub point nearest the detergent box, D of [B]"),
+    "detergent_displacement": (
+        "axis",
+        "m",
+        "largest displacement of the tub point nearest the detergent box, D of [B]",
+    ),
     "gasket_force": ("axis", "N", "largest force of the gasket on the housing, F of [B]"),
     "gasket_moment": ("axis", "N m", "largest moment of the gasket on the housing, M of [B]"),
     "amplitude": ("sensor", "m", "largest absolute value of the envelopes"),
     "critical_speed": ("sensor", "rad/s", "drum speed where it occurs"),
-    "power_mean": ("sensor", "m", "mean of order 20 of the filtered displacement: a smooth stand-in for the amplitude"),
+    "power_mean": (
+        "sensor",
+        "m",
+        "mean of order 20 of the filtered displacement: a smooth stand-in for the amplitude",
+    ),
     "smallest_gap": ("", "m", "smallest distance between tub group and housing"),
-    "region_displacement": ("region accelerometer axis", "m", "RMS displacement in each region of the spin profile"),
-    "region_displacement_integrated": ("region accelerometer axis", "m", "the same from acceleration, integrated twice"),
+    "region_displacement": (
+        "region accelerometer axis",
+        "m",
+        "RMS displacement in each region of the spin profile",
+    ),
+    "region_displacement_integrated": (
+        "region accelerometer axis",
+        "m",
+        "the same from acceleration, integrated twice",
+    ),
 }
 
 
@@ -46,7 +62,7 @@ def simulate_many(
     histories: bool = False,
     workers: int | None = None,
     progress: Callable[[int], None] = lambda done: None,
-    finished: Callable[[Ended], None] = lambda ended: None,
+    finished: Callable[[RunResult], None] = lambda ended: None,
 ) -> xr.Dataset:
     """Runs many cases of one machine with the compiled engine, several side by side in the vector units of each core.
 
@@ -58,7 +74,7 @@ def simulate_many(
         measures: Keys of `MEASURES`: "extremes" are D, F, M of [B], "amplitudes" those of `measure` with their speeds, "power
             means" are smooth stand-ins for them (`measures.power_means`), "gap"
             is the smallest distance between tub group and housing (NaN if the SDF has no shapes), "regions" the RMS
-            displacements of the accelerometers in the regions of the profile, by number (`wm_drake.vibration`).
+            displacements of the accelerometers in the regions of the profile, by number (`wm_drake.simulation.vibration`).
         step: As for `simulate`.
         histories: Whether each run handed to `finished` shall carry its record, as `simulate` gives it.
         workers: Threads; as many as cores by default.
@@ -80,7 +96,7 @@ def simulate_many(
     step = checked_step(machine.parameters, step)
     results: dict[int, tuple[str, str, list[FloatArray]]] = {}
 
-    def collect(runs: list[Ended]) -> None:
+    def collect(runs: list[RunResult]) -> None:
         for run in runs:  # first of all into the table, whatever the callbacks do
             results[run.number] = (run.case.name, run.diverged, list(run.values.values()))
         for run in runs:
@@ -96,7 +112,9 @@ def simulate_many(
 
 
 def as_table(
-    parameters: MachineParameters, measures: tuple[str, ...], results: dict[int, tuple[str, str, list[FloatArray]]]
+    parameters: MachineParameters,
+    measures: tuple[str, ...],
+    results: dict[int, tuple[str, str, list[FloatArray]]],
 ) -> xr.Dataset:
     """The table of runs by number: name of the case, when and why it diverged, its measures in the order of `MEASURES`."""
     numbers = sorted(results)
@@ -115,13 +133,17 @@ def as_table(
     for index, name in enumerate(name for measure in measures for name in MEASURES[measure]):
         dim, unit, text = _VARIABLES[name]
         dims = ("run", *dim.split())
-        values = np.reshape([results[number][2][index] for number in numbers], [len(labels[d]) for d in dims])
+        values = np.reshape(
+            [results[number][2][index] for number in numbers], [len(labels[d]) for d in dims]
+        )
         variables[name] = (dims, values, {"units": unit, "long_name": text})
     diverged = np.array([results[number][1] for number in numbers], dtype=object)
     return xr.Dataset({**variables, "diverged": ("run", diverged)}, labels)
 
 
-def _region_count(measures: tuple[str, ...], results: dict[int, tuple[str, str, list[FloatArray]]]) -> int:
+def _region_count(
+    measures: tuple[str, ...], results: dict[int, tuple[str, str, list[FloatArray]]]
+) -> int:
     """How many regions the profile of all runs has.
 
     Raises:
@@ -131,16 +153,21 @@ def _region_count(measures: tuple[str, ...], results: dict[int, tuple[str, str, 
     counts = {len(values[names.index("region_displacement")]) for _, _, values in results.values()}
     if len(counts) > 1:
         raise input_error(
-            f"have {' and '.join(map(str, sorted(counts)))} regions; runs of one table need equally many", key="profile"
+            f"have {' and '.join(map(str, sorted(counts)))} regions; runs of one table need equally many",
+            key="profile",
         )
     return counts.pop() if counts else 0
 
 
 def _run_all(
-    preparation: Preparation, runner: Runner, cases: Iterable[Case], workers: int, collect: Callable[[list[Ended]], None]
+    preparation: Preparation,
+    runner: Runner,
+    cases: Iterable[Case],
+    workers: int,
+    collect: Callable[[list[RunResult]], None],
 ) -> None:
     """Feeds batches to threads, no more of them than keeps those busy, and hands on what ends."""
-    running: set[Future[list[Ended]]] = set()
+    running: set[Future[list[RunResult]]] = set()
 
     def gather(at_most: int) -> None:
         while len(running) > at_most:
@@ -150,8 +177,8 @@ def _run_all(
 
     with ThreadPoolExecutor(workers) as pool:
         try:
-            for kind, jobs in preparation.batches(cases):
-                running.add(pool.submit(runner.run, kind, jobs))
+            for kind, work_items in preparation.batches(cases):
+                running.add(pool.submit(runner.run, kind, work_items))
                 gather(workers)  # one waits while the others run
             gather(0)
         except BaseException:

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import xarray as xr
 
+from wm_drake.batch.ledger import Ledger, key_of
 from wm_drake.batch.many import as_table, simulate_many
-from wm_drake.batch.runs import MEASURES, Ended
-from wm_drake.bodies import sdf_path
-from wm_drake.ledger import Ledger, key_of
-from wm_drake.machine import Machine
+from wm_drake.batch.runs import MEASURES, RunResult
+from wm_drake.model.bodies import sdf_path
+from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
-from wm_drake.simulation import Case, checked_step, versions
+from wm_drake.simulation.runs import Case, checked_step, versions
 
-_ROOMS_AFTER = ("cli", "ledger.py", "outputs.py", "report", "studies")
+_ROOMS_AFTER = ("cli", "batch/ledger.py", "report", "rigs", "studies")
 """What of the package does not determine a run."""
 
 _NO_NUMBERS = {"name", "about", "measured", "sources", "loads", "profile"}
@@ -29,7 +29,7 @@ def sources_version() -> str:
     digest = hashlib.sha256(repr(sorted(versions().items())).encode())
     for path in sorted(root.rglob("*.py")):
         name = path.relative_to(root)
-        if name.parts[0] not in _ROOMS_AFTER:
+        if not str(name.as_posix()).startswith(_ROOMS_AFTER):
             digest.update(f"{name}\n".encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -40,15 +40,25 @@ def model_version(parameters: MachineParameters) -> str:
 
 
 def run_keys(
-    parameters: MachineParameters, cases: Iterable[Case], *, measures: Iterable[str], step: float | None = None
+    parameters: MachineParameters,
+    cases: Iterable[Case],
+    *,
+    measures: Iterable[str],
+    step: float | None = None,
 ) -> Iterator[str]:
     """The key of each case: of its numbers, its load and profile, SDF, step, engine, measures, sources, versions."""
-    common: dict[str, object] = {"model": model_version(parameters), "sources": sources_version(), "engine": "compiled"}
+    common: dict[str, object] = {
+        "model": model_version(parameters),
+        "sources": sources_version(),
+        "engine": "compiled",
+    }
     common |= {"step": checked_step(parameters, step)}
     common |= {"measures": sorted(set(measures))}
     for case in cases:
         numbers = (case.parameters or parameters).model_dump_json(exclude=_NO_NUMBERS)
-        yield key_of(**common, numbers=numbers, load=case.load, profile=case.profile, gasket=case.gasket)
+        yield key_of(
+            **common, numbers=numbers, load=case.load, profile=case.profile, gasket=case.gasket
+        )
 
 
 def simulate_remembered(
@@ -91,7 +101,7 @@ def simulate_remembered(
                 to_run.append(len(keys) - 1)
                 yield case
 
-    def keep(run: Ended) -> None:
+    def keep(run: RunResult) -> None:
         nonlocal kept
         ledger.put(keys[to_run[run.number]], run.values, run.diverged)
         kept += 1
@@ -101,5 +111,9 @@ def simulate_remembered(
     rows = {}
     for number, (name, key) in enumerate(zip(names, keys, strict=True)):
         result = ledger.get(key)
-        rows[number] = (name, result.note, [result.values[n] for measure in wanted for n in MEASURES[measure]])
+        rows[number] = (
+            name,
+            result.note,
+            [result.values[n] for measure in wanted for n in MEASURES[measure]],
+        )
     return as_table(machine.parameters, wanted, rows)

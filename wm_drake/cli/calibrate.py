@@ -18,45 +18,68 @@ from wm_drake.cli.common import (
     interruptible,
     load_parameters,
 )
+from wm_drake.cli.progress import result_folder
 from wm_drake.errors import InputError, input_error
-from wm_drake.outputs import result_folder
 
 if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
     from wm_drake.parameters import MachineParameters
     from wm_drake.studies.calibration.calibration import Calibration, Plan
     from wm_drake.studies.calibration.prediction import Prediction
     from wm_drake.studies.calibration.targets import Targets
-    from wm_drake.studies.modal import Modes
-    from wm_drake.studies.spin import SpinResult
+    from wm_drake.studies.description.modal import Modes
+    from wm_drake.studies.spin.study import SpinResult
 
 DEFAULT_OUT = Path("wm-drake-calibrate")
 
 
 def calibrate(
-    free: Annotated[Path, typer.Option(help="Which quantities are free, with bounds and priors.", metavar="FILE")],
+    free: Annotated[
+        Path,
+        typer.Option(help="Which quantities are free, with bounds and priors.", metavar="FILE"),
+    ],
     machine: MachineOption = "reference",
     targets: Annotated[
         list[Path] | None,
-        typer.Option(help="Measured amplitudes. Repeatable; those of the machine file by default.", metavar="CSV"),
+        typer.Option(
+            help="Measured amplitudes. Repeatable; those of the machine file by default.",
+            metavar="CSV",
+        ),
     ] = None,
     method: Annotated[
-        str, typer.Option(help="least-squares, basin-hopping (slower, goes further) or evolution.", metavar="NAME")
+        str,
+        typer.Option(
+            help="least-squares, basin-hopping (slower, goes further) or evolution.", metavar="NAME"
+        ),
     ] = "least-squares",
     starts: Annotated[int, typer.Option(help="Searches, each from a start of its own.")] = 8,
-    iterations: Annotated[int, typer.Option(help="Of each search at most; 0: as many as the method takes.")] = 0,
+    iterations: Annotated[
+        int, typer.Option(help="Of each search at most; 0: as many as the method takes.")
+    ] = 0,
     seed: Annotated[int, typer.Option(help="Of the starts.")] = 0,
-    deviation: Annotated[float, typer.Option(help="Standard deviation of a measured amplitude, in percent.")] = 5.0,
+    deviation: Annotated[
+        float, typer.Option(help="Standard deviation of a measured amplitude, in percent.")
+    ] = 5.0,
     resolution: Annotated[float, typer.Option(help="Amplitudes are rounded to this, mm.")] = 0.1,
     weight: Annotated[
         list[str] | None,
-        typer.Option(help="Weight of a load, a sensor, or LOAD:SENSOR; 1 by default. Repeatable.", metavar="NAME=NUMBER"),
+        typer.Option(
+            help="Weight of a load, a sensor, or LOAD:SENSOR; 1 by default. Repeatable.",
+            metavar="NAME=NUMBER",
+        ),
     ] = None,
     leave_out: Annotated[
         list[str] | None,
-        typer.Option(help="Loads to calibrate without, then to predict: back,front. Repeatable.", metavar="LOAD[,LOAD]"),
+        typer.Option(
+            help="Loads to calibrate without, then to predict: back,front. Repeatable.",
+            metavar="LOAD[,LOAD]",
+        ),
     ] = None,
-    workers: Annotated[int | None, typer.Option(help="Threads; as many as cores by default.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted calibration.")] = False,
+    workers: Annotated[
+        int | None, typer.Option(help="Threads; as many as cores by default.")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with an interrupted calibration.")
+    ] = False,
     out: Annotated[Path, typer.Option(help="Folder for the results.", metavar="DIR")] = DEFAULT_OUT,
     as_json: JsonOption = False,
     sets: SetOption = None,
@@ -70,7 +93,9 @@ def calibrate(
     plan = Plan(method, starts, seed, iterations, deviation / 100.0, 1e-3 * resolution)
     groups = [entry.split(",") for entry in leave_out or []]
     with interruptible(f"what was evaluated is in {out}: go on with --resume"):
-        calibration, predictions = _run(parameters, free, wanted, plan, groups, out, workers, resume)
+        calibration, predictions = _run(
+            parameters, free, wanted, plan, groups, out, workers, resume
+        )
     with result_folder(out) as folder:
         _write(parameters, calibration, predictions, folder)
     if as_json:
@@ -83,14 +108,22 @@ def _with_targets(parameters: "MachineParameters", files: list[Path] | None) -> 
     """The machine with other files of measured amplitudes than its own, if any are given."""
     if not files:
         return parameters
-    return parameters.model_copy(update={"measured": tuple(str(existing_file(path, "--targets").resolve()) for path in files)})
+    return parameters.model_copy(
+        update={
+            "measured": tuple(str(existing_file(path, "--targets").resolve()) for path in files)
+        }
+    )
 
 
 def _targets(parameters: "MachineParameters") -> "Targets":
     from wm_drake.parameters import measured_amplitudes
     from wm_drake.studies.calibration.targets import targets_of
 
-    return targets_of(parameters, measured_amplitudes(parameters), ", ".join(Path(name).name for name in parameters.measured))
+    return targets_of(
+        parameters,
+        measured_amplitudes(parameters),
+        ", ".join(Path(name).name for name in parameters.measured),
+    )
 
 
 def _weights(entries: list[str] | None) -> dict[str, float]:
@@ -115,13 +148,13 @@ def _run(
     resume: bool,
 ) -> "tuple[Calibration, list[Prediction]]":
     """Calibrates, with its ledger in the folder of the results from the first evaluation on."""
-    from wm_drake.ledger import open_ledger
-    from wm_drake.machine import build_machine
+    from wm_drake.batch.ledger import open_ledger
+    from wm_drake.model.machine import build_machine
     from wm_drake.parameters import located
     from wm_drake.parameters.free import load_free
     from wm_drake.studies.calibration.calibration import calibrate, identity_of
+    from wm_drake.studies.calibration.parameter_map import turning_of
     from wm_drake.studies.calibration.prediction import check_left_out, predict
-    from wm_drake.studies.calibration.turning import turning_of
 
     free_file, built = load_free(existing_file(free, "--free")), build_machine(parameters)
     plan.check()
@@ -130,13 +163,21 @@ def _run(
         turning_of(built, free_file)
     except InputError as error:
         raise located(error, free) from None
-    with result_folder(out):  # nothing to move in yet: finds out whether the place can be written to
+    with result_folder(
+        out
+    ):  # nothing to move in yet: finds out whether the place can be written to
         pass
-    with open_ledger(out / "ledger.sqlite", identity_of(built, free_file, targets, plan), resume=resume) as ledger:
+    with open_ledger(
+        out / "ledger.sqlite", identity_of(built, free_file, targets, plan), resume=resume
+    ) as ledger:
         with _progress(plan.starts) as report:
-            calibration = calibrate(built, free_file, targets, plan, ledger, workers=workers, report=report)
+            calibration = calibrate(
+                built, free_file, targets, plan, ledger, workers=workers, report=report
+            )
         with _progress(len(left_out) * plan.starts) as report:
-            predictions = predict(built, free_file, calibration, left_out, ledger, workers=workers, report=report)
+            predictions = predict(
+                built, free_file, calibration, left_out, ledger, workers=workers, report=report
+            )
         ledger.mark_finished()
     return calibration, predictions
 
@@ -145,10 +186,28 @@ def _run(
 def _progress(searches: int) -> Iterator[Callable[[int, int, float], None]]:
     """A bar over searches on standard error, with what the running one has reached and the time that is left."""
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, TextColumn("left"), TimeRemainingColumn(), console=Console(stderr=True), transient=True) as bar:
+    columns = (
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.description}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(
+        *columns,
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    ) as bar:
         task = bar.add_task("search", total=searches)
         ended, last = 0, (0, 0)
 
@@ -157,14 +216,21 @@ def _progress(searches: int) -> Iterator[Callable[[int, int, float], None]]:
             if last[1] > evaluations or last[0] != start:  # another search has begun
                 ended += 1
             last = start, evaluations
-            bar.update(task, completed=ended, description=f"{evaluations} machines, least cost {best:.1f}")
+            bar.update(
+                task, completed=ended, description=f"{evaluations} machines, least cost {best:.1f}"
+            )
 
         yield report
 
 
-def _write(parameters: "MachineParameters", calibration: "Calibration", predictions: "list[Prediction]", folder: Path) -> None:
+def _write(
+    parameters: "MachineParameters",
+    calibration: "Calibration",
+    predictions: "list[Prediction]",
+    folder: Path,
+) -> None:
     from wm_drake.parameters import machine_yaml
-    from wm_drake.report.calibration_report import calibration_report
+    from wm_drake.report.calibration.report import calibration_report
     from wm_drake.studies.calibration.outcome import amplitude_rows, quantity_table, solved_machine
 
     for number, solution in enumerate(calibration.solutions, start=1):
@@ -177,19 +243,25 @@ def _write(parameters: "MachineParameters", calibration: "Calibration", predicti
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 
-def _shown(parameters: "MachineParameters", calibration: "Calibration") -> "tuple[SpinResult, list[tuple[str, Modes]]]":
+def _shown(
+    parameters: "MachineParameters", calibration: "Calibration"
+) -> "tuple[SpinResult, list[tuple[str, Modes]]]":
     """Spin runs and modes of the best solution, for the report."""
-    from wm_drake.machine import build_machine
-    from wm_drake.simulation import case_of
+    from wm_drake.model.machine import build_machine
+    from wm_drake.simulation.runs import case_of
     from wm_drake.studies.calibration.outcome import solved_machine
-    from wm_drake.studies.modal import natural_modes
-    from wm_drake.studies.spin import run_spin
+    from wm_drake.studies.description.modal import natural_modes
+    from wm_drake.studies.spin.study import run_spin
 
     solved = solved_machine(calibration.turning, calibration.solutions[0])
     cases = [case_of(solved, name, gasket=gasket) for name, gasket in calibration.targets.loads]
     built = build_machine(solved)
-    titles = {False: "without gasket", True: "with gasket"} if parameters.gasket else {False: "modes"}
-    return run_spin(solved, cases), [(title, natural_modes(built, gasket=gasket)) for gasket, title in titles.items()]
+    titles = (
+        {False: "without gasket", True: "with gasket"} if parameters.gasket else {False: "modes"}
+    )
+    return run_spin(solved, cases), [
+        (title, natural_modes(built, gasket=gasket)) for gasket, title in titles.items()
+    ]
 
 
 def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Path) -> None:
@@ -197,13 +269,25 @@ def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Pat
 
     best = calibration.solutions[0]
     mean, largest = mean_and_largest(best.errors(calibration.targets))
-    typer.echo(f"{len(calibration.ended)} searches, {len(calibration.solutions)} distinct good solutions")
-    typer.echo(f"best: amplitudes differ by {100 * mean:.1f} % in the mean, {100 * largest:.1f} % at most")
+    typer.echo(
+        f"{len(calibration.ended)} searches, {len(calibration.solutions)} distinct good solutions"
+    )
+    typer.echo(
+        f"best: amplitudes differ by {100 * mean:.1f} % in the mean, {100 * largest:.1f} % at most"
+    )
     for prediction in predictions:
-        pairs = [mean_and_largest(errors) for errors in (prediction.calibrated, prediction.predicted, prediction.seen)]
-        known, blind, others = (f"{100 * mean:.1f} % in the mean, {100 * largest:.1f} % at most" for mean, largest in pairs)
+        pairs = [
+            mean_and_largest(errors)
+            for errors in (prediction.calibrated, prediction.predicted, prediction.seen)
+        ]
+        known, blind, others = (
+            f"{100 * mean:.1f} % in the mean, {100 * largest:.1f} % at most"
+            for mean, largest in pairs
+        )
         loads = ", ".join(prediction.loads)
-        typer.echo(f"{loads}: {known} when calibrated with; {blind} when predicted from the others ({others})")
+        typer.echo(
+            f"{loads}: {known} when calibrated with; {blind} when predicted from the others ({others})"
+        )
     typer.echo(f"Results in {out}: report.html, machine_<n>.yaml, quantities.csv, amplitudes.csv")
 
 
@@ -217,12 +301,18 @@ def _as_json(calibration: "Calibration", predictions: "list[Prediction]") -> dic
     return {
         "searches": len(calibration.ended),
         "solutions": [
-            {"start": s.start, "cost": s.cost, "data_cost": s.data_cost, **errors(s.errors(calibration.targets))}
+            {
+                "start": s.start,
+                "cost": s.cost,
+                "data_cost": s.data_cost,
+                **errors(s.errors(calibration.targets)),
+            }
             for s in calibration.solutions
         ],
         "quantities": json.loads(quantity_table(calibration).to_json(orient="records")),
         "predictions": [
-            {"loads": list(p.loads)} | {kind: errors(getattr(p, kind)) for kind in ("calibrated", "predicted", "seen")}
+            {"loads": list(p.loads)}
+            | {kind: errors(getattr(p, kind)) for kind in ("calibrated", "predicted", "seen")}
             for p in predictions
         ],
     }

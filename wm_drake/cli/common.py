@@ -14,14 +14,23 @@ from wm_drake.errors import InputError, Problem, input_error, nearest_names
 if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
     from wm_drake.parameters import MachineParameters
     from wm_drake.parameters.keys import Tree
-    from wm_drake.simulation import Case
+    from wm_drake.simulation.runs import Case
 
-MachineOption = Annotated[str, typer.Option("--machine", help="Shipped machine or machine file.", metavar="NAME|FILE")]
+MachineOption = Annotated[
+    str, typer.Option("--machine", help="Shipped machine or machine file.", metavar="NAME|FILE")
+]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", help="Change a number: gasket.stiffness_x='5 N/mm'. Repeatable.", metavar="KEY=VALUE"),
+    typer.Option(
+        "--set",
+        help="Change a number: gasket.stiffness_x='5 N/mm'. Repeatable.",
+        metavar="KEY=VALUE",
+    ),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output and nothing else there.")]
+JsonOption = Annotated[
+    bool,
+    typer.Option("--json", help="Print one JSON object on standard output and nothing else there."),
+]
 
 
 def command_line() -> str:
@@ -59,7 +68,9 @@ def load_parameters(file: str, sets: list[str] | None) -> "MachineParameters":
     return changed.model_copy(update={"sources": sources})
 
 
-def with_sets(parameters: "Tree", sources: Mapping[str, str], sets: list[str] | None) -> "tuple[Tree, dict[str, str]]":
+def with_sets(
+    parameters: "Tree", sources: Mapping[str, str], sets: list[str] | None
+) -> "tuple[Tree, dict[str, str]]":
     """Parameters and sources of numbers, with what `--set` changes."""
     from wm_drake.parameters import with_value
 
@@ -84,12 +95,16 @@ def pairs_of(entries: list[str] | None, option: str) -> list[tuple[str, str]]:
     return found
 
 
-def cases_of(parameters: "MachineParameters", loads: list[str] | None, gasket: bool, profile: Path | None) -> "list[Case]":
+def cases_of(
+    parameters: "MachineParameters", loads: list[str] | None, gasket: bool, profile: Path | None
+) -> "list[Case]":
     """The cases that `--load`, `--no-gasket` and `--profile` ask for."""
     from wm_drake.parameters import load_load, load_profile
-    from wm_drake.simulation import Case
+    from wm_drake.simulation.runs import Case
 
-    spin_profile = parameters.profile if profile is None else load_profile(existing_file(profile, "--profile"))
+    spin_profile = (
+        parameters.profile if profile is None else load_profile(existing_file(profile, "--profile"))
+    )
     cases = []
     for name in loads or list(parameters.loads):
         if name in parameters.loads:
@@ -98,11 +113,16 @@ def cases_of(parameters: "MachineParameters", loads: list[str] | None, gasket: b
             cases.append(Case(Path(name).stem, load_load(Path(name)), spin_profile, gasket))
         else:
             hint = nearest_names(name, parameters.loads)
-            raise input_error(f"'{name}' is neither a load of machine '{parameters.name}' nor a file{hint}", where="--load")
+            raise input_error(
+                f"'{name}' is neither a load of machine '{parameters.name}' nor a file{hint}",
+                where="--load",
+            )
     names = [case.name for case in cases]
     for name in names:
         if names.count(name) > 1:
-            raise input_error(f"'{name}' is asked for twice; record_{name}.nc can hold one", where="--load")
+            raise input_error(
+                f"'{name}' is asked for twice; record_{name}.nc can hold one", where="--load"
+            )
     return cases
 
 
@@ -115,9 +135,9 @@ def existing_file(path: Path, option: str) -> Path:
 
 def check_buildable(file: str, parameters: "MachineParameters") -> None:
     """Finds the faults that show only in the built machine."""
-    from wm_drake.machine import build_machine
+    from wm_drake.model.machine import build_machine
     from wm_drake.parameters import measured_amplitudes
-    from wm_drake.simulation import check_bearing, checked_step
+    from wm_drake.simulation.runs import check_bearing, checked_step
 
     with located_in(file):
         measured_amplitudes(parameters)

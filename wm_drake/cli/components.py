@@ -15,21 +15,44 @@ if TYPE_CHECKING:
     from wm_drake.parameters.units import Unit
 
 NameOption = Annotated[
-    str | None, typer.Option("--name", help="Damper type or bushing of the machine; its first by default.", metavar="NAME")
+    str | None,
+    typer.Option(
+        "--name",
+        help="Damper type or bushing of the machine; its first by default.",
+        metavar="NAME",
+    ),
 ]
 ComponentOption = Annotated[
     str | None,
-    typer.Option("--component", help="Component file, or a shipped one, in place of one of a machine.", metavar="NAME|FILE"),
+    typer.Option(
+        "--component",
+        help="Component file, or a shipped one, in place of one of a machine.",
+        metavar="NAME|FILE",
+    ),
 ]
 AxisOption = Annotated[
-    str, typer.Option("--axis", help="radial, axial, tilt, twist; or x, y, z, about_x, about_y, about_z.", metavar="AXIS")
+    str,
+    typer.Option(
+        "--axis",
+        help="radial, axial, tilt, twist; or x, y, z, about_x, about_y, about_z.",
+        metavar="AXIS",
+    ),
 ]
 ArmOption = Annotated[
     str | None,
-    typer.Option("--arm", help="Radius of the jig through which a rotation is driven, e.g. '100 mm'.", metavar="LENGTH"),
+    typer.Option(
+        "--arm",
+        help="Radius of the jig through which a rotation is driven, e.g. '100 mm'.",
+        metavar="LENGTH",
+    ),
 ]
 
-AXIS_WORDS = {"radial": ("x", "z"), "axial": ("y",), "tilt": ("about_x", "about_z"), "twist": ("about_y",)}
+AXIS_WORDS = {
+    "radial": ("x", "z"),
+    "axial": ("y",),
+    "tilt": ("about_x", "about_z"),
+    "twist": ("about_y",),
+}
 """Axes of an axisymmetric bushing: y is its axis; the first of each is what goes on the bench."""
 
 
@@ -42,7 +65,9 @@ class Target:
     key: str
 
 
-def target_of(kind: str, machine: str, name: str | None, component: str | None, sets: list[str] | None) -> Target:
+def target_of(
+    kind: str, machine: str, name: str | None, component: str | None, sets: list[str] | None
+) -> Target:
     """The component that a command is about.
 
     Args:
@@ -60,7 +85,11 @@ def target_of(kind: str, machine: str, name: str | None, component: str | None, 
     key = _key_of(kind, parameters, name)
     table, _, entry = key.partition(".")
     chosen = getattr(parameters, table)[entry] if entry else getattr(parameters, table)
-    sources = {field: text for field in type(chosen).model_fields if (text := source_of(parameters, f"{key}.{field}"))}
+    sources = {
+        field: text
+        for field in type(chosen).model_fields
+        if (text := source_of(parameters, f"{key}.{field}"))
+    }
     return Target(Component(key.split(".")[-1], chosen, sources), machine, key)
 
 
@@ -90,14 +119,13 @@ def _key_of(kind: str, parameters: "MachineParameters", name: str | None) -> str
     keys = {entry: f"{table}.{entry}" for table in tables for entry in getattr(parameters, table)}
     if not keys:
         shipped = ", ".join(shipped_components())
-        message = (
-            f"'{parameters.name}' has no {tables[0]}; name another machine, or a component file or shipped one ({shipped})"
-        )
+        message = f"'{parameters.name}' has no {tables[0]}; name another machine, or a component file or shipped one ({shipped})"
         raise input_error(message, where="--machine")
     name = name or next(iter(keys))
     if name not in keys:
         raise input_error(
-            f"no '{name}' in {' or '.join(tables)} of '{parameters.name}'{nearest_names(name, keys)}", where="--name"
+            f"no '{name}' in {' or '.join(tables)} of '{parameters.name}'{nearest_names(name, keys)}",
+            where="--name",
         )
     return keys[name]
 
@@ -110,7 +138,9 @@ def axes_of(word: str) -> tuple[str, ...]:
         return AXIS_WORDS[word]
     if word in AXES:
         return (word,)
-    raise input_error(f"no axis '{word}'{nearest_names(word, [*AXIS_WORDS, *AXES])}", where="--axis")
+    raise input_error(
+        f"no axis '{word}'{nearest_names(word, [*AXIS_WORDS, *AXES])}", where="--axis"
+    )
 
 
 def quantities_of(text: str, unit: "Unit", option: str) -> tuple[float, ...]:
@@ -125,7 +155,10 @@ def quantities_of(text: str, unit: "Unit", option: str) -> tuple[float, ...]:
     try:
         values = [float(part) for part in numbers.split(",")]
     except ValueError:
-        raise input_error(f"'{text}' is not a number with a unit; write for example '1 {unit.shown}'", where=option) from None
+        raise input_error(
+            f"'{text}' is not a number with a unit; write for example '1 {unit.shown}'",
+            where=option,
+        ) from None
     try:
         return tuple(convert(value, written.strip() or None, unit) for value in values)
     except ValueError as error:

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wm_drake.cli.common import JsonOption, MachineOption, SetOption, command_line, interruptible, pairs_of
+from wm_drake.cli.common import (
+    JsonOption,
+    MachineOption,
+    SetOption,
+    command_line,
+    interruptible,
+    pairs_of,
+)
 from wm_drake.cli.components import (
     ArmOption,
     AxisOption,
@@ -20,35 +27,54 @@ from wm_drake.cli.components import (
     quantities_of,
     target_of,
 )
+from wm_drake.cli.progress import progress_bar, result_folder
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.outputs import progress_bar, result_folder
 
 if TYPE_CHECKING:
     from wm_drake.parameters.units import Unit
     from wm_drake.rigs.measured import MeasuredMotion
-    from wm_drake.studies.component_fit import ComponentModel
-    from wm_drake.studies.identification import Fit
+    from wm_drake.studies.fitting import Fit
+    from wm_drake.studies.identification import ComponentModel
 
 app = typer.Typer(help="Find the numbers of a component from measured loops.", no_args_is_help=True)
 
 DEFAULT_OUT = Path("wm-drake-identify")
 PER_CENT = 100
 
-FilesArgument = Annotated[list[Path], typer.Argument(help="CSV files: time, displacement, force.", metavar="FILES...")]
-MethodOption = Annotated[str, typer.Option("--method", help="least-squares, response-surface or evolution.", metavar="NAME")]
+FilesArgument = Annotated[
+    list[Path], typer.Argument(help="CSV files: time, displacement, force.", metavar="FILES...")
+]
+MethodOption = Annotated[
+    str,
+    typer.Option("--method", help="least-squares, response-surface or evolution.", metavar="NAME"),
+]
 BoundsOption = Annotated[
     list[str] | None,
-    typer.Option("--bounds", help="Of an unknown: sponge_stiffness='(50, 300) N/mm'. Repeatable.", metavar="KEY=RANGE"),
+    typer.Option(
+        "--bounds",
+        help="Of an unknown: sponge_stiffness='(50, 300) N/mm'. Repeatable.",
+        metavar="KEY=RANGE",
+    ),
 ]
 FixOption = Annotated[
     list[str] | None,
-    typer.Option("--fix", help="A number that is known: slider_damping='0.4 N s/mm'. Repeatable.", metavar="KEY=VALUE"),
+    typer.Option(
+        "--fix",
+        help="A number that is known: slider_damping='0.4 N s/mm'. Repeatable.",
+        metavar="KEY=VALUE",
+    ),
 ]
 UnitsOption = Annotated[
     str | None,
-    typer.Option("--units", help="Of time, displacement, force, where files do not say: 's,mm,N'.", metavar="UNITS"),
+    typer.Option(
+        "--units",
+        help="Of time, displacement, force, where files do not say: 's,mm,N'.",
+        metavar="UNITS",
+    ),
 ]
-KnotsOption = Annotated[int, typer.Option("--knots", help="Points of a table on each side of zero.", min=1, max=12)]
+KnotsOption = Annotated[
+    int, typer.Option("--knots", help="Points of a table on each side of zero.", min=1, max=12)
+]
 SeedOption = Annotated[int, typer.Option("--seed", help="Of the search.")]
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.", metavar="DIR")]
 
@@ -69,7 +95,10 @@ class _Asked:
 def identify_damper(
     files: FilesArgument,
     law: Annotated[
-        str | None, typer.Option(help="coulomb, stv, havsin, mstv, stv_sponge, free_stroke; the component's by default.")
+        str | None,
+        typer.Option(
+            help="coulomb, stv, havsin, mstv, stv_sponge, free_stroke; the component's by default."
+        ),
     ] = None,
     method: MethodOption = "least-squares",
     bounds: BoundsOption = None,
@@ -85,7 +114,7 @@ def identify_damper(
     sets: SetOption = None,
 ) -> None:
     """A friction damper; free_stroke finds the curve of its sponge as a monotone table."""
-    from wm_drake.studies.component_fit import damper_model
+    from wm_drake.studies.identification import damper_model
 
     target = target_of("damper", machine, name, component, sets)
     own = str(target.component.parameters.law)  # type: ignore[union-attr]
@@ -103,7 +132,9 @@ def _axis_command(kind: str) -> Callable[..., None]:
     def identify_axis(
         files: FilesArgument,
         axis: AxisOption,
-        law: Annotated[str, typer.Option(help="voigt, table (monotone curve) or, about an axis, voigt_havsin.")] = "voigt",
+        law: Annotated[
+            str, typer.Option(help="voigt, table (monotone curve) or, about an axis, voigt_havsin.")
+        ] = "voigt",
         arm: ArmOption = None,
         method: MethodOption = "least-squares",
         bounds: BoundsOption = None,
@@ -119,7 +150,7 @@ def _axis_command(kind: str) -> Callable[..., None]:
         sets: SetOption = None,
     ) -> None:
         from wm_drake.parameters.units import Unit
-        from wm_drake.studies.component_fit import bushing_model
+        from wm_drake.studies.identification import bushing_model
 
         target = target_of(kind, machine, name, component, sets)
         asked = _Asked(files, units, method, seed, out, as_json)
@@ -158,19 +189,25 @@ def _motions(asked: _Asked, *, rotates: bool) -> "list[MeasuredMotion]":
     from wm_drake.errors import InputError, Problem
     from wm_drake.parameters import read_loops
     from wm_drake.rigs.measured import measured_motion
-    from wm_drake.studies.identification import METHODS
+    from wm_drake.studies.fitting import METHODS
 
     if asked.method not in METHODS:
-        raise input_error(f"no method '{asked.method}'{nearest_names(asked.method, METHODS)}", where="--method")
+        raise input_error(
+            f"no method '{asked.method}'{nearest_names(asked.method, METHODS)}", where="--method"
+        )
     units = None
     if asked.units is not None:
         parts = [part.strip() for part in asked.units.split(",")]
         if len(parts) != 3:
-            raise input_error(f"'{asked.units}' is not three units; write for example 's,mm,N'", where="--units")
+            raise input_error(
+                f"'{asked.units}' is not three units; write for example 's,mm,N'", where="--units"
+            )
         units = (parts[0], parts[1], parts[2])
     loops = read_loops(existing_files(asked.files), units)
     if loops[0].rotates != rotates:
-        holds, needs = ("angles and moments", "displacements and forces")[:: 1 if loops[0].rotates else -1]
+        holds, needs = ("angles and moments", "displacements and forces")[
+            :: 1 if loops[0].rotates else -1
+        ]
         raise input_error(f"holds {holds}, needs {needs} (or --arm)", where=loops[0].path)
     motions, problems = [], list[Problem]()
     for loop in loops:
@@ -180,19 +217,24 @@ def _motions(asked: _Asked, *, rotates: bool) -> "list[MeasuredMotion]":
             problems += error.problems
     if problems:
         raise InputError(problems)
-    return sorted(motions, key=lambda measured: (round(measured.motion.frequency, 2), measured.motion.amplitude))
+    return sorted(
+        motions,
+        key=lambda measured: (round(measured.motion.frequency, 2), measured.motion.amplitude),
+    )
 
 
 def _kept_fields(target: Target, law: str) -> dict[str, float]:
     """Numbers of the component that no loop shall change: of the same law, those that are not unknown."""
     from wm_drake.parameters import quantities
-    from wm_drake.studies.component_fit import DAMPER_LAWS
+    from wm_drake.studies.identification import DAMPER_LAWS
 
     parameters = target.component.parameters
     if law not in DAMPER_LAWS or getattr(parameters, "law", None) != law:
         return {}
     free = set(DAMPER_LAWS[law])
-    return {key: value for key, value, _ in quantities(parameters) if "." not in key and key not in free}
+    return {
+        key: value for key, value, _ in quantities(parameters) if "." not in key and key not in free
+    }
 
 
 def _ranges(entries: list[str] | None) -> dict[str, tuple[float, float]]:
@@ -200,22 +242,31 @@ def _ranges(entries: list[str] | None) -> dict[str, tuple[float, float]]:
     for key, text in pairs_of(entries, "--bounds"):
         values = quantities_of(text, _unit_of_field(key, "--bounds"), "--bounds")
         if len(values) != 2:
-            raise input_error(f"'{text}' is not a range; write for example '(50, 300) N/mm'", where="--bounds", key=key)
+            raise input_error(
+                f"'{text}' is not a range; write for example '(50, 300) N/mm'",
+                where="--bounds",
+                key=key,
+            )
         found[key] = (values[0], values[1])
     return found
 
 
 def _single(entries: list[str] | None, option: str) -> dict[str, float]:
-    return {key: quantities_of(text, _unit_of_field(key, option), option)[0] for key, text in pairs_of(entries, option)}
+    return {
+        key: quantities_of(text, _unit_of_field(key, option), option)[0]
+        for key, text in pairs_of(entries, option)
+    }
 
 
 def _unit_of_field(key: str, option: str) -> "Unit":
     """Unit of a component's field, or of a rise of one of its tables."""
-    from wm_drake.studies.component_fit.models import unit_of_field, units_of_fields
+    from wm_drake.studies.identification.models import unit_of_field, units_of_fields
 
     unit = unit_of_field(key)
     if unit is None:
-        raise input_error(f"unknown number '{key}'{nearest_names(key, units_of_fields())}", where=option)
+        raise input_error(
+            f"unknown number '{key}'{nearest_names(key, units_of_fields())}", where=option
+        )
     return unit
 
 
@@ -227,9 +278,14 @@ def _run(
     motions: "list[MeasuredMotion]",
     copies: dict[str, str],
 ) -> None:
-    from wm_drake.report.identify_report import errors_table, estimates_table, fitted_loops, identify_report
-    from wm_drake.studies.component_fit import fit_problem, fragment
-    from wm_drake.studies.identification import identify
+    from wm_drake.report.identify.report import (
+        errors_table,
+        estimates_table,
+        fitted_loops,
+        identify_report,
+    )
+    from wm_drake.studies.fitting import identify
+    from wm_drake.studies.identification import fit_problem, fragment
 
     with interruptible(), result_folder(asked.out) as folder:
         with progress_bar(PER_CENT, "identify") as bar:
@@ -246,7 +302,9 @@ def _run(
         fitted_loops(fit, motions).to_csv(folder / "loops.csv", index=False, float_format="%.7g")
         (folder / "fit.json").write_text(json.dumps(fit.as_dict(), indent=1), encoding="utf-8")
         command = command_line()
-        (folder / "report.html").write_text(identify_report(title, fit, motions, command), encoding="utf-8")
+        (folder / "report.html").write_text(
+            identify_report(title, fit, motions, command), encoding="utf-8"
+        )
     if asked.as_json:
         typer.echo(json.dumps({"component": title, **fit.as_dict()}))
     else:
@@ -257,7 +315,7 @@ def _print(title: str, fit: "Fit", out: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from wm_drake.report.identify_report import estimate_cells, undetermined_sentences
+    from wm_drake.report.identify.report import estimate_cells, undetermined_sentences
 
     table = Table(title=f"{title}: RMSE {fit.rmse:.4g} by {fit.method}")
     for head in ("unknown", "value", "95 % interval", "unit", "remark"):
@@ -268,4 +326,6 @@ def _print(title: str, fit: "Fit", out: Path) -> None:
     console.print(table)
     for sentence in (*undetermined_sentences(fit), *fit.notes):
         console.print(sentence, highlight=False)
-    console.print(f"Results in {out}: report.html, identified.yaml, parameters.csv, errors.csv, loops.csv, fit.json")
+    console.print(
+        f"Results in {out}: report.html, identified.yaml, parameters.csv, errors.csv, loops.csv, fit.json"
+    )

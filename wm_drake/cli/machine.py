@@ -25,8 +25,8 @@ def machine_show(
     sets: SetOption = None,
 ) -> None:
     """Show a machine resolved in SI: bodies, elements, preloads, equilibrium, natural frequencies."""
-    from wm_drake.machine import build_machine
-    from wm_drake.studies.description import as_text, describe
+    from wm_drake.model.machine import build_machine
+    from wm_drake.studies.description.description import as_text, describe
 
     parameters = load_parameters(file, sets)
     with located_in(file):

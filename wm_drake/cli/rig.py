@@ -8,26 +8,47 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wm_drake.cli.common import JsonOption, MachineOption, SetOption, command_line, interruptible
-from wm_drake.cli.components import ArmOption, AxisOption, ComponentOption, NameOption, axes_of, quantities_of, target_of
+from wm_drake.cli.components import (
+    ArmOption,
+    AxisOption,
+    ComponentOption,
+    NameOption,
+    axes_of,
+    quantities_of,
+    target_of,
+)
+from wm_drake.cli.progress import progress_bar, result_folder
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.outputs import progress_bar, result_folder
 
 if TYPE_CHECKING:
     from wm_drake.parameters import Component
     from wm_drake.rigs import Bench, Harmonic, RigRun
 
-app = typer.Typer(help="Test a component on a bench: harmonic motion, steady force loops.", no_args_is_help=True)
+app = typer.Typer(
+    help="Test a component on a bench: harmonic motion, steady force loops.", no_args_is_help=True
+)
 
 DEFAULT_OUT = Path("wm-drake-rig")
 FrequencyOption = Annotated[
-    str | None, typer.Option("--frequency", "-f", help="Of the motion; several as '1,3,5 Hz'.", metavar="FREQUENCIES")
+    str | None,
+    typer.Option(
+        "--frequency", "-f", help="Of the motion; several as '1,3,5 Hz'.", metavar="FREQUENCIES"
+    ),
 ]
 AmplitudeOption = Annotated[
     str | None,
-    typer.Option("--amplitude", "-a", help="Of the motion; several as '1,3,5 mm', angles in deg.", metavar="AMPLITUDES"),
+    typer.Option(
+        "--amplitude",
+        "-a",
+        help="Of the motion; several as '1,3,5 mm', angles in deg.",
+        metavar="AMPLITUDES",
+    ),
 ]
 MatrixOption = Annotated[
-    str | None, typer.Option("--matrix", help="Run the test matrix of a paper: A, or for dampers C.", metavar="PAPER")
+    str | None,
+    typer.Option(
+        "--matrix", help="Run the test matrix of a paper: A, or for dampers C.", metavar="PAPER"
+    ),
 ]
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.", metavar="DIR")]
 
@@ -41,7 +62,11 @@ def rig_damper(
     name: NameOption = None,
     component: ComponentOption = None,
     sponge_mass: Annotated[
-        str | None, typer.Option(help="Mass of the sponge of an mstv damper, e.g. '10 g'; none in the machine.", metavar="MASS")
+        str | None,
+        typer.Option(
+            help="Mass of the sponge of an mstv damper, e.g. '10 g'; none in the machine.",
+            metavar="MASS",
+        ),
     ] = None,
     out: OutOption = DEFAULT_OUT,
     as_json: JsonOption = False,
@@ -97,19 +122,28 @@ app.command("bushing", help="One axis of a six-component bushing.")(_axis_comman
 app.command("gasket", help="One axis of the gasket.")(_axis_command("gasket"))
 
 
-def _motions(kind: str, bench: "Bench", frequency: str | None, amplitude: str | None, matrix: str | None) -> "list[Harmonic]":
+def _motions(
+    kind: str, bench: "Bench", frequency: str | None, amplitude: str | None, matrix: str | None
+) -> "list[Harmonic]":
     from wm_drake.parameters.units import Unit
     from wm_drake.rigs import MATRICES, Harmonic
 
     if matrix is not None:
         if frequency or amplitude:
-            raise input_error("has its own frequencies and amplitudes; leave -f and -a out", where="--matrix")
+            raise input_error(
+                "has its own frequencies and amplitudes; leave -f and -a out", where="--matrix"
+            )
         papers = MATRICES[kind]
         if matrix not in papers:
-            raise input_error(f"no matrix '{matrix}' for a {kind}{nearest_names(matrix, papers)}", where="--matrix")
+            raise input_error(
+                f"no matrix '{matrix}' for a {kind}{nearest_names(matrix, papers)}",
+                where="--matrix",
+            )
         return list(papers[matrix])
     if not (frequency and amplitude):
-        raise input_error("needs -f and -a (for example -f '3 Hz' -a '5 mm'), or --matrix", where=f"rig {kind}")
+        raise input_error(
+            "needs -f and -a (for example -f '3 Hz' -a '5 mm'), or --matrix", where=f"rig {kind}"
+        )
     unit = Unit("rad", "deg") if bench.rotates else Unit("m", "mm")
     return [
         Harmonic(f, a)
@@ -118,8 +152,15 @@ def _motions(kind: str, bench: "Bench", frequency: str | None, amplitude: str | 
     ]
 
 
-def _run(title: str, bench: "Bench", motions: "list[Harmonic]", chosen: "Component", out: Path, as_json: bool) -> None:
-    from wm_drake.report.rig_report import loop_file, loop_table, measures_table, rig_report
+def _run(
+    title: str,
+    bench: "Bench",
+    motions: "list[Harmonic]",
+    chosen: "Component",
+    out: Path,
+    as_json: bool,
+) -> None:
+    from wm_drake.report.rig.report import loop_file, loop_table, measures_table, rig_report
     from wm_drake.rigs import run_rig
 
     with interruptible(), result_folder(out) as folder:
@@ -144,23 +185,30 @@ def _numbers(chosen: "Component") -> tuple[tuple[str, str, str], ...]:
     for key, value, unit in quantities(chosen.parameters):
         if key.startswith("end_bushing"):
             continue  # not on the bench
-        source = next((chosen.sources[part] for part in (key, key.split(".")[0]) if part in chosen.sources), "")
+        source = next(
+            (chosen.sources[part] for part in (key, key.split(".")[0]) if part in chosen.sources),
+            "",
+        )
         found.append((key, readable(value, unit), source))
     return tuple(found)
 
 
 def _as_json(run: "RigRun") -> dict[str, Any]:
-    from wm_drake.report.rig_report import measures_table
+    from wm_drake.report.rig.report import measures_table
 
     rows = json.loads(measures_table(run).to_json(orient="records", double_precision=15))
-    return {"component": run.title, **rows[0]} if len(rows) == 1 else {"component": run.title, "loops": rows}
+    return (
+        {"component": run.title, **rows[0]}
+        if len(rows) == 1
+        else {"component": run.title, "loops": rows}
+    )
 
 
 def _print(run: "RigRun", out: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from wm_drake.report.rig_report import measures_cells, measures_header
+    from wm_drake.report.rig.report import measures_cells, measures_header
 
     table = Table(title=run.title)
     for name in measures_header(run):

@@ -17,13 +17,13 @@ from wm_drake.cli.common import (
     interruptible,
     load_parameters,
 )
+from wm_drake.cli.progress import result_folder
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.outputs import result_folder
 
 if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
     from wm_drake.parameters import MachineParameters
-    from wm_drake.simulation import Case
-    from wm_drake.studies.spin import CaseResult, SpinResult
+    from wm_drake.simulation.runs import Case
+    from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 DEFAULT_OUT = Path("wm-drake-spin")
 
@@ -33,19 +33,27 @@ def spin(
     load: Annotated[
         list[str] | None,
         typer.Option(
-            help="Load of the machine, or load file. Repeatable; all of the machine's by default.", metavar="NAME|FILE"
+            help="Load of the machine, or load file. Repeatable; all of the machine's by default.",
+            metavar="NAME|FILE",
         ),
     ] = None,
     no_gasket: Annotated[bool, typer.Option("--no-gasket", help="Take the gasket out.")] = False,
-    profile: Annotated[Path | None, typer.Option(help="Spin profile, YAML or CSV (time_s,speed_rpm).", metavar="FILE")] = None,
-    engine: Annotated[str | None, typer.Option(help="Engine that integrates the motion.", metavar="NAME")] = None,
+    profile: Annotated[
+        Path | None,
+        typer.Option(help="Spin profile, YAML or CSV (time_s,speed_rpm).", metavar="FILE"),
+    ] = None,
+    engine: Annotated[
+        str | None, typer.Option(help="Engine that integrates the motion.", metavar="NAME")
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.", metavar="DIR")] = DEFAULT_OUT,
-    replay: Annotated[bool, typer.Option("--replay", help="Also write 3D replays around the largest motion.")] = False,
+    replay: Annotated[
+        bool, typer.Option("--replay", help="Also write 3D replays around the largest motion.")
+    ] = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
     """Run the drum up through the resonances, and report how the tub moves."""
-    from wm_drake.simulation import DEFAULT_ENGINE, ENGINES
+    from wm_drake.simulation.runs import DEFAULT_ENGINE, ENGINES
 
     engine = engine or DEFAULT_ENGINE
     if engine not in ENGINES:
@@ -56,7 +64,11 @@ def spin(
     with interruptible(), result_folder(out) as folder:
         result = _run(parameters, cases, engine)
         _write(result, folder, replay)
-    diverged = [f"{r.case.name}: {r.record.attrs['diverged']}" for r in result.results if r.record.attrs["diverged"]]
+    diverged = [
+        f"{r.case.name}: {r.record.attrs['diverged']}"
+        for r in result.results
+        if r.record.attrs["diverged"]
+    ]
     if as_json:
         typer.echo(json.dumps(_as_json(result)))
     else:
@@ -71,30 +83,42 @@ def _run(parameters: "MachineParameters", cases: "list[Case]", engine: str) -> "
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from wm_drake.studies.spin import run_spin
+    from wm_drake.studies.spin.study import run_spin
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         tasks = [bar.add_task(case.name, total=1.0) for case in cases]
-        return run_spin(parameters, cases, engine, progress=lambda i, fraction: bar.update(tasks[i], completed=fraction))
+        return run_spin(
+            parameters,
+            cases,
+            engine,
+            progress=lambda i, fraction: bar.update(tasks[i], completed=fraction),
+        )
 
 
 def _write(result: "SpinResult", folder: Path, replay: bool) -> None:
-    from wm_drake.report.spin_report import amplitude_table, spin_report
-    from wm_drake.simulation import save_record
+    from wm_drake.report.spin.report import amplitude_table, spin_report
+    from wm_drake.simulation.runs import save_record
 
     for case in result.results:
         save_record(case.record, folder / f"record_{case.case.name}.nc")
         if replay:
-            (folder / f"replay_{case.case.name}.html").write_text(_replay(result, case), encoding="utf-8")
+            (folder / f"replay_{case.case.name}.html").write_text(
+                _replay(result, case), encoding="utf-8"
+            )
     amplitude_table(result).to_csv(folder / "amplitudes.csv", index=False, float_format="%.4f")
     command = command_line()
     (folder / "report.html").write_text(spin_report(result, command), encoding="utf-8")
 
 
 def _replay(result: "SpinResult", case: "CaseResult") -> str:
-    from wm_drake.measures import largest_motion
-    from wm_drake.scene import replay_page
+    from wm_drake.model.scene import replay_page
+    from wm_drake.simulation.measures import largest_motion
 
     logging.getLogger("drake").setLevel(logging.WARNING)  # Meshcat would tell of its server
     time, positions = largest_motion(case.record)
@@ -106,14 +130,20 @@ def _print_tables(result: "SpinResult", out: Path) -> None:
     from rich.table import Table
 
     from wm_drake.parameters.units import Unit
-    from wm_drake.report.spin_report import amplitude_table
+    from wm_drake.report.spin.report import amplitude_table
 
     table = Table(title=f"Amplitudes in mm, machine '{result.parameters.name}'")
     amplitudes = amplitude_table(result)
     for name in amplitudes.columns:
-        table.add_column(str(name), justify="left" if name in ("load", "gasket", "source") else "right", overflow="fold")
+        table.add_column(
+            str(name),
+            justify="left" if name in ("load", "gasket", "source") else "right",
+            overflow="fold",
+        )
     for row in amplitudes.itertuples(index=False):
-        table.add_row(*(f"{value:.1f}" if isinstance(value, float) else str(value) for value in row))
+        table.add_row(
+            *(f"{value:.1f}" if isinstance(value, float) else str(value) for value in row)
+        )
     millimetre = Unit("m", "mm")
     console = Console()
     console.print(table)
@@ -143,7 +173,9 @@ def _case_as_json(case: "CaseResult") -> dict[str, Any]:
 
     def numbers(values: Any, unit: Unit, prefix: str = "") -> dict[str, float | None]:
         labels = [f"{prefix}{label}" for label in values[values.dims[0]].values]
-        shown = [unit.from_si(float(value)) if value == value else None for value in values.values]  # JSON has no NaN
+        shown = [
+            unit.from_si(float(value)) if value == value else None for value in values.values
+        ]  # JSON has no NaN
         return dict(zip(labels, shown, strict=True))
 
     return {
@@ -153,7 +185,9 @@ def _case_as_json(case: "CaseResult") -> dict[str, Any]:
         "detergent_box_mm": numbers(measures.detergent_displacement, millimetre, "D"),
         "gasket_force_N": numbers(measures.gasket_force, Unit("N", "N"), "F"),
         "gasket_moment_Nm": numbers(measures.gasket_moment, Unit("N*m", "N*m"), "M"),
-        "smallest_gap_mm": millimetre.from_si(measures.smallest_gap.distance) if measures.smallest_gap else None,
+        "smallest_gap_mm": millimetre.from_si(measures.smallest_gap.distance)
+        if measures.smallest_gap
+        else None,
         "critical_rpm": numbers(measures.critical_speed, Unit("rad/s", "rpm")),
         "diverged": case.record.attrs["diverged"] or None,
         "wall_s": case.wall_s,

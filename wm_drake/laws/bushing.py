@@ -1,10 +1,15 @@
 """Six-component bushing: connecting bushing of [A], gasket of [A] and [B]."""
 
-from wm_drake.laws.compilation import law
-from wm_drake.laws.elementary import anywhere
+from wm_drake.compiler.compilation import law
+from wm_drake.compiler.elementary import anywhere
+from wm_drake.compiler.vectors import (
+    dot,
+    moment_from_rotation_vector,
+    rotation_vector_coefficient,
+    rotation_vector_rate,
+)
 from wm_drake.laws.friction import havsin_friction
 from wm_drake.laws.table import packed_size, stiffness_force
-from wm_drake.laws.vectors import dot, moment_from_rotation_vector, rotation_vector_coefficient, rotation_vector_rate
 
 
 @law

@@ -15,8 +15,8 @@ Packed parameters, by law:
     STV_SPONGE   f_max, v_st, k1, c1, c2
 """
 
-from wm_drake.laws.compilation import law
-from wm_drake.laws.elementary import sqrt, where
+from wm_drake.compiler.compilation import law
+from wm_drake.compiler.elementary import sqrt, where
 from wm_drake.laws.friction import coulomb_friction, havsin_friction, stv_friction
 from wm_drake.laws.table import stiffness_force
 
@@ -64,7 +64,9 @@ def slider_rate(b, v, c, f_max, c_m, epsilon):
     along = where(v > 0.0, 1.0, -1.0)
     a2, a1, a0 = c_m - along * c, c * e + f_max + along * b, b * e
     half = 0.5 * v
-    slips = (v > 0.0) & ((a2 * half + a1) * half < a0)  # the sticking balance has its root beyond v/2
+    slips = (v > 0.0) & (
+        (a2 * half + a1) * half < a0
+    )  # the sticking balance has its root beyond v/2
     above, below = root_as_quotient(a2, a1, a0)
     w = where(slips, b - f_max, above) / where(slips, c + c_m, below)
     return sign * where(slips & (w < half), half, w)
@@ -160,11 +162,17 @@ def free_stroke_damper(rate, deformation, f_max, c_m, epsilon, p_b, v_b, packed,
 def damper_response(law_number, rate, deformation, p, at):
     """Tension and deformation rate of a damper of any law; parameters packed as the module's docstring lists them."""
     if law_number == MSTV:
-        return mstv_damper(rate, deformation, p[at], p[at + 1], p[at + 2], p[at + 3], p[at + 4], p[at + 5])
+        return mstv_damper(
+            rate, deformation, p[at], p[at + 1], p[at + 2], p[at + 3], p[at + 4], p[at + 5]
+        )
     if law_number == FREE_STROKE:
-        return free_stroke_damper(rate, deformation, p[at], p[at + 1], p[at + 2], p[at + 3], p[at + 4], p, at + 5)
+        return free_stroke_damper(
+            rate, deformation, p[at], p[at + 1], p[at + 2], p[at + 3], p[at + 4], p, at + 5
+        )
     if law_number == STV_SPONGE:
-        return stv_sponge_damper(rate, deformation, p[at], p[at + 1], p[at + 2], p[at + 3], p[at + 4])
+        return stv_sponge_damper(
+            rate, deformation, p[at], p[at + 1], p[at + 2], p[at + 3], p[at + 4]
+        )
     if law_number == HAVSIN:
         return p[at + 2] * rate - havsin_friction(rate, p[at + 1], p[at]), 0.0 * rate
     if law_number == STV:

@@ -6,8 +6,8 @@ Reversing all velocities reverses the force. Misprints of the papers are correct
 
 import numpy as np
 
-from wm_drake.laws.compilation import law
-from wm_drake.laws.elementary import anywhere, sine_over_angle, sqrt, where
+from wm_drake.compiler.compilation import law
+from wm_drake.compiler.elementary import anywhere, sine_over_angle, sqrt, where
 
 
 @law

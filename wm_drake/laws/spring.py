@@ -1,6 +1,6 @@
 """Suspension spring."""
 
-from wm_drake.laws.compilation import law
+from wm_drake.compiler.compilation import law
 from wm_drake.laws.table import stiffness_force
 
 

@@ -1,9 +1,9 @@
 """Geometry of a massless strut between the tub and the housing, and the bushings at its ends."""
 
-from wm_drake.laws.compilation import law
-from wm_drake.laws.elementary import sqrt
+from wm_drake.compiler.compilation import law
+from wm_drake.compiler.elementary import sqrt
+from wm_drake.compiler.vectors import add, angle_over_sine, cross, dot, scale, subtract
 from wm_drake.laws.friction import havsin_friction_per_rate
-from wm_drake.laws.vectors import add, angle_over_sine, cross, dot, scale, subtract
 
 
 @law

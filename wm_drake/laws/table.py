@@ -6,8 +6,8 @@ the last point and the slope there. The cubics are scipy's PCHIP (`wm_drake.para
 the curve monotone between monotone points.
 """
 
-from wm_drake.laws.compilation import law
-from wm_drake.laws.elementary import anywhere, everywhere, where
+from wm_drake.compiler.compilation import law
+from wm_drake.compiler.elementary import anywhere, everywhere, where
 
 PIECE_SIZE = 5
 """Numbers of a piece."""

@@ -11,7 +11,7 @@ from wm_drake.parameters.elements import BushingType, DamperType, Frozen
 from wm_drake.parameters.files import read_mapping
 from wm_drake.parameters.problems import problems_of
 
-COMPONENTS_FOLDER = Path(__file__).parents[1] / "components"
+COMPONENTS_FOLDER = Path(__file__).parents[1] / "data" / "components"
 
 ComponentParameters: TypeAlias = DamperType | BushingType
 
@@ -49,7 +49,9 @@ def load_component(name_or_path: str) -> Component:
     path = shipped.get(name_or_path, Path(name_or_path))
     if not path.is_file():
         hint = nearest_names(name_or_path, shipped)
-        raise input_error(f"no such file, and no shipped component of that name{hint}", where=str(path))
+        raise input_error(
+            f"no such file, and no shipped component of that name{hint}", where=str(path)
+        )
     plain, sources = read_mapping(path)
     return Component(path.stem, _validated(plain, path), sources)
 
@@ -58,9 +60,14 @@ def _validated(plain: dict[str, Any], path: Path) -> ComponentParameters:
     context = {"units_required": True}
     try:
         if "law" in plain:
-            return TypeAdapter(_DamperFile).validate_python({"damper": plain}, context=context).damper
+            return (
+                TypeAdapter(_DamperFile).validate_python({"damper": plain}, context=context).damper
+            )
         return BushingType.model_validate(plain, context=context)
     except ValidationError as error:
         root = _DamperFile if "law" in plain else BushingType
         problems = problems_of(error, root)
-        raise InputError(Problem(str(path), p.key.removeprefix("damper").lstrip("."), p.message) for p in problems) from None
+        raise InputError(
+            Problem(str(path), p.key.removeprefix("damper").lstrip("."), p.message)
+            for p in problems
+        ) from None

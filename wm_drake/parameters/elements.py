@@ -11,8 +11,7 @@ from scipy.interpolate import PchipInterpolator
 
 from wm_drake.laws.table import PIECE_SIZE, packed_table_size
 from wm_drake.parameters import units as u
-
-FloatArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+from wm_drake.parameters.types import FloatArray
 
 
 class Frozen(BaseModel):
@@ -58,7 +57,9 @@ class TorqueTable(Frozen):
 def check_curve(x_name: str, x: tuple[float, ...], y_name: str, y: tuple[float, ...]) -> None:
     """Refuses curves that are not functions of rising abscissa with never falling ordinate."""
     if len(x) != len(y) or len(x) < 2:
-        raise ValueError(f"needs as many values of {x_name} as of {y_name}, at least two; has {len(x)} and {len(y)}")
+        raise ValueError(
+            f"needs as many values of {x_name} as of {y_name}, at least two; has {len(x)} and {len(y)}"
+        )
     if any(left >= right for left, right in itertools.pairwise(x)):
         raise ValueError(f"{x_name} must rise from point to point")
     if any(left > right for left, right in itertools.pairwise(y)):
@@ -70,13 +71,23 @@ def packed_stiffness(stiffness: "float | ForceTable | TorqueTable") -> FloatArra
     return packed_stiffnesses([stiffness])[0]
 
 
-def packed_stiffnesses(stiffnesses: "Sequence[float | ForceTable | TorqueTable]") -> list[FloatArray]:
+def packed_stiffnesses(
+    stiffnesses: "Sequence[float | ForceTable | TorqueTable]",
+) -> list[FloatArray]:
     """Several at once: tables over the same points share one call of scipy, of which a study makes thousands."""
-    packed = [np.array([0.0, s]) if isinstance(s, float | int) else np.empty(0) for s in stiffnesses]
-    curves = {index: s.curve for index, s in enumerate(stiffnesses) if isinstance(s, ForceTable | TorqueTable)}
+    packed = [
+        np.array([0.0, s]) if isinstance(s, float | int) else np.empty(0) for s in stiffnesses
+    ]
+    curves = {
+        index: s.curve
+        for index, s in enumerate(stiffnesses)
+        if isinstance(s, ForceTable | TorqueTable)
+    }
     for points in dict.fromkeys(x for x, _ in curves.values()):
         alike = [index for index, (x, _) in curves.items() if x == points]
-        for index, curve in zip(alike, _packed_curves(points, tuple(curves[index][1] for index in alike)), strict=True):
+        for index, curve in zip(
+            alike, _packed_curves(points, tuple(curves[index][1] for index in alike)), strict=True
+        ):
             packed[index] = curve
     return packed
 
@@ -86,7 +97,9 @@ def _packed_curves(x: tuple[float, ...], ys: tuple[tuple[float, ...], ...]) -> F
     """One row for each curve: the monotone cubics (scipy's PCHIP) through the points, as `wm_drake.laws.table` takes them."""
     cubics = PchipInterpolator(x, ys, axis=1).c[::-1]  # (4, pieces, curves)
     h, (_, a, b, c) = x[-1] - x[-2], cubics[:, -1]
-    end_slopes = np.maximum(a + h * (2.0 * b + h * 3.0 * c), 0.0)  # rounding can make a flat end fall by 1e-11
+    end_slopes = np.maximum(
+        a + h * (2.0 * b + h * 3.0 * c), 0.0
+    )  # rounding can make a flat end fall by 1e-11
     packed = np.empty((len(ys), packed_table_size(len(x))))
     packed[:, 0], packed[:, -2], packed[:, -1] = len(x), x[-1], end_slopes
     pieces = packed[:, 1:-2].reshape(len(ys), -1, PIECE_SIZE)
@@ -100,10 +113,13 @@ def _form(value: Any) -> str:
 
 
 Stiffness: TypeAlias = Annotated[
-    Annotated[u.LinearStiffness, Field(ge=0.0), Tag("number")] | Annotated[ForceTable, Tag("table")], Discriminator(_form)
+    Annotated[u.LinearStiffness, Field(ge=0.0), Tag("number")]
+    | Annotated[ForceTable, Tag("table")],
+    Discriminator(_form),
 ]
 RotationalStiffness: TypeAlias = Annotated[
-    Annotated[u.RotationalStiffness, Field(ge=0.0), Tag("number")] | Annotated[TorqueTable, Tag("table")],
+    Annotated[u.RotationalStiffness, Field(ge=0.0), Tag("number")]
+    | Annotated[TorqueTable, Tag("table")],
     Discriminator(_form),
 ]
 _NonNegativeForce: TypeAlias = Annotated[u.Force, Field(ge=0.0)]
@@ -181,7 +197,9 @@ class MstvDamper(_DamperType):
     @model_validator(mode="after")
     def _slider_rate_is_finite(self) -> "MstvDamper":
         if self.sponge_damping + self.slider_damping + self.friction_damping <= 0.0:
-            raise ValueError("sponge_damping, slider_damping and friction_damping are all zero: a massless slider needs one")
+            raise ValueError(
+                "sponge_damping, slider_damping and friction_damping are all zero: a massless slider needs one"
+            )
         return self
 
 
@@ -198,7 +216,9 @@ class StvSpongeDamper(_DamperType):
     @model_validator(mode="after")
     def _slider_rate_is_finite(self) -> "StvSpongeDamper":
         if self.sponge_damping + self.slider_damping <= 0.0:
-            raise ValueError("sponge_damping and slider_damping are both zero: a massless slider needs one")
+            raise ValueError(
+                "sponge_damping and slider_damping are both zero: a massless slider needs one"
+            )
         return self
 
 
@@ -215,7 +235,8 @@ class FreeStrokeDamper(_DamperType):
 
 
 DamperType: TypeAlias = Annotated[
-    CoulombDamper | StvDamper | HavsinDamper | MstvDamper | StvSpongeDamper | FreeStrokeDamper, Field(discriminator="law")
+    CoulombDamper | StvDamper | HavsinDamper | MstvDamper | StvSpongeDamper | FreeStrokeDamper,
+    Field(discriminator="law"),
 ]
 
 

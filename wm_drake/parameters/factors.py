@@ -18,7 +18,7 @@ from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.units import Unit
 
-GASKET_FACTORS = Path(__file__).with_name("gasket_factors.yaml")
+GASKET_FACTORS = Path(__file__).parents[1] / "data" / "gasket_factors.yaml"
 """The factors of [B] section 4."""
 
 LINEAR_PART = 0.2
@@ -103,7 +103,9 @@ def factor_of_text(text: str, known: Mapping[str, Factor]) -> tuple[str, Factor]
     return name, factor.model_copy(update={"low": low, "high": high, "middle": None})
 
 
-def levels_of(parameters: MachineParameters, factors: Mapping[str, Factor], tables: str = "linear") -> tuple[FactorLevels, ...]:
+def levels_of(
+    parameters: MachineParameters, factors: Mapping[str, Factor], tables: str = "linear"
+) -> tuple[FactorLevels, ...]:
     """What the levels of factors are for a machine.
 
     Args:
@@ -123,16 +125,24 @@ def levels_of(parameters: MachineParameters, factors: Mapping[str, Factor], tabl
                     raise input_error(f"moves with factor {owner[key]} already", key=key)
             resolved.append(_resolved(parameters, known, name, factor, tables))
         except InputError as error:
-            problems += [Problem(p.where or f"factor {name}", p.key, p.message) for p in error.problems]
+            problems += [
+                Problem(p.where or f"factor {name}", p.key, p.message) for p in error.problems
+            ]
     if problems:
         raise InputError(problems)
     return tuple(resolved)
 
 
-def at_levels(parameters: MachineParameters, factors: Sequence[FactorLevels], levels: Sequence[int]) -> MachineParameters:
+def at_levels(
+    parameters: MachineParameters, factors: Sequence[FactorLevels], levels: Sequence[int]
+) -> MachineParameters:
     """The machine with each factor at a level, -1, 0 or 1."""
-    settings = [factor.settings[int(level) + 1] for factor, level in zip(factors, levels, strict=True)]
-    return with_values(parameters, {key: value for setting in settings for key, value in setting.items()})
+    settings = [
+        factor.settings[int(level) + 1] for factor, level in zip(factors, levels, strict=True)
+    ]
+    return with_values(
+        parameters, {key: value for setting in settings for key, value in setting.items()}
+    )
 
 
 def nominal_stiffness(table: ForceTable | TorqueTable) -> float:
@@ -144,14 +154,20 @@ def nominal_stiffness(table: ForceTable | TorqueTable) -> float:
     packed = packed_stiffness(table)
     for part in (LINEAR_PART, 1.0):
         points = np.linspace(part * min(x[0], 0.0), part * max(x[-1], 0.0), 201)
-        slope = float(np.polyfit(points, [stiffness_force(float(point), packed, 0) for point in points], 1)[0])
+        slope = float(
+            np.polyfit(points, [stiffness_force(float(point), packed, 0) for point in points], 1)[0]
+        )
         if slope > 0.0:
             return slope
     return 0.0
 
 
 def _resolved(
-    parameters: MachineParameters, known: Mapping[str, tuple[Any, Unit]], name: str, factor: Factor, tables: str
+    parameters: MachineParameters,
+    known: Mapping[str, tuple[Any, Unit]],
+    name: str,
+    factor: Factor,
+    tables: str,
 ) -> FactorLevels:
     settings: tuple[dict[str, Value], ...] = ({}, {}, {})
     nominal: dict[str, str] = {}
@@ -159,17 +175,25 @@ def _resolved(
     for key in factor.keys:
         number, unit = _nominal(parameters, known, key)
         low, high = (_bound(parameters, key, text, number) for text in (factor.low, factor.high))
-        middle = 0.5 * (low + high) if factor.middle is None else _bound(parameters, key, factor.middle, number)
+        middle = (
+            0.5 * (low + high)
+            if factor.middle is None
+            else _bound(parameters, key, factor.middle, number)
+        )
         if not low < middle < high:
             texts = f"{factor.low}, {factor.middle or 'half way'}, {factor.high}"
-            raise input_error(f"levels {texts} do not rise{' (the value is 0)' if number == 0.0 else ''}", key=key)
+            raise input_error(
+                f"levels {texts} do not rise{' (the value is 0)' if number == 0.0 else ''}", key=key
+            )
         original = known[key][0] if key in known else _value_at(parameters, key)
         for level, value in zip(settings, (low, middle, high), strict=True):
             scaled = isinstance(original, ForceTable | TorqueTable) and (
                 tables == "scaled" or not _takes_numbers(parameters, key)
             )
             level[key] = _scaled(original, value / float(number or 1.0)) if scaled else value
-            with_value(parameters, key, level[key])  # the machine has the last word on what it can be
+            with_value(
+                parameters, key, level[key]
+            )  # the machine has the last word on what it can be
         nominal[key] = "" if number is None else _text(number, unit)
         if not shown:
             shown = tuple(_text(value, unit) for value in (low, middle, high))
@@ -183,10 +207,18 @@ def _nominal(
     if key in known:
         value, unit = known[key]
         if isinstance(value, tuple):
-            raise input_error("is a list of numbers; name one of them by its place, from 0: " + f"{key}.0", key=key)
+            raise input_error(
+                "is a list of numbers; name one of them by its place, from 0: " + f"{key}.0",
+                key=key,
+            )
         return (None if value is None else float(value)), unit
     parent, _, last = key.rpartition(".")
-    if parent in known and last.isdigit() and isinstance(known[parent][0], tuple) and int(last) < len(known[parent][0]):
+    if (
+        parent in known
+        and last.isdigit()
+        and isinstance(known[parent][0], tuple)
+        and int(last) < len(known[parent][0])
+    ):
         return float(known[parent][0][int(last)]), known[parent][1]
     value = _value_at(parameters, key)
     if isinstance(value, ForceTable | TorqueTable):
@@ -211,7 +243,13 @@ def _value_at(parameters: MachineParameters, key: str) -> Any:
         elif place == 1 and parts[0] in ("bodies", "frames"):
             return None
         else:
-            names = list(node) if isinstance(node, dict) else list(type(node).model_fields) if isinstance(node, Frozen) else []
+            names = (
+                list(node)
+                if isinstance(node, dict)
+                else list(type(node).model_fields)
+                if isinstance(node, Frozen)
+                else []
+            )
             raise input_error(f"unknown key '{part}'{nearest_names(part, names)}", key=key)
         if node is None:
             if parts[0] in ("bodies", "frames"):
@@ -223,7 +261,10 @@ def _value_at(parameters: MachineParameters, key: str) -> Any:
 def _bound(parameters: MachineParameters, key: str, text: str, nominal: float | None) -> float:
     percent = _PERCENT.fullmatch(text)
     if percent and nominal is None:
-        raise input_error(f"is in the SDF, not in the machine file, so '{text}' of it is not known; give a value", key=key)
+        raise input_error(
+            f"is in the SDF, not in the machine file, so '{text}' of it is not known; give a value",
+            key=key,
+        )
     if percent:
         return 0.01 * float(percent[1]) * float(nominal or 0.0)
     if key.rpartition(".")[2].isdigit():
@@ -243,9 +284,15 @@ def _takes_numbers(parameters: MachineParameters, key: str) -> bool:
 
 def _scaled(table: ForceTable | TorqueTable, factor: float) -> ForceTable | TorqueTable:
     ordinate = "force" if isinstance(table, ForceTable) else "torque"
-    return table.model_copy(update={ordinate: tuple(factor * number for number in getattr(table, ordinate))})
+    return table.model_copy(
+        update={ordinate: tuple(factor * number for number in getattr(table, ordinate))}
+    )
 
 
 def _text(value: float, unit: Unit | None) -> str:
     """A value for the eye."""
-    return f"{value:.6g}" if unit is None else f"{unit.from_si(value):.6g} {unit.shown.replace('*', ' ')}"
+    return (
+        f"{value:.6g}"
+        if unit is None
+        else f"{unit.from_si(value):.6g} {unit.shown.replace('*', ' ')}"
+    )

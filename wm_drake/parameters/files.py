@@ -20,8 +20,8 @@ from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.spin import Load, SpinProfile
 
-MACHINES_FOLDER = Path(__file__).parents[1] / "machines"
-CYCLES_FOLDER = Path(__file__).parents[1] / "cycles"
+MACHINES_FOLDER = Path(__file__).parents[1] / "data" / "machines"
+CYCLES_FOLDER = Path(__file__).parents[1] / "data" / "cycles"
 Model = TypeVar("Model", bound=BaseModel)
 
 
@@ -55,7 +55,8 @@ def machine_path(name_or_path: str | Path) -> Path:
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "no such file"
         raise input_error(
-            f"{what}, and no shipped machine of that name{nearest_names(str(name_or_path), shipped)}", where=str(path)
+            f"{what}, and no shipped machine of that name{nearest_names(str(name_or_path), shipped)}",
+            where=str(path),
         )
     return path
 
@@ -82,7 +83,11 @@ def read_model(model: type[Model], path: Path) -> Model:
 
 def shipped_profiles() -> dict[str, Path]:
     """Spin profiles that come with the package, by name."""
-    return {path.stem: path for path in sorted(CYCLES_FOLDER.iterdir()) if path.stem.startswith("profile_")}
+    return {
+        path.stem: path
+        for path in sorted(CYCLES_FOLDER.iterdir())
+        if path.stem.startswith("profile_")
+    }
 
 
 def load_profile(name_or_path: str | Path) -> SpinProfile:
@@ -100,7 +105,8 @@ def load_profile(name_or_path: str | Path) -> SpinProfile:
     if not path.is_file():
         known = [name.removeprefix("profile_") for name in shipped]
         raise input_error(
-            f"no such file, and no shipped profile of that name{nearest_names(str(path), known)}", where=str(path)
+            f"no such file, and no shipped profile of that name{nearest_names(str(path), known)}",
+            where=str(path),
         )
     if path.suffix.lower() != ".csv":
         tree = read_yaml(path)
@@ -112,13 +118,19 @@ def load_profile(name_or_path: str | Path) -> SpinProfile:
     finite = np.isfinite(numbers.to_numpy(dtype=float)).all(axis=1)
     if not finite.all():
         row = int(np.flatnonzero(~finite)[0])
-        raise input_error(f"row {row + 1} of the data is not two finite numbers: {table.iloc[row].tolist()}", where=str(path))
+        raise input_error(
+            f"row {row + 1} of the data is not two finite numbers: {table.iloc[row].tolist()}",
+            where=str(path),
+        )
     text = {"time": ("time_s", "s"), "speed": ("speed_rpm", "rpm")}
     fields: dict[str, Any] = {
-        key: f"({', '.join(map(repr, numbers[name].tolist()))}) {unit}" for key, (name, unit) in text.items()
+        key: f"({', '.join(map(repr, numbers[name].tolist()))}) {unit}"
+        for key, (name, unit) in text.items()
     }
     if "region" in table:
-        fields["regions"] = _regions(numbers["time_s"].tolist(), table["region"].fillna("").astype(str).tolist())
+        fields["regions"] = _regions(
+            numbers["time_s"].tolist(), table["region"].fillna("").astype(str).tolist()
+        )
     return _validated(SpinProfile, fields, path)
 
 
@@ -194,7 +206,10 @@ class _TextResolver(VersionedResolver):
     @property
     def versioned_resolver(self) -> dict[str, list[tuple[Any, Any]]]:
         null = "tag:yaml.org,2002:null"
-        kept = {first: [pair for pair in pairs if str(pair[0]) == null] for first, pairs in super().versioned_resolver.items()}
+        kept = {
+            first: [pair for pair in pairs if str(pair[0]) == null]
+            for first, pairs in super().versioned_resolver.items()
+        }
         return {first: pairs for first, pairs in kept.items() if pairs}
 
 
@@ -221,11 +236,15 @@ def read_yaml(path: Path) -> CommentedMap:
         mark = getattr(error, "problem_mark", None)
         where = f"{path}:{mark.line + 1}" if mark else str(path)
         raise input_error(
-            f"is not YAML: {' '.join(str(getattr(error, 'problem', None) or error).split())}", where=where
+            f"is not YAML: {' '.join(str(getattr(error, 'problem', None) or error).split())}",
+            where=where,
         ) from None
     if not isinstance(tree, CommentedMap):
         raise input_error(
-            "is empty; allowed is a mapping of keys to values" if tree is None else "is not a mapping", where=str(path)
+            "is empty; allowed is a mapping of keys to values"
+            if tree is None
+            else "is not a mapping",
+            where=str(path),
         )
     return tree
 
@@ -295,7 +314,9 @@ def _with_absolute_paths(tree: dict[str, Any], path: Path) -> dict[str, Any]:
     if isinstance(model, str) and (path.parent / model).is_file():
         changed["model"] = str((path.parent / model).resolve())
     if isinstance(tree.get("measured"), list):
-        changed["measured"] = [str((path.parent / str(name)).resolve()) for name in tree["measured"]]
+        changed["measured"] = [
+            str((path.parent / str(name)).resolve()) for name in tree["measured"]
+        ]
     return changed
 
 
@@ -303,7 +324,9 @@ def _validated(model: type[Model], plain: Any, path: Path) -> Model:
     try:
         return model.model_validate(plain, context={"units_required": True})
     except ValidationError as error:
-        raise InputError(replace(p, where=_place(path, p.key)) for p in problems_of(error, model)) from None
+        raise InputError(
+            replace(p, where=_place(path, p.key)) for p in problems_of(error, model)
+        ) from None
 
 
 def located(error: InputError, path: Path) -> InputError:
@@ -312,7 +335,9 @@ def located(error: InputError, path: Path) -> InputError:
     problems = []
     for problem in error.problems:
         depth, line = _line_of(tree, problem.key)
-        problems.append(replace(problem, where=problem.where or (f"{path}:{line}" if depth else str(path))))
+        problems.append(
+            replace(problem, where=problem.where or (f"{path}:{line}" if depth else str(path)))
+        )
     return InputError(problems)
 
 

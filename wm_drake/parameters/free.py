@@ -31,7 +31,11 @@ def _measured(text: Any) -> Any:
     if not isinstance(text, str):
         return text
     magnitudes, unit, is_list = u.split(text)
-    return {"values": tuple(u.to_base(number, unit) for number in magnitudes), "unit": unit, "is_list": is_list}
+    return {
+        "values": tuple(u.to_base(number, unit) for number in magnitudes),
+        "unit": unit,
+        "is_list": is_list,
+    }
 
 
 def _pair(text: Any) -> Any:
@@ -62,7 +66,11 @@ class FreeQuantity(Frozen):
 
     bounds: _Pair
     prior: _Pair
-    sets: Annotated[dict[str, Annotated[Measured, BeforeValidator(_measured)]], BeforeValidator(_one_key), Field(min_length=1)]
+    sets: Annotated[
+        dict[str, Annotated[Measured, BeforeValidator(_measured)]],
+        BeforeValidator(_one_key),
+        Field(min_length=1),
+    ]
     source: str
     start: Annotated[Measured, BeforeValidator(_measured)] | None = None
 
@@ -86,7 +94,9 @@ class FreeQuantity(Frozen):
             raise ValueError("the standard deviation must be above 0")
         if self.start is not None:
             if self.start.is_list or u.dimension(self.start.unit) != u.dimension(self.unit):
-                raise ValueError(f"the start is not one number with a unit such as {self.unit or 'none'}")
+                raise ValueError(
+                    f"the start is not one number with a unit such as {self.unit or 'none'}"
+                )
             if not lower <= self.start.values[0] <= upper:
                 raise ValueError("the start is outside the bounds")
         return self
@@ -121,7 +131,10 @@ class FreeFile(Frozen):
 
     def without_starts(self) -> "FreeFile":
         """The same, with searches that begin at the expected values."""
-        quantities = {name: quantity.model_copy(update={"start": None}) for name, quantity in self.quantities.items()}
+        quantities = {
+            name: quantity.model_copy(update={"start": None})
+            for name, quantity in self.quantities.items()
+        }
         return self.model_copy(update={"quantities": quantities})
 
 

@@ -40,7 +40,12 @@ def with_values(parameters: Tree, values: Mapping[str, Any]) -> Tree:
     Raises:
         InputError: as `with_value`.
     """
-    return typing.cast(Tree, _replaced(parameters, [_Change(key, key.split("."), value) for key, value in values.items()]))
+    return typing.cast(
+        Tree,
+        _replaced(
+            parameters, [_Change(key, key.split("."), value) for key, value in values.items()]
+        ),
+    )
 
 
 @dataclass(frozen=True)
@@ -55,7 +60,11 @@ class _Change:
 def _replaced(node: Any, changes: list[_Change]) -> Any:
     last = max((number for number, change in enumerate(changes) if not change.path), default=None)
     if last is not None:  # the whole node is replaced; what is named after that is changed in it
-        return _replaced(changes[last].value, changes[last + 1 :]) if changes[last + 1 :] else changes[last].value
+        return (
+            _replaced(changes[last].value, changes[last + 1 :])
+            if changes[last + 1 :]
+            else changes[last].value
+        )
     parts: dict[str, list[_Change]] = {}
     for change in changes:
         parts.setdefault(change.path[0], []).append(replace(change, path=change.path[1:]))
@@ -64,15 +73,22 @@ def _replaced(node: Any, changes: list[_Change]) -> Any:
     if isinstance(node, dict):
         for name, inner in parts.items():
             if name not in node:
-                raise input_error(f"unknown key '{name}'" + nearest_names(name, node), key=inner[0].key)
+                raise input_error(
+                    f"unknown key '{name}'" + nearest_names(name, node), key=inner[0].key
+                )
         return {**node, **{name: _replaced(node[name], inner) for name, inner in parts.items()}}
     for name, inner in parts.items():
         if node is None:
             whole = inner[0].key.removesuffix("." + ".".join([name, *inner[0].path]))
-            raise input_error(f"the machine has none; a machine file describes '{whole}' whole", key=inner[0].key)
+            raise input_error(
+                f"the machine has none; a machine file describes '{whole}' whole", key=inner[0].key
+            )
         if not (isinstance(node, tuple) and name.isdigit() and int(name) < len(node)):
             raise input_error(f"'{name}' leads nowhere: the path ends before it", key=inner[0].key)
-    return tuple(_replaced(entry, parts[str(i)]) if str(i) in parts else entry for i, entry in enumerate(node))
+    return tuple(
+        _replaced(entry, parts[str(i)]) if str(i) in parts else entry
+        for i, entry in enumerate(node)
+    )
 
 
 def _replaced_in_model(node: BaseModel, parts: dict[str, list[_Change]]) -> BaseModel:
@@ -80,19 +96,30 @@ def _replaced_in_model(node: BaseModel, parts: dict[str, list[_Change]]) -> Base
     values = {field: getattr(node, field) for field in node.model_fields_set}
     for name, changes in parts.items():
         if name not in fields:
-            raise input_error(f"unknown key '{name}'" + nearest_names(name, fields), key=changes[0].key)
+            raise input_error(
+                f"unknown key '{name}'" + nearest_names(name, fields), key=changes[0].key
+            )
         values[name] = _entered(node, name, changes)
     try:
         return type(node).model_validate(values)
     except ValidationError as error:
         changes = [change for inner in parts.values() for change in inner]
         here = ".".join(changes[0].key.split(".")[: -1 - len(changes[0].path)])
-        raise InputError(_said_of(problem, changes) for problem in problems_of(error, type(node), here)) from None
+        raise InputError(
+            _said_of(problem, changes) for problem in problems_of(error, type(node), here)
+        ) from None
 
 
 def _said_of(problem: Problem, changes: list[_Change]) -> Problem:
     """A problem of a group, said of the change that led to it."""
-    return next((replace(problem, key=change.key) for change in changes if change.key.startswith(problem.key)), problem)
+    return next(
+        (
+            replace(problem, key=change.key)
+            for change in changes
+            if change.key.startswith(problem.key)
+        ),
+        problem,
+    )
 
 
 def _entered(node: BaseModel, name: str, changes: list[_Change]) -> Any:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from wm_drake.errors import InputError, Problem, input_error
-from wm_drake.parameters.elements import FloatArray
+from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit, convert
 
 FEWEST = 20
@@ -71,15 +71,21 @@ def read_loop(path: Path, units: tuple[str, str, str] | None = None) -> Measured
         raise input_error("is empty; needs the columns time, displacement, force", where=str(path))
     line, head = rows[0]
     where, factors, rotates = _columns(head, units, f"{path}:{line}")
-    table = np.array([_numbers(cells, head, where, f"{path}:{at}") for at, cells in rows[1:]]).reshape(-1, 3)
+    table = np.array(
+        [_numbers(cells, head, where, f"{path}:{at}") for at, cells in rows[1:]]
+    ).reshape(-1, 3)
     if len(table) < FEWEST:
-        raise input_error(f"has {len(table)} samples; a loop needs at least {FEWEST}", where=str(path))
+        raise input_error(
+            f"has {len(table)} samples; a loop needs at least {FEWEST}", where=str(path)
+        )
     lines = [at for at, _ in rows[1:]]
     stuck = np.flatnonzero(np.diff(table[:, 0]) <= 0.0)
     if len(stuck):
         at = int(stuck[0]) + 1
         raise input_error(
-            f"time does not rise: {table[at, 0]:g} after {table[at - 1, 0]:g}", where=f"{path}:{lines[at]}", key=head[where[0]]
+            f"time does not rise: {table[at, 0]:g} after {table[at - 1, 0]:g}",
+            where=f"{path}:{lines[at]}",
+            key=head[where[0]],
         )
     for column in (1, 2):
         if np.ptp(table[:, column]) == 0.0:
@@ -108,7 +114,9 @@ def read_loops(paths: list[Path], units: tuple[str, str, str] | None = None) -> 
         if loop.rotates != loops[0].rotates:
             kinds = ("angles and moments", "displacements and forces")
             first, other = kinds if loops[0].rotates else kinds[::-1]
-            raise input_error(f"holds {other}, {loops[0].path} {first}; a fit takes one kind", where=loop.path)
+            raise input_error(
+                f"holds {other}, {loops[0].path} {first}; a fit takes one kind", where=loop.path
+            )
     return loops
 
 
@@ -120,10 +128,16 @@ def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
         raise input_error(error.strerror or "cannot be read", where=str(path)) from None
     except UnicodeDecodeError:
         raise input_error("is not text in UTF-8", where=str(path)) from None
-    kept = [(at, line) for at, line in enumerate(text.splitlines(), 1) if line.strip() and not line.lstrip().startswith("#")]
+    kept = [
+        (at, line)
+        for at, line in enumerate(text.splitlines(), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
     if kept:
         delimiter = max(",;\t", key=kept[0][1].count)
-        for (at, _), cells in zip(kept, csv.reader((line for _, line in kept), delimiter=delimiter), strict=False):
+        for (at, _), cells in zip(
+            kept, csv.reader((line for _, line in kept), delimiter=delimiter), strict=False
+        ):
             yield at, [cell.strip() for cell in cells]
 
 
@@ -149,7 +163,10 @@ def _columns(
         )
     rotates = found["displacement"][1] == _ANGLE
     if rotates != (found["force"][1] == _TORQUE):
-        raise input_error("mixes a rotation with a translation: angle goes with moment, displacement with force", where=place)
+        raise input_error(
+            "mixes a rotation with a translation: angle goes with moment, displacement with force",
+            where=place,
+        )
     factors = [
         _factor(head[found[column][0]], column, found[column][1], (found[column][2], given), place)
         for given, column in zip(units or (None,) * 3, _COLUMNS, strict=True)
@@ -161,11 +178,15 @@ def _columns(
     )
 
 
-def _factor(head: str, column: str, unit: Unit, given: tuple[str | None, str | None], place: str) -> float:
+def _factor(
+    head: str, column: str, unit: Unit, given: tuple[str | None, str | None], place: str
+) -> float:
     """That turns a column into SI, by the unit in its header or on the command line."""
     own, asked = given
     if own and asked and own != asked:
-        raise input_error(f"is in {own} by the header, in {asked} by --units", where=place, key=head)
+        raise input_error(
+            f"is in {own} by the header, in {asked} by --units", where=place, key=head
+        )
     text = own or asked
     if not text:
         message = f"has no unit; write '{column} [{unit.shown}]' in the header or use --units"
@@ -176,7 +197,9 @@ def _factor(head: str, column: str, unit: Unit, given: tuple[str | None, str | N
         raise input_error(str(error), where=place, key=head) from None
 
 
-def _numbers(cells: list[str], head: list[str], where: tuple[int, int, int], place: str) -> list[float]:
+def _numbers(
+    cells: list[str], head: list[str], where: tuple[int, int, int], place: str
+) -> list[float]:
     if len(cells) != len(head):
         raise input_error(f"has {len(cells)} values, the header {len(head)} columns", where=place)
     values = []
@@ -184,8 +207,12 @@ def _numbers(cells: list[str], head: list[str], where: tuple[int, int, int], pla
         try:
             value = float(cells[index])
         except ValueError:
-            raise input_error(f"'{cells[index]}' is not a number", where=place, key=head[index]) from None
+            raise input_error(
+                f"'{cells[index]}' is not a number", where=place, key=head[index]
+            ) from None
         if not np.isfinite(value):
-            raise input_error(f"'{cells[index]}' is not a finite number", where=place, key=head[index])
+            raise input_error(
+                f"'{cells[index]}' is not a finite number", where=place, key=head[index]
+            )
         values.append(value)
     return values

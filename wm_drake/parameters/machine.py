@@ -41,10 +41,16 @@ class InertiaMatrix(Frozen):
 
     @model_validator(mode="after")
     def _physical(self) -> "InertiaMatrix":
-        matrix = [[self.xx, self.xy, self.xz], [self.xy, self.yy, self.yz], [self.xz, self.yz, self.zz]]
+        matrix = [
+            [self.xx, self.xy, self.xz],
+            [self.xy, self.yy, self.yz],
+            [self.xz, self.yz, self.zz],
+        ]
         smallest, middle, largest = np.linalg.eigvalsh(matrix)
         if smallest <= 0.0:
-            raise ValueError(f"is not positive definite: principal moments {smallest:g}, {middle:g}, {largest:g} kg m^2")
+            raise ValueError(
+                f"is not positive definite: principal moments {smallest:g}, {middle:g}, {largest:g} kg m^2"
+            )
         if smallest + middle < largest * (1.0 - 1e-12):
             raise ValueError(
                 f"belongs to no body: of the principal moments {smallest:g}, {middle:g}, {largest:g} kg m^2 the largest must "
@@ -162,7 +168,9 @@ class MachineParameters(Frozen):
             for name, place in places.items():
                 if getattr(place, key) not in known:
                     other = getattr(place, key)
-                    raise ValueError(f"{name}.{key}: '{other}' is not in {table}{nearest_names(other, known)}")
+                    raise ValueError(
+                        f"{name}.{key}: '{other}' is not in {table}{nearest_names(other, known)}"
+                    )
         return places
 
     @field_validator("telescopic_dampers")

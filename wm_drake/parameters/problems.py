@@ -14,11 +14,23 @@ def problems_of(error: ValidationError, root: type[BaseModel], key: str = "") ->
     problems = []
     for detail in error.errors():
         path = [str(part) for part in detail["loc"] if part not in _TAGS]
-        problems.append(Problem("", ".".join(([key] if key else []) + path), _message(detail, root)))
+        problems.append(
+            Problem("", ".".join(([key] if key else []) + path), _message(detail, root))
+        )
     return problems
 
 
-_TAGS = ("[key]", "number", "table", "coulomb", "stv", "havsin", "mstv", "stv_sponge", "free_stroke")
+_TAGS = (
+    "[key]",
+    "number",
+    "table",
+    "coulomb",
+    "stv",
+    "havsin",
+    "mstv",
+    "stv_sponge",
+    "free_stroke",
+)
 
 
 def _message(detail: Any, root: type[BaseModel]) -> str:
@@ -50,11 +62,26 @@ def _fields_at(root: type[BaseModel], path: tuple[str | int, ...]) -> set[str]:
     candidates: list[Any] = [root]
     for part in path:
         models = [c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel)]
-        tagged = [c for c in models if "law" in c.model_fields and part in typing.get_args(c.model_fields["law"].annotation)]
+        tagged = [
+            c
+            for c in models
+            if "law" in c.model_fields and part in typing.get_args(c.model_fields["law"].annotation)
+        ]
         stepped = [c.model_fields[str(part)].annotation for c in models if part in c.model_fields]
-        entries = [typing.get_args(c)[-1 if typing.get_origin(c) is dict else 0] for c in candidates if typing.get_origin(c)]
-        candidates = tagged or [inner for c in stepped + entries for inner in _alternatives(c)] or candidates
-    return {name for c in candidates if isinstance(c, type) and issubclass(c, BaseModel) for name in c.model_fields}
+        entries = [
+            typing.get_args(c)[-1 if typing.get_origin(c) is dict else 0]
+            for c in candidates
+            if typing.get_origin(c)
+        ]
+        candidates = (
+            tagged or [inner for c in stepped + entries for inner in _alternatives(c)] or candidates
+        )
+    return {
+        name
+        for c in candidates
+        if isinstance(c, type) and issubclass(c, BaseModel)
+        for name in c.model_fields
+    }
 
 
 def _alternatives(annotation: Any) -> list[Any]:

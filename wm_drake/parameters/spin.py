@@ -36,11 +36,13 @@ class _Step(Frozen):
 
     @model_validator(mode="after")
     def _one_form(self) -> "_Step":
-        forms = (self.ramp_to is not None and self.rate is not None and self.hold_until is None) or (
-            self.hold_until is not None and self.ramp_to is None and self.rate is None
-        )
+        forms = (
+            self.ramp_to is not None and self.rate is not None and self.hold_until is None
+        ) or (self.hold_until is not None and self.ramp_to is None and self.rate is None)
         if not forms:
-            raise ValueError("a step is either {ramp_to: SPEED, rate: SPEED PER TIME} or {hold_until: TIME}")
+            raise ValueError(
+                "a step is either {ramp_to: SPEED, rate: SPEED PER TIME} or {hold_until: TIME}"
+            )
         return self
 
     def after(self, time: float, speed: float) -> tuple[float, float]:
@@ -84,14 +86,20 @@ class SpinProfile(Frozen):
             try:
                 step = _Step.model_validate(entry, context=info.context)
             except ValidationError as error:
-                text = "; ".join(f"{p.key}: {p.message}" if p.key else p.message for p in problems_of(error, _Step))
+                text = "; ".join(
+                    f"{p.key}: {p.message}" if p.key else p.message
+                    for p in problems_of(error, _Step)
+                )
                 raise ValueError(f"steps.{index}: {text}") from None
             points.append(step.after(*points[-1]))
         unit = {name: cls.model_fields[name].metadata[0] for name in ("time", "speed")}
         times, speeds = zip(*points, strict=True)
         # as text again, for the door of the fields: repr keeps every digit
         points_of = {"time": times, "speed": speeds}
-        texts = {name: f"({', '.join(map(repr, values))}) {unit[name].si}" for name, values in points_of.items()}
+        texts = {
+            name: f"({', '.join(map(repr, values))}) {unit[name].si}"
+            for name, values in points_of.items()
+        }
         return {**texts, "regions": data.get("regions", ())}
 
     @model_validator(mode="after")

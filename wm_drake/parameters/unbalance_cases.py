@@ -42,11 +42,15 @@ class UnbalanceCase(Frozen):
     def load(self, parameters: MachineParameters) -> Load:
         """The masses in the drum of a machine, the error of its phase angle included; the front one is up at angle 0."""
         planes = unbalance_planes(parameters)
-        ahead = self.phase + (parameters.imperfections.phase_error if self.front and self.rear else 0.0)
+        ahead = self.phase + (
+            parameters.imperfections.phase_error if self.front and self.rear else 0.0
+        )
         masses = ((self.front, planes.front, 0.0), (self.rear, planes.rear, ahead))
         return Load(
             unbalances=tuple(
-                Unbalance(mass=mass, radius=place.radius, y=place.y, phase=phase) for mass, place, phase in masses if mass > 0.0
+                Unbalance(mass=mass, radius=place.radius, y=place.y, phase=phase)
+                for mass, place, phase in masses
+                if mass > 0.0
             )
         )
 
@@ -90,11 +94,15 @@ def load_unbalance_cases(path: Path = TABLE_9) -> list[UnbalanceCase]:
 
 def _case(path: Path, row: Mapping[Hashable, Any]) -> UnbalanceCase:
     units = {"front_g": "g", "rear_g": "g", "phase_deg": "deg"}
-    fields: dict[str, object] = {name: f"{row[column]} {units[column]}" for column, name in _COLUMNS.items()}
+    fields: dict[str, object] = {
+        name: f"{row[column]} {units[column]}" for column, name in _COLUMNS.items()
+    }
     if pd.notna(row.get(_PUBLISHED)):
         fields[_PUBLISHED] = row[_PUBLISHED]
     try:
         return UnbalanceCase.model_validate({"name": str(row["case"]), **fields})
     except ValidationError as error:
         found = problems_of(error, UnbalanceCase)
-        raise InputError(Problem(str(path), f"case {row['case']}.{p.key}", p.message) for p in found) from None
+        raise InputError(
+            Problem(str(path), f"case {row['case']}.{p.key}", p.message) for p in found
+        ) from None

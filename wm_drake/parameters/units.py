@@ -37,10 +37,14 @@ class Unit:
     si: str
     shown: str
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
         """Parses text before the field's own checks."""
         read = to_si if source is float else to_si_vector
-        return with_info_before_validator_function(lambda value, info: read(value, info, self), handler(source))
+        return with_info_before_validator_function(
+            lambda value, info: read(value, info, self), handler(source)
+        )
 
     def from_si(self, value: float) -> float:
         """The value in the unit people read."""
@@ -54,8 +58,12 @@ class Unit:
         values = value if isinstance(value, tuple) else (value,)
         shown = [self._exact_digits(number) for number in values]
         unit = self.si if None in shown else self.shown
-        digits = [repr(number) for number in values] if None in shown else [str(text) for text in shown]
-        return f"({', '.join(digits)}) {unit}" if isinstance(value, tuple) else f"{digits[0]} {unit}"
+        digits = (
+            [repr(number) for number in values] if None in shown else [str(text) for text in shown]
+        )
+        return (
+            f"({', '.join(digits)}) {unit}" if isinstance(value, tuple) else f"{digits[0]} {unit}"
+        )
 
     def _exact_digits(self, value: float) -> str | None:
         shown = self.from_si(value)
@@ -76,9 +84,13 @@ def convert(magnitude: float, unit_text: str | None, unit: Unit) -> float:
     try:
         value = float(registry().Quantity(magnitude, unit_text).to(unit.si).magnitude)
     except pint.DimensionalityError:
-        raise ValueError(f"unit '{unit_text}' does not fit; allowed is a unit such as {unit.shown}") from None
+        raise ValueError(
+            f"unit '{unit_text}' does not fit; allowed is a unit such as {unit.shown}"
+        ) from None
     except Exception as error:  # pint raises tokenizer, attribute and assertion errors alike on text that is no unit
-        raise ValueError(f"unit '{unit_text}' is not known; write for example '1 {unit.shown}'") from error
+        raise ValueError(
+            f"unit '{unit_text}' is not known; write for example '1 {unit.shown}'"
+        ) from error
     if not math.isfinite(value):
         raise ValueError(f"'{magnitude:g} {unit_text}' is not a finite number")
     return value
@@ -132,7 +144,9 @@ def to_si(value: Any, info: ValidationInfo, unit: Unit) -> float:
     if isinstance(value, str):
         match = _SCALAR.fullmatch(value)
         if match is None:
-            raise ValueError(f"'{value}' is not a number with a unit; write for example '{example}'")
+            raise ValueError(
+                f"'{value}' is not a number with a unit; write for example '{example}'"
+            )
         return convert(float(match[1]), match[2], unit)
     return _plain_number(value, info, example)
 
@@ -144,10 +158,14 @@ def to_si_vector(value: Any, info: ValidationInfo, unit: Unit) -> tuple[float, .
         match = _VECTOR.fullmatch(value)
         parts = [] if match is None else [part.strip() for part in match[1].split(",")]
         if match is None or not all(_BARE.fullmatch(part) for part in parts):
-            raise ValueError(f"'{value}' is not a list of numbers with a unit; write for example '{example}'")
+            raise ValueError(
+                f"'{value}' is not a list of numbers with a unit; write for example '{example}'"
+            )
         return tuple(convert(float(part), match[2], unit) for part in parts)
     if not isinstance(value, list | tuple):
-        raise ValueError(f"{value!r} is not a list of numbers with a unit; write for example '{example}'")
+        raise ValueError(
+            f"{value!r} is not a list of numbers with a unit; write for example '{example}'"
+        )
     return tuple(_plain_number(number, info, example) for number in value)
 
 

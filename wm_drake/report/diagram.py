@@ -13,11 +13,15 @@ def mermaid(diagram: Diagram) -> str:
     lines = ["flowchart LR"]
     for system in systems:
         kind = type(system).__name__.split("_")[0]
-        lines.append(f'  {system.get_name()}["{system.get_name().replace("_", " ")}<br/><i>{kind}</i>"]')
+        lines.append(
+            f'  {system.get_name()}["{system.get_name().replace("_", " ")}<br/><i>{kind}</i>"]'
+        )
     arrows = []
     for (to_system, to_port), (from_system, from_port) in diagram.connection_map().items():
         port = from_system.get_output_port(from_port)
         into = to_system.get_input_port(to_port).get_name().replace("_", " ")
-        label = port.get_name().replace("_", " ") if port.get_name().startswith("generalized") else into
+        label = (
+            port.get_name().replace("_", " ") if port.get_name().startswith("generalized") else into
+        )
         arrows.append(f"  {from_system.get_name()} -- {label} --> {to_system.get_name()}")
     return "\n".join(lines + sorted(arrows))

@@ -15,11 +15,18 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from wm_drake.measures import axis_motion, envelopes
-from wm_drake.parameters.elements import FloatArray
-from wm_drake.report.wording import MM_PER_M, RPM_PER_RAD_S, case_title, number, shape_name, speed_rpm
-from wm_drake.simulation import Record, point_positions
-from wm_drake.studies.spin import CaseResult
+from wm_drake.parameters.types import FloatArray
+from wm_drake.report.wording import (
+    MM_PER_M,
+    RPM_PER_RAD_S,
+    case_title,
+    number,
+    shape_name,
+    speed_rpm,
+)
+from wm_drake.simulation.measures import axis_motion, envelopes
+from wm_drake.simulation.runs import Record, point_positions
+from wm_drake.studies.spin.study import CaseResult
 
 IndexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 BoolArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
@@ -81,12 +88,19 @@ def envelopes_figure(record: Record, measured_mm: Mapping[str, float] | None = N
     for axes, name in zip(panels, sensors, strict=True):
         lower, upper = band.lower.sel(sensor=name).values, band.upper.sel(sensor=name).values
         _band(axes, record.time.values, lower, upper)
-        _mark_largest(axes, record, name, np.where(np.abs(lower) > np.abs(upper), lower, upper), "mm")
+        _mark_largest(
+            axes, record, name, np.where(np.abs(lower) > np.abs(upper), lower, upper), "mm"
+        )
         if measured_mm is not None:
             for side in (-1.0, 1.0):
                 axes.axhline(side * measured_mm[name], **DASHED)
     handles = [_band_handle("wm_drake, lower to upper envelope"), _largest_handle()]
-    _legend(figure, [*handles, Line2D([], [], label="experiment, ± amplitude", **DASHED)] if measured_mm else handles)
+    _legend(
+        figure,
+        [*handles, Line2D([], [], label="experiment, ± amplitude", **DASHED)]
+        if measured_mm
+        else handles,
+    )
     return figure
 
 
@@ -100,7 +114,10 @@ def gasket_figure(record: Record) -> Figure:
     starts = revolution_starts(record)
     time = record.time.values
     middle = 0.5 * (time[starts] + np.append(time[starts[1:]], time[-1]))
-    rows = {"F": (record.bushing_force, "N", panels[:COLUMNS]), "M": (record.bushing_moment, "N m", panels[COLUMNS:])}
+    rows = {
+        "F": (record.bushing_force, "N", panels[:COLUMNS]),
+        "M": (record.bushing_moment, "N m", panels[COLUMNS:]),
+    }
     for letter, (variable, unit, row) in rows.items():
         gasket = variable.sel(bushing="gasket")
         _set_limits(row, float(np.abs(gasket).max()))
@@ -109,7 +126,13 @@ def gasket_figure(record: Record) -> Figure:
             lower, upper = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
             _band(axes, *_held_to_ends(time, middle, lower, upper))
             _mark_largest(axes, record, f"{letter}{axis}", values, unit)
-    _legend(figure, [_band_handle("wm_drake, smallest to largest value in each drum revolution"), _largest_handle()])
+    _legend(
+        figure,
+        [
+            _band_handle("wm_drake, smallest to largest value in each drum revolution"),
+            _largest_handle(),
+        ],
+    )
     return figure
 
 
@@ -127,8 +150,12 @@ def orbits_figure(record: Record, y_front: float, y_rear: float) -> Figure:
     x_limit, z_limit = orbit_limits([path[window] for path in paths])
     height = 4.6 * z_limit / x_limit + 1.3
     figure = Figure(figsize=(WIDTH, height))
-    figure.subplots_adjust(left=0.07, right=0.985, top=1.0 - 0.35 / height, bottom=0.95 / height, wspace=0.14)
-    for axes, path, title in zip(figure.subplots(1, 2), paths, _depths(y_front, y_rear), strict=True):
+    figure.subplots_adjust(
+        left=0.07, right=0.985, top=1.0 - 0.35 / height, bottom=0.95 / height, wspace=0.14
+    )
+    for axes, path, title in zip(
+        figure.subplots(1, 2), paths, _depths(y_front, y_rear), strict=True
+    ):
         _orbit(axes, path, window, orbit_window(record, largest, 1.0), largest)
         axes.set(aspect="equal", xlim=(-x_limit, x_limit), ylim=(-z_limit, z_limit))
         axes.set_xlabel("x, to the right, mm", fontsize=9.5)
@@ -154,14 +181,31 @@ def gaps_figure(results: Sequence[CaseResult]) -> Figure:
     span = (high - low) or 1.0
     for place, (result, gap, distance) in enumerate(zip(results, gaps, distances, strict=True)):
         colour = MEASURED if distance <= 0.0 else OURS
-        axes.plot([0.0, distance], [place, place], color=colour, linewidth=2.5, solid_capstyle="butt")
+        axes.plot(
+            [0.0, distance], [place, place], color=colour, linewidth=2.5, solid_capstyle="butt"
+        )
         axes.plot(distance, place, "o", color=colour, markersize=8)
         speed = number(speed_rpm(result, gap.time), 0)
         text = f"{number(distance)} mm   {shape_name(gap.moving)} to {shape_name(gap.fixed)}, {speed} rpm"
-        axes.text(max(distance, 0.0) + 0.025 * span, place, text, va="center", fontsize=9.5, parse_math=False)
+        axes.text(
+            max(distance, 0.0) + 0.025 * span,
+            place,
+            text,
+            va="center",
+            fontsize=9.5,
+            parse_math=False,
+        )
     axes.axvline(0.0, color=MARK, linewidth=1.0)
-    axes.set_yticks(range(len(results)), [case_title(result) for result in results], parse_math=False)
-    axes.set_xticks([tick for tick in MaxNLocator(6).tick_values(low, high) if low - 0.1 * span <= tick <= high + 0.1 * span])
+    axes.set_yticks(
+        range(len(results)), [case_title(result) for result in results], parse_math=False
+    )
+    axes.set_xticks(
+        [
+            tick
+            for tick in MaxNLocator(6).tick_values(low, high)
+            if low - 0.1 * span <= tick <= high + 0.1 * span
+        ]
+    )
     axes.set(xlim=(low - 0.02 * span, high + 0.9 * span), ylim=(len(results) - 0.4, -0.6))
     axes.set_xlabel("smallest gap, mm (0: the parts touch)", fontsize=9.5, loc="left")
     axes.grid(axis="x", color=GRID)
@@ -173,7 +217,9 @@ def gaps_figure(results: Sequence[CaseResult]) -> Figure:
 
 def axis_path_mm(record: Record, y: float) -> FloatArray:
     """Motion from rest of the point of the drum axis at depth y. (n, 3) [mm]"""
-    at_rest = point_positions(np.asarray(record.attrs["rest_pose"])[None, :], np.array([[0.0, y, 0.0]]))[:, 0]
+    at_rest = point_positions(
+        np.asarray(record.attrs["rest_pose"])[None, :], np.array([[0.0, y, 0.0]])
+    )[:, 0]
     return (axis_motion(record, y) - at_rest) * MM_PER_M
 
 
@@ -186,7 +232,9 @@ def orbit_window(record: Record, index: int, revolutions: float) -> BoolArray:
 
 def orbit_limits(paths: Sequence[FloatArray]) -> tuple[float, float]:
     """Half widths in x and z of a frame around all paths, at most as high as wide, and not too flat. [as the paths]"""
-    x_size, z_size = (1.1 * max(float(np.abs(path[:, column]).max()) for path in paths) for column in (0, 2))
+    x_size, z_size = (
+        1.1 * max(float(np.abs(path[:, column]).max()) for path in paths) for column in (0, 2)
+    )
     x_limit = max(x_size, z_size) or 1.0
     return x_limit, max(z_size, 0.4 * x_limit)
 
@@ -220,7 +268,10 @@ def outline(x: FloatArray, y: FloatArray, tolerance: float) -> IndexArray:
 
 
 def _depths(y_front: float, y_rear: float) -> list[str]:
-    return [f"{where}, y = {number(y * MM_PER_M, 0)} mm" for where, y in (("front", y_front), ("rear", y_rear))]
+    return [
+        f"{where}, y = {number(y * MM_PER_M, 0)} mm"
+        for where, y in (("front", y_front), ("rear", y_rear))
+    ]
 
 
 def _orbit(axes: Axes, path: FloatArray, window: BoolArray, turn: BoolArray, largest: int) -> None:
@@ -237,8 +288,17 @@ def _panels(record: Record, count: int, labels: Sequence[str]) -> tuple[Figure, 
     rows, end = len(labels), float(record.time[-1])
     height = 2.05 * rows + 1.4
     figure = Figure(figsize=(WIDTH, height))
-    figure.subplots_adjust(left=0.065, right=0.985, top=1.0 - 0.55 / height, bottom=0.9 / height, wspace=0.1, hspace=0.12)
-    panels: list[Axes] = list(figure.subplots(rows, COLUMNS, sharex=True, sharey="row", squeeze=False).flat)
+    figure.subplots_adjust(
+        left=0.065,
+        right=0.985,
+        top=1.0 - 0.55 / height,
+        bottom=0.9 / height,
+        wspace=0.1,
+        hspace=0.12,
+    )
+    panels: list[Axes] = list(
+        figure.subplots(rows, COLUMNS, sharex=True, sharey="row", squeeze=False).flat
+    )
     ticks = np.array([tick for tick in MaxNLocator(7).tick_values(0.0, end) if 0.0 <= tick <= end])
     panels[0].set(xlim=(0.0, end), xticks=ticks)
     for index, axes in enumerate(panels):
@@ -285,7 +345,9 @@ def _band(axes: Axes, time: FloatArray, lower: FloatArray, upper: FloatArray) ->
     tolerance = 1e-3 * axes.get_ylim()[1]
     kept = [outline(time, line, tolerance) for line in (lower, upper)]
     both = np.union1d(*kept)
-    axes.fill_between(time[both], lower[both], upper[both], facecolor=OURS, alpha=0.22, linewidth=0.0)
+    axes.fill_between(
+        time[both], lower[both], upper[both], facecolor=OURS, alpha=0.22, linewidth=0.0
+    )
     for line, own in zip((lower, upper), kept, strict=True):
         axes.plot(time[own], line[own], color=OURS, linewidth=1.0)
 
@@ -311,17 +373,39 @@ def _band_handle(label: str) -> Artist:
 
 
 def _largest_handle() -> Artist:
-    return Line2D([], [], color=MARK, marker="o", markersize=4.5, linestyle="none", label="largest absolute value")
+    return Line2D(
+        [],
+        [],
+        color=MARK,
+        marker="o",
+        markersize=4.5,
+        linestyle="none",
+        label="largest absolute value",
+    )
 
 
 def _orbit_handles(window: FloatArray, moment: str) -> list[Artist]:
     return [
         Line2D([], [], color=OURS, linewidth=2.0, label="revolution of the largest motion"),
-        Line2D([], [], color=OURS, alpha=0.4, linewidth=0.9, label=f"{window[0]:.1f} s to {window[-1]:.1f} s"),
+        Line2D(
+            [],
+            [],
+            color=OURS,
+            alpha=0.4,
+            linewidth=0.9,
+            label=f"{window[0]:.1f} s to {window[-1]:.1f} s",
+        ),
         Line2D([], [], color=MARK, marker="o", markersize=5, linestyle="none", label=moment),
         Line2D([], [], color=QUIET, marker="+", markersize=10, linestyle="none", label="rest"),
     ]
 
 
 def _legend(figure: Figure, handles: Sequence[Artist]) -> None:
-    figure.legend(handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=9.5, borderaxespad=0.2)
+    figure.legend(
+        handles=handles,
+        loc="lower center",
+        ncols=len(handles),
+        frameon=False,
+        fontsize=9.5,
+        borderaxespad=0.2,
+    )

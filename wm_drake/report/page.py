@@ -47,10 +47,16 @@ def render(template: str, **values: Any) -> str:
 def sections(body: str) -> list[tuple[str, Markup]]:
     """Anchor and heading of each section of a page's text, for its contents; a heading up to its colon."""
     found = re.findall(r'<section id="([^"]+)">\s*<h2>(.*?)</h2>', body, re.DOTALL)
-    return [(anchor, Markup(heading.split(":")[0])) for anchor, heading in found]  # out of a page: escaped
+    return [
+        (anchor, Markup(heading.split(":")[0])) for anchor, heading in found
+    ]  # out of a page: escaped
 
 
 def versions_of(attrs: Mapping[str, Any]) -> str:
     """Versions of the software, from the attributes of a record."""
     prefix = "version_"
-    return ", ".join(f"{name.removeprefix(prefix)} {text}" for name, text in attrs.items() if name.startswith(prefix))
+    return ", ".join(
+        f"{name.removeprefix(prefix)} {text}"
+        for name, text in attrs.items()
+        if name.startswith(prefix)
+    )

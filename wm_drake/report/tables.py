@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from wm_drake.measures import percent_difference
 from wm_drake.parameters import Load, MachineParameters, measured_amplitudes, quantities, source_of
 from wm_drake.parameters.units import Unit
 from wm_drake.report.wording import (
@@ -22,7 +21,8 @@ from wm_drake.report.wording import (
     shape_name,
     speed_rpm,
 )
-from wm_drake.studies.spin import CaseResult, SpinResult
+from wm_drake.simulation.measures import percent_difference
+from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 OURS = "wm_drake"
 """Source of our rows in an amplitude table."""
@@ -88,22 +88,32 @@ def amplitude_table(result: SpinResult) -> pd.DataFrame:
     parts = []
     for case in result.results:
         gasket = case.record.attrs["gasket"]
-        parts.append(measured[(measured["load"] == case.case.name) & (measured["gasket"] == gasket)])
-        values = {name: MM_PER_M * float(case.measures.amplitude.sel(sensor=name)) for name in sensors}
-        parts.append(pd.DataFrame([{"load": case.case.name, "gasket": gasket, "source": OURS, **values}]))
+        parts.append(
+            measured[(measured["load"] == case.case.name) & (measured["gasket"] == gasket)]
+        )
+        values = {
+            name: MM_PER_M * float(case.measures.amplitude.sel(sensor=name)) for name in sensors
+        }
+        parts.append(
+            pd.DataFrame([{"load": case.case.name, "gasket": gasket, "source": OURS, **values}])
+        )
     return pd.concat([part for part in parts if len(part)], ignore_index=True)
 
 
 def rows_of(table: pd.DataFrame, case: CaseResult) -> pd.DataFrame:
     """The rows of an amplitude table that belong to a case."""
-    return table[(table["load"] == case.case.name) & (table["gasket"] == case.record.attrs["gasket"])]
+    return table[
+        (table["load"] == case.case.name) & (table["gasket"] == case.record.attrs["gasket"])
+    ]
 
 
 def experiment_mm(table: pd.DataFrame, case: CaseResult) -> dict[str, float] | None:
     """Measured amplitude by sensor of a case; None if the machine file has none. [mm]"""
     rows = rows_of(table, case)
     rows = rows[rows["source"] == EXPERIMENT]
-    return None if rows.empty else {str(name): float(rows.iloc[0][name]) for name in table.columns[3:]}
+    return (
+        None if rows.empty else {str(name): float(rows.iloc[0][name]) for name in table.columns[3:]}
+    )
 
 
 def differences(table: pd.DataFrame, case: CaseResult, source: str = OURS) -> list[Difference]:
@@ -114,8 +124,12 @@ def differences(table: pd.DataFrame, case: CaseResult, source: str = OURS) -> li
     if reference is None or rows.empty:
         return []
     sensors = list(reference)
-    value = xr.DataArray(rows.iloc[0][sensors].to_numpy(dtype=float), {"sensor": sensors}, ["sensor"])
-    change = percent_difference(value, xr.DataArray(list(reference.values()), {"sensor": sensors}, ["sensor"]))
+    value = xr.DataArray(
+        rows.iloc[0][sensors].to_numpy(dtype=float), {"sensor": sensors}, ["sensor"]
+    )
+    change = percent_difference(
+        value, xr.DataArray(list(reference.values()), {"sensor": sensors}, ["sensor"])
+    )
     return [Difference(case_title(case), name, float(change.sel(sensor=name))) for name in sensors]
 
 
@@ -125,7 +139,9 @@ def comparison(result: SpinResult, table: pd.DataFrame) -> Table:
     groups = []
     for case in result.results:
         rows = [_amplitudes(row, sensors) for _, row in rows_of(table, case).iterrows()]
-        others = [source for source in rows_of(table, case)["source"] if source not in (EXPERIMENT, OURS)]
+        others = [
+            source for source in rows_of(table, case)["source"] if source not in (EXPERIMENT, OURS)
+        ]
         for source in dict.fromkeys([*others, OURS]):
             rows += _difference(differences(table, case, source), source)
         groups.append(Group(case_title(case), tuple(rows)))
@@ -146,18 +162,29 @@ def _difference(changes: list[Difference], source: str) -> list[Row]:
     if not changes:
         return []
     mean = float(np.mean([abs(change.percent) for change in changes]))
-    cells = (f"{source} vs. {EXPERIMENT}", *(percent(c.percent) for c in changes), percent(mean).lstrip("+"))
+    cells = (
+        f"{source} vs. {EXPERIMENT}",
+        *(percent(c.percent) for c in changes),
+        percent(mean).lstrip("+"),
+    )
     return [Row(cells, "difference" if source == OURS else "difference other")]
 
 
 def critical_speeds(result: SpinResult) -> Table:
     """Drum speed at which each sensor moves most."""
     groups = [
-        line(case_title(case), [number(RPM_PER_RAD_S * float(speed), 0) for speed in case.measures.critical_speed])
+        line(
+            case_title(case),
+            [number(RPM_PER_RAD_S * float(speed), 0) for speed in case.measures.critical_speed],
+        )
         for case in result.results
     ]
     header = ("load", *(f"{name}, rpm" for name in result.parameters.sensors))
-    return Table("Critical speeds: drum speed at which the displacement of each sensor is largest.", header, tuple(groups))
+    return Table(
+        "Critical speeds: drum speed at which the displacement of each sensor is largest.",
+        header,
+        tuple(groups),
+    )
 
 
 def largest_values(result: SpinResult) -> Table:
@@ -166,8 +193,17 @@ def largest_values(result: SpinResult) -> Table:
         "D: largest displacement from rest of the tub point nearest the detergent box. F, M: largest force and moment of the "
         "gasket on the housing. Absolute values over the whole run, per axis."
     )
-    header = ("load", *(f"{name}{axis}, {unit}" for name, unit in (("D", "mm"), ("F", "N"), ("M", "N m")) for axis in "xyz"))
-    return Table(caption, header, tuple(line(case_title(case), _d_f_m(case)) for case in result.results))
+    header = (
+        "load",
+        *(
+            f"{name}{axis}, {unit}"
+            for name, unit in (("D", "mm"), ("F", "N"), ("M", "N m"))
+            for axis in "xyz"
+        ),
+    )
+    return Table(
+        caption, header, tuple(line(case_title(case), _d_f_m(case)) for case in result.results)
+    )
 
 
 def _d_f_m(case: CaseResult) -> list[str]:
@@ -177,7 +213,10 @@ def _d_f_m(case: CaseResult) -> list[str]:
     decimals = [1] * 3 + [2] * 3
     if not has_gasket(case):
         return [*shown, *[MISSING] * len(gasket)]
-    return [*shown, *(number(float(value), places) for value, places in zip(gasket, decimals, strict=True))]
+    return [
+        *shown,
+        *(number(float(value), places) for value, places in zip(gasket, decimals, strict=True)),
+    ]
 
 
 def smallest_gaps(result: SpinResult) -> Table:
@@ -186,7 +225,17 @@ def smallest_gaps(result: SpinResult) -> Table:
         "Smallest gap between what moves with the tub and the housing, over all samples; below zero the parts overlap. The "
         "place is that of the point of the moving part: x to the right, y to the rear, z up, from drum mid-depth at rest."
     )
-    header = ("load", "moving part", "part of the housing", "gap, mm", "drum speed, rpm", "time, s", "x, mm", "y, mm", "z, mm")
+    header = (
+        "load",
+        "moving part",
+        "part of the housing",
+        "gap, mm",
+        "drum speed, rpm",
+        "time, s",
+        "x, mm",
+        "y, mm",
+        "z, mm",
+    )
     return Table(caption, header, tuple(_gap(case) for case in result.results), text_columns=3)
 
 
@@ -196,22 +245,34 @@ def _gap(case: CaseResult) -> Group:
         return line(case_title(case), ["not measured", *[MISSING] * 7])
     place = [number(MM_PER_M * value, 0) for value in gap.point]
     speed = number(speed_rpm(case, gap.time), 0)
-    cells = [shape_name(gap.moving), shape_name(gap.fixed), number(MM_PER_M * gap.distance), speed, number(gap.time, 2), *place]
+    cells = [
+        shape_name(gap.moving),
+        shape_name(gap.fixed),
+        number(MM_PER_M * gap.distance),
+        speed,
+        number(gap.time, 2),
+        *place,
+    ]
     return line(case_title(case), cells, "alarm" if gap.distance <= 0.0 else "")
 
 
 def loads(result: SpinResult) -> Table:
     """The point masses of each case."""
-    caption = (
-        "Loads that were run: point masses in the drum. Phase 0 is up at drum angle 0; y counts to the rear from mid-depth."
-    )
+    caption = "Loads that were run: point masses in the drum. Phase 0 is up at drum angle 0; y counts to the rear from mid-depth."
     groups = (Group(case_title(case), _masses(case.case.load)) for case in result.results)
     return Table(caption, ("load", "mass, kg", "radius, mm", "y, mm", "phase, deg"), tuple(groups))
 
 
 def _masses(load: Load) -> tuple[Row, ...]:
     rows = [
-        Row((number(u.mass, 3), number(MM_PER_M * u.radius), number(MM_PER_M * u.y), number(float(np.rad2deg(u.phase)))))
+        Row(
+            (
+                number(u.mass, 3),
+                number(MM_PER_M * u.radius),
+                number(MM_PER_M * u.y),
+                number(float(np.rad2deg(u.phase))),
+            )
+        )
         for u in load.unbalances
     ]
     return tuple(rows) or (Row(("0 (empty drum)", *[MISSING] * 3)),)
@@ -221,13 +282,24 @@ def profiles(result: SpinResult) -> Table:
     """The corner points of each case's spin profile."""
     cases: dict[tuple[tuple[float, ...], tuple[float, ...]], list[str]] = {}
     for case in result.results:
-        cases.setdefault((case.case.profile.time, case.case.profile.speed), []).append(case_title(case))
-    groups = (Group("all loads" if len(cases) == 1 else "; ".join(names), _points(*points)) for points, names in cases.items())
-    return Table("Spin profile, linear between these points.", ("load", "time, s", "drum speed, rpm"), tuple(groups))
+        cases.setdefault((case.case.profile.time, case.case.profile.speed), []).append(
+            case_title(case)
+        )
+    groups = (
+        Group("all loads" if len(cases) == 1 else "; ".join(names), _points(*points))
+        for points, names in cases.items()
+    )
+    return Table(
+        "Spin profile, linear between these points.",
+        ("load", "time, s", "drum speed, rpm"),
+        tuple(groups),
+    )
 
 
 def _points(times: Sequence[float], speeds: Sequence[float]) -> tuple[Row, ...]:
-    rows = [Row((number(t, 3), number(RPM_PER_RAD_S * w))) for t, w in zip(times, speeds, strict=True)]
+    rows = [
+        Row((number(t, 3), number(RPM_PER_RAD_S * w))) for t, w in zip(times, speeds, strict=True)
+    ]
     if len(rows) > MOST_SHOWN:
         half = MOST_SHOWN // 2
         rows[half:-half] = [Row((f"{len(rows) - 2 * half} more", "…"))]
@@ -237,7 +309,8 @@ def _points(times: Sequence[float], speeds: Sequence[float]) -> tuple[Row, ...]:
 def parameter_table(parameters: MachineParameters) -> Table:
     """Every number of the machine: key path, value in the unit people read, source."""
     groups = (
-        line(key, [readable(value, unit), source_of(parameters, key) or MISSING]) for key, value, unit in quantities(parameters)
+        line(key, [readable(value, unit), source_of(parameters, key) or MISSING])
+        for key, value, unit in quantities(parameters)
     )
     caption = "Numbers of the machine file. Masses, inertias, shapes and mounting points are in its SDF model."
     return Table(caption, ("key", "value", "source"), tuple(groups), text_columns=3)
@@ -249,9 +322,16 @@ def changed_numbers(result: SpinResult, case: CaseResult) -> Table | None:
         return None
     common = {key: value for key, value, _ in quantities(result.parameters)}
     groups = tuple(
-        line(key, [readable(value, unit)]) for key, value, unit in quantities(case.case.parameters) if common.get(key) != value
+        line(key, [readable(value, unit)])
+        for key, value, unit in quantities(case.case.parameters)
+        if common.get(key) != value
     )
-    return Table("Numbers of this load that differ from the machine's.", ("key", "value"), groups, text_columns=2)
+    return Table(
+        "Numbers of this load that differ from the machine's.",
+        ("key", "value"),
+        groups,
+        text_columns=2,
+    )
 
 
 def readable(value: Any, unit: Unit) -> str:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from wm_drake.parameters.units import Unit
-from wm_drake.studies.spin import CaseResult
+from wm_drake.studies.spin.study import CaseResult
 
 MM_PER_M = Unit("m", "mm").from_si(1.0)
 RPM_PER_RAD_S = Unit("rad/s", "rpm").from_si(1.0)

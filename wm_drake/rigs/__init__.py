@@ -5,7 +5,15 @@ loop = force_loop(damper_bench(machine.damper_types["friction"]), Harmonic(frequ
 measures_of(loop).energy_per_cycle
 """
 
-from wm_drake.rigs.bench import AXES, Bench, BushingBench, DamperBench, Harmonic, bushing_bench, damper_bench
+from wm_drake.rigs.bench import (
+    AXES,
+    Bench,
+    BushingBench,
+    DamperBench,
+    Harmonic,
+    bushing_bench,
+    damper_bench,
+)
 from wm_drake.rigs.integration import NotSteadyError
 from wm_drake.rigs.loops import ForceLoop, LoopMeasures, force_loop, force_loops, measures_of
 from wm_drake.rigs.run import JIG_ARM, MATRICES, RigRun, run_rig

@@ -5,12 +5,13 @@ from typing import TypeAlias
 
 import numpy as np
 
+from wm_drake.elements.bushing import packed_bushing_law
+from wm_drake.elements.friction_damper import has_sponge, packed_damper_law
 from wm_drake.errors import input_error
 from wm_drake.laws.damper import MSTV
 from wm_drake.parameters import DamperType
-from wm_drake.parameters.elements import BushingType, FloatArray
-from wm_drake.systems.friction_damper import has_sponge, packed_damper_law
-from wm_drake.systems.six_component_bushing import packed_bushing_law
+from wm_drake.parameters.elements import BushingType
+from wm_drake.parameters.types import FloatArray
 
 AXES = ("x", "y", "z", "about_x", "about_y", "about_z")
 """Axes of a bushing, in the order of its law: along, then about."""
@@ -58,7 +59,10 @@ class DamperBench:
         if self.sponge_mass < 0.0:
             raise input_error(f"is {self.sponge_mass:g} kg; allowed is >= 0", key="sponge_mass")
         if self.sponge_mass > 0.0 and int(self.packed[0]) != MSTV:
-            raise input_error("only the law mstv has a sponge that can have a mass on the bench", key="sponge_mass")
+            raise input_error(
+                "only the law mstv has a sponge that can have a mass on the bench",
+                key="sponge_mass",
+            )
 
     @property
     def rotates(self) -> bool:

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from wm_drake.compiler.compilation import long_running
 from wm_drake.laws.bushing import bushing_force
-from wm_drake.laws.compilation import long_running
 from wm_drake.laws.damper import damper_response
-from wm_drake.parameters.elements import FloatArray
+from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import AXES, BushingBench
 
 

@@ -10,17 +10,21 @@ from collections.abc import Callable
 import numpy as np
 from scipy.integrate import ODEintWarning, odeint
 
+from wm_drake.compiler.compilation import long_running
 from wm_drake.errors import WmDrakeError
-from wm_drake.laws.compilation import long_running
 from wm_drake.laws.damper import damper_response
 from wm_drake.laws.friction import mstv_friction
-from wm_drake.parameters.elements import FloatArray
+from wm_drake.parameters.types import FloatArray
 
 POINTS = 1440
 """Of a period, equally spaced; reversals fall on points."""
 
 PHASE = 2.0 * np.pi * np.arange(POINTS + 1) / POINTS
-PIECES = (slice(0, POINTS // 4 + 1), slice(POINTS // 4, 3 * POINTS // 4 + 1), slice(3 * POINTS // 4, POINTS + 1))
+PIECES = (
+    slice(0, POINTS // 4 + 1),
+    slice(POINTS // 4, 3 * POINTS // 4 + 1),
+    slice(3 * POINTS // 4, POINTS + 1),
+)
 """Of `PHASE`, from reversal to reversal of the driven end, where friction has a corner: the integrator begins anew there."""
 
 MOST_PERIODS = 200
@@ -36,7 +40,9 @@ class NotSteadyError(WmDrakeError):
     """A bench whose motion does not become steady, or cannot be integrated."""
 
 
-def steady_states(packed: FloatArray, mass: FloatArray, amplitude: FloatArray, omega: FloatArray, size: int) -> FloatArray:
+def steady_states(
+    packed: FloatArray, mass: FloatArray, amplitude: FloatArray, omega: FloatArray, size: int
+) -> FloatArray:
     """States of benches over one steady period.
 
     Args:
@@ -77,7 +83,9 @@ def steady_states(packed: FloatArray, mass: FloatArray, amplitude: FloatArray, o
                     **TOLERANCES[size],
                 )
             except ODEintWarning as told:
-                raise NotSteadyError(f"a sponge on the bench cannot be integrated: {told}") from None
+                raise NotSteadyError(
+                    f"a sponge on the bench cannot be integrated: {told}"
+                ) from None
         if not np.all(np.isfinite(found)):
             raise NotSteadyError("a sponge on the bench runs away")
         return np.asarray(found)
@@ -88,11 +96,15 @@ def steady_states(packed: FloatArray, mass: FloatArray, amplitude: FloatArray, o
             parts.append(integrate(parts[-1][-1], PHASE[piece])[1:])
         return np.concatenate(parts)
 
-    closed = _closed_loop(period, np.zeros(rows * size), max(STEADY, 10.0 * TOLERANCES[size]["atol"]), leap=size == 1)
+    closed = _closed_loop(
+        period, np.zeros(rows * size), max(STEADY, 10.0 * TOLERANCES[size]["atol"]), leap=size == 1
+    )
     return closed.reshape(POINTS + 1, rows, size)
 
 
-def _closed_loop(period: Callable[[FloatArray], FloatArray], state: FloatArray, tolerance: float, *, leap: bool) -> FloatArray:
+def _closed_loop(
+    period: Callable[[FloatArray], FloatArray], state: FloatArray, tolerance: float, *, leap: bool
+) -> FloatArray:
     """Repeats periods until one ends where it began.
 
     With `leap`, for states that do not act on each other, each leaps to where the secant through its last two periods
@@ -107,9 +119,13 @@ def _closed_loop(period: Callable[[FloatArray], FloatArray], state: FloatArray, 
         if leap and before is not None:
             moved = state - before[0]
             safe = np.where(np.abs(moved) > 0.0, moved, 1.0)
-            slope = np.where(np.abs(moved) > tolerance, np.clip((end - before[1]) / safe, 0.0, 1.0 - 1e-3), 0.0)
+            slope = np.where(
+                np.abs(moved) > tolerance, np.clip((end - before[1]) / safe, 0.0, 1.0 - 1e-3), 0.0
+            )
         change = end - state
-        step = np.where(np.abs(change) > tolerance, change / (1.0 - slope), change)  # below it, a change is that of integration
+        step = np.where(
+            np.abs(change) > tolerance, change / (1.0 - slope), change
+        )  # below it, a change is that of integration
         if np.max(np.abs(step)) <= tolerance:
             return states
         before, state = (state, end), state + step
@@ -121,7 +137,9 @@ def deformation_rates(phase, deformation, packed, amplitude, omega, rates):  # t
     """Rates by phase of the deformations of massless sponges, both in amplitudes."""
     for i in range(len(amplitude)):
         speed = amplitude[i] * omega[i]
-        _, rate = damper_response(int(packed[i, 0]), speed * np.cos(phase), amplitude[i] * deformation[i], packed[i], 1)
+        _, rate = damper_response(
+            int(packed[i, 0]), speed * np.cos(phase), amplitude[i] * deformation[i], packed[i], 1
+        )
         rates[i] = rate / speed
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wm_drake.errors import input_error
-from wm_drake.parameters.elements import FloatArray
+from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import Bench, BushingBench, DamperBench, Harmonic
 from wm_drake.rigs.forces import bushing_loads, damper_tensions
 from wm_drake.rigs.integration import PHASE, steady_states
@@ -65,7 +65,10 @@ def force_loops(bench: Bench, motions: Sequence[Harmonic]) -> list[ForceLoop]:
     """The same for several motions, integrated side by side."""
     phase = PHASE[:-1]
     if isinstance(bench, BushingBench):
-        return [_loop(bench, motion, bushing_loads(bench, *_driven(bench, motion, phase))) for motion in motions]
+        return [
+            _loop(bench, motion, bushing_loads(bench, *_driven(bench, motion, phase)))
+            for motion in motions
+        ]
     amplitude = np.array([motion.amplitude for motion in motions])
     omega = np.array([motion.angular_frequency for motion in motions])
     packed = np.tile(bench.packed, (len(motions), 1))
@@ -78,7 +81,9 @@ def force_loops(bench: Bench, motions: Sequence[Harmonic]) -> list[ForceLoop]:
     ]
 
 
-def steady_deformations(bench: DamperBench, packed: FloatArray, amplitude: FloatArray, omega: FloatArray) -> FloatArray:
+def steady_deformations(
+    bench: DamperBench, packed: FloatArray, amplitude: FloatArray, omega: FloatArray
+) -> FloatArray:
     """Deformation of massless sponges over a steady period, at `PHASE` (r, POINTS + 1); zero where the law has none. [m]
 
     Args:
@@ -100,7 +105,8 @@ def measures_of(loop: ForceLoop) -> LoopMeasures:
     return LoopMeasures(
         peak_force=float(np.max(np.abs(loop.force))),
         energy_per_cycle=energy,
-        equivalent_damping=energy / (np.pi * loop.motion.angular_frequency * loop.motion.amplitude**2),
+        equivalent_damping=energy
+        / (np.pi * loop.motion.angular_frequency * loop.motion.amplitude**2),
         dynamic_stiffness=float(np.abs(fundamental)),
         loss_angle=float(np.angle(fundamental)),
     )
@@ -109,22 +115,34 @@ def measures_of(loop: ForceLoop) -> LoopMeasures:
 def _driven(bench: Bench, motion: Harmonic, phase: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Displacement and velocity of the driven end."""
     if isinstance(bench, BushingBench) and bench.arm and motion.amplitude >= bench.arm:
-        raise input_error(f"is {motion.amplitude:g} m; allowed is less than the arm, {bench.arm:g} m", key="amplitude")
+        raise input_error(
+            f"is {motion.amplitude:g} m; allowed is less than the arm, {bench.arm:g} m",
+            key="amplitude",
+        )
     speed = motion.amplitude * motion.angular_frequency
     velocity = speed * np.cos(phase)
-    velocity[np.abs(velocity) < 1e-12 * speed] = 0.0  # at its reversals it stands still, and dry friction must know
+    velocity[np.abs(velocity) < 1e-12 * speed] = (
+        0.0  # at its reversals it stands still, and dry friction must know
+    )
     return motion.amplitude * np.sin(phase), velocity
 
 
 def _tension_of_heavy_sponge(bench: DamperBench, motion: Harmonic) -> FloatArray:
     phase = PHASE[:-1]
     amplitude, omega = motion.amplitude, motion.angular_frequency
-    states = steady_states(bench.packed[None], np.array([bench.sponge_mass]), np.array([amplitude]), np.array([omega]), 2)[
-        :-1, 0
-    ]
+    states = steady_states(
+        bench.packed[None],
+        np.array([bench.sponge_mass]),
+        np.array([amplitude]),
+        np.array([omega]),
+        2,
+    )[:-1, 0]
     displacement, velocity = _driven(bench, motion, phase)
     k1, c1 = bench.packed[4], bench.packed[5]
-    return np.asarray(k1 * (displacement - amplitude * states[:, 0]) + c1 * (velocity - amplitude * omega * states[:, 1]))
+    return np.asarray(
+        k1 * (displacement - amplitude * states[:, 0])
+        + c1 * (velocity - amplitude * omega * states[:, 1])
+    )
 
 
 def _loop(bench: Bench, motion: Harmonic, force: FloatArray) -> ForceLoop:

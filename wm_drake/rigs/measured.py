@@ -6,8 +6,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from wm_drake.errors import input_error
-from wm_drake.parameters.elements import FloatArray
 from wm_drake.parameters.loop_files import MeasuredLoop
+from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import Harmonic
 
 LARGEST_DISTORTION = 0.2
@@ -54,7 +54,10 @@ def measured_motion(loop: MeasuredLoop) -> MeasuredMotion:
     )
     frequency = float(found.x)
     if frequency * length < WHOLE_PERIOD:
-        raise input_error(f"covers {frequency * length:.2f} of a period; a loop needs at least one", where=loop.path)
+        raise input_error(
+            f"covers {frequency * length:.2f} of a period; a loop needs at least one",
+            where=loop.path,
+        )
     amounts, error = _projected(time, loop.displacement, frequency)
     amplitude = float(np.hypot(amounts[0], amounts[1]))
     distortion = float(np.sqrt(error / len(time))) / amplitude if amplitude > 0.0 else np.inf

@@ -8,7 +8,7 @@ import numpy as np
 
 from wm_drake.laws.damper import MSTV
 from wm_drake.laws.friction import mstv_friction
-from wm_drake.parameters.elements import FloatArray
+from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import Bench, DamperBench, Harmonic
 from wm_drake.rigs.loops import ForceLoop, LoopMeasures, force_loops, measures_of
 
@@ -25,7 +25,9 @@ _C_DAMPER = (
     *itertools.product((6.67, 10.0), (0.3, 0.5, 1.0, 1.5)),
 )
 MATRICES: dict[str, dict[str, tuple[Harmonic, ...]]] = {
-    component: {paper: tuple(Harmonic(f, a * _MM) for f, a in tests) for paper, tests in papers.items()}
+    component: {
+        paper: tuple(Harmonic(f, a * _MM) for f, a in tests) for paper, tests in papers.items()
+    }
     for component, papers in {
         "damper": {"A": _A_DAMPER, "C": _C_DAMPER},
         "bushing": {"A": _A_BUSHING},
@@ -71,9 +73,13 @@ def run_rig(
     return RigRun(title, bench, numbers, loops, tuple(map(measures_of, loops)))
 
 
-def mstv_friction_curves(bench: Bench, deformation_rates: Sequence[float], rates: FloatArray) -> FloatArray | None:
+def mstv_friction_curves(
+    bench: Bench, deformation_rates: Sequence[float], rates: FloatArray
+) -> FloatArray | None:
     """Friction over the velocity of the slider at held deformation rates, as [C] Fig. 12; None for other laws. [m/s -> N]"""
     if not isinstance(bench, DamperBench) or int(bench.packed[0]) != MSTV:
         return None
     f_max, c_m, epsilon = bench.packed[1:4]
-    return np.array([[mstv_friction(w, u, f_max, c_m, epsilon) for w in rates] for u in deformation_rates])
+    return np.array(
+        [[mstv_friction(w, u, f_max, c_m, epsilon) for w in rates] for u in deformation_rates]
+    )

@@ -7,12 +7,8 @@ import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import BasicVector_, NumericParameterIndex
 
-from wm_drake.laws.compilation import generic
-
-PLANT_STATE_SIZE = 14
-"""q = [roll, pitch, yaw, x, y, z, drum angle] and v = [w_WT, v_WTo, drum rate] of the plant."""
-GENERALIZED_FORCE_SIZE = 7
-"""Moment about To and force on the tub in W, then the torque on the drum joint."""
+from wm_drake.compiler.compilation import generic
+from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE
 
 SCALARS = (float, AutoDiffXd)
 """Scalar types of all systems: one more would make Drake trace Python callbacks symbolically."""
@@ -23,7 +19,7 @@ def evaluator(compiled: Any, scalar: type) -> Callable[..., None]:
     return compiled if scalar is float else generic(compiled)
 
 
-class ForceElement:
+class ElementSystem:
     """Mixin of the LeafSystems that put a force on the plant.
 
         plant_state ──▶ [ element ] ──▶ generalized_force   on the plant, 7: moment about To, force (W), drum torque
@@ -37,7 +33,13 @@ class ForceElement:
     """
 
     def declare_element(
-        self, scalar: type, evaluate: Any, parameters: np.ndarray, force_size: int, state_size: int, trees: int = 1
+        self,
+        scalar: type,
+        evaluate: Any,
+        parameters: np.ndarray,
+        force_size: int,
+        state_size: int,
+        trees: int = 1,
     ) -> None:
         """Declares ports and parameters. `self` is a LeafSystem of the given scalar type.
 
@@ -65,7 +67,9 @@ class ForceElement:
         if own_state_port is not None:
             needs.add(own_state_port.ticket())
         first = "generalized_force_and_rate" if state_size else "generalized_force"
-        system.DeclareVectorOutputPort(first, trees * GENERALIZED_FORCE_SIZE + state_size, calc_generalized_force, needs)
+        system.DeclareVectorOutputPort(
+            first, trees * GENERALIZED_FORCE_SIZE + state_size, calc_generalized_force, needs
+        )
         system.DeclareVectorOutputPort("force", force_size, calc_force, needs)
 
     def set_parameters(self, context: Any, parameters: np.ndarray, name: str = "") -> None:
@@ -76,12 +80,17 @@ class ForceElement:
         """
         if len(parameters) != len(self.packed):
             name = name or self.get_name()  # type: ignore[attr-defined]
-            raise ValueError(f"{name}: a table has another number of points than the built machine's; build a new one")
+            raise ValueError(
+                f"{name}: a table has another number of points than the built machine's; build a new one"
+            )
         context.get_mutable_numeric_parameter(self.parameter_index).SetFromVector(parameters)
 
     def hold(self, context: Any) -> None:
         """Keeps the parameters of a Context at hand, where they lie, until `release`; the Context must last so long."""
-        self._held.both = context, np.asarray(context.get_numeric_parameter(self.parameter_index).value())
+        self._held.both = (
+            context,
+            np.asarray(context.get_numeric_parameter(self.parameter_index).value()),
+        )
 
     def release(self) -> None:
         """The end of `hold`."""
@@ -130,18 +139,39 @@ def _callbacks(
         return np.array([value.value() for value in parameters.CopyToVector()])
 
     def calc_generalized_force(context: Any, output: Any) -> None:
-        run(plant_state(context), own_state(context), numbers(context), generalized_force, force, rate)
+        run(
+            plant_state(context),
+            own_state(context),
+            numbers(context),
+            generalized_force,
+            force,
+            rate,
+        )
         output.SetFromVector(both)
 
     def calc_force(context: Any, output: Any) -> None:
-        run(plant_state(context), own_state(context), numbers(context), generalized_force, force, rate)
+        run(
+            plant_state(context),
+            own_state(context),
+            numbers(context),
+            generalized_force,
+            force,
+            rate,
+        )
         output.SetFromVector(force)
 
     def calc_stateless_force(context: Any, output: Any) -> None:
-        run(plant_state(context), no_state, numbers(context), output.get_mutable_value(), force, no_state)
+        run(
+            plant_state(context),
+            no_state,
+            numbers(context),
+            output.get_mutable_value(),
+            force,
+            no_state,
+        )
 
     in_place = scalar is float and not state_size
     return calc_stateless_force if in_place else calc_generalized_force, calc_force
 
 
-__all__ = ["GENERALIZED_FORCE_SIZE", "PLANT_STATE_SIZE", "SCALARS", "ForceElement", "evaluator"]
+__all__ = ["GENERALIZED_FORCE_SIZE", "PLANT_STATE_SIZE", "SCALARS", "ElementSystem", "evaluator"]

@@ -24,7 +24,7 @@ def SpeedSource_(T: type) -> Any:
               parameter: angular acceleration [rad/s^2]
 
         A profile jumps from piece to piece. An explicit integrator must not see a jump inside a step, so whoever runs the
-        simulation ends a step there and sets the next piece's acceleration (`wm_drake.drake_engine`).
+        simulation ends a step there and sets the next piece's acceleration (`wm_drake.engines.drake`).
         """
 
         def _construct(self, converter: Any = None) -> None:
@@ -37,11 +37,16 @@ def SpeedSource_(T: type) -> Any:
             Impl._construct(self, converter=converter)
 
         def _calc_actuation(self, context: Any, output: Any) -> None:
-            output.SetFromVector(REFLECTED_INERTIA * context.get_numeric_parameter(self.parameter_index).CopyToVector())
+            output.SetFromVector(
+                REFLECTED_INERTIA
+                * context.get_numeric_parameter(self.parameter_index).CopyToVector()
+            )
 
         def set_acceleration(self, context: Any, acceleration: float) -> None:
             """Sets the acceleration [rad/s^2] in the source's own Context."""
-            context.get_mutable_numeric_parameter(self.parameter_index).SetFromVector([acceleration])
+            context.get_mutable_numeric_parameter(self.parameter_index).SetFromVector(
+                [acceleration]
+            )
 
     Impl = SpeedSource
     return SpeedSource

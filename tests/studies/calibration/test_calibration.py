@@ -6,17 +6,22 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wm_drake.batch.ledger import open_ledger
 from wm_drake.errors import InputError
-from wm_drake.ledger import open_ledger
-from wm_drake.machine import build_machine
+from wm_drake.model.machine import build_machine
 from wm_drake.parameters import SpinProfile, load_machine
 from wm_drake.parameters.free import Measured, load_free
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
 from wm_drake.studies.calibration.outcome import amplitude_rows, quantity_table, solved_machine
+from wm_drake.studies.calibration.parameter_map import turning_of
 from wm_drake.studies.calibration.prediction import check_left_out, predict
 from wm_drake.studies.calibration.solutions import Solution, distinct
-from wm_drake.studies.calibration.targets import Targets, amplitudes_at, preload_residuals, targets_of
-from wm_drake.studies.calibration.turning import turning_of
+from wm_drake.studies.calibration.targets import (
+    Targets,
+    amplitudes_at,
+    preload_residuals,
+    targets_of,
+)
 
 FREE = """
 quantities:
@@ -74,7 +79,9 @@ def free_file(tmp_path, text=FREE):
     return load_free(path)
 
 
-def planted(machine, turning, point, loads=(("middle", True), ("counter", True), ("counter", False))):
+def planted(
+    machine, turning, point, loads=(("middle", True), ("counter", True), ("counter", False))
+):
     """Targets that a machine at a point gives."""
     amplitude = amplitudes_at(machine, turning, loads, np.array([point]))[0, 0]
     return Targets(loads, tuple(machine.parameters.sensors), amplitude, np.ones(amplitude.shape))
@@ -85,14 +92,19 @@ def test_quantities_enter_their_values_linearly(short, tmp_path):
     drawn = turning.base.frames
     made = turning.parameters_at(np.array([40.0, 0.03, 5.5, 4000.0, 10.0]))
     assert made.damper_types["friction"].friction_force == 40.0
-    assert made.frames["damper_left_housing"].position == (-0.03, *drawn["damper_left_housing"].position[1:])
+    assert made.frames["damper_left_housing"].position == (
+        -0.03,
+        *drawn["damper_left_housing"].position[1:],
+    )
     assert made.frames["damper_right_rear_housing"].position[0] == 0.03
     assert made.bodies["motor"].mass == 5.5
     assert made.bodies["motor"].inertia.xx == pytest.approx(5.5 * 0.0024)
     assert made.bodies["motor"].inertia.yy == turning.base.bodies["motor"].inertia.yy
     assert made.gasket.stiffness_x.force == pytest.approx((-130.0, 0.0, 130.0))
     assert made.gasket.stiffness_x.displacement == short.parameters.gasket.stiffness_x.displacement
-    assert turning.parameters_at(turning.expected).bodies["motor"].mass == 5.0  # the base was not written into
+    assert (
+        turning.parameters_at(turning.expected).bodies["motor"].mass == 5.0
+    )  # the base was not written into
 
 
 def test_spelled_out_machine_is_the_drawn_one(short, tmp_path):
@@ -105,16 +117,31 @@ def test_spelled_out_machine_is_the_drawn_one(short, tmp_path):
 
 
 FAULTS = {
-    "no bounds": (FREE.replace("    bounds: (10, 60) N\n", ""), "quantities.friction.bounds: is missing"),
+    "no bounds": (
+        FREE.replace("    bounds: (10, 60) N\n", ""),
+        "quantities.friction.bounds: is missing",
+    ),
     "one bound": (FREE.replace("(10, 60) N", "10 N"), "is not two numbers with a unit"),
     "falling bounds": (FREE.replace("(10, 60) N", "(60, 10) N"), "the bounds must rise"),
-    "prior outside": (FREE.replace("(30, 10) N", "(70, 10) N"), "the expected value is outside the bounds"),
-    "prior of no width": (FREE.replace("(30, 10) N", "(30, 0) N"), "standard deviation must be above 0"),
-    "prior in another dimension": (FREE.replace("(30, 10) N", "(30, 10) kg"), "the prior is in kg, the bounds in N"),
+    "prior outside": (
+        FREE.replace("(30, 10) N", "(70, 10) N"),
+        "the expected value is outside the bounds",
+    ),
+    "prior of no width": (
+        FREE.replace("(30, 10) N", "(30, 0) N"),
+        "standard deviation must be above 0",
+    ),
+    "prior in another dimension": (
+        FREE.replace("(30, 10) N", "(30, 10) kg"),
+        "the prior is in kg, the bounds in N",
+    ),
     "unknown unit": (FREE.replace("(10, 60) N", "(10, 60) Nn"), "unit 'Nn' is not known"),
     "unknown word": (FREE + "    colour: red\n", "unknown key 'colour'"),
     "nothing free": ("quantities: {}\n", "quantities"),
-    "preload that is no force": (PRELOAD.replace(") N", ") kg") + FREE, "the prior is in kg, a preload in N"),
+    "preload that is no force": (
+        PRELOAD.replace(") N", ") kg") + FREE,
+        "the prior is in kg, a preload in N",
+    ),
 }
 
 
@@ -127,15 +154,27 @@ def test_faulty_free_file_is_refused_with_its_line(fault, tmp_path):
 
 
 MISFITS = {
-    "unknown key": (FREE.replace("friction_force", "fricton_force"), "is no number of the machine (did you mean"),
-    "unknown frame": (FREE.replace("damper_left_housing", "damper_lft_housing"), "no frame 'damper_lft_housing'"),
+    "unknown key": (
+        FREE.replace("friction_force", "fricton_force"),
+        "is no number of the machine (did you mean",
+    ),
+    "unknown frame": (
+        FREE.replace("damper_left_housing", "damper_lft_housing"),
+        "no frame 'damper_lft_housing'",
+    ),
     "unknown body": (FREE.replace("bodies.motor.mass", "bodies.motr.mass"), "no link 'motr'"),
     "wrong dimension": (
         FREE.replace("(10, 60) N", "(10, 60) kg").replace("(30, 10) N", "(30, 10) kg"),
         "is in N, which kg does not",
     ),
-    "factor for a table": (FREE + TABLE.replace('"(-30, 0, 30) mm"', '"(-30, 30) mm"'), "takes a list of 3 factors, not 2"),
-    "factor of the wrong dimension": (FREE.replace("0.0024 m^2", "0.0024 m"), "which kg times m does not give"),
+    "factor for a table": (
+        FREE + TABLE.replace('"(-30, 0, 30) mm"', '"(-30, 30) mm"'),
+        "takes a list of 3 factors, not 2",
+    ),
+    "factor of the wrong dimension": (
+        FREE.replace("0.0024 m^2", "0.0024 m"),
+        "which kg times m does not give",
+    ),
 }
 
 
@@ -148,11 +187,16 @@ def test_free_file_that_does_not_fit_the_machine_is_refused(misfit, short, tmp_p
 
 
 def measured(rows):
-    return pd.DataFrame(rows, columns=["load", "gasket", "source", "Xr", "Yr", "Zr", "Xf", "Yf", "Zf"])
+    return pd.DataFrame(
+        rows, columns=["load", "gasket", "source", "Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
+    )
 
 
 def test_targets_are_the_rows_of_the_experiment(reference):
-    rows = [["middle", "no", "experiment", *range(1, 7)], ["middle", "no", "another model", *range(6)]]
+    rows = [
+        ["middle", "no", "experiment", *range(1, 7)],
+        ["middle", "no", "another model", *range(6)],
+    ]
     targets = targets_of(reference, measured(rows))
     assert targets.loads == (("middle", False),)
     assert targets.amplitude == pytest.approx(np.arange(1, 7)[None] * 1e-3)
@@ -161,7 +205,10 @@ def test_targets_are_the_rows_of_the_experiment(reference):
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
-        ([["midle", "no", "experiment", *range(1, 7)]], "no load 'midle' in the machine (did you mean 'middle'?"),
+        (
+            [["midle", "no", "experiment", *range(1, 7)]],
+            "no load 'midle' in the machine (did you mean 'middle'?",
+        ),
         ([["back", "no", "experiment", *range(1, 7)]] * 2, "'back' is there twice"),
         ([["back", "no", "experiment", *range(6)]], "not above 0"),
         ([["back", "no", "a model", *range(1, 7)]], "has no row of source 'experiment'"),
@@ -175,9 +222,9 @@ def test_targets_that_cannot_be_aimed_at_are_refused(rows, message, reference):
 
 
 def test_point_that_is_no_machine_has_no_amplitudes_and_harms_no_other(short, tmp_path):
-    text = FREE.replace("{bodies.motor.mass: 1, bodies.motor.inertia.xx: 0.0024 m^2}", "bodies.motor.mass").replace(
-        "(4, 6)", "(-6, 6)"
-    )
+    text = FREE.replace(
+        "{bodies.motor.mass: 1, bodies.motor.inertia.xx: 0.0024 m^2}", "bodies.motor.mass"
+    ).replace("(4, 6)", "(-6, 6)")
     turning = turning_of(short, free_file(tmp_path, text))
     points = np.array([[30.0, 0.0, 5.0], [30.0, 0.0, -5.0], [30.0, 0.0, 5.0]])
     values = amplitudes_at(short, turning, (("middle", True),), points)
@@ -188,13 +235,18 @@ def test_point_that_is_no_machine_has_no_amplitudes_and_harms_no_other(short, tm
 
 def test_preloads_of_the_springs_are_held_against_what_is_expected(short, tmp_path):
     turning = turning_of(short, free_file(tmp_path, PRELOAD + FREE))
-    points = np.array([[30.0, 0.02, 5.0], [30.0, 0.02, 500.0]])  # the second has a motor that no spring holds
+    points = np.array(
+        [[30.0, 0.02, 5.0], [30.0, 0.02, 500.0]]
+    )  # the second has a motor that no spring holds
     springs = short.set_up(parameters=turning.parameters_at(points[0])).springs.values()
     expected = [(spring.preload - 100.0) / 20.0 for spring in springs]
     residuals = preload_residuals(short, turning, points)
     assert residuals[0] == pytest.approx(expected)
     assert np.isnan(residuals[1]).all()
-    assert preload_residuals(short, turning_of(short, free_file(tmp_path, FREE)), points).shape == (2, 0)
+    assert preload_residuals(short, turning_of(short, free_file(tmp_path, FREE)), points).shape == (
+        2,
+        0,
+    )
 
 
 def test_expected_preload_is_prior_not_data(short, tmp_path):
@@ -209,18 +261,26 @@ def test_expected_preload_is_prior_not_data(short, tmp_path):
 
 
 def test_weights_go_by_load_by_sensor_and_by_both():
-    targets = Targets((("a", False), ("a", True), ("b", True)), ("X", "Y"), np.ones((3, 2)), np.ones((3, 2)))
+    targets = Targets(
+        (("a", False), ("a", True), ("b", True)), ("X", "Y"), np.ones((3, 2)), np.ones((3, 2))
+    )
     weight = targets.weighted({"a": 2.0, "Y": 3.0, "b:X": 0.0}).weight
     assert weight.tolist() == [[2.0, 6.0], [2.0, 6.0], [0.0, 3.0]]
     assert targets.weight.all()
-    for key, factor, message in (("c", 1.0, "'c' is no load"), ("a:Q", 1.0, "'a:Q' is no load"), ("a", -1.0, "below 0")):
+    for key, factor, message in (
+        ("c", 1.0, "'c' is no load"),
+        ("a:Q", 1.0, "'a:Q' is no load"),
+        ("a", -1.0, "below 0"),
+    ):
         with pytest.raises(InputError, match=message):
             targets.weighted({key: factor})
 
 
 def test_gasket_effect_is_the_change_the_gasket_makes():
     amplitude = np.array([[2.0, 1.0], [3.0, 0.5], [9.0, 9.0]])
-    targets = Targets((("a", False), ("a", True), ("b", True)), ("X", "Y"), amplitude, np.ones((3, 2)))
+    targets = Targets(
+        (("a", False), ("a", True), ("b", True)), ("X", "Y"), amplitude, np.ones((3, 2))
+    )
     effects = targets.gasket_effects(amplitude)
     assert list(effects) == ["a"]
     assert effects["a"] == pytest.approx([0.5, -0.5])
@@ -233,7 +293,10 @@ def recovered(short, tmp_path_factory):
     free = free_file(folder)
     turning = turning_of(short, free)
     truth = turning.expected + np.array([-0.7, 0.6, 0.9]) * turning.deviation
-    targets, plan = planted(short, turning, truth), Plan(starts=2, seed=4, iterations=12, deviation=0.002, resolution=0.0)
+    targets, plan = (
+        planted(short, turning, truth),
+        Plan(starts=2, seed=4, iterations=12, deviation=0.002, resolution=0.0),
+    )
     with open_ledger(folder / "ledger.sqlite", identity_of(short, free, targets, plan)) as ledger:
         calibration = calibrate(short, free, targets, plan, ledger)
         predictions = predict(short, free, calibration, [["middle"]], ledger)
@@ -248,14 +311,20 @@ def test_planted_machine_is_recovered_within_what_the_data_are_said_to_know(reco
     sure = best.spread() * turning.deviation
     assert np.all(np.abs(best.point - truth) < 3.0 * sure + 0.02 * turning.deviation)
     assert np.nanmax(np.abs(best.errors(targets))) < 0.01
-    assert np.all(best.spread()[:2] < 0.2)  # friction and lean move the tub, the weight of the motor hardly
+    assert np.all(
+        best.spread()[:2] < 0.2
+    )  # friction and lean move the tub, the weight of the motor hardly
     assert np.sum(best.directions() > 1.0) >= 2
 
 
-def test_starting_values_which_may_have_seen_a_load_do_not_help_to_predict_it(short, recovered, tmp_path):
+def test_starting_values_which_may_have_seen_a_load_do_not_help_to_predict_it(
+    short, recovered, tmp_path
+):
     truth, free, targets, plan, calibration, predictions, _ = recovered
     knowing = {
-        name: quantity.model_copy(update={"start": Measured(values=(float(value),), unit=quantity.unit, is_list=False)})
+        name: quantity.model_copy(
+            update={"start": Measured(values=(float(value),), unit=quantity.unit, is_list=False)}
+        )
         for (name, quantity), value in zip(free.quantities.items(), truth, strict=True)
     }
     told = free.model_copy(update={"quantities": knowing})
@@ -299,7 +368,9 @@ def test_interrupted_calibration_goes_on_where_it_was(short, tmp_path, recovered
     with open_ledger(path, identity, resume=True) as ledger:
         assert len(ledger) > 5
         resumed = calibrate(short, free, targets, plan, ledger, workers=1)
-    assert quantity_table(resumed).equals(quantity_table(calibration))  # also: any number of workers
+    assert quantity_table(resumed).equals(
+        quantity_table(calibration)
+    )  # also: any number of workers
 
 
 def test_solved_machine_carries_the_origin_of_each_number(recovered):
@@ -309,7 +380,9 @@ def test_solved_machine_carries_the_origin_of_each_number(recovered):
     text = solved.sources["damper_types.friction.friction_force"]
     assert text.startswith(f"fit: friction {value} ± ")
     assert text.endswith("N (expected 30 ± 10 N)")
-    assert solved.damper_types["friction"].friction_force == pytest.approx(calibration.solutions[0].point[0], abs=0.01)
+    assert solved.damper_types["friction"].friction_force == pytest.approx(
+        calibration.solutions[0].point[0], abs=0.01
+    )
     assert len(value) <= len("12.345")  # no digits that mean nothing
     assert solved.sources["gravity"]  # others are kept
 
@@ -320,7 +393,9 @@ def test_table_of_amplitudes_is_a_file_of_measured_amplitudes(recovered, short, 
     from wm_drake.parameters import measured_amplitudes
 
     named = short.parameters.model_copy(update={"measured": (str(path),)})
-    assert targets_of(short.parameters, measured_amplitudes(named)).amplitude == pytest.approx(recovered[2].amplitude)
+    assert targets_of(short.parameters, measured_amplitudes(named)).amplitude == pytest.approx(
+        recovered[2].amplitude
+    )
 
 
 def test_unknown_load_cannot_be_left_out_nor_all_of_them():
@@ -332,7 +407,16 @@ def test_unknown_load_cannot_be_left_out_nor_all_of_them():
 
 
 def solution(coordinates, amplitude, slopes, cost=1.0):
-    return Solution(0, np.array(coordinates), np.array(coordinates), np.array([amplitude]), cost, 0.0, np.array(slopes), 1)
+    return Solution(
+        0,
+        np.array(coordinates),
+        np.array(coordinates),
+        np.array([amplitude]),
+        cost,
+        0.0,
+        np.array(slopes),
+        1,
+    )
 
 
 def test_spread_is_that_of_the_normal_distribution():
@@ -346,6 +430,11 @@ def test_distinct_solutions_are_good_and_far_apart():
     targets = Targets((("a", True),), ("X",), np.array([[1.0]]), np.ones((1, 1)))
     best, near, far, bad = (
         solution(at, [1.0 + error], [[1.0, 0.0]], cost)
-        for at, error, cost in (([0, 0], 0.1, 1.0), ([0.1, 0], 0.1, 1.1), ([2, 0], 0.11, 1.2), ([-2, 0], 0.5, 9.0))
+        for at, error, cost in (
+            ([0, 0], 0.1, 1.0),
+            ([0.1, 0], 0.1, 1.1),
+            ([2, 0], 0.11, 1.2),
+            ([-2, 0], 0.5, 9.0),
+        )
     )
     assert distinct([bad, far, near, best], targets) == [best, far]

@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from wm_drake.studies.calibration.search import METHODS, Problem, evolution_search, least_squares_search
+from wm_drake.studies.calibration.search import (
+    METHODS,
+    SearchProblem,
+    evolution_search,
+    least_squares_search,
+)
 
 TRUTH = np.array([0.8, -0.5, 0.3])
 
@@ -11,12 +16,17 @@ TRUTH = np.array([0.8, -0.5, 0.3])
 def curved(points):
     """Residuals of a planted point, sharp against the prior, with a bend."""
     offset = points - TRUTH
-    return 200.0 * np.column_stack([offset[:, 0], offset[:, 1] + offset[:, 0] ** 2, offset[:, 2] - 0.5 * offset[:, 1] ** 2])
+    return 200.0 * np.column_stack(
+        [offset[:, 0], offset[:, 1] + offset[:, 0] ** 2, offset[:, 2] - 0.5 * offset[:, 1] ** 2]
+    )
 
 
 def problem(residuals=curved, bound=3.0, size=3):
-    return Problem(
-        lambda points: (residuals(points), residuals(points)), np.full(size, -bound), np.full(size, bound), np.zeros(size)
+    return SearchProblem(
+        lambda points: (residuals(points), residuals(points)),
+        np.full(size, -bound),
+        np.full(size, bound),
+        np.zeros(size),
     )
 
 
@@ -28,7 +38,9 @@ def test_planted_point_is_found_from_a_far_start(method):
 
 
 def test_prior_alone_holds_what_the_data_do_not_see():
-    found = least_squares_search(problem(lambda points: 50.0 * (points[:, :1] - 1.0)), np.array([0.0, 1.5, -1.0]), 30)
+    found = least_squares_search(
+        problem(lambda points: 50.0 * (points[:, :1] - 1.0)), np.array([0.0, 1.5, -1.0]), 30
+    )
     assert found.point == pytest.approx([1.0, 0.0, 0.0], abs=1e-3)
 
 
@@ -75,7 +87,9 @@ def test_hops_go_on_where_slopes_are_caught_in_a_ripple():
 
     def search(method):
         bounds = np.full(1, -3.0), np.full(1, 3.0)
-        return METHODS[method](Problem(rippled, *bounds, np.zeros(1)), np.array([-2.0]), 12, 0)
+        return METHODS[method](
+            SearchProblem(rippled, *bounds, np.zeros(1)), np.array([-2.0]), 12, 0
+        )
 
     assert search("least-squares").cost > 2.0
     assert search("basin-hopping").cost < 0.5
@@ -91,7 +105,7 @@ def test_starts_are_the_expected_machine_and_draws_that_the_seed_fixes():
 
 def test_progress_tells_points_and_a_cost_that_only_falls():
     told = []
-    watched = Problem(
+    watched = SearchProblem(
         lambda points: (curved(points), curved(points)),
         np.full(3, -3.0),
         np.full(3, 3.0),
@@ -111,12 +125,20 @@ def kinked(points):
     peaks = np.stack([np.exp(0.5 + x + 0.2 * y), np.exp(0.5 - x + 0.2 * y)])
     hard, smooth = peaks.max(axis=0), np.mean(peaks**20, axis=0) ** (1 / 20)
     other = np.exp(x - 0.3)
-    return 50.0 * np.log(np.stack([hard, other], axis=1)), 50.0 * np.log(np.stack([smooth, other], axis=1))
+    return 50.0 * np.log(np.stack([hard, other], axis=1)), 50.0 * np.log(
+        np.stack([smooth, other], axis=1)
+    )
 
 
 def test_smooth_slopes_lead_past_a_kink():
     wide = np.full(2, 6.0)
-    found = least_squares_search(Problem(kinked, -wide, wide, 0.0 * wide), np.array([-1.5, 1.0]), 60)
-    stuck = least_squares_search(Problem(lambda p: (kinked(p)[0],) * 2, -wide, wide, 0.0 * wide), np.array([-1.5, 1.0]), 60)
+    found = least_squares_search(
+        SearchProblem(kinked, -wide, wide, 0.0 * wide), np.array([-1.5, 1.0]), 60
+    )
+    stuck = least_squares_search(
+        SearchProblem(lambda p: (kinked(p)[0],) * 2, -wide, wide, 0.0 * wide),
+        np.array([-1.5, 1.0]),
+        60,
+    )
     assert found.point == pytest.approx([0.3, -4.0], abs=0.1)
     assert found.cost <= stuck.cost + 0.1

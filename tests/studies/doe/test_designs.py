@@ -37,10 +37,16 @@ def treatment_efficiency(levels, model):
     """By another coding (indicators), another normalisation (against the full factorial's determinant) and log determinants."""
 
     def columns(array):
-        main = [np.stack([array[:, f] == 0, array[:, f] == 1], axis=1).astype(float) for f in range(array.shape[1])]
+        main = [
+            np.stack([array[:, f] == 0, array[:, f] == 1], axis=1).astype(float)
+            for f in range(array.shape[1])
+        ]
         blocks = [np.ones((len(array), 1)), *main]
         if model == "main+2fi":
-            blocks += [(a[:, :, None] * b[:, None, :]).reshape(len(array), -1) for a, b in itertools.combinations(main, 2)]
+            blocks += [
+                (a[:, :, None] * b[:, None, :]).reshape(len(array), -1)
+                for a, b in itertools.combinations(main, 2)
+            ]
         return np.hstack(blocks)
 
     def logarithm(x):
@@ -53,7 +59,9 @@ def treatment_efficiency(levels, model):
 @pytest.mark.parametrize("model", MODELS)
 def test_efficiency_of_another_coding_is_the_same(d_optimal, model):
     design, _ = d_optimal
-    assert efficiency(design.levels, model) == pytest.approx(treatment_efficiency(design.levels, model), abs=1e-6)
+    assert efficiency(design.levels, model) == pytest.approx(
+        treatment_efficiency(design.levels, model), abs=1e-6
+    )
 
 
 def test_thousand_trials_are_efficient_different_and_quickly_found(d_optimal):
@@ -118,7 +126,8 @@ def test_strength_of_an_unbalanced_array_is_less():
 
 def test_small_design_is_the_best_of_all():
     best = max(
-        efficiency(level_matrix(2)[list(rows)], "main") for rows in itertools.combinations(range(9), 6)
+        efficiency(level_matrix(2)[list(rows)], "main")
+        for rows in itertools.combinations(range(9), 6)
     )  # all 84 of them
     found = max(efficiency(d_optimal_levels(2, 6, "main", seed), "main") for seed in range(5))
     assert found == pytest.approx(best)
@@ -133,14 +142,22 @@ def test_no_design_beats_the_bound(seed):
 
 def test_efficiency_does_not_know_names_of_factors_and_levels(d_optimal):
     levels = d_optimal[0].levels
-    assert efficiency(levels[:, ::-1], "main+2fi") == pytest.approx(efficiency(levels, "main+2fi"), rel=1e-10)
-    assert efficiency(-levels, "main+2fi") == pytest.approx(efficiency(levels, "main+2fi"), rel=1e-10)
+    assert efficiency(levels[:, ::-1], "main+2fi") == pytest.approx(
+        efficiency(levels, "main+2fi"), rel=1e-10
+    )
+    assert efficiency(-levels, "main+2fi") == pytest.approx(
+        efficiency(levels, "main+2fi"), rel=1e-10
+    )
     turned = ((levels.astype(int) + 2) % 3 - 1).astype(np.int8)
-    assert efficiency(turned, "main+2fi") == pytest.approx(efficiency(levels, "main+2fi"), rel=1e-10)
+    assert efficiency(turned, "main+2fi") == pytest.approx(
+        efficiency(levels, "main+2fi"), rel=1e-10
+    )
 
 
 def test_few_trials_and_large_grids():
-    assert make_design("d-optimal", NAMES[:4], trials=33).efficiency() > 0.0  # as many trials as coefficients
+    assert (
+        make_design("d-optimal", NAMES[:4], trials=33).efficiency() > 0.0
+    )  # as many trials as coefficients
     assert make_design("d-optimal", NAMES[:3], trials=27).efficiency() == pytest.approx(100.0)
     ten = make_design("d-optimal", tuple("abcdefghij"), trials=100, model="main")
     assert ten.efficiency() > 95.0
@@ -150,7 +167,10 @@ def test_few_trials_and_large_grids():
 FAULTS = {
     "kind": ({"kind": "d-optmal"}, "no design 'd-optmal' (did you mean 'd-optimal'?"),
     "model": ({"kind": "full", "model": "quadratic"}, "no model 'quadratic'"),
-    "too few": ({"kind": "d-optimal", "trials": 100}, "100 trials cannot determine the 129 coefficients"),
+    "too few": (
+        {"kind": "d-optimal", "trials": 100},
+        "100 trials cannot determine the 129 coefficients",
+    ),
     "too many": ({"kind": "d-optimal", "trials": 6562}, "6561 different trials"),
     "full of another size": ({"kind": "full", "trials": 1000}, "has 6561 trials, not 1000"),
     "no such array": ({"kind": "orthogonal", "trials": 1000}, "orthogonal designs have 243 or 729"),

@@ -10,14 +10,20 @@ import typer
 from wm_drake.errors import input_error
 
 if TYPE_CHECKING:
-    from wm_drake.ledger import Ledger
+    from wm_drake.batch.ledger import Ledger
 
 LEDGER = "ledger.sqlite"
 """Name of the ledger in a study's folder."""
 
-WorkersOption = Annotated[int | None, typer.Option(help="Cores to use; all by default.", min=1, metavar="N")]
-ResumeOption = Annotated[bool, typer.Option("--resume", help="Go on with an unfinished study in the same folder.")]
-ProfileOption = Annotated[Path | None, typer.Option(help="Spin profile, YAML or CSV (time_s,speed_rpm).", metavar="FILE")]
+WorkersOption = Annotated[
+    int | None, typer.Option(help="Cores to use; all by default.", min=1, metavar="N")
+]
+ResumeOption = Annotated[
+    bool, typer.Option("--resume", help="Go on with an unfinished study in the same folder.")
+]
+ProfileOption = Annotated[
+    Path | None, typer.Option(help="Spin profile, YAML or CSV (time_s,speed_rpm).", metavar="FILE")
+]
 
 
 @contextmanager
@@ -27,7 +33,7 @@ def study_ledger(out: Path, identity: Mapping[str, str], resume: bool) -> "Itera
     Ctrl-C ends the command with code 130 and says what is kept. A folder that was made here and holds no result is removed
     again.
     """
-    from wm_drake.ledger import open_ledger
+    from wm_drake.batch.ledger import open_ledger
 
     if out.exists() and not out.is_dir():
         raise input_error("is a file, needs to be a folder", where=str(out))
@@ -44,7 +50,10 @@ def study_ledger(out: Path, identity: Mapping[str, str], resume: bool) -> "Itera
             finally:
                 kept = len(ledger)
     except KeyboardInterrupt:
-        typer.echo(f"interrupted; {kept} finished runs are kept in {out / LEDGER}: go on with --resume", err=True)
+        typer.echo(
+            f"interrupted; {kept} finished runs are kept in {out / LEDGER}: go on with --resume",
+            err=True,
+        )
         raise typer.Exit(130) from None
     finally:
         if made and not kept:

@@ -19,9 +19,9 @@ from wm_drake.cli.common import (
     existing_file,
     load_parameters,
 )
+from wm_drake.cli.progress import progress_bar, result_folder
 from wm_drake.cli.study.common import ProfileOption, ResumeOption, WorkersOption, study_ledger
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.outputs import progress_bar, result_folder
 
 if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
     from collections.abc import Callable
@@ -29,10 +29,10 @@ if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
     import xarray as xr
 
     from wm_drake.parameters import FactorLevels, MachineParameters
-    from wm_drake.simulation import Case
+    from wm_drake.simulation.runs import Case
     from wm_drake.studies.doe import Design
-    from wm_drake.studies.gasket import GasketTrials
-    from wm_drake.studies.screening import Screening
+    from wm_drake.studies.gasket.screening import Screening
+    from wm_drake.studies.gasket.study import GasketTrials
 
 DEFAULT_OUT = Path("wm-drake-gasket")
 
@@ -41,16 +41,26 @@ def gasket(
     machine: MachineOption = "reference",
     load: Annotated[
         list[str] | None,
-        typer.Option(help="Load of the machine, or load file. Repeatable; middle and counter by default.", metavar="NAME|FILE"),
+        typer.Option(
+            help="Load of the machine, or load file. Repeatable; middle and counter by default.",
+            metavar="NAME|FILE",
+        ),
     ] = None,
     design: Annotated[
-        str, typer.Option(help="d-optimal, orthogonal, full, or a CSV file with a column of -1, 0, 1 per factor.")
+        str,
+        typer.Option(
+            help="d-optimal, orthogonal, full, or a CSV file with a column of -1, 0, 1 per factor."
+        ),
     ] = "d-optimal",
     trials: Annotated[
-        int | None, typer.Option(help="Trials: 1000 d-optimal; 243 or 729 orthogonal; all full.", min=1, metavar="N")
+        int | None,
+        typer.Option(
+            help="Trials: 1000 d-optimal; 243 or 729 orthogonal; all full.", min=1, metavar="N"
+        ),
     ] = None,
     model: Annotated[
-        str, typer.Option(help="What is estimated: main effects, or with all two-factor interactions.")
+        str,
+        typer.Option(help="What is estimated: main effects, or with all two-factor interactions."),
     ] = "main+2fi",
     seed: Annotated[int, typer.Option(help="Of the D-optimal design.", min=0)] = 0,
     factor: Annotated[
@@ -61,24 +71,33 @@ def gasket(
             metavar="NAME|KEY[=LOW..HIGH]",
         ),
     ] = None,
-    factors: Annotated[Path | None, typer.Option(help="File of factors, YAML.", metavar="FILE")] = None,
+    factors: Annotated[
+        Path | None, typer.Option(help="File of factors, YAML.", metavar="FILE")
+    ] = None,
     tables: Annotated[
         str,
-        typer.Option(help="A stiffness given as a table becomes: linear, level times its slope at rest; scaled, its forces."),
+        typer.Option(
+            help="A stiffness given as a table becomes: linear, level times its slope at rest; scaled, its forces."
+        ),
     ] = "linear",
     profile: ProfileOption = None,
     workers: WorkersOption = None,
     cluster: Annotated[
-        str | None, typer.Option(help="Run on the dask.distributed cluster of this scheduler.", metavar="ADDRESS")
+        str | None,
+        typer.Option(
+            help="Run on the dask.distributed cluster of this scheduler.", metavar="ADDRESS"
+        ),
     ] = None,
     resume: ResumeOption = False,
-    out: Annotated[Path, typer.Option(help="Folder for the results and the ledger of runs.", metavar="DIR")] = DEFAULT_OUT,
+    out: Annotated[
+        Path, typer.Option(help="Folder for the results and the ledger of runs.", metavar="DIR")
+    ] = DEFAULT_OUT,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
     """Screen the gasket: which of its stiffnesses and dampings drive displacement, force and moment, and which way."""
     begin = time.perf_counter()
-    from wm_drake.studies.gasket import GasketTrials
+    from wm_drake.studies.gasket.study import GasketTrials
 
     parameters = load_parameters(machine, sets)
     levels = _factors(parameters, factor, factors, tables)
@@ -87,7 +106,10 @@ def gasket(
     middle = _at_middle(parameters, levels)
     check_buildable(machine, parameters)
     work = GasketTrials(middle, levels, cases)
-    with _runner(middle, workers, cluster) as run, study_ledger(out, _identity(work, plan), resume) as ledger:
+    with (
+        _runner(middle, workers, cluster) as run,
+        study_ledger(out, _identity(work, plan), resume) as ledger,
+    ):
         screening = _run(work, plan, partial(run, ledger=ledger))
         ledger.mark_finished()
         try:
@@ -113,7 +135,9 @@ def _factors(
     return levels_of(parameters, chosen, tables)
 
 
-def _design(kind: str, levels: "Sequence[FactorLevels]", trials: int | None, model: str, seed: int) -> "Design":
+def _design(
+    kind: str, levels: "Sequence[FactorLevels]", trials: int | None, model: str, seed: int
+) -> "Design":
     from wm_drake.studies.doe import DESIGNS, MODELS, make_design, read_design
 
     names = tuple(factor.name for factor in levels)
@@ -122,20 +146,27 @@ def _design(kind: str, levels: "Sequence[FactorLevels]", trials: int | None, mod
     if kind in DESIGNS:
         return make_design(kind, names, trials=trials, model=model, seed=seed)
     if not Path(kind).is_file():
-        raise input_error(f"'{kind}' is neither a kind of design nor a file{nearest_names(kind, DESIGNS)}", where="--design")
+        raise input_error(
+            f"'{kind}' is neither a kind of design nor a file{nearest_names(kind, DESIGNS)}",
+            where="--design",
+        )
     if trials is not None:
         raise input_error("a design from a file has as many trials as it has", where="--trials")
     return read_design(Path(kind), names, model)
 
 
-def _loads(parameters: "MachineParameters", loads: list[str] | None, profile: Path | None) -> "list[Case]":
-    from wm_drake.studies.gasket import LOADS
+def _loads(
+    parameters: "MachineParameters", loads: list[str] | None, profile: Path | None
+) -> "list[Case]":
+    from wm_drake.studies.gasket.study import LOADS
 
     usual = [name for name in LOADS if name in parameters.loads]
     return cases_of(parameters, loads or usual, gasket=True, profile=profile)
 
 
-def _at_middle(parameters: "MachineParameters", levels: "Sequence[FactorLevels]") -> "MachineParameters":
+def _at_middle(
+    parameters: "MachineParameters", levels: "Sequence[FactorLevels]"
+) -> "MachineParameters":
     from wm_drake.parameters import at_levels
 
     return at_levels(parameters, levels, [0] * len(levels))
@@ -144,12 +175,14 @@ def _at_middle(parameters: "MachineParameters", levels: "Sequence[FactorLevels]"
 def _identity(work: "GasketTrials", plan: "Design") -> dict[str, str]:
     """What tells this study from another, in words as far as that goes."""
     from wm_drake.batch import sources_version
-    from wm_drake.ledger import key_of
-    from wm_drake.studies.gasket import MEASURES
+    from wm_drake.batch.ledger import key_of
+    from wm_drake.studies.gasket.study import MEASURES
 
     machine = work.parameters
     levels = key_of(levels=plan.levels, settings=[f.settings for f in work.factors])[:8]
-    runs = key_of(numbers=machine.model_dump_json(exclude={"name", "about", "sources", "measured"}))[:8]
+    runs = key_of(
+        numbers=machine.model_dump_json(exclude={"name", "about", "sources", "measured"})
+    )[:8]
     loads = key_of(loads=[(case.load, case.profile) for case in work.loads])[:8]
     return {
         "study": "gasket",
@@ -162,11 +195,13 @@ def _identity(work: "GasketTrials", plan: "Design") -> dict[str, str]:
 
 
 @contextmanager
-def _runner(parameters: "MachineParameters", workers: int | None, cluster: str | None) -> "Iterator[Callable[..., xr.Dataset]]":
+def _runner(
+    parameters: "MachineParameters", workers: int | None, cluster: str | None
+) -> "Iterator[Callable[..., xr.Dataset]]":
     """What runs cases: the cores of this computer, or a cluster."""
     from wm_drake.batch import simulate_remembered
     from wm_drake.batch.cluster import cluster_client, simulate_on_cluster
-    from wm_drake.machine import build_machine
+    from wm_drake.model.machine import build_machine
 
     if cluster is None:
         yield partial(simulate_remembered, build_machine(parameters), workers=workers)
@@ -176,24 +211,31 @@ def _runner(parameters: "MachineParameters", workers: int | None, cluster: str |
 
 
 def _run(work: "GasketTrials", plan: "Design", run: "Callable[..., xr.Dataset]") -> "Screening":
-    from wm_drake.studies.gasket import MEASURES
-    from wm_drake.studies.screening import run_screening
+    from wm_drake.studies.gasket.screening import run_screening
+    from wm_drake.studies.gasket.study import MEASURES
 
     with progress_bar(plan.trials * len(work.loads)) as progress:
-        return run_screening(plan, lambda d: work.responses(d, lambda cases: run(cases, measures=MEASURES, progress=progress)))
+        return run_screening(
+            plan,
+            lambda d: work.responses(
+                d, lambda cases: run(cases, measures=MEASURES, progress=progress)
+            ),
+        )
 
 
 def _write(screening: "Screening", work: "GasketTrials", folder: Path, wall_s: float) -> None:
-    from wm_drake.report.gasket_report import gasket_report
-    from wm_drake.studies.screening_tables import write_tables
+    from wm_drake.report.gasket.report import gasket_report
+    from wm_drake.studies.gasket.tables import write_tables
 
     write_tables(screening, folder)
     command = command_line()
-    (folder / "report.html").write_text(gasket_report(screening, work, command, wall_s), encoding="utf-8")
+    (folder / "report.html").write_text(
+        gasket_report(screening, work, command, wall_s), encoding="utf-8"
+    )
 
 
 def _tell(screening: "Screening", out: Path, as_json: bool, wall_s: float) -> None:
-    from wm_drake.studies.screening_tables import as_plain_data, to_json
+    from wm_drake.studies.gasket.tables import as_plain_data, to_json
 
     if as_json:
         typer.echo(to_json(as_plain_data(screening) | {"wall_s": wall_s}))
@@ -210,7 +252,7 @@ def _print_table(screening: "Screening") -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from wm_drake.studies.screening import leading_terms
+    from wm_drake.studies.gasket.screening import leading_terms
 
     design = screening.design
     about = f"{design.kind}, {design.trials} trials, D-efficiency {design.efficiency():.2f} %"

@@ -16,13 +16,13 @@ from wm_drake.cli.common import (
     interruptible,
     load_parameters,
 )
+from wm_drake.cli.progress import result_folder
 from wm_drake.errors import input_error
-from wm_drake.outputs import result_folder
 
 if TYPE_CHECKING:
     from wm_drake.parameters import MachineParameters
-    from wm_drake.parameters.elements import FloatArray
-    from wm_drake.studies.gasket_damping import Damping, Measured
+    from wm_drake.parameters.types import FloatArray
+    from wm_drake.studies.gasket_damping.study import Damping, Measured
 
 DEFAULT_OUT = Path("wm-drake-gasket-damping")
 
@@ -37,15 +37,19 @@ def gasket_damping(
             metavar="LOAD=FILE",
         ),
     ] = None,
-    planted_linear: Annotated[str, typer.Option(help="C_L of the virtual experiment.")] = "0.0287 N s/mm",
-    planted_torsional: Annotated[str, typer.Option(help="C_T of the virtual experiment.")] = "87 N mm s/deg",
+    planted_linear: Annotated[
+        str, typer.Option(help="C_L of the virtual experiment.")
+    ] = "0.0287 N s/mm",
+    planted_torsional: Annotated[
+        str, typer.Option(help="C_T of the virtual experiment.")
+    ] = "87 N mm s/deg",
     seed: Annotated[int, typer.Option(help="Of the virtual experiment's noise.", min=0)] = 0,
     out: Annotated[Path, typer.Option(help="Folder for the results.", metavar="DIR")] = DEFAULT_OUT,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
     """Find the damping of the gasket that brings computed and measured envelopes nearest."""
-    from wm_drake.studies.gasket_damping import identify_damping
+    from wm_drake.studies.gasket_damping.study import identify_damping
 
     parameters = load_parameters(machine, sets)
     check_buildable(machine, parameters)
@@ -68,8 +72,8 @@ def _read(parameters: "MachineParameters", entries: list[str]) -> "Measured":
     import xarray as xr
 
     from wm_drake.parameters.csv_files import read_csv
-    from wm_drake.simulation import load_record
-    from wm_drake.studies.gasket_damping import MM_PER_M, as_measured
+    from wm_drake.simulation.runs import load_record
+    from wm_drake.studies.gasket_damping.study import MM_PER_M, as_measured
 
     measured = {}
     sensors = list(parameters.sensors)
@@ -77,14 +81,17 @@ def _read(parameters: "MachineParameters", entries: list[str]) -> "Measured":
         load, equals, name = (part.strip() for part in entry.partition("="))
         if not equals or load not in parameters.loads:
             raise input_error(
-                f"'{entry}' is not LOAD=FILE with a load of the machine ({', '.join(parameters.loads)})", where="--record"
+                f"'{entry}' is not LOAD=FILE with a load of the machine ({', '.join(parameters.loads)})",
+                where="--record",
             )
         path = existing_file(Path(name), "--record")
         if path.suffix.lower() == ".csv":
             table = read_csv(path, ["time_s", *sensors])
             values = table[sensors].to_numpy(dtype=float) / MM_PER_M
             record = xr.DataArray(
-                values, {"time": table["time_s"].to_numpy(dtype=float), "sensor": sensors}, ["time", "sensor"]
+                values,
+                {"time": table["time_s"].to_numpy(dtype=float), "sensor": sensors},
+                ["time", "sensor"],
             )
         else:
             record = _displacement(load_record, path)
@@ -96,7 +103,9 @@ def _displacement(load_record: Any, path: Path) -> Any:
     try:
         return load_record(path).displacement
     except (OSError, ValueError, AttributeError, KeyError) as error:
-        raise input_error(f"cannot be read as a netCDF record ({' '.join(str(error).split())})", where=str(path)) from None
+        raise input_error(
+            f"cannot be read as a netCDF record ({' '.join(str(error).split())})", where=str(path)
+        ) from None
 
 
 def _planted(parameters: "MachineParameters", linear: str, torsional: str) -> "FloatArray":
@@ -106,39 +115,56 @@ def _planted(parameters: "MachineParameters", linear: str, torsional: str) -> "F
 
     if parameters.gasket is None:
         raise input_error(f"machine '{parameters.name}' has no gasket", key="gasket")
-    changed = with_values(parameters, {"gasket.damping_x": linear, "gasket.rotational_damping_x": torsional})
+    changed = with_values(
+        parameters, {"gasket.damping_x": linear, "gasket.rotational_damping_x": torsional}
+    )
     assert changed.gasket is not None  # as above
     return np.array([changed.gasket.damping_x, changed.gasket.rotational_damping_x])
 
 
 def _virtual(parameters: "MachineParameters", truth: "FloatArray", seed: int) -> "Measured":
-    from wm_drake.studies.gasket_damping import LOADS, virtual_experiment
+    from wm_drake.studies.gasket_damping.study import LOADS, virtual_experiment
 
     for name in LOADS:
         if name not in parameters.loads:
             raise input_error(
-                f"machine '{parameters.name}' has no load '{name}', which the virtual experiment runs", key="loads"
+                f"machine '{parameters.name}' has no load '{name}', which the virtual experiment runs",
+                key="loads",
             )
-    typer.echo("no measured records: a virtual experiment is run by the Drake engine, with another damping and noise", err=True)
+    typer.echo(
+        "no measured records: a virtual experiment is run by the Drake engine, with another damping and noise",
+        err=True,
+    )
     return virtual_experiment(parameters, truth, seed)
 
 
 def _write(result: "Damping", parameters: "MachineParameters", folder: Path) -> None:
-    from wm_drake.report.gasket_damping_report import gasket_damping_report, points_table
+    from wm_drake.report.gasket_damping.report import gasket_damping_report, points_table
 
     points_table(result).to_csv(folder / "objective.csv", index=False, float_format="%.9g")
     command = command_line()
-    (folder / "report.html").write_text(gasket_damping_report(result, parameters, command), encoding="utf-8")
+    (folder / "report.html").write_text(
+        gasket_damping_report(result, parameters, command), encoding="utf-8"
+    )
 
 
 def _as_json(result: "Damping") -> dict[str, Any]:
-    from wm_drake.report.gasket_damping_report import in_papers_units
+    from wm_drake.report.gasket_damping.report import in_papers_units
 
     def found(search: Any) -> dict[str, Any]:
         linear, torsional = in_papers_units(search.best)
-        return {"C_L": linear, "C_T": torsional, "objective_mm": search.value, "evaluations": search.evaluations}
+        return {
+            "C_L": linear,
+            "C_T": torsional,
+            "objective_mm": search.value,
+            "evaluations": search.evaluations,
+        }
 
-    truth = None if result.truth is None else dict(zip(("C_L", "C_T"), in_papers_units(result.truth), strict=True))
+    truth = (
+        None
+        if result.truth is None
+        else dict(zip(("C_L", "C_T"), in_papers_units(result.truth), strict=True))
+    )
     return {
         "units": {"C_L": "N s/mm", "C_T": "N mm s/deg"},
         "virtual_experiment": result.truth is not None,
@@ -149,7 +175,7 @@ def _as_json(result: "Damping") -> dict[str, Any]:
 
 
 def _tell(result: "Damping", out: Path) -> None:
-    from wm_drake.report.gasket_damping_report import summary
+    from wm_drake.report.gasket_damping.report import summary
 
     typer.echo(summary(result))
     typer.echo(f"Results in {out}: report.html, objective.csv")

@@ -18,17 +18,17 @@ from wm_drake.cli.common import (
     interruptible,
     load_parameters,
 )
+from wm_drake.cli.progress import progress_bar, result_folder
 from wm_drake.cli.study.common import LEDGER, WorkersOption
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.outputs import progress_bar, result_folder
 
 if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
     import xarray as xr
 
-    from wm_drake.ledger import Ledger
+    from wm_drake.batch.ledger import Ledger
     from wm_drake.parameters import MachineParameters, SpinProfile
     from wm_drake.parameters.unbalance_cases import UnbalanceCase
-    from wm_drake.studies.spin_cycle import SpinCycleResult
+    from wm_drake.studies.spin_cycle.study import SpinCycleResult
 
 DEFAULT_OUT = Path("wm-drake-spin-cycle")
 
@@ -36,24 +36,42 @@ DEFAULT_OUT = Path("wm-drake-spin-cycle")
 def spin_cycle(
     machine: MachineOption = "free_stroke",
     profile: Annotated[
-        str, typer.Option(help="Shipped profile (spin_cycle, run_up, ifb_9kg), or file with regions.", metavar="NAME|FILE")
+        str,
+        typer.Option(
+            help="Shipped profile (spin_cycle, run_up, ifb_9kg), or file with regions.",
+            metavar="NAME|FILE",
+        ),
     ] = "spin_cycle",
     cases: Annotated[
         Path | None,
-        typer.Option(help="CSV of cases: case,front_g,rear_g,phase_deg. The 33 of [A] Table 9 by default.", metavar="FILE"),
+        typer.Option(
+            help="CSV of cases: case,front_g,rear_g,phase_deg. The 33 of [A] Table 9 by default.",
+            metavar="FILE",
+        ),
     ] = None,
-    case: Annotated[list[str] | None, typer.Option(help="Run this case only. Repeatable.", metavar="NAME")] = None,
+    case: Annotated[
+        list[str] | None, typer.Option(help="Run this case only. Repeatable.", metavar="NAME")
+    ] = None,
     measured: Annotated[
-        Path | None, typer.Option(help="Measured RMS: CSV case,region,sensor,axis,rms_mm.", metavar="FILE")
+        Path | None,
+        typer.Option(help="Measured RMS: CSV case,region,sensor,axis,rms_mm.", metavar="FILE"),
     ] = None,
     accelerations: Annotated[
         Path | None,
-        typer.Option(help="Folder of measured accelerations, CASE.csv: time_s,S1_x,S1_y,... in m/s^2.", metavar="DIR"),
+        typer.Option(
+            help="Folder of measured accelerations, CASE.csv: time_s,S1_x,S1_y,... in m/s^2.",
+            metavar="DIR",
+        ),
     ] = None,
-    engine: Annotated[str, typer.Option(help="compiled; or drake, minutes a case.", metavar="NAME")] = "compiled",
+    engine: Annotated[
+        str, typer.Option(help="compiled; or drake, minutes a case.", metavar="NAME")
+    ] = "compiled",
     workers: WorkersOption = None,
     out: Annotated[
-        Path, typer.Option(help="Folder for the results; runs found there are not run again.", metavar="DIR")
+        Path,
+        typer.Option(
+            help="Folder for the results; runs found there are not run again.", metavar="DIR"
+        ),
     ] = DEFAULT_OUT,
     as_json: JsonOption = False,
     sets: SetOption = None,
@@ -62,7 +80,9 @@ def spin_cycle(
     from wm_drake.parameters import load_profile
 
     if engine not in ("compiled", "drake"):
-        raise input_error(f"no engine '{engine}'{nearest_names(engine, ('compiled', 'drake'))}", where="--engine")
+        raise input_error(
+            f"no engine '{engine}'{nearest_names(engine, ('compiled', 'drake'))}", where="--engine"
+        )
     parameters = load_parameters(machine, sets)
     spin_profile = load_profile(profile)
     table = cases_of_table(cases, case)
@@ -74,7 +94,11 @@ def spin_cycle(
         result = result if comparison is None else _with(result, comparison)
         _write(result, folder, engine)
         ledger.mark_finished()
-    diverged = [f"case {c.name}: {text}" for c, text in zip(result.cases, result.diverged, strict=True) if text]
+    diverged = [
+        f"case {c.name}: {text}"
+        for c, text in zip(result.cases, result.diverged, strict=True)
+        if text
+    ]
     typer.echo(json.dumps(_as_json(result, engine))) if as_json else _print_table(result, out)
     for message in diverged:
         typer.echo(message, err=True)
@@ -102,8 +126,8 @@ def measurement(
     accelerations: Path | None,
 ) -> "xr.DataArray | None":
     """What `--measured` or `--accelerations` name."""
-    from wm_drake.studies.spin_cycle import labels_of, runs_of
-    from wm_drake.studies.spin_measured import read_accelerations, read_rms
+    from wm_drake.studies.spin_cycle.measured import read_accelerations, read_rms
+    from wm_drake.studies.spin_cycle.study import labels_of, runs_of
 
     if measured and accelerations:
         raise input_error("and --measured exclude each other", where="--accelerations")
@@ -117,7 +141,7 @@ def measurement(
 @contextmanager
 def open_runs(out: Path) -> "Iterator[Ledger]":
     """The ledger of runs in a folder; what it holds is used without being asked."""
-    from wm_drake.ledger import open_ledger
+    from wm_drake.batch.ledger import open_ledger
 
     out.mkdir(exist_ok=True)
     with open_ledger(out / LEDGER, {"study": "spin cycle"}, resume=True) as ledger:
@@ -132,15 +156,17 @@ def _run(
     ledger: "Ledger",
     workers: int | None,
 ) -> "SpinCycleResult":
-    from wm_drake.machine import build_machine
-    from wm_drake.studies.spin_cycle import run_spin_cycle
-    from wm_drake.studies.spin_cycle_runs import compiled_runs, drake_runs
+    from wm_drake.model.machine import build_machine
+    from wm_drake.studies.spin_cycle.runs import compiled_runs, drake_runs
+    from wm_drake.studies.spin_cycle.study import run_spin_cycle
 
     with progress_bar(len(cases), "cases") as progress:
         if engine == "drake":
             evaluate = drake_runs(parameters, progress=progress)
         else:
-            evaluate = compiled_runs(build_machine(parameters), ledger, workers=workers, progress=progress)
+            evaluate = compiled_runs(
+                build_machine(parameters), ledger, workers=workers, progress=progress
+            )
         return run_spin_cycle(parameters, cases, profile, evaluate)
 
 
@@ -151,28 +177,32 @@ def _with(result: "SpinCycleResult", measured: "xr.DataArray") -> "SpinCycleResu
 
 
 def _write(result: "SpinCycleResult", folder: Path, engine: str) -> None:
-    from wm_drake.report.spin_cycle_report import spin_cycle_report
-    from wm_drake.report.spin_cycle_tables import case_table
-    from wm_drake.studies.spin_measured import rms_table
+    from wm_drake.report.spin_cycle.report import spin_cycle_report
+    from wm_drake.report.spin_cycle.tables import case_table
+    from wm_drake.studies.spin_cycle.measured import rms_table
 
     rms_table(result.displacement).to_csv(folder / "rms.csv", index=False, float_format="%.6g")
     case_table(result).to_csv(folder / "cases.csv", index=False, float_format="%.4g")
     command = command_line()
-    (folder / "report.html").write_text(spin_cycle_report(result, engine, command), encoding="utf-8")
+    (folder / "report.html").write_text(
+        spin_cycle_report(result, engine, command), encoding="utf-8"
+    )
 
 
 def _print_table(result: "SpinCycleResult", out: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from wm_drake.report.spin_cycle_tables import case_table
+    from wm_drake.report.spin_cycle.tables import case_table
 
     numbers = case_table(result)
     table = Table(title=f"Spin cycle of machine '{result.parameters.name}'")
     for name in numbers.columns:
         table.add_column(name.replace("_", " "), justify="right")
     for row in numbers.itertuples(index=False):
-        table.add_row(*(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row))
+        table.add_row(
+            *(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row)
+        )
     console = Console()
     console.print(table)
     console.print(f"Results in {out}: report.html, cases.csv, rms.csv")
@@ -181,7 +211,12 @@ def _print_table(result: "SpinCycleResult", out: Path) -> None:
 def _as_json(result: "SpinCycleResult", engine: str) -> dict[str, Any]:
     import numpy as np
 
-    from wm_drake.studies.spin_cycle import average_errors, disagreement, mean_and_deviation, region_errors
+    from wm_drake.studies.spin_cycle.study import (
+        average_errors,
+        disagreement,
+        mean_and_deviation,
+        region_errors,
+    )
 
     def plain(values: Any, scale: float = 1.0) -> Any:
         """Nested lists; JSON has no NaN."""

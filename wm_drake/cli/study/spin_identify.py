@@ -16,14 +16,14 @@ from wm_drake.cli.common import (
     interruptible,
     load_parameters,
 )
+from wm_drake.cli.progress import progress_bar, result_folder
 from wm_drake.cli.study.common import WorkersOption
 from wm_drake.cli.study.spin_cycle import cases_of_table, measurement, open_runs
 from wm_drake.errors import input_error
-from wm_drake.outputs import progress_bar, result_folder
 
 if TYPE_CHECKING:
     from wm_drake.parameters import MachineParameters
-    from wm_drake.studies.spin_identification import Sought, SpinIdentification
+    from wm_drake.studies.spin_identification.study import Sought, SpinIdentification
 
 DEFAULT_OUT = Path("wm-drake-spin-identify")
 PER_CENT = 100
@@ -40,31 +40,50 @@ def spin_identify(
         ),
     ] = None,
     profile: Annotated[
-        str, typer.Option(help="Shipped profile (spin_cycle, run_up, ifb_9kg), or file with regions.", metavar="NAME|FILE")
+        str,
+        typer.Option(
+            help="Shipped profile (spin_cycle, run_up, ifb_9kg), or file with regions.",
+            metavar="NAME|FILE",
+        ),
     ] = "spin_cycle",
-    cases: Annotated[Path | None, typer.Option(help="CSV of cases: case,front_g,rear_g,phase_deg.", metavar="FILE")] = None,
+    cases: Annotated[
+        Path | None,
+        typer.Option(help="CSV of cases: case,front_g,rear_g,phase_deg.", metavar="FILE"),
+    ] = None,
     case: Annotated[
         list[str] | None,
-        typer.Option(help="Use this case. Repeatable; of [A] Table 9, 2, 5 and 29 by default.", metavar="NAME"),
+        typer.Option(
+            help="Use this case. Repeatable; of [A] Table 9, 2, 5 and 29 by default.",
+            metavar="NAME",
+        ),
     ] = None,
     measured: Annotated[
-        Path | None, typer.Option(help="Measured RMS: CSV case,region,sensor,axis,rms_mm.", metavar="FILE")
+        Path | None,
+        typer.Option(help="Measured RMS: CSV case,region,sensor,axis,rms_mm.", metavar="FILE"),
     ] = None,
     accelerations: Annotated[
         Path | None, typer.Option(help="Folder of measured accelerations, CASE.csv.", metavar="DIR")
     ] = None,
-    noise: Annotated[float, typer.Option(help="Of a virtual experiment: relative errors of its numbers.", min=0.0)] = 0.005,
-    seed: Annotated[int, typer.Option(help="Of what a virtual experiment plants, and of the search.")] = 0,
+    noise: Annotated[
+        float,
+        typer.Option(help="Of a virtual experiment: relative errors of its numbers.", min=0.0),
+    ] = 0.005,
+    seed: Annotated[
+        int, typer.Option(help="Of what a virtual experiment plants, and of the search.")
+    ] = 0,
     workers: WorkersOption = None,
     out: Annotated[
-        Path, typer.Option(help="Folder for the results; runs found there are not run again.", metavar="DIR")
+        Path,
+        typer.Option(
+            help="Folder for the results; runs found there are not run again.", metavar="DIR"
+        ),
     ] = DEFAULT_OUT,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
     """Find numbers of a machine from RMS displacements; without measurements, from those of a virtual experiment."""
     from wm_drake.parameters import load_profile
-    from wm_drake.studies.spin_identification import DEFAULT_CASES, SpinModel
+    from wm_drake.studies.spin_identification.study import DEFAULT_CASES, SpinModel
 
     parameters = load_parameters(machine, sets)
     spin_profile = load_profile(profile)
@@ -87,29 +106,42 @@ def spin_identify(
 def unknowns_of(parameters: "MachineParameters", texts: list[str] | None) -> "tuple[Sought, ...]":
     """The unknowns that `--unknown` names."""
     from wm_drake.errors import InputError, Problem
-    from wm_drake.studies.spin_identification import JOIN, TABLE_8, sought_of
+    from wm_drake.studies.spin_identification.study import JOIN, TABLE_8, sought_of
 
     if not texts:
         names = {key for keys in TABLE_8 for key in keys}
-        missing = [name for name in sorted(names) if name.split(".")[0] == "bushing_types" and not parameters.bushing_types]
+        missing = [
+            name
+            for name in sorted(names)
+            if name.split(".")[0] == "bushing_types" and not parameters.bushing_types
+        ]
         if missing or parameters.gasket is None:
-            raise input_error(f"machine '{parameters.name}' has not the numbers of [A] Table 8; name others", where="--unknown")
+            raise input_error(
+                f"machine '{parameters.name}' has not the numbers of [A] Table 8; name others",
+                where="--unknown",
+            )
         return tuple(sought_of(parameters, keys) for keys in TABLE_8)
     found = []
     for text in texts:
         names_text, separator, range_text = text.partition("=")
         keys = [key.strip() for key in names_text.split(JOIN)]
         try:
-            found.append(sought_of(parameters, keys, _range(parameters, keys[0], range_text) if separator else None))
+            found.append(
+                sought_of(
+                    parameters, keys, _range(parameters, keys[0], range_text) if separator else None
+                )
+            )
         except InputError as error:
-            raise InputError(Problem("--unknown", p.key, p.message) for p in error.problems) from None
+            raise InputError(
+                Problem("--unknown", p.key, p.message) for p in error.problems
+            ) from None
     return tuple(found)
 
 
 def _range(parameters: "MachineParameters", key: str, text: str) -> tuple[float, float]:
     """`(lower, upper) unit` in SI."""
     from wm_drake.parameters.units import convert
-    from wm_drake.studies.spin_identification import unit_of_key
+    from wm_drake.studies.spin_identification.study import unit_of_key
 
     unit = unit_of_key(parameters, key)
     inside, _, unit_text = text.strip().removeprefix("(").partition(")")
@@ -122,13 +154,21 @@ def _range(parameters: "MachineParameters", key: str, text: str) -> tuple[float,
     return lower, upper
 
 
-def _identify(model: Any, given: Any, noise: float, seed: int, ledger: Any, workers: int | None) -> "SpinIdentification":
+def _identify(
+    model: Any, given: Any, noise: float, seed: int, ledger: Any, workers: int | None
+) -> "SpinIdentification":
     from wm_drake.batch import simulate_remembered
-    from wm_drake.machine import build_machine
-    from wm_drake.studies.spin_identification import identify_from_spin, planted_values, virtual_experiment
+    from wm_drake.model.machine import build_machine
+    from wm_drake.studies.spin_identification.study import (
+        identify_from_spin,
+        planted_values,
+        virtual_experiment,
+    )
 
     built = build_machine(model.args[0])
-    regions = partial(simulate_remembered, built, ledger=ledger, measures=("regions",), workers=workers)
+    regions = partial(
+        simulate_remembered, built, ledger=ledger, measures=("regions",), workers=workers
+    )
     with progress_bar(PER_CENT, "search, %") as progress:
         ready, planted = model(regions), None
         if given is None:
@@ -139,8 +179,8 @@ def _identify(model: Any, given: Any, noise: float, seed: int, ledger: Any, work
 
 
 def _write(result: "SpinIdentification", folder: Path) -> None:
-    from wm_drake.report.spin_identify_report import spin_identify_report
-    from wm_drake.studies.spin_measured import rms_table
+    from wm_drake.report.spin_identify.report import spin_identify_report
+    from wm_drake.studies.spin_cycle.measured import rms_table
 
     rms_table(result.measured).to_csv(folder / "measured.csv", index=False, float_format="%.6g")
     rms_table(result.after).to_csv(folder / "rms.csv", index=False, float_format="%.6g")
@@ -152,14 +192,18 @@ def _print_table(result: "SpinIdentification", out: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from wm_drake.report.spin_identify_report import directions, summary, unknowns
+    from wm_drake.report.spin_identify.report import directions, summary, unknowns
 
     console = Console()
     console.print(summary(result))
     shown = unknowns(result)
     table = Table()
     for name in shown.header:
-        table.add_column(name, justify="left" if name in ("unknown", "equal numbers") else "right", overflow="fold")
+        table.add_column(
+            name,
+            justify="left" if name in ("unknown", "equal numbers") else "right",
+            overflow="fold",
+        )
     for group in shown.groups:
         table.add_row(group.heading, *group.rows[0].cells)
     console.print(table)
@@ -169,11 +213,17 @@ def _print_table(result: "SpinIdentification", out: Path) -> None:
 
 
 def _as_json(result: "SpinIdentification") -> dict[str, Any]:
-    from wm_drake.studies.spin_cycle import average_errors
+    from wm_drake.studies.spin_cycle.study import average_errors
 
     shown = result.fit.as_dict()
-    for k, (sought, entry) in enumerate(zip(result.sought, shown["unknowns"].values(), strict=True)):
-        entry |= {"keys": list(sought.keys), "found": result.fit.estimates[k].value, "identifiable": result.identifiable[k]}
+    for k, (sought, entry) in enumerate(
+        zip(result.sought, shown["unknowns"].values(), strict=True)
+    ):
+        entry |= {
+            "keys": list(sought.keys),
+            "found": result.fit.estimates[k].value,
+            "identifiable": result.identifiable[k],
+        }
         if result.planted is not None and result.recovered is not None:
             entry |= {"planted": float(result.planted[k]), "error": float(result.recovered[k])}
     return {

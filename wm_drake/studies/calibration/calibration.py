@@ -5,16 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wm_drake.batch.ledger import Ledger, Result, key_of
 from wm_drake.batch.remembered import model_version, sources_version
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.ledger import Ledger, Result, key_of
-from wm_drake.machine import Machine
-from wm_drake.parameters.elements import FloatArray
+from wm_drake.model.machine import Machine
 from wm_drake.parameters.free import FreeFile
-from wm_drake.studies.calibration.search import METHODS, Problem
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.calibration.parameter_map import ParameterMap, turning_of
+from wm_drake.studies.calibration.search import METHODS, SearchProblem
 from wm_drake.studies.calibration.solutions import Solution, distinct
 from wm_drake.studies.calibration.targets import Targets, amplitudes_at, preload_residuals
-from wm_drake.studies.calibration.turning import Turning, turning_of
 
 RELATIVE_DEVIATION = 0.05
 """Standard deviation of a measured amplitude about the computed one, as part of it: scatter of machines and what no rigid
@@ -49,7 +49,9 @@ class Plan:
     def check(self) -> None:
         """Refuses what cannot be done."""
         if self.method not in METHODS:
-            raise input_error(f"no method '{self.method}'{nearest_names(self.method, METHODS)}", key="method")
+            raise input_error(
+                f"no method '{self.method}'{nearest_names(self.method, METHODS)}", key="method"
+            )
         if self.starts < 1:
             raise input_error(f"{self.starts} starts; allowed is 1 or more", key="starts")
         if not self.deviation > 0.0:
@@ -72,7 +74,7 @@ class Calibration:
         ended: Where every start ended, in their order.
     """
 
-    turning: Turning
+    turning: ParameterMap
     targets: Targets
     plan: Plan
     solutions: tuple[Solution, ...]
@@ -83,11 +85,14 @@ def identity_of(machine: Machine, free: FreeFile, targets: Targets, plan: Plan) 
     """What makes a calibration this one and no other, for its ledger."""
     return {
         "study": "calibration",
-        "machine": key_of(machine=machine.parameters.model_dump(exclude={"sources"}), model=model_version(machine.parameters))[
+        "machine": key_of(
+            machine=machine.parameters.model_dump(exclude={"sources"}),
+            model=model_version(machine.parameters),
+        )[:8],
+        "free": key_of(free=free)[:8],
+        "targets": key_of(loads=targets.loads, amplitude=targets.amplitude, weight=targets.weight)[
             :8
         ],
-        "free": key_of(free=free)[:8],
-        "targets": key_of(loads=targets.loads, amplitude=targets.amplitude, weight=targets.weight)[:8],
         "plan": key_of(plan=plan)[:8],
         "sources": sources_version(),
     }
@@ -123,13 +128,15 @@ def calibrate(
     plan.check()
     turning = turning_of(machine, free)
     amplitudes = _Remembered(machine, turning, targets, ledger, workers)
-    ended = [_search(number, turning, targets, plan, amplitudes, report) for number in range(plan.starts)]
+    ended = [
+        _search(number, turning, targets, plan, amplitudes, report) for number in range(plan.starts)
+    ]
     return Calibration(turning, targets, plan, tuple(distinct(ended, targets)), tuple(ended))
 
 
 def _search(
     number: int,
-    turning: Turning,
+    turning: ParameterMap,
     targets: Targets,
     plan: Plan,
     amplitudes: "_Remembered",
@@ -141,20 +148,42 @@ def _search(
         computed = amplitudes(turning.expected + coordinates * turning.deviation)
         logarithms = np.log(computed / targets.amplitude) * scale
         hard, smooth = logarithms[..., targets.weight > 0.0]
-        preloads = preload_residuals(amplitudes.machine, turning, turning.expected + coordinates * turning.deviation)
+        preloads = preload_residuals(
+            amplitudes.machine, turning, turning.expected + coordinates * turning.deviation
+        )
         return np.hstack([hard, preloads]), np.hstack([smooth, preloads])
 
-    lower, upper = ((bound - turning.expected) / turning.deviation for bound in (turning.lower, turning.upper))
+    lower, upper = (
+        (bound - turning.expected) / turning.deviation for bound in (turning.lower, turning.upper)
+    )
     first = (turning.start - turning.expected) / turning.deviation
-    problem = Problem(residuals, lower, upper, first, lambda evaluations, best: report(number, evaluations, best))
+    problem = SearchProblem(
+        residuals, lower, upper, first, lambda evaluations, best: report(number, evaluations, best)
+    )
     iterations = plan.iterations or ITERATIONS[plan.method]
-    found = METHODS[plan.method](problem, problem.start(number, plan.seed), iterations, plan.seed + number)
+    found = METHODS[plan.method](
+        problem, problem.start(number, plan.seed), iterations, plan.seed + number
+    )
     point = turning.expected + found.point * turning.deviation
-    measured = np.count_nonzero(targets.weight)  # residuals behind these are of preloads: what is expected, not data
+    measured = np.count_nonzero(
+        targets.weight
+    )  # residuals behind these are of preloads: what is expected, not data
     squares = residuals(found.point[None])[0][0] ** 2
-    data, prior = 0.5 * float(np.sum(squares[:measured])), 0.5 * float(np.sum(squares[measured:]) + np.sum(found.point**2))
+    data, prior = (
+        0.5 * float(np.sum(squares[:measured])),
+        0.5 * float(np.sum(squares[measured:]) + np.sum(found.point**2)),
+    )
     slopes = problem.jacobian(found.point)[:measured]
-    return Solution(number, point, found.point, amplitudes(point[None])[0, 0], data, prior, slopes, problem.evaluations)
+    return Solution(
+        number,
+        point,
+        found.point,
+        amplitudes(point[None])[0, 0],
+        data,
+        prior,
+        slopes,
+        problem.evaluations,
+    )
 
 
 _KINDS = ("amplitude", "power_mean")
@@ -163,16 +192,34 @@ _KINDS = ("amplitude", "power_mean")
 class _Remembered:
     """Amplitudes at points, from the ledger where they are there."""
 
-    def __init__(self, machine: Machine, turning: Turning, targets: Targets, ledger: Ledger, workers: int | None) -> None:
-        self.machine, self.turning, self.targets, self.ledger, self.workers = machine, turning, targets, ledger, workers
+    def __init__(
+        self,
+        machine: Machine,
+        turning: ParameterMap,
+        targets: Targets,
+        ledger: Ledger,
+        workers: int | None,
+    ) -> None:
+        self.machine, self.turning, self.targets, self.ledger, self.workers = (
+            machine,
+            turning,
+            targets,
+            ledger,
+            workers,
+        )
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """(2, points, case, sensor) as `amplitudes_at`."""
         keys = [key_of(point=point) for point in points]
         new = [index for index, key in enumerate(keys) if key not in self.ledger]
         if new:
-            values = amplitudes_at(self.machine, self.turning, self.targets.loads, points[new], workers=self.workers)
-            kept = {keys[i]: Result(dict(zip(_KINDS, values[:, place], strict=True))) for place, i in enumerate(new)}
+            values = amplitudes_at(
+                self.machine, self.turning, self.targets.loads, points[new], workers=self.workers
+            )
+            kept = {
+                keys[i]: Result(dict(zip(_KINDS, values[:, place], strict=True)))
+                for place, i in enumerate(new)
+            }
             self.ledger.put_all(kept)
         found = [self.ledger.get(key).values for key in keys]
         return np.array([[values[kind] for values in found] for kind in _KINDS])

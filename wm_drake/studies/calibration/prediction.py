@@ -3,11 +3,11 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from wm_drake.batch.ledger import Ledger
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.ledger import Ledger
-from wm_drake.machine import Machine
-from wm_drake.parameters.elements import FloatArray
+from wm_drake.model.machine import Machine
 from wm_drake.parameters.free import FreeFile
+from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate
 from wm_drake.studies.calibration.targets import Targets
 
@@ -58,12 +58,17 @@ def predict(
     targets, plan, found = calibration.targets, plan or calibration.plan, []
     for loads in map(tuple, left_out):
         seen = targets.without(*loads)
-        blind = calibrate(machine, free.without_starts(), seen, plan, ledger, workers=workers, report=report)
+        blind = calibrate(
+            machine, free.without_starts(), seen, plan, ledger, workers=workers, report=report
+        )
         cases = targets.of(*loads)
         calibrated, predicted = (
-            best.amplitude[cases] / targets.amplitude[cases] - 1.0 for best in (calibration.solutions[0], blind.solutions[0])
+            best.amplitude[cases] / targets.amplitude[cases] - 1.0
+            for best in (calibration.solutions[0], blind.solutions[0])
         )
-        found.append(Prediction(loads, calibrated, predicted, blind.solutions[0].errors(seen)[~cases]))
+        found.append(
+            Prediction(loads, calibrated, predicted, blind.solutions[0].errors(seen)[~cases])
+        )
     return found
 
 
@@ -73,6 +78,8 @@ def check_left_out(targets: Targets, left_out: Sequence[Sequence[str]]) -> None:
     for loads in left_out:
         for name in loads:
             if name not in known:
-                raise input_error(f"no measured load '{name}'{nearest_names(name, known)}", key="left out")
+                raise input_error(
+                    f"no measured load '{name}'{nearest_names(name, known)}", key="left out"
+                )
         if known <= set(loads):
             raise input_error("leaves no load to calibrate with", key="left out")

@@ -9,7 +9,7 @@ import cma
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
-from wm_drake.parameters.elements import FloatArray
+from wm_drake.parameters.types import FloatArray
 
 Residuals: TypeAlias = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """(points, n) in units of the prior -> residuals (points, m), and smooth stand-ins for them (points, m), whose slopes are
@@ -33,7 +33,7 @@ HOP_SPREAD = 0.3
 
 
 @dataclass
-class Problem:
+class SearchProblem:
     """Least squares in units of the prior: a coordinate is (quantity - expected) / deviation.
 
     Attributes:
@@ -78,7 +78,9 @@ class Problem:
             return begin
         return self.best_near(begin, START_SPREAD, np.random.default_rng([seed, number]))
 
-    def best_near(self, point: FloatArray, spread: float, generator: np.random.Generator) -> FloatArray:
+    def best_near(
+        self, point: FloatArray, spread: float, generator: np.random.Generator
+    ) -> FloatArray:
         """The best of some points drawn about one, with this standard deviation in each coordinate."""
         drawn = point + generator.normal(0.0, spread, (DRAWS, len(point)))
         points = np.clip(drawn, self.lower, self.upper)
@@ -100,7 +102,9 @@ class Found:
     evaluations: int
 
 
-def least_squares_search(problem: Problem, start: FloatArray, iterations: int, seed: int = 0) -> Found:  # noqa: ARG001
+def least_squares_search(
+    problem: SearchProblem, start: FloatArray, iterations: int, seed: int = 0
+) -> Found:  # noqa: ARG001
     """Gauss-Newton in a trust region within the bounds (scipy's trf) from one start; takes no chances, so no seed.
 
     Where it gets stuck it begins anew from there with another difference step, until none of them helps.
@@ -119,20 +123,28 @@ def least_squares_search(problem: Problem, start: FloatArray, iterations: int, s
     return Found(point, cost, problem.evaluations - before)
 
 
-def _gauss_newton(problem: Problem, start: FloatArray, step: float, iterations: int) -> OptimizeResult:
+def _gauss_newton(
+    problem: SearchProblem, start: FloatArray, step: float, iterations: int
+) -> OptimizeResult:
     def residuals(point: FloatArray) -> FloatArray:
         values, _ = problem.evaluate(point[None])
-        data = np.where(np.isfinite(values[0]), values[0], 1e3)  # no machine there: the step is refused and shortened
+        data = np.where(
+            np.isfinite(values[0]), values[0], 1e3
+        )  # no machine there: the step is refused and shortened
         return np.concatenate([data, point])
 
     def slopes(point: FloatArray) -> FloatArray:
         return np.concatenate([problem.jacobian(point, step), np.eye(len(point))])
 
     limits = {"xtol": 1e-4, "ftol": 1e-3, "gtol": 1e-6, "max_nfev": iterations}
-    return least_squares(residuals, start, jac=slopes, bounds=(problem.lower, problem.upper), **limits)
+    return least_squares(
+        residuals, start, jac=slopes, bounds=(problem.lower, problem.upper), **limits
+    )
 
 
-def basin_hopping_search(problem: Problem, start: FloatArray, iterations: int, seed: int = 0) -> Found:
+def basin_hopping_search(
+    problem: SearchProblem, start: FloatArray, iterations: int, seed: int = 0
+) -> Found:
     """Least squares, then so many hops: least squares again from the best of some points about the best so far.
 
     [Wales and Doye, J. Phys. Chem. A 101, 5111 (1997)], downhill only.
@@ -142,11 +154,15 @@ def basin_hopping_search(problem: Problem, start: FloatArray, iterations: int, s
     best = least_squares_search(problem, start, 2 * POLISH)
     for _ in range(iterations):
         hopped = problem.best_near(best.point, HOP_SPREAD, generator)
-        best = min(best, least_squares_search(problem, hopped, POLISH), key=lambda found: found.cost)
+        best = min(
+            best, least_squares_search(problem, hopped, POLISH), key=lambda found: found.cost
+        )
     return Found(best.point, best.cost, problem.evaluations - before)
 
 
-def evolution_search(problem: Problem, start: FloatArray, iterations: int, seed: int = 0) -> Found:
+def evolution_search(
+    problem: SearchProblem, start: FloatArray, iterations: int, seed: int = 0
+) -> Found:
     """CMA-ES [Hansen, The CMA Evolution Strategy: A Tutorial, 2016] from one start, then least squares from where it ends."""
     before = problem.evaluations
     options = {
@@ -161,7 +177,9 @@ def evolution_search(problem: Problem, start: FloatArray, iterations: int, seed:
     while not strategy.stop():
         points = np.array(strategy.ask())
         strategy.tell(points, problem.evaluate(points)[1].tolist())
-    found = least_squares_search(problem, np.clip(strategy.result.xbest, problem.lower, problem.upper), POLISH)
+    found = least_squares_search(
+        problem, np.clip(strategy.result.xbest, problem.lower, problem.upper), POLISH
+    )
     return Found(found.point, found.cost, problem.evaluations - before)
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wm_drake.parameters.elements import FloatArray
+from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibration.targets import Targets
 
 GOOD = 1.25
@@ -72,7 +72,10 @@ def distinct(solutions: list[Solution], targets: Targets) -> list[Solution]:
     limit = GOOD * float(np.nanmean(np.abs(ordered[0].errors(targets))))
     kept: list[Solution] = []
     for solution in ordered:
-        far = all(np.sqrt(np.mean((solution.coordinates - other.coordinates) ** 2)) > DISTINCT for other in kept)
+        far = all(
+            np.sqrt(np.mean((solution.coordinates - other.coordinates) ** 2)) > DISTINCT
+            for other in kept
+        )
         if far and np.nanmean(np.abs(solution.errors(targets))) <= limit:
             kept.append(solution)
     return kept

@@ -8,12 +8,12 @@ import pandas as pd
 
 from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
-from wm_drake.machine import Machine, Setup
+from wm_drake.model.machine import Machine, Setup
 from wm_drake.parameters import MachineParameters
-from wm_drake.parameters.elements import FloatArray
+from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.simulation import Case
-from wm_drake.studies.calibration.turning import Turning
+from wm_drake.simulation.runs import Case
+from wm_drake.studies.calibration.parameter_map import ParameterMap
 
 MILLIMETRE = Unit("m", "mm")
 
@@ -51,10 +51,19 @@ class Targets:
         known = [*dict.fromkeys(name for name, _ in self.loads), *self.sensors]
         for key, factor in weights.items():
             load, _, sensor = key.rpartition(":")
-            loads = self.of(load or key) if load or key not in self.sensors else np.ones(len(self.loads), dtype=bool)
-            sensors = np.array([name == sensor or (not load and key not in self.sensors) for name in self.sensors])
+            loads = (
+                self.of(load or key)
+                if load or key not in self.sensors
+                else np.ones(len(self.loads), dtype=bool)
+            )
+            sensors = np.array(
+                [name == sensor or (not load and key not in self.sensors) for name in self.sensors]
+            )
             if not (loads.any() and sensors.any()):
-                raise input_error(f"'{key}' is no load, sensor, or LOAD:SENSOR{nearest_names(key, known)}", key="weight")
+                raise input_error(
+                    f"'{key}' is no load, sensor, or LOAD:SENSOR{nearest_names(key, known)}",
+                    key="weight",
+                )
             if not factor >= 0.0:
                 raise input_error(f"{factor:g} is below 0", key=f"weight of '{key}'")
             weight[np.ix_(loads, sensors)] *= factor
@@ -81,23 +90,38 @@ def targets_of(parameters: MachineParameters, table: pd.DataFrame, where: str = 
     """
     rows = table[table["source"] == EXPERIMENT]
     sensors = tuple(parameters.sensors)
-    loads = [(str(name), bool(gasket == "yes")) for name, gasket in zip(rows["load"], rows["gasket"], strict=True)]
+    loads = [
+        (str(name), bool(gasket == "yes"))
+        for name, gasket in zip(rows["load"], rows["gasket"], strict=True)
+    ]
     problems = [
-        Problem(where, "", f"no load '{name}' in the machine{nearest_names(name, parameters.loads)}")
+        Problem(
+            where, "", f"no load '{name}' in the machine{nearest_names(name, parameters.loads)}"
+        )
         for name, _ in loads
         if name not in parameters.loads
     ]
     problems += [
-        Problem(where, "", f"load '{n}' is there twice with the same gasket") for n, g in set(loads) if loads.count((n, g)) > 1
+        Problem(where, "", f"load '{n}' is there twice with the same gasket")
+        for n, g in set(loads)
+        if loads.count((n, g)) > 1
     ]
     amplitude = rows[list(sensors)].to_numpy(dtype=float)
     if not loads:
         problems.append(Problem(where, "", f"has no row of source '{EXPERIMENT}'"))
     elif not (amplitude > 0.0).all():
-        problems.append(Problem(where, "", "an amplitude is not above 0: its ratio to the computed one has no logarithm"))
+        problems.append(
+            Problem(
+                where,
+                "",
+                "an amplitude is not above 0: its ratio to the computed one has no logarithm",
+            )
+        )
     if problems:
         raise InputError(problems)
-    return Targets(tuple(loads), sensors, amplitude / MILLIMETRE.from_si(1.0), np.ones(amplitude.shape))
+    return Targets(
+        tuple(loads), sensors, amplitude / MILLIMETRE.from_si(1.0), np.ones(amplitude.shape)
+    )
 
 
 EXPERIMENT = "experiment"
@@ -106,7 +130,7 @@ EXPERIMENT = "experiment"
 
 def amplitudes_at(
     machine: Machine,
-    turning: Turning,
+    turning: ParameterMap,
     loads: Sequence[tuple[str, bool]],
     points: FloatArray,
     *,
@@ -116,7 +140,7 @@ def amplitudes_at(
     """Amplitudes and their smooth stand-ins at points (point, quantity); NaN where there is no machine, or its run diverged.
 
     Returns:
-        (2, point, case, sensor): amplitudes, then power means (`wm_drake.measures.power_means`). [m]
+        (2, point, case, sensor): amplitudes, then power means (`wm_drake.simulation.measures.power_means`). [m]
     """
     made = _machines(machine, turning, points)
     cases = (
@@ -124,31 +148,41 @@ def amplitudes_at(
         for parameters in made.values()
         for name, gasket in loads
     )
-    table = simulate_many(machine, cases, measures=("amplitudes", "power means"), workers=workers, progress=progress)
+    table = simulate_many(
+        machine, cases, measures=("amplitudes", "power means"), workers=workers, progress=progress
+    )
     result = np.full((2, len(points), len(loads), len(machine.parameters.sensors)), np.nan)
     ended = (table.diverged == "").values[:, None]
     for kind, values in enumerate((table.amplitude.values, table.power_mean.values)):
-        result[kind, list(made)] = np.where(ended, values, np.nan).reshape(len(made), *result.shape[2:])
+        result[kind, list(made)] = np.where(ended, values, np.nan).reshape(
+            len(made), *result.shape[2:]
+        )
     return result
 
 
-def preload_residuals(machine: Machine, turning: Turning, points: FloatArray) -> FloatArray:
+def preload_residuals(machine: Machine, turning: ParameterMap, points: FloatArray) -> FloatArray:
     """(preload - expected) / deviation at points (point, spring); no springs if nothing is expected, NaN without a machine."""
     if turning.preload is None:
         return np.empty((len(points), 0))
     expected, deviation = turning.preload
     result = np.full((len(points), len(machine.springs)), np.nan)
     for index, setup in _set_up(machine, turning, points):
-        result[index] = [(spring.preload - expected) / deviation for spring in setup.springs.values()]
+        result[index] = [
+            (spring.preload - expected) / deviation for spring in setup.springs.values()
+        ]
     return result
 
 
-def _machines(machine: Machine, turning: Turning, points: FloatArray) -> dict[int, MachineParameters]:
+def _machines(
+    machine: Machine, turning: ParameterMap, points: FloatArray
+) -> dict[int, MachineParameters]:
     """The machines at points, by number of the point; without those that cannot be or cannot stand."""
     return {index: setup.parameters for index, setup in _set_up(machine, turning, points)}
 
 
-def _set_up(machine: Machine, turning: Turning, points: FloatArray) -> Iterator[tuple[int, Setup]]:
+def _set_up(
+    machine: Machine, turning: ParameterMap, points: FloatArray
+) -> Iterator[tuple[int, Setup]]:
     """Set-ups at points, one after the other in the same Context; without those that cannot be or cannot stand."""
     context = None
     for index, point in enumerate(points):

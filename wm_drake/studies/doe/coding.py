@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from wm_drake.parameters.elements import FloatArray
+from wm_drake.parameters.types import FloatArray
 
 Levels: TypeAlias = np.ndarray[tuple[int, int], np.dtype[np.int8]]
 """A trial a row, a factor a column, each -1, 0 or 1."""
@@ -15,13 +15,19 @@ LEVELS = (-1, 0, 1)
 MODELS = {"main": 1, "main+2fi": 2}
 """Models by name: the most factors that a term may join. main+2fi has all two-factor interactions."""
 
-_MAIN = np.array([[-np.sqrt(1.5), np.sqrt(0.5)], [0.0, -np.sqrt(2.0)], [np.sqrt(1.5), np.sqrt(0.5)]])
+_MAIN = np.array(
+    [[-np.sqrt(1.5), np.sqrt(0.5)], [0.0, -np.sqrt(2.0)], [np.sqrt(1.5), np.sqrt(0.5)]]
+)
 """Linear and quadratic contrast of the three levels: mean 0, mean square 1, uncorrelated over equally frequent levels."""
 
 
 def terms_of(factors: int, model: str) -> list[tuple[int, ...]]:
     """The terms of a model without its constant, as factor numbers: main effects, then interactions."""
-    return [term for size in range(1, MODELS[model] + 1) for term in itertools.combinations(range(factors), size)]
+    return [
+        term
+        for size in range(1, MODELS[model] + 1)
+        for term in itertools.combinations(range(factors), size)
+    ]
 
 
 def columns(factors: int, model: str) -> int:

@@ -54,7 +54,12 @@ class Design:
 
 
 def make_design(
-    kind: str, factors: tuple[str, ...], *, trials: int | None = None, model: str = "main+2fi", seed: int = 0
+    kind: str,
+    factors: tuple[str, ...],
+    *,
+    trials: int | None = None,
+    model: str = "main+2fi",
+    seed: int = 0,
 ) -> Design:
     """A design of a kind.
 
@@ -74,12 +79,17 @@ def make_design(
         raise input_error(f"no model '{model}'{nearest_names(model, MODELS)}", key="model")
     count, everything = len(factors), 3 ** len(factors)
     if kind == "full" and trials not in (None, everything):
-        raise input_error(f"the full factorial of {count} factors has {everything} trials, not {trials}", key="trials")
+        raise input_error(
+            f"the full factorial of {count} factors has {everything} trials, not {trials}",
+            key="trials",
+        )
     if kind == "full":
         _check_size(everything)
         return Design(kind, factors, level_matrix(count), model)
     if kind == "orthogonal":
-        return Design(kind, factors, orthogonal_levels(count, 729 if trials is None else trials), model)
+        return Design(
+            kind, factors, orthogonal_levels(count, 729 if trials is None else trials), model
+        )
     wanted = min(1000, everything) if trials is None else trials
     least = columns(count, model)
     if wanted < least:
@@ -100,7 +110,9 @@ LARGEST_DESIGN = 3**11
 
 def _check_size(trials: int) -> None:
     if trials > LARGEST_DESIGN:
-        raise input_error(f"{trials} trials are too many; allowed are {LARGEST_DESIGN}", key="trials")
+        raise input_error(
+            f"{trials} trials are too many; allowed are {LARGEST_DESIGN}", key="trials"
+        )
 
 
 def write_design(design: Design, path: Path) -> None:
@@ -118,7 +130,8 @@ def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -
     wanted = [name for name in named if name != TRIAL]
     if sorted(wanted) != sorted(factors):
         raise input_error(
-            f"needs the columns {','.join(factors)} (and may have {TRIAL}), has {','.join(named)}", where=str(path)
+            f"needs the columns {','.join(factors)} (and may have {TRIAL}), has {','.join(named)}",
+            where=str(path),
         )
     table = read_csv(path, named)[list(factors)]
     numbers = table.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
@@ -127,17 +140,24 @@ def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -
         row, column = bad[0]
         value = table.iloc[row, column]
         raise input_error(
-            f"row {row + 1}: '{value}' is no level; allowed are -1, 0 and 1", where=str(path), key=factors[column]
+            f"row {row + 1}: '{value}' is no level; allowed are -1, 0 and 1",
+            where=str(path),
+            key=factors[column],
         )
     levels = numbers.astype(np.int8)
     _, first, counts = np.unique(levels, axis=0, return_index=True, return_counts=True)
     if len(first) < len(levels):
         row = int(first[np.argmax(counts)]) + 1
-        raise input_error(f"row {row} is there more than once; a repeated run would tell nothing new", where=str(path))
+        raise input_error(
+            f"row {row} is there more than once; a repeated run would tell nothing new",
+            where=str(path),
+        )
     design = Design(path.name, factors, levels, model)
     if design.efficiency() == 0.0:
         need = columns(len(factors), model)
-        message = f"these {design.trials} trials do not determine the {need} coefficients of {model}"
+        message = (
+            f"these {design.trials} trials do not determine the {need} coefficients of {model}"
+        )
         raise input_error(f"{message}; add others, or take the model main", where=str(path))
     return design
 
@@ -146,4 +166,6 @@ def _header(path: Path) -> pd.Index:
     try:
         return pd.read_csv(path, comment="#", skipinitialspace=True, nrows=0).columns
     except (OSError, ValueError) as error:
-        raise input_error(f"cannot be read as CSV ({' '.join(str(error).split())})", where=str(path)) from None
+        raise input_error(
+            f"cannot be read as CSV ({' '.join(str(error).split())})", where=str(path)
+        ) from None

@@ -3,7 +3,7 @@
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from wm_drake.parameters.elements import FloatArray
+from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.doe.coding import Levels, level_matrix, model_matrix
 
 LARGEST_GRID = 3**9
@@ -35,11 +35,16 @@ def d_optimal_levels(factors: int, trials: int, model: str, seed: int) -> Levels
     candidates = model_matrix(grid, model)
     columns = np.ascontiguousarray(candidates.T)
     log_determinant = -np.inf
-    with threadpool_limits(1, "blas"):  # the products are small: threads would wait for each other, on a busy machine for long
+    with threadpool_limits(
+        1, "blas"
+    ):  # the products are small: threads would wait for each other, on a busy machine for long
         chosen = _independent_start(candidates, trials, rng)
         for _ in range(MOST_PASSES):
             _pass(columns, chosen)
-            last, log_determinant = log_determinant, np.linalg.slogdet(candidates[chosen].T @ candidates[chosen])[1]
+            last, log_determinant = (
+                log_determinant,
+                np.linalg.slogdet(candidates[chosen].T @ candidates[chosen])[1],
+            )
             if log_determinant - last < SMALLEST_GAIN * candidates.shape[1]:
                 break
     levels = grid[chosen]
@@ -89,6 +94,8 @@ def _pass(columns: FloatArray, chosen: np.ndarray) -> None:
             free[old], free[new] = True, False
             chosen[place] = new
         following = columns[:, chosen[(place + 1) % len(chosen)]]
-        *changes, covariance = np.stack([*steps, inverse @ following]) @ columns  # all products with the grid in one go
+        *changes, covariance = (
+            np.stack([*steps, inverse @ following]) @ columns
+        )  # all products with the grid in one go
         for scale, change in zip(scales, changes, strict=True):
             variance -= scale * change**2

@@ -30,9 +30,13 @@ def orthogonal_levels(factors: int, trials: int) -> Levels:
         InputError: there is none of this size here.
     """
     if trials not in _ROWS:
-        raise input_error(f"{trials} trials: orthogonal designs have {' or '.join(map(str, sorted(_ROWS)))}")
+        raise input_error(
+            f"{trials} trials: orthogonal designs have {' or '.join(map(str, sorted(_ROWS)))}"
+        )
     if factors > CHECKS.shape[1]:
-        raise input_error(f"{factors} factors: orthogonal designs have at most {CHECKS.shape[1]}; take a D-optimal one")
+        raise input_error(
+            f"{factors} factors: orthogonal designs have at most {CHECKS.shape[1]}; take a D-optimal one"
+        )
     if 3**factors <= trials:
         return level_matrix(factors)
     full = level_matrix(CHECKS.shape[1])

@@ -1,27 +1,21 @@
-"""Identification: unknown numbers of any model from what was measured, by three methods with one kind of result."""
+"""From measured loops to the numbers of a component: the rig as the model of an identification."""
 
-from wm_drake.studies.identification.assessment import assess
-from wm_drake.studies.identification.fit import Direction, Estimate, Fit, TestError
-from wm_drake.studies.identification.methods import METHODS, evolution, identify, least_squares
-from wm_drake.studies.identification.problem import Evaluate, Measurement, Problem, Progress, Unknown, point_by_point, rmse
-from wm_drake.studies.identification.surfaces import response_surface
+from wm_drake.studies.identification.fragment import fragment
+from wm_drake.studies.identification.models import (
+    BUSHING_LAWS,
+    DAMPER_LAWS,
+    ComponentModel,
+    bushing_model,
+    damper_model,
+)
+from wm_drake.studies.identification.problem import fit_problem
 
 __all__ = [
-    "METHODS",
-    "Direction",
-    "Estimate",
-    "Evaluate",
-    "Fit",
-    "Measurement",
-    "Problem",
-    "Progress",
-    "TestError",
-    "Unknown",
-    "assess",
-    "evolution",
-    "identify",
-    "least_squares",
-    "point_by_point",
-    "response_surface",
-    "rmse",
+    "BUSHING_LAWS",
+    "DAMPER_LAWS",
+    "ComponentModel",
+    "bushing_model",
+    "damper_model",
+    "fit_problem",
+    "fragment",
 ]

@@ -1,174 +1,78 @@
-"""What an identification is about: numbers that are not known, what was measured, and a model that computes it.
+"""The identification problem of a component: its rig computes what the files measured."""
 
-Engine-free: the model is any function of the unknowns. It is asked for many points at once, so that it can run them side by
-side; `point_by_point` makes it from a function of one point.
-"""
-
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TypeAlias
+from collections.abc import Sequence
 
 import numpy as np
 
-from wm_drake.errors import input_error
-from wm_drake.parameters.elements import FloatArray
-from wm_drake.parameters.units import Unit
+from wm_drake.parameters.types import FloatArray
+from wm_drake.rigs import Bench, BushingBench, DamperBench, NotSteadyError
+from wm_drake.rigs.forces import bushing_loads, damper_tensions
+from wm_drake.rigs.integration import PHASE
+from wm_drake.rigs.loops import steady_deformations
+from wm_drake.rigs.measured import MeasuredMotion
+from wm_drake.studies.fitting import FitProblem, Measurement
+from wm_drake.studies.identification.models import ComponentModel
 
-Evaluate: TypeAlias = Callable[[FloatArray], FloatArray]
-"""Points (k, p), in SI -> computed values (k, n), those of all measurements in a row. A row of NaN: the model fails there."""
-
-Progress: TypeAlias = Callable[[float, float], None]
-"""Called with the fraction that is done and the least RMSE so far."""
-
-FAILED = 1e3
-"""Residual that stands for a failed model, in largest measured values: worse than any point that can be computed."""
-
-
-PURE_NUMBER = Unit("dimensionless", "dimensionless")
+MOST_ROWS = 32
+"""Benches that are integrated side by side. More share hardly more work, and all step as the hardest one asks: at scattered
+points 256 rows took three times as long."""
 
 
-@dataclass(frozen=True)
-class Unknown:
-    """A number to be found.
-
-    Attributes:
-        name: What users call it; a key path where it is a number of a machine.
-        lower, upper: Bounds of the search. [SI]
-        unit: Unit in SI and as people read it; a pure number by default.
-        start: A first guess; the middle of the bounds if None. [SI]
-        logarithmic: Searched by its logarithm: for numbers of unknown order of magnitude.
-    """
-
-    name: str
-    lower: float
-    upper: float
-    unit: Unit = PURE_NUMBER
-    start: float | None = None
-    logarithmic: bool = False
-
-    def __post_init__(self) -> None:
-        """Refuses bounds that leave nothing to search, and starts outside of them."""
-        if not (np.isfinite(self.lower) and np.isfinite(self.upper) and self.lower < self.upper):
-            raise input_error(f"bounds {self._shown(self.lower)} to {self._shown(self.upper)} are not a range", key=self.name)
-        if self.logarithmic and self.lower <= 0.0:
-            raise input_error("a logarithmic search needs a lower bound > 0", key=self.name)
-        if self.start is not None and not self.lower <= self.start <= self.upper:
-            allowed = f"{self._shown(self.lower)} to {self._shown(self.upper)}"
-            raise input_error(f"start {self._shown(self.start)} is outside the bounds {allowed}", key=self.name)
-
-    def _shown(self, value: float) -> str:
-        return f"{self.unit.from_si(value):.6g} {self.unit.shown}" if np.isfinite(value) else str(value)
+def fit_problem(model: ComponentModel, motions: Sequence[MeasuredMotion]) -> FitProblem:
+    """The problem of finding a component's unknowns from measured loops, with offset and drift of each force taken out."""
+    measurements = tuple(
+        Measurement(measured.loop.name, measured.loop.force, measured.baseline, correlated=True)
+        for measured in motions
+    )
+    return FitProblem(
+        model.unknowns, measurements, lambda points: computed_forces(model, motions, points)
+    )
 
 
-@dataclass(frozen=True, eq=False)
-class Measurement:
-    """What one test measured.
-
-    Attributes:
-        name: Of the test.
-        values: Measured values (n,). [any unit, the model's]
-        baseline: Columns (n, q) that the instrument may have added in unknown amounts, such as an offset or a drift; the
-            best of each is taken out of every residual. None: the instrument is trusted.
-        scale: Residuals are divided by it before tests are put together: the error that is expected, where tests differ.
-        correlated: Neighbouring values err alike (samples over time): intervals widen accordingly.
-    """
-
-    name: str
-    values: FloatArray
-    baseline: FloatArray | None = None
-    scale: float = 1.0
-    correlated: bool = False
-
-    @property
-    def largest(self) -> float:
-        """Largest measured value, by which [A] normalises."""
-        return float(np.max(np.abs(self.values)))
-
-    @cached_property
-    def basis(self) -> FloatArray:
-        """Orthonormal columns (n, q) of the baseline."""
-        return np.zeros((len(self.values), 0)) if self.baseline is None else np.linalg.qr(self.baseline)[0]
-
-    def residuals(self, computed: FloatArray) -> FloatArray:
-        """Measured less computed (k, n), less the baseline that fits it best."""
-        plain = self.values - computed
-        return np.asarray(plain - (plain @ self.basis) @ self.basis.T)
+def computed_forces(
+    model: ComponentModel, motions: Sequence[MeasuredMotion], points: FloatArray
+) -> FloatArray:
+    """Forces at the samples of all loops, at each point (k, n); NaN where a point has no steady loop."""
+    benches = [model.bench(point) for point in points]
+    if isinstance(benches[0], BushingBench):
+        return np.array(
+            [np.concatenate([_bushing_forces(bench, m) for m in motions]) for bench in benches]
+        )
+    at_once = max(1, MOST_ROWS // len(motions))
+    parts = [
+        _damper_forces(benches[k : k + at_once], motions) for k in range(0, len(benches), at_once)
+    ]
+    return np.concatenate(parts)
 
 
-@dataclass(frozen=True, eq=False)
-class Problem:
-    """Find the unknowns with which the model comes nearest to what was measured.
-
-    Nearest by the root mean square error over all values of all tests, [A] Eq. (1) = [C] Eq. (5).
-    """
-
-    unknowns: tuple[Unknown, ...]
-    measurements: tuple[Measurement, ...]
-    evaluate: Evaluate
-
-    def __post_init__(self) -> None:
-        """Refuses problems without unknowns or without data, and names that stand twice."""
-        names = [unknown.name for unknown in self.unknowns]
-        if not names or not self.measurements:
-            raise input_error("an identification needs at least one unknown and one measurement")
-        for name in names:
-            if names.count(name) > 1:
-                raise input_error("is unknown twice", key=name)
-
-    @cached_property
-    def slices(self) -> tuple[slice, ...]:
-        """Where the values of each measurement stand in a row of the model's."""
-        ends = np.cumsum([len(m.values) for m in self.measurements])
-        return tuple(slice(int(end) - len(m.values), int(end)) for end, m in zip(ends, self.measurements, strict=True))
-
-    @property
-    def start(self) -> FloatArray:
-        """First guess in unit coordinates (p,)."""
-        known = [u.start is not None for u in self.unknowns]
-        guess = self.to_unit(np.array([u.lower if u.start is None else u.start for u in self.unknowns]))
-        return np.where(known, guess, 0.5)
-
-    def to_unit(self, points: FloatArray) -> FloatArray:
-        """SI values (..., p) -> coordinates from 0 at the lower to 1 at the upper bound."""
-        lower, upper = self._ends
-        return np.asarray((self._straight(points) - lower) / (upper - lower))
-
-    def from_unit(self, coordinates: FloatArray) -> FloatArray:
-        """The way back of `to_unit`."""
-        lower, upper = self._ends
-        straight = lower + np.asarray(coordinates) * (upper - lower)
-        return np.where(self._logarithmic, np.exp(np.where(self._logarithmic, straight, 0.0)), straight)
-
-    def residuals(self, coordinates: FloatArray) -> FloatArray:
-        """Scaled residuals (k, n) at points in unit coordinates (k, p); finite also where the model fails."""
-        computed = self.evaluate(self.from_unit(coordinates))
-        parts = []
-        for where, m in zip(self.slices, self.measurements, strict=True):
-            plain = m.residuals(computed[:, where])
-            failed = FAILED * (m.largest or 1.0)
-            parts.append(np.where(np.isfinite(plain), plain, failed) / m.scale)
-        return np.concatenate(parts, axis=1)
-
-    @cached_property
-    def _logarithmic(self) -> np.ndarray:
-        return np.array([u.logarithmic for u in self.unknowns])
-
-    @cached_property
-    def _ends(self) -> tuple[FloatArray, FloatArray]:
-        lower, upper = (np.array([getattr(u, side) for u in self.unknowns]) for side in ("lower", "upper"))
-        return self._straight(lower), self._straight(upper)
-
-    def _straight(self, points: FloatArray) -> FloatArray:
-        safe = np.where(self._logarithmic, points, 1.0)
-        return np.where(self._logarithmic, np.log(safe), points)
+def _bushing_forces(bench: Bench, measured: MeasuredMotion) -> FloatArray:
+    assert isinstance(bench, BushingBench)
+    amplitude, omega = measured.motion.amplitude, measured.motion.angular_frequency
+    return bushing_loads(
+        bench, amplitude * np.sin(measured.phase), amplitude * omega * np.cos(measured.phase)
+    )
 
 
-def point_by_point(model: Callable[[FloatArray], Sequence[FloatArray]]) -> Evaluate:
-    """The form `Problem` asks for, from a model of one point (p,) that answers with an array for each measurement."""
-    return lambda points: np.array([np.concatenate(model(point)) for point in points])
-
-
-def rmse(residuals: FloatArray) -> FloatArray:
-    """Root mean square over the last axis; [A] Eq. (1), [C] Eq. (5)."""
-    return np.asarray(np.sqrt(np.mean(np.square(residuals), axis=-1)))
+def _damper_forces(benches: Sequence[Bench], motions: Sequence[MeasuredMotion]) -> FloatArray:
+    dampers = [bench for bench in benches if isinstance(bench, DamperBench)]
+    amplitude = np.array([m.motion.amplitude for _ in dampers for m in motions])
+    omega = np.array([m.motion.angular_frequency for _ in dampers for m in motions])
+    packed = np.array([bench.packed for bench in dampers for _ in motions])
+    try:
+        deformation = steady_deformations(dampers[0], packed, amplitude, omega)
+    except NotSteadyError:
+        if len(dampers) == 1:
+            return np.full((1, sum(len(m.phase) for m in motions)), np.nan)
+        half = len(dampers) // 2
+        return np.concatenate(
+            [_damper_forces(dampers[:half], motions), _damper_forces(dampers[half:], motions)]
+        )
+    rows = []
+    for index, bench in enumerate(dampers):
+        forces = []
+        for number, m in enumerate(motions):
+            own = np.interp(m.phase, PHASE, deformation[index * len(motions) + number])
+            speed = m.motion.amplitude * m.motion.angular_frequency
+            forces.append(damper_tensions(speed * np.cos(m.phase), own, bench.packed))
+        rows.append(np.concatenate(forces))
+    return np.array(rows)

@@ -1,0 +1,294 @@
+"""simulate_many: the numbers of a run are its own, whatever runs beside it; interruptions, divergence, faults, memory."""
+
+import itertools
+import tracemalloc
+import warnings
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from wm_drake.batch import SimulationInterrupted, simulate_many
+from wm_drake.batch.work_items import KEPT_NUMBERS
+from wm_drake.compiler.lanes import WIDTH
+from wm_drake.errors import InputError
+from wm_drake.model.machine import build_machine
+from wm_drake.model.scene import Scene
+from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, with_value
+from wm_drake.simulation.measures import measure
+from wm_drake.simulation.runs import Case, DivergenceWarning, simulate
+
+RUN_UP = SpinProfile(time=(0.0, 12.0), speed=(5.0, 30.0))
+LONGER = SpinProfile(time=(0.0, 11.0, 13.0), speed=(5.0, 28.0, 28.0))
+VARIABLES = (
+    "detergent_displacement",
+    "gasket_force",
+    "gasket_moment",
+    "amplitude",
+    "critical_speed",
+)
+VIOLENT = Load(unbalances=(Unbalance(mass=60.0, radius=0.3, y=0.1),))
+
+
+def radial_force(reference, stiffness):
+    """Of a straight table for the gasket, as long as the machine's."""
+    return tuple(float(stiffness * x) for x in reference.gasket.stiffness_x.displacement)
+
+
+def cases_of(reference, count, seed=1):
+    """Cases with other gaskets, weights, loads and profiles, some without gasket."""
+    rng = np.random.default_rng(seed)
+    for index in range(count):
+        changed = with_value(
+            reference, "gasket.stiffness_x.force", radial_force(reference, rng.uniform(2e3, 6e3))
+        )
+        changed = with_value(
+            changed, "damper_types.friction.friction_force", float(rng.uniform(15.0, 40.0))
+        )
+        if index % 3 == 0:
+            changed = with_value(changed, "bodies.motor.mass", float(rng.uniform(4.0, 7.0)))
+        load = reference.loads[("middle", "counter", "front")[index % 3]]
+        yield Case(
+            f"case {index}",
+            load,
+            (RUN_UP, LONGER)[index % 2],
+            gasket=index % 4 != 3,
+            parameters=changed,
+        )
+
+
+@pytest.fixture(scope="module")
+def cases(reference):
+    return list(cases_of(reference, 19))
+
+
+@pytest.fixture(scope="module")
+def table(machine, cases):
+    return simulate_many(machine, cases, workers=2)
+
+
+def test_table_holds_each_case_in_its_place(table, cases):
+    assert list(table.run.values) == list(range(19))
+    assert list(table.case.values) == [case.name for case in cases]
+    assert not any(table.diverged.values)
+    assert all(table[name].attrs["units"] for name in VARIABLES)
+    assert not table.gasket_force.values[3].any()  # this one had no gasket
+    assert np.all(table.gasket_force.values[0] > 0.0)
+
+
+def test_numbers_of_a_run_are_those_of_simulate(machine, cases, table):
+    for index in (0, 3, 7, 18):
+        alone = measure(simulate(machine, cases[index]))
+        for name in VARIABLES:
+            np.testing.assert_allclose(
+                table[name].values[index], getattr(alone, name).values, rtol=1e-9, err_msg=name
+            )
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_number_of_workers_changes_no_bit(machine, cases, table, workers):
+    assert table.identical(simulate_many(machine, cases, workers=workers))
+
+
+def test_company_changes_no_bit(machine, cases, table):
+    backwards = simulate_many(machine, reversed(cases))
+    some = simulate_many(machine, cases[4:7])
+    for name in VARIABLES:
+        np.testing.assert_array_equal(backwards[name].values[::-1], table[name].values)
+        np.testing.assert_array_equal(some[name].values, table[name].values[4:7])
+
+
+def test_smallest_gap_is_that_of_the_scene(machine, reference, cases):
+    told = simulate_many(machine, cases[:5], measures=["gap"], workers=2)
+    assert set(told.data_vars) == {"smallest_gap", "diverged"}
+    for index in (0, 4):
+        alone = measure(simulate(machine, cases[index]), Scene(reference))
+        assert told.smallest_gap.values[index] == pytest.approx(
+            alone.smallest_gap.distance, rel=1e-9
+        )
+
+
+def test_histories_on_request_are_the_records_of_simulate(machine, cases):
+    ended = []
+    violent = Case("violent", VIOLENT, RUN_UP)
+    simulate_many(
+        machine, [*cases[:3], violent], measures=[], histories=True, finished=ended.append
+    )
+    for run in ended:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DivergenceWarning)
+            alone = simulate(machine, run.case)
+        assert run.record.attrs["diverged"] == alone.attrs["diverged"]
+        xr.testing.assert_allclose(run.record, alone, rtol=1e-9, atol=1e-9)
+        assert set(run.record.attrs) == set(alone.attrs)
+    simulate_many(machine, cases[:1], finished=ended.append)
+    assert ended[-1].record is None
+
+
+def test_only_what_is_asked_for_is_measured(machine, cases, table):
+    few = simulate_many(machine, cases[:2], measures=["extremes"])
+    assert set(few.data_vars) == {
+        "detergent_displacement",
+        "gasket_force",
+        "gasket_moment",
+        "diverged",
+    }
+    np.testing.assert_array_equal(few.gasket_force, table.gasket_force[:2])
+
+
+def test_a_diverging_run_is_reported_and_harms_no_other(machine, cases, table):
+    violent = Case("violent", VIOLENT, RUN_UP)
+    mixed = simulate_many(machine, [*cases[:3], violent, *cases[3:]])
+    with pytest.warns(DivergenceWarning):
+        alone = simulate(machine, violent)
+    assert mixed.diverged.values[3] == alone.attrs["diverged"]
+    np.testing.assert_allclose(mixed.gasket_force.values[3], measure(alone).gasket_force, rtol=1e-9)
+    np.testing.assert_allclose(mixed.amplitude.values[3], measure(alone).amplitude, rtol=1e-9)
+    others = [0, 1, 2, *range(4, 20)]
+    for name in VARIABLES:
+        np.testing.assert_array_equal(mixed[name].values[others], table[name].values)
+
+
+def test_runs_that_all_diverge_end_early_and_are_reported(machine):
+    told = simulate_many(machine, [Case("violent", VIOLENT, RUN_UP)] * (WIDTH + 1))
+    assert all("diverged at" in text for text in told.diverged.values)
+    assert np.isfinite(told.gasket_force).all()
+
+
+def test_cases_are_taken_as_they_are_needed_and_progress_is_told(machine, cases):
+    taken, told, ended = [], [], []
+
+    def endless():
+        for number in itertools.count():
+            taken.append(number)
+            yield cases[number % 2]
+
+    simulate_many(
+        machine,
+        itertools.islice(endless(), 5 * WIDTH),
+        workers=1,
+        measures=["extremes"],
+        progress=lambda done: told.append((done, len(taken))),
+        finished=lambda run: ended.append(run.number),
+    )
+    assert [done for done, _ in told][-1] == 5 * WIDTH
+    assert sorted(ended) == list(range(5 * WIDTH))
+    assert all(ahead - done <= 4 * WIDTH for done, ahead in told)
+
+
+def test_ctrl_c_keeps_the_runs_that_had_ended(machine, cases, table):
+    ended = []
+
+    def interrupt(done):
+        if done >= WIDTH:
+            raise KeyboardInterrupt  # once per batch that ends, as an impatient user would
+
+    with pytest.raises(SimulationInterrupted, match="interrupted after") as interrupted:
+        simulate_many(
+            machine,
+            cases * 4,
+            workers=2,
+            progress=interrupt,
+            finished=lambda run: ended.append(run),
+        )
+    kept = interrupted.value.finished
+    assert WIDTH <= kept.sizes["run"] < 4 * len(cases)
+    assert sorted(run.number for run in ended) == list(kept.run.values)
+    for place, number in enumerate(kept.run.values):
+        np.testing.assert_array_equal(
+            kept.gasket_force.values[place], table.gasket_force.values[number % len(cases)]
+        )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"measures": ["extremes", "amplitude"]}, "did you mean 'amplitudes'"),
+        ({"step": 3e-3}, "not a whole part"),
+    ],
+)
+def test_bad_arguments_are_refused(machine, cases, change, message):
+    with pytest.raises(InputError, match=message):
+        simulate_many(machine, cases[:1], **change)
+
+
+def test_a_bad_case_is_named_and_what_had_ended_is_not_lost(machine, reference, cases):
+    other = reference.model_copy(update={"gravity": 1.6})
+    ended = []
+    bad = Case("on the moon", reference.loads["middle"], RUN_UP, parameters=other)
+    with pytest.raises(InputError, match=r"case 40 'on the moon'.*gravity"):
+        simulate_many(
+            machine,
+            [*[cases[0]] * 40, bad],
+            workers=1,
+            finished=lambda run: ended.append(run.number),
+        )
+    assert len(ended) >= WIDTH
+
+
+@pytest.mark.slow
+def test_memory_does_not_grow_with_the_number_of_runs(reference, machine):
+    profile = SpinProfile(time=(0.0, 0.1), speed=(0.0, 1.0))
+
+    def many(count):
+        for number in range(count):
+            yield Case(
+                "short",
+                reference.loads["middle"],
+                profile,
+                parameters=with_value(
+                    reference, "gasket.stiffness_x.force", radial_force(reference, 3e3 + number)
+                ),
+            )
+
+    simulate_many(machine, many(WIDTH), measures=["extremes"])
+    peaks = []
+    for count in (500, 2500):
+        tracemalloc.start()
+        simulate_many(machine, many(count), measures=["extremes"], workers=1)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    results = (2500 - 500) * 2000  # bytes; the table itself, and the numbers kept for the next load
+    assert peaks[1] - peaks[0] < results + KEPT_NUMBERS * 12_000
+    assert peaks[1] < 60e6
+
+
+def test_machines_whose_tables_are_elsewhere_do_not_run_side_by_side(reference):
+    """A table on x and a number on z take as much room as the other way round, but are not read alike."""
+    table = {"displacement": (-0.05, 0.0, 0.05), "force": (-150.0, 0.0, 300.0)}
+    cases = []
+    for axis in "xz":
+        gasket = reference.gasket.model_dump() | {f"stiffness_{axis}": table}
+        parameters = MachineParameters.model_validate(reference.model_dump() | {"gasket": gasket})
+        cases.append(Case(axis, reference.loads["middle"], RUN_UP, parameters=parameters))
+    built = build_machine(cases[0].parameters)
+    told = simulate_many(built, cases)
+    for index, case in enumerate(cases):
+        alone = measure(simulate(built, case))
+        np.testing.assert_allclose(
+            told.gasket_force.values[index], alone.gasket_force.values, rtol=1e-9
+        )
+    assert abs(told.gasket_force.values[0] / told.gasket_force.values[1] - 1.0).max() > 0.01
+
+
+def test_machines_with_tables_and_sponges_run_side_by_side():
+    from machines_of_each_kind import machines_of_each_kind
+
+    for name in (
+        "gasket tables",
+        "spring tables",
+        "free_stroke",
+        "two bushings, five dampers of three laws",
+    ):
+        parameters = machines_of_each_kind()[name]
+        built = build_machine(parameters)
+        jobs = [
+            Case(load, parameters.loads[load], RUN_UP) for load in ("middle", "counter", "back")
+        ]
+        told = simulate_many(built, jobs)
+        for index, job in enumerate(jobs):
+            alone = measure(simulate(built, job))
+            for variable in VARIABLES:
+                np.testing.assert_allclose(
+                    told[variable].values[index], getattr(alone, variable).values, rtol=1e-9
+                )

@@ -1,0 +1,123 @@
+"""A study on a dask.distributed cluster gives the tables of one computer, also when a worker dies on the way."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from wm_drake.batch import simulate_many
+from wm_drake.batch.cluster import (
+    PARCEL,
+    check_workers,
+    cluster_client,
+    run_parcel,
+    simulate_on_cluster,
+)
+from wm_drake.batch.ledger import Ledger, open_ledger
+from wm_drake.errors import InputError
+from wm_drake.parameters import SpinProfile, with_value
+from wm_drake.simulation.runs import Case
+
+SHORT = SpinProfile(time=(0.0, 3.0), speed=(5.0, 20.0))
+
+
+def cases_of(reference, count):
+    for index in range(count):
+        changed = with_value(reference, "gasket.damping_x", 10.0 + index)
+        yield Case(f"case {index}", reference.loads["middle"], SHORT, parameters=changed)
+
+
+def test_nobody_at_the_address():
+    with pytest.raises(
+        InputError, match=r"--cluster: no scheduler answers at 'tcp://127\.0\.0\.1:9'"
+    ):
+        cluster_client("tcp://127.0.0.1:9").__enter__()
+
+
+def test_worker_with_other_sources_is_refused():
+    class Client:
+        def run(self, function):
+            return {"tcp://one": function(), "tcp://two": "0123"}
+
+    with pytest.raises(InputError, match="worker tcp://two has other sources or versions"):
+        check_workers(Client())
+
+
+def test_parcel_gives_results_by_key(reference, machine):
+    cases = list(cases_of(reference, 3))
+    results = run_parcel(reference, tuple(zip("abc", cases, strict=True)), ("extremes",), 2.5e-3)
+    table = simulate_many(machine, cases, measures=("extremes",))
+    assert list(results) == ["a", "b", "c"]
+    assert results["b"].values["gasket_force"].tolist() == table.gasket_force.values[1].tolist()
+
+
+@pytest.mark.slow
+def test_tables_are_the_same_though_a_worker_is_killed(reference, machine, tmp_path):
+    from distributed import LocalCluster
+
+    count = 12 * PARCEL
+    killed = []
+    with (
+        LocalCluster(
+            n_workers=2,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            memory_limit=0,
+        ) as cluster,
+        cluster_client(cluster.scheduler_address) as client,
+        open_ledger(tmp_path / "ledger.sqlite", {"study": "test"}) as ledger,
+    ):
+        pids = client.run(os.getpid)
+
+        def kill_one(done):
+            if done >= 2 * PARCEL and not killed:
+                killed.append(next(iter(pids.values())))
+                os.kill(killed[0], signal.SIGKILL)
+
+        table = simulate_on_cluster(
+            machine, cases_of(reference, count), ledger, client, progress=kill_one
+        )
+        assert len(ledger) == count
+        again = simulate_on_cluster(machine, cases_of(reference, count), ledger, client)
+    assert killed
+    xr.testing.assert_identical(
+        table, simulate_many(machine, cases_of(reference, count), measures=("extremes",))
+    )
+    xr.testing.assert_identical(table, again)
+
+
+@pytest.mark.slow
+def test_command_on_a_cluster_that_loses_a_worker_gives_the_same_tables(wm_drake, monkeypatch):
+    from distributed import LocalCluster
+
+    Path("p.yaml").write_text("time: (0, 8) s\nspeed: (0, 60) rpm\n")
+    factors = ("--factor", "K_Lx", "--factor", "C_L", "--factor", "K_Ty", "--factor", "C_T")
+    study = ("study", "gasket", "--design", "full", *factors, "--profile", "p.yaml")
+    assert wm_drake(*study, "--out", "here").code == 0
+    monkeypatch.setattr("wm_drake.batch.runs.integrate_lanes", None)  # this process runs nothing
+    put_all, killed = Ledger.put_all, []
+
+    def put_and_kill(ledger, results):
+        put_all(ledger, results)
+        if not killed:
+            killed.append(victim)
+            os.kill(victim, signal.SIGKILL)
+
+    monkeypatch.setattr(Ledger, "put_all", put_and_kill)
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0
+    ) as cluster:
+        victim = next(iter(cluster.workers.values())).pid
+        ended = wm_drake(*study, "--out", "there", "--cluster", cluster.scheduler_address)
+    assert (ended.code, killed) == (0, [victim])
+    for name in (
+        "runs.csv",
+        "contributions.csv",
+        "effects.csv",
+        "variance.csv",
+        "leading_terms.csv",
+    ):
+        assert (Path("here") / name).read_bytes() == (Path("there") / name).read_bytes()

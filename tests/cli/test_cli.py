@@ -1,0 +1,607 @@
+"""The command `wm-drake`: what it prints and writes, and how it answers bad input."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wm_drake import load_record
+from wm_drake.cli import main
+from wm_drake.cli.progress import result_folder
+from wm_drake.model.machine import build_machine
+from wm_drake.parameters import load_machine
+
+SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
+PROFILE = "time: (0, 2) s\nspeed: (0, 100) rpm\n"
+BLOW_UP = "spring_types.suspension.stiffness=1e9 N/mm"  # far beyond what the fixed step can follow
+
+
+def in_machine(text):
+    return {"machine.yaml": f"extends: reference\n{text}\n"}
+
+
+FAULTY_MACHINES = {
+    "missing file": ({}, "no such file, and no shipped machine of that name"),
+    "bad YAML": ({"machine.yaml": "name: x\nloads: [1,\n  }\n"}, "is not YAML"),
+    "empty": ({"machine.yaml": ""}, "is empty"),
+    "unknown key": (
+        in_machine("gasket: {stifness_x: 3 N/mm}"),
+        "unknown key 'stifness_x' (did you mean 'stiffness_x'?",
+    ),
+    "wrong unit": (in_machine("gasket: {stiffness_x: 3 N}"), "unit 'N' does not fit"),
+    "negative mass": (in_machine("bodies: {tub: {mass: -1 kg}}"), "'-1 kg' is out of range"),
+    "inertia not positive definite": (
+        in_machine(
+            "bodies: {tub: {inertia: {xx: 1 kg m^2, yy: 1 kg m^2, zz: 1 kg m^2, xy: 2 kg m^2}}}"
+        ),
+        "bodies.tub",
+    ),
+    "inertia against the triangle inequality": (
+        in_machine("bodies: {tub: {inertia: {xx: 1 kg m^2, yy: 1 kg m^2, zz: 5 kg m^2}}}"),
+        "bodies.tub",
+    ),
+    "mass beyond measure": (in_machine("bodies: {tub: {mass: 1e300 kg}}"), "machine.yaml"),
+    "spring of no length": (
+        in_machine("springs: {extra: {type: suspension, tub_frame: tub, housing_frame: housing}}"),
+        "springs.extra",
+    ),
+    "damper of no length": (
+        in_machine("dampers: {extra: {type: friction, tub_frame: tub, housing_frame: housing}}"),
+        "dampers.extra",
+    ),
+    "unknown frame": (
+        in_machine("springs: {left: {tub_frame: spring_lft_tub}}"),
+        "no frame 'spring_lft_tub' in the SDF",
+    ),
+    "unknown link": (
+        in_machine("bodies: {tubb: {mass: 1 kg}}"),
+        "no moving link 'tubb' in the SDF (did you mean 'tub'?",
+    ),
+    "unknown joint": (
+        in_machine("drive: {joint: drum_axes}"),
+        "no moving joint 'drum_axes' (did you mean 'drum_axis'?",
+    ),
+    "unknown model": (in_machine("model: nosuch.sdf"), "no SDF file 'nosuch.sdf'"),
+    "model that is no SDF": (in_machine("model: machine.yaml"), "cannot be read"),
+    "NaN": (in_machine("gravity: nan m/s^2"), "gravity: 'nan m/s^2' is not a number with a unit"),
+    "empty profile": (in_machine("profile: {steps: []}"), "profile: is empty"),
+    "times that fall": (
+        in_machine("profile: {time: '(0, 2, 1) s', speed: '(0, 1, 2) rpm'}"),
+        "times must rise",
+    ),
+    "missing measured table": (
+        in_machine("measured: [nosuch.csv]"),
+        "measured: cannot be read as CSV",
+    ),
+    "spring that would push": (
+        in_machine("frames: {spring_left_housing: {position: '(-250, 0, -600) mm'}}"),
+        "springs.left: would be pushed, not pulled",
+    ),
+}
+
+FAULTY_SPINS = {
+    "unknown load": (
+        {},
+        ["--load", "midle"],
+        "neither a load of machine 'reference' nor a file (did you mean 'middle'?",
+    ),
+    "unknown engine": ({}, ["--engine", "drak"], "no engine 'drak' (did you mean 'drake'?"),
+    "unknown key": (
+        {},
+        ["--set", "gasket.stifness_x=3 N/mm"],
+        "gasket.stifness_x: unknown key 'stifness_x' (did you mean",
+    ),
+    "set without =": ({}, ["--set", "gasket.stiffness_x"], "'gasket.stiffness_x' is not KEY=VALUE"),
+    "set without unit": (
+        {},
+        ["--set", "gasket.stiffness_x=3"],
+        "gasket.stiffness_x: '3' has no unit",
+    ),
+    "set negative mass": (
+        {},
+        ["--set", "bodies.tub.mass=-1 kg"],
+        "bodies.tub.mass: '-1 kg' is out of range",
+    ),
+    "set unknown link": (
+        {},
+        ["--set", "bodies.tubb.mass=1 kg"],
+        "no moving link 'tubb' in the SDF",
+    ),
+    "same load twice": (
+        {},
+        ["--load", "middle", "--load", "middle"],
+        "'middle' is asked for twice",
+    ),
+    "load file named as a load": (
+        {"middle.yaml": "unbalances: []\n"},
+        ["--load", "middle", "--load", "middle.yaml"],
+        "'middle' is asked for twice",
+    ),
+    "bad load file": (
+        {"l.yaml": "unbalances: [{mass: -1 kg, radius: 1 mm, y: 0 mm}]\n"},
+        ["--load", "l.yaml"],
+        "l.yaml:1: unbal",
+    ),
+    "missing profile": ({}, ["--profile", "nosuch.csv"], "no such file 'nosuch.csv'"),
+    "profile without rows": ({"p.csv": "time_s,speed_rpm\n"}, ["--profile", "p.csv"], "p.csv"),
+    "profile that falls": (
+        {"p.csv": "time_s,speed_rpm\n0,0\n2,1\n1,2\n"},
+        ["--profile", "p.csv"],
+        "times must rise",
+    ),
+    "profile with NaN": (
+        {"p.csv": "time_s,speed_rpm\n0,0\n2,nan\n"},
+        ["--profile", "p.csv"],
+        "row 2 of the data",
+    ),
+    "out is a file": ({"file": ""}, ["--out", "file"], "file: is a file, needs to be a folder"),
+    "out is below a file": ({"file": ""}, ["--out", "file/out"], "file/out: cannot be written to"),
+}
+
+
+def listing():
+    return sorted(map(str, Path().rglob("*")))
+
+
+def write_all(files):
+    for name, text in files.items():
+        Path(name).write_text(text, encoding="utf-8")
+    return listing()
+
+
+def assert_refused(ended, before, message):
+    assert ended.code == 2
+    assert ended.out == ""
+    assert "Traceback" not in ended.err
+    assert len(ended.messages) == 1
+    assert message in ended.messages[0]
+    assert listing() == before
+
+
+@pytest.mark.parametrize(
+    "command", [("machine", "check"), ("machine", "show"), ("spin", "--out", "out", "--machine")]
+)
+@pytest.mark.parametrize("fault", FAULTY_MACHINES)
+def test_faulty_machine_is_refused_with_one_line_and_nothing_written(wm_drake, fault, command):
+    files, message = FAULTY_MACHINES[fault]
+    if (fault, command) == ("missing measured table", ("machine", "show")):
+        pytest.skip("what is shown needs no measured amplitudes")
+    before = write_all(files)
+    ended = wm_drake(*command, "machine.yaml")
+    assert_refused(ended, before, message)
+    assert "machine.yaml" in ended.err or "nosuch" in ended.err
+
+
+@pytest.mark.parametrize("fault", FAULTY_SPINS)
+def test_faulty_spin_is_refused_with_one_line_and_nothing_written(wm_drake, fault):
+    files, arguments, message = FAULTY_SPINS[fault]
+    before = write_all(files)
+    out = [] if "--out" in arguments else ["--out", "out"]
+    assert_refused(wm_drake("spin", *arguments, *out), before, message)
+
+
+def test_one_line_per_problem(wm_drake):
+    before = write_all(
+        in_machine(
+            "gravity: 9.81\ngasket: {stiffness_x: 3 N, damping_x: -1 N s/mm}\nprofile: {steps: []}"
+        )
+    )
+    ended = wm_drake("machine", "check", "machine.yaml")
+    assert (ended.code, ended.out, listing()) == (2, "", before)
+    assert [re.match(r"machine.yaml:\d: ([\w.]+): ", line)[1] for line in ended.messages] == [
+        "gravity",
+        "gasket.stiffness_x",
+        "gasket.damping_x",
+        "profile",
+    ]
+
+
+def test_folder_without_permission_is_refused(wm_drake, tmp_path):
+    (tmp_path / "locked").mkdir(mode=0o500)
+    if os.access(tmp_path / "locked", os.W_OK):
+        pytest.skip("this user may write anywhere")
+    assert_refused(
+        wm_drake("spin", "--out", "locked/out"), ["locked"], "locked/out: cannot be written to"
+    )
+
+
+def test_load_name_that_is_no_file_name_is_refused_before_the_run(wm_drake):
+    before = write_all(
+        in_machine("loads: {a/b: {unbalances: [{mass: 1 kg, radius: 1 mm, y: 0 mm}]}}")
+        | {"p.yaml": PROFILE}
+    )
+    ended = wm_drake(
+        "spin", "--machine", "machine.yaml", "--load", "a/b", "--profile", "p.yaml", "--out", "out"
+    )
+    assert_refused(ended, before, "a/b")
+
+
+@pytest.mark.parametrize("mishap", [KeyboardInterrupt, OSError("disk full")])
+def test_failed_run_leaves_nothing(monkeypatch, tmp_path, mishap):
+    def fail(*_, **__):
+        raise mishap
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("wm_drake.studies.spin.study.run_spin", fail)
+    monkeypatch.setattr(sys, "argv", ["wm-drake", "spin", "--out", "out"])
+    with pytest.raises((KeyboardInterrupt, OSError, SystemExit)):
+        main()
+    assert listing() == []
+
+
+def test_failed_run_keeps_older_results(monkeypatch, tmp_path):
+    def fail_after_writing():
+        with result_folder(Path("out")) as folder:
+            (folder / "report.html").write_text("new")
+            raise RuntimeError
+
+    monkeypatch.chdir(tmp_path)
+    Path("out").mkdir()
+    before = write_all({"out/report.html": "old"})
+    with pytest.raises(RuntimeError):
+        fail_after_writing()
+    assert (listing(), Path("out/report.html").read_text()) == (before, "old")
+
+
+def test_check_of_the_reference(wm_drake):
+    ended = wm_drake("machine", "check", "reference")
+    assert (ended.code, ended.out, ended.err) == (
+        0,
+        "reference: machine 'reference' is in order\n",
+        "",
+    )
+
+
+def test_shown_machine_is_complete(wm_drake, reference):
+    ended = wm_drake("machine", "show", "--json")
+    shown = json.loads(ended.out)
+    assert (ended.code, ended.err) == (0, "")
+    assert set(shown) == {
+        *(
+            "machine",
+            "units",
+            "gravity_W",
+            "bodies",
+            "oscillating_mass_kg",
+            "drum_joint",
+            "springs",
+            "dampers",
+            "bushings",
+        ),
+        *("telescopic_dampers", "drum_bearing"),
+        *("sensors", "detergent_point_T", "loads", "profile", "rest_pose", "equilibrium_residual"),
+        *("natural_frequencies_hz", "mode_damping_ratios"),
+    }
+    assert sum(body["mass"] for body in shown["bodies"].values()) == pytest.approx(
+        shown["oscillating_mass_kg"]
+    )
+    for body in shown["bodies"].values():
+        assert set(body) == {"turns_with", "mass", "centre_of_mass_T", "inertia_about_centre_T"}
+        assert set(body["inertia_about_centre_T"]) == {"xx", "yy", "zz", "xy", "xz", "yz"}
+    assert (
+        np.abs(
+            [*shown["equilibrium_residual"]["moment_Nm"], *shown["equilibrium_residual"]["force_N"]]
+        ).max()
+        < 1e-9
+    )
+    assert len(shown["natural_frequencies_hz"]) == len(shown["mode_damping_ratios"]) == 6
+    assert shown["natural_frequencies_hz"] == sorted(shown["natural_frequencies_hz"])
+    for name in ("springs", "dampers", "sensors", "loads"):
+        assert set(shown[name]) == set(getattr(reference, name))
+    assert set(shown["bushings"]) == {"gasket"}
+    for spring in shown["springs"].values():
+        assert {
+            "tub_point_T",
+            "housing_point_W",
+            "stiffness",
+            "preload",
+            "length_at_preload",
+        } <= set(spring)
+    for damper in shown["dampers"].values():
+        assert {"tub_point_T", "housing_point_W", "law", "friction_force", "end_bushing"} <= set(
+            damper
+        )
+
+
+def test_shown_machine_obeys_set(wm_drake):
+    shown = json.loads(
+        wm_drake(
+            "machine",
+            "show",
+            "--json",
+            "--set",
+            "bodies.tub.mass=11 kg",
+            "--set",
+            "gravity = 1 m/s^2",
+        ).out
+    )
+    assert shown["bodies"]["tub"]["mass"] == 11.0
+    assert shown["gravity_W"] == [0.0, 0.0, -1.0]
+
+
+def test_machine_is_shown_as_text(wm_drake):
+    ended = wm_drake("machine", "show", "reference")
+    assert ended.code == 0
+    assert ended.out.startswith("machine: reference\nunits: SI: m, kg, s, rad, N;")
+    tub = build_machine(load_machine("reference")).plant.GetBodyByName("tub")
+    assert f"    mass: {tub.default_mass():.6g}\n" in ended.out
+
+
+def spin(wm_drake, *arguments, load="middle"):
+    Path("profile.yaml").write_text(PROFILE)
+    ended = wm_drake(
+        "spin", "--json", "--profile", "profile.yaml", "--out", "out", "--load", load, *arguments
+    )
+    return ended, strict_json(ended.out)
+
+
+def strict_json(text):
+    return json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} is not JSON"))
+
+
+@dataclass(frozen=True)
+class PlainRun:
+    """A run of the reference machine in a process of its own, and the folder it was run in."""
+
+    ended: subprocess.CompletedProcess
+    folder: Path
+
+    @property
+    def case(self):
+        (case,) = strict_json(self.ended.stdout)["cases"]
+        return case
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("plain")
+    (folder / "profile.yaml").write_text(PROFILE)
+    arguments = [
+        "spin",
+        "--json",
+        "--profile",
+        "profile.yaml",
+        "--out",
+        "out",
+        "--load",
+        "middle",
+        "--replay",
+    ]
+    return PlainRun(in_own_process(*arguments, cwd=folder), folder)
+
+
+def in_own_process(*arguments, cwd):
+    command = [sys.executable, "-c", "from wm_drake.cli import main; main()", *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+
+
+def test_spin_prints_one_json_object(plain):
+    assert plain.ended.returncode == 0
+    printed = strict_json(plain.ended.stdout)
+    assert set(printed) == {"machine", "engine", "cases"}
+    assert (printed["machine"], printed["engine"]) == ("reference", "compiled")
+    case = plain.case
+    assert set(case) == {
+        *(
+            "load",
+            "gasket",
+            "amplitudes_mm",
+            "detergent_box_mm",
+            "gasket_force_N",
+            "gasket_moment_Nm",
+        ),
+        *("smallest_gap_mm", "critical_rpm", "diverged", "wall_s"),
+    }
+    assert (case["load"], case["gasket"], case["diverged"]) == ("middle", True, None)
+    assert list(case["amplitudes_mm"]) == list(case["critical_rpm"]) == SENSORS
+    assert list(case["detergent_box_mm"]) == ["Dx", "Dy", "Dz"]
+    assert list(case["gasket_force_N"]) == ["Fx", "Fy", "Fz"]
+    assert list(case["gasket_moment_Nm"]) == ["Mx", "My", "Mz"]
+    assert 0.0 < case["smallest_gap_mm"] < 100.0
+    assert all(0.0 <= rpm <= 100.0 + 1e-9 for rpm in case["critical_rpm"].values())
+    assert all(size > 0.0 for size in case["amplitudes_mm"].values())
+
+
+def test_nothing_else_is_printed(plain):
+    assert len(plain.ended.stdout.splitlines()) == 1
+    assert plain.ended.stderr.strip() == ""
+
+
+def test_result_files_are_there_and_nothing_beside_them(plain):
+    assert sorted(str(path.relative_to(plain.folder)) for path in plain.folder.rglob("*")) == [
+        *(
+            "out",
+            "out/amplitudes.csv",
+            "out/record_middle.nc",
+            "out/replay_middle.html",
+            "out/report.html",
+            "profile.yaml",
+        )
+    ]
+
+
+def test_record_can_be_loaded_and_agrees(plain):
+    record = load_record(plain.folder / "out" / "record_middle.nc")
+    assert record.time.values == pytest.approx(np.arange(0.0, 2.0 + 1e-9, 0.005))
+    assert (record.attrs["diverged"], record.attrs["load"], record.attrs["gasket"]) == (
+        "",
+        "middle",
+        "yes",
+    )
+    largest = {
+        "detergent_box_mm": 1e3 * record.detergent_displacement,
+        "gasket_force_N": record.bushing_force.squeeze("bushing"),
+    }
+    for name, values in largest.items():
+        assert abs(values).max("time").values == pytest.approx(list(plain.case[name].values()))
+
+
+def test_table_of_amplitudes_agrees(plain):
+    table = pd.read_csv(plain.folder / "out" / "amplitudes.csv")
+    assert list(table.columns) == ["load", "gasket", "source", *SENSORS]
+    (computed,) = table[table["source"] == "wm_drake"].to_dict("records")
+    assert [computed[name] for name in SENSORS] == pytest.approx(
+        list(plain.case["amplitudes_mm"].values()), abs=1e-4
+    )
+
+
+def test_report_is_one_self_contained_page_with_its_command(plain):
+    report = (plain.folder / "out" / "report.html").read_text(encoding="utf-8")
+    assert "--profile profile.yaml" in report
+    assert is_self_contained(report)
+
+
+def test_replay_is_one_self_contained_page(plain):
+    page = (plain.folder / "out" / "replay_middle.html").read_text(encoding="utf-8")
+    assert is_self_contained(page)
+    assert len(page) > 500_000  # the viewer is inside
+
+
+def is_self_contained(page):
+    """Whether a page loads nothing from elsewhere; links to read on are fine."""
+    loads = re.findall(r"<(?:script|img|iframe|source)[^>]*\ssrc=\"([^\"]{0,20})", page)
+    loads += re.findall(r"<link[^>]*\shref=\"([^\"]{0,20})", page)
+    return page.lstrip().lower().startswith("<!doctype html") and all(
+        address.startswith("data:") for address in loads
+    )
+
+
+def test_page_that_loads_from_elsewhere_is_not_self_contained():
+    assert is_self_contained(
+        '<!DOCTYPE html><img src="data:image/png;base64,xx"><a href="https://example.org">'
+    )
+    assert not is_self_contained(
+        '<!DOCTYPE html><script type="module" src="https://example.org/x.js">'
+    )
+    assert not is_self_contained('<!DOCTYPE html><link rel="stylesheet" href="style.css">')
+
+
+def test_without_gasket_there_is_no_gasket_force(wm_drake):
+    _, printed = spin(wm_drake, "--no-gasket")
+    (case,) = printed["cases"]
+    assert case["gasket"] is False
+    assert [*case["gasket_force_N"].values(), *case["gasket_moment_Nm"].values()] == [0.0] * 6
+    assert load_record(Path("out/record_middle.nc")).attrs["gasket"] == "no"
+
+
+def test_set_changes_the_result_and_is_recorded(wm_drake, plain):
+    _, printed = spin(
+        wm_drake,
+        "--set",
+        "loads.middle.unbalances.0.mass = 500 g",
+        "--set",
+        "gasket.damping_x=0.03 N s/mm",
+    )
+    assert printed["cases"][0]["amplitudes_mm"]["Xr"] < 0.8 * plain.case["amplitudes_mm"]["Xr"]
+    attrs = load_record(Path("out/record_middle.nc")).attrs
+    assert json.loads(attrs["load_parameters"])["unbalances"][0]["mass"] == 0.5
+    assert json.loads(attrs["parameters"])["gasket"]["damping_x"] == pytest.approx(30.0)
+    report = Path("out/report.html").read_text(encoding="utf-8")
+    assert "gasket.damping_x" in report
+    assert "set on the command line" in report
+
+
+def test_load_file_equals_the_same_load_of_the_machine(wm_drake, plain):
+    one = load_machine("reference").loads["middle"].unbalances[0]
+    place = f"radius: {1e3 * one.radius:g} mm, y: {1e3 * one.y:g} mm"
+    Path("towels.yaml").write_text(f"unbalances: [{{mass: 1 kg, {place}, phase: 0 deg}}]\n")
+    _, printed = spin(wm_drake, load="towels.yaml")
+    (case,) = printed["cases"]
+    assert case["load"] == "towels"
+    assert {**case, "load": "middle", "wall_s": plain.case["wall_s"]} == plain.case
+    assert Path("out/record_towels.nc").is_file()
+
+
+def test_tables_are_printed_without_json(wm_drake):
+    Path("profile.yaml").write_text(PROFILE)
+    ended = wm_drake("spin", "--profile", "profile.yaml", "--out", "out", "--load", "middle")
+    assert ended.code == 0
+    assert ended.err.strip() == ""
+    for text in (
+        "Amplitudes in mm, machine 'reference'",
+        "wm_drake",
+        "middle: smallest gap ",
+        "Results in out: report.html",
+    ):
+        assert text in ended.out
+
+
+@pytest.mark.parametrize("replay", [(), ("--replay",)], ids=["", "replay"])
+def test_diverging_run_exits_1_says_when_and_what_and_keeps_its_record(wm_drake, replay):
+    ended, printed = spin(wm_drake, "--set", BLOW_UP, *replay)
+    assert ended.code == 1
+    (message,) = filter(None, ended.messages)
+    assert re.match(r"middle: the run diverged at \d+\.\d+ s: (roll|pitch|yaw|x|y|z) = ", message)
+    assert message == f"middle: {printed['cases'][0]['diverged']}"
+    record = load_record(Path("out/record_middle.nc"))
+    assert f"middle: {record.attrs['diverged']}" == message
+    assert record.time.size >= 1
+    assert Path("out/amplitudes.csv").is_file()
+    assert "diverged" in Path("out/report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_loads_side_by_side(tmp_path):
+    (tmp_path / "profile.yaml").write_text("time: (0, 0.5) s\nspeed: (0, 60) rpm\n")
+    ended = in_own_process(
+        "spin",
+        "--json",
+        "--profile",
+        "profile.yaml",
+        "--load",
+        "middle",
+        "--load",
+        "counter",
+        "--no-gasket",
+        cwd=tmp_path,
+    )
+    assert (ended.returncode, ended.stderr.strip()) == (0, "")
+    assert [case["load"] for case in strict_json(ended.stdout)["cases"]] == ["middle", "counter"]
+    assert {path.name for path in (tmp_path / "wm-drake-spin").iterdir()} == {
+        *("record_middle.nc", "record_counter.nc", "amplitudes.csv", "report.html")
+    }
+
+
+def test_faulty_input_in_a_process_of_its_own(tmp_path):
+    ended = in_own_process("machine", "check", "nosuch.yaml", cwd=tmp_path)
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert (
+        ended.stderr
+        == "nosuch.yaml: no such file, and no shipped machine of that name (known: free_stroke, reference)\n"
+    )
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("--help",), ("spin", "--help"), ("machine", "--help"), ("machine", "check", "--help")],
+)
+def test_help(wm_drake, arguments):
+    ended = wm_drake(*arguments)
+    assert ended.code == 0
+    assert "Usage: " in ended.out
+
+
+def test_help_does_not_wait_for_drake(tmp_path):
+    code = "import sys, wm_drake.cli; print('pydrake' in sys.modules, 'matplotlib' in sys.modules)"
+    ended = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert ended.stdout == "False False\n"
+
+
+def test_interrupt_says_so_and_leaves_nothing(wm_drake, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("wm_drake.studies.spin.study.run_spin", interrupted)
+    ended = wm_drake("spin", "--out", "out")
+    assert ended.code == 130
+    assert "interrupted; nothing was written" in ended.err
+    assert list(Path().iterdir()) == []

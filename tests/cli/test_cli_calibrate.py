@@ -1,0 +1,142 @@
+"""`wm-drake calibrate`: what it writes, how it resumes, and how it answers bad input."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wm_drake.model.machine import build_machine
+from wm_drake.parameters import load_machine, with_value
+from wm_drake.simulation.measures import measure
+from wm_drake.simulation.runs import case_of, simulate
+
+SHORT = "extends: reference\nname: short\nmeasured: []\nprofile: {time: '(0, 12) s', speed: '(40, 270) rpm'}\n"
+FREE = """quantities:
+  friction: {bounds: "(10, 60) N", prior: "(30, 10) N", sets: damper_types.friction.friction_force, source: test}
+  radius:
+    bounds: (230, 250) mm
+    prior: (240, 5) mm
+    sets: loads.middle.unbalances.0.radius
+    source: test
+"""
+TRUTH = 38.0
+SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with a machine, a free file, and amplitudes that a machine with other friction gives."""
+    (tmp_path / "short.yaml").write_text(SHORT)
+    (tmp_path / "free.yaml").write_text(FREE)
+    machine = build_machine(load_machine(tmp_path / "short.yaml"))
+    parameters = with_value(machine.parameters, "damper_types.friction.friction_force", TRUTH)
+    parameters = with_value(parameters, "loads.middle.unbalances.0.radius", 0.24)
+    rows = []
+    for name in ("middle", "back"):
+        case = case_of(parameters, name)
+        amplitude = measure(
+            simulate(machine, type(case)(name, case.load, case.profile, True, parameters))
+        ).amplitude
+        rows.append([name, "yes", "experiment", *(1e3 * amplitude.values)])
+    pd.DataFrame(rows, columns=["load", "gasket", "source", *SENSORS]).to_csv(
+        tmp_path / "measured.csv", index=False
+    )
+    return tmp_path
+
+
+ARGUMENTS = (
+    "calibrate",
+    "--machine",
+    "short.yaml",
+    "--free",
+    "free.yaml",
+    "--targets",
+    "measured.csv",
+    "--starts",
+    "1",
+)
+
+
+@pytest.mark.usefixtures("folder")
+def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
+    ended = wm_drake(
+        *ARGUMENTS, "--deviation", "1", "--leave-out", "back", "--json", "--out", "out"
+    )
+    assert ended.code == 0, ended.err
+    result = json.loads(ended.out)
+    friction, radius = result["quantities"]
+    assert friction["value_1"] == pytest.approx(TRUTH, abs=0.5)
+    assert friction["held_by_1"] == "data"
+    assert radius["unit"] == "mm"
+    assert result["solutions"][0]["largest_percent"] < 2.0
+    assert result["predictions"][0]["loads"] == ["back"]
+    names = {path.name for path in Path("out").iterdir()}
+    assert names == {
+        "report.html",
+        "machine_1.yaml",
+        "quantities.csv",
+        "amplitudes.csv",
+        "ledger.sqlite",
+    }
+    written = load_machine(Path("out/machine_1.yaml"))
+    assert written.damper_types["friction"].friction_force == pytest.approx(
+        friction["value_1"], abs=0.01
+    )
+    assert written.sources["damper_types.friction.friction_force"].startswith("fit: friction")
+    table = pd.read_csv("out/amplitudes.csv")
+    assert np.allclose(
+        *(table[table.source == source][SENSORS] for source in ("experiment", "solution 1")),
+        rtol=0.03,
+    )
+    again = wm_drake(
+        *ARGUMENTS, "--deviation", "1", "--leave-out", "back", "--json", "--out", "out"
+    )
+    assert json.loads(again.out) == result  # a finished calibration is read back
+
+
+FAULTS = {
+    "no free file": (["--free", "none.yaml"], "--free: no such file 'none.yaml'"),
+    "no targets file": (["--targets", "none.csv"], "--targets: no such file 'none.csv'"),
+    "unknown method": (["--method", "luck"], "no method 'luck'"),
+    "no start": (["--starts", "0"], "0 starts"),
+    "deviation": (["--deviation", "0"], "deviation"),
+    "resolution": (["--resolution", "-1"], "resolution"),
+    "unknown load left out": (
+        ["--leave-out", "bck"],
+        "no measured load 'bck' (did you mean 'back'?",
+    ),
+    "all loads left out": (["--leave-out", "back,middle"], "leaves no load"),
+    "weight of nothing": (["--weight", "Q=2"], "'Q' is no load, sensor"),
+    "weight that is no number": (["--weight", "Xr=much"], "--weight: 'Xr=much' is not NAME=NUMBER"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faulty_calibration_is_refused_and_nothing_written(fault, wm_drake, tmp_path):
+    (tmp_path / "free.yaml").write_text(FREE)
+    (tmp_path / "short.yaml").write_text(SHORT)
+    rows = [
+        ["middle", "yes", "experiment", *range(1, 7)],
+        ["back", "yes", "experiment", *range(1, 7)],
+    ]
+    pd.DataFrame(rows, columns=["load", "gasket", "source", *SENSORS]).to_csv(
+        tmp_path / "measured.csv", index=False
+    )
+    arguments, message = FAULTS[fault]
+    ended = wm_drake(*ARGUMENTS, "--out", "out", *arguments)
+    assert ended.code == 2
+    assert message in ended.err
+    assert len(ended.messages) == 1
+    assert not Path("out").exists()
+
+
+def test_free_file_that_does_not_fit_is_refused_with_its_line(wm_drake, tmp_path):
+    (tmp_path / "free.yaml").write_text(FREE.replace("friction_force", "fricton_force"))
+    ended = wm_drake("calibrate", "--free", "free.yaml", "--out", "out")
+    assert ended.code == 2
+    assert ended.err.startswith(
+        "free.yaml:2: quantities.friction.sets: 'damper_types.friction.fricton_force' is no number"
+    )
+    assert not Path("out").exists()

@@ -1,0 +1,355 @@
+"""`wm-drake study gasket`: what it prints and writes, how it answers bad input, kills, full disks and company."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from wm_drake.batch.ledger import Ledger
+
+PROFILE = "time: (0, 1) s\nspeed: (0, 60) rpm\n"
+TABLES = [
+    "contributions.csv",
+    "design.csv",
+    "effects.csv",
+    "leading_terms.csv",
+    "runs.csv",
+    "variance.csv",
+]
+FACTORS = (
+    "--factor",
+    "K_Lx",
+    "--factor",
+    "C_L",
+    "--factor",
+    "damper_types.friction.friction_force=20 N..30 N",
+)
+SMALL = ("--design", "full", *FACTORS, "--profile", "p.yaml")
+
+
+@pytest.fixture
+def study(wm_drake):
+    """Runs a small study of 27 trials and two loads in this process: study("--resume").code == 0."""
+    Path("p.yaml").write_text(PROFILE)
+    return lambda *arguments: wm_drake("study", "gasket", *SMALL, "--out", "out", *arguments)
+
+
+@pytest.fixture
+def study_without_page(study, monkeypatch):
+    """The same without figures, which take most of its time, for what depends on runs and tables alone."""
+    monkeypatch.setattr("wm_drake.report.gasket.report.gasket_report", lambda *_: "")
+    return study
+
+
+def tables(folder="out"):
+    return {name: (Path(folder) / name).read_bytes() for name in TABLES}
+
+
+def no_runs(monkeypatch):
+    monkeypatch.setattr("wm_drake.batch.runs.integrate_lanes", None)  # whoever runs now, fails
+
+
+def test_study_writes_tables_and_prints_them(study):
+    ended = study()
+    assert (ended.code, ended.err.strip()) == (0, "")
+    assert "Percent of the variance explained (full, 27 trials, D-efficiency 100.00 %)" in ended.out
+    assert set(TABLES) < {path.name for path in Path("out").iterdir()}
+    runs = pd.read_csv("out/runs.csv")
+    assert len(runs) == 54
+    assert set(runs["load"]) == {"middle", "counter"}
+    assert (runs[["Dx [mm]", "Fy [N]", "Mz [N m]"]] > 0.0).all(axis=None)
+    percents = pd.read_csv("out/contributions.csv").groupby(["load", "response"])["percent"].sum()
+    rest = pd.read_csv("out/variance.csv").set_index(["load", "response"])["residual_percent"]
+    assert (percents + rest).to_numpy() == pytest.approx(100.0)
+
+
+def test_json_is_one_object_of_the_promised_form(study):
+    ended = study("--json", "--load", "counter")
+    assert (ended.code, ended.err.strip()) == (0, "")
+    printed = json.loads(ended.out, parse_constant=lambda word: pytest.fail(f"{word} is not JSON"))
+    assert (printed["design"], printed["trials"], printed["wall_s"] > 0.0) == ("full", 27, True)
+    assert printed["d_efficiency"] == pytest.approx(100.0)
+    assert list(printed["responses"]) == ["counter"]
+    response = printed["responses"]["counter"]["Dx"]
+    assert {"mean", "main_percent", "interaction_percent", "residual_percent", "terms"} <= set(
+        response
+    )
+    assert [set(term) for term in response["terms"]] == [{"term", "percent", "effects"}] * 6
+    assert set(response["terms"][0]["effects"]) == {"-1", "0", "1"}
+
+
+def test_finished_study_is_not_run_again(study_without_page, monkeypatch):
+    study_without_page()
+    before = tables()
+    no_runs(monkeypatch)
+    assert study_without_page().code == 0
+    assert study_without_page("--resume").code == 0
+    assert tables() == before
+
+
+@pytest.mark.slow
+def test_own_design_gives_the_same_as_the_made_one(study_without_page, wm_drake):
+    study_without_page()
+    before = tables()
+    Path("out/design.csv").rename("mine.csv")
+    ended = wm_drake(
+        "study", "gasket", *FACTORS, "--design", "mine.csv", "--profile", "p.yaml", "--out", "other"
+    )
+    assert ended.code == 0
+    assert tables("other") == before
+
+
+@pytest.mark.slow
+def test_factor_file_and_one_worker_give_the_same(study_without_page, wm_drake):
+    study_without_page()
+    Path("factors.yaml").write_text(
+        "K_Lx: {keys: [gasket.stiffness_x]}\n"
+        "C_L: {keys: [gasket.damping_x, gasket.damping_y, gasket.damping_z]}\n"
+        "damper_types.friction.friction_force: {keys: [damper_types.friction.friction_force], low: 20 N, high: 30 N}\n"
+    )
+    arguments = (
+        "--factors",
+        "factors.yaml",
+        "--design",
+        "full",
+        "--profile",
+        "p.yaml",
+        "--workers",
+        "1",
+        "--out",
+        "other",
+    )
+    assert wm_drake("study", "gasket", *arguments).code == 0
+    assert tables("other") == tables()
+
+
+FAULTS = {
+    "kind of design": (
+        ("--design", "d-optmal"),
+        "--design: 'd-optmal' is neither a kind of design nor a file (did you mean",
+    ),
+    "trials": (
+        ("--design", "d-optimal", "--trials", "10"),
+        "10 trials cannot determine the 19 coefficients",
+    ),
+    "model": (("--model", "mian"), "no model 'mian' (did you mean 'main'?"),
+    "factor": (
+        ("--factor", "gasket.stifness_x"),
+        "gasket.stifness_x: unknown key 'stifness_x' (did you mean 'stiffness_x'?",
+    ),
+    "factor twice": (("--factor", "K_Lx"), "a factor is named twice"),
+    "bounds": (("--factor", "K_Lz=1 N..2 N"), "unit 'N' does not fit"),
+    "impossible bound": (("--factor", "K_Lz=-10 %..50 %"), "gasket.stiffness_z: '-"),
+    "tables": (("--tables", "curved"), "no way 'curved'"),
+    "load": (
+        ("--load", "midle"),
+        "neither a load of machine 'reference' nor a file (did you mean 'middle'?",
+    ),
+    "factor file": (("--factors", "nosuch.yaml"), "no such file 'nosuch.yaml'"),
+    "machine": (("--machine", "nosuch.yaml"), "no such file, and no shipped machine"),
+    "out": (("--out", "p.yaml"), "p.yaml: is a file, needs to be a folder"),
+    "out below a file": (("--out", "p.yaml/out"), "p.yaml/out: cannot be written to"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_are_refused_in_one_line_and_leave_nothing(study, fault):
+    arguments, message = FAULTS[fault]
+    ended = study(*arguments)
+    assert (ended.code, ended.out) == (2, "")
+    assert len(ended.messages) == 1
+    assert message in ended.messages[0]
+    assert [path.name for path in Path().iterdir()] == ["p.yaml"]
+
+
+def interrupted_after(count, monkeypatch, mishap):
+    put = Ledger.put
+
+    def failing(self, *values):
+        put(self, *values)
+        if len(self) == count:
+            raise mishap
+
+    monkeypatch.setattr(Ledger, "put", failing)
+
+
+def test_interrupt_keeps_what_had_finished(study_without_page, monkeypatch):
+    with monkeypatch.context() as changed:
+        interrupted_after(10, changed, KeyboardInterrupt())
+        ended = study_without_page()
+    assert ended.code == 130
+    assert "finished runs are kept in out/ledger.sqlite: go on with --resume" in ended.err
+    assert [path.name for path in Path("out").iterdir()] == ["ledger.sqlite"]
+    ended = study_without_page()
+    assert ended.code == 2
+    assert "go on from there with --resume" in ended.err
+    assert study_without_page("--resume").code == 0
+    resumed = tables()
+    assert study_without_page("--out", "whole").code == 0
+    assert tables("whole") == resumed
+
+
+def test_disk_that_is_full_at_the_end_costs_no_run(study_without_page, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as changed:
+        changed.setattr("wm_drake.studies.gasket.tables.write_tables", full)
+        ended = study_without_page()
+    assert (ended.code, len(ended.err.strip().splitlines())) == (2, 1)
+    assert "out: cannot be written to: No space left on device; all runs are kept" in ended.err
+    assert [path.name for path in Path("out").iterdir()] == ["ledger.sqlite"]
+    no_runs(monkeypatch)
+    assert study_without_page().code == 0
+
+
+def test_other_study_in_the_folder_is_refused_and_kept(study_without_page):
+    study_without_page()
+    before = tables()
+    for arguments, word in (
+        (("--load", "middle"), "loads is"),
+        (("--set", "gravity=9.8 m/s^2"), "machine is"),
+        (("--factor", "K_Ty"), "design is"),
+    ):
+        ended = study_without_page(*arguments, "--resume")
+        assert ended.code == 2
+        assert "out/ledger.sqlite: belongs to another study or version" in ended.err
+        assert word in ended.err
+    assert tables() == before
+
+
+def test_other_version_of_the_sources_is_refused(study_without_page, monkeypatch):
+    study_without_page()
+    monkeypatch.setattr("wm_drake.batch.sources_version", lambda: "0123")
+    ended = study_without_page("--resume")
+    assert ended.code == 2
+    assert "and '0123' here" in ended.err
+
+
+def test_damaged_ledger_is_refused_and_left(study_without_page):
+    study_without_page()
+    path = Path("out/ledger.sqlite")
+    damaged = b"x" * 200 + path.read_bytes()[200:]
+    path.write_bytes(damaged)
+    ended = study_without_page("--resume")
+    assert (ended.code, len(ended.messages)) == (2, 1)
+    assert "out/ledger.sqlite: is damaged" in ended.err
+    assert path.read_bytes() == damaged
+
+
+def test_diverging_trial_is_said_and_left_out(study):
+    ended = study("--factor", "spring_types.suspension.stiffness=8 N/mm..1e9 N/mm")
+    assert ended.code == 2
+    assert "runs failed; the others do not determine the effects" in ended.err
+
+
+# a study in a process of its own: one load, runs of one second, 65 trials of a D-optimal design
+OWN = (
+    "--factor",
+    "K_Lx",
+    "--factor",
+    "K_Lz",
+    "--factor",
+    "C_L",
+    "--factor",
+    "C_T",
+    "--trials",
+    "65",
+    "--load",
+    "middle",
+)
+
+
+def start(folder, *arguments, **options):
+    (folder / "p.yaml").write_text("time: (0, 8) s\nspeed: (0, 60) rpm\n")
+    code = "from wm_drake.cli import main; main()"
+    command = [
+        sys.executable,
+        "-c",
+        code,
+        "study",
+        "gasket",
+        *OWN,
+        "--profile",
+        "p.yaml",
+        "--workers",
+        "1",
+        *arguments,
+    ]
+    return subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options
+    )
+
+
+@pytest.mark.slow
+def test_ten_kills_leave_identical_tables(tmp_path):
+    begin = time.perf_counter()
+    assert start(tmp_path, "--out", "whole").wait() == 0
+    wall_s = time.perf_counter() - begin
+    rng, kills = random.Random(6), 0
+    while kills < 10:
+        process = start(tmp_path, "--out", "out", "--resume")
+        try:
+            # from the moment the ledger is there, somewhere in the rest of the study; earlier kills would hit imports only
+            while not list((tmp_path / "out").glob("ledger.sqlite")) and process.poll() is None:
+                time.sleep(0.01)
+            process.wait(rng.uniform(0.0, 0.3 * wall_s))
+        except subprocess.TimeoutExpired:
+            pass
+        process.send_signal(signal.SIGKILL)
+        kills += 1
+        process.communicate()
+    process = start(tmp_path, "--out", "out", "--resume")
+    assert process.communicate()[1].strip() == ""
+    assert process.returncode == 0
+    assert tables(tmp_path / "out") == tables(tmp_path / "whole")
+
+
+@pytest.mark.slow
+def test_second_study_on_the_folder_is_refused_while_the_first_runs(tmp_path):
+    first = start(tmp_path, "--out", "out")
+    while not (tmp_path / "out" / "ledger.sqlite").exists():
+        time.sleep(0.01)
+    first.send_signal(signal.SIGSTOP)
+    second = start(tmp_path, "--out", "out", "--resume")
+    message = second.communicate()[1]
+    first.send_signal(signal.SIGCONT)
+    assert second.returncode == 2
+    assert "out/ledger.sqlite: is in use by another study that runs now" in message
+    first.communicate()
+    assert first.returncode == 0
+    assert set(TABLES) < {path.name for path in (tmp_path / "out").iterdir()}
+
+
+def limit_files():
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, resource.RLIM_INFINITY))
+
+
+@pytest.mark.slow
+def test_full_disk_is_said_and_nothing_finished_is_lost(tmp_path):
+    process = start(tmp_path, "--out", "out", preexec_fn=limit_files)
+    message = process.communicate()[1].strip()
+    assert process.returncode == 2
+    assert len(message.splitlines()) == 1
+    assert "out/ledger.sqlite: cannot be written to" in message
+    process = start(tmp_path, "--out", "out", "--resume")
+    assert process.communicate()[1].strip() == ""
+    assert process.returncode == 0
+
+
+def test_folder_without_permission_is_refused(study, tmp_path):
+    (tmp_path / "locked").mkdir(mode=0o500)
+    if os.access(tmp_path / "locked", os.W_OK):
+        pytest.skip("this user may write anywhere")
+    ended = study("--out", "locked")
+    assert ended.code == 2
+    assert "locked/ledger.sqlite: cannot be written to" in ended.err

@@ -1,0 +1,18 @@
+"""What a user sees of long work."""
+
+from rich.console import Console
+
+from wm_drake.cli import progress as outputs
+
+
+def test_progress_bar_counts_up_to_the_total_on_standard_error(monkeypatch, capsys):
+    monkeypatch.setattr(
+        outputs, "Console", lambda **options: Console(**options, force_terminal=True, width=100)
+    )
+    with outputs.progress_bar(40, "machines") as progress:
+        progress(10)
+        progress(40)
+    seen = capsys.readouterr()
+    assert "machines" in seen.err
+    assert "40/40" in seen.err
+    assert seen.out == ""

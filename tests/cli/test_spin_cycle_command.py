@@ -1,0 +1,184 @@
+"""`wm-drake study spin-cycle`: what it prints and writes, that it goes on where it was interrupted, bad input."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from machine_with_bearing import BEARING, UNITS
+
+from wm_drake.simulation.runs import versions
+
+PROFILE = """
+time: (0, 4, 6) s
+speed: (60, 250, 250) rpm
+regions: [{name: R1, begin: 0 s, end: 3 s}, {name: R2, begin: 3 s, end: 6 s}]
+"""
+CASES = "case,front_g,rear_g,phase_deg\nfront,400,0,0\nboth,400,400,180\n"
+INPUT = ("--profile", "p.yaml", "--cases", "c.csv", "--machine", "reference")
+
+
+@pytest.fixture
+def study(wm_drake):
+    def run(*arguments):
+        Path("p.yaml").write_text(PROFILE)
+        Path("c.csv").write_text(CASES)
+        return wm_drake("study", "spin-cycle", *INPUT, "--out", "out", *arguments)
+
+    return run
+
+
+@pytest.fixture
+def whirling_file(tmp_path):
+    numbers = "\n".join(f"    {key}: {value} {UNITS[key]}" for key, value in BEARING.items())
+    path = tmp_path / "whirling.yaml"
+    path.write_text(
+        f"name: whirling\nextends: reference\nstep: 0.5 ms\nimperfections:\n  bearing:\n{numbers}\n"
+    )
+    return path
+
+
+def test_prints_one_json_object_and_writes_what_it_says(study):
+    ended = study("--json")
+    assert (ended.code, len(ended.out.splitlines())) == (0, 1)
+    shown = json.loads(ended.out)
+    assert [case["case"] for case in shown["cases"]] == ["front", "both"]
+    rms = np.array([case["rms_mm"] for case in shown["cases"]])
+    assert rms.shape == (2, 2, 3, 3)
+    assert rms.min() > 0.0
+    assert sorted(path.name for path in Path("out").iterdir()) == [
+        "cases.csv",
+        "ledger.sqlite",
+        "report.html",
+        "rms.csv",
+    ]
+    table = pd.read_csv("out/rms.csv")
+    np.testing.assert_allclose(table["rms_mm"].to_numpy().reshape(rms.shape), rms, rtol=1e-5)
+    page = Path("out/report.html").read_text(encoding="utf-8")
+    assert "Case both: 400 g in front and 400 g at the rear, 180° apart" in page
+    assert "http" not in page.replace("http://www.w3.org", "")
+    assert versions()["drake"] in page
+
+
+def test_second_time_nothing_is_run_and_its_own_table_is_a_perfect_measurement(study, monkeypatch):
+    first = json.loads(study("--json").out)
+    monkeypatch.setattr("wm_drake.batch.runs.integrate_lanes", None)  # whoever runs now, fails
+    again = study("--json", "--measured", "out/rms.csv")
+    assert again.code == 0
+    shown = json.loads(again.out)
+    assert [case["rms_mm"] for case in shown["cases"]] == [
+        case["rms_mm"] for case in first["cases"]
+    ]
+    assert max(shown["relative_error"]["by_region_mean"]) < 1e-5
+    assert "average error" in Path("out/report.html").read_text(encoding="utf-8")
+
+
+def test_drakes_engine_runs_a_case_too(study):
+    shown = {}
+    for engine in ("drake", "compiled"):
+        ended = study("--json", "--case", "front", "--engine", engine)
+        assert ended.code == 0
+        shown[engine] = json.loads(ended.out)["cases"][0]
+    for name in ("rms_mm", "rms_from_acceleration_mm"):
+        np.testing.assert_allclose(shown["drake"][name], shown["compiled"][name], rtol=1e-6)
+    # Drake's distance of two shapes is good to some micrometres
+    np.testing.assert_allclose(
+        shown["drake"]["smallest_gap_mm"], shown["compiled"]["smallest_gap_mm"], atol=1e-2
+    )
+
+
+def test_interrupted_it_keeps_what_had_ended(study, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr("wm_drake.report.spin_cycle.report.spin_cycle_report", interrupted)
+        ended = study()
+        assert ended.code == 130
+        assert [path.name for path in Path("out").iterdir()] == ["ledger.sqlite"]
+    monkeypatch.setattr("wm_drake.batch.runs.integrate_lanes", None)
+    assert study().code == 0
+
+
+def interrupted(*_):
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--profile", "nosuch"), "no such file, and no shipped profile"),
+        (("--cases", "nosuch.csv"), "--cases: no such file"),
+        (("--case", "fron"), "no case 'fron' (did you mean 'front'?"),
+        (("--engine", "drak"), "no engine 'drak'"),
+        (("--measured", "nosuch.csv"), "--measured: no such file"),
+        (("--accelerations", "nosuch"), "has no file CASE.csv"),
+        (("--set", "imperfections.phase_eror=1 deg"), "did you mean 'phase_error'"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line_and_nothing_is_written(study, arguments, message):
+    ended = study(*arguments)
+    assert (ended.code, ended.out, len(ended.messages)) == (2, "", 1)
+    assert message in ended.err
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("case,region,sensor,axis\n", "needs the columns"),
+        ("case,region,sensor,axis,rms_mm\nfront,R9,S1,x,1\n", "no region 'R9' in this study"),
+        ("case,region,sensor,axis,rms_mm\nfront,R1,S1,x,-1\n", "not a number of at least 0"),
+        ("case,region,sensor,axis,rms_mm\nfront,R1,S1,x,1\nfront,R1,S1,x,2\n", "is there twice"),
+    ],
+)
+def test_bad_measurements_are_refused(study, text, message):
+    Path("m.csv").write_text(text)
+    ended = study("--measured", "m.csv")
+    assert ended.code == 2
+    assert message in ended.err
+
+
+def test_measured_accelerations_are_integrated(study):
+    time = 5e-3 * np.arange(1200)
+    wave = 2e-3 * np.sin(2.0 * np.pi * 4.0 * time) * np.clip(time, 0.0, 1.0) ** 3
+    channels = {
+        f"S{sensor}_{axis}": -((2.0 * np.pi * 4.0) ** 2) * wave
+        for sensor in (1, 2, 3)
+        for axis in "xyz"
+    }
+    Path("records").mkdir()
+    pd.DataFrame({"time_s": time, **channels}).to_csv("records/front.csv", index=False)
+    shown = json.loads(study("--json", "--accelerations", "records").out)
+    error = shown["relative_error"]["by_region_mean"][1]
+    (front,) = (np.array(case["rms_mm"][1]) for case in shown["cases"] if case["case"] == "front")
+    expected = np.linalg.norm(front - 2.0 / np.sqrt(2.0)) / np.linalg.norm(
+        np.full(9, 2.0 / np.sqrt(2.0))
+    )
+    assert error == pytest.approx(expected, rel=0.02)
+
+
+def test_a_drum_that_can_whirl_is_run_and_said(study, whirling_file):
+    shown = json.loads(study("--machine", whirling_file, "--json").out)
+    plain = json.loads(study("--out", "perfect", "--json").out)
+    rms, perfect = (np.array([case["rms_mm"] for case in told["cases"]]) for told in (shown, plain))
+    assert 1e-5 < np.abs(rms / perfect - 1.0).max() < 0.05
+    page = Path("out/report.html").read_text(encoding="utf-8")
+    assert (
+        "The drum can whirl: its bearing gives by 4000 N/mm across its axis and 50000 N m/rad."
+        in page
+    )
+
+
+def test_a_step_too_long_for_the_bearing_is_refused(wm_drake, whirling_file):
+    whirling_file.write_text(whirling_file.read_text().replace("step: 0.5 ms", "step: 2.5 ms"))
+    for command in (
+        ("machine", "check", whirling_file),
+        ("study", "spin-cycle", "--machine", whirling_file, "--out", "out"),
+    ):
+        ended = wm_drake(*command)
+        assert (ended.code, ended.out) == (2, "")
+        assert f"{whirling_file}:3" in ended.err
+        assert (
+            "step: 2.5 ms is too long for the drum in its bearing, whose fastest motion is at"
+            in ended.err
+        )
+        assert not Path("out").exists()

@@ -1,0 +1,244 @@
+"""Tubes of telescopic dampers: the compiled machine against the Drake diagram, at random states and along a run."""
+
+import re
+
+import numpy as np
+import pytest
+from telescopic_machine import RUN_UP, changed, telescopic, with_bushing
+
+from wm_drake.engines.compiled.alone import Alone
+from wm_drake.engines.compiled.mechanics import DRUM_RATE
+from wm_drake.engines.compiled.run import run_compiled
+from wm_drake.errors import InputError
+from wm_drake.model.bodies import sdf_path
+from wm_drake.model.machine import build_machine
+from wm_drake.parameters import Load, SpinProfile, Unbalance
+from wm_drake.simulation.runs import Case, simulate
+
+LOAD = Load(
+    unbalances=(
+        Unbalance(mass=0.6, radius=0.24, y=-0.1, phase=0.7),
+        Unbalance(mass=0.4, radius=0.2, y=0.12, phase=2.9),
+    )
+)
+TUB = np.array(
+    [1.0, 1.2, 1.0] + [0.15] * 3 + [30.0] + [8.0] * 3 + [3.0] * 3 + [150.0]
+)  # rad, m, rad/s, m/s
+TUBES = np.array([1.0, 1.2, 1.0] + [0.15] * 3 + [0.05] + [8.0] * 3 + [3.0] * 3 + [2.0])
+VECTORS = (
+    slice(0, 3),
+    slice(3, 6),
+    slice(6, 7),
+    slice(7, 10),
+    slice(10, 13),
+    slice(13, 14),
+    slice(14, None),
+)
+
+
+@pytest.fixture(scope="module")
+def built():
+    return build_machine(telescopic())
+
+
+def worst_difference(machine, setup, count, seed=5):
+    """Largest relative difference of the derivative of Drake's state and the compiled machine's, per vector."""
+    rng, context, trees = np.random.default_rng(seed), setup.context, machine.state_layout.states()
+    alone, tubes = Alone(setup), len(setup.telescopes)
+    worst = 0.0
+    for _ in range(count):
+        blocks = [
+            rng.uniform(-1.0, 1.0, 14) * TUB,
+            *(rng.uniform(-1.0, 1.0, 14) * TUBES for _ in range(tubes)),
+        ]
+        sponges = rng.uniform(-0.01, 0.01, tubes)
+        state = np.zeros(context.num_continuous_states())
+        for tree, block in zip(trees, blocks, strict=True):
+            state[tree] = block
+        state[-tubes:] = sponges
+        context.SetContinuousState(state)
+        machine.source.set_acceleration(
+            machine.source.GetMyContextFromRoot(context), rng.uniform(-20.0, 20.0)
+        )
+        told = machine.diagram.EvalTimeDerivatives(context).CopyToVector()
+        drake = [
+            told[trees[0]],
+            *(np.append(told[tree], told[k - tubes]) for k, tree in enumerate(trees[1:])),
+        ]
+        x = np.concatenate(
+            [
+                blocks[0],
+                *(
+                    np.append(block, delta)
+                    for block, delta in zip(blocks[1:], sponges, strict=True)
+                ),
+            ]
+        )
+        dx = alone.derivative(x, told[trees[0]][DRUM_RATE])
+        for mine, its in zip(np.split(dx, 14 + 15 * np.arange(tubes)), drake, strict=True):
+            for part in VECTORS:
+                scale = np.max(np.abs(its[part]), initial=1e-3)
+                worst = max(worst, np.max(np.abs(mine[part] - its[part]), initial=0.0) / scale)
+    return worst
+
+
+def test_derivatives_are_those_of_the_diagram_at_1000_random_states(built):
+    assert worst_difference(built, built.set_up(LOAD), 1000) < 1e-10
+
+
+def test_they_agree_for_crooked_tubes_and_without_friction(built):
+    crooked = changed(
+        telescopic(),
+        bodies={
+            "damper_left_outer": {
+                "mass": 0.4,
+                "centre_of_mass": (-0.2, 0.02, -0.28),
+                "inertia": {
+                    "xx": 1e-3,
+                    "yy": 1.2e-3,
+                    "zz": 9e-4,
+                    "xy": 1e-4,
+                    "xz": -2e-4,
+                    "yz": 5e-5,
+                },
+            },
+            "damper_left_inner": {"mass": 0.3, "centre_of_mass": (-0.25, -0.01, -0.35)},
+        },
+    )
+    with pytest.raises(
+        InputError, match="telescopic_dampers: their bushings cannot hold the tubes"
+    ):
+        built.set_up(LOAD, parameters=crooked)
+    held = with_bushing(crooked, rotational_stiffness_y=20.0)  # N m/rad
+    assert worst_difference(built, built.set_up(LOAD, parameters=held), 200) < 1e-10
+    assert worst_difference(built, built.set_up(LOAD, dampers=False), 200) < 1e-10
+
+
+def test_they_agree_for_other_laws_along_the_joint_and_tables_in_the_bushings():
+    table = {"angle": (-0.5, 0.0, 0.3), "torque": (-2.0, 0.0, 0.7)}
+    mstv = {
+        "law": "mstv",
+        "friction_force": 60.0,
+        "sponge_stiffness": 176e3,
+        "sponge_damping": 90.0,
+        "slider_damping": 400.0,
+    }
+    other = changed(
+        with_bushing(telescopic(), rotational_stiffness_x=table), damper_types={"free_stroke": mstv}
+    )
+    machine = build_machine(other)
+    assert worst_difference(machine, machine.set_up(LOAD), 200) < 1e-10
+
+
+@pytest.mark.slow
+def test_a_run_moves_as_in_drake(built):
+    drake, compiled = (
+        simulate(built, Case("two", LOAD, RUN_UP), engine) for engine in ("drake", "compiled")
+    )
+    assert list(drake.data_vars) == list(compiled.data_vars)
+    motion = float(np.abs(drake.displacement).max())
+    assert motion > 1e-3
+    for variable in (
+        "displacement",
+        "tub_position",
+        "tube_position",
+        "tube_extension",
+        "damper_deformation",
+    ):
+        np.testing.assert_allclose(compiled[variable], drake[variable], rtol=0.0, atol=1e-8)  # m
+    np.testing.assert_allclose(
+        compiled.bushing_force, drake.bushing_force, atol=1e-6 * float(drake.bushing_force.max())
+    )
+
+
+def test_tubes_stay_between_their_bushings(built):
+    record = simulate(built, Case("two", LOAD, RUN_UP))
+    load = np.abs(record.bushing_force.sel(bushing=["left_tub", "left_housing"]))
+    assert 20.0 < float(load.sel(axis="y").max()) < 200.0  # along the damper, N: it works
+    stretch = record.tube_extension.sel(tube="left")
+    assert float(stretch.max() - stretch.min()) > 1e-3
+    # what the two bushings and the tub leave between them is the extension
+    tension = record.damper_tension.sel(damper="left")
+    np.testing.assert_allclose(
+        record.bushing_force.sel(bushing="left_housing", axis="y"),
+        tension,
+        atol=0.12 * float(np.abs(tension).max()),
+    )
+
+
+REVOLUTE = (
+    r'<joint name="damper_left_telescope" type="prismatic">',
+    '<joint name="damper_left_telescope" type="revolute">',
+)
+DAMPED = (
+    r"(damper_left_telescope.*?<effort>0</effort></limit>)(</axis>)",
+    r"\1<dynamics><damping>3</damping></dynamics>\2",
+)
+DRIVEN = (r"(damper_left_telescope.*?)<effort>0</effort>", r"\1")
+
+
+def redrawn(tmp_path, pattern, replacement):
+    text, count = re.subn(
+        pattern, replacement, sdf_path("free_stroke.sdf").read_text(), count=1, flags=re.DOTALL
+    )
+    assert count == 1
+    (tmp_path / "redrawn.sdf").write_text(text)
+    return changed(telescopic(), model=str(tmp_path / "redrawn.sdf"))
+
+
+def test_a_joint_with_damping_of_its_own_is_refused_by_the_compiled_engine_only(tmp_path):
+    machine = build_machine(redrawn(tmp_path, *DAMPED))
+    setup = machine.set_up()
+    with pytest.raises(
+        InputError,
+        match="joint 'damper_left_telescope' has damping of its own; use the drake engine",
+    ):
+        run_compiled(
+            setup, SpinProfile(time=(0.0, 1.0), speed=(0.0, 1.0)), 2.5e-4, lambda fraction: None
+        )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (REVOLUTE, "joint 'damper_left_telescope' is revolute, not prismatic"),
+        (DRIVEN, "must be the only driven one"),
+    ],
+    ids=["revolute", "driven"],
+)
+def test_other_joints_are_refused(tmp_path, change, message):
+    with pytest.raises(InputError, match=message):
+        build_machine(redrawn(tmp_path, *change))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            {"joint": "damper_lft_telescope"},
+            r"joint: no joint 'damper_lft_telescope' \(did you mean 'damper_left_telescope'",
+        ),
+        (
+            {"outer_frame": "damper_left_tub"},
+            "outer_frame: frame 'damper_left_tub' is not fixed to the damper_left_outer",
+        ),
+        (
+            {"tub_bushing": "conecting"},
+            r"left.tub_bushing: 'conecting' is not in bushing_types \(did you mean 'connecting'",
+        ),
+    ],
+)
+def test_wrong_names_are_refused(change, message):
+    parameters = telescopic()
+    dampers = parameters.model_dump()["telescopic_dampers"]
+    with pytest.raises((InputError, ValueError), match=message):
+        build_machine(
+            changed(parameters, telescopic_dampers=dampers | {"left": dampers["left"] | change})
+        )
+
+
+def test_dampers_may_come_in_any_order():
+    parameters = telescopic()
+    dampers = dict(reversed(parameters.model_dump()["telescopic_dampers"].items()))
+    machine = build_machine(changed(parameters, telescopic_dampers=dampers))
+    assert worst_difference(machine, machine.set_up(LOAD), 50) < 1e-10

@@ -1,0 +1,355 @@
+"""What must hold of a drum that whirls in its bearing: closed forms, limits, energy, runs side by side, refusals."""
+
+import numpy as np
+import pytest
+from machine_with_bearing import BEARING, stiffer, with_bearing
+from pydrake.multibody.plant import MultibodyPlant
+from simple_machines import DAMPING, STIFFNESS, constant_speed, isotropic_machine, unbalance
+from tube_energy import Motion, bushing, dense_states, still
+
+from wm_drake.batch import simulate_many
+from wm_drake.errors import InputError
+from wm_drake.model.bodies import add_bodies, add_load, set_bodies
+from wm_drake.model.machine import build_machine
+from wm_drake.parameters import (
+    Load,
+    MachineParameters,
+    SpinProfile,
+    Unbalance,
+    load_machine,
+    machine_yaml,
+    with_value,
+)
+from wm_drake.simulation.measures import measure
+from wm_drake.simulation.runs import Case, simulate
+from wm_drake.studies.description.modal import natural_modes
+
+RUN_UP = SpinProfile(time=(0.0, 3.0), speed=(5.0, 30.0))
+RADIAL, TILTING = 2e5, 5e3  # N/m, N m/rad
+DRUM, TUB = 7.0, 35.0  # kg: one of six balls, and the others
+SIX_BALLS = {
+    "radial_stiffness": RADIAL,
+    "tilting_stiffness": TILTING,
+    "radial_damping": 120.0,
+    "tilting_damping": 6.0,
+    "y": 0.0,
+}
+
+
+@pytest.fixture(scope="module")
+def whirling():
+    return build_machine(with_bearing(load_machine("reference")))
+
+
+@pytest.fixture(scope="module")
+def balls():
+    """Tub and drum with their centres of mass on To, and the bearing there; the drum is slimmer across its axis."""
+    tree = isotropic_machine().model_dump()
+    drum = tree["bodies"]["drum"] | {"inertia": {"xx": 0.2, "yy": 0.3, "zz": 0.2}}
+    damped = {f"rotational_damping_{axis}": 40.0 for axis in "xyz"}
+    tree |= {"bodies": tree["bodies"] | {"drum": drum}, "gasket": tree["gasket"] | damped}
+    return build_machine(
+        with_bearing(MachineParameters.model_validate(tree), step=5e-4, **SIX_BALLS)
+    )
+
+
+def drum_weight_and_depth(machine, setup):
+    drum = machine.plant.GetBodyByName("drum")
+    depth = drum.CalcCenterOfMassInBodyFrame(setup.plant_context)[1]
+    return drum.get_mass(setup.plant_context) * setup.parameters.gravity, depth
+
+
+def test_the_drum_sags_by_its_weight_over_the_stiffness(whirling):
+    setup = whirling.set_up()
+    weight, depth = drum_weight_and_depth(whirling, setup)
+    own = whirling.bearing.GetOutputPort("force").Eval(
+        whirling.bearing.GetMyContextFromRoot(setup.context)
+    )
+    np.testing.assert_allclose(
+        own[:3], [0.0, 0.0, -weight / BEARING["radial_stiffness"]], atol=1e-12
+    )  # m
+    moment = weight * (BEARING["y"] - depth)  # its centre of mass hangs in front of the bearing
+    np.testing.assert_allclose(
+        own[3:6], [moment / BEARING["tilting_stiffness"], 0.0, 0.0], rtol=1e-6, atol=1e-12
+    )
+    np.testing.assert_allclose(own[6:], [0.0, 0.0, -weight, moment, 0.0, 0.0], rtol=1e-6, atol=1e-9)
+
+
+def test_preloads_balance_the_machine_with_its_drum_sagged(whirling, machine):
+    setup, perfect = whirling.set_up(), machine.set_up()
+    assert np.abs(setup.residual).max() < 1e-9
+    assert np.abs(setup.rest_pose).max() < 1e-12
+    for name, spring in setup.springs.items():
+        assert spring.preload == pytest.approx(perfect.springs[name].preload, rel=1e-3)
+    assert np.abs(whirling.diagram.EvalTimeDerivatives(setup.context).CopyToVector()).max() < 1e-9
+
+
+def response(record, values, along, across):
+    """Complex amplitude of what turns with the drum: the first part as the cosine of its angle, the second as its sine."""
+    angle = record.drum_angle.values
+    basis = np.column_stack([np.cos(angle), np.sin(angle), np.ones(len(angle))])
+    in_phase, ahead, _ = np.linalg.lstsq(basis, values.sel(axis=along).values, rcond=None)[0]
+    assert np.linalg.lstsq(basis, values.sel(axis=across).values, rcond=None)[0][
+        1
+    ] == pytest.approx(in_phase, rel=1e-3)
+    return in_phase - 1j * ahead
+
+
+def two_bodies(mass, stiffness, damping, inner, inner_stiffness, inner_damping, speed, force):
+    """Complex amplitude of the inner body against the outer one, which hangs on a spring; the force turns with the inner."""
+    own, between = stiffness + 1j * speed * damping, inner_stiffness + 1j * speed * inner_damping
+    matrix = [[own + between - mass * speed**2, -between], [-between, between - inner * speed**2]]
+    outer, moved = np.linalg.solve(matrix, [0.0, force])
+    return moved - outer
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.9, 1.1, 1.6])
+def test_whirl_is_that_of_a_rotor_on_two_springs(balls, ratio):
+    critical = np.sqrt(RADIAL * (1.0 / DRUM + 1.0 / TUB))  # rad/s
+    speed, mass = ratio * critical, 0.02
+    record = simulate(balls, Case("one", unbalance(mass), constant_speed(speed, 22.0))).sel(
+        time=slice(20.0, None)
+    )
+    expected = two_bodies(
+        TUB, STIFFNESS, DAMPING, DRUM + mass, RADIAL, 120.0, speed, mass * 0.25 * speed**2
+    )
+    found = response(
+        record, record.drum_displacement, "z", "x"
+    )  # phase 0 points up and turns towards the right
+    assert found == pytest.approx(expected, rel=2e-4)
+    assert abs(record.drum_displacement.sel(axis="y")).max() < 1e-9
+    assert np.angle(expected) < (
+        -1.5 if ratio > 1.0 else 0.0
+    )  # above its critical speed the drum turns about its centre
+
+
+@pytest.mark.parametrize("speed", [60.0, 300.0])
+def test_a_couple_tilts_the_drum_as_its_gyroscopic_moment_lets_it(balls, speed):
+    mass, depth = 0.005, 0.15
+    ends = (
+        Unbalance(mass=mass, radius=0.25, y=depth),
+        Unbalance(mass=mass, radius=0.25, y=-depth, phase=np.pi),
+    )
+    record = simulate(balls, Case("two", Load(unbalances=ends), constant_speed(speed, 6.0))).sel(
+        time=slice(4.0, None)
+    )
+    across, about = (
+        0.2 + 2 * mass * (depth**2 + 0.25**2 / 2),
+        0.3 + 2 * mass * 0.25**2,
+    )  # kg m^2, means
+    couple = 2 * mass * 0.25 * depth * speed**2
+    # a body that turns about its axis resists circular tilting with J_across - J_about
+    expected = two_bodies(5 * 0.3, 4000.0, 40.0, across - about, TILTING, 6.0, speed, couple)
+    angle = record.drum_angle.values
+    basis = np.column_stack([np.cos(angle), np.sin(angle), np.ones(len(angle))])
+    cosine, sine, _ = np.linalg.lstsq(basis, record.drum_tilt.sel(axis="x").values, rcond=None)[0]
+    assert cosine - 1j * sine == pytest.approx(expected, rel=4e-3)
+    assert abs(cosine - 1j * sine) < 0.9 * abs(couple / TILTING) or speed < 100.0
+
+
+def test_amplitudes_tend_to_those_of_a_perfect_joint_with_the_give(machine, reference):
+    load = reference.loads["front"]
+    perfect = simulate(machine, Case("front", load, RUN_UP), step=2.5e-4).displacement.values
+    apart = []
+    for share in (0.25, 1.0, 4.0):
+        parameters = with_bearing(reference, **stiffer(share))
+        moved = simulate(build_machine(parameters), Case("front", load, RUN_UP)).displacement.values
+        apart.append(np.abs(moved - perfect).max())
+    assert 1e-6 < apart[0] < 1e-3  # m
+    np.testing.assert_allclose(
+        [apart[0] / apart[1], apart[1] / apart[2]], 4.0, rtol=0.1
+    )  # first order
+
+
+def test_energy_of_a_run_is_balanced():
+    parameters = with_bearing(
+        isotropic_machine(), **SIX_BALLS | {"y": 0.1, "torsional_damping": 3.0}
+    )
+    machine = build_machine(parameters)
+    load, profile = unbalance(0.5, y=-0.1), SpinProfile(time=(0.0, 2.0), speed=(30.0, 120.0))
+    setup = machine.set_up(load)
+    time, samples, torque, layout = dense_states(setup, profile, 1e-4)
+    motion, _, _, carrier = layout.parts(samples)
+    tub, drum = Motion(motion), Motion(np.insert(carrier, (6, 12), 0.0, axis=1))
+    stored, power = 0.0, 0.0
+    for kind, a, placed, b in (
+        (parameters.gasket, tub, setup.bushings["gasket"], still(len(time))),
+        (parameters.imperfections.bearing.as_bushing(), drum, setup.bearing, tub),
+    ):
+        more_stored, more_power = bushing(
+            kind, a, placed.p_ToB_T, placed.R_TB, b, placed.p_WG, placed.R_WG
+        )
+        stored, power = stored + more_stored, power + more_power
+    plant = MultibodyPlant(0.0)
+    add_bodies(plant, parameters)
+    context = plant.CreateDefaultContext()
+    set_bodies(plant, context, parameters)
+    add_load(plant, context, load)
+    plant.get_joint_actuator(plant.GetJointActuatorIndices()[0]).SetRotorInertia(
+        context, 0.0
+    )  # a device, no energy
+    places, kinetic = machine.state_layout.states(), []
+    for sample in (0, -1):
+        state = np.zeros(plant.num_multibody_states())
+        state[places[1]] = np.insert(carrier[sample], (6, 12), 0.0)
+        state[places[0]] = motion[sample]
+        plant.SetPositionsAndVelocities(context, state)
+        kinetic.append(plant.CalcKineticEnergy(context))
+    drive = np.trapezoid(torque * motion[:, 13], time)
+    dissipated = np.trapezoid(power, time)
+    assert np.trapezoid(more_power, time) > 0.3 * dissipated > 1.0  # J; the bearing's share
+    assert (
+        abs(drive - (kinetic[1] - kinetic[0]) - (stored[-1] - stored[0]) - dissipated)
+        < 1e-5 * dissipated
+    )
+
+
+@pytest.mark.parametrize("name", ["reference", pytest.param("free_stroke", marks=pytest.mark.slow)])
+def test_runs_side_by_side_are_those_of_simulate(name):
+    parameters = with_bearing(load_machine(name))
+    whirling = build_machine(parameters)
+    cases = [
+        Case(
+            f"{load} {k:g}",
+            parameters.loads[load],
+            RUN_UP,
+            parameters=with_value(parameters, key, k),
+        )
+        for load in list(parameters.loads)[-2:]
+        for key, k in (
+            ("imperfections.bearing.radial_stiffness", 2e6),
+            ("imperfections.residual_imbalance.mass", 0.1),
+        )
+    ]
+    ended = []
+    table = simulate_many(
+        whirling,
+        cases,
+        measures=["extremes", "amplitudes", "regions"],
+        histories=True,
+        finished=ended.append,
+    )
+    for index, case in enumerate(cases):
+        record = simulate(whirling, case)
+        alone = measure(record)
+        for name in ("detergent_displacement", "gasket_force", "gasket_moment", "amplitude"):
+            np.testing.assert_allclose(
+                table[name].values[index], getattr(alone, name).values, rtol=1e-9
+            )
+        for name in ("drum_displacement", "drum_tilt", "bearing_force", "motor_torque"):
+            size = float(np.abs(record[name]).max())
+            np.testing.assert_allclose(
+                ended[index].record[name], record[name], rtol=0.0, atol=1e-9 * size
+            )
+    assert table.amplitude.values[0] != pytest.approx(table.amplitude.values[1], rel=1e-6)
+
+
+def test_modes_of_the_tub_hardly_change(whirling, machine):
+    np.testing.assert_allclose(
+        natural_modes(whirling).frequency_hz, natural_modes(machine).frequency_hz, rtol=5e-3
+    )
+
+
+def test_machines_with_and_without_do_not_mix(whirling, machine, reference):
+    with pytest.raises(
+        InputError,
+        match=r"imperfections.bearing: gives; that of the built machine does not: build a new one",
+    ):
+        machine.set_up(parameters=whirling.parameters)
+    with pytest.raises(
+        InputError, match=r"imperfections.bearing: does not give; that of the built machine does"
+    ):
+        whirling.set_up(parameters=reference)
+    cases = [
+        Case("one", reference.loads["front"], RUN_UP, parameters=p)
+        for p in (reference, whirling.parameters)
+    ]
+    with pytest.raises(InputError, match=r"case 1 'one'.*imperfections.bearing"):
+        simulate_many(machine, cases)
+
+
+def test_the_fastest_motion_of_two_bodies_on_a_spring_is_the_closed_form(balls):
+    axial = np.sqrt(BEARING["axial_stiffness"] * (1.0 / DRUM + 1.0 / TUB))
+    assert balls.set_up().bearing_rate == pytest.approx(
+        axial, rel=1e-9
+    )  # rad/s; the stiffest direction
+
+
+@pytest.mark.parametrize(("pieces", "allowed"), [(5, "1 ms"), (7, "0.7143 ms, such as 0.625 ms")])
+def test_a_step_too_long_for_the_bearing_is_refused_with_the_longest_one(
+    whirling, reference, pieces, allowed
+):
+    # of a bearing that 5 ms over almost as many pieces would just follow
+    share = ((pieces - 0.1) / 5e-3 / whirling.set_up().bearing_rate) ** 2
+    parameters = with_bearing(reference, **stiffer(share))
+    case = Case("front", reference.loads["front"], RUN_UP, parameters=parameters)
+    told = rf"step: 2.5 ms is too long for the drum in its bearing, whose fastest motion is at [\d.]+ Hz; allowed are up to {allowed}$"
+    with pytest.raises(InputError, match=f"^{told}"):
+        simulate(whirling, case, step=2.5e-3)
+    with pytest.raises(InputError, match=f"^case 0 'front': {told}"):
+        simulate_many(whirling, [case], step=2.5e-3)
+    if pieces == 5:  # the longest one holds in both engines
+        records = [simulate(whirling, case, engine, step=1e-3) for engine in ("compiled", "drake")]
+        assert [record.attrs["diverged"] for record in records] == ["", ""]
+        np.testing.assert_allclose(records[0].displacement, records[1].displacement, atol=1e-8)  # m
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("radial_stiffness", "-1 N/mm", "'-1 N/mm' is out of range; allowed is > 0"),
+        ("tilting_damping", "-1 N m s/rad", "allowed is >= 0"),
+        ("axial_stiffness", "5 N m", "unit 'N m' does not fit"),
+        ("radial_stifness", "5 N/mm", "did you mean 'radial_stiffness'"),
+    ],
+)
+def test_wrong_numbers_are_refused(whirling, key, value, message):
+    with pytest.raises(InputError, match=rf"imperfections.bearing.{key}: .*{message}"):
+        with_value(whirling.parameters, f"imperfections.bearing.{key}", value)
+
+
+def test_a_number_of_a_bearing_that_is_not_there_is_refused(reference):
+    with pytest.raises(
+        InputError,
+        match=r"the machine has none; a machine file describes 'imperfections.bearing' whole",
+    ):
+        with_value(reference, "imperfections.bearing.radial_stiffness", "5 N/mm")
+
+
+def test_a_bearing_that_cannot_hold_the_drum_is_refused(whirling):
+    soft = with_value(whirling.parameters, "imperfections.bearing.radial_stiffness", 3e3)
+    with pytest.raises(
+        InputError,
+        match=r"imperfections.bearing: cannot hold the drum: at rest it would sag by more than 20 mm",
+    ):
+        whirling.set_up(parameters=soft)
+
+
+FILE = """
+extends: reference
+name: whirling
+step: 0.5 ms
+imperfections:
+  bearing:
+    radial_stiffness: {value: 10 N/mm, source: assumption}
+    axial_stiffness: 8 kN/mm
+    tilting_stiffness: 100 kN m/rad
+    radial_damping: 1 N s/mm
+    axial_damping: 1 N s/mm
+    tilting_damping: 10 N m s/rad
+    y: 150 mm
+"""
+
+
+def test_a_bearing_is_written_in_a_machine_file_and_back(tmp_path):
+    (tmp_path / "mine.yaml").write_text(FILE)
+    parameters = load_machine(tmp_path / "mine.yaml")
+    bearing = parameters.imperfections.bearing
+    assert (bearing.radial_stiffness, bearing.axial_stiffness, bearing.y) == pytest.approx(
+        (1e4, 8e6, 0.15)
+    )
+    kind = bearing.as_bushing()
+    assert kind.rotational_stiffness_y == kind.rotational_stiffness_x == 1e5
+    assert parameters.sources["imperfections.bearing.radial_stiffness"] == "assumption"
+    (tmp_path / "again.yaml").write_text(machine_yaml(parameters))
+    assert load_machine(tmp_path / "again.yaml").imperfections == parameters.imperfections

@@ -1,0 +1,174 @@
+"""Statics, Contexts and linearization of the whole diagram."""
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from wm_drake.errors import InputError
+from wm_drake.model.bodies import sdf_path
+from wm_drake.model.equilibrium import EQUILIBRIUM_TOLERANCE
+from wm_drake.model.machine import build_machine
+from wm_drake.parameters import Load, Unbalance, load_machine, with_value
+from wm_drake.studies.description.modal import natural_modes
+from wm_drake.systems.speed_source import REFLECTED_INERTIA
+
+
+def test_rest_pose_is_a_static_equilibrium(machine):
+    setup = machine.set_up()
+    derivative = machine.diagram.EvalTimeDerivatives(setup.context).CopyToVector()
+    assert EQUILIBRIUM_TOLERANCE == 1e-9
+    assert np.max(np.abs(setup.residual)) < 1e-9  # N and N m
+    assert np.max(np.abs(setup.rest_pose)) < 1e-9  # T coincides with W
+    assert np.max(np.abs(derivative)) < 1e-9
+
+
+def test_preloads_carry_the_weight_and_its_moments(machine):
+    setup = machine.set_up()
+    plant, context = machine.plant, setup.plant_context
+    moving = [body for body in map(plant.get_body, plant.GetBodyIndices(plant.GetBodyByName("tub").model_instance()))
+              if body.name() not in ("world", "housing")]  # fmt: skip
+    weights = [body.get_mass(context) * setup.parameters.gravity for body in moving]
+    centres = [
+        plant.EvalBodyPoseInWorld(context, body) @ body.CalcCenterOfMassInBodyFrame(context)
+        for body in moving
+    ]
+    pulls = [
+        s.preload * (s.p_WH - s.p_ToA_T) / np.linalg.norm(s.p_WH - s.p_ToA_T)
+        for s in setup.springs.values()
+    ]
+    assert sum(pull[2] for pull in pulls) == pytest.approx(sum(weights), rel=1e-12)
+    moment = sum(
+        np.cross(s.p_ToA_T, pull) for s, pull in zip(setup.springs.values(), pulls, strict=True)
+    )
+    weight_moment = sum(np.cross(c, [0, 0, -w]) for c, w in zip(centres, weights, strict=True))
+    np.testing.assert_allclose(moment, -weight_moment, atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("bodies.upper_counterweight.mass", 11.0),
+        ("bodies.motor.centre_of_mass", (0.02, 0.13, -0.28)),
+        ("frames.damper_left_tub.position", (-0.22, -0.05, -0.17)),
+        ("frames.spring_left_housing.position", (-0.2, -0.1, 0.40)),
+        ("gasket.stiffness_x.force", (-90.0, -40.0, 0.0, 40.0, 90.0)),
+        ("damper_types.friction.friction_force", 40.0),
+    ],
+)
+def test_a_change_in_the_context_equals_a_rebuild_bit_for_bit(machine, reference, key, value):
+    changed = with_value(reference, key, value)
+    load = Load(unbalances=(Unbalance(mass=0.8, radius=0.24, y=0.05, phase=1.0),))
+    rng = np.random.default_rng(7)
+    states = rng.normal(
+        0.0, 0.02, (5, machine.diagram.CreateDefaultContext().num_continuous_states())
+    )
+    derivatives = []
+    for built in (machine, build_machine(changed)):
+        setup = built.set_up(load, parameters=changed)
+        rows = [setup.rest_pose]
+        for state in states:
+            setup.context.SetContinuousState(state)
+            rows.append(built.diagram.EvalTimeDerivatives(setup.context).CopyToVector())
+        derivatives.append(rows)
+    original = machine.set_up(load)
+    original.context.SetContinuousState(states[0])
+    assert all(np.array_equal(a, b) for a, b in zip(*derivatives, strict=True))
+    assert not np.array_equal(
+        derivatives[0][1], machine.diagram.EvalTimeDerivatives(original.context).CopyToVector()
+    )
+
+
+def test_an_unbalanced_override_finds_its_own_equilibrium(machine, reference):
+    hook = machine.set_up().springs["left"].p_WH
+    changed = with_value(reference, "bodies.upper_counterweight.mass", 10.5)
+    changed = with_value(
+        changed, "frames.spring_left_housing.position", tuple(hook + np.array([-0.004, 0.002, 0.0]))
+    )  # it leans now
+    setup = machine.set_up(parameters=changed)
+    assert np.max(np.abs(setup.residual)) < 1e-9
+    assert 0.0 < np.max(np.abs(setup.rest_pose)) < 0.02
+
+
+def test_springs_that_cannot_hold_the_tub_are_refused(machine, reference):
+    heavy = with_value(reference, "bodies.motor.centre_of_mass", (0.0, 3.0, -0.3))
+    with pytest.raises(InputError, match="spring"):
+        machine.set_up(parameters=heavy)
+
+
+def test_another_machine_than_the_built_one_is_refused(machine, reference):
+    with pytest.raises(InputError, match="law"):
+        machine.set_up(
+            parameters=with_value(
+                reference, "damper_types.friction", {"law": "coulomb", "friction_force": 30.0}
+            )
+        )
+    with pytest.raises(InputError, match="gravity"):
+        machine.set_up(parameters=with_value(reference, "gravity", 1.6))
+
+
+def test_gasket_out_means_no_gasket_force(machine):
+    setup = machine.set_up(gasket=False)
+    machine.plant.SetPositions(setup.plant_context, [0.01, 0.02, -0.01, 0.01, 0.01, 0.01, 0.3])
+    gasket = machine.bushings["gasket"]
+    assert not np.any(
+        gasket.GetOutputPort("force").Eval(gasket.GetMyContextFromRoot(setup.context))
+    )
+
+
+def mass_and_finite_difference_stiffness(machine, setup):
+    """6 x 6 mass matrix of the tub with the drum locked, and stiffness by central differences of the static force."""
+    plant, context = machine.plant, setup.plant_context
+    mass = plant.CalcMassMatrix(context)
+    step = 1e-6
+    stiffness = np.empty((6, 6))
+    for column in range(6):
+        forces = []
+        for sign in (1.0, -1.0):
+            pose = np.append(setup.rest_pose, 0.0)
+            pose[column] += sign * step
+            plant.SetPositions(context, pose)
+            forces.append(machine.elastic_and_gravity_force(setup.context))
+        stiffness[:, column] = -(forces[0] - forces[1]) / (2 * step)
+    return mass[:6, :6], stiffness
+
+
+@pytest.mark.parametrize("gasket", [True, False])
+def test_linearized_frequencies_equal_those_of_a_finite_difference_stiffness(
+    machine, reference, gasket
+):
+    undamped = reference
+    for axis in "xyz":
+        undamped = with_value(undamped, f"gasket.damping_{axis}", 0.0)
+        undamped = with_value(undamped, f"gasket.rotational_damping_{axis}", 0.0)
+    modes = natural_modes(machine, undamped, gasket=gasket)
+    mass, stiffness = mass_and_finite_difference_stiffness(
+        machine, machine.set_up(parameters=undamped, gasket=gasket, dampers=False)
+    )
+    np.testing.assert_allclose(stiffness, stiffness.T, atol=1e-3 * np.abs(stiffness).max())
+    squared = eigh(0.5 * (stiffness + stiffness.T), mass, eigvals_only=True)
+    assert len(modes.frequency_hz) == 6
+    np.testing.assert_allclose(modes.frequency_hz, np.sqrt(squared) / (2 * np.pi), rtol=1e-5)
+    np.testing.assert_allclose(modes.damping_ratio, 0.0, atol=1e-9)
+
+
+def test_drum_is_locked_to_its_speed_by_the_reflected_inertia(machine):
+    setup = machine.set_up()
+    mass = machine.plant.CalcMassMatrix(setup.plant_context)
+    assert mass[6, 6] == pytest.approx(REFLECTED_INERTIA, rel=1e-6)
+    assert np.max(np.abs(mass[6, :6])) < 1.0  # nothing of it reaches the tub
+
+
+@pytest.mark.parametrize("effort", ["0", "10"])
+def test_a_model_of_ones_own_must_not_clamp_the_motor(tmp_path, effort):
+    text = sdf_path("oscillating_group.sdf").read_text()
+    limit = f"<limit><effort>{effort}</effort><lower>"
+    assert "<limit><lower>" in text
+    (tmp_path / "own.sdf").write_text(text.replace("<limit><lower>", limit))
+    (tmp_path / "free.sdf").write_text(text)
+    for model in ("own", "free"):
+        (tmp_path / f"{model}.yaml").write_text(f"extends: reference\nmodel: {model}.sdf\n")
+    with pytest.raises(InputError, match="without <effort>"):
+        build_machine(load_machine(tmp_path / "own.yaml"))
+    assert (
+        np.max(np.abs(build_machine(load_machine(tmp_path / "free.yaml")).set_up().residual)) < 1e-9
+    )

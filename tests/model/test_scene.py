@@ -1,0 +1,91 @@
+"""Distances between tub and housing: against brute force, a closed form, and the replay page."""
+
+import numpy as np
+import pytest
+
+from wm_drake.model.scene import Scene, replay_page
+from wm_drake.parameters import load_machine
+
+REST = np.zeros(6)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return Scene(load_machine("reference"))
+
+
+def pair_named(scene, moving, fixed):
+    return next(
+        pair
+        for pair in scene._pairs
+        if (scene._name(pair[0]), scene._name(pair[1])) == (moving, fixed)
+    )
+
+
+def random_poses(count, seed):
+    return np.random.default_rng(seed).normal(0.0, 1.0, (count, 6)) * np.repeat([0.01, 0.008], 3)
+
+
+def test_shapes_of_tub_weights_and_housing_are_measured(scene):
+    moving = {scene._name(pair[0]) for pair in scene._pairs}
+    fixed = {scene._name(pair[1]) for pair in scene._pairs}
+    assert {"tub_shell", "motor_block", "upper_counterweight_block"} <= moving
+    assert {
+        "wall_left",
+        "wall_right",
+        "wall_top",
+        "wall_bottom",
+        "wall_rear",
+        "wall_front",
+        "detergent_box",
+    } == fixed
+
+
+def test_tub_shell_to_side_wall_is_the_support_function_of_a_cylinder(scene):
+    pair = pair_named(scene, "tub_shell", "wall_right")
+    at_rest, _ = scene.distance(REST, pair)
+    # a cylinder about y, turned by yaw: its extent in x is r cos(yaw) + l/2 sin(yaw), about its centre 30 mm to the front
+    radius, length, centre, wall = 0.262, 0.40, -0.03, 0.30
+    assert at_rest == pytest.approx(wall - radius, abs=1e-5)
+    yaw, x = 0.03, 0.01
+    moved, point = scene.distance(np.array([0, 0, yaw, x, 0, 0]), pair)
+    extent = radius * np.cos(yaw) + 0.5 * length * np.sin(yaw) + x - centre * np.sin(yaw)
+    assert moved == pytest.approx(wall - extent, abs=2e-5)
+    assert point[0] == pytest.approx(extent, abs=1e-4)
+
+
+def test_smallest_gap_is_that_of_brute_force(scene):
+    poses, time = random_poses(60, 3), np.arange(60.0)
+    every = {
+        (i, pair): scene.distance(pose, pair)[0]
+        for i, pose in enumerate(poses)
+        for pair in scene._pairs
+    }
+    (index, pair), smallest = min(every.items(), key=lambda entry: entry[1])
+    gap = scene.smallest_gap(time, poses, REST)
+    assert gap.distance == smallest
+    assert gap.time == time[index]
+    assert (gap.moving, gap.fixed) == (scene._name(pair[0]), scene._name(pair[1]))
+
+
+def test_overlap_is_a_negative_gap_and_no_samples_are_no_gap(scene):
+    gap = scene.smallest_gap(np.array([1.5]), np.array([[0, 0, 0, 0.06, 0, 0]]), REST)
+    assert gap.distance == pytest.approx(0.038 - 0.06, abs=1e-4)
+    assert gap.fixed == "wall_right"
+    assert scene.smallest_gap(np.empty(0), np.empty((0, 6)), REST) is None
+
+
+def test_clearance_at_rest_is_that_of_a_real_machine(scene):
+    gap = scene.smallest_gap(np.array([0.0]), REST[None, :], REST)
+    assert 0.020 < gap.distance < 0.040  # m; [B] section 1: 20 to 40 mm
+
+
+def test_replay_is_one_page_that_needs_nothing_else():
+    positions = np.zeros((2, 7))
+    still = replay_page(load_machine("reference"), np.array([0.0, 0.1]), positions)
+    positions[1, 3] = 0.02
+    page = replay_page(load_machine("reference"), np.array([0.0, 0.1]), positions)
+    assert page.lstrip().lower().startswith("<!doctype html>")
+    assert len(page) > 1_000_000  # the viewer and the scene are inside
+    assert 'src="http' not in page
+    assert page != still

@@ -1,0 +1,163 @@
+"""Shipped machines: every number has its source, every frame its use, and the whole is a plausible washing machine."""
+
+import xml.etree.ElementTree as ET
+
+import pytest
+from pydantic import BaseModel
+
+from wm_drake.model.bodies import SDF_FOLDER, sdf_path
+from wm_drake.model.equilibrium import EQUILIBRIUM_TOLERANCE
+from wm_drake.model.machine import build_machine
+from wm_drake.parameters import (
+    load_machine,
+    measured_amplitudes,
+    quantities,
+    shipped_machines,
+    source_of,
+)
+from wm_drake.studies.description.description import oscillating_mass
+from wm_drake.studies.description.modal import natural_modes
+
+README = SDF_FOLDER / "README.md"
+FRAME_GROUPS = ("spring_", "damper_", "gasket_", "sensor_", "detergent_")
+
+pytestmark = pytest.mark.parametrize(
+    "machine", [pytest.param(name, id=name) for name in shipped_machines()], indirect=True
+)
+
+
+@pytest.fixture(scope="module")
+def machine(request):
+    return load_machine(request.param)
+
+
+@pytest.fixture(scope="module")
+def built(machine):
+    return build_machine(machine)
+
+
+@pytest.fixture(scope="module")
+def sdf(machine):
+    return ET.parse(sdf_path(machine.model)).getroot().find("model")
+
+
+@pytest.fixture(scope="module")
+def readme():
+    assert README.is_file(), f"{README} is missing"
+    return README.read_text(encoding="utf-8")
+
+
+def is_written(node, parts):
+    """Whether a number stands in the file; defaults do not."""
+    if not parts:
+        return True
+    if isinstance(node, BaseModel):
+        return parts[0] in node.model_fields_set and is_written(getattr(node, parts[0]), parts[1:])
+    return is_written(node[int(parts[0]) if isinstance(node, tuple) else parts[0]], parts[1:])
+
+
+def used_frames(machine):
+    elements = [
+        *machine.springs.values(),
+        *machine.dampers.values(),
+        *machine.all_bushings().values(),
+    ]
+    frames = {frame for element in elements for frame in (element.tub_frame, element.housing_frame)}
+    ends = ("tub_frame", "outer_frame", "inner_frame", "housing_frame")
+    frames |= {
+        getattr(damper, end) for damper in machine.telescopic_dampers.values() for end in ends
+    }
+    sensors = [*machine.sensors.values(), *machine.accelerometers.values()]
+    return frames | {sensor.frame for sensor in sensors} | {machine.clearance.detergent_frame}
+
+
+def test_every_written_number_has_a_source(machine):
+    keys = [key for key, _, _ in quantities(machine) if is_written(machine, key.split("."))]
+    assert len(keys) >= 10
+    assert [key for key in keys if not source_of(machine, key).strip()] == []
+
+
+def test_every_source_belongs_to_a_number(machine):
+    keys = [key for key, _, _ in quantities(machine)]
+    assert [
+        source
+        for source in machine.sources
+        if not any(f"{key}.".startswith(f"{source}.") for key in keys)
+    ] == []
+
+
+def test_every_frame_is_used_or_documented(machine, sdf, readme):
+    frames = {frame.get("name") for frame in sdf.iter("frame")}
+    assert frames
+    assert {frame for frame in frames - used_frames(machine) if frame not in readme} == set()
+
+
+def test_every_link_and_group_of_frames_is_documented(sdf, readme):
+    links = {link.get("name") for link in sdf.iter("link")}
+    assert {link for link in links if link not in readme} == set()
+    frames = {frame.get("name") for frame in sdf.iter("frame")}
+    prefixes = {
+        frame: next((group for group in FRAME_GROUPS if frame.startswith(group)), frame)
+        for frame in frames
+    }
+    assert {
+        frame for frame, prefix in prefixes.items() if frame not in readme and prefix not in readme
+    } == set()
+
+
+def test_measured_tables_are_readable_and_belong_to_the_machine(machine):
+    table = measured_amplitudes(machine)
+    assert set(table["load"]) <= set(machine.loads)
+    sizes = table[list(machine.sensors)]
+    assert ((sizes > 0.0) & (sizes < 100.0)).all(axis=None)  # mm
+
+
+def test_counts(machine):
+    assert len(machine.springs) >= 2
+    assert len(machine.dampers) + len(machine.telescopic_dampers) >= 2
+    assert len(machine.sensors) == 6
+    assert machine.gasket is not None
+    assert len(machine.loads) >= 2
+    assert machine.profile.duration > 10.0
+
+
+def test_oscillating_mass_is_that_of_the_sdf(machine, built, sdf):
+    masses = {
+        link.get("name"): float(link.findtext("inertial/mass"))
+        for link in sdf.iter("link")
+        if link.get("name") != "housing"
+    }
+    masses = {name: mass for name, mass in masses.items() if not name.startswith("damper_")}
+    masses |= {
+        name: override.mass
+        for name, override in machine.bodies.items()
+        if override.mass is not None
+    }
+    assert oscillating_mass(built.set_up()) == pytest.approx(sum(masses.values()))
+    assert 20.0 < sum(masses.values()) < 100.0
+
+
+def test_springs_carry_the_weight(machine, built):
+    setup = built.set_up()
+    rest = setup.rest_pose[3:]
+    lift = sum(
+        spring.preload * (spring.p_WH - spring.p_ToA_T - rest)[2] / spring.rest_length
+        for spring in setup.springs.values()
+    )
+    tubes = sum(
+        built.plant.GetBodyByName(f"damper_{name}_outer").default_mass()
+        for name in machine.telescopic_dampers
+    )
+    assert lift == pytest.approx((oscillating_mass(setup) + tubes) * machine.gravity, rel=1e-3)
+    assert all(spring.preload > 0.0 for spring in setup.springs.values())
+    assert abs(setup.residual).max() <= EQUILIBRIUM_TOLERANCE
+    assert abs(rest).max() < 1e-3  # m: the drawn pose is the rest pose
+
+
+def test_tub_has_six_soft_modes(machine, built):
+    frequencies = natural_modes(built).frequency_hz
+    assert len(frequencies) == 6
+    assert 0.5 < frequencies[0] < frequencies[-1] < 10.0
+    assert (
+        machine.profile.speed[-1] > 2.0 * 3.1416 * frequencies[-1]
+    )  # the run-up goes through all of them

@@ -1,0 +1,129 @@
+"""Measures on signals of known answer."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from wm_drake.simulation.measures import (
+    envelopes,
+    filtered_displacement,
+    largest_motion,
+    measure,
+    peak_line,
+    percent_difference,
+)
+
+RATE = 200.0  # Hz, as records are sampled
+
+
+def record_of(displacement, drum_speed=None):
+    """A record with one sensor, at rest but for its displacement."""
+    n = len(displacement)
+    zeros = np.zeros((n, 3))
+    axes = {
+        "axis": list("xyz"),
+        "angle": ["roll", "pitch", "yaw"],
+        "sensor": ["Xr"],
+        "bushing": ["gasket", "other"],
+    }
+    force = np.zeros((n, 2, 3))
+    force[n // 2, 0] = (-3.0, 2.0, 1.0)
+    force[n // 3, 1] = 50.0
+    return xr.Dataset(
+        {
+            "displacement": (("time", "sensor"), np.asarray(displacement)[:, None]),
+            "detergent_displacement": (("time", "axis"), zeros - [0.001, 0.0, 0.002]),
+            "bushing_force": (("time", "bushing", "axis"), force),
+            "bushing_moment": (("time", "bushing", "axis"), 0.1 * force),
+            "drum_speed": (
+                ("time",),
+                np.linspace(0.0, 40.0, n) if drum_speed is None else drum_speed,
+            ),
+            "drum_angle": (("time",), np.linspace(0.0, 9.0, n)),
+            "tub_angle": (("time", "angle"), zeros),
+            "tub_position": (("time", "axis"), zeros),
+        },
+        {"time": np.arange(n) / RATE, **axes},
+        {"rest_pose": np.zeros(6)},
+    )
+
+
+def sine(frequency, duration=40.0, amplitude=0.01):
+    time = np.arange(int(duration * RATE)) / RATE
+    return amplitude * np.sin(2 * np.pi * frequency * time)
+
+
+@pytest.mark.parametrize("frequency", [0.3, 0.5, 2.0, 5.0, 20.0, 40.0])
+def test_filter_is_a_butterworth_band_run_both_ways(frequency):
+    # |H|^2 of a fourth-order band pass through the bilinear map, squared by running it back
+    warped = np.tan(np.pi * np.array([0.5, 20.0, frequency]) / RATE)
+    low, high, w = warped
+    ratio = (w**2 - low * high) / (w * (high - low))
+    gain = 1.0 / (1.0 + ratio**8)
+    middle = filtered_displacement(record_of(sine(frequency))).isel(time=slice(3000, 5000))
+    amplitude = np.sqrt(2.0) * float(np.std(middle))  # the samples need not meet the peaks
+    assert amplitude == pytest.approx(0.01 * gain, rel=0.01, abs=2e-6)
+
+
+def test_filter_shifts_nothing_and_takes_out_a_constant():
+    signal = sine(3.0)
+    filtered = filtered_displacement(record_of(signal + 0.05)).isel(sensor=0).values
+    np.testing.assert_allclose(filtered[1000:-1000], signal[1000:-1000], atol=2e-5)
+
+
+def test_filter_does_not_flare_where_a_record_ends():
+    filtered = filtered_displacement(record_of(sine(1.6)))
+    assert np.max(np.abs(filtered)) < 1.15 * 0.01  # 1.3 with the padding scipy would choose
+
+
+def test_a_record_shorter_than_the_filter_has_no_amplitude():
+    assert np.isnan(filtered_displacement(record_of(np.zeros(20)))).all()
+    assert np.isnan(measure(record_of(np.zeros(20))).amplitude).all()
+    assert np.isnan(measure(record_of(np.zeros(20))).critical_speed).all()
+
+
+def test_peak_line_goes_from_peak_to_peak():
+    time = np.arange(7.0)
+    signal = np.array([0.0, 2.0, 0.0, 1.0, 0.0, 4.0, 0.0])
+    assert peak_line(time, signal).tolist() == [2.0, 2.0, 1.5, 1.0, 2.5, 4.0, 4.0]
+    assert peak_line(time, time).tolist() == time.tolist()
+
+
+def test_envelopes_of_a_growing_and_decaying_oscillation_follow_its_size():
+    time = np.arange(8000) / RATE
+    size = 0.01 * np.exp(-(((time - 20.0) / 6.0) ** 2))
+    both = envelopes(record_of(size * np.sin(2 * np.pi * 3.0 * time)))
+    np.testing.assert_allclose(both.upper.isel(sensor=0), size, atol=1e-4)
+    np.testing.assert_allclose(both.lower.isel(sensor=0), -size, atol=1e-4)
+
+
+def test_measures_read_amplitude_speed_and_forces():
+    time = np.arange(8000) / RATE
+    size = 0.01 * np.exp(-(((time - 20.0) / 6.0) ** 2))
+    measures = measure(record_of(size * np.sin(2 * np.pi * 3.0 * time)))
+    assert float(measures.amplitude[0]) == pytest.approx(0.01, rel=5e-3)
+    assert float(measures.critical_speed[0]) == pytest.approx(20.0, abs=0.2)
+    assert measures.detergent_displacement.values.tolist() == [0.001, 0.0, 0.002]
+    assert measures.gasket_force.values.tolist() == [
+        3.0,
+        2.0,
+        1.0,
+    ]  # the other bushing does not count
+    assert measures.gasket_moment.values == pytest.approx([0.3, 0.2, 0.1])
+    assert measures.smallest_gap is None
+
+
+def test_percent_difference_is_equation_1_of_B():
+    with_gasket, without = xr.DataArray([29.1, 8.0]), xr.DataArray([23.6, 1.1])
+    assert percent_difference(with_gasket, without).values == pytest.approx([23.3, 627.3], abs=0.05)
+
+
+def test_replay_shows_the_stretch_around_the_largest_motion():
+    time = np.arange(8000) / RATE
+    times, positions = largest_motion(record_of(0.01 * np.exp(-(((time - 20.0) / 2.0) ** 2))))
+    assert times[0] == pytest.approx(16.0)
+    assert times[-1] == pytest.approx(24.0, abs=0.05)
+    assert positions.shape == (len(times), 7)
+    assert np.diff(times).max() < 0.04  # s
+    alone, _ = largest_motion(record_of([0.0]))
+    assert alone.tolist() == [0.0]

@@ -1,0 +1,191 @@
+"""RMS displacements in regions: hand values, acceleration integrated twice, and the batch against single runs."""
+
+import numpy as np
+import pytest
+from simple_machines import constant_speed, isotropic_machine
+
+from wm_drake.batch import simulate_many
+from wm_drake.model.machine import build_machine
+from wm_drake.parameters import Load, SpinProfile, Unbalance, with_value
+from wm_drake.parameters.spin import Region
+from wm_drake.simulation.runs import Case, simulate
+from wm_drake.simulation.vibration import (
+    HIGH_PASS_HZ,
+    high_passed,
+    integrated_twice,
+    point_accelerations,
+    record_region_displacements,
+    region_rms,
+    relative_error,
+)
+
+PERIOD = 5e-3
+PROFILE = SpinProfile(
+    time=(0.0, 6.0, 9.0),
+    speed=(5.0, 30.0, 30.0),
+    regions=(Region(name="A", begin=1.0, end=4.0), Region(name="B", begin=4.0, end=9.0)),
+)
+
+
+def pair(front, rear, phase=0.0, y=0.1):
+    masses = (
+        Unbalance(mass=front, radius=0.25, y=-y),
+        Unbalance(mass=rear, radius=0.25, y=y, phase=phase),
+    )
+    return Load(unbalances=tuple(mass for mass in masses if mass.mass))
+
+
+def test_rms_by_hand():
+    signal = np.concatenate([np.full(200, 9.0), np.full(600, 3.0), np.tile([1.0, -7.0], 501)])[
+        :, None
+    ]
+    np.testing.assert_allclose(region_rms(signal, PERIOD, PROFILE), [[3.0], [5.0]])
+
+
+def test_regions_a_run_did_not_get_through_have_no_number():
+    rms = region_rms(np.ones((1000, 2)), PERIOD, PROFILE)
+    np.testing.assert_array_equal(rms, [[1.0, 1.0], [np.nan, np.nan]])
+
+
+@pytest.mark.parametrize("frequency", [0.8, 3.0, 6.0, 20.0])
+def test_acceleration_of_a_wave_gives_its_displacement_whatever_the_bias(frequency):
+    time = PERIOD * np.arange(8000)
+    growth = np.clip(time / 5.0, 0.0, 1.0) ** 3  # from rest
+    wave = (1e-3 * growth * np.sin(2.0 * np.pi * frequency * time))[:, None]
+    acceleration = np.gradient(np.gradient(wave[:, 0], PERIOD, edge_order=2), PERIOD, edge_order=2)
+    exact = np.where(time > 5.0, -((2.0 * np.pi * frequency) ** 2) * wave[:, 0], acceleration)[
+        :, None
+    ]
+    middle = slice(2500, 7000)  # away from what numpy's gradient makes of the growth
+    biased = integrated_twice(exact + 0.2 - (exact + 0.2).mean(), PERIOD)
+    for displacement in (integrated_twice(exact, PERIOD), biased):
+        shown = high_passed(displacement, PERIOD, HIGH_PASS_HZ)
+        rms = np.sqrt(np.mean(shown[middle] ** 2))
+        assert rms == pytest.approx(1e-3 / np.sqrt(2.0), rel=0.03 if frequency < 1.0 else 0.005)
+
+
+def test_too_few_samples_have_no_displacement():
+    assert np.isnan(high_passed(np.ones((5, 2)), PERIOD, 0.5)).all()
+    assert np.isnan(integrated_twice(np.ones((1, 2)), PERIOD)).all()
+    assert integrated_twice(np.ones((0, 2)), PERIOD).shape == (0, 2)
+
+
+def test_accelerations_of_points_are_the_second_differences_of_their_positions(machine, reference):
+    record = simulate(
+        machine,
+        Case("middle", reference.loads["middle"], SpinProfile(time=(0.0, 2.0), speed=(20.0, 20.0))),
+    )
+    angle = record.drum_angle.values[:, None]
+    motion = np.hstack(
+        [
+            record.tub_angle,
+            record.tub_position,
+            angle,
+            record.tub_angular_velocity,
+            record.tub_velocity,
+        ]
+    )
+    acceleration = np.hstack([record.tub_angular_acceleration, record.tub_acceleration])
+    points = np.array([[0.1, -0.2, 0.25]])
+    told = point_accelerations(motion, acceleration, points)[:, 0]
+    from wm_drake.simulation.runs import point_positions
+
+    positions = point_positions(motion, points)[:, 0]
+    differences = np.diff(positions, 2, axis=0) / PERIOD**2
+    np.testing.assert_allclose(told[201:-1], differences[200:], atol=0.02 * np.abs(told).max())
+
+
+def test_relative_error_by_hand():
+    computed, measured = np.array([[3.0, 4.0], [1.0, 1.0]]), np.array([[3.0, 0.0], [0.0, 0.0]])
+    np.testing.assert_allclose(relative_error(computed, measured), [4.0 / 3.0, np.nan])
+
+
+def test_both_ways_agree_and_the_batch_measures_what_single_runs_do(machine):
+    cases = [Case(str(mass), pair(mass, 0.4), PROFILE) for mass in (0.0, 0.2, 0.5)]
+    table = simulate_many(machine, cases, measures=["regions"], workers=2)
+    assert dict(table.sizes) == {"run": 3, "axis": 3, "sensor": 6, "accelerometer": 3, "region": 2}
+    error = relative_error(
+        table.region_displacement_integrated.values.reshape(3, 2, -1),
+        table.region_displacement.values.reshape(3, 2, -1),
+    )
+    assert 0.0 < error.max() < 0.01
+    for number, case in enumerate(cases):
+        record = simulate(machine, case)
+        alone = record_region_displacements(record, record.accelerometer_point.values, PROFILE)
+        np.testing.assert_allclose(table.region_displacement.values[number], alone[0], rtol=1e-8)
+        np.testing.assert_allclose(
+            table.region_displacement_integrated.values[number], alone[1], rtol=1e-8
+        )
+
+
+def test_a_residual_imbalance_is_a_load_of_its_own(machine, reference):
+    residual = reference
+    for key, value in (("mass", "50 g"), ("radius", "240 mm"), ("y", "30 mm"), ("phase", "40 deg")):
+        residual = with_value(residual, f"imperfections.residual_imbalance.{key}", value)
+    as_load = Load(
+        unbalances=(*pair(0.3, 0.2).unbalances, residual.imperfections.residual_imbalance)
+    )
+    cases = [
+        Case("residual", pair(0.3, 0.2), PROFILE, parameters=residual),
+        Case("load", as_load, PROFILE),
+    ]
+    told = simulate_many(
+        machine, [*cases, Case("without", pair(0.3, 0.2), PROFILE)], measures=["regions"]
+    )
+    residual_rms, load_rms, without = told.region_displacement.values
+    np.testing.assert_allclose(residual_rms, load_rms, rtol=1e-9)
+    assert np.abs(residual_rms / without - 1.0).max() > 0.02
+
+
+@pytest.fixture(scope="module")
+def isotropic():
+    return build_machine(isotropic_machine())
+
+
+class TestClosedForms:
+    """Of static and dynamic unbalance, on a machine whose centre of mass is on the drum axis, at the first instant."""
+
+    SPEED, MASS, RADIUS, Y = 30.0, 0.4, 0.25, 0.1
+
+    def rates(self, isotropic, phase):
+        load = pair(self.MASS, self.MASS, phase, self.Y)
+        record = simulate(isotropic, Case("pair", load, constant_speed(self.SPEED, 0.01)))
+        return record.tub_acceleration.values[0], record.tub_angular_acceleration.values[0]
+
+    def test_equal_masses_in_phase_push_and_do_not_turn(self, isotropic):
+        acceleration, turning = self.rates(isotropic, 0.0)
+        force = 2.0 * self.MASS * self.RADIUS * self.SPEED**2  # both up at the first instant
+        # the masses ride on the tub too: their own inertia about its centre lets the push turn nothing
+        np.testing.assert_allclose(
+            acceleration, [0.0, 0.0, force / (42.0 + 2.0 * self.MASS)], rtol=2e-3, atol=1e-3
+        )
+        np.testing.assert_allclose(turning, 0.0, atol=1e-6)
+
+    def test_equal_masses_in_opposition_turn_and_do_not_push(self, isotropic):
+        acceleration, turning = self.rates(isotropic, np.pi)
+        couple = (
+            2.0 * self.MASS * self.RADIUS * self.Y * self.SPEED**2
+        )  # front up, rear down: about -x
+        inertia = 6 * 0.3 + 2.0 * self.MASS * (self.RADIUS**2 + self.Y**2)
+        np.testing.assert_allclose(acceleration, 0.0, atol=1e-9)
+        assert turning[0] == pytest.approx(-couple / inertia, rel=0.02)
+
+    @pytest.mark.parametrize("phase", [0.0, 0.5 * np.pi, np.pi])
+    def test_exchanged_masses_mirror_front_and_rear_of_a_symmetric_machine(self, isotropic, phase):
+        points = np.array([[0.1, -0.2, 0.2], [0.1, 0.2, 0.2]])
+        forth, back = (
+            record_region_displacements(
+                simulate(isotropic, Case("pair", load, PROFILE)), points, PROFILE
+            )[0]
+            for load in (
+                pair(0.6, 0.2, phase),
+                Load(  # the same seen in a mirror between front and rear: what was ahead stays ahead
+                    unbalances=(
+                        Unbalance(mass=0.2, radius=0.25, y=-0.1, phase=phase),
+                        Unbalance(mass=0.6, radius=0.25, y=0.1),
+                    )
+                ),
+            )
+        )
+        np.testing.assert_allclose(forth, back[:, ::-1], rtol=1e-9, atol=1e-12)
+        assert np.abs(forth / back - 1.0).max() > 0.1  # front and rear themselves differ

@@ -1,0 +1,223 @@
+"""Analysis of variance against a textbook, statsmodels' own reference tables, planted effects and properties."""
+
+import itertools
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from statsmodels.formula.api import ols
+from statsmodels.stats.anova import anova_lm
+
+from wm_drake.studies.doe import d_optimal_levels, level_matrix, orthogonal_levels
+from wm_drake.studies.doe.anova import anova
+
+# Montgomery, Design and Analysis of Experiments, battery life data: hours by plate material (1-3) and temperature (15, 70, 125 deg F),
+# four batteries each; analysis of variance as printed there
+BATTERY = {
+    (1, 15): (130, 155, 74, 180),
+    (1, 70): (34, 40, 80, 75),
+    (1, 125): (20, 70, 82, 58),
+    (2, 15): (150, 188, 159, 126),
+    (2, 70): (136, 122, 106, 115),
+    (2, 125): (25, 70, 58, 45),
+    (3, 15): (138, 110, 168, 160),
+    (3, 70): (174, 120, 150, 139),
+    (3, 125): (96, 104, 82, 60),
+}
+BATTERY_TABLE = {  # sum of squares, degrees of freedom, F
+    "material": (10683.72, 2, 7.91),
+    "temperature": (39118.72, 2, 28.97),
+    "material:temperature": (9613.78, 4, 3.56),
+}
+
+
+def battery():
+    rows = [(m, t, hours) for (m, t), cell in BATTERY.items() for hours in cell]
+    return pd.DataFrame(rows, columns=["material", "temperature", "hours"])
+
+
+def test_battery_table_of_the_textbook():
+    data = battery()
+    table = anova(data[["material", "temperature"]], data[["hours"]])["hours"]
+    for term in table.terms:
+        sum_sq, df, f = BATTERY_TABLE[term.name]
+        assert (term.sum_sq, term.df, term.f) == (
+            pytest.approx(sum_sq, abs=0.006),
+            df,
+            pytest.approx(f, abs=0.006),
+        )
+        assert term.percent == pytest.approx(100.0 * sum_sq / 77646.97, abs=1e-3)
+    assert table.residual_sum_sq == pytest.approx(18230.75, abs=0.006)
+    assert table.total_sum_sq == pytest.approx(77646.97, abs=0.006)
+    assert table.residual_df == 27
+    assert table.terms[2].p == pytest.approx(0.0186, abs=5e-5)
+    assert table.constant == pytest.approx(105.53, abs=0.005)
+
+
+# R's table of type III with contrasts sum for these data, from statsmodels' test suite (stats/tests/test_anova.py, TestAnovaLM): days
+# in hospital of kidney patients by duration of treatment (1, 2) and weight gain (1, 2, 3), first row of each cell left out in the
+# unbalanced case as there
+KIDNEY = """
+0.0 1 1|2.0 1 1|1.0 1 1|3.0 1 1|0.0 1 1|2.0 1 1|0.0 1 1|5.0 1 1|6.0 1 1|8.0 1 1|2.0 1 2|4.0 1 2|7.0 1 2|12.0 1 2|15.0 1 2|4.0 1 2|
+3.0 1 2|1.0 1 2|5.0 1 2|20.0 1 2|15.0 1 3|10.0 1 3|8.0 1 3|5.0 1 3|25.0 1 3|16.0 1 3|7.0 1 3|30.0 1 3|3.0 1 3|27.0 1 3|0.0 2 1|
+1.0 2 1|1.0 2 1|0.0 2 1|4.0 2 1|2.0 2 1|7.0 2 1|4.0 2 1|0.0 2 1|3.0 2 1|5.0 2 2|3.0 2 2|2.0 2 2|0.0 2 2|1.0 2 2|1.0 2 2|3.0 2 2|
+6.0 2 2|7.0 2 2|9.0 2 2|10.0 2 3|8.0 2 3|12.0 2 3|3.0 2 3|7.0 2 3|15.0 2 3|4.0 2 3|9.0 2 3|6.0 2 3|1.0 2 3
+"""
+
+
+def kidney():
+    rows = [row.split() for row in KIDNEY.replace("\n", "").strip().split("|")]
+    data = pd.DataFrame(rows, columns=["Days", "Duration", "Weight"]).astype(
+        {"Days": float, "Duration": int, "Weight": int}
+    )
+    return data.assign(log_days=np.log(data["Days"] + 1.0))
+
+
+def statsmodels_table(data, response, factors):
+    formula = f"{response} ~ {' * '.join(f'C({name}, Sum)' for name in factors)}"
+    return anova_lm(ols(formula, data).fit(), typ=3)
+
+
+@pytest.mark.parametrize("dropped", [[], [0, 4, 11, 27, 33, 50]])
+def test_reference_case_of_statsmodels(dropped):
+    data = kidney().drop(index=dropped)
+    assert len(kidney()) == 60
+    expected = statsmodels_table(data, "log_days", ["Duration", "Weight"]).drop(index="Intercept")
+    table = anova(data[["Duration", "Weight"]], data[["log_days"]])["log_days"]
+    for (_, row), term in zip(expected.iloc[:3].iterrows(), table.terms, strict=True):
+        assert (term.sum_sq, term.df, term.f, term.p) == pytest.approx(
+            (row["sum_sq"], row["df"], row["F"], row["PR(>F)"])
+        )
+    assert table.residual_sum_sq == pytest.approx(expected.loc["Residual", "sum_sq"])
+
+
+def test_balanced_reference_case_as_r_prints_it():
+    """R: anova(lm(log(Days+1) ~ Duration*Weight)): sums of squares as in statsmodels' test file."""
+    data = kidney()
+    table = anova(data[["Duration", "Weight"]], data[["log_days"]])["log_days"]
+    assert [term.sum_sq for term in table.terms] == pytest.approx(
+        [2.3397, 16.9713, 0.6357], abs=5e-5
+    )
+    assert [term.f for term in table.terms] == pytest.approx([4.3583, 15.8064, 0.5920], abs=5e-4)
+
+
+NAMES = list("abcdefgh")
+
+
+def design_of(levels):
+    return pd.DataFrame(levels, columns=NAMES[: levels.shape[1]])
+
+
+def planted(levels, main, cross):
+    """A response of known effects: per factor at its levels, and of factors 0 and 1 together."""
+    response = 7.0 + sum(effects[levels[:, f] + 1] for f, effects in enumerate(main))
+    return response + cross[levels[:, 0] + 1, levels[:, 1] + 1]
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(["full", "orthogonal", "d-optimal", "random"]))
+def test_planted_effects_are_recovered_exactly_by_any_design(seed, kind):
+    rng = np.random.default_rng(seed)
+    full = level_matrix(5)
+    levels = {
+        "full": lambda: full,
+        "orthogonal": lambda: orthogonal_levels(8, 243),
+        "d-optimal": lambda: d_optimal_levels(4, 50, "main+2fi", 0),
+        "random": lambda: full[rng.choice(243, 120, replace=False)],
+    }[kind]().astype(int)
+    main = rng.normal(size=(levels.shape[1], 3))
+    main -= main.mean(axis=1, keepdims=True)
+    cross = rng.normal(size=(3, 3))
+    cross -= cross.mean(axis=0, keepdims=True)
+    cross -= cross.mean(axis=1, keepdims=True)
+    table = anova(design_of(levels), pd.DataFrame({"y": planted(levels, main, cross)}))["y"]
+    assert table.constant == pytest.approx(7.0)
+    variances = {(NAMES[f],): np.mean(effects**2) for f, effects in enumerate(main)} | {
+        ("a", "b"): np.mean(cross**2)
+    }
+    total = sum(variances.values())
+    for term in table.terms:
+        assert term.percent == pytest.approx(
+            100.0 * variances.get(term.factors, 0.0) / total, abs=1e-8
+        )
+        for combination, effect in term.effects.items():
+            places = tuple(level + 1 for level in combination)
+            expected = 0.0
+            if len(places) == 1:
+                expected = main[NAMES.index(term.name), places[0]]
+            elif term.factors == ("a", "b"):
+                expected = cross[places]
+            assert effect == pytest.approx(expected, abs=1e-9)
+    assert table.residual_percent == pytest.approx(0.0, abs=1e-12)
+    assert table.main_percent + table.interaction_percent == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize(
+    "levels", [level_matrix(5), orthogonal_levels(8, 243)], ids=["full", "orthogonal"]
+)
+def test_contributions_of_an_orthogonal_design_are_those_of_statsmodels(levels):
+    rng = np.random.default_rng(1)
+    response = (
+        rng.normal(size=len(levels))
+        + levels @ rng.normal(size=levels.shape[1])
+        + 2.0 * levels[:, 0] * levels[:, 1]
+    )
+    data = design_of(levels).assign(y=response)
+    table = anova(data.drop(columns="y"), data[["y"]])["y"]
+    formula = f"y ~ ({' + '.join(f'C({name}, Sum)' for name in data.columns[:-1])})**2"
+    expected = anova_lm(ols(formula, data).fit(), typ=3).drop(index="Intercept")
+    percents = 100.0 * expected["sum_sq"] / np.sum((response - response.mean()) ** 2)
+    found = [*(term.percent for term in table.terms), table.residual_percent]
+    assert found == pytest.approx(list(percents))
+    assert sum(found) == pytest.approx(100.0)
+
+
+def test_renaming_and_reordering_factors_permutes_the_table():
+    levels = d_optimal_levels(5, 100, "main+2fi", 0)
+    rng = np.random.default_rng(0)
+    response = pd.DataFrame({"y": rng.normal(size=100) + levels[:, 0] * levels[:, 3]})
+    order = [3, 0, 4, 1, 2]
+    plain, permuted = (
+        anova(design_of(levels)[[NAMES[f] for f in o]], response)["y"] for o in (range(5), order)
+    )
+    by_set = {frozenset(term.factors): term for term in permuted.terms}
+    for term in plain.terms:
+        other = by_set[frozenset(term.factors)]
+        assert (other.percent, other.sum_sq) == pytest.approx((term.percent, term.sum_sq))
+        for combination, effect in term.effects.items():
+            level = dict(zip(term.factors, combination, strict=True))
+            assert other.effects[tuple(level[name] for name in other.factors)] == pytest.approx(
+                effect, abs=1e-12
+            )
+    assert permuted.residual_percent == pytest.approx(plain.residual_percent)
+
+
+def test_effects_sum_to_zero_over_each_factor():
+    levels = d_optimal_levels(4, 60, "main+2fi", 2)
+    response = pd.DataFrame({"y": np.random.default_rng(3).normal(size=60)})
+    for term in anova(design_of(levels), response)["y"].terms:
+        for place in range(len(term.factors)):
+            for others in itertools.product((-1, 0, 1), repeat=len(term.factors) - 1):
+                line = [e for c, e in term.effects.items() if c[:place] + c[place + 1 :] == others]
+                assert len(line) == 3
+                assert sum(line) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_response_that_does_not_vary_has_no_contributions():
+    levels = level_matrix(3)
+    table = anova(design_of(levels), pd.DataFrame({"y": np.full(27, 0.3)}))["y"]
+    assert table.constant == pytest.approx(0.3)
+    assert all(np.isnan(term.percent) for term in table.terms)
+    assert np.isnan(table.residual_percent)
+
+
+def test_saturated_fit_has_no_tests():
+    levels = d_optimal_levels(4, 33, "main+2fi", 0)
+    table = anova(design_of(levels), pd.DataFrame({"y": np.random.default_rng(0).normal(size=33)}))[
+        "y"
+    ]
+    assert table.residual_df == 0
+    assert all(np.isnan(term.p) for term in table.terms)
+    assert sum(term.percent for term in table.terms) == pytest.approx(100.0)

@@ -1,0 +1,335 @@
+"""The core of identification on functions of known answer."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import curve_fit
+
+from wm_drake.errors import InputError
+from wm_drake.parameters.units import Unit
+from wm_drake.studies.fitting import (
+    METHODS,
+    FitProblem,
+    Measurement,
+    Unknown,
+    identify,
+    point_by_point,
+)
+from wm_drake.studies.fitting.assessment import correlation_time
+from wm_drake.studies.fitting.surfaces import (
+    QuadraticSurface,
+    Region,
+    response_surface,
+    surface_design,
+)
+
+TIME = np.linspace(0.0, 2.0, 200)
+TRUTH = np.array([2.0, 1.5, 0.7])
+UNKNOWNS = (
+    Unknown("a", 0.0, 10.0),
+    Unknown("b", 0.1, 10.0, logarithmic=True),
+    Unknown("c", 0.0, 5.0),
+)
+
+
+def decay_and_swing(points):
+    a, b, c = points.T[:, :, None]
+    return a * np.exp(-b * TIME) + c * np.sin(3.0 * TIME)
+
+
+def planted(noise=0.0, seed=0, **fields):
+    values = decay_and_swing(TRUTH[None])[0] + noise * np.random.default_rng(seed).normal(
+        size=TIME.size
+    )
+    return FitProblem(UNKNOWNS, (Measurement("swing", values, **fields),), decay_and_swing)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_planted_numbers_are_found(method):
+    fit = identify(planted(), method)
+    assert fit.values == pytest.approx(TRUTH, rel=1e-4)
+    assert fit.rmse < 1e-6
+    assert all(estimate.determined and not estimate.at_bound for estimate in fit.estimates)
+    assert list(fit.history) == sorted(fit.history, reverse=True)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_same_seed_gives_the_same_fit_and_progress_ends_at_one(method):
+    told = []
+    first, second = (
+        identify(
+            planted(0.05), method, seed=0, progress=lambda done, least: told.append((done, least))
+        )
+        for _ in range(2)
+    )
+    assert np.array_equal(first.values, second.values)
+    assert first.as_dict() == second.as_dict()
+    assert told[-1][0] == 1.0
+    assert all(0.0 <= done <= 1.0 for done, _ in told)
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        pytest.param(name, marks=pytest.mark.slow if name == "response-surface" else ())
+        for name in METHODS
+    ],
+)
+def test_intervals_hold_the_truth_in_95_of_100_noisy_repeats(method):
+    inside = np.zeros(3)
+    for seed in range(100):
+        fit = identify(planted(0.05, seed), method, seed=seed)
+        inside += [
+            e.lower <= truth <= e.upper for e, truth in zip(fit.estimates, TRUTH, strict=True)
+        ]
+    assert inside.min() >= 90
+    assert inside.max() <= 99  # they are not simply wide
+
+
+def straight_valley(p):
+    """Seen through p combinations of the numbers, of which one moves what is measured a hundred times less than the others."""
+    axes = np.linalg.qr(np.random.default_rng(0).normal(size=(p, p)))[0]
+    strength = np.where(np.arange(p) == 0, 0.01, 1.0)
+    unknowns = tuple(Unknown(f"x{k}", 0.0, 2.0, start=1.8) for k in range(p))
+    measured = (Measurement("zero", np.zeros(p)),)
+    return FitProblem(unknowns, measured, lambda x: np.sinh((1.5 * (x - 1.0)) @ axes * strength))
+
+
+def bent_valley(p):
+    """Rosenbrock's, whose floor is ten times flatter than its sides; least at 1."""
+    unknowns = tuple(Unknown(f"x{k}", -2.0, 2.0, start=(-1.2, 1.0)[k % 2]) for k in range(p))
+    measured = (Measurement("zero", np.zeros(2 * (p - 1))),)
+    model = lambda x: np.concatenate([10.0 * (x[:, 1:] - x[:, :-1] ** 2), 1.0 - x[:, :-1]], axis=1)  # noqa: E731
+    return FitProblem(unknowns, measured, model)
+
+
+@pytest.mark.parametrize("problem", [straight_valley(9), bent_valley(2), bent_valley(4)])
+def test_response_surfaces_come_to_the_end_of_narrow_valleys(problem):
+    fit = response_surface(problem)
+    assert fit.values == pytest.approx(np.ones(len(problem.unknowns)), abs=1e-4)
+    assert "had not come to an end" not in fit.notes[-1]
+
+
+def test_points_of_a_region_keep_to_the_ranges_and_fill_it():
+    rng = np.random.default_rng(4)
+    for p in (1, 2, 5):
+        design = surface_design(p)
+        for _ in range(50):
+            axes = np.linalg.qr(rng.normal(size=(p, p)))[0] * rng.uniform(0.01, 0.5, p)
+            region = Region(
+                rng.uniform(0.0, 1.0, p).round(), 0.0, axes
+            )  # its centre is a corner of the ranges
+            points = region.designed(design)
+            assert points.min() >= 0.0
+            assert points.max() <= 1.0
+            assert region.points(region.places(points)) == pytest.approx(points, abs=1e-12)
+            gradient = rng.normal(size=p)
+            least = QuadraticSurface(
+                region.places(points), region.places(points) @ gradient, 0.0
+            ).least_place(region)
+            inside = region.centre + least @ region.axes.T
+            assert inside == pytest.approx(np.clip(inside, 0.0, 1.0), abs=1e-6)
+            assert np.abs(least).max() <= 1.0
+
+
+def tone(phase=0.7):
+    """A frequency among many local minima."""
+    model = lambda x: x[:, :1] * np.sin(x[:, 1:2] * TIME + x[:, 2:3])  # noqa: E731
+    unknowns = (
+        Unknown("amplitude", 0.0, 5.0),
+        Unknown("frequency", 1.0, 60.0),
+        Unknown("phase", 0.0, 3.0),
+    )
+    return FitProblem(
+        unknowns, (Measurement("tone", model(np.array([[2.0, 23.0, phase]]))[0]),), model
+    )
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_evolution_finds_a_frequency_among_many_minima(seed):
+    fit = identify(tone(), "evolution", seed=seed)
+    assert fit.values == pytest.approx([2.0, 23.0, 0.7], rel=1e-4)
+    assert "2 came to the same least RMSE" in fit.notes[0]
+
+
+def test_a_search_that_had_not_come_to_an_end_claims_no_interval():
+    fit = response_surface(planted(0.05), rounds=2)
+    assert all(np.isnan([estimate.lower, estimate.upper]).all() for estimate in fit.estimates)
+    assert np.isnan(fit.covariance).all()
+    assert "had not come to an end" in fit.notes[-1]
+    assert all(unknown["interval_95"] is None for unknown in fit.as_dict()["unknowns"].values())
+    json.dumps(fit.as_dict(), allow_nan=False)
+
+
+def test_covariance_is_that_of_scipys_curve_fit():
+    fit = identify(planted(0.05))
+    values, covariance = curve_fit(
+        lambda _, *x: decay_and_swing(np.array([x]))[0],
+        TIME,
+        fit.problem.measurements[0].values,
+        [1.0, 1.0, 1.0],
+        xtol=1e-12,
+    )
+    assert fit.values == pytest.approx(values, rel=1e-5)
+    assert fit.covariance == pytest.approx(covariance, rel=1e-3)
+
+
+def test_rmse_per_test_is_absolute_and_normalised_by_the_largest_measured_value():
+    problem = FitProblem(
+        (Unknown("level", 0.0, 10.0),),
+        (
+            Measurement("low", np.array([1.0, 3.0])),
+            Measurement("high", np.array([4.0, 4.0, 4.0, 4.0])),
+        ),
+        point_by_point(lambda x: (np.full(2, x[0]), np.full(4, x[0]))),
+    )
+    fit = identify(problem)
+    assert fit.values[0] == pytest.approx(20.0 / 6.0, rel=1e-6)  # mean of all six
+    low, high = fit.tests
+    assert low.rmse == pytest.approx(np.sqrt(np.mean(np.square(np.array([1.0, 3.0]) - 20.0 / 6.0))))
+    assert low.normalised == pytest.approx(low.rmse / 3.0)
+    assert high.normalised == pytest.approx((2.0 / 3.0) / 4.0)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_the_data_cannot_determine_is_named(method):
+    """a + b alone counts, c does not at all."""
+    unknowns = (
+        Unknown("a", 0.0, 10.0),
+        Unknown("b", 0.0, 10.0),
+        Unknown("c", 0.0, 5.0),
+        Unknown("d", 0.0, 5.0),
+    )
+    measured = Measurement("line", np.concatenate([3.0 * TIME, [2.0]]))
+    model = lambda x: np.concatenate([(x[:, :1] + x[:, 1:2]) * TIME, x[:, 3:]], axis=1)  # noqa: E731
+    fit = identify(FitProblem(unknowns, (measured,), model), method)
+    assert {frozenset(direction.names) for direction in fit.undetermined} == {
+        frozenset("ab"),
+        frozenset("c"),
+    }
+    (both,) = (direction for direction in fit.undetermined if set(direction.names) == {"a", "b"})
+    assert both.parts[0] == pytest.approx(-both.parts[1], rel=1e-3)
+    assert [estimate.determined for estimate in fit.estimates] == [False, False, False, True]
+    assert fit.as_dict()["unknowns"]["c"]["value"] is None
+    assert fit["d"].value == pytest.approx(2.0, rel=1e-4)
+
+
+def test_an_unknown_that_came_to_a_bound_by_chance_is_not_said_to_have_hit_it():
+    unknowns = (Unknown("seen", 0.0, 10.0), Unknown("unseen", 0.0, 5.0, start=5.0))
+    problem = FitProblem(unknowns, (Measurement("line", 3.0 * TIME),), lambda x: x[:, :1] * TIME)
+    fit = identify(problem, "least-squares")
+    assert (fit["unseen"].at_bound, fit["unseen"].determined) == ("", False)
+
+
+def test_a_bound_that_is_hit_is_told_and_claims_no_interval():
+    unknowns = (Unknown("a", 0.0, 1.0), UNKNOWNS[1], UNKNOWNS[2])
+    fit = identify(FitProblem(unknowns, planted().measurements, decay_and_swing))
+    assert fit["a"].at_bound == "upper"
+    assert fit["a"].value == pytest.approx(1.0, abs=1e-3)
+    assert np.isnan(fit["a"].lower)
+    assert np.isfinite(fit["b"].lower)
+
+
+def test_offset_and_drift_of_the_instrument_are_taken_out():
+    problem = planted()
+    spoilt = problem.measurements[0].values + 5.0 - 3.0 * TIME
+    baseline = np.stack([np.ones_like(TIME), TIME], axis=1)
+    fit = identify(FitProblem(UNKNOWNS, (Measurement("swing", spoilt, baseline),), decay_and_swing))
+    assert fit.values == pytest.approx(TRUTH, rel=1e-6)
+    assert fit.baselines[0] == pytest.approx([5.0, -3.0], rel=1e-6)
+    assert fit.computed == pytest.approx(spoilt, abs=1e-6)
+
+
+def test_a_model_that_fails_in_places_is_searched_elsewhere():
+    def fails_above_four(points):
+        return np.where(points[:, :1] > 4.0, np.nan, decay_and_swing(points))
+
+    for method in METHODS:
+        fit = identify(FitProblem(UNKNOWNS, planted().measurements, fails_above_four), method)
+        assert fit.values == pytest.approx(TRUTH, rel=1e-4)
+
+
+def test_correlated_samples_claim_less():
+    rng = np.random.default_rng(0)
+    noise = np.convolve(rng.normal(size=2040), np.ones(40) / 40.0, "valid")[:2000]
+    values = 3.0 + noise
+    widths = {}
+    for correlated in (False, True):
+        problem = FitProblem(
+            (Unknown("mean", 0.0, 10.0),),
+            (Measurement("m", values, correlated=correlated),),
+            lambda x: np.repeat(x, 2000, 1),
+        )
+        fit = identify(problem)
+        widths[correlated] = fit["mean"].upper - fit["mean"].lower
+    assert 4.0 < widths[True] / widths[False] < 9.0  # root of 40 samples that move together
+
+
+def test_correlation_time_of_white_noise_is_one():
+    assert correlation_time(np.random.default_rng(1).normal(size=4000)) == pytest.approx(
+        1.0, abs=0.05
+    )
+    assert correlation_time(np.zeros(50)) == 1.0
+
+
+@given(z=st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3))
+def test_unit_coordinates_and_values_go_both_ways(z):
+    problem = planted()
+    assert problem.to_unit(problem.from_unit(np.array(z))) == pytest.approx(z, abs=1e-12)
+
+
+@pytest.mark.parametrize("p", [1, 2, 3, 5])
+def test_a_quadratic_is_its_own_surface(p):
+    rng = np.random.default_rng(p)
+    root = rng.normal(size=(p, p))
+    hessian, least = root @ root.T + np.eye(p), rng.uniform(-0.5, 0.5, p)
+
+    def value(x):
+        return 2.0 + 0.5 * np.einsum("ki,ij,kj->k", x - least, hessian, x - least)
+
+    design = surface_design(p)
+    assert len(design) >= p + p * (p + 1) // 2
+    surface = QuadraticSurface(design, value(design), float(value(np.zeros((1, p)))[0]))
+    assert surface.hessian == pytest.approx(hessian, abs=1e-9)
+    assert surface.least_place(Region(np.full(p, 0.5), 0.0, 0.1 * np.eye(p))) == pytest.approx(
+        least, abs=1e-4
+    )
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda: Unknown("k", 2e3, 1e3, Unit("N/m", "N/mm")),
+            "k: bounds 2 N/mm to 1 N/mm are not a range",
+        ),
+        (lambda: Unknown("k", 0.0, np.inf, Unit("N", "N")), "k: bounds 0 N to inf are not a range"),
+        (
+            lambda: Unknown("k", 0.0, 1.0, logarithmic=True),
+            "k: a logarithmic search needs a lower bound > 0",
+        ),
+        (
+            lambda: Unknown("k", 0.0, 1.0, Unit("N", "N"), start=2.0),
+            "k: start 2 N is outside the bounds",
+        ),
+        (
+            lambda: FitProblem((), (), decay_and_swing),
+            "an identification needs at least one unknown",
+        ),
+        (
+            lambda: FitProblem((UNKNOWNS[0],) * 2, planted().measurements, decay_and_swing),
+            "a: is unknown twice",
+        ),
+        (
+            lambda: identify(planted(), "leastsquares"),
+            "--method: no method 'leastsquares' (did you mean 'least-squares'?",
+        ),
+    ],
+)
+def test_bad_input_is_told(make, message):
+    with pytest.raises(InputError) as told:
+        make()
+    assert str(told.value).startswith(message)

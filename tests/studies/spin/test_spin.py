@@ -1,0 +1,39 @@
+"""Spin runs in processes give what one process gives."""
+
+import numpy as np
+import pytest
+
+from wm_drake.parameters import SpinProfile, load_machine
+from wm_drake.simulation.runs import Case
+from wm_drake.studies.spin.study import run_spin
+
+SHORT = SpinProfile(time=(0.0, 2.0), speed=(0.0, 15.0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["compiled", "drake"])
+def test_results_do_not_depend_on_the_number_of_workers(engine):
+    parameters = load_machine("reference")
+    cases = [Case(name, parameters.loads[name], SHORT) for name in ("middle", "back", "front")]
+    told = []
+    alone = run_spin(parameters, cases, engine, workers=1)
+    shared = run_spin(
+        parameters,
+        cases,
+        engine,
+        workers=2,
+        progress=lambda index, fraction: told.append((index, fraction)),
+    )
+    for one, other in zip(alone.results, shared.results, strict=True):
+        assert one.case == other.case
+        assert one.record.identical(other.record)
+        assert one.measures.smallest_gap == other.measures.smallest_gap
+    assert {index for index, fraction in told if fraction == 1.0} == {0, 1, 2}
+
+
+def test_one_case_runs_here_and_is_measured():
+    parameters = load_machine("reference")
+    (result,) = run_spin(parameters, [Case("middle", parameters.loads["middle"], SHORT)]).results
+    assert result.wall_s > 0.0
+    assert np.isfinite(result.measures.amplitude).all()
+    assert result.measures.smallest_gap.distance > 0.0

@@ -1,0 +1,149 @@
+"""Cases -> work_items: packed numbers, in batches that can run side by side."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.framework import Context
+
+from wm_drake.compiler.lanes import WIDTH
+from wm_drake.engines.compiled.mechanics import DRUM_RATE
+from wm_drake.engines.compiled.packing import Layout, initial_state, pack_bodies, pack_elements
+from wm_drake.errors import InputError, Problem, input_error
+from wm_drake.model.machine import Machine, Setup
+from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.outputs import measured_points
+from wm_drake.simulation.runs import Case, check_bearing
+
+KEPT_BODIES, KEPT_NUMBERS = 64, 2048
+"""How many sets of bodies with a load, and of other numbers, are remembered for cases to come."""
+
+
+@dataclass(frozen=True)
+class PackedParameters:
+    """What is packed of a set of numbers apart from bodies and load.
+
+    Attributes:
+        setup: From which it was packed, without load; its Context has been used again since.
+        elements, layout: From `pack_elements`.
+        points: What is measured of the motion, `readings.measured_points` one after the other.
+        rest: State of rest.
+    """
+
+    setup: Setup
+    elements: FloatArray
+    layout: Layout
+    points: FloatArray
+    rest: FloatArray
+
+
+@dataclass(frozen=True)
+class WorkItem:
+    """A case, packed: all that its run needs.
+
+    Attributes:
+        number: Of the case, in the order given.
+        case: What to run.
+        numbers: Shared by the cases with these parameters.
+        packed: From `pack`.
+        begin: State to begin with.
+    """
+
+    number: int
+    case: Case
+    numbers: PackedParameters
+    packed: FloatArray
+    begin: FloatArray
+
+
+@dataclass(frozen=True)
+class BatchKey:
+    """What runs side by side must have in common."""
+
+    profile: SpinProfile
+    layout: Layout
+
+
+class Preparation:
+    """Packs cases of one machine. To set it up takes a good part of the time of a run, so that is done as rarely as can be."""
+
+    def __init__(self, machine: Machine, step: float) -> None:
+        """For a built machine, and the step that it will run with. [s]"""
+        self.machine, self.step = machine, step
+        self.sensors = list(machine.parameters.sensors)
+        self._context: Context | None = None
+        self._known_bodies: list[tuple[object, FloatArray]] = []
+        self._known_numbers: dict[tuple[int, bool], PackedParameters] = {}
+
+    def batches(self, cases: Iterable[Case]) -> Iterator[tuple[BatchKey, list[WorkItem]]]:
+        """Up to `WIDTH` work_items each that can run side by side, in the order of the cases as far as that goes.
+
+        Raises:
+            InputError: of a case; says which.
+        """
+        waiting: dict[BatchKey, list[WorkItem]] = {}
+        for number, case in enumerate(cases):
+            item = self._job(number, case)
+            kind = BatchKey(case.profile, item.numbers.layout)
+            work_items = waiting.setdefault(kind, [])
+            work_items.append(item)
+            if len(work_items) == WIDTH:
+                yield kind, waiting.pop(kind)
+        yield from waiting.items()
+
+    def _job(self, number: int, case: Case) -> WorkItem:
+        try:
+            bodies, numbers = self._bodies(case), self._numbers(case)
+        except InputError as error:
+            raise InputError(
+                Problem(f"case {number} '{case.name}'", p.key, p.message) for p in error.problems
+            ) from None
+        begin = numbers.rest.copy()
+        begin[DRUM_RATE] = case.profile.speed[0]
+        return WorkItem(number, case, numbers, np.concatenate([bodies, numbers.elements]), begin)
+
+    def _bodies(self, case: Case) -> FloatArray:
+        """Packed bodies: the same for all cases with these bodies, frames and load."""
+        parameters = case.parameters or self.machine.parameters
+        key = (
+            parameters.bodies,
+            parameters.frames,
+            parameters.imperfections.residual_imbalance,
+            case.load,
+        )
+        for known, bodies in self._known_bodies:
+            if known == key:
+                return bodies
+        self._context = self.machine.set_up_bodies(case.load, parameters, self._context)
+        plant = self.machine.plant
+        bodies = pack_bodies(
+            plant, plant.GetMyContextFromRoot(self._context), parameters.drive.joint
+        )
+        self._known_bodies = [(key, bodies), *self._known_bodies[: KEPT_BODIES - 1]]
+        return bodies
+
+    def _numbers(self, case: Case) -> PackedParameters:
+        """All else of a case: the same whatever its load."""
+        # the parameters are held by the setup, so that no others can take their id meanwhile
+        key = (id(case.parameters or self.machine.parameters), case.gasket)
+        if key not in self._known_numbers:
+            if len(self._known_numbers) >= KEPT_NUMBERS:
+                del self._known_numbers[next(iter(self._known_numbers))]
+            setup = self._set_up(case)
+            elements, layout = pack_elements(setup)
+            points, rest = measured_points(setup).ravel(), initial_state(setup, case.profile)
+            self._known_numbers[key] = PackedParameters(setup, elements, layout, points, rest)
+        return self._known_numbers[key]
+
+    def _set_up(self, case: Case) -> Setup:
+        setup = self.machine.set_up(
+            parameters=case.parameters, gasket=case.gasket, context=self._context
+        )
+        if list(setup.sensors) != self.sensors:
+            raise input_error(
+                f"has sensors {', '.join(setup.sensors)}; the machine has {', '.join(self.sensors)}"
+            )
+        self._context = setup.context
+        check_bearing(setup, self.step)
+        return setup

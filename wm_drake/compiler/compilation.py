@@ -1,0 +1,76 @@
+"""One source for each law, run three ways: compiled for floats or for lanes of several runs, interpreted for other scalars.
+
+A law is a plain function of scalars (or short tuples and arrays of scalars). ``@law`` compiles it with numba for floats, and
+for lanes (`wm_drake.compiler.lanes`) when a compiled loop calls it with them. ``generic(law)`` runs the very same source in
+Python, so that automatic differentiation sees every operation; a law that calls other laws calls their generic forms then.
+Rules for the source: choose between values with ``where``, and take functions from `wm_drake.compiler.elementary`; an ``if``
+may ask what is the same in all lanes. ``np.sign`` drops derivatives, a square root of zero has none. Numbers of other
+modules become constants of the compiled code: they must lie in files that `_cache_folder` looks at.
+"""
+
+import functools
+import hashlib
+import os
+import types
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import config
+from numba.core.dispatcher import Dispatcher
+
+_ROOM = Path(__file__).parents[1]
+
+
+def _cache_folder() -> str:
+    """A folder of compiled code that belongs to exactly these sources: the laws and all that compiles them in.
+
+    numba looks only at the file of the function it compiles: after an edit of a called law, its cached callers would go on
+    with the old one. A folder named by the hash of all sources cannot go stale.
+    """
+    digest = hashlib.sha256()
+    for source in sorted(_ROOM.rglob("*.py")):
+        text = source.read_text(encoding="utf-8")
+        if "compiler.compilation" in text or "numba" in text:
+            digest.update(text.encode())
+    home = os.environ.get("NUMBA_CACHE_DIR") or Path.home() / ".cache" / "wm_drake"
+    return str(Path(home) / digest.hexdigest()[:16])
+
+
+def law(function: Callable[..., Any]) -> Any:
+    """Compiles a law, with a cache on disk. Products and sums may fuse into one rounding; nothing else is reordered."""
+    return _compiled(function, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
+
+
+def long_running(function: Callable[..., Any]) -> Any:
+    """Compiles a loop that calls laws for milliseconds and more: other threads of Python go on meanwhile."""
+    return _compiled(function, error_model="numpy", nogil=True, fastmath={"contract", "nsz"})
+
+
+def _compiled(function: Callable[..., Any], **options: Any) -> Any:
+    options |= {"no_cfunc_wrapper": True}  # no C code calls these; a tenth of the time to compile
+    chosen_by_user = config.CACHE_DIR
+    config.CACHE_DIR = _CACHE_FOLDER
+    try:
+        return numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # no folder to write to: compile anew in each process
+        return numba.njit(**options)(function)
+    finally:
+        config.CACHE_DIR = chosen_by_user
+
+
+@functools.cache
+def generic(compiled: Any) -> Callable[..., Any]:
+    """The same source as `compiled`, interpreted, for scalars such as Drake's AutoDiffXd."""
+    source = compiled.py_func
+    names = dict(source.__globals__)
+    for name in source.__code__.co_names:  # the laws it calls
+        if isinstance(names.get(name), Dispatcher):
+            names[name] = generic(names[name])
+    return types.FunctionType(
+        source.__code__, names, source.__name__, source.__defaults__, source.__closure__
+    )
+
+
+_CACHE_FOLDER = _cache_folder()

@@ -1,0 +1,66 @@
+"""Symmetric matrices of three by three as six numbers: xx, yy, zz, xy, xz, yz; and packed numbers as vectors."""
+
+from wm_drake.compiler.compilation import law
+
+
+@law
+def three(p, at):
+    """Three numbers as a vector."""
+    return (p[at], p[at + 1], p[at + 2])
+
+
+@law
+def six(p, at):
+    """Six numbers: a symmetric matrix as xx, yy, zz, xy, xz, yz."""
+    return (p[at], p[at + 1], p[at + 2], p[at + 3], p[at + 4], p[at + 5])
+
+
+@law
+def times(i, a):
+    """Symmetric matrix times vector."""
+    return (
+        i[0] * a[0] + i[3] * a[1] + i[4] * a[2],
+        i[3] * a[0] + i[1] * a[1] + i[5] * a[2],
+        i[4] * a[0] + i[5] * a[1] + i[2] * a[2],
+    )
+
+
+@law
+def inverse(i):
+    """Inverse of a symmetric matrix."""
+    xx, yy, zz = i[1] * i[2] - i[5] * i[5], i[0] * i[2] - i[4] * i[4], i[0] * i[1] - i[3] * i[3]
+    xy, xz, yz = i[4] * i[5] - i[3] * i[2], i[3] * i[5] - i[4] * i[1], i[3] * i[4] - i[5] * i[0]
+    s = 1.0 / (i[0] * xx + i[3] * xy + i[4] * xz)
+    return (s * xx, s * yy, s * zz, s * xy, s * xz, s * yz)
+
+
+@law
+def less_square(i, a, c):
+    """i - c a a^T."""
+    return (
+        i[0] - c * a[0] * a[0],
+        i[1] - c * a[1] * a[1],
+        i[2] - c * a[2] * a[2],
+        i[3] - c * a[0] * a[1],
+        i[4] - c * a[0] * a[2],
+        i[5] - c * a[1] * a[2],
+    )
+
+
+@law
+def about_centre(i, m, q):
+    """Inertia about the centre of mass, from that about another point, the first moment m about it, and 1/M = q."""
+    return (
+        i[0] - q * (m[1] * m[1] + m[2] * m[2]),
+        i[1] - q * (m[0] * m[0] + m[2] * m[2]),
+        i[2] - q * (m[0] * m[0] + m[1] * m[1]),
+        i[3] + q * m[0] * m[1],
+        i[4] + q * m[0] * m[2],
+        i[5] + q * m[1] * m[2],
+    )
+
+
+@law
+def plus(a, b):
+    """Sum of two wrenches."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])

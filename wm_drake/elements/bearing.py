@@ -1,0 +1,62 @@
+"""Bearing of the drum where it gives: a six-component bushing between the tub and what carries the drum."""
+
+import numpy as np
+
+from wm_drake.compiler.compilation import law
+from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, numbers, rows_to_lanes
+from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.compiler.vectors import rotate_back, rotation_vector
+from wm_drake.elements.bushing import motion_between, six_component_bushing_between
+from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE, motion_at, tub_motion
+
+FORCE_SIZE = 12
+"""Own numbers: displacement and rotation vector of the drum's carrier against the tub, force and moment on the tub."""
+
+
+@law
+def drum_bearing_forces(tub, carrier, p, at):
+    """Moment about the origin and force on the tub, and on the carrier (six numbers each, W), and `FORCE_SIZE` own ones.
+
+    Args:
+        tub, carrier: `TubMotion` of the two bodies.
+        p, at: Array that holds what `SixComponentBushingParameters.packed` gives, the tub being the ground, and where that
+            begins. Displacement and force are in the frame on the tub: y along the drum axis.
+    """
+    on_carrier, on_tub, own = six_component_bushing_between(carrier, tub, p, at)
+    _, _, r_ground, displaced, relative = motion_between(carrier, tub, p, at)
+    return on_tub, on_carrier, rotate_back(r_ground, displaced) + rotation_vector(relative) + own
+
+
+@law
+def evaluate_drum_bearing(x, state, p, generalized_force, force, rate):
+    """Forces of the bearing; arguments as in `ElementSystem`.
+
+    x: states of two trees of the plant, one after the other: tub and drum; the drum's carrier and drum. The generalized force
+    is that on both.
+    """
+    y, q = numbers(x), numbers(p)
+    on_tub, on_carrier, own = drum_bearing_forces(
+        tub_motion(y), motion_at(y, PLANT_STATE_SIZE), q, 0
+    )
+    for i in range(6):
+        generalized_force[i] = on_tub[i]
+        generalized_force[GENERALIZED_FORCE_SIZE + i] = on_carrier[i]
+    for i in range(FORCE_SIZE):
+        force[i] = own[i]
+    generalized_force[6] = 0.0 * on_tub[0]
+    generalized_force[GENERALIZED_FORCE_SIZE + 6] = 0.0 * on_tub[0]
+
+
+@law
+def drum_bearing_history(states, own_states, p, forces):
+    """Own numbers at each row of a sampled motion: `evaluate_drum_bearing` without Drake, for records."""
+    align_stack()
+    x_numbers, own_numbers = np.empty(2 * PLANT_STATE_SIZE * WIDTH), np.empty(FORCE_SIZE * WIDTH)
+    p_numbers = in_each_lane(p)
+    x, own, q = lane_array(x_numbers), lane_array(own_numbers), lane_array(p_numbers)
+    for begin in range(0, len(states), WIDTH):
+        rows_to_lanes(states, begin, x_numbers)
+        _, _, found = drum_bearing_forces(tub_motion(x), motion_at(x, PLANT_STATE_SIZE), q, 0)
+        for k in range(FORCE_SIZE):
+            own[k] = found[k]
+        lanes_to_rows(own_numbers, begin, forces)

@@ -1,0 +1,306 @@
+"""Setup -> flat numbers and indices that the compiled engine runs on; everything is read from the built machine."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import ForceElementIndex, RevoluteJoint, SpatialInertia
+from pydrake.systems.framework import Context
+
+from wm_drake.compiler.lanes import WIDTH
+from wm_drake.engines.compiled.mechanics import (
+    BODIES_SIZE,
+    DRUM_RATE,
+    RATES_SIZE,
+    STATE_SIZE,
+    Elements,
+)
+from wm_drake.engines.compiled.tubes import TUBES_STATE_SIZE
+from wm_drake.errors import InputError, input_error
+from wm_drake.model.machine import Setup
+from wm_drake.model.state_layout import CARRIER
+from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.types import FloatArray
+
+_ON_TUB = ("springs", "dampers", "bushings")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where things begin in the packed numbers of a machine, and what must be the same where machines run side by side.
+
+    Attributes:
+        springs, dampers, bushings, telescopes: Index of each element.
+        gasket: Index of the gasket, -1 without one.
+        bearing: Index of the drum's bearing, -1 if it does not give.
+        structure: Number of each damper's law, and of the points of every table, in order.
+    """
+
+    springs: tuple[int, ...]
+    dampers: tuple[int, ...]
+    bushings: tuple[int, ...]
+    telescopes: tuple[int, ...]
+    gasket: int
+    bearing: int
+    structure: tuple[int, ...]
+
+    @property
+    def elements(self) -> Elements:
+        """As compiled functions take them; None lets them be compiled without tubes, or without a bearing."""
+        springs, dampers, bushings, telescopes = (
+            np.array(indices, dtype=np.int64)
+            for indices in (self.springs, self.dampers, self.bushings, self.telescopes)
+        )
+        deformations = STATE_SIZE + np.arange(len(dampers))
+        bearing = self.bearing if self.bearing >= 0 else None
+        tubes = STATE_SIZE + len(dampers)
+        return Elements(
+            springs,
+            dampers,
+            deformations,
+            bushings,
+            telescopes if self.telescopes else None,
+            bearing,
+            tubes,
+        )
+
+    @property
+    def rates_size(self) -> int:
+        """How many numbers of the derivative a sample keeps behind the state."""
+        return RATES_SIZE if self.bearing < 0 else 2 * RATES_SIZE
+
+    def parts(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Of states (n, size).
+
+        Returns:
+            Those of the plant's first 14, deformations of all dampers, states of the tubes (n, k, 14), state of the drum's
+            carrier (n, 12), or (n, 0) without one.
+        """
+        tubes_begin = STATE_SIZE + len(self.dampers)
+        tubes_end = tubes_begin + TUBES_STATE_SIZE * len(self.telescopes)
+        tubes = states[:, tubes_begin:tubes_end].reshape(
+            len(states), len(self.telescopes), TUBES_STATE_SIZE
+        )
+        deformation = np.hstack([states[:, STATE_SIZE:tubes_begin], tubes[:, :, -1]])
+        return states[:, :STATE_SIZE], deformation, tubes[:, :, :-1], states[:, tubes_end:]
+
+
+def pack(setup: Setup) -> tuple[FloatArray, Layout]:
+    """Packed numbers of a machine as it is set up, laid out as `wm_drake.engines.compiled.mechanics` and the elements say.
+
+    Raises:
+        InputError: the machine has something that the compiled engine does not represent.
+    """
+    elements, layout = pack_elements(setup)
+    bodies = pack_bodies(setup.machine.plant, setup.plant_context, setup.parameters.drive.joint)
+    return np.concatenate([bodies, elements]), layout
+
+
+def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
+    """The part of `pack` that follows the bodies: springs, dampers, bushings; no load changes it."""
+    on_tub, indices = pack_on_tub(setup, BODIES_SIZE)
+    parts, size = [on_tub], BODIES_SIZE + len(on_tub)
+    structure = [
+        number
+        for kind in _ON_TUB
+        for element in getattr(setup, kind).values()
+        for number in element.structure
+    ]
+    begins = []
+    for name, telescope in setup.telescopes.items():
+        begins.append(size)
+        parts += [pack_tubes(setup, name), telescope.packed()]
+        size += sum(map(len, parts[-2:]))
+        structure += telescope.structure
+    indices["telescopes"] = tuple(begins)
+    names = list(setup.bushings)
+    gasket = indices["bushings"][names.index("gasket")] if "gasket" in names else -1
+    if setup.bearing:
+        parts += [pack_tub(setup), setup.bearing.packed()]
+        structure += setup.bearing.structure
+    bearing = size if setup.bearing else -1
+    return np.concatenate(parts), Layout(
+        **indices, gasket=gasket, bearing=bearing, structure=tuple(structure)
+    )
+
+
+def pack_on_tub(setup: Setup, size: int = 0) -> tuple[FloatArray, dict[str, tuple[int, ...]]]:
+    """Springs, dampers and bushings, whose forces the motion of the tub decides; and by kind, in this order, where each begins.
+
+    Args:
+        setup: The machine.
+        size: How many numbers come before.
+    """
+    packed: list[FloatArray] = []
+    indices: dict[str, tuple[int, ...]] = {}
+    for kind in _ON_TUB:
+        begins = []
+        for element in getattr(setup, kind).values():
+            begins.append(size)
+            packed.append(element.packed())
+            size += len(packed[-1])
+        indices[kind] = tuple(begins)
+    return np.concatenate([[], *packed]), indices
+
+
+def aligned(size: int) -> FloatArray:
+    """Zeros at an address from which vectors are loaded in one go."""
+    raw = np.zeros(size + WIDTH)
+    begin = (-raw.ctypes.data // raw.itemsize) % WIDTH
+    return raw[begin : begin + size]
+
+
+def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
+    """The state a run begins with: at rest at the rest pose, the drum at its first speed, sponges undeformed."""
+    x = np.zeros(STATE_SIZE + len(setup.dampers))
+    x[:6] = setup.rest_pose
+    x[DRUM_RATE] = profile.speed[0]
+    tubes = np.zeros((len(setup.telescopes), TUBES_STATE_SIZE))
+    tubes[:, :7] = setup.tube_rest
+    carrier = np.append(setup.carrier_rest, np.zeros_like(setup.carrier_rest))
+    return np.concatenate([x, tubes.ravel(), carrier])
+
+
+def pack_tubes(setup: Setup, name: str) -> FloatArray:
+    """Bodies of a telescopic damper, as `wm_drake.engines.compiled.tubes` says.
+
+    Raises:
+        InputError: its joint has something that the compiled engine does not represent.
+    """
+    plant, context = setup.machine.plant, setup.plant_context
+    joint = plant.GetJointByName(setup.parameters.telescopic_dampers[name].joint)
+    if np.any(joint.GetDampingVector(context)):
+        raise _not_represented(
+            f"joint '{joint.name()}' has damping of its own", f"telescopic_dampers.{name}.joint"
+        )
+    outer_inertia, inner_inertia = (
+        plant.CalcSpatialInertia(
+            context, body.body_frame(), [part.index() for part in plant.GetBodiesWeldedTo(body)]
+        )
+        for body in (joint.parent_body(), joint.child_body())
+    )
+    # of the inner tube in the frame of the outer one, at extension 0
+    frames = joint.frame_on_parent(), joint.frame_on_child()
+    X_OI = frames[0].GetFixedPoseInBodyFrame() @ frames[1].GetFixedPoseInBodyFrame().inverse()
+    inner_inertia = inner_inertia.ReExpress(X_OI.rotation()).Shift(-X_OI.translation())
+    m, s = inner_inertia.get_mass(), _moment(inner_inertia)
+    a = setup.telescopes[name].axis
+    along = np.dot(a, s)
+    first_order = 2.0 * along * np.eye(3) - np.outer(a, s) - np.outer(s, a)
+    second_order = m * (np.eye(3) - np.outer(a, a))
+    both = _matrix(outer_inertia) + _matrix(inner_inertia)
+    mass = outer_inertia.get_mass() + m
+    inertias = [_six(matrix) for matrix in (both, first_order, second_order)]
+    return np.concatenate([[1.0 / mass, m], a, _moment(outer_inertia) + s, s, *inertias])
+
+
+def pack_tub(setup: Setup) -> FloatArray:
+    """The tub without the drum, as `wm_drake.engines.compiled.bearing` says."""
+    plant, context = setup.machine.plant, setup.plant_context
+    tub = plant.GetBodyByName("tub")
+    group = [body.index() for body in plant.GetBodiesWeldedTo(tub)]
+    inertia = plant.CalcSpatialInertia(context, tub.body_frame(), group)
+    return np.concatenate([[1.0 / inertia.get_mass()], _moment(inertia), _six(_matrix(inertia))])
+
+
+def pack_bodies(plant: MultibodyPlant, context: Context, drive: str) -> FloatArray:
+    """The first part of `pack`: bodies and load in a plant Context, which no number of an element changes.
+
+    Where the drum's bearing gives, what turns in the tub turns in its carrier, and the tub is no part of it.
+
+    Args:
+        plant: The plant.
+        context: Its Context.
+        drive: Name of the joint that the drive turns.
+
+    Raises:
+        InputError: as `pack`.
+    """
+    joint = drum_joint(plant, drive)
+    tub = plant.GetBodyByName(CARRIER if plant.HasBodyNamed(CARRIER) else "tub")
+    X_TF = plant.CalcRelativeTransform(context, tub.body_frame(), joint.frame_on_parent())
+    axis, origin = X_TF.rotation() @ joint.revolute_axis(), X_TF.translation()
+    tub_group, drum_group = (
+        [part.index() for part in plant.GetBodiesWeldedTo(body)]
+        for body in (tub, joint.child_body())
+    )
+    tub_inertia = plant.CalcSpatialInertia(context, tub.body_frame(), tub_group).Shift(origin)
+    drum_inertia = plant.CalcSpatialInertia(context, tub.body_frame(), drum_group).Shift(origin)
+    gravity = plant.gravity_field().gravity_vector()
+    mass = tub_inertia.get_mass() + drum_inertia.get_mass()
+    damping = joint.GetDampingVector(context)
+    parts = [gravity, [1.0 / mass], axis, origin, _moment(tub_inertia), _six(_matrix(tub_inertia))]
+    angle = joint.get_angle(context)
+    return np.concatenate([*parts, *_drum_harmonics(drum_inertia, axis, angle), damping])
+
+
+def drum_joint(plant: MultibodyPlant, name: str) -> RevoluteJoint:
+    """The joint that the drive turns.
+
+    Raises:
+        InputError: the plant has a joint or a force that the compiled engine does not represent.
+    """
+    joint = plant.GetJointByName(name)
+    if not isinstance(joint, RevoluteJoint):
+        raise _not_represented(
+            f"joint '{name}' is {joint.type_name()}, not revolute", "drive.joint"
+        )
+    tub = plant.GetBodiesWeldedTo(plant.GetBodyByName("tub"))
+    if not plant.HasBodyNamed(CARRIER) and not any(
+        body.index() == joint.parent_body().index() for body in tub
+    ):
+        raise _not_represented(
+            f"joint '{name}' has the tub as its child, not as its parent", "drive.joint"
+        )
+    if plant.num_force_elements() > 1:  # the first is gravity
+        force = plant.get_force_element(ForceElementIndex(1))
+        raise _not_represented(f"force element {type(force).__name__} of the SDF", "model")
+    return joint
+
+
+def _not_represented(what: str, key: str) -> InputError:
+    return input_error(
+        f"the compiled engine does not represent this: {what}; use the drake engine", key=key
+    )
+
+
+def _moment(inertia: SpatialInertia) -> FloatArray:
+    """First moment about the point the inertia is about. [kg m]"""
+    return np.asarray(inertia.get_mass() * inertia.get_com())
+
+
+def _matrix(inertia: SpatialInertia) -> FloatArray:
+    return np.array(inertia.CalcRotationalInertia().CopyToFullMatrix3())
+
+
+def _six(matrix: FloatArray) -> FloatArray:
+    return matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+
+
+def _drum_harmonics(
+    inertia: SpatialInertia, axis: FloatArray, angle: float
+) -> tuple[FloatArray, FloatArray]:
+    """First moment and inertia of the drum about the axis, as harmonics of the drum angle, given what they are at `angle`.
+
+    With R = A + B cos + C sin for a rotation about the axis: R s, and R J R^T with products of cosine and sine written in
+    the double angle.
+    """
+    along = np.outer(axis, axis)
+    across = np.eye(3) - along
+    turned = np.cross(axis, np.eye(3)).T  # axis x .
+    back = along + across * np.cos(angle) - turned * np.sin(angle)
+    s, j = back @ _moment(inertia), back @ _matrix(inertia) @ back.T
+    moment = np.column_stack([along @ s, across @ s, turned @ s])
+
+    def product(left: FloatArray, right: FloatArray) -> FloatArray:
+        return left @ j @ right.T
+
+    cosine_squared, sine_squared = product(across, across), product(turned, turned)
+    parts = (
+        product(along, along) + 0.5 * (cosine_squared + sine_squared),
+        product(along, across) + product(across, along),
+        product(along, turned) + product(turned, along),
+        0.5 * (cosine_squared - sine_squared),
+        0.5 * (product(across, turned) + product(turned, across)),
+    )
+    return moment.ravel(), np.column_stack([_six(part) for part in parts]).ravel()

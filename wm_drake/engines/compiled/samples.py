@@ -1,0 +1,71 @@
+"""What the compiled loops sampled -> the motion that an engine hands over."""
+
+import numpy as np
+
+from wm_drake.compiler.compilation import long_running
+from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, sine_cosine
+from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.compiler.matrices import three
+from wm_drake.elements.motion import PLANT_STATE_SIZE, tub_motion
+from wm_drake.engines.compiled.mechanics import mass_properties, motor_torque
+from wm_drake.engines.compiled.packing import Layout
+from wm_drake.engines.schedule import Schedule
+from wm_drake.engines.trajectory import Trajectory, ended_where_it_diverged
+from wm_drake.parameters.types import FloatArray
+
+
+def trajectory_of(
+    samples: FloatArray, schedule: Schedule, p: FloatArray, layout: Layout
+) -> Trajectory:
+    """Motion up to the last good sample, with the motor's torque.
+
+    Args:
+        samples: (rows, size + `Layout.rates_size`) as `kernel.integration` writes them; NaN behind the end of a run.
+        schedule: The steps.
+        p, layout: From `pack`.
+    """
+    states, rates = np.split(samples, [-layout.rates_size], axis=1)
+    motion, deformation, tubes, carrier = layout.parts(states)
+    torque = np.empty((len(samples), 1))
+    drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
+    torque_history(
+        _of_what_carries_the_drum(motion, carrier), rates[:, -6:], drum_acceleration, p, torque
+    )
+    return ended_where_it_diverged(
+        Trajectory(schedule.time, motion, deformation, torque[:, 0], rates[:, :6], tubes, carrier)
+    )
+
+
+def _of_what_carries_the_drum(motion: FloatArray, carrier: FloatArray) -> FloatArray:
+    """Motion of the tub or, in a bearing that gives, of the drum's carrier, with that of the drum."""
+    if not carrier.shape[1]:
+        return motion
+    return np.column_stack([carrier[:, :6], motion[:, 6], carrier[:, 6:], motion[:, 13]])
+
+
+@long_running
+def torque_history(motions, rates, acceleration, p, torque):
+    """Torque of the motor on the drum at samples.
+
+    Args:
+        motions: (n, 14) motion of what carries the drum, and the drum's, as `TubMotion` is read.
+        rates: (n, 6) its angular acceleration and that of its origin, in W. [rad/s^2, m/s^2]
+        acceleration: Of the drum, (n, 1). [rad/s^2]
+        p: Packed numbers of the bodies.
+        torque: (n, 1), written. [N m]
+    """
+    align_stack()
+    x_numbers, rates_numbers = np.empty(PLANT_STATE_SIZE * WIDTH), np.empty(6 * WIDTH)
+    drum_numbers, numbers, p_numbers = np.empty(WIDTH), np.empty(WIDTH), in_each_lane(p)
+    x, dx, drum = lane_array(x_numbers), lane_array(rates_numbers), lane_array(drum_numbers)
+    answer, q = lane_array(numbers), lane_array(p_numbers)
+    for begin in range(0, len(torque), WIDTH):
+        rows_to_lanes(motions, begin, x_numbers)
+        rows_to_lanes(rates, begin, rates_numbers)
+        rows_to_lanes(acceleration, begin, drum_numbers)
+        sine, cosine = sine_cosine(x[6])
+        masses = mass_properties(q, cosine, sine)
+        answer[0] = motor_torque(
+            tub_motion(x), three(dx, 0), three(dx, 3), masses, x[13], drum[0], q
+        )
+        lanes_to_rows(numbers, begin, torque)

@@ -1,0 +1,376 @@
+"""The bodies: SDF model -> MultibodyPlant, and what the machine file changes in it, set in a Context."""
+
+import functools
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    JointActuator,
+    PrismaticJoint,
+    RevoluteJoint,
+    RigidBody,
+    RotationalInertia,
+    RpyFloatingJoint,
+    SpatialInertia,
+    UnitInertia,
+)
+
+from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.model.state_layout import CARRIER
+from wm_drake.parameters import BodyOverride, Load, MachineParameters, with_value
+from wm_drake.systems.speed_source import REFLECTED_INERTIA
+
+_PACKAGE = Path(__file__).parents[1]
+SDF_FOLDER = _PACKAGE / "sdf" if (_PACKAGE / "sdf").is_dir() else _PACKAGE.parent / "sdf"
+"""The SDF models: inside an installed package, beside it in a checkout."""
+
+
+def sdf_path(model: str) -> Path:
+    """The file of a shipped model's name or of a path."""
+    path = Path(model) if Path(model).is_absolute() else SDF_FOLDER / model
+    if not path.is_file():
+        known = [shipped.name for shipped in SDF_FOLDER.glob("*.sdf")]
+        raise input_error(f"no SDF file '{model}'{nearest_names(model, known)}", key="model")
+    return path
+
+
+def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
+    """Parses the SDF strictly into `plant`, lets the tub float, couples the drive to the drum, finalizes.
+
+    The tub gets an RpyFloatingJoint (7 positions and 7 velocities with the drum), which SDF cannot say. The drive's reflected
+    inertia makes the drum follow its speed source (`wm_drake.systems.speed_source`). If its bearing gives, the drum turns in
+    a massless body that floats as well (`wm_drake.model.state_layout.CARRIER`), whose frame is T when drawn.
+
+    Raises:
+        InputError: no such file, not valid SDF, or not the bodies this machine needs.
+    """
+    parser = Parser(plant)
+    parser.SetStrictParsing()
+    try:
+        parser.AddModels(str(sdf_path(parameters.model)))
+    except RuntimeError as error:
+        raise input_error(
+            f"SDF '{parameters.model}' cannot be read: {error}", key="model"
+        ) from None
+    missing = [
+        f"link '{name}'" for name in ("housing", "tub", "drum") if not plant.HasBodyNamed(name)
+    ]
+    if (
+        not plant.HasJointNamed(parameters.drive.joint)
+        or not plant.GetJointByName(parameters.drive.joint).num_velocities()
+    ):
+        joints = [
+            joint.name()
+            for joint in map(plant.get_joint, plant.GetJointIndices())
+            if joint.num_velocities()
+        ]
+        raise input_error(
+            f"no moving joint '{parameters.drive.joint}'{nearest_names(parameters.drive.joint, joints)}",
+            key="drive.joint",
+        )
+    if missing:
+        raise input_error(
+            f"SDF '{parameters.model}' has no {' and no '.join(missing)}", key="model"
+        )
+    floating = [
+        plant.GetBodyByName("tub"),
+        *(outer_tube(plant, parameters, name) for name in parameters.telescopic_dampers),
+    ]
+    for body in floating:
+        plant.AddJoint(
+            RpyFloatingJoint(f"{body.name()}_floating", plant.world_frame(), body.body_frame())
+        )
+    actuator = _drive_actuator(plant, parameters.drive.joint)
+    if parameters.imperfections.bearing:
+        actuator = _hung_in_a_carrier(plant, actuator)
+    actuator.set_default_rotor_inertia(REFLECTED_INERTIA)
+    actuator.set_default_gear_ratio(1.0)
+    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -parameters.gravity])
+    plant.Finalize()
+    _check_freedoms(plant, parameters)
+
+
+def outer_tube(plant: MultibodyPlant, parameters: MachineParameters, name: str) -> RigidBody:
+    """The outer tube of a telescopic damper: the parent of its joint.
+
+    Raises:
+        InputError: no such joint, or not a prismatic one.
+    """
+    key, joint_name = f"telescopic_dampers.{name}.joint", parameters.telescopic_dampers[name].joint
+    joints = [joint.name() for joint in map(plant.get_joint, plant.GetJointIndices())]
+    if joint_name not in joints:
+        raise input_error(f"no joint '{joint_name}'{nearest_names(joint_name, joints)}", key=key)
+    joint = plant.GetJointByName(joint_name)
+    if not isinstance(joint, PrismaticJoint):
+        raise input_error(f"joint '{joint_name}' is {joint.type_name()}, not prismatic", key=key)
+    return joint.parent_body()
+
+
+def _drive_actuator(plant: MultibodyPlant, joint_name: str) -> JointActuator:
+    """The actuator that the parser gave the drive's joint; it gives one to every moving joint without an effort limit of 0."""
+    actuators = [plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices()]
+    if [actuator.joint().name() for actuator in actuators] != [joint_name] or np.isfinite(
+        actuators[0].effort_limit()
+    ):
+        raise input_error(
+            f"joint '{joint_name}' must be the only driven one, and without <effort>, which would clamp the motor",
+            key="drive.joint",
+        )
+    return actuators[0]
+
+
+def _hung_in_a_carrier(plant: MultibodyPlant, actuator: JointActuator) -> JointActuator:
+    """Puts a massless body that floats in the tub's place as the parent of the drum's joint.
+
+    Returns:
+        The new joint's actuator.
+
+    Raises:
+        InputError: the joint is not a revolute one from tub to drum.
+    """
+    joint, key = actuator.joint(), "imperfections.bearing"
+    if not isinstance(joint, RevoluteJoint) or joint.parent_body().name() != "tub":
+        what = f"joint '{joint.name()}' is {joint.type_name()}, from '{joint.parent_body().name()}'"
+        raise input_error(
+            f"a bearing that gives asks for a revolute joint from 'tub' to 'drum'; {what}", key=key
+        )
+    name, axis, damping = joint.name(), joint.revolute_axis(), joint.default_damping_vector()[0]
+    X_TF, on_drum = joint.frame_on_parent().GetFixedPoseInBodyFrame(), joint.frame_on_child()
+    plant.RemoveJointActuator(actuator)
+    plant.RemoveJoint(joint)
+    carrier = plant.AddRigidBody(CARRIER, plant.AddModelInstance("bearing"), SpatialInertia.Zero())
+    frame = plant.AddFrame(FixedOffsetFrame(f"{CARRIER}_axis", carrier.body_frame(), X_TF))
+    plant.AddJoint(
+        RpyFloatingJoint(f"{CARRIER}_floating", plant.world_frame(), carrier.body_frame())
+    )
+    return plant.AddJointActuator(
+        name, plant.AddJoint(RevoluteJoint(name, frame, on_drum, axis, damping))
+    )
+
+
+def _check_freedoms(plant: MultibodyPlant, parameters: MachineParameters) -> None:
+    dampers, carriers = (
+        len(parameters.telescopic_dampers),
+        1 if parameters.imperfections.bearing else 0,
+    )
+    if (
+        plant.num_velocities() != 7 + 7 * dampers + 6 * carriers
+        or plant.num_positions() != plant.num_velocities()
+    ):
+        tubes = ", seven for each damper with tubes" if dampers else ""
+        raise input_error(
+            f"SDF '{parameters.model}' has {plant.num_velocities()} freedoms; a machine has the tub's six and the drum's one"
+            f"{tubes}, all else on fixed joints",
+            key="model",
+        )
+
+
+def tubes_of(plant: MultibodyPlant, joint: str) -> tuple[RigidBody, RigidBody]:
+    """Outer and inner tube of a telescoping joint."""
+    telescope = plant.GetJointByName(joint)
+    return telescope.parent_body(), telescope.child_body()
+
+
+def frame_names(plant: MultibodyPlant) -> list[str]:
+    """Names of the frames and links of the model, by which elements attach."""
+    frames = map(
+        plant.get_frame, plant.GetFrameIndices(plant.GetBodyByName("tub").model_instance())
+    )
+    return sorted({frame.name() for frame in frames} - {"__model__"})
+
+
+def fixed_to(plant: MultibodyPlant, body_name: str, frame_name: str) -> bool:
+    """Whether a frame moves with a body (on it, or on one welded to it)."""
+    body = plant.GetFrameByName(frame_name).body()
+    return any(
+        body.index() == other.index()
+        for other in plant.GetBodiesWeldedTo(plant.GetBodyByName(body_name))
+    )
+
+
+def frame_problems(plant: MultibodyPlant, parameters: MachineParameters) -> list[Problem]:
+    """What is wrong with the names of frames and bodies in a machine."""
+    wanted = [
+        (
+            f"{table}.{name}.{end}_frame" if name else f"{table}.{end}_frame",
+            end,
+            getattr(element, f"{end}_frame"),
+        )
+        for table, name, element in _placed_elements(parameters)
+        for end in ("tub", "housing")
+    ]
+    for name, damper in parameters.telescopic_dampers.items():
+        outer, inner = (body.name() for body in tubes_of(plant, damper.joint))
+        ends = (("tub", "tub"), ("outer", outer), ("inner", inner), ("housing", "housing"))
+        key = f"telescopic_dampers.{name}"
+        wanted += [
+            (f"{key}.{end}_frame", body, getattr(damper, f"{end}_frame")) for end, body in ends
+        ]
+    wanted += [
+        (f"sensors.{name}.frame", "tub", sensor.frame)
+        for name, sensor in parameters.sensors.items()
+    ]
+    wanted += [
+        (f"accelerometers.{name}.frame", "tub", sensor.frame)
+        for name, sensor in parameters.accelerometers.items()
+    ]
+    wanted.append(("clearance.detergent_frame", "tub", parameters.clearance.detergent_frame))
+    return list(
+        _name_problems(plant, tuple(wanted), tuple(parameters.bodies), tuple(parameters.frames))
+    )
+
+
+@functools.lru_cache(
+    maxsize=64
+)  # a study asks a thousand times with other numbers and the same names
+def _name_problems(
+    plant: MultibodyPlant,
+    wanted: tuple[tuple[str, str, str], ...],
+    bodies: tuple[str, ...],
+    frames: tuple[str, ...],
+) -> tuple[Problem, ...]:
+    """Of frames (key, body they must be fixed to, name), overridden bodies, and overridden frames."""
+    known = frame_names(plant)
+    problems = []
+    for key, body, frame in wanted:
+        if frame not in known:
+            problems.append(
+                Problem("", key, f"no frame '{frame}' in the SDF{nearest_names(frame, known)}")
+            )
+        elif not fixed_to(plant, body, frame):
+            problems.append(Problem("", key, f"frame '{frame}' is not fixed to the {body}"))
+    fixed = [body.index() for body in plant.GetBodiesWeldedTo(plant.world_body())]
+    links = [
+        body.name()
+        for body in map(
+            plant.get_body, plant.GetBodyIndices(plant.GetBodyByName("tub").model_instance())
+        )
+        if body.index() not in fixed
+    ]
+    problems += [
+        Problem(
+            "", f"bodies.{name}", f"no moving link '{name}' in the SDF{nearest_names(name, links)}"
+        )
+        for name in bodies
+        if name not in links
+    ]
+    for name in frames:
+        if name not in known or not isinstance(plant.GetFrameByName(name), FixedOffsetFrame):
+            movable = [
+                frame
+                for frame in known
+                if isinstance(plant.GetFrameByName(frame), FixedOffsetFrame)
+            ]
+            problems.append(
+                Problem(
+                    "",
+                    f"frames.{name}",
+                    f"no frame '{name}' in the SDF{nearest_names(name, movable)}",
+                )
+            )
+    return tuple(problems)
+
+
+def _placed_elements(parameters: MachineParameters) -> Iterable[tuple[str, str, Any]]:
+    for table in ("springs", "dampers", "bushings"):
+        for name, element in getattr(parameters, table).items():
+            yield table, name, element
+    if parameters.gasket:
+        yield "gasket", "", parameters.gasket
+
+
+def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameters) -> None:
+    """Puts the overrides of the machine file into a plant Context.
+
+    Raises:
+        InputError: names the SDF does not have.
+    """
+    problems = frame_problems(plant, parameters)
+    if problems:
+        raise InputError(problems)
+    for name, override in parameters.bodies.items():
+        body = plant.GetBodyByName(name)
+        body.SetSpatialInertiaInBodyFrame(
+            context, _overridden(body.default_spatial_inertia(), override)
+        )
+    for name, frame_override in parameters.frames.items():
+        frame = plant.GetFrameByName(name)
+        rotation = frame.GetFixedPoseInBodyFrame().rotation()
+        frame.SetPoseInParentFrame(context, RigidTransform(rotation, frame_override.position))
+
+
+def add_load(plant: MultibodyPlant, context: Any, load: Load) -> None:
+    """Adds the point masses of a load to the drum in a plant Context."""
+    drum = plant.GetBodyByName("drum")
+    loaded = drum.CalcSpatialInertiaInBodyFrame(context)
+    for unbalance in load.unbalances:
+        p_DoU_D = unbalance.position()
+        loaded += SpatialInertia(unbalance.mass, p_DoU_D, UnitInertia.PointMass(p_DoU_D))
+    drum.SetSpatialInertiaInBodyFrame(context, loaded)
+
+
+def _overridden(inertia: SpatialInertia, override: BodyOverride) -> SpatialInertia:
+    mass = inertia.get_mass() if override.mass is None else override.mass
+    centre = (
+        inertia.get_com() if override.centre_of_mass is None else np.array(override.centre_of_mass)
+    )
+    if override.inertia is None:
+        central = inertia.Shift(inertia.get_com()).CalcRotationalInertia()
+        about_centre = central * (mass / inertia.get_mass())
+    else:
+        matrix = override.inertia
+        about_centre = RotationalInertia(
+            matrix.xx, matrix.yy, matrix.zz, matrix.xy, matrix.xz, matrix.yz
+        )
+    return SpatialInertia.MakeFromCentralInertia(mass, centre, about_centre)
+
+
+def spelled_out(
+    plant: MultibodyPlant, parameters: MachineParameters, keys: Iterable[str]
+) -> MachineParameters:
+    """A copy in which the values of the SDF that key paths reach into stand as overrides, so that parts of them can be changed.
+
+    Raises:
+        InputError: bodies or frames the SDF does not have.
+    """
+    changed = parameters
+    for table, name, part in dict.fromkeys(tuple([*key.split("."), "", ""][:3]) for key in keys):
+        if table == "frames" and name not in changed.frames:
+            known = frame_names(plant)
+            if name not in known or not isinstance(plant.GetFrameByName(name), FixedOffsetFrame):
+                raise input_error(
+                    f"no frame '{name}' in the SDF{nearest_names(name, known)}",
+                    key=f"frames.{name}",
+                )
+            position = plant.GetFrameByName(name).GetFixedPoseInBodyFrame().translation()
+            changed = with_value(changed, f"frames.{name}.position", tuple(map(float, position)))
+        if table == "bodies" and part in BodyOverride.model_fields:
+            value = _mass_properties(plant, name, changed.bodies.get(name, BodyOverride()))[part]
+            changed = with_value(changed, f"bodies.{name}.{part}", value)
+    return changed
+
+
+def _mass_properties(plant: MultibodyPlant, name: str, override: BodyOverride) -> dict[str, Any]:
+    """Mass, centre of mass and central inertia of a body under an override, as an override says them."""
+    if not plant.HasBodyNamed(name):
+        links = [
+            plant.get_body(index).name()
+            for index in plant.GetBodyIndices(plant.GetBodyByName("tub").model_instance())
+        ]
+        raise input_error(
+            f"no link '{name}' in the SDF{nearest_names(name, links)}", key=f"bodies.{name}"
+        )
+    inertia = _overridden(plant.GetBodyByName(name).default_spatial_inertia(), override)
+    matrix = inertia.Shift(inertia.get_com()).CalcRotationalInertia().CopyToFullMatrix3()
+    places = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+    return {
+        "mass": float(inertia.get_mass()),
+        "centre_of_mass": tuple(map(float, inertia.get_com())),
+        "inertia": {axis: float(matrix[place]) for axis, place in places.items()},
+    }

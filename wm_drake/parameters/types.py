@@ -1,0 +1,8 @@
+"""Aliases that several rooms share."""
+
+from typing import TypeAlias
+
+import numpy as np
+
+FloatArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+"""An array of floats; the docstring that uses it says its shape and unit."""

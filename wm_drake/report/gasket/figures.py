@@ -1,0 +1,291 @@
+"""Figures of a screening study: contributions, spread of the responses, effects, interactions, residuals."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH
+from wm_drake.report.wording import number
+from wm_drake.studies.gasket.screening import Label, Screening, contributions, main_effects, mean_at
+
+LEVEL_COLOURS = (OURS, QUIET, MEASURED)
+"""Of levels -1, 0 and 1."""
+
+LEVEL_MARKS = ("v", "o", "^")
+"""Of levels -1, 0 and 1: told apart in print too."""
+
+FEWEST_PERCENT = 1.0
+"""Terms that reach this contribution in no response are left out of the heat map."""
+
+MOST_POINTS = 1500
+"""Of a scatter; of more, evenly taken ones are drawn."""
+
+COLUMNS = 3
+
+
+def heat_map_figure(screening: Screening) -> Figure:
+    """Contributions in percent: terms down, responses of each load across."""
+    table = contributions(screening).fillna(0.0)
+    shown = table[table.max(axis=1) >= FEWEST_PERCENT]
+    values = shown.to_numpy()
+    labels = list(screening.tables)
+    figure = Figure(figsize=(WIDTH, 0.27 * len(shown) + 1.5), layout="constrained")
+    axes = figure.subplots()
+    image = axes.imshow(
+        np.sqrt(values), cmap="Blues", vmin=0.0, vmax=10.0, aspect="auto"
+    )  # the root shows small ones too
+    for (row, column), value in np.ndenumerate(values):
+        if value >= 0.5:
+            colour = "white" if value > 40.0 else MARK
+            axes.text(
+                column, row, number(value, 0), ha="center", va="center", fontsize=8.5, color=colour
+            )
+    axes.set_yticks(
+        range(len(shown)),
+        [str(name).replace(":", " × ") for name in shown.index],
+        fontsize=9,
+        parse_math=False,
+    )
+    axes.set_xticks(range(len(labels)), [name for _, name in labels], fontsize=9)
+    axes.xaxis.tick_top()
+    axes.tick_params(length=0)
+    for index, load in enumerate(screening.loads):
+        first = len(screening.names) * index
+        middle = first + 0.5 * (len(screening.names) - 1)
+        axes.annotate(f"load {load}", (middle, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 22),
+                      textcoords="offset points", ha="center", fontsize=10, fontweight="bold", parse_math=False)  # fmt: skip
+        if index:
+            axes.axvline(first - 0.5, color="white", linewidth=5.0)
+    mains = sum(":" not in str(name) for name in shown.index)
+    axes.axhline(mains - 0.5, color="white", linewidth=5.0)
+    for side in axes.spines.values():
+        side.set_visible(False)
+    bar = figure.colorbar(
+        image, ax=axes, fraction=0.025, pad=0.015, ticks=np.sqrt([0, 1, 5, 10, 25, 50, 100])
+    )
+    bar.ax.set_yticklabels(["0", "1", "5", "10", "25", "50", "100 %"], fontsize=8.5)
+    bar.outline.set_visible(False)
+    return figure
+
+
+def spread_figure(screening: Screening, names: Sequence[str], what: str) -> Figure:
+    """All values of some responses, a panel per load: points, with a box from quartile to quartile ([B] Figs. 10-12)."""
+    figure = Figure(figsize=(WIDTH, 3.7), layout="constrained")
+    panels = figure.subplots(1, len(screening.loads), squeeze=False, sharey=True)[0]
+    rng = np.random.default_rng(0)  # of the sideways scatter, which means nothing
+    for axes, load in zip(panels, screening.loads, strict=True):
+        for place, name in enumerate(names):
+            values = _some(screening.responses.values[load][name].dropna().to_numpy())
+            aside = place + rng.uniform(-0.28, 0.28, len(values))
+            axes.plot(
+                aside,
+                values,
+                ".",
+                color=OURS,
+                alpha=0.35,
+                markersize=3.0,
+                markeredgewidth=0.0,
+                rasterized=True,
+            )
+            whole = screening.responses.values[load][name].dropna().to_numpy()
+            _box(axes, place, whole, 0.34)
+        axes.set_xticks(range(len(names)), list(names))
+        axes.set_xlim(-0.6, len(names) - 0.4)
+        axes.set_ylim(bottom=0.0)
+        axes.set_title(
+            f"load {load}", fontsize=10.5, loc="left", fontweight="bold", parse_math=False
+        )
+        _plain(axes, "y")
+    panels[0].set_ylabel(f"{what}, {screening.responses.units[names[0]]}", fontsize=9.5)
+    return figure
+
+
+def main_effects_figure(screening: Screening, load: str) -> Figure:
+    """Mean response at the three levels of each factor, a panel per response."""
+
+    def draw(axes: Axes, label: Label) -> None:
+        table = screening.tables[label]
+        factors = screening.design.factors
+        axes.axhline(table.constant, color=QUIET, linewidth=0.8)
+        for place, factor in enumerate(factors):
+            means = mean_at(screening, label, [factor])
+            percent = next(term.percent for term in table.terms if term.factors == (factor,))
+            strong = percent >= 10.0
+            at = place + 0.3 * np.array([-1.0, 0.0, 1.0])
+            line: dict[str, Any] = {
+                "color": OURS if strong else QUIET,
+                "linewidth": 1.8 if strong else 1.0,
+            }
+            axes.plot(at, list(means.values()), "-", marker="o", markersize=3.5, **line)
+        axes.set_xticks(
+            range(len(factors)), list(factors), rotation=90, fontsize=8.5, parse_math=False
+        )
+        _plain(axes, "y")
+
+    return _panels(
+        screening, load, draw, extra=0.5 + 0.055 * max(map(len, screening.design.factors))
+    )
+
+
+def interactions_figure(screening: Screening, load: str) -> Figure:
+    """For each response its strongest interaction: mean over one factor, a line per level of the other."""
+
+    def draw(axes: Axes, label: Label) -> None:
+        pairs = [term for term in screening.tables[label].terms if len(term.factors) == 2]
+        strongest = max(pairs, key=lambda term: np.nan_to_num(term.percent))
+        first, second = strongest.factors
+        means = mean_at(screening, label, [first, second])
+        for level, colour, mark in zip((-1, 0, 1), LEVEL_COLOURS, LEVEL_MARKS, strict=True):
+            line = [means[x, level] for x in (-1, 0, 1)]
+            axes.plot((-1, 0, 1), line, color=colour, marker=mark, markersize=5, linewidth=1.4)
+        text = f"lines: {second};  {number(strongest.percent, 1)} %"
+        axes.text(
+            0.98,
+            1.03,
+            text,
+            transform=axes.transAxes,
+            ha="right",
+            fontsize=8.5,
+            color=QUIET,
+            parse_math=False,
+        )
+        axes.set_xticks((-1, 0, 1), ["−1", "0", "1"])
+        axes.set_xlabel(first, fontsize=9, parse_math=False)
+        axes.margins(0.12)
+        _plain(axes, "y")
+
+    figure = _panels(screening, load, draw, extra=0.45)
+    handles = [
+        Line2D(
+            [], [], color=colour, marker=mark, markersize=5, linewidth=1.4, label=f"level {text}"
+        )
+        for colour, mark, text in zip(LEVEL_COLOURS, LEVEL_MARKS, ("−1", "0", "1"), strict=True)
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+    return figure
+
+
+def combinations_figure(screening: Screening, load: str) -> Figure:
+    """Runs at each level combination of the two most influential factors of each response ([B] Fig. 13)."""
+
+    def draw(axes: Axes, label: Label) -> None:
+        first, second = two_most_influential(screening, label)
+        columns = [screening.design.factors.index(name) for name in (first, second)]
+        levels = screening.design.levels[:, columns]
+        values = screening.responses.values[label[0]][label[1]].to_numpy()
+        for x in (-1, 0, 1):
+            for level, colour in zip((-1, 0, 1), LEVEL_COLOURS, strict=True):
+                here = values[(levels[:, 0] == x) & (levels[:, 1] == level)]
+                _box(axes, x + 0.27 * level, here[np.isfinite(here)], 0.1, colour)
+        axes.set_xticks((-1, 0, 1), ["−1", "0", "1"])
+        axes.set_xlabel(first, fontsize=9, parse_math=False)
+        axes.text(
+            0.98,
+            1.03,
+            f"colour: {second}",
+            transform=axes.transAxes,
+            ha="right",
+            fontsize=8.5,
+            color=QUIET,
+            parse_math=False,
+        )
+        _plain(axes, "y")
+
+    figure = _panels(screening, load, draw, extra=0.45)
+    handles = [
+        Line2D([], [], color=colour, linewidth=5, label=f"level {text}")
+        for colour, text in zip(LEVEL_COLOURS, ("−1", "0", "1"), strict=True)
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+    return figure
+
+
+def two_most_influential(screening: Screening, label: Label) -> tuple[str, str]:
+    """Factors of the two largest main effects."""
+    first, second = main_effects(screening.tables[label])[:2]
+    return first.name, second.name
+
+
+def residuals_figure(screening: Screening, load: str) -> Figure:
+    """What the model does not say, against what it says."""
+
+    def draw(axes: Axes, label: Label) -> None:
+        table = screening.tables[label]
+        axes.axhline(0.0, color=QUIET, linewidth=0.8)
+        shown: dict[str, Any] = {
+            "alpha": 0.4,
+            "markersize": 3.0,
+            "markeredgewidth": 0.0,
+            "rasterized": True,
+        }
+        axes.plot(_some(table.fitted), _some(table.residual), ".", color=OURS, **shown)
+        _plain(axes, "both")
+
+    return _panels(screening, load, draw, extra=0.1)
+
+
+def _panels(
+    screening: Screening, load: str, draw: Callable[[Axes, Label], None], extra: float
+) -> Figure:
+    """A panel per response of a load, three in a row, each with name and unit."""
+    names = screening.names
+    rows = -(-len(names) // COLUMNS)
+    figure = Figure(figsize=(WIDTH, rows * (1.75 + extra) + 0.4), layout="constrained")
+    for axes, name in zip(figure.subplots(rows, COLUMNS, squeeze=False).flat, names, strict=False):
+        axes.text(0.0, 1.03, name, transform=axes.transAxes, fontsize=10.5, fontweight="bold")
+        axes.set_ylabel(screening.responses.units[name], fontsize=9)
+        draw(axes, (load, name))
+    return figure
+
+
+def _box(
+    axes: Axes, place: float, values: FloatArray, half_width: float, colour: str = MARK
+) -> None:
+    """Smallest to largest value as a line, quartiles as a box, the median as a stroke."""
+    if not len(values):
+        return
+    low, first, median, third, high = np.percentile(values, (0, 25, 50, 75, 100))
+    axes.plot([place, place], [low, high], color=colour, linewidth=0.9, solid_capstyle="butt")
+    corners = (
+        [
+            place - half_width,
+            place + half_width,
+            place + half_width,
+            place - half_width,
+            place - half_width,
+        ],
+    )
+    axes.fill(
+        *corners,
+        [first, first, third, third, first],
+        facecolor=(1.0, 1.0, 1.0, 0.45),
+        edgecolor=colour,
+        linewidth=1.2,
+        zorder=3,
+    )
+    axes.plot(
+        [place - half_width, place + half_width],
+        [median, median],
+        color=colour,
+        linewidth=2.0,
+        zorder=4,
+    )
+
+
+def _some(values: FloatArray) -> FloatArray:
+    """At most so many points of a scatter, evenly taken."""
+    step = -(-len(values) // MOST_POINTS) if len(values) else 1
+    return values[::step]
+
+
+def _plain(axes: Axes, grid: str) -> None:
+    axes.set_axisbelow(True)
+    axes.grid(axis=grid, color=GRID)  # type: ignore[arg-type]
+    axes.tick_params(labelsize=8.5)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)

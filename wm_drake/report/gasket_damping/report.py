@@ -1,0 +1,276 @@
+"""The report of the gasket-damping study: optimum, surface of the objective, path of the search, envelopes."""
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from matplotlib.figure import Figure
+
+from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
+from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH
+from wm_drake.report.page import Picture, picture, render, versions_of
+from wm_drake.report.tables import Group, Row, Table, parameter_table
+from wm_drake.report.wording import MM_PER_M, number, percent
+from wm_drake.simulation.measures import envelopes, percent_difference
+from wm_drake.studies.gasket_damping.grid_search import Search
+from wm_drake.studies.gasket_damping.study import NOISE, STOP, UNKNOWNS, WINDOW, Damping
+
+UNITS = (Unit("N*s/m", "N*s/mm"), Unit("N*m*s/rad", "N*mm*s/deg"))
+
+
+def in_papers_units(damping: FloatArray) -> tuple[float, float]:
+    """C_L and C_T. [N s/mm, N mm s/deg]"""
+    linear, torsional = (
+        unit.from_si(float(value)) for unit, value in zip(UNITS, damping, strict=True)
+    )
+    return linear, torsional
+
+
+def gasket_damping_report(result: Damping, parameters: MachineParameters, command: str = "") -> str:
+    """The report as text of one HTML file, with style and figures inside."""
+    record = next(iter(result.at_best.values()))
+    facts = [
+        ("Machine", parameters.name),
+        ("About", parameters.about),
+        ("Engine of the search", "compiled"),
+    ]
+    facts += [("Versions", versions_of(record.attrs)), ("Command", command)]
+    return render(
+        "gasket_damping/page.html",
+        title=f"Gasket damping of machine {parameters.name}",
+        about=parameters.about,
+        summary=summary(result),
+        warnings=_warnings(result),
+        optima=_optima(result),
+        surface=_surface_picture(result),
+        envelopes=[_envelopes_picture(result, load) for load in result.measured],
+        amplitudes=_amplitudes(result),
+        facts=[(word, text) for word, text in facts if text],
+        numbers=parameter_table(parameters),
+    )
+
+
+def summary(result: Damping) -> str:
+    """One paragraph, made from the numbers."""
+    source = "a virtual experiment" if result.truth is not None else "measured records"
+    text = (
+        f"Against {source} of load {', '.join(result.measured)}, the envelopes are nearest at {_words(result.grid.best)}: the "
+        f"grid search took {result.grid.evaluations} evaluations in {len(result.grid.rounds)} rounds and ended at a "
+        f"distance of "
+        f"{number(result.grid.value, 2)} mm. scipy's bounded Nelder-Mead found {_words(result.scipy.best)} at "
+        f"{number(result.scipy.value, 2)} mm with {result.scipy.evaluations} evaluations."
+    )
+    if result.truth is None:
+        return text
+    errors = [
+        percent(100.0 * (b - t) / t)
+        for b, t in zip(result.grid.best, result.truth, strict=True)
+        if t
+    ]
+    return f"{text} Planted were {_words(result.truth)}; the grid search is off by {' and '.join(errors)}."
+
+
+def _warnings(result: Damping) -> list[str]:
+    if result.truth is None:
+        return []
+    return [
+        "No measured records were given. The records here come from a virtual experiment: the same machine, run by "
+        "the Drake engine "
+        f"with {_words(result.truth)}, and noise of {number(MM_PER_M * NOISE, 1)} mm added to each sample. It shows "
+        f"that the study "
+        "finds what it should, and says nothing about a real gasket."
+    ]
+
+
+def _words(damping: FloatArray) -> str:
+    linear, torsional = in_papers_units(damping)
+    return f"C_L = {number(linear, 4)} N s/mm and C_T = {number(torsional, 1)} N mm s/deg"
+
+
+def points_table(result: Damping) -> pd.DataFrame:
+    """Every point of the grid search: round, damping, objective."""
+    rows = [
+        {
+            "round": index,
+            "C_L [N s/mm]": in_papers_units(point)[0],
+            "C_T [N mm s/deg]": in_papers_units(point)[1],
+            "objective [mm]": value,
+        }
+        for index, grid in enumerate(result.grid.rounds, start=1)
+        for point, value in zip(grid.points, grid.values, strict=True)
+    ]
+    return pd.DataFrame(rows)
+
+
+def _optima(result: Damping) -> Table:
+    def line(name: str, search: Search) -> Group:
+        linear, torsional = in_papers_units(search.best)
+        cells = (
+            number(linear, 4),
+            number(torsional, 1),
+            number(search.value, 2),
+            str(search.evaluations),
+        )
+        return Group(name, (Row(cells),))
+
+    groups = [
+        line("grid search of [B]", result.grid),
+        line("scipy, Nelder-Mead within bounds", result.scipy),
+    ]
+    if result.truth is not None:
+        linear, torsional = in_papers_units(result.truth)
+        groups.append(
+            Group("planted", (Row((number(linear, 4), number(torsional, 1), "", ""), "measured"),))
+        )
+    header = ("found by", "C_L, N s/mm", "C_T, N mm s/deg", "distance, mm", "evaluations")
+    caption = (
+        "Distance: sum over the loads of the 2-norm of the differences of upper and lower envelopes at all sensors, "
+        "every 5 ms from "
+        f"{WINDOW[0]:g} to {WINDOW[1]:g} s, [B] Eq. (2), (3). The grid search ends when a round gains less than {STOP:g} mm."
+    )
+    return Table(caption, header, tuple(groups))
+
+
+def _surface_picture(result: Damping) -> Picture:
+    caption = (
+        "Left: points of the grid search, darker from round to round, and the path of its best point. Right: the "
+        "objective over them "
+        "([B] Fig. 7)."
+    )
+    return picture(
+        surface_figure(result),
+        "Grid points with the path of the search, and the surface of the objective.",
+        caption,
+    )
+
+
+def surface_figure(result: Damping) -> Figure:
+    """Grid and path beside the surface of the objective."""
+    figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
+    axes, space = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2, projection="3d")
+    points = np.array([in_papers_units(p) for grid in result.grid.rounds for p in grid.points])
+    values = np.concatenate([grid.values for grid in result.grid.rounds])
+    finite = np.isfinite(values)
+    levels = axes.tricontourf(
+        points[finite, 0], points[finite, 1], values[finite], levels=14, cmap="Blues_r", alpha=0.55
+    )
+    figure.colorbar(levels, ax=axes, label="distance, mm", pad=0.02)
+    for index, grid in enumerate(result.grid.rounds):
+        own = np.array([in_papers_units(p) for p in grid.points]).reshape(-1, 2)
+        mark, size = ("o", 5.0) if index == 0 else ("x", 4.0)
+        shade = min(1.0, 0.35 + 0.15 * index)
+        axes.plot(*own.T, mark, color=MARK, alpha=shade, markersize=size, fillstyle="none")
+    path = np.array([in_papers_units(grid.best) for grid in result.grid.rounds])
+    axes.plot(*path.T, "-", color=MEASURED, linewidth=1.6, label="path of the best point")
+    axes.plot(*path[-1], "o", color=MEASURED, markersize=6)
+    if result.truth is not None:
+        axes.plot(
+            *in_papers_units(result.truth),
+            "+",
+            color=OURS,
+            markersize=14,
+            markeredgewidth=2.2,
+            label="planted",
+        )
+    axes.set_xlabel("C_L, N s/mm", fontsize=9.5)
+    axes.set_ylabel("C_T, N mm s/deg", fontsize=9.5)
+    axes.legend(loc="upper right", fontsize=8.5)
+    axes.tick_params(labelsize=9)
+    space.plot_trisurf(
+        *points[finite].T, values[finite], cmap="Blues_r", linewidth=0.2, edgecolor="white"
+    )
+    space.set_xlabel("C_L, N s/mm", fontsize=8.5)
+    space.set_ylabel("C_T, N mm s/deg", fontsize=8.5)
+    space.set_zlabel("distance, mm", fontsize=8.5)
+    space.tick_params(labelsize=8)
+    space.view_init(
+        30, 40
+    )  # from the far corner: the one with little damping stands high and would hide the valley
+    return figure
+
+
+def _envelopes_picture(result: Damping, load: str) -> Picture:
+    caption = (
+        f"Load {load}: envelopes of the displacement at each sensor, band 0.5–20 Hz, computed at the optimum (band) "
+        f"and compared with "
+        f"(dashed). Compared from {WINDOW[0]:g} to {WINDOW[1]:g} s."
+    )
+    return picture(
+        envelopes_figure(result, load),
+        f"Envelopes at the optimum against those compared with, load {load}.",
+        caption,
+    )
+
+
+def envelopes_figure(result: Damping, load: str) -> Figure:
+    """Computed and compared envelopes, a panel per sensor."""
+    ours = MM_PER_M * envelopes(result.at_best[load])
+    theirs = MM_PER_M * envelopes(xr.Dataset({"displacement": result.measured[load]}))
+    sensors = [str(name) for name in ours.sensor.values]
+    rows = -(-len(sensors) // 3)
+    figure = Figure(figsize=(WIDTH, 2.0 * rows + 0.7), layout="constrained")
+    panels = figure.subplots(rows, 3, squeeze=False, sharex=True, sharey=True)
+    for axes, name in zip(panels.flat, sensors, strict=False):
+        kept = ours.sel(sensor=name).isel(time=slice(None, None, 10))
+        axes.fill_between(
+            kept.time,
+            kept.lower,
+            kept.upper,
+            color=OURS,
+            alpha=0.3,
+            linewidth=0.0,
+            label="computed",
+        )
+        other = theirs.sel(sensor=name).isel(time=slice(None, None, 10))
+        for side in ("upper", "lower"):
+            axes.plot(
+                other.time,
+                other[side],
+                "--",
+                color=MEASURED,
+                linewidth=1.1,
+                label="compared with" if side == "upper" else None,
+            )
+        axes.set_title(name, fontsize=10, loc="left", fontweight="bold", parse_math=False)
+        axes.axhline(0.0, color=QUIET, linewidth=0.6)
+        axes.grid(color=GRID)
+        axes.tick_params(labelsize=8.5)
+        axes.spines[["top", "right"]].set_visible(False)
+    for axes in panels[-1]:
+        axes.set_xlabel("time, s", fontsize=9)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("mm", fontsize=9)
+    figure.legend(
+        *panels.flat[0].get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=2,
+        frameon=False,
+        fontsize=9,
+    )
+    return figure
+
+
+def _amplitudes(result: Damping) -> Table:
+    """[B] Table 2: largest values of the envelopes within the window, computed against compared."""
+    groups = []
+    for load, record in result.at_best.items():
+        pair = [_largest(record.displacement), _largest(result.measured[load])]
+        change = percent_difference(*pair)
+        rows = [Row((name, *(number(MM_PER_M * float(v)) for v in values)), kind) for name, values, kind in (
+            ("computed", pair[0], "ours"), ("compared with", pair[1], "measured"))]  # fmt: skip
+        rows.append(Row(("difference", *(percent(float(value)) for value in change)), "difference"))
+        groups.append(Group(load, tuple(rows)))
+    sensors = next(iter(result.at_best.values())).sensor.values
+    caption = "Amplitudes within the window, and their differences, [B] Eq. (1) and Table 2."
+    return Table(
+        caption, ("load", "", *(f"{name}, mm" for name in sensors)), tuple(groups), text_columns=2
+    )
+
+
+def _largest(displacement: xr.DataArray) -> xr.DataArray:
+    both = envelopes(xr.Dataset({"displacement": displacement})).sel(time=slice(*WINDOW))
+    return np.maximum(abs(both.upper), abs(both.lower)).max("time")
+
+
+__all__ = ["UNKNOWNS", "gasket_damping_report", "in_papers_units", "points_table", "summary"]

@@ -1,0 +1,95 @@
+"""Figures of an identification of a component: measured against fitted loops, course of the search."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.report.figures import MEASURED, OURS, WIDTH
+from wm_drake.report.rig.figures import axes_line, force_scale, motion_scale, plain
+from wm_drake.rigs.measured import MeasuredMotion
+from wm_drake.studies.fitting import Fit
+
+COLUMNS = 4
+
+
+def motion_text(measured: MeasuredMotion) -> str:
+    """Frequency and amplitude of a measured loop."""
+    factor, _, unit = motion_scale(measured.loop.rotates)
+    return f"{measured.motion.frequency:.3g} Hz, {factor * measured.motion.amplitude:.3g} {unit}"
+
+
+def loops_figure(fit: Fit, motions: Sequence[MeasuredMotion], *, over: str) -> Figure:
+    """A panel for each file: measured samples and the fitted loop; offset and drift taken out of both.
+
+    Args:
+        fit: Of these motions.
+        motions: At least one.
+        over: displacement or velocity.
+    """
+    columns = min(COLUMNS, max(2, len(motions)))
+    rows = -(-len(motions) // columns)
+    figure = Figure(figsize=(WIDTH, 2.55 * rows + 0.45), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False)
+    factor, name, unit = motion_scale(motions[0].loop.rotates)
+    head = f"{name}, {unit}" if over == "displacement" else f"velocity, {unit}/s"
+    for index, axes in enumerate(grid.flat):
+        axes.set_visible(index < len(motions))
+        if index >= len(motions):
+            continue
+        measured = motions[index]
+        offset = measured.baseline @ fit.baselines[index]
+        computed = fit.computed[fit.problem.slices[index]] - offset
+        _panel(axes, measured, measured.loop.force - offset, computed, over, factor)
+        axes.set_title(
+            motion_text(measured), fontsize=10, loc="left", fontweight="bold", parse_math=False
+        )
+        if index >= len(motions) - columns:
+            axes.set_xlabel(head, fontsize=9.5)
+        if index % columns == 0:
+            axes.set_ylabel(", ".join(force_scale(measured.loop.rotates)), fontsize=9.5)
+    handles = [
+        axes_line(MEASURED, "measured", marker="o", markersize=3.0, linestyle="none"),
+        axes_line(OURS, "fitted", linewidth=1.8),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False, fontsize=9.5)
+    return figure
+
+
+def history_figure(fit: Fit) -> Figure:
+    """Least RMSE after each round."""
+    figure = Figure(figsize=(WIDTH, 2.3), layout="constrained")
+    axes = figure.subplots()
+    axes.semilogy(
+        range(1, len(fit.history) + 1),
+        np.maximum(fit.history, 1e-300),
+        "o-",
+        color=OURS,
+        linewidth=1.4,
+        markersize=3.5,
+    )
+    axes.set_xlabel("round of the search", fontsize=9.5)
+    axes.set_ylabel("least RMSE", fontsize=9.5)
+    plain(axes)
+    return figure
+
+
+def _panel(
+    axes: Axes,
+    measured: MeasuredMotion,
+    force: FloatArray,
+    computed: FloatArray,
+    over: str,
+    factor: float,
+) -> None:
+    amplitude, omega = factor * measured.motion.amplitude, measured.motion.angular_frequency
+    order = np.argsort(measured.phase)
+    order = np.append(order, order[0])
+    turn = np.sin(measured.phase) if over == "displacement" else omega * np.cos(measured.phase)
+    axes.plot(
+        amplitude * turn, force, "o", color=MEASURED, markersize=2.0, alpha=0.45, rasterized=True
+    )
+    axes.plot(amplitude * turn[order], computed[order], color=OURS, linewidth=1.6)
+    plain(axes)

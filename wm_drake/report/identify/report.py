@@ -1,0 +1,239 @@
+"""The page and the tables of an identification of a component."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from wm_drake.report.identify.figures import history_figure, loops_figure, motion_text
+from wm_drake.report.page import picture, render
+from wm_drake.report.rig.figures import force_scale, motion_scale
+from wm_drake.report.tables import Group, Row, Table
+from wm_drake.report.wording import MISSING, number
+from wm_drake.rigs.measured import MeasuredMotion
+from wm_drake.studies.fitting import Estimate, Fit
+
+
+def identify_report(
+    title: str, fit: Fit, motions: Sequence[MeasuredMotion], command: str = ""
+) -> str:
+    """The report as text of one HTML file, with style and figures inside."""
+    alternative = "Measured samples and the fitted loop, a panel for each file"
+    return render(
+        "identify/page.html",
+        title=f"Identification of {title}",
+        about=f"From {len(motions)} measured loops.",
+        warnings=_warnings(fit),
+        summary=_summary(fit, motions),
+        estimates=_estimates(fit),
+        undetermined=undetermined_sentences(fit),
+        pictures=[
+            picture(
+                loops_figure(fit, motions, over=over),
+                f"{alternative}, over {over}.",
+                f"Force over {over}: measured samples and fitted loop, offset and drift of the instrument taken out of both.",
+            )
+            for over in ("displacement", "velocity")
+        ],
+        errors=_errors(fit, motions),
+        history=picture(
+            history_figure(fit),
+            "Least RMSE after each round.",
+            "Least RMSE after each round of the search.",
+        ),
+        correlations=_correlations(fit),
+        facts=[
+            ("Method", fit.method),
+            ("Seed", str(fit.seed)),
+            ("Points computed", str(fit.evaluations)),
+            ("Condition", f"{fit.condition:.3g}"),
+            *(("Note", note) for note in fit.notes),
+            ("Command", command),
+        ],
+    )
+
+
+def estimate_cells(fit: Fit) -> list[tuple[str, str, str, str, str]]:
+    """Name, value, interval, unit and remark of each unknown, for reading."""
+    found = []
+    for e, unknown in zip(fit.estimates, fit.problem.unknowns, strict=True):
+        unit = unknown.unit
+        value = f"{unit.from_si(e.value):.5g}" if e.determined else MISSING
+        interval = MISSING
+        if np.isfinite(e.lower):
+            interval = f"{unit.from_si(e.lower):.5g} to {unit.from_si(e.upper):.5g}"
+        found.append((e.name, value, interval, unit.shown.replace("*", " "), _remark(e)))
+    return found
+
+
+def _remark(e: Estimate) -> str:
+    if not e.determined:
+        return "not determined by these data"
+    return f"at its {e.at_bound} bound" if e.at_bound else ""
+
+
+def undetermined_sentences(fit: Fit) -> list[str]:
+    """One sentence for each direction that the data do not determine."""
+    found = []
+    for direction in fit.undetermined:
+        if len(direction.names) == 1:
+            found.append(
+                f"{direction.names[0]} can take any value within its bounds without a change that could be seen."
+            )
+        else:
+            parts = ", ".join(
+                f"{name} {part:+.2g}"
+                for name, part in zip(direction.names, direction.parts, strict=True)
+            )
+            found.append(
+                f"Together these can change without being seen, in parts of their ranges: {parts}."
+            )
+    return found
+
+
+def estimates_table(fit: Fit) -> pd.DataFrame:
+    """What was found, in the units people read."""
+    rows = []
+    for e, unknown in zip(fit.estimates, fit.problem.unknowns, strict=True):
+        shown = [
+            unknown.unit.from_si(v) if np.isfinite(v) else np.nan
+            for v in (e.value, e.lower, e.upper)
+        ]
+        rows.append(
+            {
+                "unknown": e.name,
+                "value": shown[0] if e.determined else np.nan,
+                "lower_95": shown[1],
+                "upper_95": shown[2],
+                "unit": unknown.unit.shown,
+                "lower_bound": unknown.unit.from_si(unknown.lower),
+                "upper_bound": unknown.unit.from_si(unknown.upper),
+                "remark": _remark(e),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def errors_table(fit: Fit, motions: Sequence[MeasuredMotion]) -> pd.DataFrame:
+    """RMSE per test, as [A] Tables 2, 4, 5 and 7."""
+    rows = []
+    for test, measured in zip(fit.tests, motions, strict=True):
+        factor, _, unit = motion_scale(measured.loop.rotates)
+        force = force_scale(measured.loop.rotates)[1].replace(" ", "")
+        rows.append(
+            {
+                "file": measured.loop.path,
+                "frequency_hz": measured.motion.frequency,
+                f"amplitude_{unit}": factor * measured.motion.amplitude,
+                f"rmse_{force}": test.rmse,
+                "rmse_by_largest_force": test.normalised,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def fitted_loops(fit: Fit, motions: Sequence[MeasuredMotion]) -> pd.DataFrame:
+    """Measured and fitted force at every sample, SI."""
+    parts = [
+        pd.DataFrame(
+            {
+                "file": measured.loop.name,
+                "time_s": measured.loop.time,
+                "phase_rad": measured.phase,
+                "measured": measured.loop.force,
+                "fitted": fit.computed[where],
+            }
+        )
+        for measured, where in zip(motions, fit.problem.slices, strict=True)
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
+def _estimates(fit: Fit) -> Table:
+    groups = tuple(
+        Group(name, (Row(cells),))
+        for name, *cells_ in estimate_cells(fit)
+        for cells in [tuple(cells_)]
+    )
+    caption = "What was found, with 95 % intervals; none where a bound was hit or the data do not determine the value."
+    return Table(
+        caption, ("unknown", "value", "95 % interval", "unit", "remark"), groups, text_columns=5
+    )
+
+
+def _errors(fit: Fit, motions: Sequence[MeasuredMotion]) -> Table:
+    unit = force_scale(motions[0].loop.rotates)[1]
+    groups = tuple(
+        Group(
+            measured.loop.name,
+            (
+                Row(
+                    (
+                        motion_text(measured),
+                        str(len(measured.phase)),
+                        f"{test.rmse:.4g}",
+                        number(test.normalised, 4),
+                    )
+                ),
+            ),
+        )
+        for test, measured in zip(fit.tests, motions, strict=True)
+    )
+    caption = "Error of each test, as [A] Tables 2, 4, 5 and 7: root mean square, absolute and by the largest measured force."
+    return Table(
+        caption,
+        ("file", "motion", "samples", f"RMSE, {unit}", "RMSE / largest"),
+        groups,
+        text_columns=2,
+    )
+
+
+def _correlations(fit: Fit) -> Table:
+    deviation = np.sqrt(np.diag(fit.covariance))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlation = fit.covariance / np.outer(deviation, deviation)
+    names = [e.name for e in fit.estimates]
+    groups = tuple(
+        Group(
+            name,
+            (
+                Row(
+                    (
+                        f"{u.unit.from_si(s):.3g} {u.unit.shown.replace('*', ' ')}"
+                        if np.isfinite(s)
+                        else MISSING,
+                        *(number(value, 2) for value in row),
+                    )
+                ),
+            ),
+        )
+        for name, u, s, row in zip(names, fit.problem.unknowns, deviation, correlation, strict=True)
+    )
+    caption = "Covariance of the unknowns: standard deviation of each, and correlations."
+    return Table(caption, ("unknown", "deviation", *names), groups, text_columns=2)
+
+
+def _warnings(fit: Fit) -> list[str]:
+    flat = [
+        e.name for e in fit.estimates if ".rise_" in e.name and e.at_bound == "lower"
+    ]  # of a curve: no fault
+    found = [
+        f"{e.name} hit its {e.at_bound} bound."
+        for e in fit.estimates
+        if e.at_bound and e.name not in flat
+    ]
+    unknown = [e.name for e in fit.estimates if not e.determined]
+    if unknown:
+        found.append(f"These data do not determine {', '.join(unknown)}.")
+    return found
+
+
+def _summary(fit: Fit, motions: Sequence[MeasuredMotion]) -> str:
+    unit = force_scale(motions[0].loop.rotates)[1]
+    normalised = [test.normalised for test in fit.tests]
+    determined = sum(e.determined for e in fit.estimates)
+    least, most = (f"{100.0 * value:.2g}" for value in (min(normalised), max(normalised)))
+    return (
+        f"The fitted loops miss the measured ones by {fit.rmse:.3g} {unit} RMSE over all samples, {least} to {most} % of the "
+        f"largest force of each test. Of {len(fit.estimates)} unknowns the data determine {determined}."
+    )

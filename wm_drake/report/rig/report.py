@@ -1,0 +1,203 @@
+"""The page and the tables of a rig run."""
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from wm_drake.report.page import Picture, picture, render
+from wm_drake.report.rig.figures import (
+    DEG_PER_RAD,
+    amplitude_text,
+    force_scale,
+    frequency_text,
+    friction_law_figure,
+    motion_scale,
+    overlaid_figure,
+    time_figure,
+)
+from wm_drake.report.tables import Group, Row, Table
+from wm_drake.report.wording import MM_PER_M, number
+from wm_drake.rigs import ForceLoop, RigRun
+
+SAMPLES_KEPT = 4
+"""Every so many samples of a loop go to its file."""
+
+
+def rig_report(run: RigRun, command: str = "") -> str:
+    """The report as text of one HTML file, with style and figures inside."""
+    return render(
+        "rig/page.html",
+        title=f"Bench test: {run.title}",
+        about="Steady force loops under harmonic motion, computed by the laws of the machine.",
+        warnings=[],
+        summary=_summary(run),
+        pictures=_pictures(run),
+        measures=_measures(run),
+        numbers=_numbers(run),
+        facts=[("Component", run.title), ("Loops", str(len(run.loops))), ("Command", command)],
+    )
+
+
+def loop_file(loop: ForceLoop) -> str:
+    """Name of the file of a loop."""
+    return f"loop_{frequency_text(loop)}_{amplitude_text(loop)}.csv".replace(" ", "")
+
+
+def loop_table(loop: ForceLoop) -> pd.DataFrame:
+    """A loop as a file that `wm-drake identify` reads; units in the heads."""
+    factor, name, unit = motion_scale(loop.rotates)
+    force, newton = force_scale(loop.rotates)
+    columns = {
+        "time_s": loop.time,
+        f"{name}_{unit}": factor * loop.displacement,
+        f"{'rate' if loop.rotates else 'velocity'}_{unit}_s": factor * loop.velocity,
+        f"{force}_{newton.replace(' ', '')}": loop.force,
+    }
+    return pd.DataFrame({head: values[::SAMPLES_KEPT] for head, values in columns.items()})
+
+
+def measures_table(run: RigRun) -> pd.DataFrame:
+    """What is read off each loop, in SI but for frequency, amplitude and loss angle; names carry the units."""
+    rotates = run.bench.rotates
+    factor, _, unit = motion_scale(rotates)
+    rows = []
+    for loop, m in zip(run.loops, run.measures, strict=True):
+        forces = (
+            {
+                "peak_moment_Nm": m.peak_force,
+                "energy_per_cycle_J": m.energy_per_cycle,
+                "equivalent_damping_Nms_per_rad": m.equivalent_damping,
+                "dynamic_stiffness_Nm_per_rad": m.dynamic_stiffness,
+            }
+            if rotates
+            else {
+                "peak_force_N": m.peak_force,
+                "energy_per_cycle_J": m.energy_per_cycle,
+                "equivalent_damping_Ns_per_m": m.equivalent_damping,
+                "dynamic_stiffness_N_per_m": m.dynamic_stiffness,
+            }
+        )
+        motion = {
+            "frequency_hz": loop.motion.frequency,
+            f"amplitude_{unit}": factor * loop.motion.amplitude,
+        }
+        rows.append({**motion, **forces, "loss_angle_deg": DEG_PER_RAD * m.loss_angle})
+    return pd.DataFrame(rows)
+
+
+def measures_header(run: RigRun) -> tuple[str, ...]:
+    """Heads of `measures_cells`."""
+    rotates = run.bench.rotates
+    if rotates:
+        units = (
+            "peak moment, N\u00a0m",
+            "energy per cycle, mJ",
+            "equivalent damping, N\u00a0m\u00a0s/rad",
+            "dynamic stiffness, N\u00a0m/rad",
+        )
+    else:
+        units = (
+            "peak force, N",
+            "energy per cycle, mJ",
+            "equivalent damping, N\u00a0s/mm",
+            "dynamic stiffness, N/mm",
+        )
+    return ("frequency, Hz", f"amplitude, {motion_scale(rotates)[2]}", *units, "loss angle, deg")
+
+
+def measures_cells(run: RigRun) -> list[tuple[str, ...]]:
+    """What is read off each loop, for reading."""
+    found: list[tuple[str, ...]] = []
+    per = 1.0 if run.bench.rotates else 1.0 / MM_PER_M
+    for loop, m in zip(run.loops, run.measures, strict=True):
+        found.append(
+            (
+                f"{loop.motion.frequency:.3g}",
+                amplitude_text(loop).split()[0],
+                number(m.peak_force, 2),
+                f"{1e3 * m.energy_per_cycle:.4g}",
+                number(per * m.equivalent_damping, 3),
+                number(per * m.dynamic_stiffness, 2),
+                number(DEG_PER_RAD * m.loss_angle, 1),
+            )
+        )
+    return found
+
+
+def _measures(run: RigRun) -> Table:
+    caption = (
+        "What is read off each loop. Energy: area of the loop. Equivalent damping: of the dashpot that takes the same "
+        "energy. Dynamic stiffness and loss angle: amplitude ratio and lead of the fundamental of the force against the motion."
+    )
+    groups = tuple(Group(cells[0], (Row(cells[1:]),)) for cells in measures_cells(run))
+    return Table(caption, measures_header(run), groups)
+
+
+def _numbers(run: RigRun) -> Table:
+    groups = tuple(Group(key, (Row((value, source or "–")),)) for key, value, source in run.numbers)
+    return Table("Numbers of the component.", ("key", "value", "source"), groups, text_columns=3)
+
+
+def _pictures(run: RigRun) -> list[Picture]:
+    largest = max(run.loops, key=lambda loop: (loop.motion.amplitude, -loop.motion.frequency))
+    which = f"{frequency_text(largest)}, {amplitude_text(largest)}"
+    found = [
+        picture(
+            time_figure(largest),
+            f"Motion and force over a period, and the loop, at {which}.",
+            f"One period at {which}: motion and force over time, force over displacement and over velocity "
+            "(the form of [A] Figs. 5, 8, 12 and of [C] Figs. 4 and 5).",
+        )
+    ]
+    frequencies, amplitudes = _texts(run.loops, frequency_text), _texts(run.loops, amplitude_text)
+    if len(run.loops) > 1:
+        found += [
+            picture(
+                overlaid_figure(run.loops, frequency_text, amplitude_text, over=over),
+                f"Force over {over}, a panel for each frequency.",
+                f"Force over {over}: amplitudes overlaid, a panel for each frequency (the form of [C] Fig. 6).",
+            )
+            for over in ("displacement", "velocity")
+        ]
+    shared = [a for a in amplitudes if sum(amplitude_text(loop) == a for loop in run.loops) > 1]
+    if len(frequencies) > 1 and shared:
+        loops = [loop for loop in run.loops if amplitude_text(loop) in shared]
+        found.append(
+            picture(
+                overlaid_figure(loops, amplitude_text, frequency_text, over="displacement"),
+                "Force over displacement, a panel for each amplitude.",
+                "Force over displacement: frequencies overlaid, a panel for each amplitude (the form of [C] Figs. 7 and 14).",
+            )
+        )
+    law = friction_law_figure(run)
+    if law is not None:
+        found.append(
+            picture(
+                law,
+                "Friction over sponge velocity at several deformation rates.",
+                "The MSTV law: friction over the velocity of the sponge at held deformation rates (the form of [C] Fig. 12).",
+            )
+        )
+    return found
+
+
+def _texts(loops: Sequence[ForceLoop], text: object) -> list[str]:
+    return list(dict.fromkeys(text(loop) for loop in loops))  # type: ignore[operator]
+
+
+def _summary(run: RigRun) -> str:
+    force, unit = force_scale(run.bench.rotates)
+    peaks = [m.peak_force for m in run.measures]
+    energies = [1e3 * m.energy_per_cycle for m in run.measures]
+    if len(run.loops) == 1:
+        loop = run.loops[0]
+        return (
+            f"At {frequency_text(loop)} and {amplitude_text(loop)} the peak {force} is {number(peaks[0], 2)} {unit}; a cycle "
+            f"takes {number(energies[0], 2)} mJ."
+        )
+    first, last = peaks.index(min(peaks)), peaks.index(max(peaks))
+    at = [f"{frequency_text(run.loops[k])}, {amplitude_text(run.loops[k])}" for k in (first, last)]
+    return (
+        f"{len(run.loops)} loops. The peak {force} goes from {number(peaks[first], 2)} {unit} ({at[0]}) to "
+        f"{number(peaks[last], 2)} {unit} ({at[1]}); a cycle takes {number(min(energies), 2)} to {number(max(energies), 2)} mJ."
+    )

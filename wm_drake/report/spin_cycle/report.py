@@ -1,0 +1,236 @@
+"""The report of a spin-cycle study: one HTML file that needs nothing else."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wm_drake.parameters.unbalance_cases import UnbalanceCase
+from wm_drake.report.page import Picture, picture, render
+from wm_drake.report.spin_cycle import tables
+from wm_drake.report.spin_cycle.figures import bars_figure, heat_map_figure, profile_figure
+from wm_drake.report.tables import Table, parameter_table
+from wm_drake.report.wording import MM_PER_M, number
+from wm_drake.simulation.runs import versions
+from wm_drake.studies.spin_cycle.study import SpinCycleResult, average_errors, disagreement, largest
+
+SHOWN_MASSES = ((0.4, 0.0, 0.0), (0.0, 0.4, 0.0), (0.4, 0.4, 180.0))
+"""Front mass, rear mass, phase of the cases that [A] Figs. 24 to 26 show. [kg, kg, deg]"""
+
+
+@dataclass(frozen=True)
+class CaseView:
+    """What the page shows of one case."""
+
+    anchor: str
+    title: str
+    picture: Picture
+    table: Table
+
+
+def spin_cycle_report(result: SpinCycleResult, engine: str, command: str = "") -> str:
+    """The report as text of one HTML file, with style and figures inside.
+
+    Args:
+        result: At least one case.
+        engine: That ran it.
+        command: The command line that made it, to be shown.
+    """
+    return render(
+        "spin_cycle/page.html",
+        title=f"Spin cycle of machine {result.parameters.name}",
+        about=result.parameters.about,
+        summary=summary(result, engine),
+        warnings=warnings_of(result),
+        profile_picture=_profile_picture(result),
+        regions=tables.regions(result),
+        worst_picture=_worst_picture(result),
+        cases_table=tables.cases(result),
+        cases=[_case_view(result, case) for case in shown_cases(result)],
+        facts=_facts(result, engine, command),
+        numbers=parameter_table(result.parameters),
+    )
+
+
+def summary(result: SpinCycleResult, engine: str) -> str:
+    """One paragraph, made from the numbers."""
+    count = len(result.cases)
+    sentences = [
+        f"{count} unbalance case{'s were' if count > 1 else ' was'} run through the profile with the {engine} engine."
+    ]
+    worst = largest(result.displacement)
+    if worst:
+        sentences.append(
+            f"The largest RMS displacement is {number(MM_PER_M * worst.value, 2)} mm: case {worst.case} "
+            f"({case_words(_case(result, worst.case))}), region {worst.region}, sensor {worst.accelerometer}, "
+            f"axis {worst.axis}."
+        )
+    gaps = result.smallest_gap.dropna("case")
+    if gaps.size:
+        nearest = str(gaps.case.values[int(np.argmin(gaps.values))])
+        sentences.append(
+            f"The tub comes nearest to the housing in case {nearest} ({case_words(_case(result, nearest))}): "
+            f"{number(MM_PER_M * float(gaps.min()))} mm."
+        )
+    apart = float(disagreement(result).max(skipna=True))
+    if np.isfinite(apart):
+        sentences.append(
+            f"Displacements taken directly and by integrating acceleration twice differ by at most {number(100 * apart, 2)} % "
+            "in any region."
+        )
+    if result.measured is None:
+        sentences.append("No measurement was given to compare with.")
+    else:
+        errors = average_errors(result.displacement, result.measured)
+        mean, deviation = (
+            number(100.0 * float(value))
+            for value in (errors.mean(skipna=True), errors.std(skipna=True))
+        )
+        sentences.append(
+            f"Against the measurement, the average error is {mean} %, standard deviation over the cases {deviation} % "
+            "([A] reports 20.1 and 4.1 % for its own)."
+        )
+    return " ".join(sentences)
+
+
+def case_words(case: UnbalanceCase) -> str:
+    """Masses and phase of a case."""
+    masses = [
+        f"{number(1e3 * mass, 0)} g {where}"
+        for mass, where in ((case.front, "in front"), (case.rear, "at the rear"))
+        if mass > 0.0
+    ]
+    phase = f", {number(float(np.rad2deg(case.phase)), 0)}° apart" if len(masses) == 2 else ""
+    return (" and ".join(masses) or "empty drum") + phase
+
+
+def shown_cases(result: SpinCycleResult) -> list[UnbalanceCase]:
+    """Those that [A] shows, or the first few where they were not run, and the worst."""
+    wanted = [
+        case
+        for masses in SHOWN_MASSES
+        for case in result.cases
+        if np.allclose((case.front, case.rear, np.rad2deg(case.phase)), masses, atol=1e-6)
+    ]
+    worst = largest(result.displacement)
+    chosen = (wanted or list(result.cases[:3])) + ([_case(result, worst.case)] if worst else [])
+    return list({case.name: case for case in chosen}.values())
+
+
+def warnings_of(result: SpinCycleResult) -> list[str]:
+    """Runs that diverged, parts that overlap, two ways of measuring that do not agree, imperfections that are on."""
+    found = [
+        f"Case {case.name} {text}. Regions it did not get through have no number."
+        for case, text in zip(result.cases, result.diverged, strict=True)
+        if text
+    ]
+    touching = [
+        str(name)
+        for name, gap in zip(
+            result.smallest_gap.case.values, result.smallest_gap.values, strict=True
+        )
+        if gap <= 0.0
+    ]
+    if touching:
+        found.append(
+            f"Tub and housing overlap in case {', '.join(touching)}. The model has no contact: the real machine would strike."
+        )
+    apart = float(disagreement(result).max(skipna=True))
+    if apart > 0.01:
+        found.append(
+            f"Displacements from acceleration are {number(100 * apart, 1)} % off in some region: its motion is too small, or "
+            "too fast for samples every 5 ms, to be integrated."
+        )
+    faults = result.parameters.imperfections
+    if faults.residual_imbalance.mass > 0.0:
+        found.append(
+            f"The drum has a residual imbalance of {number(1e3 * faults.residual_imbalance.mass)} g."
+        )
+    if faults.phase_error != 0.0:
+        found.append(
+            f"Phases between front and rear are {number(float(np.rad2deg(faults.phase_error)))}° off."
+        )
+    if faults.bearing:
+        radial, tilting = 1e-3 * faults.bearing.radial_stiffness, faults.bearing.tilting_stiffness
+        found.append(
+            f"The drum can whirl: its bearing gives by {number(radial, 0)} N/mm across its axis and "
+            f"{number(tilting, 0)} N m/rad."
+        )
+    return found
+
+
+def _case(result: SpinCycleResult, name: str) -> UnbalanceCase:
+    return next(case for case in result.cases if case.name == name)
+
+
+def _profile_picture(result: SpinCycleResult) -> Picture:
+    names = ", ".join(region.name for region in result.profile.regions)
+    return picture(
+        profile_figure(result.profile),
+        f"Spin profile with the regions {names}.",
+        "Drum speed over time, and the regions.",
+    )
+
+
+def _worst_picture(result: SpinCycleResult) -> Picture | None:
+    if largest(result.displacement) is None:
+        return None
+    values, which = tables.worst_of_all(result.displacement)
+    shown = result.displacement
+    columns = [
+        f"{sensor} {axis}" for sensor in shown.accelerometer.values for axis in shown.axis.values
+    ]
+    notes = [
+        [f"case {result.cases[index].name}" if len(result.cases) > 1 else "" for index in row]
+        for row in which
+    ]
+    caption = "Largest RMS displacement of any case, by region, sensor and axis, in mm; below it the case."
+    figure = heat_map_figure(
+        np.where(values < 0.0, np.nan, values), list(map(str, shown.region.values)), columns, notes
+    )
+    return picture(
+        figure, "Heat map of the largest RMS displacement, region by sensor and axis.", caption
+    )
+
+
+def _case_view(result: SpinCycleResult, case: UnbalanceCase) -> CaseView:
+    computed, integrated = (
+        values.sel(case=case.name) for values in (result.displacement, result.integrated)
+    )
+    measured = result.measured.sel(case=case.name) if result.measured is not None else None
+    if measured is not None and not np.isfinite(measured).any():
+        measured = None
+    title = f"Case {case.name}: {case_words(case)}"
+    caption = "RMS displacement per region; rows are sensors, columns axes; all panels have the same scale."
+    shown = picture(
+        bars_figure(computed, integrated, measured),
+        f"{title}: RMS displacement per region.",
+        caption,
+    )
+    return CaseView(
+        f"case-{re.sub(r'[^A-Za-z0-9_-]', '-', case.name)}",
+        title,
+        shown,
+        tables.displacements(result, case.name),
+    )
+
+
+def _facts(result: SpinCycleResult, engine: str, command: str) -> list[tuple[str, str]]:
+    planes = [
+        f"{name} {frame.removeprefix('sensor_')}"
+        for name, frame in result.parameters.accelerometer_frames().items()
+    ]
+    facts = [
+        ("Machine", result.parameters.name),
+        ("SDF model", Path(result.parameters.model).name),
+        ("Engine", engine),
+        ("Sensors", f"at the frames {', '.join(planes)}; axes x to the right, y to the rear, z up"),
+        (
+            "Displacement",
+            "from rest, without what is slower than 0.5 Hz; RMS over all samples of a region, every 5 ms",
+        ),
+        ("Versions", ", ".join(f"{name} {text}" for name, text in versions().items())),
+        ("Command", command),
+    ]
+    return [(word, text) for word, text in facts if text]

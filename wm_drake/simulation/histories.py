@@ -1,0 +1,160 @@
+"""Sampled motion -> what is read off it, compiled, for one machine or for several side by side."""
+
+import numpy as np
+
+from wm_drake.compiler.compilation import law, long_running
+from wm_drake.compiler.elementary import (
+    in_each_lane,
+    lanes_to_rows,
+    rows_to_lanes,
+    where,
+)
+from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.compiler.matrices import three
+from wm_drake.compiler.vectors import add, dot, rotate, rotation_from_rpy
+from wm_drake.elements.bushing import six_component_bushing_wrench
+from wm_drake.elements.friction_damper import ENGAGED, friction_damper_line, friction_damper_tension
+from wm_drake.elements.motion import PLANT_STATE_SIZE, tub_motion
+from wm_drake.elements.spring import spring_strut_wrench
+
+POINT_SIZE = 7
+"""Numbers of a measured point: its place in T, the direction in W along which it is measured, its value at rest. [m]"""
+
+
+@long_running
+def position_history(samples, points, positions):
+    """Positions in W of points of the tub at each sample. [m]
+
+    Args:
+        samples: (n, >= 6) roll, pitch, yaw, x, y, z. [rad, m]
+        points: (k, 3) in T. [m]
+        positions: (n, 3 k), written: x, y, z of each point.
+    """
+    align_stack()
+    x_numbers, numbers = np.empty(samples.shape[1] * WIDTH), np.empty(3 * len(points) * WIDTH)
+    x, place = lane_array(x_numbers), lane_array(numbers)
+    for begin in range(0, len(samples), WIDTH):
+        rows_to_lanes(samples, begin, x_numbers)
+        rotation = rotation_from_rpy(x[0], x[1], x[2])
+        for k in range(len(points)):
+            turned = rotate(rotation, (points[k, 0], points[k, 1], points[k, 2]))
+            place[3 * k], place[3 * k + 1], place[3 * k + 2] = add((x[3], x[4], x[5]), turned)
+        lanes_to_rows(numbers, begin, positions)
+
+
+@long_running
+def reading_history(state, deformation, points, p, springs, dampers, bushings, readings):
+    """What is read off a motion at each sample: displacements at points, own forces of springs, dampers and bushings.
+
+    The forces are those of the elements' ports in Drake, from the same functions.
+
+    Args:
+        state: (n, 14) states of the plant.
+        deformation: (n, >= dampers) of the dampers' sponges. [m]
+        points: Measured points, one after the other (`POINT_SIZE` numbers each).
+        p: Packed numbers of springs, dampers and bushings.
+        springs, dampers, bushings: Where each begins in them, arrays.
+        readings: (n, k) written: displacement at each point [m], tension of each spring and each damper [N], force and moment
+            of each bushing on the housing [N, N m].
+    """
+    align_stack()
+    state_numbers, own_numbers = (
+        np.empty(PLANT_STATE_SIZE * WIDTH),
+        np.empty(deformation.shape[1] * WIDTH),
+    )
+    numbers, p_numbers, point_numbers = (
+        np.empty(readings.shape[1] * WIDTH),
+        in_each_lane(p),
+        in_each_lane(points),
+    )
+    x, own, answer = lane_array(state_numbers), lane_array(own_numbers), lane_array(numbers)
+    q, measured = lane_array(p_numbers), lane_array(point_numbers)
+    for begin in range(0, len(state), WIDTH):
+        rows_to_lanes(state, begin, state_numbers)
+        rows_to_lanes(deformation, begin, own_numbers)
+        motion = tub_motion(x)
+        column = len(points) // POINT_SIZE
+        for k in range(column):
+            answer[k] = displacement_at(motion, measured, k * POINT_SIZE)
+        for at in springs:
+            _, answer[column] = spring_strut_wrench(motion, q, at)
+            column += 1
+        for i, at in enumerate(dampers):
+            _, line = friction_damper_line(motion, q, at)
+            tension, _ = friction_damper_tension(line[1], own[i], q, at)
+            answer[column] = q[at + ENGAGED] * tension
+            column += 1
+        for at in bushings:
+            _, on_housing = six_component_bushing_wrench(motion, q, at)
+            for k in range(6):
+                answer[column + k] = on_housing[k]
+            column += 6
+        lanes_to_rows(numbers, begin, readings)
+
+
+@law
+def displacement_at(motion, points, at):
+    """Displacement at the measured point whose numbers begin at `at`, along its direction. [m]"""
+    moved_to = add(motion.position, rotate(motion.rotation, three(points, at)))
+    return dot(three(points, at + 3), moved_to) - points[at + 6]
+
+
+@law
+def in_bounds(x, angle, displacement):
+    """Whether a tub is within the bounds where a run may go on: 1 or 0."""
+    level = (abs(x[0]) <= angle) & (abs(x[1]) <= angle) & (abs(x[2]) <= angle)
+    near = (abs(x[3]) <= displacement) & (abs(x[4]) <= displacement) & (abs(x[5]) <= displacement)
+    return where(level & near, 1.0, 0.0)
+
+
+@law
+def measure_samples(samples, rows, size, bounds, p, gasket, points, count, x, moved, extremes):
+    """Displacements at measured points, and the largest values of a run up to the first sample out of bounds.
+
+    Args:
+        samples: Samples, one after the other, each with the state first.
+        rows, size: How many they are, and how many numbers each has.
+        bounds: Largest angle and displacement of the tub at which a run goes on. [rad, m]
+        p, gasket: Packed numbers and where the gasket begins in them, -1 without one.
+        points, count: Measured points, one after the other, and how many they are.
+        x: The plant's part of a state, to work in.
+        moved: Displacement at each sample and point, written. [m]
+        extremes: Written: largest absolute displacement at each point [m]; largest absolute force and moment of the
+            gasket on the housing, x, y, z [N, N m]; number of samples in bounds.
+    """
+    zero = 0.0 * p[0]
+    for k in range(count + 7):
+        extremes[k] = zero
+    good = zero + 1.0
+    for row in range(rows):
+        for k in range(PLANT_STATE_SIZE):
+            x[k] = samples[row * size + k]
+        good = good * in_bounds(x, bounds[0], bounds[1])
+        motion = tub_motion(x)
+        for k in range(count):
+            value = displacement_at(motion, points, k * POINT_SIZE)
+            moved[row * count + k] = value
+            extremes[k] = larger(extremes[k], value, good)
+        if gasket >= 0:
+            _, on_housing = six_component_bushing_wrench(motion, p, gasket)
+            for k in range(6):
+                extremes[count + k] = larger(extremes[count + k], on_housing[k], good)
+        extremes[count + 6] = extremes[count + 6] + good
+
+
+@law
+def larger(largest, value, good):
+    """The largest absolute value so far, after one more, which counts if it is good."""
+    size = abs(value)
+    return where((good > 0.5) & (size > largest), size, largest)
+
+
+@long_running
+def measure_samples_lanes(
+    samples, rows, size, bounds, p, gasket, points, count, x, moved, extremes
+):
+    """`measure_samples` of `lanes.WIDTH` machines side by side."""
+    align_stack()
+    runs = (lane_array(samples), rows, size, bounds)
+    measured = (lane_array(points), count, lane_array(x), lane_array(moved), lane_array(extremes))
+    measure_samples(*runs, lane_array(p), gasket, *measured)

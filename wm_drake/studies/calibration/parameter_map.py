@@ -1,0 +1,169 @@
+"""Free quantities -> parameters of a machine, by a linear map into its values."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from wm_drake.errors import InputError, Problem, nearest_names
+from wm_drake.model.bodies import spelled_out
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.free import FreeFile, FreeQuantity, Measured
+from wm_drake.parameters.keys import quantities
+from wm_drake.parameters.problems import problems_of
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit, dimension
+
+COMPONENTS = {"x": 0, "y": 1, "z": 2}
+
+
+@dataclass(frozen=True)
+class Value:
+    """A value of the machine that free quantities enter.
+
+    Attributes:
+        path: Names and numbers that lead to it in the tree of parameters.
+        component: Of a vector; None for the whole.
+        factors: Of each free quantity, one for a number, several for a table. (quantities, 1 or points)
+        is_list: Whether it is a table's column.
+    """
+
+    path: tuple[str, ...]
+    component: int | None
+    factors: FloatArray
+    is_list: bool
+
+
+@dataclass(frozen=True)
+class ParameterMap:
+    """What can be turned in a machine, and how. Arrays over the quantities, SI.
+
+    Attributes:
+        base: The machine with all values spelled out that may change.
+        names, units: Of the quantities.
+        lower, upper: Bounds.
+        expected, deviation: Prior.
+        start: Where searches begin.
+        values: What they set.
+        preload: Expected preload of each spring and its standard deviation; None if nothing is expected. [N]
+    """
+
+    base: MachineParameters
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    lower: FloatArray
+    upper: FloatArray
+    expected: FloatArray
+    deviation: FloatArray
+    start: FloatArray
+    values: tuple[Value, ...]
+    preload: tuple[float, float] | None
+    _tree: dict[str, Any]
+
+    def parameters_at(self, point: FloatArray) -> MachineParameters:
+        """The machine with these quantities. [SI]
+
+        Raises:
+            InputError: a value that no machine can have.
+        """
+        tree = dict(self._tree)
+        for value in self.values:
+            set_to = np.asarray(point) @ value.factors
+            _set(tree, value, tuple(map(float, set_to)) if value.is_list else float(set_to[0]))
+        try:
+            return MachineParameters.model_validate(tree)
+        except ValidationError as error:
+            raise InputError(problems_of(error, MachineParameters)) from None
+
+
+def turning_of(machine: Machine, free: FreeFile) -> ParameterMap:
+    """What a free file turns in a machine.
+
+    Raises:
+        InputError: keys the machine does not have, factors of the wrong dimension or number.
+    """
+    keys = list(
+        dict.fromkeys(key for quantity in free.quantities.values() for key in quantity.sets)
+    )
+    base = spelled_out(machine.plant, machine.parameters, keys)
+    known = {key: (value, unit) for key, value, unit in quantities(base)}
+    problems: list[Problem] = []
+    values = []
+    for key in keys:
+        try:
+            values.append(_value(key, known, free.quantities))
+        except ValueError as error:
+            first = next(name for name, quantity in free.quantities.items() if key in quantity.sets)
+            problems.append(Problem("", f"quantities.{first}.sets", f"'{key}' {error}"))
+    if problems:
+        raise InputError(problems)
+    entries = list(free.quantities.values())
+    pairs = np.array([[*q.bounds.values, *q.prior.values] for q in entries])
+    names, units = tuple(free.quantities), tuple(q.unit for q in entries)
+    lower, upper, expected, deviation = pairs.T
+    start = np.array([(q.start or q.prior).values[0] for q in entries])
+    tree = base.model_dump(exclude_unset=True)
+    preload = None
+    if free.spring_preload is not None:
+        preload = (free.spring_preload.prior.values[0], free.spring_preload.prior.values[1])
+    return ParameterMap(
+        base, names, units, lower, upper, expected, deviation, start, tuple(values), preload, tree
+    )
+
+
+def _value(
+    key: str, known: Mapping[str, tuple[Any, Unit]], free: Mapping[str, FreeQuantity]
+) -> Value:
+    name, _, last = key.rpartition(".")
+    component = None
+    if key not in known and last in COMPONENTS and name in known:
+        component, shape_key = COMPONENTS[last], name
+    elif key in known:
+        shape_key = key
+    else:
+        raise ValueError(f"is no number of the machine{nearest_names(key, known)}")
+    value, unit = known[shape_key]
+    is_list = isinstance(value, tuple) and component is None
+    size = len(value) if is_list else 1
+    rows = []
+    for quantity in free.values():
+        factor = quantity.sets.get(key)
+        rows.append(
+            np.zeros(size)
+            if factor is None
+            else _factor(factor, quantity.unit, unit, size, is_list)
+        )
+    return Value(tuple(shape_key.split(".")), component, np.array(rows), is_list)
+
+
+def _factor(
+    factor: Measured, quantity_unit: str, unit: Unit, size: int, is_list: bool
+) -> FloatArray:
+    if factor.is_list != is_list or len(factor.values) != size:
+        wanted = f"a list of {size} factors" if is_list else "one factor"
+        raise ValueError(f"takes {wanted}, not {len(factor.values)}")
+    if dimension(quantity_unit) * dimension(factor.unit) != dimension(unit.si):
+        written = " times ".join(filter(None, [quantity_unit, factor.unit])) or "a pure number"
+        raise ValueError(f"is in {unit.shown}, which {written} does not give")
+    return np.array(factor.values)
+
+
+def _set(tree: dict[str, Any], value: Value, number: Any) -> None:
+    """Puts a number in its place; whatever lies on the way there is copied first, the base stays as it is."""
+    node: Any = tree
+    *way, last = value.path
+    for part in way:
+        at: Any = int(part) if isinstance(node, list) else part
+        child = node[at]
+        node[at] = dict(child) if isinstance(child, dict) else list(child)
+        node = node[at]
+    place: Any = int(last) if isinstance(node, list) else last
+    if value.component is None:
+        node[place] = number
+    else:
+        vector = list(node[place])
+        vector[value.component] = number
+        node[place] = tuple(vector)

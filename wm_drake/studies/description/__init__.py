@@ -1,0 +1,1 @@
+"""Describe a machine: its numbers in SI, equilibrium, natural modes."""

@@ -1,0 +1,214 @@
+"""A machine resolved in SI: everything needed to rebuild it in another program, as plain data and as text."""
+
+from typing import Any
+
+import numpy as np
+
+from wm_drake.compiler.compilation import generic
+from wm_drake.compiler.vectors import rotation_from_rpy
+from wm_drake.model.bodies import tubes_of
+from wm_drake.model.machine import Machine, Setup
+from wm_drake.model.state_layout import CARRIER
+from wm_drake.parameters import ForceTable, TorqueTable
+from wm_drake.studies.description.modal import natural_modes
+
+_BEARING_NUMBERS = [
+    f"{kind}_{axis}"
+    for kind in ("stiffness", "rotational_stiffness", "damping", "rotational_damping")
+    for axis in "xyz"
+]
+PRODUCTS = ("xx", "yy", "zz", "xy", "xz", "yz")
+
+
+def describe(machine: Machine) -> dict[str, Any]:
+    """The machine at rest in SI (m, kg, s, rad, N).
+
+    Frames: W housing, T tub, D drum; T = D = W when drawn. Points are given in the frame their key names. Inertias are about
+    the centre of mass, products as elements of the matrix.
+    """
+    setup = machine.set_up()
+    modes = natural_modes(machine)
+    parameters = setup.parameters
+    return {
+        "machine": parameters.name,
+        "units": "SI: m, kg, s, rad, N; x right, y to the rear, z up",
+        "gravity_W": [0.0, 0.0, -parameters.gravity],
+        "bodies": _bodies(setup),
+        "oscillating_mass_kg": oscillating_mass(setup),
+        "drum_joint": {"name": parameters.drive.joint, **_drum_axis(setup)},
+        "drum_bearing": _drum_bearing(setup),
+        "springs": {name: _spring(setup, name) for name in setup.springs},
+        "dampers": {name: _damper(setup, name) for name in setup.dampers},
+        "bushings": {name: _bushing(setup, name) for name in setup.bushings},
+        "telescopic_dampers": {name: _telescope(setup, name) for name in setup.telescopes},
+        "sensors": {
+            name: {"point_T": setup.sensor_points[name].tolist(), "axis_W": sensor.axis}
+            for name, sensor in parameters.sensors.items()
+        },
+        "detergent_point_T": setup.detergent_point.tolist(),
+        "loads": {name: load.model_dump() for name, load in parameters.loads.items()},
+        "profile": parameters.profile.model_dump(),
+        "rest_pose": dict(
+            zip(("roll", "pitch", "yaw", "x", "y", "z"), setup.rest_pose.tolist(), strict=True)
+        ),
+        "equilibrium_residual": {
+            "moment_Nm": setup.residual[:3].tolist(),
+            "force_N": setup.residual[3:].tolist(),
+        },
+        "natural_frequencies_hz": modes.frequency_hz.tolist(),
+        "mode_damping_ratios": modes.damping_ratio.tolist(),
+    }
+
+
+def oscillating_mass(setup: Setup) -> float:
+    """Mass of all that moves with the tub, the drum and its load included. [kg]"""
+    plant = setup.machine.plant
+    moving = [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]
+    return float(sum(body.get_mass(setup.plant_context) for body in moving))
+
+
+def _bodies(setup: Setup) -> dict[str, Any]:
+    plant, context = setup.machine.plant, setup.plant_context
+    tub = plant.GetBodyByName("tub").body_frame()
+    described = {}
+    moving = [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]
+    groups = {part.name(): "drum" if part.name() == "drum" else "tub" for part in moving}
+    carriers = (
+        {"drum": plant.GetBodyByName(CARRIER).body_frame()} if setup.bearing else {}
+    )  # T, as drawn
+    tubes = [
+        body
+        for damper in setup.parameters.telescopic_dampers.values()
+        for body in tubes_of(plant, damper.joint)
+    ]
+    for part in [*moving, *tubes]:
+        X_TB = plant.CalcRelativeTransform(
+            context, carriers.get(part.name(), tub), part.body_frame()
+        )
+        M_B = part.CalcSpatialInertiaInBodyFrame(context)
+        central = M_B.Shift(M_B.get_com()).CalcRotationalInertia().ReExpress(X_TB.rotation())
+        matrix = central.CopyToFullMatrix3()
+        described[part.name()] = {
+            "turns_with": groups.get(part.name(), part.name()),
+            "mass": M_B.get_mass(),
+            "centre_of_mass_T": (X_TB @ M_B.get_com()).tolist(),
+            "inertia_about_centre_T": {
+                key: float(matrix["xyz".index(key[0]), "xyz".index(key[1])]) for key in PRODUCTS
+            },
+        }
+    return described
+
+
+def _drum_axis(setup: Setup) -> dict[str, list[float]]:
+    joint = setup.machine.plant.GetJointByName(setup.parameters.drive.joint)
+    X_TF = joint.frame_on_parent().CalcPoseInBodyFrame(setup.plant_context)
+    axis = X_TF.rotation() @ joint.revolute_axis()
+    return {"axis_T": list(map(float, axis)), "through_T": list(map(float, X_TF.translation()))}
+
+
+def _drum_bearing(setup: Setup) -> dict[str, Any] | None:
+    """Where it acts and its six components along x, y, z of a frame whose y axis is the drum's; None for a perfect joint."""
+    placed, bearing = setup.bearing, setup.parameters.imperfections.bearing
+    if placed is None or bearing is None:
+        return None
+    kind = bearing.as_bushing().model_dump(include=set(_BEARING_NUMBERS))
+    sag = setup.carrier_rest[3:] - setup.rest_pose[3:]
+    rate = {"fastest_motion_hz": setup.bearing_rate / (2.0 * np.pi)}
+    return {
+        "point_T": placed.p_WG.tolist(),
+        "rotation_T": placed.R_WG.tolist(),
+        **kind,
+        "sag_of_Do_at_rest_W": sag.tolist(),
+        **rate,
+    }
+
+
+def _line(setup: Setup, element: Any) -> dict[str, Any]:
+    """Ends, length and direction (housing end to tub end) of a strut at the rest pose."""
+    rotation = np.reshape(generic(rotation_from_rpy)(*setup.rest_pose[:3]), (3, 3))
+    line = setup.rest_pose[3:] + rotation @ element.p_ToA_T - element.p_WH
+    length = float(np.linalg.norm(line))
+    return {
+        "tub_point_T": element.p_ToA_T.tolist(),
+        "housing_point_W": element.p_WH.tolist(),
+        "length_at_rest": length,
+        "direction_at_rest_W": (line / length).tolist(),
+    }
+
+
+def _spring(setup: Setup, name: str) -> dict[str, Any]:
+    placed = setup.springs[name]
+    kind = setup.parameters.spring_types[setup.parameters.springs[name].type]
+    return {
+        **_line(setup, placed),
+        "stiffness": _stiffness(kind.stiffness),
+        "length_at_preload": placed.rest_length,
+        "preload": placed.preload,
+    }
+
+
+def _damper(setup: Setup, name: str) -> dict[str, Any]:
+    kind = setup.parameters.damper_types[setup.parameters.dampers[name].type]
+    return {**_line(setup, setup.dampers[name]), **kind.model_dump()}
+
+
+def _bushing(setup: Setup, name: str) -> dict[str, Any]:
+    placed = setup.bushings[name]
+    element = setup.parameters.all_bushings()[name]
+    constants = {
+        key: _stiffness(value) if isinstance(value, ForceTable | TorqueTable) else value
+        for key, value in element
+        if not key.endswith("_frame")
+    }
+    return {
+        "tub_point_T": placed.p_ToB_T.tolist(),
+        "tub_rotation_T": placed.R_TB.tolist(),
+        "housing_point_W": placed.p_WG.tolist(),
+        "housing_rotation_W": placed.R_WG.tolist(),
+        **constants,
+    }
+
+
+def _telescope(setup: Setup, name: str) -> dict[str, Any]:
+    placed, damper = setup.telescopes[name], setup.parameters.telescopic_dampers[name]
+    kind = setup.parameters.damper_types[damper.type]
+    tubes = [body.name() for body in tubes_of(setup.machine.plant, damper.joint)]
+    return {
+        "outer_tube": tubes[0],
+        "inner_tube": tubes[1],
+        "axis_outer_tube": placed.axis.tolist(),
+        "tub_point_T": placed.tub_bushing.p_ToB_T.tolist(),
+        "outer_point_outer_tube": placed.tub_bushing.p_WG.tolist(),
+        "inner_point_outer_tube": placed.housing_bushing.p_ToB_T.tolist(),
+        "housing_point_W": placed.housing_bushing.p_WG.tolist(),
+        "tub_bushing": setup.parameters.bushing_types[damper.tub_bushing].model_dump(),
+        "housing_bushing": setup.parameters.bushing_types[damper.housing_bushing].model_dump(),
+        **kind.model_dump(exclude={"end_bushing"}),
+    }
+
+
+def _stiffness(value: Any) -> Any:
+    return value.model_dump() if isinstance(value, ForceTable | TorqueTable) else value
+
+
+def as_text(description: dict[str, Any]) -> str:
+    """The description for a terminal: one aligned line per number or list."""
+    return "\n".join(_lines(description, ""))
+
+
+def _lines(node: Any, indent: str) -> list[str]:
+    lines = []
+    for key, value in node.items():
+        if isinstance(value, dict):
+            lines += [f"{indent}{key}:", *_lines(value, indent + "  ")]
+        else:
+            lines.append(f"{indent}{key}: {_short(value)}")
+    return lines
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return "(" + ", ".join(_short(item) for item in value) + ")"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_short(item)}" for key, item in value.items()) + "}"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

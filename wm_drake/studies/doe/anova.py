@@ -1,0 +1,179 @@
+"""Analysis of variance of factors at a few levels: how much of a response each term explains, and how it acts at each level.
+
+Sum-to-zero coding: the constant is the mean over all level combinations, and the effects of a term sum to zero over the levels
+of each of its factors. Fits and tests are statsmodels'.
+
+A contribution is the variance of a term's effects over the grid of all level combinations, as a part of the variance there. On
+an orthogonal design that is the sum of squares of an analysis of variance over the total one, of any type. On others, sums of
+squares of type III do not add up to the total and those of type I depend on the order of terms; contributions by variance add
+up to 100 with the residual on any design.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.stats import f as f_distribution
+from statsmodels.regression.linear_model import OLS
+from threadpoolctl import threadpool_limits
+
+from wm_drake.parameters.types import FloatArray
+
+Combination = tuple[int, ...]
+"""A level for each factor of a term."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """What one term of the model explains.
+
+    Attributes:
+        factors: Names; one for a main effect, two for an interaction.
+        percent: Contribution: mean square of its effects over all level combinations, of the variance there.
+        sum_sq: Sum of squares over the trials that are lost without it (type III). [unit of the response, squared]
+        df: Degrees of freedom.
+        f, p: F statistic and its p-value against the residual; they mean something only if the residual is noise.
+        effects: By the levels of its factors, deviation from what the terms below it predict. [unit of the response]
+    """
+
+    factors: tuple[str, ...]
+    percent: float
+    sum_sq: float
+    df: int
+    f: float
+    p: float
+    effects: dict[Combination, float]
+
+    @property
+    def name(self) -> str:
+        """Names of the factors, joined by a colon."""
+        return ":".join(self.factors)
+
+
+@dataclass(frozen=True)
+class AnovaTable:
+    """Analysis of variance of one response.
+
+    Attributes:
+        constant: Mean over all level combinations. [unit of the response]
+        terms: Main effects, then interactions, in the order of the factors.
+        main_percent, interaction_percent, residual_percent: Contributions of all main effects, all interactions, and what is
+            left; they sum to 100.
+        total_sum_sq, residual_sum_sq: Sums of squares over the trials, about the mean and about the fit.
+        residual_df: Degrees of freedom of the residual.
+        fitted, residual: Per trial. [unit of the response]
+    """
+
+    constant: float
+    terms: tuple[Term, ...]
+    main_percent: float
+    interaction_percent: float
+    residual_percent: float
+    total_sum_sq: float
+    residual_sum_sq: float
+    residual_df: int
+    fitted: FloatArray
+    residual: FloatArray
+
+    def percents(self) -> pd.Series:
+        """Contribution by name of term. [%]"""
+        return pd.Series({term.name: term.percent for term in self.terms})
+
+
+class SumCoding:
+    """Sum-coded columns of a design for all main effects and, if wanted, two-factor interactions."""
+
+    def __init__(self, levels: pd.DataFrame, interactions: bool) -> None:
+        """For a design: a trial a row, a factor a column, any hashable levels that can be sorted, at least two a factor."""
+        self.levels = {str(name): sorted(set(levels[name])) for name in levels.columns}
+        self.codes = {name: _sum_code(len(found)) for name, found in self.levels.items()}
+        places = {
+            name: levels[name].map({v: i for i, v in enumerate(found)})
+            for name, found in self.levels.items()
+        }
+        names, self.terms, blocks = list(self.levels), [], [np.ones((len(levels), 1))]
+        for size in (1, 2) if interactions else (1,):
+            for term in itertools.combinations(names, size):
+                block = np.ones((len(levels), 1))
+                for name in term:
+                    own = self.codes[name][places[name].to_numpy()]
+                    block = (block[:, :, None] * own[:, None, :]).reshape(len(levels), -1)
+                self.terms.append(term)
+                blocks.append(block)
+        ends = np.cumsum([block.shape[1] for block in blocks])
+        self.columns = dict(
+            zip(self.terms, itertools.starmap(slice, itertools.pairwise(ends)), strict=True)
+        )
+        self.matrix = np.hstack(blocks)
+
+    def effects(self, term: tuple[str, ...], coefficients: FloatArray) -> dict[Combination, float]:
+        """Effects at all level combinations of a term, from its coefficients."""
+        table = coefficients.reshape([self.codes[name].shape[1] for name in term])
+        for axis, name in enumerate(term):
+            table = np.moveaxis(np.tensordot(self.codes[name], table, axes=(1, axis)), 0, axis)
+        combinations = itertools.product(*(self.levels[name] for name in term))
+        return dict(zip(combinations, map(float, table.ravel()), strict=True))
+
+
+def _sum_code(levels: int) -> FloatArray:
+    """Columns for all levels but the last, which is minus their sum: that of R and patsy. (levels, levels - 1)"""
+    return np.vstack([np.eye(levels - 1), -np.ones(levels - 1)])
+
+
+def anova(
+    levels: pd.DataFrame, responses: pd.DataFrame, interactions: bool = True
+) -> dict[str, AnovaTable]:
+    """Analyses the variance of responses.
+
+    Args:
+        levels: A trial a row, a factor a column.
+        responses: A trial a row, a response a column.
+        interactions: Whether two-factor interactions are in the model.
+
+    Returns:
+        By name of response. A response that does not vary has no contributions: all percents are NaN.
+    """
+    coding = SumCoding(levels, interactions)
+    with threadpool_limits(1, "blas"):  # many small fits: threads would wait for each other
+        return {
+            str(name): _analysed(coding, responses[name].to_numpy(dtype=float))
+            for name in responses.columns
+        }
+
+
+def _analysed(coding: SumCoding, response: FloatArray) -> AnovaTable:
+    fit = OLS(response, coding.matrix).fit()
+    noise = float(fit.ssr / fit.df_resid) if fit.df_resid > 0 else np.nan
+    effects = {
+        term: coding.effects(term, fit.params[columns]) for term, columns in coding.columns.items()
+    }
+    variances = {
+        term: float(np.mean(np.square(list(own.values())))) for term, own in effects.items()
+    }
+    variance = sum(variances.values()) + float(fit.ssr) / len(response)
+    # rounding alone leaves some 1e-16 of the response itself: nothing to divide up
+    scale = 100.0 / variance if variance > 1e-20 * float(np.mean(response**2)) else np.nan
+    identity = np.eye(coding.matrix.shape[1])
+    terms = []
+    for term, columns in coding.columns.items():
+        # with the covariance for unit variance, F times its degrees of freedom is the sum of squares, exact fit or not
+        test = fit.f_test(identity[columns], cov_p=fit.normalized_cov_params)
+        df = columns.stop - columns.start
+        sum_sq = float(test.fvalue) * df
+        with np.errstate(divide="ignore", invalid="ignore"):
+            f = float(np.divide(sum_sq / df, noise))
+        p = float(f_distribution.sf(f, df, fit.df_resid)) if fit.df_resid > 0 else np.nan
+        terms.append(Term(term, scale * variances[term], sum_sq, df, f, p, effects[term]))
+    return AnovaTable(
+        constant=float(fit.params[0]),
+        terms=tuple(terms),
+        main_percent=sum(term.percent for term in terms if len(term.factors) == 1),
+        interaction_percent=sum(term.percent for term in terms if len(term.factors) > 1),
+        residual_percent=scale * float(fit.ssr) / len(response),
+        total_sum_sq=float(fit.centered_tss),
+        residual_sum_sq=float(fit.ssr),
+        residual_df=int(fit.df_resid),
+        fitted=np.asarray(fit.fittedvalues),
+        residual=np.asarray(fit.resid),
+    )

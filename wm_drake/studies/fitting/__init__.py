@@ -1,0 +1,35 @@
+"""Identification: unknown numbers of any model from what was measured, by three methods with one kind of result."""
+
+from wm_drake.studies.fitting.assessment import assess
+from wm_drake.studies.fitting.fit import Direction, Estimate, Fit, TestError
+from wm_drake.studies.fitting.methods import METHODS, evolution, identify, least_squares
+from wm_drake.studies.fitting.problem import (
+    Evaluate,
+    FitProblem,
+    Measurement,
+    Progress,
+    Unknown,
+    point_by_point,
+    rmse,
+)
+from wm_drake.studies.fitting.surfaces import response_surface
+
+__all__ = [
+    "METHODS",
+    "Direction",
+    "Estimate",
+    "Evaluate",
+    "Fit",
+    "FitProblem",
+    "Measurement",
+    "Progress",
+    "TestError",
+    "Unknown",
+    "assess",
+    "evolution",
+    "identify",
+    "least_squares",
+    "point_by_point",
+    "response_surface",
+    "rmse",
+]

@@ -1,0 +1,239 @@
+"""How well the data determine what a search found: bounds that were hit, covariance, intervals, directions not seen."""
+
+from typing import TypeAlias
+
+import numpy as np
+from scipy.stats import t as student
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.fitting.fit import Direction, Estimate, Fit, TestError
+from wm_drake.studies.fitting.problem import FitProblem, rmse
+
+IndexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
+
+CONFIDENCE = 0.95
+
+AT_BOUND = 1e-3
+"""An unknown this near a bound, in ranges, has hit it."""
+
+DIFFERENCE = 1e-3
+"""Step of the central differences, in ranges."""
+
+RESOLUTION = 1e-4
+"""Errors below this part of the measured values are not told from errors of model and integration."""
+
+WIDEST = 0.25
+"""Standard deviation, in ranges, from which the 95 % interval says no more than the bounds did."""
+
+TAKES_PART = 0.3
+"""Component of a unit direction from which an unknown is named with it."""
+
+
+def assess(
+    problem: FitProblem,
+    point: FloatArray,
+    *,
+    method: str,
+    seed: int,
+    evaluations: int,
+    history: tuple[float, ...],
+    notes: tuple[str, ...] = (),
+) -> Fit:
+    """The fit at a point in unit coordinates (p,) where a search ended.
+
+    Covariance by the sandwich of generalised least squares: each test errs by its own variance, larger by the correlation
+    of its samples where they follow each other, so that tests sampled densely do not claim more than they know.
+    """
+    residuals = problem.residuals(point[None])[0]
+    jacobian = central_differences(problem, point)
+    bound = _bounds_hit(problem, point, jacobian)
+    free = np.flatnonzero(bound == 0)
+    spread = _spread(problem, residuals, jacobian[:, free])
+    p = len(problem.unknowns)
+    slope = _slopes(problem, point)[free]
+    covariance = np.full((p, p), np.nan)
+    covariance[np.ix_(free, free)] = spread.covariance * np.outer(slope, slope)
+    computed, baselines = _computed(problem, point)
+    return Fit(
+        problem=problem,
+        method=method,
+        seed=seed,
+        estimates=_estimates(problem, point, bound, spread),
+        rmse=float(rmse(residuals)),
+        tests=_test_errors(problem, residuals),
+        computed=computed,
+        baselines=baselines,
+        covariance=covariance,
+        condition=spread.condition,
+        undetermined=spread.undetermined([problem.unknowns[k].name for k in free]),
+        evaluations=evaluations + 2 * p + 2,
+        history=history,
+        notes=notes,
+    )
+
+
+def _bounds_hit(problem: FitProblem, point: FloatArray, jacobian: FloatArray) -> IndexArray:
+    """Which unknowns are at their lower (-1) or upper (1) bound; 0 too for those that the data do not see."""
+    bound = np.where(point < AT_BOUND, -1, np.where(point > 1.0 - AT_BOUND, 1, 0))
+    unseen = WIDEST * np.linalg.norm(jacobian, axis=0) < float(rmse(_resolution(problem)))
+    return np.where(unseen, 0, bound)  # those came there by chance
+
+
+def central_differences(problem: FitProblem, point: FloatArray) -> FloatArray:
+    """Derivatives of the residuals by the unknowns (n, p), in unit coordinates; one-sided at a bound."""
+    steps = DIFFERENCE * np.eye(len(point))
+    sides = np.clip(np.concatenate([point + steps, point - steps]), 0.0, 1.0)
+    above, below = np.split(problem.residuals(sides), 2)
+    width = np.diag(sides[: len(point)] - sides[len(point) :])
+    return np.asarray(((above - below) / width[:, None]).T)
+
+
+class _Spread:
+    """What the singular values of the Jacobian say of the free unknowns, in unit coordinates."""
+
+    def __init__(self, jacobian: FloatArray, variance: FloatArray, resolution: FloatArray) -> None:
+        _, self.singular, rows = np.linalg.svd(jacobian, full_matrices=False)
+        self.directions = rows
+        smallest = 1e-12 * max(float(self.singular.max(initial=0.0)), 1e-300)
+        self._inverse = np.array([0.0 if s <= smallest else 1.0 / s for s in self.singular])
+        rotated = jacobian @ rows.T
+        self.covariance = rows.T @ self._sandwich(rotated, variance) @ rows
+        with np.errstate(divide="ignore"):
+            seen = np.diag(self._sandwich(rotated, resolution))
+        self.deviations = np.where(self._inverse > 0.0, np.sqrt(seen), np.inf)
+        with np.errstate(invalid="ignore"):
+            parts = np.where(np.abs(rows) > 1e-9, np.abs(rows) * self.deviations[:, None], 0.0)
+        self.resolved_deviation = np.sqrt(np.sum(np.square(parts), axis=0))
+
+    def _sandwich(self, rotated: FloatArray, variance: FloatArray) -> FloatArray:
+        scaled = rotated * np.sqrt(variance)[:, None]
+        return np.asarray((scaled.T @ scaled) * np.outer(self._inverse, self._inverse) ** 2)
+
+    @property
+    def condition(self) -> float:
+        """Largest by smallest singular value."""
+        if not len(self.singular):
+            return 1.0
+        return float(self.singular[0] / self.singular[-1]) if self.singular[-1] > 0.0 else np.inf
+
+    def undetermined(self, names: list[str]) -> tuple[Direction, ...]:
+        """The directions along which the data leave the unknowns where they like."""
+        found = []
+        for row, deviation in zip(self.directions, self.deviations, strict=True):
+            if deviation > WIDEST:
+                taking = np.flatnonzero(np.abs(row) > TAKES_PART)
+                parts = row[taking] / row[taking][np.argmax(np.abs(row[taking]))]
+                found.append(
+                    Direction(
+                        tuple(names[k] for k in taking), tuple(map(float, parts)), float(deviation)
+                    )
+                )
+        return tuple(found)
+
+
+def _spread(problem: FitProblem, residuals: FloatArray, jacobian: FloatArray) -> _Spread:
+    variance = _variances(problem, residuals, jacobian)
+    return _Spread(jacobian, variance, np.maximum(variance, _resolution(problem) ** 2))
+
+
+def _estimates(
+    problem: FitProblem, point: FloatArray, bound: IndexArray, spread: _Spread
+) -> tuple[Estimate, ...]:
+    """What is said of each unknown; `bound` is 0 for those whose `spread` is known."""
+    free = np.flatnonzero(bound == 0)
+    resolved, wide = np.zeros((2, len(point)))
+    resolved[free] = spread.resolved_deviation
+    wide[free] = np.sqrt(np.diag(spread.covariance))
+    quantile = float(
+        student.ppf(0.5 + 0.5 * CONFIDENCE, max(_degrees_of_freedom(problem, len(free)), 1))
+    )
+    with np.errstate(over="ignore", invalid="ignore"):
+        lower, upper = (problem.from_unit(point + sign * quantile * wide) for sign in (-1.0, 1.0))
+    values, found = problem.from_unit(point), []
+    for k, unknown in enumerate(problem.unknowns):
+        determined = bool(resolved[k] <= WIDEST)
+        claims = determined and bound[k] == 0
+        interval = (float(lower[k]), float(upper[k])) if claims else (np.nan, np.nan)
+        at_bound = {-1: "lower", 0: "", 1: "upper"}[int(bound[k])]
+        found.append(Estimate(unknown.name, float(values[k]), *interval, determined, at_bound))
+    return tuple(found)
+
+
+def _slopes(problem: FitProblem, point: FloatArray) -> FloatArray:
+    """Derivative of the SI value of each unknown by its unit coordinate."""
+    values = problem.from_unit(point)
+    return np.array(
+        [
+            value * np.log(u.upper / u.lower) if u.logarithmic else u.upper - u.lower
+            for u, value in zip(problem.unknowns, values, strict=True)
+        ]
+    )
+
+
+def _degrees_of_freedom(problem: FitProblem, free: int) -> int:
+    return sum(len(m.values) - m.basis.shape[1] for m in problem.measurements) - free
+
+
+def _variances(problem: FitProblem, residuals: FloatArray, jacobian: FloatArray) -> FloatArray:
+    """Variance of each scaled residual (n,), with what estimating and correlation take from it.
+
+    Samples of one test have a variance of their own, whose degrees of freedom are less what its baseline and its share of the
+    unknowns (its leverages) take; values that are no samples have one together.
+    """
+    leverage = np.sum(np.square(np.linalg.svd(jacobian, full_matrices=False)[0]), axis=1)
+    pooled = float(np.sum(np.square(residuals))) / max(
+        _degrees_of_freedom(problem, jacobian.shape[1]), 1e-12
+    )
+    parts = []
+    for where, m in zip(problem.slices, problem.measurements, strict=True):
+        own = residuals[where]
+        variance = pooled
+        if m.correlated:
+            freedom = max(len(own) - m.basis.shape[1] - float(np.sum(leverage[where])), 1e-12)
+            variance = float(np.sum(np.square(own))) / freedom * correlation_time(own)
+        parts.append(np.full(len(own), variance))
+    return np.concatenate(parts)
+
+
+def correlation_time(series: FloatArray) -> float:
+    """How many samples say as much as one independent one: 1 + 2 sum of the autocorrelation up to its first zero."""
+    power = float(np.mean(np.square(series)))
+    if power == 0.0:
+        return 1.0
+    spectrum = np.fft.rfft(series, 2 * len(series))
+    correlation = np.fft.irfft(np.abs(spectrum) ** 2)[: len(series)] / (len(series) * power)
+    below = np.flatnonzero(
+        correlation[1:] <= 2.0 / np.sqrt(len(series))
+    )  # what white noise shows by chance
+    end = 1 + int(below[0]) if len(below) else len(series)
+    return max(1.0, 1.0 + 2.0 * float(np.sum(correlation[1:end])))
+
+
+def _resolution(problem: FitProblem) -> FloatArray:
+    parts = [
+        np.full(len(m.values), RESOLUTION * float(rmse(m.values)) / m.scale)
+        for m in problem.measurements
+    ]
+    return np.concatenate(parts)
+
+
+def _test_errors(problem: FitProblem, residuals: FloatArray) -> tuple[TestError, ...]:
+    found = []
+    for where, m in zip(problem.slices, problem.measurements, strict=True):
+        error = float(rmse(residuals[where])) * m.scale
+        found.append(TestError(m.name, error, error / m.largest if m.largest else float("nan")))
+    return tuple(found)
+
+
+def _computed(problem: FitProblem, point: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+    """Computed values with the best baselines added (n,), and the amounts of their columns."""
+    computed = problem.evaluate(problem.from_unit(point)[None])[0].copy()
+    amounts = []
+    for where, m in zip(problem.slices, problem.measurements, strict=True):
+        if m.baseline is None:
+            amounts.append(np.zeros(0))
+            continue
+        amount = np.linalg.lstsq(m.baseline, m.values - computed[where], rcond=None)[0]
+        computed[where] += m.baseline @ amount
+        amounts.append(amount)
+    return computed, tuple(amounts)

@@ -1,0 +1,138 @@
+"""What an identification found."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.fitting.problem import FitProblem
+
+
+@dataclass(frozen=True)
+class TestError:
+    """Error of one test, as in [A] Tables 2, 4, 5, 7. `rmse` in the test's unit, `normalised` by its largest measured value."""
+
+    __test__ = False  # not one of pytest's
+
+    name: str
+    rmse: float
+    normalised: float
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One unknown, found.
+
+    Attributes:
+        name: Of the unknown.
+        value: Where the search ended. [SI]
+        lower, upper: 95 % interval; NaN where there is none: at a bound, or not determined. [SI]
+        determined: Whether the data say more about it than its bounds did.
+        at_bound: "lower" or "upper" if it hit one, else "".
+    """
+
+    name: str
+    value: float
+    lower: float
+    upper: float
+    determined: bool
+    at_bound: str
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A change of the unknowns together that the data do not see.
+
+    Attributes:
+        names: The unknowns that take part.
+        parts: How far each moves, in its range (log range if searched so), largest 1.
+        deviation: Standard deviation along it, in ranges; infinite if the data do not see it at all.
+    """
+
+    names: tuple[str, ...]
+    parts: tuple[float, ...]
+    deviation: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Result of an identification; the same for every method.
+
+    Attributes:
+        problem: What was asked.
+        method, seed: How it was searched.
+        estimates: One for each unknown.
+        rmse: Over all values of all tests, scaled as the problem says.
+        tests: Error of each test.
+        computed: Best values of the model (n,), baselines included: beside the measured ones.
+        baselines: Amounts of each test's baseline columns.
+        covariance: Of the unknowns (p, p); NaN in rows of those at a bound. [SI]
+        condition: Of the scaled Jacobian: 1 if all directions are seen alike, large if one is hardly seen.
+        undetermined: Directions the data do not determine.
+        evaluations: Points the model was asked for.
+        history: Least RMSE after each round of the search.
+        notes: What a reader should know of the search.
+    """
+
+    problem: FitProblem
+    method: str
+    seed: int
+    estimates: tuple[Estimate, ...]
+    rmse: float
+    tests: tuple[TestError, ...]
+    computed: FloatArray
+    baselines: tuple[FloatArray, ...]
+    covariance: FloatArray
+    condition: float
+    undetermined: tuple[Direction, ...]
+    evaluations: int
+    history: tuple[float, ...]
+    notes: tuple[str, ...]
+
+    def without_intervals(self, reason: str) -> "Fit":
+        """The same, claiming no interval of any unknown."""
+        bare = tuple(replace(estimate, lower=np.nan, upper=np.nan) for estimate in self.estimates)
+        return replace(
+            self,
+            estimates=bare,
+            covariance=np.full_like(self.covariance, np.nan),
+            notes=(*self.notes, reason),
+        )
+
+    @property
+    def values(self) -> FloatArray:
+        """Where the search ended (p,). [SI]"""
+        return np.array([estimate.value for estimate in self.estimates])
+
+    def __getitem__(self, name: str) -> Estimate:
+        """The estimate of an unknown."""
+        return next(estimate for estimate in self.estimates if estimate.name == name)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON, in SI: numbers that are not finite become null, as does the value of an unknown not determined."""
+        return {
+            "method": self.method,
+            "seed": self.seed,
+            "rmse": self.rmse,
+            "unknowns": {
+                e.name: {
+                    "value": e.value if e.determined else None,
+                    "interval_95": None if np.isnan(e.lower) else [e.lower, e.upper],
+                    "unit": u.unit.si,
+                    "determined": e.determined,
+                    "at_bound": e.at_bound or None,
+                }
+                for e, u in zip(self.estimates, self.problem.unknowns, strict=True)
+            },
+            "tests": [
+                {"name": t.name, "rmse": t.rmse, "rmse_normalised": t.normalised}
+                for t in self.tests
+            ],
+            "condition": self.condition if np.isfinite(self.condition) else None,
+            "undetermined": [
+                {"unknowns": list(d.names), "parts": list(d.parts)} for d in self.undetermined
+            ],
+            "evaluations": self.evaluations,
+            "notes": list(self.notes),
+        }

@@ -1,0 +1,124 @@
+"""What the ways to search share: a count of what they ask, scattered points to begin from, and descent by least squares."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+from scipy import optimize
+from scipy.stats import qmc
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.fitting.assessment import assess
+from wm_drake.studies.fitting.fit import Fit
+from wm_drake.studies.fitting.problem import FitProblem, rmse
+
+STEP = 1e-5
+"""Of one-sided differences during a search, in ranges."""
+
+SAME_END = 1e-3
+"""Searches whose RMSE differ by less than this part came to the same end."""
+
+End: TypeAlias = tuple[FloatArray, float]
+"""Where a search ended, in unit coordinates (p,), and its RMSE."""
+
+
+def silent(fraction: float, least: float) -> None:
+    """Progress that nobody looks at."""
+
+
+def underway(done: int, usual: int) -> float:
+    """Fraction shown of a search that may end any time: 2/3 after as many rounds as it usually takes."""
+    return done / (done + 0.5 * usual)
+
+
+@dataclass
+class Count:
+    """The problem, with a count of what it is asked and the best point so far."""
+
+    problem: FitProblem
+    evaluations: int = 0
+    best: FloatArray | None = None
+    least: float = np.inf
+    history: list[float] = field(default_factory=list)
+
+    def residuals(self, points: FloatArray) -> FloatArray:
+        """Scaled residuals (k, n) at points in unit coordinates (k, p)."""
+        found = self.problem.residuals(points)
+        self.evaluations += len(points)
+        errors = rmse(found)
+        index = int(np.argmin(errors))
+        if errors[index] < self.least:
+            self.least, self.best = float(errors[index]), points[index].copy()
+        return found
+
+    def errors(self, points: FloatArray) -> FloatArray:
+        """RMSE at each point (k,)."""
+        return rmse(self.residuals(points))
+
+    def round_done(self) -> None:
+        """Notes the least RMSE so far."""
+        self.history.append(self.least)
+
+    def fit(self, point: FloatArray, method: str, seed: int, notes: tuple[str, ...] = ()) -> Fit:
+        """The fit at the point where the search ended."""
+        rounds = (*self.history, self.least)
+        return assess(
+            self.problem,
+            point,
+            method=method,
+            seed=seed,
+            evaluations=self.evaluations,
+            history=rounds,
+            notes=notes,
+        )
+
+
+def scattered(p: int, number: int, seed: int) -> FloatArray:
+    """Points that fill the ranges evenly (number, p); a power of two of them fills best."""
+    return np.asarray(qmc.Sobol(p, rng=np.random.default_rng(seed)).random(number))
+
+
+def agreeing(problem: FitProblem, ends: list[End]) -> int:
+    """How many searches came to the least RMSE of all."""
+    if not ends:
+        return 0
+    errors = np.array([error for _, error in ends])
+    floor = 1e-9 * float(rmse(np.concatenate([m.values / m.scale for m in problem.measurements])))
+    return int(np.sum(errors <= (1.0 + SAME_END) * errors.min() + floor))
+
+
+def descend(
+    count: Count, begin: FloatArray, step_done: Callable[[float], None], most: int = 60
+) -> End:
+    """One search by scipy's trust-region reflective method."""
+    steps = 0
+    last: tuple[FloatArray, FloatArray] = (np.full(len(begin), np.nan), np.empty(0))
+
+    def residuals(z: FloatArray) -> FloatArray:
+        nonlocal last
+        last = (z.copy(), np.asarray(count.residuals(z[None])[0]))
+        return last[1]
+
+    def jacobian(z: FloatArray) -> FloatArray:
+        nonlocal steps
+        steps += 1
+        step_done(min(1.0, steps / 25))
+        here = last[1] if np.array_equal(z, last[0]) else count.residuals(z[None])[0]
+        sign = np.where(z > 0.5, -1.0, 1.0)
+        found = count.residuals(z + np.diag(STEP * sign))
+        return np.asarray(((found - here) / (STEP * sign)[:, None]).T)
+
+    inside = np.clip(begin, 1e-4, 1.0 - 1e-4)
+    end = optimize.least_squares(
+        residuals,
+        inside,
+        jacobian,
+        bounds=(0.0, 1.0),
+        x_scale=1.0,
+        ftol=1e-9,
+        xtol=1e-9,
+        gtol=1e-14,
+        max_nfev=most,
+    )
+    return end.x, float(rmse(end.fun))

@@ -1,0 +1,231 @@
+"""Iterated response surfaces, the method of [A] section 3: designed points, a quadratic surface, a move, a smaller region.
+
+The region is not a box along the unknowns: its axes follow the valley that the last surface showed, each as long as the surface
+bends alike along all of them. In a narrow valley that runs across the unknowns a box is soon as small as the valley is narrow,
+and takes as many rounds as the valley is long in such steps.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import optimize
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.fitting.fit import Fit
+from wm_drake.studies.fitting.problem import FitProblem, Progress
+from wm_drake.studies.fitting.search import Count, scattered, silent, underway
+
+WIDEST = 0.5
+"""Longest half axis of a region, in ranges; the first region has it everywhere."""
+
+SMALLEST = 1e-6
+"""A search has come to an end if no half axis is longer, in ranges."""
+
+FLAT = 1e-2
+"""It has also come to an end if no point of the region is worse by more than this part of what one standard error costs, the
+mean square error per value: the region is then a tenth of a standard error to either side, its centre nearer still."""
+
+STRETCH = 3.0
+"""Most by which an axis is stretched or shortened against the others in a round."""
+
+USUAL_ROUNDS = 20
+
+SLENDEREST = 1e3
+"""Longest by shortest axis, at most."""
+
+
+def response_surface(
+    problem: FitProblem,
+    *,
+    seed: int = 0,
+    screened: int = 32,
+    rounds: int = 80,
+    progress: Progress = silent,
+) -> Fit:
+    """Iterated response surfaces.
+
+    In each round the model is evaluated at designed points of a region, a quadratic surface is fitted to the mean square
+    error, and the region moves to the least point of the surface, checked by the model, or to the best designed point. It
+    grows where the surface foretold a move to its rim, and shrinks where it stays.
+
+    Args:
+        problem: What to find.
+        seed: Of the scattered points.
+        screened: Points (a power of two) that are looked at beside the problem's start; the best is the first centre.
+        rounds: At most.
+        progress: Told after every round.
+    """
+    count = Count(problem)
+    design = surface_design(len(problem.unknowns))
+    region = _first_region(count, seed, screened)
+    done, ended = 0, False
+    while done < rounds and not ended:
+        done += 1
+        region, ended = _round(count, region, design)
+        count.round_done()
+        progress(underway(done, USUAL_ROUNDS), count.least)
+    progress(1.0, count.least)
+    notes = (f"{done} rounds, last region {2.0 * region.longest:.2g} of the ranges",)
+    fit = count.fit(region.centre, "response-surface", seed, notes)
+    if ended:
+        return fit
+    return fit.without_intervals(
+        "the search had not come to an end: no optimum, and no intervals are claimed"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """Where a surface is fitted: centre + axes x, each |x| <= 1, within the ranges.
+
+    Attributes:
+        centre: In unit coordinates (p,).
+        value: Mean square error there.
+        axes: Half axes as columns (p, p), perpendicular to each other.
+    """
+
+    centre: FloatArray
+    value: float
+    axes: FloatArray
+
+    @property
+    def longest(self) -> float:
+        """Length of the longest half axis, in ranges."""
+        return float(np.max(np.linalg.norm(self.axes, axis=0)))
+
+    def designed(self, design: FloatArray) -> FloatArray:
+        """Points (k, p) of a design (k, p) along the axes, all within the ranges.
+
+        A point beyond them goes half as far to the other side instead, if that is less beyond: points that are brought back
+        to a bound lie on it together, and say little of the surface. Then most searches take fewer rounds.
+        """
+        ahead, back = self.centre + design @ self.axes.T, self.centre - 0.5 * design @ self.axes.T
+        beyond = [
+            np.sum(np.abs(points - np.clip(points, 0.0, 1.0)), axis=1) for points in (ahead, back)
+        ]
+        return np.clip(np.where((beyond[1] < beyond[0])[:, None], back, ahead), 0.0, 1.0)
+
+    def points(self, places: FloatArray) -> FloatArray:
+        """Points (k, p) at places along the axes, brought back into the ranges."""
+        return np.clip(self.centre + places @ self.axes.T, 0.0, 1.0)
+
+    def places(self, points: FloatArray) -> FloatArray:
+        """The way back of `points`."""
+        return np.asarray(np.linalg.solve(self.axes, (points - self.centre).T).T)
+
+    def moved(self, centre: FloatArray, value: float) -> "Region":
+        """The same about another centre."""
+        return Region(centre, value, self.axes)
+
+    def reshaped(self, hessian: FloatArray, factor: float) -> "Region":
+        """Larger by a factor, with axes along which a surface of this Hessian (p, p), in places, bends more alike."""
+        bends, directions = np.linalg.eigh(hessian)
+        bend = np.abs(bends) + 1e-12 * np.max(np.abs(bends)) + 1e-300
+        stretch = np.clip(np.sqrt(np.exp(np.mean(np.log(bend))) / bend), 1.0 / STRETCH, STRETCH)
+        perpendicular, lengths, _ = np.linalg.svd(factor * (self.axes @ directions) * stretch)
+        lengths = np.minimum(lengths, WIDEST)
+        return Region(
+            self.centre, self.value, perpendicular * np.maximum(lengths, lengths.max() / SLENDEREST)
+        )
+
+
+def _first_region(count: Count, seed: int, screened: int) -> Region:
+    """The whole ranges, about the best of the problem's start and scattered points."""
+    p = len(count.problem.unknowns)
+    begins = np.concatenate([count.problem.start[None], scattered(p, screened, seed)])
+    values = np.square(count.errors(begins))
+    count.round_done()
+    best = int(np.argmin(values))
+    return Region(begins[best], float(values[best]), WIDEST * np.eye(p))
+
+
+def _round(count: Count, region: Region, design: FloatArray) -> tuple[Region, bool]:
+    """The region after a round, and whether the search has come to an end."""
+    points = region.designed(design)
+    places, values = region.places(points), np.square(count.errors(points))
+    surface = QuadraticSurface(places, values, region.value)
+    least = surface.least_place(region)
+    target = region.points(least)
+    value = float(count.errors(target[None])[0]) ** 2
+    foretold = region.value - value > 0.5 * -surface.rise(least) > 0.0
+    best = int(np.argmin(values))
+    if values[best] < value:
+        target, value, least = points[best], float(values[best]), places[best]
+    better = value < region.value
+    factor = _resize(float(np.max(np.abs(least))), better, foretold)
+    samples = sum(len(m.values) for m in count.problem.measurements)
+    flat = float(np.max(values)) - region.value <= FLAT * region.value / samples
+    after = (region.moved(target, value) if better else region).reshaped(surface.hessian, factor)
+    return after, flat or after.longest <= SMALLEST
+
+
+def _resize(moved: float, better: bool, foretold: bool) -> float:
+    """Factor of a region whose centre moved so far, in half axes: more at the rim, less the nearer to the centre."""
+    if not better:
+        return 0.5
+    if moved > 0.9:
+        return 2.0 if foretold else 1.0
+    return 0.6 if moved > 0.5 else 0.4
+
+
+def surface_design(p: int) -> FloatArray:
+    """Points for a quadratic surface of p variables in [-1, 1]: both ends of each axis, a corner of each pair.
+
+    With the centre as many as the surface has coefficients: where surfaces are iterated, more points a round were seen to
+    save no rounds.
+    """
+    points = [sign * np.eye(p)[k] for k in range(p) for sign in (-1.0, 1.0)]
+    for number, (i, j) in enumerate(itertools.combinations(range(p), 2)):
+        point = np.zeros(p)
+        point[i], point[j] = (-1.0) ** number, (-1.0) ** (number + i + j)
+        points.append(point)
+    return np.array(points)
+
+
+class QuadraticSurface:
+    """Least-squares quadratic through values at places, exact at the centre."""
+
+    def __init__(self, places: FloatArray, values: FloatArray, at_centre: float) -> None:
+        """FramePoses (k, p) about the centre, values (k,), the value at the centre."""
+        p = places.shape[1]
+        self._pairs = list(itertools.combinations_with_replacement(range(p), 2))
+        products = np.stack([places[:, i] * places[:, j] for i, j in self._pairs], axis=1)
+        near = 1.0 / np.sqrt(
+            1e-300 + np.abs(values) + 1e-3 * np.max(np.abs(values))
+        )  # low values matter most
+        rows = np.concatenate([places, products], axis=1) * near[:, None]
+        found = np.linalg.lstsq(rows, (values - at_centre) * near, rcond=None)[0]
+        self.gradient = found[:p]
+        self.hessian = np.zeros((p, p))
+        for coefficient, (i, j) in zip(found[p:], self._pairs, strict=True):
+            self.hessian[i, j] += coefficient
+            self.hessian[j, i] += coefficient
+
+    def rise(self, place: FloatArray) -> float:
+        """Of the surface from its centre to a place (p,)."""
+        return float((self.gradient + 0.5 * self.hessian @ place) @ place)
+
+    def least_place(self, region: Region) -> FloatArray:
+        """Where the surface is least in a region, searched from its centre and from two opposite corners."""
+        size = max(
+            float(np.max(np.abs(self.hessian))), float(np.max(np.abs(self.gradient))), 1e-300
+        )
+        within = optimize.LinearConstraint(region.axes, -region.centre, 1.0 - region.centre)
+        ends = [
+            optimize.minimize(
+                lambda x: self.rise(x) / size,
+                begin,
+                jac=lambda x: (self.gradient + self.hessian @ x) / size,
+                method="SLSQP",
+                bounds=[(-1.0, 1.0)] * len(begin),
+                constraints=within,
+                options={"ftol": 1e-9},
+            ).x
+            for begin in region.places(
+                region.points(np.array([[0.0], [-0.9], [0.9]]) * np.ones(len(self.gradient)))
+            )
+        ]
+        return min(
+            (np.clip(end, -1.0, 1.0) for end in ends if np.all(np.isfinite(end))), key=self.rise
+        )

@@ -1,0 +1,157 @@
+"""Results of a screening as plain tables and plain data, for files and other programs."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from wm_drake.studies.doe import write_design
+from wm_drake.studies.doe.anova import Term
+from wm_drake.studies.gasket.screening import Screening, leading_terms
+
+DIGITS = "%.9g"
+"""Of numbers in CSV files: more than the runs are good for."""
+
+
+def write_tables(screening: Screening, folder: Path) -> None:
+    """Writes all tables as CSV. The same screening always gives the same bytes."""
+    write_design(screening.design, folder / "design.csv")
+    tables = {
+        "runs.csv": runs_table(screening),
+        "variance.csv": variance_table(screening),
+        "contributions.csv": contributions_table(screening),
+        "effects.csv": effects_table(screening),
+        "leading_terms.csv": leading_table(screening),
+    }
+    for name, table in tables.items():
+        table.to_csv(folder / name, index=False, float_format=DIGITS)
+
+
+def runs_table(screening: Screening) -> pd.DataFrame:
+    """Every run: trial, levels, load, responses with their units, why it failed if it did."""
+    design, responses = screening.design, screening.responses
+    parts = []
+    for load in screening.loads:
+        values = responses.values[load].rename(
+            columns={name: f"{name} [{unit}]" for name, unit in responses.units.items()}
+        )
+        part = pd.concat([design.frame(), values], axis=1)
+        part.insert(1, "load", load)
+        part["failed"] = [responses.failed.get((trial, load), "") for trial in range(design.trials)]
+        parts.append(part)
+    return pd.concat(parts).sort_values("trial", kind="stable")
+
+
+def variance_table(screening: Screening) -> pd.DataFrame:
+    """[B] Table 4: percent explained by main effects, by interactions, and not at all; with mean and range of the runs."""
+    rows = []
+    for (load, name), table in screening.tables.items():
+        values = screening.responses.values[load][name]
+        rows.append(
+            {
+                "load": load,
+                "response": name,
+                "unit": screening.responses.units[name],
+                "constant": table.constant,
+                "smallest": values.min(),
+                "largest": values.max(),
+                "main_percent": table.main_percent,
+                "interaction_percent": table.interaction_percent,
+                "residual_percent": table.residual_percent,
+                "total_sum_sq": table.total_sum_sq,
+                "residual_sum_sq": table.residual_sum_sq,
+                "residual_df": table.residual_df,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def contributions_table(screening: Screening) -> pd.DataFrame:
+    """Every term of every response: contribution, sum of squares (type III), degrees of freedom."""
+    return pd.DataFrame(
+        {
+            "load": load,
+            "response": name,
+            "term": t.name,
+            "percent": t.percent,
+            "sum_sq": t.sum_sq,
+            "df": t.df,
+        }
+        for (load, name), table in screening.tables.items()
+        for t in table.terms
+    )
+
+
+def effects_table(screening: Screening) -> pd.DataFrame:
+    """Every effect: term, levels of its factors joined by a colon, deviation in the unit of the response."""
+    return pd.DataFrame(
+        {"load": load, "response": name, "term": t.name, "levels": levels, "effect": effect}
+        for (load, name), table in screening.tables.items()
+        for t in table.terms
+        for levels, effect in effects_of(t).items()
+    )
+
+
+def leading_table(screening: Screening) -> pd.DataFrame:
+    """[B] Table 5: constant, and the terms above its thresholds with contribution and effects at their levels."""
+    rows: list[dict[str, Any]] = []
+    for (load, name), table in screening.tables.items():
+        head = {"load": load, "response": name, "unit": screening.responses.units[name]}
+        rows.append(
+            head | {"term": "constant", "percent": np.nan, "levels": "", "effect": table.constant}
+        )
+        for term in leading_terms(table):
+            rows += [
+                head
+                | {"term": term.name, "percent": term.percent, "levels": levels, "effect": effect}
+                for levels, effect in effects_of(term).items()
+            ]
+    return pd.DataFrame(rows)
+
+
+def effects_of(term: Term) -> dict[str, float]:
+    """Effects by levels as text: "-1", or "-1:0" of an interaction."""
+    return {":".join(map(str, levels)): effect for levels, effect in term.effects.items()}
+
+
+def as_plain_data(screening: Screening) -> dict[str, Any]:
+    """For JSON: design, efficiency, and per load and response the contributions with the effects at each level."""
+    responses: dict[str, dict[str, Any]] = {load: {} for load in screening.loads}
+    for (load, name), table in screening.tables.items():
+        responses[load][name] = {
+            "unit": screening.responses.units[name],
+            "mean": finite(table.constant),
+            "main_percent": finite(table.main_percent),
+            "interaction_percent": finite(table.interaction_percent),
+            "residual_percent": finite(table.residual_percent),
+            "terms": [
+                {
+                    "term": t.name,
+                    "percent": finite(t.percent),
+                    "effects": {k: finite(v) for k, v in effects_of(t).items()},
+                }
+                for t in table.terms
+            ],
+        }
+    design = screening.design
+    return {
+        "design": design.kind,
+        "model": design.model,
+        "seed": design.seed,
+        "trials": design.trials,
+        "d_efficiency": design.efficiency(),
+        "responses": responses,
+    }
+
+
+def finite(value: float) -> float | None:
+    """JSON has no NaN."""
+    return value if math.isfinite(value) else None
+
+
+def to_json(data: Any) -> str:
+    """Strict JSON, one line."""
+    return json.dumps(data, allow_nan=False)

@@ -1,0 +1,1 @@
+"""Find the damping of the gasket from measured envelopes."""

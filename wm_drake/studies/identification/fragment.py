@@ -1,0 +1,168 @@
+"""What was identified, as a file: a fragment that starts from a machine and changes one component, or a component file."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ruamel.yaml import YAML
+
+from wm_drake.errors import input_error
+from wm_drake.parameters import Component, quantities, shipped_machines
+from wm_drake.parameters.units import Unit
+from wm_drake.studies.fitting import Fit
+from wm_drake.studies.identification.models import DAMPER_LAWS, ComponentModel
+from wm_drake.studies.identification.scales import FORCE, TORQUE
+
+_LENGTH, _ANGLE = Unit("m", "mm"), Unit("rad", "deg")
+
+
+def fragment(
+    fit: Fit,
+    model: ComponentModel,
+    target: Component,
+    machine: str,
+    key: str,
+    copies: Mapping[str, str],
+    out: Path,
+) -> str:
+    """The text of a YAML file with what was identified; what the data do not determine is left out, and said.
+
+    Args:
+        fit: Of the model.
+        model: Of the component.
+        target: The component as it was, for the keys of another law that have to go.
+        machine: Machine that the fragment starts from, as it was named; "" for a component file that stands alone.
+        key: Place of the component in the machine.
+        copies: Fields that get the value of another, such as z of an axisymmetric bushing from x.
+        out: Folder the file goes to, from which a machine file is named.
+    """
+    entries, comments = _entries(fit, model, target)
+    for field, source in copies.items():
+        if source in entries:
+            entries[field] = entries[source]
+    head = [
+        f"# Identified by least RMSE, method {fit.method}, seed {fit.seed}, from {', '.join(t.name for t in fit.tests)}.",
+        f"# RMSE {fit.rmse:.4g} {'N m' if any(u.unit == TORQUE for u in fit.problem.unknowns) else 'N'} over all tests.",
+        *(f"# {line}" for line in comments),
+    ]
+    if not machine:
+        body: Any = _whole(entries, target)
+    else:
+        body = {"extends": _named_from(machine, out)}
+        node = body
+        for part in key.split("."):
+            node = node.setdefault(part, {})
+        node.update(_leaving(entries, target))
+    lines: list[str] = []
+    yaml = YAML()
+    yaml.width = 4096
+    yaml.dump(body, _Lines(lines))
+    return "\n".join(head) + "\n" + "".join(lines)
+
+
+class _Lines:
+    def __init__(self, lines: list[str]) -> None:
+        self._lines = lines
+
+    def write(self, part: str | bytes) -> None:
+        """As a stream."""
+        self._lines.append(part if isinstance(part, str) else part.decode())
+
+
+def _entries(
+    fit: Fit, model: ComponentModel, target: Component
+) -> tuple[dict[str, Any], list[str]]:
+    """Values with sources by field, and comments on what is missing."""
+    fields = model.fields(fit.values)
+    estimates = {estimate.name: estimate for estimate in fit.estimates}
+    units = {unknown.name: unknown.unit for unknown in fit.problem.unknowns}
+    entries: dict[str, Any] = {"law": fields["law"]} if "law" in fields else {}
+    comments = []
+    for name, value in fields.items():
+        if isinstance(value, dict):
+            entries[name] = _table(value, fit)
+            open_ends = [
+                e.name for e in fit.estimates if e.name.startswith(f"{name}.") and not e.determined
+            ]
+            if open_ends:
+                comments.append(
+                    f"The data do not determine {', '.join(open_ends)}: the table's rises there are not to be trusted."
+                )
+        elif name in estimates:
+            estimate, unit = estimates[name], units[name]
+            if not estimate.determined:
+                comments.append(
+                    f"The data do not determine {name}; it is left out and stays what it was."
+                )
+                continue
+            text = f"identified from {len(fit.tests)} loops, normalised RMSE {_normalised(fit):.3g}"
+            if estimate.at_bound:
+                text += f"; at the {estimate.at_bound} bound of the search"
+            elif np.isfinite(estimate.lower):
+                text += f"; 95 % interval {unit.from_si(estimate.lower):.4g} to {unit.from_si(estimate.upper):.4g} {_plain(unit)}"
+            entries[name] = {"value": f"{unit.from_si(value):.7g} {_plain(unit)}", "source": text}
+    missing = [name for name in _required(target, entries) if name not in entries]
+    if missing and "law" in entries and entries["law"] != getattr(target.parameters, "law", None):
+        raise input_error(
+            f"not determined by the data, and law {entries['law']} is new to {target.name}",
+            key=", ".join(missing),
+        )
+    return entries, comments
+
+
+def _required(target: Component, entries: Mapping[str, Any]) -> list[str]:
+    return list(DAMPER_LAWS.get(entries.get("law", ""), {})) if target.is_damper else []
+
+
+def _normalised(fit: Fit) -> float:
+    return float(np.sqrt(np.mean([test.normalised**2 for test in fit.tests])))
+
+
+def _table(value: Mapping[str, Any], fit: Fit) -> dict[str, str]:
+    units = {"displacement": _LENGTH, "angle": _ANGLE, "force": FORCE, "torque": TORQUE}
+    shown = {
+        name: f"({', '.join(f'{units[name].from_si(x):.6g}' for x in values)}) {_plain(units[name])}"
+        for name, values in value.items()
+    }
+    return {
+        **shown,
+        "source": f"identified from {len(fit.tests)} loops, normalised RMSE {_normalised(fit):.3g}",
+    }
+
+
+def _plain(unit: Unit) -> str:
+    return unit.shown.replace("*", " ")
+
+
+def _leaving(entries: dict[str, Any], target: Component) -> dict[str, Any]:
+    """With null for what belongs to the component's old law only."""
+    if "law" not in entries or entries["law"] == getattr(target.parameters, "law", None):
+        return entries
+    old = target.parameters.model_fields_set - {"law", "end_bushing"}
+    return {**entries, **dict.fromkeys(sorted(old - set(entries)))}
+
+
+def _whole(entries: dict[str, Any], target: Component) -> dict[str, Any]:
+    """A component file: what was identified, and of the old numbers what still belongs to it."""
+    if "law" in entries and entries["law"] != getattr(target.parameters, "law", None):
+        return entries
+    kept = {
+        key: {"value": unit.text(value), "source": target.sources.get(key, "as before")}
+        for key, value, unit in quantities(target.parameters)
+        if "." not in key and key not in entries
+    }
+    for name in target.parameters.model_fields_set - set(
+        entries
+    ):  # tables, which are no single quantity
+        table = getattr(target.parameters, name)
+        if hasattr(table, "packed"):
+            kept[name] = {key: unit.text(value) for key, value, unit in quantities(table)}
+    return {**entries, **kept}
+
+
+def _named_from(machine: str, out: Path) -> str:
+    if machine in shipped_machines():
+        return machine
+    return os.path.relpath(Path(machine).resolve(), out.resolve())

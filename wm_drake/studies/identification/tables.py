@@ -1,0 +1,49 @@
+"""Curves of force over displacement whose rises from knot to knot are the unknowns, so that they never fall."""
+
+import numpy as np
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.fitting import Unknown
+from wm_drake.studies.identification.scales import FORCE, TORQUE, Scale
+
+
+class OddTable:
+    """A curve through zero with the same rises to either side."""
+
+    def __init__(self, name: str, scale: Scale, knots: int) -> None:
+        """Knots of each side, equally spaced up to the stroke."""
+        self.name = name
+        self.displacement = scale.stroke * np.arange(1, knots + 1) / knots
+        self.unknowns = tuple(
+            Unknown(f"{name}.rise_{k + 1}", 0.0, scale.force, FORCE) for k in range(knots)
+        )
+
+    def curve(self, rises: FloatArray) -> dict[str, tuple[float, ...]]:
+        """The table of these rises, as a mapping."""
+        force = np.cumsum(rises)
+        return {
+            "displacement": (*(-self.displacement[::-1]), 0.0, *self.displacement),
+            "force": (*(-force[::-1]), 0.0, *force),
+        }
+
+
+class TwoSidedTable:
+    """A curve through zero with its own rises on each side."""
+
+    def __init__(self, name: str, scale: Scale, knots: int, about: bool) -> None:
+        """Knots of each side, equally spaced up to the stroke; of angle and torque if it turns about an axis."""
+        self.name = name
+        self.position = scale.stroke * np.arange(1, knots + 1) / knots
+        self._names = ("angle", "torque") if about else ("displacement", "force")
+        unit = TORQUE if about else FORCE
+        self.unknowns = tuple(
+            Unknown(f"{name}.rise_{side}{k + 1}", 0.0, scale.force, unit)
+            for side in ("plus_", "minus_")
+            for k in range(knots)
+        )
+
+    def curve(self, rises: FloatArray) -> dict[str, tuple[float, ...]]:
+        """The table of these rises, as a mapping."""
+        plus, minus = (np.cumsum(part) for part in np.split(rises, 2))
+        ends = ((*(-self.position[::-1]), 0.0, *self.position), (*(-minus[::-1]), 0.0, *plus))
+        return dict(zip(self._names, ends, strict=True))

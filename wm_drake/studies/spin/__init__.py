@@ -1,0 +1,1 @@
+"""Run the loads of a machine through its spin profile and collect what a report shows."""

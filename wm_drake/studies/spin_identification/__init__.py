@@ -1,0 +1,1 @@
+"""Identify numbers of a machine from RMS displacements of spin cycles."""
