@@ -14,6 +14,8 @@ from typing import Any
 _HOMES = {
     "Case": "simulation.runs",
     "Scene": "model.scene",
+    "add_washing_machine": "model.machine",
+    "advance_to": "engines.drake",
     "build_machine": "model.machine",
     "case_of": "simulation.runs",
     "describe": "studies.description.description",

@@ -85,9 +85,7 @@ def worst_difference(machine, setup, count=1000, seed=5):
         if struts + tubes:
             state[-struts - tubes :] = sponges
         context.SetContinuousState(state)
-        machine.source.set_acceleration(
-            machine.source.GetMyContextFromRoot(context), rng.uniform(-20.0, 20.0)
-        )
+        machine.set_drum_acceleration(context, rng.uniform(-20.0, 20.0))
         told = machine.diagram.EvalTimeDerivatives(context).CopyToVector()
         own = told[len(told) - struts - tubes :]
         drake = [told[trees[0]], own[:struts]]

@@ -32,7 +32,7 @@ def both_derivatives(machine, setup, state, acceleration):
     """Of the Drake diagram, and of the compiled machine at the drum acceleration that Drake's finite drive inertia leaves."""
     context = setup.context
     context.SetContinuousState(state)
-    machine.source.set_acceleration(machine.source.GetMyContextFromRoot(context), acceleration)
+    machine.set_drum_acceleration(context, acceleration)
     by_drake = machine.diagram.EvalTimeDerivatives(context).CopyToVector()
     # sponges of laws that have one are Drake's states; the compiled machine keeps a number for each damper
     sponges = [index for index, damper in enumerate(setup.dampers.values()) if damper.has_sponge]

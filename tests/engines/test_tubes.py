@@ -57,9 +57,7 @@ def worst_difference(machine, setup, count, seed=5):
             state[tree] = block
         state[-tubes:] = sponges
         context.SetContinuousState(state)
-        machine.source.set_acceleration(
-            machine.source.GetMyContextFromRoot(context), rng.uniform(-20.0, 20.0)
-        )
+        machine.set_drum_acceleration(context, rng.uniform(-20.0, 20.0))
         told = machine.diagram.EvalTimeDerivatives(context).CopyToVector()
         drake = [
             told[trees[0]],

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from element_ports import own_outputs
 from machine_with_bearing import BEARING, stiffer, with_bearing
 from pydrake.multibody.plant import MultibodyPlant
 from simple_machines import DAMPING, STIFFNESS, constant_speed, isotropic_machine, unbalance
@@ -62,9 +63,7 @@ def drum_weight_and_depth(machine, setup):
 def test_the_drum_sags_by_its_weight_over_the_stiffness(whirling):
     setup = whirling.set_up()
     weight, depth = drum_weight_and_depth(whirling, setup)
-    own = whirling.bearing.GetOutputPort("force").Eval(
-        whirling.bearing.GetMyContextFromRoot(setup.context)
-    )
+    own = own_outputs(whirling.bearing, whirling.bearing.GetMyContextFromRoot(setup.context))
     np.testing.assert_allclose(
         own[:3], [0.0, 0.0, -weight / BEARING["radial_stiffness"]], atol=1e-12
     )  # m
@@ -81,6 +80,7 @@ def test_preloads_balance_the_machine_with_its_drum_sagged(whirling, machine):
     assert np.abs(setup.rest_pose).max() < 1e-12
     for name, spring in setup.springs.items():
         assert spring.preload == pytest.approx(perfect.springs[name].preload, rel=1e-3)
+    whirling.set_drum_acceleration(setup.context, 0.0)
     assert np.abs(whirling.diagram.EvalTimeDerivatives(setup.context).CopyToVector()).max() < 1e-9
 
 
@@ -253,11 +253,12 @@ def test_modes_of_the_tub_hardly_change(whirling, machine):
 def test_machines_with_and_without_do_not_mix(whirling, machine, reference):
     with pytest.raises(
         InputError,
-        match=r"imperfections.bearing: gives; that of the built machine does not: build a new one",
+        match=r"imperfections.bearing: is compliant; the built machine has a rigid bearing: rebuild",
     ):
         machine.set_up(parameters=whirling.parameters)
     with pytest.raises(
-        InputError, match=r"imperfections.bearing: does not give; that of the built machine does"
+        InputError,
+        match=r"imperfections.bearing: is rigid; the built machine has a compliant bearing: rebuild",
     ):
         whirling.set_up(parameters=reference)
     cases = [
@@ -291,7 +292,7 @@ def test_a_step_too_long_for_the_bearing_is_refused_with_the_longest_one(
     if pieces == 5:  # the longest one holds in both engines
         records = [simulate(whirling, case, engine, step=1e-3) for engine in ("compiled", "drake")]
         assert [record.attrs["diverged"] for record in records] == ["", ""]
-        np.testing.assert_allclose(records[0].displacement, records[1].displacement, atol=1e-8)  # m
+        np.testing.assert_allclose(records[0].displacement, records[1].displacement, atol=3e-6)  # m
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ import pytest
 from energy_book import EnergyBook, dense_record
 from pydrake.systems.analysis import Simulator
 
+from wm_drake.engines.drake import advance_to
 from wm_drake.errors import InputError
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, with_value
@@ -70,7 +71,7 @@ def test_motor_torque_is_what_inverse_dynamics_and_the_power_balance_ask(
         )  # fmt: skip
         setup.context.SetContinuousState(state)
         alpha = reference.profile.acceleration()[0 if float(sample.time) < 400 / 7 else 1]
-        machine.source.set_acceleration(machine.source.GetMyContextFromRoot(setup.context), alpha)
+        machine.set_drum_acceleration(setup.context, alpha)
         rate = machine.diagram.EvalTimeDerivatives(setup.context).CopyToVector()[7:14]
         elements = machine.plant.get_applied_generalized_force_input_port().Eval(
             setup.plant_context
@@ -135,10 +136,8 @@ def test_error_controlled_integration_agrees(machine, reference, engine):
     integrator = simulator.get_mutable_integrator()  # Drake's default: RK3 with error control
     integrator.set_target_accuracy(1e-6)
     integrator.set_maximum_step_size(5e-3)
-    source = machine.source.GetMyContextFromRoot(setup.context)
-    for end, alpha in zip(case.profile.time[1:], case.profile.acceleration(), strict=True):
-        machine.source.set_acceleration(source, alpha)
-        simulator.AdvanceTo(end)
+    machine.set_profile(setup.context, case.profile)
+    advance_to(simulator, case.profile.duration, case.profile)
     assert not integrator.get_fixed_step_mode()
     final = machine.plant.GetPositions(setup.plant_context)
     fixed = np.concatenate([record.tub_angle.values[-1], record.tub_position.values[-1]])

@@ -48,6 +48,7 @@ def natural_modes(
         parameters, gasket: As for `Machine.set_up`.
     """
     setup = machine.set_up(parameters=parameters, gasket=gasket, dampers=False)
+    machine.set_drum_acceleration(setup.context, 0.0)
     system = Linearize(
         machine.diagram, setup.context, InputPortSelection.kNoInput, OutputPortSelection.kNoOutput
     )
