@@ -26,7 +26,7 @@ Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
 
 DEFAULT_STEP = 2.5e-3
 """Integration step; a whole part of the output period. At a tenth of it the compiled engine's peaks with
-gasket move by less than 0.05 %, Drake's by less than 0.1 % (tested); DECISIONS, "Default step 2.5 ms", has the rest. [s]"""
+gasket move by less than 0.05 %, Drake's by less than 0.1 % (tested); see docs/decisions/0007. [s]"""
 
 
 class InertiaMatrix(Frozen):
