@@ -33,7 +33,7 @@ from wm_drake import (
     with_values,
 )
 from wm_drake.compiler.lanes import WIDTH
-from wm_drake.engines.compiled.alone import Alone
+from wm_drake.engines.compiled.derivative import StateDerivative
 from wm_drake.engines.compiled.integration import integrate_lanes
 from wm_drake.engines.compiled.packing import initial_state
 from wm_drake.model.machine import Machine
@@ -135,10 +135,10 @@ def one_run(machine: Machine, size: Size) -> Iterator[str]:
 def by_lsoda(machine: Machine, case: Case) -> None:
     """The motion by scipy's stiff integrator, piece by piece of the profile."""
     setup = machine.set_up(case.load)
-    alone, x = Alone(setup), initial_state(setup, case.profile)
+    derivative, x = StateDerivative(setup), initial_state(setup, case.profile)
 
     def rate(_: float, x: np.ndarray, acceleration: float) -> np.ndarray:
-        return alone.derivative(x, acceleration)
+        return derivative(x, acceleration)
 
     corners = case.profile.time
     for begin, end, acceleration in zip(

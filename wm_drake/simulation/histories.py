@@ -108,41 +108,6 @@ def in_bounds(x, angle, displacement):
 
 
 @law
-def measure_samples(samples, rows, size, bounds, p, gasket, points, count, x, moved, extremes):
-    """Displacements at measured points, and the largest values of a run up to the first sample out of bounds.
-
-    Args:
-        samples: Samples, one after the other, each with the state first.
-        rows, size: How many they are, and how many numbers each has.
-        bounds: Largest angle and displacement of the tub at which a run goes on. [rad, m]
-        p, gasket: Packed numbers and where the gasket begins in them, -1 without one.
-        points, count: Measured points, one after the other, and how many they are.
-        x: The plant's part of a state, to work in.
-        moved: Displacement at each sample and point, written. [m]
-        extremes: Written: largest absolute displacement at each point [m]; largest absolute force and moment of the
-            gasket on the housing, x, y, z [N, N m]; number of samples in bounds.
-    """
-    zero = 0.0 * p[0]
-    for k in range(count + 7):
-        extremes[k] = zero
-    good = zero + 1.0
-    for row in range(rows):
-        for k in range(PLANT_STATE_SIZE):
-            x[k] = samples[row * size + k]
-        good = good * in_bounds(x, bounds[0], bounds[1])
-        motion = tub_motion(x)
-        for k in range(count):
-            value = displacement_at(motion, points, k * POINT_SIZE)
-            moved[row * count + k] = value
-            extremes[k] = larger(extremes[k], value, good)
-        if gasket >= 0:
-            _, on_housing = six_component_bushing_wrench(motion, p, gasket)
-            for k in range(6):
-                extremes[count + k] = larger(extremes[count + k], on_housing[k], good)
-        extremes[count + 6] = extremes[count + 6] + good
-
-
-@law
 def larger(largest, value, good):
     """The largest absolute value so far, after one more, which counts if it is good."""
     size = abs(value)
@@ -150,11 +115,40 @@ def larger(largest, value, good):
 
 
 @long_running
-def measure_samples_lanes(
-    samples, rows, size, bounds, p, gasket, points, count, x, moved, extremes
-):
-    """`measure_samples` of `lanes.WIDTH` machines side by side."""
+def measure_samples_lanes(samples, rows, size, bounds, p, gasket, points, count, moved, extremes):
+    """Measure `lanes.WIDTH` runs side by side, each up to its first sample out of bounds.
+
+    All arrays of floats are flat arrays of lanes.
+
+    Args:
+        samples: Samples, one after the other, each with the state first.
+        rows, size: Number of samples, and of the numbers in each.
+        bounds: Largest angle and displacement of the tub at which a run goes on. [rad, m]
+        p, gasket: Packed numbers and index of the gasket in them, -1 without one.
+        points, count: Measured points, one after the other, and their number.
+        moved: Displacement at each sample and point, written. [m]
+        extremes: Written: largest absolute displacement at each point [m]; largest absolute force
+            and moment of the gasket on the housing, x, y, z [N, N m]; number of samples in bounds.
+    """
     align_stack()
-    runs = (lane_array(samples), rows, size, bounds)
-    measured = (lane_array(points), count, lane_array(x), lane_array(moved), lane_array(extremes))
-    measure_samples(*runs, lane_array(p), gasket, *measured)
+    x_numbers = np.empty(PLANT_STATE_SIZE * WIDTH)
+    x, states, numbers = lane_array(x_numbers), lane_array(samples), lane_array(p)
+    measured, values, largest = lane_array(points), lane_array(moved), lane_array(extremes)
+    zero = 0.0 * numbers[0]
+    for k in range(count + 7):
+        largest[k] = zero
+    good = zero + 1.0
+    for row in range(rows):
+        for k in range(PLANT_STATE_SIZE):
+            x[k] = states[row * size + k]
+        good = good * in_bounds(x, bounds[0], bounds[1])
+        motion = tub_motion(x)
+        for k in range(count):
+            value = displacement_at(motion, measured, k * POINT_SIZE)
+            values[row * count + k] = value
+            largest[k] = larger(largest[k], value, good)
+        if gasket >= 0:
+            _, on_housing = six_component_bushing_wrench(motion, numbers, gasket)
+            for k in range(6):
+                largest[count + k] = larger(largest[count + k], on_housing[k], good)
+        largest[count + 6] = largest[count + 6] + good

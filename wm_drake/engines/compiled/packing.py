@@ -51,13 +51,11 @@ class Layout:
             np.array(indices, dtype=np.int64)
             for indices in (self.springs, self.dampers, self.bushings, self.telescopes)
         )
-        deformations = STATE_SIZE + np.arange(len(dampers))
         bearing = self.bearing if self.bearing >= 0 else None
         tubes = STATE_SIZE + len(dampers)
         return Elements(
             springs,
             dampers,
-            deformations,
             bushings,
             telescopes if self.telescopes else None,
             bearing,
@@ -148,6 +146,21 @@ def aligned(size: int) -> FloatArray:
     raw = np.zeros(size + WIDTH)
     begin = (-raw.ctypes.data // raw.itemsize) % WIDTH
     return raw[begin : begin + size]
+
+
+def fill_lanes(lanes: FloatArray, runs: list[FloatArray]) -> FloatArray:
+    """Write arrays of up to `WIDTH` runs into a flat array of lanes; idle lanes repeat the last run.
+
+    Args:
+        lanes: (size * WIDTH,), written.
+        runs: Array (size,) of each run.
+
+    Returns:
+        The array of lanes.
+    """
+    idle = WIDTH - len(runs)
+    lanes.reshape(-1, WIDTH)[:] = np.stack([*runs, *runs[-1:] * idle], axis=1)
+    return lanes
 
 
 def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:

@@ -82,7 +82,7 @@ def tube_accelerations(motion, s, s_rate, wrench, along, gravity, p, at):
 
 
 @law
-def with_telescopes(x, dx, motion, gravity, p, telescopes, first, total):
+def add_telescopic_dampers(x, dx, motion, gravity, p, telescopes, first, total):
     """Writes the derivatives of the tubes' states into `dx`.
 
     Args:
@@ -121,7 +121,7 @@ def with_telescopes(x, dx, motion, gravity, p, telescopes, first, total):
 
 
 @law
-def count_of(telescopes):
+def telescopic_damper_count(telescopes):
     """How many telescopic dampers there are."""
     if telescopes is None:
         return 0
