@@ -80,7 +80,9 @@ def bushing(kind, a, p_a, r_a, b, p_b, r_b):
 def balance(machine, setup, load, profile, step):
     """Work of the drive, change of stored energy, dissipated energy. [J]"""
     parameters = setup.parameters
-    run = run_compiled(setup, profile, step, lambda fraction: None, period=step)  # samples each step
+    run = run_compiled(
+        setup, profile, step, lambda fraction: None, period=step
+    )  # samples each step
     time, motion, deformation, tubes = run.time, run.state, run.deformation, run.tubes
     tub, ground = Motion(motion), still(len(time))
     stored, power = 0.0, 0.0

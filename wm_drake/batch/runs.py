@@ -1,4 +1,4 @@
-"""Jobs -> ended runs: several side by side, measured as they end."""
+"""Work items -> results: several runs side by side, measured as they end."""
 
 import threading
 from collections.abc import Iterable
@@ -36,22 +36,22 @@ MEASURES = {
     "gap": ("smallest_gap",),
     "regions": ("region_displacement", "region_displacement_integrated"),
 }
-"""What can be measured of each run, and the variables that gives."""
+"""What can be measured of each run, with the names of its variables."""
 
 _FILTERED = {"amplitudes", "power means"}
-"""Measures of the filtered displacements at the sensors."""
+"""Measures that need the filtered displacements at the sensors."""
 
 
 @dataclass(frozen=True)
 class RunResult:
-    """A run that has ended.
+    """The result of one run.
 
     Attributes:
-        number: Of its case, in the order given.
-        case: What was run.
+        number: Number of its case, in the given order.
+        case: The case.
         values: Measures by name. SI.
-        diverged: When and why it stopped early; "" if it did not.
-        record: Its history, if that was asked for.
+        diverged: When and why the run stopped early; "" if it did not.
+        record: Its history; None if histories were not requested.
     """
 
     number: int
@@ -80,22 +80,22 @@ class Runner:
         self.stopped = threading.Event()
         self._memory = threading.local()
 
-    def run(self, kind: BatchKey, work_items: list[WorkItem]) -> list[RunResult]:
+    def run(self, key: BatchKey, work_items: list[WorkItem]) -> list[RunResult]:
         """Run up to `WIDTH` work items side by side and measure them.
 
         Returns:
             A result for each work item; none if `stopped` was set meanwhile.
         """
-        schedule = schedule_of(kind.profile, self.step, OUTPUT_PERIOD)
+        schedule = schedule_of(key.profile, self.step, OUTPUT_PERIOD)
         # without amplitudes only the detergent point is followed, which comes last
         first = 0 if _FILTERED & set(self.measures) else -3 * POINT_SIZE
         points = [item.numbers.points[first:] for item in work_items]
         rows, count = len(schedule.time), len(points[0]) // POINT_SIZE
-        size = len(work_items[0].begin) + kind.layout.rates_size
+        size = len(work_items[0].begin) + key.layout.rates_size
         p = self._lanes("packed", [item.packed for item in work_items])
         x = self._lanes("begin", [item.begin for item in work_items])
         samples = self._array("samples", rows * size)
-        for _ in integrate_runs(schedule, kind.layout, p, x, samples):
+        for _ in integrate_runs(schedule, key.layout, p, x, samples):
             if self.stopped.is_set():
                 return []
         moved, extremes = self._array("moved", rows * count), self._array("extremes", count + 7)
@@ -105,7 +105,7 @@ class Runner:
             size,
             (LARGEST_ANGLE, LARGEST_DISPLACEMENT),
             p,
-            kind.layout.gasket,
+            key.layout.gasket,
             self._lanes("points", points),
             count,
             moved,
@@ -117,11 +117,11 @@ class Runner:
             extremes.reshape(-1, WIDTH),
         )
         return [
-            self._ended(item, schedule, *(a[..., lane] for a in histories))
+            self._result(item, schedule, *(a[..., lane] for a in histories))
             for lane, item in enumerate(work_items)
         ]
 
-    def _ended(
+    def _result(
         self,
         item: WorkItem,
         schedule: Schedule,
@@ -129,10 +129,8 @@ class Runner:
         moved: FloatArray,
         extremes: FloatArray,
     ) -> RunResult:
-        good, sensors = (
-            int(extremes[-1]),
-            moved.shape[1] - 3,
-        )  # the last three points are the detergent point's
+        # the last three points are the detergent point's
+        good, sensors = int(extremes[-1]), moved.shape[1] - 3
         values: dict[str, FloatArray] = {}
         if _FILTERED & set(self.measures):
             displacement = filtered(moved[:good, :sensors], OUTPUT_PERIOD)
@@ -172,7 +170,7 @@ class Runner:
 
     def _gap(self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray) -> FloatArray:
         kept = self._memory.__dict__
-        if "scene" not in kept:  # one for each thread: a scene is in one pose at a time
+        if "scene" not in kept:  # one for each thread: a scene has one pose at a time
             kept["scene"] = Scene(self.parameters)
         gap = kept["scene"].smallest_gap(time, poses, rest_pose)
         return np.array(np.nan if gap is None else gap.distance)
@@ -190,9 +188,9 @@ class Runner:
 
 
 def _divergence(time: FloatArray, samples: FloatArray, good: int) -> str:
-    """What a record of the run would say."""
+    """Return why and when a run diverged, as its record has it; "" if it did not."""
     if good == len(time):
         return ""
     reason = diverging_coordinate(samples[good])
-    assert reason is not None  # the first sample out of bounds
+    assert reason is not None  # this is the first sample out of bounds
     return divergence_text(Divergence(float(time[good]), *reason), time[:good], samples[:good])

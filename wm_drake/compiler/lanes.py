@@ -19,6 +19,7 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.compiler import Compiler
 from numba.core.typeconv import Conversion
+from numba.core.types.containers import BaseTuple
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
@@ -38,7 +39,7 @@ class _InternalType(types.Type):
 
 
 class LanesType(_InternalType):
-    """Type of `WIDTH` floats; a plain number combined with it becomes the same number in each lane."""
+    """Type of `WIDTH` floats; a number that meets it becomes the same number in each lane."""
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Conversion | None:
         """Return how a number converts; None for other types."""
@@ -106,7 +107,10 @@ def _declare(
     emit: Callable[..., Any],
     mixed: bool = False,
 ) -> None:
-    """Add an operation on `kinds` to the compiler; `mixed` allows numbers in place of some lanes."""
+    """Add an operation on `kinds` to the compiler.
+
+    With `mixed`, some of the arguments may be numbers, which become lanes.
+    """
 
     def fits(given: tuple[Any, ...]) -> bool:
         if not mixed or kinds[0] not in given:
@@ -233,7 +237,7 @@ def _address_of(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 @intrinsic
 def align_stack(typing_context):
-    """Align the vectors on the stack of the calling function, so that one load reads one of them."""
+    """Align the vectors on the stack of the calling function, so that one load reads each."""
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         with builder.goto_entry_block():
@@ -303,6 +307,6 @@ class LawCompiler(Compiler):
 
 def _is_internal(kind: Any) -> bool:
     """Return whether no Python value has this type."""
-    if isinstance(kind, types.BaseTuple):
+    if isinstance(kind, BaseTuple):
         return any(map(_is_internal, kind.types))
     return isinstance(kind, _InternalType)

@@ -1,4 +1,4 @@
-"""The time derivative of a machine's state, for integrators other than the engine's and for tests."""
+"""The time derivative of a machine's state, for integrators of other packages and for tests."""
 
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.integration import derivative_lanes

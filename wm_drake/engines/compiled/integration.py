@@ -1,4 +1,4 @@
-"""The classical fourth-order Runge-Kutta scheme at fixed steps, for several machines side by side."""
+"""The classical fourth-order Runge-Kutta scheme at fixed steps, for `WIDTH` machines."""
 
 from wm_drake.compiler.compilation import long_running
 from wm_drake.compiler.elementary import sine_cosine
@@ -69,9 +69,14 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
 
 @long_running
 def derivative_lanes(x, dx, acceleration, p, elements):
-    """Evaluate `state_derivative` for `lanes.WIDTH` machines at one acceleration of the drum [rad/s^2].
+    """Evaluate `state_derivative` for `lanes.WIDTH` machines.
 
-    The arrays are flat arrays of lanes; the drum's angle and rate are read from the state.
+    Args:
+        x: States; the drum's angle and rate are read from them.
+        dx: Time derivatives, written.
+        acceleration: Acceleration of the drum, the same for all machines. [rad/s^2]
+        p: Packed numbers.
+        elements: `Elements`, which all machines have in common.
     """
     align_stack()
     state, numbers = lane_array(x), lane_array(p)

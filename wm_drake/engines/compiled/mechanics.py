@@ -1,4 +1,4 @@
-"""Rigid-body mechanics of the compiled engine: a floating tub and a drum that turns in it as prescribed.
+"""Rigid-body mechanics of the compiled engine: a floating tub and a drum with prescribed rotation.
 
 Own derivation; the tests compare it with the Drake plant. All vectors are in the tub frame T, all
 moments about a point O of the drum axis:
@@ -12,8 +12,8 @@ O; a: unit vector of the axis, along the drum's rotation against the tub. The dr
 the drum angle exactly: for a body that turns about a fixed axis they contain the first and second
 harmonic of the angle and no other.
 
-Packed numbers of the bodies, from index 0 (`wm_drake.engines.compiled.packing`): gravity vector in W
-[m/s^2]; 1/M [1/kg]; a; position of O from To [m]; S_t [kg m]; I_t as xx, yy, zz, xy, xz, yz
+Packed numbers of the bodies, from index 0 (`wm_drake.engines.compiled.packing`): gravity vector in
+W [m/s^2]; 1/M [1/kg]; a; position of O from To [m]; S_t [kg m]; I_t as xx, yy, zz, xy, xz, yz
 [kg m^2]; s_d, three times its mean, cosine and sine part; J_d, six times its mean, cosine, sine,
 double cosine and double sine part; damping of the drum joint [N m s/rad].
 
@@ -72,7 +72,7 @@ packed numbers, None if the bearing is rigid; tubes: index of the telescopic dam
 MassProperties = namedtuple(
     "MassProperties", ("drum_moment", "drum_inertia", "moment", "inverse_inertia")
 )
-"""At one drum angle: s_d, J_d, S, and the inverse of the inertia about the common centre of mass."""
+"""s_d, J_d, S and the inverse of the inertia about the common centre of mass, at a drum angle."""
 
 
 @law
