@@ -9,6 +9,11 @@ from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.model.bodies import add_bodies, add_load, set_bodies
 
 
+def dense_run(setup, profile, step):
+    """Return the trajectory of a run with a sample at every step."""
+    return run_compiled(setup, profile, step, lambda fraction: None, period=step)
+
+
 class Motion:
     """Of a body: rotation, position, velocities, at all samples."""
 
@@ -80,9 +85,7 @@ def bushing(kind, a, p_a, r_a, b, p_b, r_b):
 def balance(machine, setup, load, profile, step):
     """Work of the drive, change of stored energy, dissipated energy. [J]"""
     parameters = setup.parameters
-    run = run_compiled(
-        setup, profile, step, lambda fraction: None, period=step
-    )  # samples each step
+    run = dense_run(setup, profile, step)
     time, motion, deformation, tubes = run.time, run.state, run.deformation, run.tubes
     tub, ground = Motion(motion), still(len(time))
     stored, power = 0.0, 0.0
