@@ -15,7 +15,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from wm_drake import Case, build_machine, load_machine, simulate
-from wm_drake.engines.compiled.alone import Alone
+from wm_drake.engines.compiled.derivative import StateDerivative
 from wm_drake.engines.compiled.packing import initial_state
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters, SpinProfile
@@ -30,11 +30,11 @@ PERIOD = 5e-3
 def by_radau(machine: Machine, case: Case, rtol: float) -> tuple[np.ndarray, np.ndarray]:
     """States every 5 ms, and displacements of the accelerometers."""
     setup = machine.set_up(case.load)
-    alone, x = Alone(setup), initial_state(setup, case.profile)
+    derivative, x = StateDerivative(setup), initial_state(setup, case.profile)
     (acceleration,) = case.profile.acceleration()
 
     def rate(_: float, x: np.ndarray) -> np.ndarray:
-        return alone.derivative(x, acceleration)
+        return derivative(x, acceleration)
 
     samples = np.arange(round(case.profile.duration / PERIOD) + 1) * PERIOD
     limits = {"rtol": rtol, "atol": 1e-3 * rtol, "max_step": 0.01}

@@ -7,7 +7,7 @@ import pytest
 from machine_with_bearing import with_bearing
 from machines_of_each_kind import machines_of_each_kind
 
-from wm_drake.engines.compiled.alone import Alone
+from wm_drake.engines.compiled.derivative import StateDerivative
 from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.errors import InputError
 from wm_drake.model.bodies import sdf_path
@@ -69,9 +69,9 @@ def random_states(rng, coordinates, sponges):
 
 
 def worst_difference(machine, setup, count=1000, seed=5):
-    """Largest relative difference of the derivative of Drake's state and the compiled machine's, per vector."""
+    """Return the largest relative difference between the time derivatives of both engines, per vector."""
     rng, context, trees = np.random.default_rng(seed), setup.context, machine.state_layout.states()
-    alone = Alone(setup)
+    derivative = StateDerivative(setup)
     struts, tubes = len(setup.dampers), len(setup.telescopes)
     worst = 0.0
     without_joint = np.delete(np.arange(14), (6, 13))
@@ -100,7 +100,7 @@ def worst_difference(machine, setup, count=1000, seed=5):
             for block, delta in zip(blocks[1:-1], sponges[struts:], strict=True)
         ]
         x = np.concatenate([*x, blocks[-1][without_joint]])
-        dx = alone.derivative(x, told[trees[0]][DRUM_RATE])
+        dx = derivative(x, told[trees[0]][DRUM_RATE])
         compiled = np.split(dx, np.cumsum([len(part) for part in drake])[:-1])
         compiled[-1] = np.insert(compiled[-1], (6, 12), (told[trees[0]][6], told[trees[0]][13]))
         for mine, its in zip(compiled, drake, strict=True):

@@ -1,9 +1,13 @@
 """The compiled engine against the Drake engine: trajectories, peaks, every kind of machine, divergence, repetition."""
 
+import warnings
+
 import numpy as np
 import pytest
+import xarray as xr
 from machines_of_each_kind import machines_of_each_kind
 
+from wm_drake.engines.compiled import run
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance
 from wm_drake.simulation.measures import measure
@@ -107,6 +111,21 @@ def test_a_run_that_diverges_says_what_drakes_says(machine):
     )  # at the same sample
     assert compiled.sizes["time"] == drake.sizes["time"]
     assert np.isfinite(compiled.displacement).all()
+
+
+@pytest.mark.parametrize("mass", [0.3, 60.0])  # kg; the second run diverges
+def test_where_the_integration_pauses_changes_no_bit(machine, monkeypatch, mass):
+    load = Load(unbalances=(Unbalance(mass=mass, radius=0.3, y=0.1),))
+    profile = SpinProfile(time=(0.0, 1.0031, 8.0), speed=(0.0, 8.0, 29.3))  # a corner off samples
+    records = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DivergenceWarning)
+        for steps in (run.PAUSE_STEPS, 1, 7, 10**6):
+            monkeypatch.setattr(run, "PAUSE_STEPS", steps)
+            records.append(simulate(machine, Case("case", load, profile)))
+    assert bool(records[0].attrs["diverged"]) == (mass > 1.0)
+    for record in records[1:]:
+        xr.testing.assert_identical(record, records[0])
 
 
 def test_progress_runs_to_one(machine, reference):

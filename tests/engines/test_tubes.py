@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from telescopic_machine import RUN_UP, changed, telescopic, with_bushing
 
-from wm_drake.engines.compiled.alone import Alone
+from wm_drake.engines.compiled.derivative import StateDerivative
 from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.errors import InputError
@@ -42,9 +42,9 @@ def built():
 
 
 def worst_difference(machine, setup, count, seed=5):
-    """Largest relative difference of the derivative of Drake's state and the compiled machine's, per vector."""
+    """Return the largest relative difference between the time derivatives of both engines, per vector."""
     rng, context, trees = np.random.default_rng(seed), setup.context, machine.state_layout.states()
-    alone, tubes = Alone(setup), len(setup.telescopes)
+    derivative, tubes = StateDerivative(setup), len(setup.telescopes)
     worst = 0.0
     for _ in range(count):
         blocks = [
@@ -72,7 +72,7 @@ def worst_difference(machine, setup, count, seed=5):
                 ),
             ]
         )
-        dx = alone.derivative(x, told[trees[0]][DRUM_RATE])
+        dx = derivative(x, told[trees[0]][DRUM_RATE])
         for mine, its in zip(np.split(dx, 14 + 15 * np.arange(tubes)), drake, strict=True):
             for part in VECTORS:
                 scale = np.max(np.abs(its[part]), initial=1e-3)

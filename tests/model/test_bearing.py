@@ -6,7 +6,7 @@ from element_ports import own_outputs
 from machine_with_bearing import BEARING, stiffer, with_bearing
 from pydrake.multibody.plant import MultibodyPlant
 from simple_machines import DAMPING, STIFFNESS, constant_speed, isotropic_machine, unbalance
-from tube_energy import Motion, bushing, dense_states, still
+from tube_energy import Motion, bushing, dense_run, still
 
 from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
@@ -168,8 +168,8 @@ def test_energy_of_a_run_is_balanced():
     machine = build_machine(parameters)
     load, profile = unbalance(0.5, y=-0.1), SpinProfile(time=(0.0, 2.0), speed=(30.0, 120.0))
     setup = machine.set_up(load)
-    time, samples, torque, layout = dense_states(setup, profile, 1e-4)
-    motion, _, _, carrier = layout.parts(samples)
+    run = dense_run(setup, profile, 1e-4)
+    time, motion, carrier, torque = run.time, run.state, run.carrier, run.motor_torque
     tub, drum = Motion(motion), Motion(np.insert(carrier, (6, 12), 0.0, axis=1))
     stored, power = 0.0, 0.0
     for kind, a, placed, b in (

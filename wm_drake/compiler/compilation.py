@@ -20,6 +20,8 @@ import numba
 from numba.core import config
 from numba.core.dispatcher import Dispatcher
 
+from wm_drake.compiler.lanes import LawCompiler
+
 _ROOM = Path(__file__).parents[1]
 
 
@@ -40,7 +42,13 @@ def _cache_folder() -> str:
 
 def law(function: Callable[..., Any]) -> Any:
     """Compiles a law, with a cache on disk. Products and sums may fuse into one rounding; nothing else is reordered."""
-    return _compiled(function, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
+    return _compiled(
+        function,
+        pipeline_class=LawCompiler,
+        error_model="numpy",
+        forceinline=True,
+        fastmath={"contract", "nsz"},
+    )
 
 
 def long_running(function: Callable[..., Any]) -> Any:

@@ -11,7 +11,7 @@ from wm_drake.engines.compiled.packing import pack_on_tub
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.histories import position_history, reading_history
+from wm_drake.simulation.histories import position_history, output_history
 
 AXES = ("x", "y", "z")
 
@@ -205,7 +205,7 @@ def readings(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, ...]:
     begins = [np.array(of_kind, dtype=np.int64) for of_kind in indices.values()]
     sizes = [len(points), len(begins[0]), len(begins[1]), 6 * len(begins[2])]
     columns = np.empty((len(trajectory.time), sum(sizes)), order="F")
-    reading_history(trajectory.state, trajectory.deformation, points.ravel(), p, *begins, columns)
+    output_history(trajectory.state, trajectory.deformation, points.ravel(), p, *begins, columns)
     displacements, springs, dampers, bushings = np.split(columns, np.cumsum(sizes)[:-1], axis=1)
     return displacements, springs, dampers, bushings.reshape(len(columns), len(begins[2]), 6)
 
