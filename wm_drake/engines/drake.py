@@ -19,6 +19,10 @@ ACCURACY = 1e-5
 """Target accuracy of a step, relative to unit coordinates. Peaks then differ from converged ones by
 less than 0.1 % (tested)."""
 
+SMALLEST_STEP = 5e-5
+"""Smallest step of the error control, accepted with whatever error it has. [s] Coulomb friction jumps
+where the velocity changes its sign: across such a jump no step is short enough."""
+
 SAMPLES_BETWEEN_LOOKS = 100
 """Samples between checks for divergence and reports of progress: half a second of motion."""
 
@@ -93,6 +97,7 @@ def _simulator(setup: Setup, step: float, scheme: str, accuracy: float | None) -
         integrator.set_fixed_step_mode(True)
     else:
         integrator.set_target_accuracy(accuracy)
+        integrator.set_requested_minimum_step_size(min(SMALLEST_STEP, step))
         integrator.set_throw_on_minimum_step_size_violation(False)
     simulator.Initialize()
     return simulator

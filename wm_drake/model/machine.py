@@ -140,8 +140,10 @@ class MachineSystems:
     def set_profile(self, context: Context, profile: SpinProfile) -> None:
         """Set the spin profile to follow in a root Context, and the drum to its first speed."""
         self.spin_profile.set_profile(self.spin_profile.GetMyContextFromRoot(context), profile)
-        joint = self.plant.GetJointByName(self.parameters.drive.joint)
-        joint.set_angular_rate(self.plant.GetMyContextFromRoot(context), profile.speed[0])
+        plant_context = self.plant.GetMyContextFromRoot(context)
+        velocities = self.plant.GetVelocities(plant_context)
+        velocities[self.state_layout.drum] = profile.speed[0]
+        self.plant.SetVelocities(plant_context, velocities)
 
     def set_drum_acceleration(self, context: Context, acceleration: float) -> None:
         """Fix the drum's acceleration in a root Context, in place of the spin profile. [rad/s^2]
