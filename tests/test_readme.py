@@ -7,7 +7,8 @@ from wm_drake.model.machine import build_machine
 from wm_drake.parameters import SpinProfile, load_machine
 from wm_drake.parameters.free import load_free
 from wm_drake.report.diagram import mermaid
-from wm_drake.simulation.runs import Case, simulate
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.runs import simulate
 from wm_drake.studies.calibration.parameter_map import turning_of
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")

@@ -18,7 +18,7 @@ from wm_drake.batch.cluster import (
 from wm_drake.batch.ledger import Ledger, open_ledger
 from wm_drake.errors import InputError
 from wm_drake.parameters import SpinProfile, with_value
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 
 SHORT = SpinProfile(time=(0.0, 3.0), speed=(5.0, 20.0))
 

@@ -10,7 +10,7 @@ from wm_drake.batch import SimulationInterrupted, run_keys, simulate_many, simul
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import SpinProfile, with_value
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 
 SHORT = SpinProfile(time=(0.0, 3.0), speed=(5.0, 20.0))
 IDENTITY = {"study": "test"}

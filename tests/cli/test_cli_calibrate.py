@@ -9,8 +9,9 @@ import pytest
 
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import load_machine, with_value
+from wm_drake.simulation.cases import case_of
 from wm_drake.simulation.measures import measure
-from wm_drake.simulation.runs import case_of, simulate
+from wm_drake.simulation.runs import simulate
 
 SHORT = "extends: reference\nname: short\nmeasured: []\nprofile: {time: '(0, 12) s', speed: '(40, 270) rpm'}\n"
 FREE = """quantities:

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from machine_with_bearing import BEARING, UNITS
 
-from wm_drake.simulation.runs import versions
+from wm_drake.simulation.records import versions
 
 PROFILE = """
 time: (0, 4, 6) s

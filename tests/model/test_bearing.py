@@ -20,8 +20,9 @@ from wm_drake.parameters import (
     machine_yaml,
     with_value,
 )
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
-from wm_drake.simulation.runs import Case, simulate
+from wm_drake.simulation.runs import simulate
 from wm_drake.studies.description.modal import natural_modes
 
 RUN_UP = SpinProfile(time=(0.0, 3.0), speed=(5.0, 30.0))

@@ -8,7 +8,7 @@ import pytest
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.free import load_free
 from wm_drake.report.calibration.report import calibration_report, knowledge, summary
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 from wm_drake.studies.calibration.calibration import Calibration, Plan
 from wm_drake.studies.calibration.parameter_map import turning_of
 from wm_drake.studies.calibration.prediction import Prediction

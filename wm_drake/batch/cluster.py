@@ -18,7 +18,8 @@ from wm_drake.batch.runs import MEASURES
 from wm_drake.errors import WmDrakeError, input_error
 from wm_drake.model.machine import Machine, build_machine
 from wm_drake.parameters import MachineParameters
-from wm_drake.simulation.runs import DEFAULT_STEP, Case
+from wm_drake.parameters.machine import DEFAULT_STEP
+from wm_drake.simulation.cases import Case
 
 PARCEL = 32
 """Runs a parcel: a fifth of a second of work, against some milliseconds to send it."""

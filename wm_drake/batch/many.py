@@ -13,7 +13,9 @@ from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.runs import AXES, Case, checked_step
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.outputs import AXES
+from wm_drake.simulation.runs import checked_step
 
 _VARIABLES = {
     "detergent_displacement": (

@@ -13,7 +13,9 @@ from wm_drake.batch.runs import MEASURES, RunResult
 from wm_drake.model.bodies import sdf_path
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
-from wm_drake.simulation.runs import Case, checked_step, versions
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.records import versions
+from wm_drake.simulation.runs import checked_step
 
 _ROOMS_AFTER = ("cli", "batch/ledger.py", "report", "rigs", "studies")
 """What of the package does not determine a run."""

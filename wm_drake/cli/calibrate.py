@@ -248,7 +248,7 @@ def _shown(
 ) -> "tuple[SpinResult, list[tuple[str, Modes]]]":
     """Spin runs and modes of the best solution, for the report."""
     from wm_drake.model.machine import build_machine
-    from wm_drake.simulation.runs import case_of
+    from wm_drake.simulation.cases import case_of
     from wm_drake.studies.calibration.outcome import solved_machine
     from wm_drake.studies.description.modal import natural_modes
     from wm_drake.studies.spin.study import run_spin

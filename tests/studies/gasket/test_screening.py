@@ -15,8 +15,9 @@ from wm_drake.parameters import (
     levels_of,
     load_factors,
 )
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
-from wm_drake.simulation.runs import Case, simulate
+from wm_drake.simulation.runs import simulate
 from wm_drake.studies.doe import Design, level_matrix, make_design
 from wm_drake.studies.gasket.screening import Responses, leading_terms, mean_at, run_screening
 from wm_drake.studies.gasket.study import RESPONSES, GasketTrials

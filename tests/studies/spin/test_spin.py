@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wm_drake.parameters import SpinProfile, load_machine
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 from wm_drake.studies.spin.study import run_spin
 
 SHORT = SpinProfile(time=(0.0, 2.0), speed=(0.0, 15.0))

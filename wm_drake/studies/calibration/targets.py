@@ -12,7 +12,7 @@ from wm_drake.model.machine import Machine, Setup
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 from wm_drake.studies.calibration.parameter_map import ParameterMap
 
 MILLIMETRE = Unit("m", "mm")

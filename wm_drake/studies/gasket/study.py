@@ -10,7 +10,8 @@ import xarray as xr
 
 from wm_drake.parameters import FactorLevels, MachineParameters, at_levels
 from wm_drake.parameters.units import Unit
-from wm_drake.simulation.runs import AXES, Case
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.outputs import AXES
 from wm_drake.studies.doe import Design
 from wm_drake.studies.gasket.screening import Responses
 

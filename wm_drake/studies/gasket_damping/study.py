@@ -18,8 +18,10 @@ from wm_drake.parameters import (
     with_values,
 )
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import envelopes
-from wm_drake.simulation.runs import Case, Record, simulate
+from wm_drake.simulation.records import Record
+from wm_drake.simulation.runs import simulate
 from wm_drake.studies.gasket_damping.grid_search import Search, bounded_search, grid_search
 
 UNKNOWNS = ("C_L", "C_T")

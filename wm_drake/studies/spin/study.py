@@ -14,15 +14,10 @@ from typing import Any
 from wm_drake.model.machine import Machine, build_machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import Measures, measure
-from wm_drake.simulation.runs import (
-    DEFAULT_ENGINE,
-    Case,
-    DivergenceWarning,
-    Record,
-    checked_step,
-    simulate,
-)
+from wm_drake.simulation.records import Record
+from wm_drake.simulation.runs import DEFAULT_ENGINE, DivergenceWarning, checked_step, simulate
 
 _IN_PROCESSES = {"drake"}
 """Engines whose cases run in processes of their own: seconds each, and Drake's Python callbacks take turns in one."""

@@ -10,7 +10,7 @@ from wm_drake.batch import simulate_many, simulate_remembered
 from wm_drake.batch.ledger import Ledger
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.vibration import record_region_displacements
 from wm_drake.studies.spin.study import CaseResult, run_spin
 from wm_drake.studies.spin_cycle.study import MEASURES, Evaluate

@@ -10,7 +10,8 @@ import xarray as xr
 from wm_drake.errors import input_error
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
-from wm_drake.simulation.runs import AXES, Case
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.outputs import AXES
 from wm_drake.simulation.vibration import relative_error
 
 MEASURES = ("regions", "gap")

@@ -12,7 +12,7 @@ from wm_drake.parameters import MachineParameters, SpinProfile, quantities, with
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.parameters.units import Unit
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 from wm_drake.studies.fitting import Fit, FitProblem, Measurement, Progress, Unknown, least_squares
 from wm_drake.studies.spin_cycle.study import DIMS, labels_of, runs_of
 
