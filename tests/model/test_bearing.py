@@ -312,7 +312,7 @@ def test_wrong_numbers_are_refused(whirling, key, value, message):
 def test_a_number_of_a_bearing_that_is_not_there_is_refused(reference):
     with pytest.raises(
         InputError,
-        match=r"the machine has none; a machine file describes 'imperfections.bearing' whole",
+        match=r"the machine has no 'imperfections.bearing'; to add it, write all of it in a",
     ):
         with_value(reference, "imperfections.bearing.radial_stiffness", "5 N/mm")
 

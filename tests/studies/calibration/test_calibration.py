@@ -122,7 +122,7 @@ FAULTS = {
         "quantities.friction.bounds: is missing",
     ),
     "one bound": (FREE.replace("(10, 60) N", "10 N"), "is not two numbers with a unit"),
-    "falling bounds": (FREE.replace("(10, 60) N", "(60, 10) N"), "the bounds must rise"),
+    "falling bounds": (FREE.replace("(10, 60) N", "(60, 10) N"), "lower bound must be below the upper"),
     "prior outside": (
         FREE.replace("(30, 10) N", "(70, 10) N"),
         "the expected value is outside the bounds",
