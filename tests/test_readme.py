@@ -9,7 +9,7 @@ from wm_drake.parameters.free import load_free
 from wm_drake.report.diagram import mermaid
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.calibration.parameter_map import turning_of
+from wm_drake.studies.calibration.parameter_map import parameter_map_of
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 
@@ -76,8 +76,8 @@ def test_the_example_of_a_free_file_fits_the_reference_machine(tmp_path, machine
     example = re.findall(r"```yaml\n(.*?)\n```", README, re.DOTALL)[1]
     path = tmp_path / "free.yaml"
     path.write_text(example)
-    turning = turning_of(machine, load_free(path))
-    made = turning.parameters_at(turning.expected)
+    parameter_map = parameter_map_of(machine, load_free(path))
+    made = parameter_map.parameters_at(parameter_map.expected)
     assert (
         made.frames["damper_left_housing"].position[0]
         == -made.frames["damper_right_rear_housing"].position[0]

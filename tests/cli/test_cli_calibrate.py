@@ -138,6 +138,6 @@ def test_free_file_that_does_not_fit_is_refused_with_its_line(wm_drake, tmp_path
     ended = wm_drake("calibrate", "--free", "free.yaml", "--out", "out")
     assert ended.code == 2
     assert ended.err.startswith(
-        "free.yaml:2: quantities.friction.sets: 'damper_types.friction.fricton_force' is no number"
+        "free.yaml:2: quantities.friction.sets: 'damper_types.friction.fricton_force' is not a number"
     )
     assert not Path("out").exists()
