@@ -4,8 +4,8 @@
     record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
     wm.envelopes(record).upper.sel(sensor="Xr").plot()
 
-The rooms, in the order data flows: `parameters`, `laws`, `systems`, `machine`, `simulation`, `measures`, `studies`, `report`,
-`cli`.
+The rooms, in the order of the data flow: `parameters`, `laws`, `elements`, `systems`, `model`,
+`engines`, `simulation`, `batch`, `rigs`, `studies`, `report`, `cli`.
 """
 
 import importlib
@@ -38,7 +38,7 @@ __all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str) -> Any:
-    """Loads a public name from its room when it is first used: Drake takes a second to import."""
+    """Load a public name from its room when it is first used, because importing Drake takes 1 s."""
     if name not in _HOMES:
         raise AttributeError(f"module 'wm_drake' has no attribute '{name}'")
     return getattr(importlib.import_module(f"wm_drake.{_HOMES[name]}"), name)
