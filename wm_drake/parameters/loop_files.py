@@ -152,7 +152,7 @@ def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
 def _columns(
     head: list[str], units: tuple[str, str, str] | None, place: str
 ) -> tuple[tuple[int, int, int], tuple[float, float, float], bool]:
-    """Return what the header says about the columns time, displacement and force.
+    """Return indices, unit factors and kind of the columns time, displacement and force.
 
     Args:
         head: Cells of the header.
