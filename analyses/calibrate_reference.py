@@ -110,9 +110,9 @@ def _lines(calibration: Calibration, predictions: list[Prediction]) -> list[str]
 
 
 def _write(calibration: Calibration) -> None:
-    solved = solved_machine(calibration.turning, calibration.solutions[0])
+    solved = solved_machine(calibration.parameter_map, calibration.solutions[0])
     path, model = machine_path("reference"), sdf_path(solved.model)
-    keys = [".".join(value.path) for value in calibration.turning.values]
+    keys = [".".join(value.path) for value in calibration.parameter_map.values]
     own = [key for key in dict.fromkeys(keys) if not key.startswith(("bodies.", "frames."))]
     texts = {
         path: machine_file_with(path, solved, own),

@@ -12,7 +12,8 @@ import pandas as pd
 
 from wm_drake import Case, build_machine, load_machine, measure, simulate
 from wm_drake.parameters import MachineParameters, SpinProfile
-from wm_drake.simulation.runs import DEFAULT_STEP, DivergenceWarning
+from wm_drake.parameters.machine import DEFAULT_STEP
+from wm_drake.simulation.runs import DivergenceWarning
 
 STEPS_MS = (5.0, 2.5, 1.25, 0.5)
 CONVERGED_MS = 0.125

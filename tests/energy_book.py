@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.bodies import add_bodies, add_load, set_bodies
-from wm_drake.simulation.runs import as_record
+from wm_drake.simulation.records import as_record
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
 

@@ -11,8 +11,9 @@ from wm_drake.model.machine import build_machine
 from wm_drake.parameters import SpinProfile, load_machine
 from wm_drake.parameters.free import load_free
 from wm_drake.report.diagram import mermaid
-from wm_drake.simulation.runs import Case, simulate
-from wm_drake.studies.calibration.parameter_map import turning_of
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.runs import simulate
+from wm_drake.studies.calibration.parameter_map import parameter_map_of
 
 PAGES = [README, *HOW_TO]
 SHORT = SpinProfile(time=(0.0, 6.0), speed=(0.0, 12.0))
@@ -122,8 +123,8 @@ def test_the_example_of_a_component_is_in_order(tmp_path):
 
 
 def test_the_example_of_a_free_file_fits_the_reference_machine(tmp_path, machine):
-    turning = turning_of(machine, load_free(written(tmp_path, page("calibrate"))))
-    frames = turning.parameters_at(turning.expected).frames
+    parameter_map = parameter_map_of(machine, load_free(written(tmp_path, page("calibrate"))))
+    frames = parameter_map.parameters_at(parameter_map.expected).frames
     assert (
         frames["damper_left_housing"].position[0]
         == -frames["damper_right_rear_housing"].position[0]

@@ -15,8 +15,9 @@ from wm_drake.errors import InputError
 from wm_drake.model.machine import build_machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, with_value
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
-from wm_drake.simulation.runs import Case, DivergenceWarning, simulate
+from wm_drake.simulation.runs import DivergenceWarning, simulate
 
 RUN_UP = SpinProfile(time=(0.0, 12.0), speed=(5.0, 30.0))
 LONGER = SpinProfile(time=(0.0, 11.0, 13.0), speed=(5.0, 28.0, 28.0))
@@ -241,7 +242,7 @@ def test_ctrl_c_keeps_the_runs_that_had_ended(machine, cases, table):
     ("change", "message"),
     [
         ({"measures": ["extremes", "amplitude"]}, "did you mean 'amplitudes'"),
-        ({"step": 3e-3}, "not a whole part"),
+        ({"step": 3e-3}, "does not divide the output period"),
     ],
 )
 def test_bad_arguments_are_refused(machine, cases, change, message):

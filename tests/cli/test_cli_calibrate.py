@@ -9,8 +9,9 @@ import pytest
 
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import load_machine, with_value
+from wm_drake.simulation.cases import case_of
 from wm_drake.simulation.measures import measure
-from wm_drake.simulation.runs import case_of, simulate
+from wm_drake.simulation.runs import simulate
 
 SHORT = "extends: reference\nname: short\nmeasured: []\nprofile: {time: '(0, 12) s', speed: '(40, 270) rpm'}\n"
 FREE = """quantities:
@@ -137,6 +138,6 @@ def test_free_file_that_does_not_fit_is_refused_with_its_line(wm_drake, tmp_path
     ended = wm_drake("calibrate", "--free", "free.yaml", "--out", "out")
     assert ended.code == 2
     assert ended.err.startswith(
-        "free.yaml:2: quantities.friction.sets: 'damper_types.friction.fricton_force' is no number"
+        "free.yaml:2: quantities.friction.sets: 'damper_types.friction.fricton_force' is not a number"
     )
     assert not Path("out").exists()

@@ -230,7 +230,7 @@ def test_other_version_of_the_sources_is_refused(study_without_page, monkeypatch
     monkeypatch.setattr("wm_drake.batch.sources_version", lambda: "0123")
     ended = study_without_page("--resume")
     assert ended.code == 2
-    assert "and '0123' here" in ended.err
+    assert "and '0123' now" in ended.err
 
 
 def test_damaged_ledger_is_refused_and_left(study_without_page):

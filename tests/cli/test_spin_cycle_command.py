@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from machine_with_bearing import BEARING, UNITS
 
-from wm_drake.simulation.runs import versions
+from wm_drake.simulation.records import versions
 
 PROFILE = """
 time: (0, 4, 6) s
@@ -127,7 +127,7 @@ def test_bad_input_is_refused_in_one_line_and_nothing_is_written(study, argument
         ("case,region,sensor,axis\n", "needs the columns"),
         ("case,region,sensor,axis,rms_mm\nfront,R9,S1,x,1\n", "no region 'R9' in this study"),
         ("case,region,sensor,axis,rms_mm\nfront,R1,S1,x,-1\n", "not a number of at least 0"),
-        ("case,region,sensor,axis,rms_mm\nfront,R1,S1,x,1\nfront,R1,S1,x,2\n", "is there twice"),
+        ("case,region,sensor,axis,rms_mm\nfront,R1,S1,x,1\nfront,R1,S1,x,2\n", "occurs twice"),
     ],
 )
 def test_bad_measurements_are_refused(study, text, message):

@@ -12,8 +12,9 @@ from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.engines.drake import run_drake
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance, with_value
+from wm_drake.simulation.cases import Case, case_of
 from wm_drake.simulation.measures import measure
-from wm_drake.simulation.runs import Case, DivergenceWarning, case_of, simulate
+from wm_drake.simulation.runs import DivergenceWarning, simulate
 
 MACHINES = machines_of_each_kind()
 RUN_UP = SpinProfile(time=(0.0, 0.501, 3.0, 3.5), speed=(4.0, 6.0, 30.0, 22.0))

@@ -21,8 +21,9 @@ from wm_drake.parameters import (
     machine_yaml,
     with_value,
 )
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
-from wm_drake.simulation.runs import Case, simulate
+from wm_drake.simulation.runs import simulate
 from wm_drake.studies.description.modal import natural_modes
 
 RUN_UP = SpinProfile(time=(0.0, 3.0), speed=(5.0, 30.0))
@@ -312,7 +313,7 @@ def test_wrong_numbers_are_refused(whirling, key, value, message):
 def test_a_number_of_a_bearing_that_is_not_there_is_refused(reference):
     with pytest.raises(
         InputError,
-        match=r"the machine has none; a machine file describes 'imperfections.bearing' whole",
+        match=r"the machine has no 'imperfections.bearing'; to add it, write all of it in a",
     ):
         with_value(reference, "imperfections.bearing.radial_stiffness", "5 N/mm")
 

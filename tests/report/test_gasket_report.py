@@ -10,7 +10,7 @@ from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors
 from wm_drake.report.gasket.report import gasket_report
 from wm_drake.report.gasket.tables import digits
 from wm_drake.report.gasket.words import about_residual, conflicts, load_findings, summary
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket.screening import Responses, run_screening
 from wm_drake.studies.gasket.study import RESPONSES, GasketTrials

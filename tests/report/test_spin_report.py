@@ -16,8 +16,10 @@ from wm_drake.report.figures import outline, revolution_starts
 from wm_drake.report.spin.report import amplitude_table, spin_report
 from wm_drake.report.tables import differences, profiles, readable
 from wm_drake.report.wording import number, percent
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
-from wm_drake.simulation.runs import Case, Record, point_displacements
+from wm_drake.simulation.outputs import point_displacements
+from wm_drake.simulation.records import Record
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 SENSOR_POINTS = {

@@ -24,9 +24,10 @@ from wm_drake.model.machine import OUTPUT_PERIOD
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.histories import POINT_SIZE, measure_samples_lanes
 from wm_drake.simulation.measures import amplitudes, filtered, power_means
-from wm_drake.simulation.runs import Case, Record, as_record
+from wm_drake.simulation.records import Record, as_record
 from wm_drake.simulation.vibration import region_displacements
 
 MEASURES = {

@@ -13,8 +13,9 @@ from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.model.machine import Machine, Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.outputs import measured_points
-from wm_drake.simulation.runs import Case, check_bearing
+from wm_drake.simulation.runs import check_bearing
 
 KEPT_BODIES, KEPT_NUMBERS = 64, 2048
 """How many sets of bodies with a load, and of other numbers, are cached."""

@@ -153,14 +153,14 @@ def _run(
     from wm_drake.parameters import located
     from wm_drake.parameters.free import load_free
     from wm_drake.studies.calibration.calibration import calibrate, identity_of
-    from wm_drake.studies.calibration.parameter_map import turning_of
-    from wm_drake.studies.calibration.prediction import check_left_out, predict
+    from wm_drake.studies.calibration.parameter_map import parameter_map_of
+    from wm_drake.studies.calibration.prediction import check_held_out, predict
 
     free_file, built = load_free(existing_file(free, "--free")), build_machine(parameters)
     plan.check()
-    check_left_out(targets, left_out)
+    check_held_out(targets, left_out)
     try:
-        turning_of(built, free_file)
+        parameter_map_of(built, free_file)
     except InputError as error:
         raise located(error, free) from None
     with result_folder(
@@ -234,7 +234,7 @@ def _write(
     from wm_drake.studies.calibration.outcome import amplitude_rows, quantity_table, solved_machine
 
     for number, solution in enumerate(calibration.solutions, start=1):
-        text = machine_yaml(solved_machine(calibration.turning, solution))
+        text = machine_yaml(solved_machine(calibration.parameter_map, solution))
         (folder / f"machine_{number}.yaml").write_text(text, encoding="utf-8")
     quantity_table(calibration).to_csv(folder / "quantities.csv", index=False, float_format="%.6g")
     amplitude_rows(calibration).to_csv(folder / "amplitudes.csv", index=False, float_format="%.4f")
@@ -248,12 +248,12 @@ def _shown(
 ) -> "tuple[SpinResult, list[tuple[str, Modes]]]":
     """Spin runs and modes of the best solution, for the report."""
     from wm_drake.model.machine import build_machine
-    from wm_drake.simulation.runs import case_of
+    from wm_drake.simulation.cases import case_of
     from wm_drake.studies.calibration.outcome import solved_machine
     from wm_drake.studies.description.modal import natural_modes
     from wm_drake.studies.spin.study import run_spin
 
-    solved = solved_machine(calibration.turning, calibration.solutions[0])
+    solved = solved_machine(calibration.parameter_map, calibration.solutions[0])
     cases = [case_of(solved, name, gasket=gasket) for name, gasket in calibration.targets.loads]
     built = build_machine(solved)
     titles = (

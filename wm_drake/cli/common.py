@@ -14,7 +14,7 @@ from wm_drake.errors import InputError, Problem, input_error, nearest_names
 if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
     from wm_drake.parameters import MachineParameters
     from wm_drake.parameters.keys import Tree
-    from wm_drake.simulation.runs import Case
+    from wm_drake.simulation.cases import Case
 
 MachineOption = Annotated[
     str, typer.Option("--machine", help="Shipped machine or machine file.", metavar="NAME|FILE")
@@ -100,7 +100,7 @@ def cases_of(
 ) -> "list[Case]":
     """The cases that `--load`, `--no-gasket` and `--profile` ask for."""
     from wm_drake.parameters import load_load, load_profile
-    from wm_drake.simulation.runs import Case
+    from wm_drake.simulation.cases import Case
 
     spin_profile = (
         parameters.profile if profile is None else load_profile(existing_file(profile, "--profile"))

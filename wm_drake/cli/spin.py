@@ -22,7 +22,7 @@ from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
     from wm_drake.parameters import MachineParameters
-    from wm_drake.simulation.runs import Case
+    from wm_drake.simulation.cases import Case
     from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 DEFAULT_OUT = Path("wm-drake-spin")
@@ -103,7 +103,7 @@ def _run(parameters: "MachineParameters", cases: "list[Case]", engine: str) -> "
 
 def _write(result: "SpinResult", folder: Path, replay: bool) -> None:
     from wm_drake.report.spin.report import amplitude_table, spin_report
-    from wm_drake.simulation.runs import save_record
+    from wm_drake.simulation.records import save_record
 
     for case in result.results:
         save_record(case.record, folder / f"record_{case.case.name}.nc")

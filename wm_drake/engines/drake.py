@@ -97,7 +97,9 @@ def _simulator(setup: Setup, step: float, scheme: str, accuracy: float | None) -
         integrator.set_fixed_step_mode(True)
     else:
         integrator.set_target_accuracy(accuracy)
-        integrator.set_requested_minimum_step_size(min(SMALLEST_STEP, step))
+        first = 0.1 * step
+        integrator.request_initial_step_size_target(first)
+        integrator.set_requested_minimum_step_size(min(SMALLEST_STEP, first))
         integrator.set_throw_on_minimum_step_size_violation(False)
     simulator.Initialize()
     return simulator

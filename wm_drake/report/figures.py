@@ -25,7 +25,8 @@ from wm_drake.report.wording import (
     speed_rpm,
 )
 from wm_drake.simulation.measures import axis_motion, envelopes
-from wm_drake.simulation.runs import Record, point_positions
+from wm_drake.simulation.outputs import point_positions
+from wm_drake.simulation.records import Record
 from wm_drake.studies.spin.study import CaseResult
 
 IndexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.intp]]

@@ -29,7 +29,7 @@ if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
     import xarray as xr
 
     from wm_drake.parameters import FactorLevels, MachineParameters
-    from wm_drake.simulation.runs import Case
+    from wm_drake.simulation.cases import Case
     from wm_drake.studies.doe import Design
     from wm_drake.studies.gasket.screening import Screening
     from wm_drake.studies.gasket.study import GasketTrials

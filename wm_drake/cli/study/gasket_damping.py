@@ -72,7 +72,7 @@ def _read(parameters: "MachineParameters", entries: list[str]) -> "Measured":
     import xarray as xr
 
     from wm_drake.parameters.csv_files import read_csv
-    from wm_drake.simulation.runs import load_record
+    from wm_drake.simulation.records import load_record
     from wm_drake.studies.gasket_damping.study import MM_PER_M, as_measured
 
     measured = {}

@@ -82,7 +82,7 @@ def modes_figure(modes: Sequence[tuple[str, Modes]]) -> Figure:
 
 def quantities_figure(calibration: Calibration) -> Figure:
     """Each free quantity over its bounds: what was expected, and where each solution puts it with what certainty."""
-    turning, solutions = calibration.turning, calibration.solutions
+    turning, solutions = calibration.parameter_map, calibration.solutions
     count = len(turning.names)
     figure = Figure(figsize=(WIDTH, 0.8 + 0.235 * count), layout="constrained")
     axes = figure.subplots()

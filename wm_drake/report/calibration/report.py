@@ -76,7 +76,7 @@ def summary(calibration: Calibration, predictions: Sequence[Prediction]) -> str:
         f"in the mean of absolute values and by {percent(100 * errors[case, sensor])} at most: sensor "
         f"{targets.sensors[sensor]}, load {name} {'with' if gasket else 'without'} gasket. "
         f"{searches} {'search' if searches == 1 else 'searches'} ended in {count} distinct good "
-        f"{'solution' if count == 1 else 'solutions'}. Of {len(calibration.turning.names)} free quantities the data determine "
+        f"{'solution' if count == 1 else 'solutions'}. Of {len(calibration.parameter_map.names)} free quantities the data determine "
         f"{int(np.sum(best.directions() > 1.0))} combinations better than what was expected of them; the others are held by "
         "their priors."
     )
@@ -103,7 +103,7 @@ def warnings_of(best: SpinResult) -> list[str]:
 
 def knowledge(calibration: Calibration) -> list[tuple[str, str]]:
     """What the data say and what only the priors do, as pairs of word and text."""
-    best, names = calibration.solutions[0], calibration.turning.names
+    best, names = calibration.solutions[0], calibration.parameter_map.names
     column = quantity_table(calibration)["held_by_1"]
     sizes = best.directions()
     found = [

@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from wm_drake.parameters.machine import DEFAULT_STEP
 from wm_drake.report.gasket import figures, tables
 from wm_drake.report.gasket.words import about_residual, findings, load_findings, summary
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.tables import Table, parameter_table
 from wm_drake.report.wording import number
-from wm_drake.simulation.runs import DEFAULT_STEP, versions
+from wm_drake.simulation.records import versions
 from wm_drake.studies.gasket.screening import Screening
 from wm_drake.studies.gasket.study import GasketTrials
 
