@@ -7,7 +7,7 @@ import pytest
 
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.free import load_free
-from wm_drake.report.calibration.report import calibration_report, knowledge, summary
+from wm_drake.report.calibration.report import calibration_report, certainty, summary
 from wm_drake.simulation.runs import Case
 from wm_drake.studies.calibration.calibration import Calibration, Plan
 from wm_drake.studies.calibration.parameter_map import turning_of
@@ -62,17 +62,17 @@ def page(machine, calibration):
 
 def test_summary_has_mean_largest_and_their_place(calibration):
     text = summary(calibration, [])
-    assert "18 measured amplitudes by 1.4 %" in text
-    assert "by −25 % at most: sensor Yf, load middle with gasket" in text
-    assert "3 searches ended in 2 distinct good solutions" in text
+    assert "compared with 18 measured amplitudes. The mean absolute difference is 1.4 %" in text
+    assert "−25 %, at sensor Yf with load middle (with gasket)" in text
+    assert "3 searches found 2 distinct good solutions" in text
 
 
-def test_knowledge_sorts_the_quantities(calibration):
-    found = dict(knowledge(calibration))
+def test_certainty_sorts_the_quantities(calibration):
+    found = dict(certainty(calibration))
     assert found["Determined by the data"] == "friction"
     assert found["At a bound"] == "motor"
-    assert found["By data and prior together"] == "radius"
-    assert found["By the prior only"] == "none"
+    assert found["Determined by data and prior"] == "radius"
+    assert found["Determined by the prior only"] == "none"
 
 
 def test_page_needs_nothing_else_and_escapes_the_command(page):
@@ -81,7 +81,7 @@ def test_page_needs_nothing_else_and_escapes_the_command(page):
 
 
 def test_page_shows_every_search_prediction_and_quantity(page):
-    for text in ("2000.0", "31.0", "4.001 ± ", "held by", "bound", "123", "back"):
+    for text in ("2000.0", "31.0", "4.001 ± ", "determined by", "bound", "123", "back"):
         assert text in page
     assert page.count("<h3>Load ") == 3
 

@@ -12,10 +12,11 @@ import xarray as xr
 from wm_drake.model.scene import Gap
 from wm_drake.parameters import MachineParameters, SpinProfile, load_machine, quantities
 from wm_drake.parameters.units import Unit
-from wm_drake.report.figures import outline, revolution_starts
+from wm_drake.report.formatting import number, percent
+from wm_drake.report.spin.figures import revolution_starts, simplified_indices
 from wm_drake.report.spin.report import amplitude_table, spin_report
-from wm_drake.report.tables import differences, profiles, readable
-from wm_drake.report.wording import number, percent
+from wm_drake.report.spin.tables import differences, profiles
+from wm_drake.report.tables import readable
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import Case, Record, point_displacements
 from wm_drake.studies.spin.study import CaseResult, SpinResult
@@ -251,9 +252,9 @@ def test_diverged_case_is_warned_of_and_left_out_of_the_summary(machine: Machine
     assert Tags(page).open == []
     box = page[page.index('<section class="warning"') :]
     assert DIVERGED in box[: box.index("</section>")]
-    assert "1 diverged and is left out" in page
-    assert "moves most with load back" in page
-    assert "too short for the filter" in page
+    assert "1 run diverged and is excluded from this summary" in page
+    assert "The largest amplitude occurs with load back" in page
+    assert "too short for the band-pass filter" in page
 
 
 @pytest.mark.usefixtures("without_drawing")
@@ -262,7 +263,7 @@ def test_all_cases_diverged_still_give_a_page(machine: MachineParameters) -> Non
     bad.record.attrs["diverged"] = DIVERGED
     page = spin_report(spin_result(machine, [bad]))
     assert DIVERGED in page
-    assert "nothing to sum up" in page
+    assert "no result to summarize" in page
     assert "<img" not in page
 
 
@@ -272,7 +273,7 @@ def test_overlap_and_foreign_profile_are_warned_of(machine: MachineParameters) -
     slow = SpinProfile(time=(0.0, 2.0), speed=(0.0, 10.0))
     page = spin_report(spin_result(machine, [replace(case, case=replace(case.case, profile=slow))]))
     assert "tub shell and wall right overlap by 3.0 mm" in page
-    assert "the spin profile is not the machine file" in page
+    assert "the spin profile differs from the one in the machine file" in page
 
 
 def test_names_cannot_inject_markup(machine: MachineParameters) -> None:
@@ -352,8 +353,8 @@ def test_percent_difference_row_by_hand(machine: MachineParameters) -> None:
     assert row is not None
     cells = [word for word in Tags(row[1]).words if word]
     assert cells == ["+20 %", "0 %", "−50 %", "0 %", "−50 %", "−90 %", "35 %"]  # 210 / 6
-    assert "by 35 % in the mean" in page
-    assert "−90 % at most: sensor Zf" in page
+    assert "The mean absolute difference is 35 %" in page
+    assert "The largest difference is −90 %, at sensor Zf" in page
 
 
 @pytest.mark.usefixtures("without_drawing")
@@ -378,9 +379,9 @@ def test_page_is_small(page: str) -> None:
 def test_outline_keeps_corners_within_tolerance() -> None:
     x = np.linspace(0.0, 10.0, 1001)
     tent = np.interp(x, [0.0, 3.0, 10.0], [0.0, 6.0, -1.0])
-    assert x[outline(x, tent, 1e-6)].tolist() == [0.0, 3.0, 10.0]
+    assert x[simplified_indices(x, tent, 1e-6)].tolist() == [0.0, 3.0, 10.0]
     wave = np.sin(x)
-    kept = outline(x, wave, 0.01)
+    kept = simplified_indices(x, wave, 0.01)
     assert len(kept) < 50
     assert np.abs(np.interp(x, x[kept], wave[kept]) - wave).max() <= 0.01
 

@@ -11,7 +11,7 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH
 from wm_drake.report.page import Picture, picture, render, versions_of
 from wm_drake.report.tables import Group, Row, Table, parameter_table
-from wm_drake.report.wording import MM_PER_M, number, percent
+from wm_drake.report.formatting import MM_PER_M, number, percent
 from wm_drake.simulation.measures import envelopes, percent_difference
 from wm_drake.studies.gasket_damping.grid_search import Search
 from wm_drake.studies.gasket_damping.study import NOISE, STOP, UNKNOWNS, WINDOW, Damping

@@ -9,7 +9,7 @@ from wm_drake.report.identify.figures import history_figure, loops_figure, motio
 from wm_drake.report.page import picture, render
 from wm_drake.report.rig.figures import force_scale, motion_scale
 from wm_drake.report.tables import Group, Row, Table
-from wm_drake.report.wording import MISSING, number
+from wm_drake.report.formatting import MISSING, number
 from wm_drake.rigs.measured import MeasuredMotion
 from wm_drake.studies.fitting import Estimate, Fit
 

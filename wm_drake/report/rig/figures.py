@@ -11,7 +11,7 @@ from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 
 from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH
-from wm_drake.report.wording import MM_PER_M
+from wm_drake.report.formatting import MM_PER_M
 from wm_drake.rigs import ForceLoop, RigRun
 from wm_drake.rigs.run import mstv_friction_curves
 

@@ -16,7 +16,7 @@ from wm_drake.report.rig.figures import (
     time_figure,
 )
 from wm_drake.report.tables import Group, Row, Table
-from wm_drake.report.wording import MM_PER_M, number
+from wm_drake.report.formatting import MM_PER_M, number
 from wm_drake.rigs import ForceLoop, RigRun
 
 SAMPLES_KEPT = 4

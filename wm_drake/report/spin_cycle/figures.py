@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH
-from wm_drake.report.wording import MM_PER_M, RPM_PER_RAD_S, number
+from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
 
 DARK_FROM = 0.55
 """Part of the colour scale from which writing on it is white."""

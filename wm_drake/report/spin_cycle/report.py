@@ -11,7 +11,7 @@ from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.spin_cycle import tables
 from wm_drake.report.spin_cycle.figures import bars_figure, heat_map_figure, profile_figure
 from wm_drake.report.tables import Table, parameter_table
-from wm_drake.report.wording import MM_PER_M, number
+from wm_drake.report.formatting import MM_PER_M, number
 from wm_drake.simulation.runs import versions
 from wm_drake.studies.spin_cycle.study import SpinCycleResult, average_errors, disagreement, largest
 

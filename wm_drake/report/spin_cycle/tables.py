@@ -5,7 +5,7 @@ import pandas as pd
 import xarray as xr
 
 from wm_drake.report.tables import Group, Row, Table
-from wm_drake.report.wording import MISSING, MM_PER_M, RPM_PER_RAD_S, number
+from wm_drake.report.formatting import MISSING, MM_PER_M, RPM_PER_RAD_S, number
 from wm_drake.studies.spin_cycle.study import (
     SpinCycleResult,
     average_errors,

@@ -9,7 +9,7 @@ from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.spin_cycle.figures import bars_figure, profile_figure
 from wm_drake.report.spin_cycle.report import case_words
 from wm_drake.report.tables import Group, Row, Table
-from wm_drake.report.wording import MISSING, number
+from wm_drake.report.formatting import MISSING, number
 from wm_drake.simulation.runs import versions
 from wm_drake.studies.spin_cycle.study import average_errors, region_errors
 from wm_drake.studies.spin_identification.study import JOIN, KNOWN, SpinIdentification
