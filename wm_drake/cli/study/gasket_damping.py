@@ -149,10 +149,10 @@ def _write(result: "Damping", parameters: "MachineParameters", folder: Path) -> 
 
 
 def _as_json(result: "Damping") -> dict[str, Any]:
-    from wm_drake.report.gasket_damping.report import in_papers_units
+    from wm_drake.report.gasket_damping.report import in_units_of_paper
 
     def found(search: Any) -> dict[str, Any]:
-        linear, torsional = in_papers_units(search.best)
+        linear, torsional = in_units_of_paper(search.best)
         return {
             "C_L": linear,
             "C_T": torsional,
@@ -163,7 +163,7 @@ def _as_json(result: "Damping") -> dict[str, Any]:
     truth = (
         None
         if result.truth is None
-        else dict(zip(("C_L", "C_T"), in_papers_units(result.truth), strict=True))
+        else dict(zip(("C_L", "C_T"), in_units_of_paper(result.truth), strict=True))
     )
     return {
         "units": {"C_L": "N s/mm", "C_T": "N mm s/deg"},
