@@ -14,7 +14,7 @@ import pytest
 
 from wm_drake import load_record
 from wm_drake.cli import main
-from wm_drake.cli.progress import result_folder
+from wm_drake.cli.result_folder import result_folder
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import load_machine
 
@@ -92,13 +92,17 @@ FAULTY_SPINS = {
         ["--load", "midle"],
         "neither a load of machine 'reference' nor a file (did you mean 'middle'?",
     ),
-    "unknown engine": ({}, ["--engine", "drak"], "no engine 'drak' (did you mean 'drake'?"),
+    "unknown engine": ({}, ["--engine", "drak"], "unknown engine 'drak' (did you mean 'drake'?"),
     "unknown key": (
         {},
         ["--set", "gasket.stifness_x=3 N/mm"],
         "gasket.stifness_x: unknown key 'stifness_x' (did you mean",
     ),
-    "set without =": ({}, ["--set", "gasket.stiffness_x"], "'gasket.stiffness_x' is not KEY=VALUE"),
+    "set without =": (
+        {},
+        ["--set", "gasket.stiffness_x"],
+        "'gasket.stiffness_x' does not have the form KEY=VALUE",
+    ),
     "set without unit": (
         {},
         ["--set", "gasket.stiffness_x=3"],
@@ -117,12 +121,12 @@ FAULTY_SPINS = {
     "same load twice": (
         {},
         ["--load", "middle", "--load", "middle"],
-        "'middle' is asked for twice",
+        "'middle' is given twice",
     ),
     "load file named as a load": (
         {"middle.yaml": "unbalances: []\n"},
         ["--load", "middle", "--load", "middle.yaml"],
-        "'middle' is asked for twice",
+        "'middle' is given twice",
     ),
     "bad load file": (
         {"l.yaml": "unbalances: [{mass: -1 kg, radius: 1 mm, y: 0 mm}]\n"},
@@ -141,7 +145,11 @@ FAULTY_SPINS = {
         ["--profile", "p.csv"],
         "row 2 of the data",
     ),
-    "out is a file": ({"file": ""}, ["--out", "file"], "file: is a file, needs to be a folder"),
+    "out is a file": (
+        {"file": ""},
+        ["--out", "file"],
+        "file: this path is a file, but a folder is needed",
+    ),
     "out is below a file": ({"file": ""}, ["--out", "file/out"], "file/out: cannot be written to"),
 }
 
@@ -254,7 +262,7 @@ def test_check_of_the_reference(wm_drake):
     ended = wm_drake("machine", "check", "reference")
     assert (ended.code, ended.out, ended.err) == (
         0,
-        "reference: machine 'reference' is in order\n",
+        "reference: machine 'reference' is valid\n",
         "",
     )
 
@@ -525,7 +533,7 @@ def test_tables_are_printed_without_json(wm_drake):
     assert ended.code == 0
     assert ended.err.strip() == ""
     for text in (
-        "Amplitudes in mm, machine 'reference'",
+        "Displacement amplitudes of machine 'reference', in mm",
         "wm_drake",
         "middle: smallest gap ",
         "Results in out: report.html",

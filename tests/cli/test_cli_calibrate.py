@@ -109,7 +109,10 @@ FAULTS = {
     ),
     "all loads left out": (["--leave-out", "back,middle"], "leaves no load"),
     "weight of nothing": (["--weight", "Q=2"], "'Q' is no load, sensor"),
-    "weight that is no number": (["--weight", "Xr=much"], "--weight: 'Xr=much' is not NAME=NUMBER"),
+    "weight that is no number": (
+        ["--weight", "Xr=much"],
+        "--weight: 'Xr=much' does not have the form NAME=NUMBER",
+    ),
 }
 
 

@@ -139,22 +139,22 @@ FAULTS = {
         ("--design", "d-optimal", "--trials", "10"),
         "10 trials cannot determine the 19 coefficients",
     ),
-    "model": (("--model", "mian"), "no model 'mian' (did you mean 'main'?"),
+    "model": (("--model", "mian"), "unknown model 'mian' (did you mean 'main'?"),
     "factor": (
         ("--factor", "gasket.stifness_x"),
         "gasket.stifness_x: unknown key 'stifness_x' (did you mean 'stiffness_x'?",
     ),
-    "factor twice": (("--factor", "K_Lx"), "a factor is named twice"),
+    "factor twice": (("--factor", "K_Lx"), "a factor is given twice"),
     "bounds": (("--factor", "K_Lz=1 N..2 N"), "unit 'N' does not fit"),
     "impossible bound": (("--factor", "K_Lz=-10 %..50 %"), "gasket.stiffness_z: '-"),
-    "tables": (("--tables", "curved"), "no way 'curved'"),
+    "tables": (("--tables", "curved"), "unknown treatment 'curved'"),
     "load": (
         ("--load", "midle"),
         "neither a load of machine 'reference' nor a file (did you mean 'middle'?",
     ),
     "factor file": (("--factors", "nosuch.yaml"), "no such file 'nosuch.yaml'"),
     "machine": (("--machine", "nosuch.yaml"), "no such file, and no shipped machine"),
-    "out": (("--out", "p.yaml"), "p.yaml: is a file, needs to be a folder"),
+    "out": (("--out", "p.yaml"), "p.yaml: this path is a file, but a folder is needed"),
     "out below a file": (("--out", "p.yaml/out"), "p.yaml/out: cannot be written to"),
 }
 
@@ -185,7 +185,7 @@ def test_interrupt_keeps_what_had_finished(study_without_page, monkeypatch):
         interrupted_after(10, changed, KeyboardInterrupt())
         ended = study_without_page()
     assert ended.code == 130
-    assert "finished runs are kept in out/ledger.sqlite: go on with --resume" in ended.err
+    assert "finished runs are kept in out/ledger.sqlite; continue with --resume" in ended.err
     assert [path.name for path in Path("out").iterdir()] == ["ledger.sqlite"]
     ended = study_without_page()
     assert ended.code == 2

@@ -107,8 +107,8 @@ def interrupted(*_):
     [
         (("--profile", "nosuch"), "no such file, and no shipped profile"),
         (("--cases", "nosuch.csv"), "--cases: no such file"),
-        (("--case", "fron"), "no case 'fron' (did you mean 'front'?"),
-        (("--engine", "drak"), "no engine 'drak'"),
+        (("--case", "fron"), "unknown case 'fron' (did you mean 'front'?"),
+        (("--engine", "drak"), "unknown engine 'drak'"),
         (("--measured", "nosuch.csv"), "--measured: no such file"),
         (("--accelerations", "nosuch"), "has no file CASE.csv"),
         (("--set", "imperfections.phase_eror=1 deg"), "did you mean 'phase_error'"),

@@ -203,7 +203,7 @@ def test_command_says_that_its_experiment_is_virtual_and_finds_what_was_planted(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "machine 'reference' has not the numbers of [A] Table 8; name others"),
+        ((), "machine 'reference' does not have the numbers of [A] Table 8; give keys"),
         (
             ("--unknown", "gasket.stiffness"),
             "--unknown: gasket.stiffness: no number 'gasket.stiffness'",
