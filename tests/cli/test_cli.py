@@ -1,4 +1,4 @@
-"""The command `wm-drake`: what it prints and writes, and how it answers bad input."""
+"""Tests of the command `wm-drake`: its output, its files, and its errors for bad input."""
 
 import json
 import os
@@ -356,7 +356,7 @@ def strict_json(text):
 
 @dataclass(frozen=True)
 class PlainRun:
-    """A run of the reference machine in a process of its own, and the folder it was run in."""
+    """Run of the reference machine in a separate process, with its folder."""
 
     ended: subprocess.CompletedProcess
     folder: Path
@@ -473,7 +473,7 @@ def test_replay_is_one_self_contained_page(plain):
 
 
 def is_self_contained(page):
-    """Whether a page loads nothing from elsewhere; links to read on are fine."""
+    """Return whether a page loads nothing from other places; links for reading are allowed."""
     loads = re.findall(r"<(?:script|img|iframe|source)[^>]*\ssrc=\"([^\"]{0,20})", page)
     loads += re.findall(r"<link[^>]*\shref=\"([^\"]{0,20})", page)
     return page.lstrip().lower().startswith("<!doctype html") and all(

@@ -1,4 +1,4 @@
-"""`wm-drake study gasket`: what it prints and writes, how it answers bad input, kills, full disks and company."""
+"""Tests of `wm-drake study gasket`: output, bad input, kills, full disks, parallel processes."""
 
 import json
 import os
@@ -36,14 +36,14 @@ SMALL = ("--design", "full", *FACTORS, "--profile", "p.yaml")
 
 @pytest.fixture
 def study(wm_drake):
-    """Runs a small study of 27 trials and two loads in this process: study("--resume").code == 0."""
+    """Return a function that runs a small study (27 trials, two loads) with extra arguments."""
     Path("p.yaml").write_text(PROFILE)
     return lambda *arguments: wm_drake("study", "gasket", *SMALL, "--out", "out", *arguments)
 
 
 @pytest.fixture
 def study_without_page(study, monkeypatch):
-    """The same without figures, which take most of its time, for what depends on runs and tables alone."""
+    """Return the small study without its figures, which take most of its time."""
     monkeypatch.setattr("wm_drake.report.gasket.report.gasket_report", lambda *_: "")
     return study
 

@@ -1,4 +1,4 @@
-"""`wm-drake study spin-cycle`: what it prints and writes, that it goes on where it was interrupted, bad input."""
+"""Tests of `wm-drake study spin-cycle`: output, files, resumption after interruption, bad input."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The page of a calibration says what its numbers say."""
+"""Tests of the calibration page: its text agrees with the numbers."""
 
 import re
 

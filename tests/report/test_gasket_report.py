@@ -1,4 +1,4 @@
-"""The page of a gasket study says what its numbers say, whatever the number of loads, factors and responses."""
+"""Tests of the gasket page, for any number of loads, factors and responses."""
 
 import re
 
@@ -20,7 +20,11 @@ UNITS = {name: {"D": "mm", "F": "N", "M": "N m"}[name[0]] for name in RESPONSES}
 
 
 def planted(design):
-    """Dx falls with C_L by 4 mm, Mx rises with it by 2 N m; Dy is lowest at level 0 of C_T; Fz is an interaction; the rest small."""
+    """Return responses with known effects.
+
+    Dx falls with C_L by 4 mm, and Mx rises with it by 2 N m. Dy is lowest at level 0 of C_T. Fz is an
+    interaction. All other effects are small.
+    """
     x = dict(zip(design.factors, design.levels.T.astype(float), strict=True))
     small = 0.01 * x["K_Ly"]
     values = dict.fromkeys(RESPONSES, 10.0 + small)

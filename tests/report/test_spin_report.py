@@ -36,7 +36,10 @@ VOID = ("meta", "img", "br", "hr", "link", "input")
 def harmonic_record(
     parameters: MachineParameters, load: str, gasket: bool, size: float, samples: int = 400
 ) -> Record:
-    """2 s of a tub that swings at 4 Hz, its drum at 240 rpm: every variable that as_record makes, by hand."""
+    """Return a hand-made record of 2 s, with the tub moving at 4 Hz and the drum at 240 rpm.
+
+    It has every variable of a real record.
+    """
     time = 5e-3 * np.arange(samples)
     wave = np.sin(2.0 * np.pi * 4.0 * time)[:, None]
     angle, position = wave * [0.01, 0.002, 0.02], wave * [size, 0.3 * size, 0.5 * size]
@@ -130,14 +133,14 @@ def page(result: SpinResult) -> str:
 
 @pytest.fixture
 def without_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For tests of words and tables: the figures are made, but not drawn, which is what takes long."""
+    """Skip the slow drawing of the figures, for tests of texts and tables."""
     monkeypatch.setattr(
         "wm_drake.report.page.inline_svg_or_png", lambda figure: "data:image/png;base64,"
     )
 
 
 class Tags(HTMLParser):
-    """Checks that tags close in order and keeps what they load and say."""
+    """HTML parser that checks that tags close in order, and keeps their attributes and words."""
 
     def __init__(self, text: str) -> None:
         super().__init__()

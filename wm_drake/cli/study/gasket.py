@@ -75,8 +75,8 @@ def gasket(
         list[str] | None,
         typer.Option(
             help="Factor to study instead of the eight factors of the gasket: one of C_L, K_Lx, "
-            "..., or any key of the machine file. Bounds are in percent of its value or with a unit; "
-            "default 50 %..150 %. Repeatable.",
+            "..., or any key of the machine file. Bounds are in percent of its value, or numbers "
+            "with a unit. Default: 50 %..150 %. Repeatable.",
             metavar="NAME|KEY[=LOW..HIGH]",
         ),
     ] = None,
