@@ -296,7 +296,7 @@ def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Pat
         typer.echo(f"  load {', '.join(prediction.loads)}:")
         typer.echo(f"    used for the calibration: {calibrated}")
         typer.echo(f"    held out and predicted: {predicted}")
-        typer.echo(f"    other loads in the calibration without it: {others}")
+        typer.echo(f"    other loads in that calibration: {others}")
     typer.echo(f"Results in {out}: report.html, machine_<n>.yaml, quantities.csv, amplitudes.csv")
 
 

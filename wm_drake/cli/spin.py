@@ -42,7 +42,7 @@ def spin(
     profile: Annotated[
         Path | None,
         typer.Option(
-            help="Spin profile, YAML or CSV (time_s,speed_rpm). Default: that of the machine.",
+            help="Spin profile, YAML or CSV (time_s, speed_rpm). Default: that of the machine.",
             metavar="FILE",
         ),
     ] = None,

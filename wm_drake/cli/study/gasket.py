@@ -276,7 +276,7 @@ def _print_table(screening: "Screening") -> None:
     design = screening.design
     about = f"{design.kind}, {design.trials} trials, D-efficiency {design.efficiency():.2f} %"
     table = Table(title=f"Percent of the variance explained ({about})")
-    for name in ("load", "response", "mean", "main", "interactions", "residual"):
+    for name in ("load", "response", "mean", "main", "inter-\nactions", "residual"):
         table.add_column(name, justify="left" if name in ("load", "response") else "right")
     table.add_column("leading terms")
     for (load, name), found in screening.tables.items():

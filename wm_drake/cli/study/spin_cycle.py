@@ -39,7 +39,7 @@ TERMINAL_HEADS = {
     "phase_deg": "phase, deg",
     "largest_rms_mm": "RMS, mm",
     "region": "region",
-    "sensor_axis": "sensor, axis",
+    "sensor_axis": "sensor axis",
     "smallest_gap_mm": "gap, mm",
     "average_error_percent": "error, %",
     "published_error_percent": "error in [A], %",
@@ -59,7 +59,7 @@ def spin_cycle(
     cases: Annotated[
         Path | None,
         typer.Option(
-            help="CSV file of cases: case,front_g,rear_g,phase_deg. Default: the 33 cases of [A] "
+            help="CSV file of cases: case, front_g, rear_g, phase_deg. Default: the 33 cases of [A] "
             "Table 9.",
             metavar="FILE",
         ),
@@ -70,7 +70,7 @@ def spin_cycle(
     measured: Annotated[
         Path | None,
         typer.Option(
-            help="CSV file of measured RMS displacements: case,region,sensor,axis,rms_mm.",
+            help="CSV file of measured RMS displacements: case, region, sensor, axis, rms_mm.",
             metavar="FILE",
         ),
     ] = None,
@@ -78,7 +78,7 @@ def spin_cycle(
         Path | None,
         typer.Option(
             help="Folder of measured accelerations, one file CASE.csv per case: "
-            "time_s,S1_x,S1_y,... in m/s^2.",
+            "time_s, S1_x, S1_y, ... in m/s^2.",
             metavar="DIR",
         ),
     ] = None,

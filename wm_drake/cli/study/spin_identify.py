@@ -36,9 +36,9 @@ def spin_identify(
     unknown: Annotated[
         list[str] | None,
         typer.Option(
-            help="Number to find, with or without a range: "
-            "gasket.stiffness_x+gasket.stiffness_z='(4, 12) N/mm'. The sign + joins keys that have "
-            "the same value. Repeatable. Default: the numbers of [A] Table 8.",
+            help="Number to find, with or without a range: gasket.stiffness_y='(1, 4) N/mm'. "
+            "KEY1+KEY2 are two keys with the same value. Repeatable. Default: the numbers of [A] "
+            "Table 8.",
             metavar="KEYS[=RANGE]",
         ),
     ] = None,
@@ -51,7 +51,7 @@ def spin_identify(
     ] = "spin_cycle",
     cases: Annotated[
         Path | None,
-        typer.Option(help="CSV file of cases: case,front_g,rear_g,phase_deg.", metavar="FILE"),
+        typer.Option(help="CSV file of cases: case, front_g, rear_g, phase_deg.", metavar="FILE"),
     ] = None,
     case: Annotated[
         list[str] | None,
@@ -63,7 +63,7 @@ def spin_identify(
     measured: Annotated[
         Path | None,
         typer.Option(
-            help="CSV file of measured RMS displacements: case,region,sensor,axis,rms_mm.",
+            help="CSV file of measured RMS displacements: case, region, sensor, axis, rms_mm.",
             metavar="FILE",
         ),
     ] = None,
@@ -217,15 +217,18 @@ def _print_table(result: "SpinIdentification", out: Path) -> None:
     console = Console()
     console.print(summary(result))
     shown = unknowns(result)
+    # a narrow first column: keys are broken at their dots, keys of the same value below each other
+    keys = [
+        "\n= ".join(sought.keys[:1] + tuple(key.rsplit(".", 1)[-1] for key in sought.keys[1:]))
+        for sought in result.sought
+    ]
+    keys = [text.replace(".", ".\n") for text in keys]
     table = Table()
-    for name in shown.header:
-        table.add_column(
-            name,
-            justify="left" if name in ("unknown", "set to the same value") else "right",
-            overflow="fold",
-        )
-    for group in shown.groups:
-        table.add_row(group.heading, *group.rows[0].cells)
+    table.add_column("unknown", no_wrap=True)
+    for name in shown.header[2:]:
+        table.add_column(name, justify="right", overflow="fold")
+    for text, group in zip(keys, shown.groups, strict=True):
+        table.add_row(text, *group.rows[0].cells[1:])
     console.print(table)
     for text in directions(result):
         console.print(text)

@@ -71,17 +71,16 @@ def summary(calibration: Calibration, predictions: Sequence[Prediction]) -> str:
     case, sensor = np.unravel_index(int(np.nanargmax(np.abs(errors))), errors.shape)
     name, gasket = targets.loads[case]
     count = len(calibration.solutions)
-    searches = len(calibration.ended)
+    searches, quantities = len(calibration.ended), len(calibration.turning.names)
+    determined = int(np.sum(best.directions() > 1.0))
     text = (
         f"The best machine is compared with {np.isfinite(errors).sum()} measured amplitudes. The "
         f"mean absolute difference is {number(100 * mean)} %. The largest difference is "
         f"{percent(100 * errors[case, sensor])}, at sensor {targets.sensors[sensor]} with load "
         f"{name} ({'with' if gasket else 'without'} gasket). "
         f"{searches} {'search' if searches == 1 else 'searches'} found {count} distinct good "
-        f"{'solution' if count == 1 else 'solutions'}. There are "
-        f"{len(calibration.turning.names)} free quantities. The data determine "
-        f"{int(np.sum(best.directions() > 1.0))} combinations of them better than the priors do; "
-        "the priors determine the other combinations."
+        f"{'solution' if count == 1 else 'solutions'}. The data determine {determined} of "
+        f"{quantities} independent combinations of the free quantities better than the priors do."
     )
     if predictions:
         worst = max(predictions, key=lambda p: mean_and_largest(p.predicted)[0])

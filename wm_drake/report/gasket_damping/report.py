@@ -61,7 +61,7 @@ def gasket_damping_report(result: Damping, parameters: MachineParameters, comman
 def summary(result: Damping) -> str:
     """Return one paragraph about the damping that each search found."""
     source = "a virtual experiment" if result.truth is not None else "measured records"
-    loads = f"load{'s' if len(result.measured) > 1 else ''} {', '.join(result.measured)}"
+    loads = f"load{'s' if len(result.measured) > 1 else ''} {' and '.join(result.measured)}"
     text = (
         f"The computed envelopes were fitted to {source} of {loads}. The grid search found "
         f"{_damping_text(result.grid.best)}, with an envelope distance of "
