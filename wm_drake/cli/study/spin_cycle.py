@@ -59,8 +59,8 @@ def spin_cycle(
     cases: Annotated[
         Path | None,
         typer.Option(
-            help="CSV file of cases: case, front_g, rear_g, phase_deg. Default: the 33 cases of [A] "
-            "Table 9.",
+            help="CSV file of cases: case, front_g, rear_g, phase_deg. Default: the 33 cases of "
+            "[A] Table 9.",
             metavar="FILE",
         ),
     ] = None,
