@@ -32,7 +32,7 @@ def gasket_damping(
     record: Annotated[
         list[str] | None,
         typer.Option(
-            help="Measured displacements of a load: CSV with time_s, Xr, Yr, ... in mm, or a netCDF "
+            help="Measured displacements of a load: CSV with time_s, Xr, Yr, ... in mm, or netCDF "
             "record of the command spin. Repeatable. Default: the records of a virtual experiment.",
             metavar="LOAD=FILE",
         ),
