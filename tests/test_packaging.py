@@ -117,7 +117,7 @@ def test_command_checks_and_shows_the_shipped_machine(python, tmp_path):
     command = python.parent / "wm-drake"
     assert (
         run(command, "machine", "check", "reference", cwd=tmp_path)
-        == "reference: machine 'reference' is in order\n"
+        == "reference: machine 'reference' is valid\n"
     )
     shown = json.loads(run(command, "machine", "show", "--json", cwd=tmp_path))
     assert len(shown["natural_frequencies_hz"]) == 6

@@ -1,4 +1,4 @@
-"""`wm-drake calibrate`: what it writes, how it resumes, and how it answers bad input."""
+"""Tests of `wm-drake calibrate`: its files, its resumption, and its errors for bad input."""
 
 import json
 from pathlib import Path
@@ -28,7 +28,7 @@ SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
 
 @pytest.fixture
 def folder(tmp_path):
-    """A folder with a machine, a free file, and amplitudes that a machine with other friction gives."""
+    """Return a folder with a machine, a free file, and amplitudes for another friction force."""
     (tmp_path / "short.yaml").write_text(SHORT)
     (tmp_path / "free.yaml").write_text(FREE)
     machine = build_machine(load_machine(tmp_path / "short.yaml"))
@@ -110,7 +110,10 @@ FAULTS = {
     ),
     "all loads left out": (["--leave-out", "back,middle"], "leaves no load"),
     "weight of nothing": (["--weight", "Q=2"], "'Q' is no load, sensor"),
-    "weight that is no number": (["--weight", "Xr=much"], "--weight: 'Xr=much' is not NAME=NUMBER"),
+    "weight that is no number": (
+        ["--weight", "Xr=much"],
+        "--weight: 'Xr=much' does not have the form NAME=NUMBER",
+    ),
 }
 
 

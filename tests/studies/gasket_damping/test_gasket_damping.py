@@ -120,7 +120,7 @@ def test_short_profile_is_refused(reference):
 def test_command_recovers_its_virtual_experiment_and_names_it_so(wm_drake):
     ended = wm_drake("study", "gasket-damping", "--out", "out", "--json")
     assert ended.code == 0
-    assert "a virtual experiment is run by the Drake engine" in ended.err
+    assert "The Drake engine runs a virtual experiment" in ended.err
     printed = json.loads(ended.out)
     assert printed["virtual_experiment"] is True
     assert printed["scipy"]["C_L"] == pytest.approx(printed["planted"]["C_L"], rel=0.05)
@@ -172,7 +172,7 @@ def run_of(machine, parameters, load):
 def test_faults_of_the_command_are_refused(wm_drake):
     Path("r.csv").write_text("time_s,Xr\n0,1\n")
     for arguments, message in (
-        (("--record", "r.csv"), "is not LOAD=FILE with a load of the machine"),
+        (("--record", "r.csv"), "does not have the form LOAD=FILE with a load of the machine"),
         (("--record", "middle=nosuch.csv"), "no such file 'nosuch.csv'"),
         (("--record", "middle=r.csv"), "r.csv: needs the columns time_s,Xr,Yr"),
         (("--planted-linear", "3 N"), "unit 'N' does not fit"),

@@ -203,7 +203,7 @@ def test_command_names_its_experiment_virtual_and_recovers_the_true_numbers(iden
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "machine 'reference' has not the numbers of [A] Table 8; name others"),
+        ((), "machine 'reference' does not have the numbers of [A] Table 8; give keys"),
         (
             ("--unknown", "gasket.stiffness"),
             "--unknown: gasket.stiffness: no number 'gasket.stiffness'",
