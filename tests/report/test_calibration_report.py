@@ -30,7 +30,7 @@ LOADS = (("middle", False), ("middle", True), ("back", True))
 def calibration(machine, tmp_path_factory):
     path = tmp_path_factory.mktemp("free") / "free.yaml"
     path.write_text(FREE)
-    turning = parameter_map_of(machine, load_free(path))
+    parameter_map = parameter_map_of(machine, load_free(path))
     sensors = tuple(machine.parameters.sensors)
     measured = np.full((3, 6), 0.01)
     targets = Targets(LOADS, sensors, measured, np.ones((3, 6)))
@@ -39,11 +39,11 @@ def calibration(machine, tmp_path_factory):
     point = np.array([40.0, 4.001, 0.24])
     slopes = np.zeros((18, 3))
     slopes[:2] = [[10.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
-    coordinates = (point - turning.expected) / turning.deviation
+    coordinates = (point - parameter_map.expected) / parameter_map.deviation
     best = Solution(0, point, coordinates, computed, 20.0, 2.0, slopes, 123)
     other = Solution(1, point, -coordinates, computed, 21.0, 2.0, slopes, 77)
     bad = Solution(2, point, coordinates, 2.0 * computed, 2000.0, 2.0, slopes, 55)
-    return Calibration(turning, targets, Plan(starts=3), (best, other), (best, other, bad))
+    return Calibration(parameter_map, targets, Plan(starts=3), (best, other), (best, other, bad))
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,8 @@ from pydrake.systems.analysis import InitializeParams, ResetIntegratorFromFlags,
 
 from wm_drake.engines.schedule import output_times
 from wm_drake.engines.trajectory import Trajectory, diverging_coordinate, ended_where_it_diverged
-from wm_drake.model.machine import OUTPUT_PERIOD, Machine, MachineSystems, Setup
+from wm_drake.model.machine import OUTPUT_PERIOD, Machine, MachineSystems
+from wm_drake.model.setup import Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 

@@ -84,13 +84,13 @@ def modes_figure(modes: Sequence[tuple[str, Modes]]) -> Figure:
 
 def quantities_figure(calibration: Calibration) -> Figure:
     """Draw each free quantity between its bounds: prior, and value and deviation of solutions."""
-    turning, solutions = calibration.parameter_map, calibration.solutions
-    count = len(turning.names)
+    parameter_map, solutions = calibration.parameter_map, calibration.solutions
+    count = len(parameter_map.names)
     figure = Figure(figsize=(WIDTH, 0.8 + 0.235 * count), layout="constrained")
     axes = figure.subplots()
-    reach = turning.upper - turning.lower
+    reach = parameter_map.upper - parameter_map.lower
     low, high = (
-        (turning.expected + sign * turning.deviation - turning.lower) / reach
+        (parameter_map.expected + sign * parameter_map.deviation - parameter_map.lower) / reach
         for sign in (-1.0, 1.0)
     )
     places = np.arange(count)
@@ -102,8 +102,8 @@ def quantities_figure(calibration: Calibration) -> Figure:
         color=GRID,
     )
     for rank, solution in reversed(list(enumerate(solutions))):
-        at = (solution.point - turning.lower) / reach
-        wide = solution.spread() * turning.deviation / reach
+        at = (solution.point - parameter_map.lower) / reach
+        wide = solution.spread() * parameter_map.deviation / reach
         colour = OURS if rank == 0 else OTHER
         if rank == 0:
             axes.hlines(
@@ -122,7 +122,7 @@ def quantities_figure(calibration: Calibration) -> Figure:
             linestyle="none",
         )
     axes.plot(
-        (turning.expected - turning.lower) / reach,
+        (parameter_map.expected - parameter_map.lower) / reach,
         places,
         "|",
         color=MEASURED,
@@ -130,7 +130,10 @@ def quantities_figure(calibration: Calibration) -> Figure:
         linestyle="none",
     )
     axes.set_yticks(
-        places, [name.replace("_", " ") for name in turning.names], fontsize=8.5, parse_math=False
+        places,
+        [name.replace("_", " ") for name in parameter_map.names],
+        fontsize=8.5,
+        parse_math=False,
     )
     axes.set_xticks([0.0, 0.5, 1.0], ["lower bound", "", "upper bound"], color=QUIET)
     axes.set(xlim=(-0.02, 1.02), ylim=(count - 0.3, -0.7))

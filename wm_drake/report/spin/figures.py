@@ -17,7 +17,8 @@ from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH, st
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, shape_name
 from wm_drake.report.spin.cases import case_title, speed_rpm
 from wm_drake.simulation.measures import axis_motion, envelopes
-from wm_drake.simulation.runs import Record, point_positions
+from wm_drake.simulation.outputs import point_positions
+from wm_drake.simulation.records import Record
 from wm_drake.studies.spin.study import CaseResult
 
 IndexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
