@@ -49,7 +49,7 @@ class WorkItem:
         case: The case.
         numbers: Shared by all cases with these parameters.
         packed: All packed numbers, as from `pack`.
-        begin: State at the begin of the run.
+        begin: State at the start of the run.
     """
 
     number: int

@@ -16,7 +16,7 @@ from wm_drake.engines.compiled.mechanics import (
 
 @long_running
 def integrate_lanes(steps, begin, end, p, elements, x, work, history):
-    """Advance the states of `lanes.WIDTH` machines from the begin of step `begin` to that of `end`.
+    """Advance the states of `lanes.WIDTH` machines from the start of step `begin` to that of `end`.
 
     All arrays of floats are flat arrays of lanes: they hold one number of every machine, then the
     next one of every machine.
@@ -30,7 +30,7 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
         x: States; they are advanced.
         work: Three arrays of the size of the state, to work in.
         history: Samples, one after the other: the state, then `rates_size` accelerations. A sample
-            is written at the begin of each step that has a sample number.
+            is written at the start of each step that has a sample number.
     """
     align_stack()
     numbers, state, samples = lane_array(p), lane_array(x), lane_array(history)

@@ -174,7 +174,7 @@ def fill_lanes(lanes: FloatArray, runs: list[FloatArray]) -> FloatArray:
 
 
 def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
-    """Return the state at the begin of a run.
+    """Return the state at the start of a run.
 
     The machine is at rest at the rest pose, the drum at its first speed, sponges undeformed.
     """
