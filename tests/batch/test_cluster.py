@@ -97,7 +97,7 @@ def test_command_writes_the_same_tables_if_the_cluster_loses_a_worker(wm_drake, 
     factors = ("--factor", "K_Lx", "--factor", "C_L", "--factor", "K_Ty", "--factor", "C_T")
     study = ("study", "gasket", "--design", "full", *factors, "--profile", "p.yaml")
     assert wm_drake(*study, "--out", "here").code == 0
-    monkeypatch.setattr("wm_drake.batch.runs.integrate_lanes", None)  # this process runs nothing
+    monkeypatch.setattr("wm_drake.batch.runs.integrate_runs", None)  # this process runs nothing
     put_all, killed = Ledger.put_all, []
 
     def put_and_kill(ledger, results):

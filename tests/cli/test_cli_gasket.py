@@ -53,7 +53,7 @@ def tables(folder="out"):
 
 
 def no_runs(monkeypatch):
-    monkeypatch.setattr("wm_drake.batch.runs.integrate_lanes", None)  # whoever runs now, fails
+    monkeypatch.setattr("wm_drake.batch.runs.integrate_runs", None)  # whoever runs now, fails
 
 
 def test_study_writes_tables_and_prints_them(study):

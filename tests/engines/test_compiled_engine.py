@@ -44,7 +44,7 @@ def test_every_kind_of_machine_moves_as_in_drake(name):
     assert list(drake.data_vars) == list(compiled.data_vars)
     motion = float(np.abs(drake.displacement).max())
     assert motion > 1e-3
-    tolerance = 2e-2 if name in JUMPS else 1e-4
+    tolerance = 2e-2 if name in JUMPS else 3e-4
     for variable in ("displacement", "tub_position", "detergent_displacement"):
         np.testing.assert_allclose(compiled[variable], drake[variable], atol=tolerance * motion)
     np.testing.assert_allclose(compiled.drum_speed, drake.drum_speed, atol=1e-6)

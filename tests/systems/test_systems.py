@@ -26,7 +26,7 @@ from wm_drake.parameters.elements import (
     StvDamper,
     packed_stiffness,
 )
-from wm_drake.simulation.histories import reading_history
+from wm_drake.simulation.histories import output_history
 from wm_drake.systems.friction_damper import FrictionDamper
 from wm_drake.systems.six_component_bushing import SixComponentBushing
 from wm_drake.systems.speed_source import REFLECTED_INERTIA, MotorTorque, SpeedSource
@@ -381,7 +381,7 @@ def test_readings_repeat_the_force_port_row_by_row(element):
         for kind in (SpringStrut, FrictionDamper, SixComponentBushing)
     ]
     forces = np.empty((len(states), 6 if element.kind is SixComponentBushing else 1))
-    reading_history(states, sponges, np.empty(0), element.packed, *begins, forces)
+    output_history(states, sponges, np.empty(0), element.packed, *begins, forces)
     for x, own, force in zip(states, sponges[:, : len(element.state)], forces, strict=True):
         assert np.array_equal(own_outputs(system, context_of(system, x, own)), force)
 
