@@ -8,11 +8,13 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
 from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bushing_law
-from wm_drake.elements.friction_damper import FrictionDamperParameters, packed_damper_law
+from wm_drake.elements.damper_law import packed_damper_law
+from wm_drake.elements.friction_damper import FrictionDamperParameters
+from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.elements.spring import SpringStrutParameters
 from wm_drake.elements.telescopic_damper import TelescopicDamperParameters
 from wm_drake.errors import input_error
-from wm_drake.parameters import FrameOverride, MachineParameters, packed_stiffness
+from wm_drake.parameters import FrameOverride, MachineParameters
 from wm_drake.parameters.types import FloatArray
 
 SHORTEST_STRUT = 1e-3

@@ -10,15 +10,19 @@ from wm_drake.compiler.elementary import (
     where,
 )
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
-from wm_drake.compiler.matrices import three
+from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import add, dot, rotate, rotation_from_rpy
 from wm_drake.elements.bushing import six_component_bushing_wrench
-from wm_drake.elements.friction_damper import ENGAGED, friction_damper_line, friction_damper_tension
+from wm_drake.elements.friction_damper import friction_damper_force
 from wm_drake.elements.motion import PLANT_STATE_SIZE, tub_motion
 from wm_drake.elements.spring import spring_strut_wrench
 
-POINT_SIZE = 7
-"""Numbers of a measured point: its place in T, the direction in W along which it is measured, its value at rest. [m]"""
+MEASURED_POINT = PackedLayout(
+    "MeasuredPointNumbers", p_ToM_T=VECTOR, direction_W=VECTOR, at_rest=SCALAR
+)
+"""Place of a measured point in T [m], direction in W along which it is measured, its value at rest [m]."""
+read_measured_point = MEASURED_POINT.read
+POINT_SIZE = MEASURED_POINT.fixed_size or 0
 
 
 @long_running
@@ -80,9 +84,7 @@ def reading_history(state, deformation, points, p, springs, dampers, bushings, r
             _, answer[column] = spring_strut_wrench(motion, q, at)
             column += 1
         for i, at in enumerate(dampers):
-            _, line = friction_damper_line(motion, q, at)
-            tension, _ = friction_damper_tension(line[1], own[i], q, at)
-            answer[column] = q[at + ENGAGED] * tension
+            answer[column] = friction_damper_force(motion, own[i], q, at)
             column += 1
         for at in bushings:
             _, on_housing = six_component_bushing_wrench(motion, q, at)
@@ -94,9 +96,10 @@ def reading_history(state, deformation, points, p, springs, dampers, bushings, r
 
 @law
 def displacement_at(motion, points, at):
-    """Displacement at the measured point whose numbers begin at `at`, along its direction. [m]"""
-    moved_to = add(motion.position, rotate(motion.rotation, three(points, at)))
-    return dot(three(points, at + 3), moved_to) - points[at + 6]
+    """Return the displacement of the measured point whose numbers begin at `at`, along its direction. [m]"""
+    point = read_measured_point(points, at)
+    moved_to = add(motion.position, rotate(motion.rotation, point.p_ToM_T))
+    return dot(point.direction_W, moved_to) - point.at_rest
 
 
 @law

@@ -11,7 +11,7 @@ from wm_drake.engines.compiled.packing import pack_on_tub
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.histories import position_history, reading_history
+from wm_drake.simulation.histories import MEASURED_POINT, position_history, reading_history
 
 AXES = ("x", "y", "z")
 
@@ -236,7 +236,12 @@ def measured_points(setup: Setup) -> FloatArray:
     places = np.array([*setup.sensor_points.values(), *[setup.detergent_point] * 3])
     axes = [*(AXES.index(sensor.axis) for sensor in setup.sensors.values()), 0, 1, 2]
     at_rest = point_positions(setup.rest_pose[None, :], places)[0, range(len(axes)), axes]
-    return np.column_stack([places, np.eye(3)[axes], at_rest])
+    return np.array(
+        [
+            MEASURED_POINT.pack(p_ToM_T=place, direction_W=np.eye(3)[axis], at_rest=rest)
+            for place, axis, rest in zip(places, axes, at_rest, strict=True)
+        ]
+    )
 
 
 def point_displacements(state: FloatArray, points: FloatArray, rest_pose: FloatArray) -> FloatArray:
