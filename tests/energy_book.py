@@ -74,8 +74,8 @@ class EnergyBook:
     def gasket(self):
         """Elastic energy and dissipated power of the gasket; its frames coincide with the axes of W at rest."""
         g, placed = self.parameters.gasket, self.setup.bushings["gasket"]
-        arm = self.rotation.apply(placed.p_ToB_T)
-        d = self.position + arm - placed.p_WG
+        arm = self.rotation.apply(placed.tub_side_point)
+        d = self.position + arm - placed.ground_side_point
         d_rate = self.v + np.cross(self.w, arm)
         r = self.rotation.as_rotvec()
         c = np.array([g.damping_x, g.damping_y, g.damping_z])

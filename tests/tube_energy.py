@@ -120,7 +120,13 @@ def balance(machine, setup, load, profile, step):
         )
     for kind, a, placed, b in parts:
         more_stored, more_power = bushing(
-            kind, a, placed.p_ToB_T, placed.R_TB, b, placed.p_WG, placed.R_WG
+            kind,
+            a,
+            placed.tub_side_point,
+            placed.tub_side_rotation,
+            b,
+            placed.ground_side_point,
+            placed.ground_side_rotation,
         )
         stored, power = stored + more_stored, power + more_power
     plant = MultibodyPlant(0.0)

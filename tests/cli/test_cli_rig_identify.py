@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.laws.table import stiffness_force
-from wm_drake.parameters import load_component, load_machine, packed_stiffness
+from wm_drake.parameters import load_component, load_machine
 
 COULOMB = "law: coulomb\nfriction_force: 60 N\n"
 KINDS = (("", "N/mm"), ("rotational_", "N mm/rad"))

@@ -147,12 +147,16 @@ def test_a_drum_that_turns_about_another_axis_is_represented(tmp_path):
     assert worst_difference(machine, machine.set_up(LOAD), 300) < 1e-10
     bearing = machine.set_up().bearing
     joint = machine.plant.GetJointByName("drum_axis")
-    np.testing.assert_allclose(np.linalg.det(bearing.R_WG), 1.0)
-    np.testing.assert_allclose(bearing.R_WG @ bearing.R_WG.T, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.det(bearing.ground_side_rotation), 1.0)
+    np.testing.assert_allclose(
+        bearing.ground_side_rotation @ bearing.ground_side_rotation.T, np.eye(3), atol=1e-12
+    )
     X_TF = joint.frame_on_parent().GetFixedPoseInBodyFrame()
     axis = X_TF.rotation() @ joint.revolute_axis()
-    np.testing.assert_allclose(bearing.R_WG[:, 1], axis, atol=1e-12)
-    np.testing.assert_allclose(bearing.p_WG - X_TF.translation(), 0.15 * axis, atol=1e-12)
+    np.testing.assert_allclose(bearing.ground_side_rotation[:, 1], axis, atol=1e-12)
+    np.testing.assert_allclose(
+        bearing.ground_side_point - X_TF.translation(), 0.15 * axis, atol=1e-12
+    )
 
 
 def test_a_joint_that_is_no_revolute_one_from_the_tub_is_refused(tmp_path):

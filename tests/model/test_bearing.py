@@ -178,7 +178,13 @@ def test_energy_of_a_run_is_balanced():
         (parameters.imperfections.bearing.as_bushing(), drum, setup.bearing, tub),
     ):
         more_stored, more_power = bushing(
-            kind, a, placed.p_ToB_T, placed.R_TB, b, placed.p_WG, placed.R_WG
+            kind,
+            a,
+            placed.tub_side_point,
+            placed.tub_side_rotation,
+            b,
+            placed.ground_side_point,
+            placed.ground_side_rotation,
         )
         stored, power = stored + more_stored, power + more_power
     plant = MultibodyPlant(0.0)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.errors import InputError
 from wm_drake.laws.table import stiffness_force
 from wm_drake.parameters import (
@@ -14,7 +15,6 @@ from wm_drake.parameters import (
     levels_of,
     load_factors,
     nominal_stiffness,
-    packed_stiffness,
     quantities,
     with_value,
 )

@@ -13,6 +13,7 @@ from scipy.interpolate import PchipInterpolator
 
 from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bushing_law
 from wm_drake.elements.friction_damper import FrictionDamperParameters, packed_damper_law
+from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.elements.spring import SpringStrutParameters
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.elements import (
@@ -24,7 +25,6 @@ from wm_drake.parameters.elements import (
     HavsinDamper,
     MstvDamper,
     StvDamper,
-    packed_stiffness,
 )
 from wm_drake.simulation.histories import output_history
 from wm_drake.systems.friction_damper import FrictionDamper
@@ -327,11 +327,11 @@ def test_a_bushing_acts_at_its_tub_side_point_along_the_axes_of_its_housing_fram
     placed = bushing_parameters()
     bushing = SixComponentBushing(placed.packed())
     curve = PchipInterpolator(GASKET.stiffness_y.displacement, GASKET.stiffness_y.force)
-    R_WG = placed.R_WG
+    R_WG = placed.ground_side_rotation
     for x in random_plant_states(10, seed=26):
-        R_WT, arm, p_WB, v_WB = tub_motion(x, placed.p_ToB_T)
-        d, d_rate, w = R_WG.T @ (p_WB - placed.p_WG), R_WG.T @ v_WB, R_WG.T @ x[7:10]
-        rotation = AngleAxis(R_WG.T @ R_WT @ placed.R_TB)
+        R_WT, arm, p_WB, v_WB = tub_motion(x, placed.tub_side_point)
+        d, d_rate, w = R_WG.T @ (p_WB - placed.ground_side_point), R_WG.T @ v_WB, R_WG.T @ x[7:10]
+        rotation = AngleAxis(R_WG.T @ R_WT @ placed.tub_side_rotation)
         r = rotation.angle() * rotation.axis()
         # rate of the rotation vector and the moment that does its work, through the 3 x 3 matrix of the Bortz equation
         angle, cross_r = rotation.angle(), np.cross(np.eye(3), r)
@@ -358,13 +358,16 @@ def test_the_logged_force_of_a_bushing_is_the_reaction_to_what_acts_on_the_tub()
     placed = bushing_parameters()
     bushing = SixComponentBushing(placed.packed())
     for x in random_plant_states(5, seed=27):
-        _, arm, _, _ = tub_motion(x, placed.p_ToB_T)
+        _, arm, _, _ = tub_motion(x, placed.tub_side_point)
         context = context_of(bushing, x)
         on_tub, on_housing = (
             port(bushing, context, "generalized_force"),
             own_outputs(bushing, context),
         )
-        force, moment = placed.R_WG @ on_housing[:3], placed.R_WG @ on_housing[3:]
+        force, moment = (
+            placed.ground_side_rotation @ on_housing[:3],
+            placed.ground_side_rotation @ on_housing[3:],
+        )
         np.testing.assert_allclose(on_tub[3:6], -force, rtol=1e-12)
         np.testing.assert_allclose(
             on_tub[0:3] - np.cross(arm, on_tub[3:6]), -moment, rtol=1e-9, atol=1e-11

@@ -8,6 +8,7 @@ import numpy as np
 
 from wm_drake.batch.work_items import BatchKey, WorkItem
 from wm_drake.compiler.lanes import WIDTH
+from wm_drake.elements.sensor import POINT_SIZE
 from wm_drake.engines.compiled.mechanics import DRUM_RATE, RATES_SIZE, STATE_SIZE
 from wm_drake.engines.compiled.packing import aligned, fill_lanes
 from wm_drake.engines.compiled.run import integrate_runs
@@ -25,7 +26,7 @@ from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.histories import POINT_SIZE, measure_samples_lanes
+from wm_drake.simulation.histories import measure_samples_lanes
 from wm_drake.simulation.measures import amplitudes, filtered, power_means
 from wm_drake.simulation.records import Record, as_record
 from wm_drake.simulation.vibration import region_displacements

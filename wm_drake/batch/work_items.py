@@ -15,7 +15,6 @@ from wm_drake.model.setup import Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.outputs import measured_points
 from wm_drake.simulation.runs import check_bearing
 
 KEPT_BODIES, KEPT_NUMBERS = 64, 2048
@@ -139,7 +138,7 @@ class Preparation:
                 del self._known_numbers[next(iter(self._known_numbers))]
             setup = self._set_up(case)
             elements, layout = pack_elements(setup)
-            points, rest = measured_points(setup).ravel(), initial_state(setup, case.profile)
+            points, rest = setup.measured_points.ravel(), initial_state(setup, case.profile)
             self._known_numbers[key] = PackedParameters(setup, elements, layout, points, rest)
         return self._known_numbers[key]
 

@@ -174,6 +174,16 @@ def sine_over_angle(angle_squared):
     return (1.0 + y * even) - z * odd
 
 
+def whole_number(x):
+    """Return a number that counts something as an integer: the first lane's, an AutoDiffXd's value."""
+    return int(x.value() if hasattr(x, "value") else x)
+
+
+@overload(whole_number)
+def _compiled_whole_number(x):
+    return lambda x: int(x)
+
+
 def numbers(array):
     """An array of numbers as laws take it fastest; the array itself where it is not one of floats."""
     return array

@@ -1,27 +1,19 @@
 """Displacement sensor: a point of the tub, measured along one direction of the housing."""
 
-import numpy as np
-
 from wm_drake.compiler.compilation import law
-from wm_drake.compiler.matrices import three
+from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import add, dot, rotate
 from wm_drake.elements.motion import tub_motion
-from wm_drake.parameters.types import FloatArray
 
-POINT_SIZE = 7
-"""Numbers of a measured point: its position in T, the direction in W along which it is measured,
-its coordinate along that direction at rest. [m]"""
+MEASURED_POINT = PackedLayout(
+    "MeasuredPointNumbers", p_ToM_T=VECTOR, direction_W=VECTOR, at_rest=SCALAR
+)
+"""A measured point: its position in T [m], the direction in W along which it is measured, and its
+coordinate along that direction at the rest pose [m]."""
 
-
-def packed_points(p_ToS_T: FloatArray, direction: FloatArray, at_rest: FloatArray) -> FloatArray:
-    """Return measured points as rows (k, `POINT_SIZE`).
-
-    Args:
-        p_ToS_T: (k, 3) positions in T. [m]
-        direction: (k, 3) unit vectors in W.
-        at_rest: (k,) coordinates along the directions at the rest pose. [m]
-    """
-    return np.column_stack([p_ToS_T, direction, at_rest])
+read_measured_point = MEASURED_POINT.read
+POINT_SIZE = MEASURED_POINT.fixed_size or 0
+"""Numbers of a measured point."""
 
 
 @law
@@ -30,11 +22,12 @@ def displacement_at(motion, points, at):
 
     Args:
         motion: `TubMotion`.
-        points: Array that holds what `packed_points` returns, row after row.
+        points: Array that holds packed measured points, one after the other.
         at: Index where the numbers of the point begin.
     """
-    moved_to = add(motion.position, rotate(motion.rotation, three(points, at)))
-    return dot(three(points, at + 3), moved_to) - points[at + 6]
+    point = read_measured_point(points, at)
+    moved_to = add(motion.position, rotate(motion.rotation, point.p_ToM_T))
+    return dot(point.direction_W, moved_to) - point.at_rest
 
 
 @law
@@ -43,7 +36,7 @@ def evaluate_sensors(x, points, displacement):
 
     Args:
         x: State of tub and drum, as `tub_motion` reads it.
-        points: Array that holds what `packed_points` returns, row after row.
+        points: Array that holds packed measured points, one after the other.
         displacement: (k,) written. [m]
     """
     motion = tub_motion(x)

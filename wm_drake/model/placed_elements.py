@@ -14,11 +14,9 @@ from wm_drake.elements.bushing import (
     evaluate_six_component_bushing,
     packed_bushing_law,
 )
-from wm_drake.elements.friction_damper import (
-    FrictionDamperParameters,
-    evaluate_friction_damper,
-    packed_damper_law,
-)
+from wm_drake.elements.damper_law import packed_damper_law
+from wm_drake.elements.friction_damper import FrictionDamperParameters, evaluate_friction_damper
+from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.elements.spring import SpringStrutParameters, evaluate_spring_strut
 from wm_drake.elements.telescopic_damper import (
     TelescopicDamperParameters,
@@ -27,7 +25,7 @@ from wm_drake.elements.telescopic_damper import (
 from wm_drake.errors import input_error
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.state_layout import StateLayout
-from wm_drake.parameters import MachineParameters, packed_stiffness
+from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 
 SHORTEST_STRUT = 1e-3

@@ -9,7 +9,7 @@ from pydrake.systems.framework import Context
 from wm_drake.compiler.vectors import rotation_from_rpy
 from wm_drake.elements.bushing import SixComponentBushingParameters
 from wm_drake.elements.friction_damper import FrictionDamperParameters
-from wm_drake.elements.sensor import packed_points
+from wm_drake.elements.sensor import MEASURED_POINT
 from wm_drake.elements.spring import SpringStrutParameters
 from wm_drake.elements.telescopic_damper import TelescopicDamperParameters
 from wm_drake.model.placed_elements import PlacedElements
@@ -140,4 +140,9 @@ def measured_points(
     axes = [*(AXES.index(sensor.axis) for sensor in parameters.sensors.values()), 0, 1, 2]
     rotation = np.reshape(rotation_from_rpy(*map(float, rest[:3])), (3, 3))
     at_rest = (positions @ rotation.T + rest[3:6])[range(len(axes)), axes]
-    return packed_points(positions, np.eye(3)[axes], at_rest)
+    return np.array(
+        [
+            MEASURED_POINT.pack(p_ToM_T=position, direction_W=np.eye(3)[axis], at_rest=value)
+            for position, axis, value in zip(positions, axes, at_rest, strict=True)
+        ]
+    )

@@ -8,25 +8,26 @@ May import: `laws`, `compiler` and `errors`; no pydrake.
 
 from wm_drake.parameters.bearing import Bearing
 from wm_drake.parameters.components import Component, load_component, shipped_components
-from wm_drake.parameters.elements import (
-    Bushing,
-    BushingType,
+from wm_drake.parameters.damper_laws import (
+    DAMPER_LAWS,
     CoulombDamper,
-    Damper,
     DamperType,
-    EndBushing,
-    ForceTable,
     FreeStrokeDamper,
     HavsinDamper,
     MstvDamper,
-    Spring,
-    SpringType,
     StvDamper,
     StvSpongeDamper,
+)
+from wm_drake.parameters.elements import (
+    Bushing,
+    BushingType,
+    Damper,
+    EndBushing,
+    ForceTable,
+    Spring,
+    SpringType,
     TelescopicDamper,
     TorqueTable,
-    packed_stiffness,
-    packed_stiffnesses,
 )
 from wm_drake.parameters.factors import (
     GASKET_FACTORS,
@@ -64,6 +65,7 @@ from wm_drake.parameters.measured import measured_amplitudes
 from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
 
 __all__ = [
+    "DAMPER_LAWS",
     "GASKET_FACTORS",
     "TABLES",
     "Bearing",
@@ -111,8 +113,6 @@ __all__ = [
     "machine_yaml",
     "measured_amplitudes",
     "nominal_stiffness",
-    "packed_stiffness",
-    "packed_stiffnesses",
     "quantities",
     "read_loop",
     "read_loops",

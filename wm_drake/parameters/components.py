@@ -7,7 +7,8 @@ from typing import Any, TypeAlias
 from pydantic import TypeAdapter, ValidationError
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
-from wm_drake.parameters.elements import BushingType, DamperType, Frozen
+from wm_drake.parameters.damper_laws import DamperType
+from wm_drake.parameters.elements import BushingType, Frozen
 from wm_drake.parameters.files import read_mapping
 from wm_drake.parameters.problems import problems_of
 

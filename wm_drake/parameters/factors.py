@@ -10,8 +10,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
-from wm_drake.laws.table import stiffness_force
-from wm_drake.parameters.elements import ForceTable, Frozen, TorqueTable, packed_stiffness
+from wm_drake.parameters.elements import ForceTable, Frozen, TorqueTable
 from wm_drake.parameters.files import read_yaml
 from wm_drake.parameters.keys import quantities, unit_of, with_value, with_values
 from wm_drake.parameters.machine import MachineParameters
@@ -177,13 +176,10 @@ def nominal_stiffness(table: ForceTable | TorqueTable) -> float:
     of zero. If the curve is flat there (a free stroke), it is the slope of the line through the
     whole curve.
     """
-    x = table.displacement if isinstance(table, ForceTable) else table.angle
-    packed = packed_stiffness(table)
+    x = table.curve[0]
     for part in (LINEAR_PART, 1.0):
         points = np.linspace(part * min(x[0], 0.0), part * max(x[-1], 0.0), 201)
-        slope = float(
-            np.polyfit(points, [stiffness_force(float(point), packed, 0) for point in points], 1)[0]
-        )
+        slope = float(np.polyfit(points, table.values(points), 1)[0])
         if slope > 0.0:
             return slope
     return 0.0

@@ -8,11 +8,11 @@ from pydantic import Field, StringConstraints, ValidationInfo, field_validator, 
 from wm_drake.errors import nearest_names
 from wm_drake.parameters import units as u
 from wm_drake.parameters.bearing import Bearing
+from wm_drake.parameters.damper_laws import DamperType
 from wm_drake.parameters.elements import (
     Bushing,
     BushingType,
     Damper,
-    DamperType,
     Frozen,
     Spring,
     SpringType,

@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from wm_drake.errors import Problem, nearest_names
+from wm_drake.parameters.damper_laws import DAMPER_LAWS
 
 
 def problems_of(error: ValidationError, root: type[BaseModel], key: str = "") -> list[Problem]:
@@ -26,17 +27,7 @@ def problems_of(error: ValidationError, root: type[BaseModel], key: str = "") ->
     return problems
 
 
-_TAGS = (
-    "[key]",
-    "number",
-    "table",
-    "coulomb",
-    "stv",
-    "havsin",
-    "mstv",
-    "stv_sponge",
-    "free_stroke",
-)
+_TAGS = ("[key]", "number", "table", *DAMPER_LAWS)
 
 
 def _message(detail: Any, root: type[BaseModel]) -> str:

@@ -5,16 +5,12 @@ import numpy as np
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, where
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
-from wm_drake.compiler.matrices import three
-from wm_drake.compiler.vectors import add, dot, rotate, rotation_from_rpy
+from wm_drake.compiler.vectors import add, rotate, rotation_from_rpy
 from wm_drake.elements.bushing import six_component_bushing_wrench
-from wm_drake.elements.friction_damper import ENGAGED, friction_damper_line, friction_damper_tension
+from wm_drake.elements.friction_damper import friction_damper_force
 from wm_drake.elements.motion import PLANT_STATE_SIZE, tub_motion
+from wm_drake.elements.sensor import POINT_SIZE, displacement_at
 from wm_drake.elements.spring import spring_strut_wrench
-
-POINT_SIZE = 7
-"""Numbers of a measured point: its position in T [m], the direction in W in which displacement is
-measured, the value at rest [m]."""
 
 
 @long_running
@@ -76,9 +72,7 @@ def output_history(state, deformation, points, p, springs, dampers, bushings, ou
             _, answer[column] = spring_strut_wrench(motion, q, at)
             column += 1
         for i, at in enumerate(dampers):
-            _, line = friction_damper_line(motion, q, at)
-            tension, _ = friction_damper_tension(line[1], own[i], q, at)
-            answer[column] = q[at + ENGAGED] * tension
+            answer[column] = friction_damper_force(motion, own[i], q, at)
             column += 1
         for at in bushings:
             _, on_housing = six_component_bushing_wrench(motion, q, at)
@@ -86,13 +80,6 @@ def output_history(state, deformation, points, p, springs, dampers, bushings, ou
                 answer[column + k] = on_housing[k]
             column += 6
         lanes_to_rows(numbers, begin, outputs)
-
-
-@law
-def displacement_at(motion, points, at):
-    """Return the displacement at the measured point with index `at`, along its direction. [m]"""
-    moved_to = add(motion.position, rotate(motion.rotation, three(points, at)))
-    return dot(three(points, at + 3), moved_to) - points[at + 6]
 
 
 @law

@@ -212,7 +212,7 @@ def tub_outputs(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, ...]:
         and of the strut dampers (n, dampers) [N]; force and moment of the bushings on the housing
         (n, bushings, 6) [N, N m].
     """
-    points, (p, indices) = measured_points(setup), pack_on_tub(setup)
+    points, (p, indices) = setup.measured_points, pack_on_tub(setup)
     begins = [np.array(of_kind, dtype=np.int64) for of_kind in indices.values()]
     sizes = [len(points), len(begins[0]), len(begins[1]), 6 * len(begins[2])]
     columns = np.empty((len(trajectory.time), sum(sizes)), order="F")
@@ -252,20 +252,6 @@ def _with_telescopes(
         dampers = np.hstack([dampers, forces[:, :1]])
         bushings = np.hstack([bushings, forces[:, 1:].reshape(-1, 2, 6)])
     return [springs, dampers, bushings]
-
-
-def measured_points(setup: Setup) -> FloatArray:
-    """Return the measured points, packed for `wm_drake.simulation.histories`.
-
-    The points are the sensors, then the detergent point three times, along x, y and z.
-
-    Returns:
-        (k, 7) position in T, direction in W, and the coordinate along that direction at rest. [m]
-    """
-    places = np.array([*setup.sensor_points.values(), *[setup.detergent_point] * 3])
-    axes = [*(AXES.index(sensor.axis) for sensor in setup.sensors.values()), 0, 1, 2]
-    at_rest = point_positions(setup.rest_pose[None, :], places)[0, range(len(axes)), axes]
-    return np.column_stack([places, np.eye(3)[axes], at_rest])
 
 
 def point_displacements(state: FloatArray, points: FloatArray, rest_pose: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH
 from wm_drake.report.formatting import MM_PER_M
 from wm_drake.rigs import ForceLoop, RigRun
-from wm_drake.rigs.run import mstv_friction_curves
+from wm_drake.rigs.run import slider_friction_curves
 
 COLUMNS = 4
 """Largest number of panels in a row."""
@@ -152,7 +152,7 @@ def friction_law_figure(run: RigRun) -> Figure | None:
     """
     rates_mm_s = (1.0, 5.0, 20.0, 60.0)
     w = np.concatenate([-np.geomspace(0.08, 1e-5, 200), np.geomspace(1e-5, 0.08, 200)])
-    curves = mstv_friction_curves(run.bench, [u / MM_PER_M for u in rates_mm_s], w)
+    curves = slider_friction_curves(run.bench, [u / MM_PER_M for u in rates_mm_s], w)
     if curves is None:
         return None
     figure = Figure(figsize=(WIDTH, 2.9), layout="constrained")

@@ -119,8 +119,8 @@ def _drum_bearing(setup: Setup) -> dict[str, Any] | None:
     sag = setup.carrier_rest[3:] - setup.rest_pose[3:]
     rate = {"fastest_motion_hz": setup.bearing_rate / (2.0 * np.pi)}
     return {
-        "point_T": placed.p_WG.tolist(),
-        "rotation_T": placed.R_WG.tolist(),
+        "point_T": placed.ground_side_point.tolist(),
+        "rotation_T": placed.ground_side_rotation.tolist(),
         **kind,
         "sag_of_Do_at_rest_W": sag.tolist(),
         **rate,
@@ -168,10 +168,10 @@ def _bushing(setup: Setup, name: str) -> dict[str, Any]:
         if not key.endswith("_frame")
     }
     return {
-        "tub_point_T": placed.p_ToB_T.tolist(),
-        "tub_rotation_T": placed.R_TB.tolist(),
-        "housing_point_W": placed.p_WG.tolist(),
-        "housing_rotation_W": placed.R_WG.tolist(),
+        "tub_point_T": placed.tub_side_point.tolist(),
+        "tub_rotation_T": placed.tub_side_rotation.tolist(),
+        "housing_point_W": placed.ground_side_point.tolist(),
+        "housing_rotation_W": placed.ground_side_rotation.tolist(),
         **constants,
     }
 
@@ -184,10 +184,10 @@ def _telescope(setup: Setup, name: str) -> dict[str, Any]:
         "outer_tube": tubes[0],
         "inner_tube": tubes[1],
         "axis_outer_tube": placed.axis.tolist(),
-        "tub_point_T": placed.tub_bushing.p_ToB_T.tolist(),
-        "outer_point_outer_tube": placed.tub_bushing.p_WG.tolist(),
-        "inner_point_outer_tube": placed.housing_bushing.p_ToB_T.tolist(),
-        "housing_point_W": placed.housing_bushing.p_WG.tolist(),
+        "tub_point_T": placed.tub_bushing.tub_side_point.tolist(),
+        "outer_point_outer_tube": placed.tub_bushing.ground_side_point.tolist(),
+        "inner_point_outer_tube": placed.housing_bushing.tub_side_point.tolist(),
+        "housing_point_W": placed.housing_bushing.ground_side_point.tolist(),
         "tub_bushing": setup.parameters.bushing_types[damper.tub_bushing].model_dump(),
         "housing_bushing": setup.parameters.bushing_types[damper.housing_bushing].model_dump(),
         **kind.model_dump(exclude={"end_bushing"}),
