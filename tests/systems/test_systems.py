@@ -16,16 +16,14 @@ from wm_drake.elements.friction_damper import FrictionDamperParameters, packed_d
 from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.elements.spring import SpringStrutParameters
 from wm_drake.parameters import SpinProfile
-from wm_drake.parameters.elements import (
-    Bushing,
+from wm_drake.parameters.damper_laws import (
     CoulombDamper,
-    EndBushing,
-    ForceTable,
     FreeStrokeDamper,
     HavsinDamper,
     MstvDamper,
     StvDamper,
 )
+from wm_drake.parameters.elements import Bushing, EndBushing, ForceTable
 from wm_drake.simulation.histories import output_history
 from wm_drake.systems.friction_damper import FrictionDamper
 from wm_drake.systems.six_component_bushing import SixComponentBushing

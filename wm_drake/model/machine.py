@@ -251,6 +251,10 @@ class Machine(MachineSystems):
         context = context or self.diagram.CreateDefaultContext()
         return super().set_up_bodies(load, parameters, context)
 
+    def set_drum_acceleration(self, context: Context, acceleration: float) -> None:
+        """Fix the drum's acceleration in a root Context; see `MachineSystems`. [rad/s^2]"""
+        self.diagram.GetInputPort("drum_acceleration").FixValue(context, [acceleration])
+
 
 def add_washing_machine(
     builder: DiagramBuilder, parameters: MachineParameters, *, name: str = ""

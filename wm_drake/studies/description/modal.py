@@ -56,7 +56,9 @@ def natural_modes(
         gasket: False removes the gasket.
     """
     setup = machine.set_up(parameters=parameters, gasket=gasket, dampers=False)
+    # the drum stands still, whatever speed the spin profile begins with
     machine.set_drum_acceleration(setup.context, 0.0)
+    machine.plant.SetVelocities(setup.plant_context, np.zeros(machine.plant.num_velocities()))
     system = Linearize(
         machine.diagram, setup.context, InputPortSelection.kNoInput, OutputPortSelection.kNoOutput
     )
