@@ -14,7 +14,7 @@ from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bush
 from wm_drake.elements.friction_damper import FrictionDamperParameters, packed_damper_law
 from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.elements.spring import SpringStrutParameters
-from wm_drake.parameters.elements import (
+from wm_drake.parameters import (
     Bushing,
     CoulombDamper,
     EndBushing,

@@ -1,4 +1,4 @@
-"""The bearing of the drum, where it gives."""
+"""Compliant bearing of the drum."""
 
 from typing import Annotated
 
@@ -9,15 +9,20 @@ from wm_drake.parameters.elements import BushingType, Frozen
 
 
 class Bearing(Frozen):
-    """What holds the drum's axis in the tub, where that gives: without it the drum turns in a perfect revolute joint.
+    """Compliant bearing of the drum in the tub; a machine without one has a perfect revolute joint.
 
-    Nothing of it is published: every number is an assumption of whoever gives it.
+    No paper has these numbers: each is an assumption of its author.
 
     Attributes:
-        radial_stiffness, axial_stiffness, tilting_stiffness: Across the drum axis, along it, against tilting of it.
-        torsional_stiffness: About it, where the motor's reaction passes to the tub; as against tilting if None.
-        radial_damping, axial_damping, tilting_damping, torsional_damping: Likewise.
-        y: Where it acts: along the drum axis, from the origin of its joint in the direction of the joint's axis.
+        radial_stiffness, axial_stiffness: Across and along the drum axis. [N/m]
+        tilting_stiffness: Against tilting of the drum axis. [N m/rad]
+        torsional_stiffness: About the drum axis, where the reaction of the motor acts on the tub;
+            the tilting stiffness if None. [N m/rad]
+        radial_damping, axial_damping: Across and along the drum axis. [N s/m]
+        tilting_damping: Against tilting of the drum axis. [N m s/rad]
+        torsional_damping: About the drum axis; the tilting damping if None. [N m s/rad]
+        y: Place of the bearing on the drum axis, from the origin of its joint in the direction of
+            the joint's axis. [m]
     """
 
     radial_stiffness: Annotated[u.LinearStiffness, Field(gt=0.0)]
@@ -31,7 +36,7 @@ class Bearing(Frozen):
     y: u.Length
 
     def as_bushing(self) -> BushingType:
-        """Six components in a frame whose y axis is the drum's."""
+        """Return the bushing of six components in a frame whose y axis is the drum's."""
 
         def or_tilting(torsional: float | None, tilting: float) -> float:
             return tilting if torsional is None else torsional

@@ -22,7 +22,7 @@ MEASURED_POINT = PackedLayout(
 )
 """Place of a measured point in T [m], direction in W along which it is measured, its value at rest [m]."""
 read_measured_point = MEASURED_POINT.read
-POINT_SIZE = MEASURED_POINT.fixed_size or 0
+POINT_SIZE = MEASURED_POINT.fixed_size
 
 
 @long_running
