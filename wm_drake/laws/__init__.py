@@ -23,6 +23,7 @@ Dampers without a sponge (damper.coulomb_damper, stv_damper, havsin_damper) add 
 friction law. The registry of damper laws is `wm_drake.parameters.damper_laws`.
 
 [A] Component-level framework of a front-loading washing machine with free-stroke damper, bushing
-and gasket. [B] Sanchez-Tabuenca et al., Sensors 2020, 20, 6636. [C] Modified stick transition velocity
-(MSTV) model of a lubricated friction damper.
+and gasket.
+[B] Sanchez-Tabuenca et al., Sensors 2020, 20, 6636.
+[C] Modified stick transition velocity (MSTV) model of a lubricated friction damper.
 """
