@@ -250,11 +250,12 @@ def test_compiled_code_lies_in_a_folder_named_by_the_sources(tmp_path, monkeypat
     shutil.copytree(
         Path(wm_drake.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__")
     )
-    monkeypatch.setattr(compilation, "_ROOM", copy)
+    monkeypatch.setattr(compilation, "_PACKAGE", copy)
     before = compilation._cache_folder()
     assert compilation._cache_folder() == before
-    # laws that others call, and a compiled function of a system that a kernel may call
-    for name in ("laws/friction.py", "compiler/vectors.py", "elements/friction_damper.py"):
+    # laws that others call, the registry, and types whose fields are a packed order
+    names = ("laws/friction.py", "compiler/vectors.py", "elements/friction_damper.py")
+    for name in (*names, "parameters/damper_laws.py", "parameters/elements.py"):
         source = copy / name
         source.write_text(source.read_text() + "# changed\n")
         after = compilation._cache_folder()

@@ -4,11 +4,12 @@ A layout is declared once, with a name and a kind for each field:
 
     SPRING = PackedLayout("SpringNumbers", p_ToA_T=VECTOR, preload=SCALAR, stiffness=CURVE)
 
-It packs values by name (`pack`), and it generates a law (`read`) that returns the numbers which begin at
-an index as a named tuple. Compiled laws and interpreted ones use the same reader. A field is either of
-fixed size, a number or a tuple of numbers, or it is a part: packed numbers of their own, such as a table
-of points or the numbers of another layout. A part is read as the pair ``(p, at)`` of the array and the
-index where it begins, which a law passes on: ``stiffness_force(x, *numbers.stiffness)``.
+It packs values by name (`pack`), and it generates a law (`read`) that returns the numbers which
+begin at an index as a named tuple. Compiled laws and interpreted ones use the same reader. A field
+is either of fixed size, a number or a tuple of numbers, or it is a part: packed numbers of their
+own, such as a table of points or the numbers of another layout. A part is read as the pair ``(p,
+at)`` of the array and the index where it begins, which a law passes on: ``stiffness_force(x,
+*numbers.stiffness)``.
 """
 
 import linecache
@@ -42,9 +43,10 @@ class Part:
     """A field with packed numbers of its own, whose size may depend on them.
 
     Attributes:
-        size: Law (p, at) that returns how many numbers the part has; None for a part that must be last.
-        structure: Function (p, at) that returns the whole numbers which must be equal in all machines of
-            a batch, such as the number of points of a table.
+        size: Law (p, at) that returns how many numbers the part has; None for a part that must be
+            last.
+        structure: Function (p, at) that returns the whole numbers which must be equal in all
+            machines of a batch, such as the number of points of a table.
     """
 
     size: Any
@@ -79,7 +81,6 @@ class PackedLayout:
         read: Law (p, at) that returns the numbers which begin at index `at` as a named tuple.
         size: Law (p, at) that returns how many numbers there are.
         offsets: Offset of each field whose offset is the same in all machines.
-        fixed_size: Number of entries, if it is the same in all machines; else None.
     """
 
     def __init__(self, name: str, **fields: Fixed | Part) -> None:
@@ -116,7 +117,7 @@ class PackedLayout:
                 place = _sum(begin, offset)
                 steps.append(f"    {after} = {place} + size_of_{field}(p, {place})\n")
                 begin, offset = after, 0
-        self.fixed_size = offset if begin == "at" and not open_ended else None
+        self._fixed_size = offset if begin == "at" and not open_ended else None
         chain = "".join(steps)
         self.read = generated(
             f"read_{self.name}",
@@ -125,6 +126,17 @@ class PackedLayout:
         )
         size = f"def size_of_{self.name}(p, at):\n{chain}    return {_sum(begin, offset)} - at\n"
         self.size = None if open_ended else generated(f"size_of_{self.name}", size, names)
+
+    @property
+    def fixed_size(self) -> int:
+        """Number of entries of a layout without variable parts.
+
+        Raises:
+            ValueError: The layout has a part of variable size.
+        """
+        if self._fixed_size is None:
+            raise ValueError(f"{self.name} has no fixed size")
+        return self._fixed_size
 
     def pack(self, **values: Any) -> _FloatArray:
         """Return the packed numbers of named values; a part is given packed.

@@ -1,4 +1,4 @@
-"""Compliant bearing of the drum: a six-component bushing between the tub and the carrier of the drum."""
+"""Compliant bearing of the drum: a six-component bushing between the tub and the drum's carrier."""
 
 import numpy as np
 
@@ -10,8 +10,8 @@ from wm_drake.elements.bushing import motion_between, six_component_bushing_betw
 from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE, motion_at, tub_motion
 
 FORCE_SIZE = 12
-"""Own numbers: displacement and rotation vector of the drum's carrier against the tub, force and moment on the
-tub."""
+"""Own numbers: displacement and rotation vector of the drum's carrier against the tub, force and
+moment on the tub."""
 
 
 @law
@@ -20,11 +20,12 @@ def drum_bearing_forces(tub, carrier, p, at):
 
     Args:
         tub, carrier: `TubMotion` of the two bodies.
-        p, at: Array that holds the numbers of `BUSHING`, the tub being the ground, and where they begin.
+        p, at: Array that holds the numbers of `BUSHING`, the tub being the ground, and where they
+            begin.
 
     Returns:
-        Moment about its origin and force on the tub, and on the carrier (six numbers each, W); `FORCE_SIZE` own
-        numbers, in the frame on the tub: y along the drum axis.
+        Moment about its origin and force on the tub, and on the carrier (six numbers each, W);
+        `FORCE_SIZE` own numbers, in the frame on the tub: y along the drum axis.
     """
     on_carrier, on_tub, own = six_component_bushing_between(carrier, tub, p, at)
     _, _, r_ground, displaced, relative = motion_between(carrier, tub, p, at)
@@ -35,8 +36,8 @@ def drum_bearing_forces(tub, carrier, p, at):
 def evaluate_drum_bearing(x, state, p, generalized_force, force, rate):
     """Write the forces of the bearing; arguments as in `ElementSystem`.
 
-    x: states of two trees of the plant, one after the other: tub and drum; the drum's carrier and drum. The
-    generalized force is that on both.
+    x: states of two trees of the plant, one after the other: tub and drum; the drum's carrier and
+    drum. The generalized force is that on both.
     """
     y, q = numbers(x), numbers(p)
     on_tub, on_carrier, own = drum_bearing_forces(
@@ -53,7 +54,7 @@ def evaluate_drum_bearing(x, state, p, generalized_force, force, rate):
 
 @law
 def drum_bearing_history(states, own_states, p, forces):
-    """Write the own numbers at each row of a sampled motion: `evaluate_drum_bearing` without Drake, for records."""
+    """Write the own numbers at each row of a sampled motion, as `evaluate_drum_bearing`."""
     align_stack()
     x_numbers, own_numbers = np.empty(2 * PLANT_STATE_SIZE * WIDTH), np.empty(FORCE_SIZE * WIDTH)
     p_numbers = in_each_lane(p)

@@ -1,4 +1,4 @@
-"""Six-component bushing between a frame of the tub and a frame of the housing; the gasket is one."""
+"""Six-component bushing between frames of the tub and of the housing; the gasket is one."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -30,8 +30,8 @@ from wm_drake.parameters.types import FloatArray
 AXES = ("x", "y", "z")
 
 BUSHING_LAW = layout_of("BushingNumbers", BushingType, tuple(BushingType.model_fields))
-"""Numbers of `BushingType` by name: damping, rotational damping, friction torque, full friction rate of each axis,
-then the six stiffnesses."""
+"""Numbers of `BushingType` by name: damping, rotational damping, friction torque, full friction
+rate of each axis, then the six stiffnesses."""
 BUSHING = PackedLayout(
     "SixComponentBushingNumbers",
     tub_side_point=VECTOR,
@@ -52,13 +52,13 @@ def packed_bushing_law(bushing: BushingType) -> FloatArray:
 
 @dataclass(frozen=True)
 class SixComponentBushingParameters:
-    """A bushing in its place: its two frames at the rest pose and its law. `engaged` 0 takes it out.
+    """A bushing in its place: its two frames at the rest pose, and its law.
 
     Attributes:
-        tub_side_point, tub_side_rotation: Frame on the tub side, in the frame of the tub-side body: T, if that is
-            the tub. [m]
-        ground_side_point, ground_side_rotation: Frame G on the ground side, in the frame of the ground-side body: W,
-            if that is the housing. The stiffness acts along its axes. [m]
+        tub_side_point, tub_side_rotation: Frame on the tub side, in the frame of the tub-side body:
+            T, if that is the tub. [m]
+        ground_side_point, ground_side_rotation: Frame G on the ground side, in the frame of the
+            ground-side body: W, if that is the housing. The stiffness acts along its axes. [m]
         packed_law: Numbers of `BUSHING_LAW`.
         engaged: 1, or 0 for a bushing that is taken out.
     """
@@ -82,7 +82,7 @@ class SixComponentBushingParameters:
 
     @property
     def stiffness(self) -> FloatArray:
-        """Stiffness along x, y, z and about them (6,), of a bushing whose stiffnesses are numbers. [N/m, N m/rad]"""
+        """Stiffness along x, y, z and about them (6,), if all are numbers. [N/m, N m/rad]"""
         return np.array([stiffness_force(1.0, p, at) for p, at in self._by_axis("stiffness")])
 
     def _by_axis(self, quantity: str) -> list[Any]:
@@ -116,7 +116,8 @@ def six_component_bushing_wrench(motion, p, at):
         p, at: Array that holds the numbers of `BUSHING`, and where they begin.
 
     Returns:
-        Moment about To and force on the tub (six numbers, W); force and moment on the housing (six, G).
+        Moment about To and force on the tub (six numbers, W); force and moment on the housing (six,
+        G).
     """
     bushing = read_bushing(p, at)
     r_ground = bushing.ground_side_rotation
@@ -145,15 +146,16 @@ def six_component_bushing_wrench(motion, p, at):
 
 @law
 def six_component_bushing_between(motion, ground, p, at):
-    """Return the wrenches of a bushing on two bodies that move; its ground side is fixed to the second.
+    """Return the wrenches of a bushing on two bodies; its ground side is fixed to the second.
 
     Args:
         motion, ground: `TubMotion` of the two bodies.
-        p, at: Array that holds the numbers of `BUSHING`, and where they begin; the ground-side point and rotation
-            are in the frame of the second body.
+        p, at: Array that holds the numbers of `BUSHING`, and where they begin; the ground-side
+            point and rotation are in the frame of the second body.
 
     Returns:
-        Moment about its origin and force on each body (six numbers, W), and force and moment on the second, in G.
+        Moment about its origin and force on each body (six numbers, W), and force and moment on the
+        second, in G.
     """
     bushing = read_bushing(p, at)
     arm, ground_arm, r_ground, displaced, relative = motion_between(motion, ground, p, at)
@@ -185,8 +187,9 @@ def motion_between(motion, ground, p, at):
         motion, ground, p, at: As for `six_component_bushing_between`.
 
     Returns:
-        From the origins of the two bodies to its point on the first, in W [m]; rotation of its frame G on the second;
-        displacement of the first's frame from G, in W [m]; rotation of the first's frame in G.
+        From the origins of the two bodies to its point on the first, in W [m]; rotation of its
+        frame G on the second; displacement of the first's frame from G, in W [m]; rotation of the
+        first's frame in G.
     """
     bushing = read_bushing(p, at)
     r_ground = compose(ground.rotation, bushing.ground_side_rotation)

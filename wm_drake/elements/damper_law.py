@@ -78,9 +78,9 @@ damper_response = _choice(
 )
 """Law (rate, deformation, p, at) that returns tension and deformation rate of a damper of any law.
 
-rate: rate of elongation [m/s]; deformation: that of the sponge, any number for a law without one [m]; p, at:
-array that holds the packed law, and where it begins. Returns tension, > 0 pulls the ends together [N], and
-deformation rate, 0 without a sponge [m/s]."""
+rate: rate of elongation [m/s]; deformation: that of the sponge, any number for a law without one
+[m]; p, at: array that holds the packed law, and where it begins. Returns tension, > 0 pulls the
+ends together [N], and deformation rate, 0 without a sponge [m/s]."""
 
 sponge_with_mass = _choice(
     "sponge_with_mass",
@@ -88,8 +88,8 @@ sponge_with_mass = _choice(
     {law.number: law.sponge_with_mass for law in DAMPER_LAWS.values() if law.sponge_with_mass},
     result="{}",
 )
-"""Law (deformation, deformation_rate, slider_rate, p, at) that returns tension and force on a sponge with mass,
-of a law that has one on the bench. [m, m/s, m/s -> N, N]"""
+"""Law (deformation, deformation_rate, slider_rate, p, at) that returns tension and force on a
+sponge with mass, of a law that has one on the bench. [m, m/s, m/s -> N, N]"""
 
 LAW = Part(None, law_structure)
 """Kind of a field that holds a packed damper law; the last of a layout."""

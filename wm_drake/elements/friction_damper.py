@@ -32,14 +32,14 @@ FRICTION_DAMPER = PackedLayout(
     end_bushing=LAYOUT(END_BUSHING),
     law=LAW,
 )
-"""Tub end (T) and housing end (W) [m], unit vector from the housing end to the tub end at the rest pose, 1 or 0
-for a damper that is taken out, end bushings, law."""
+"""Tub end (T) and housing end (W) [m], unit vector from the housing end to the tub end at the rest
+pose, 1 or 0 for a damper that is taken out, end bushings, law."""
 read_end_bushing, read_friction_damper = END_BUSHING.read, FRICTION_DAMPER.read
 
 
 @dataclass(frozen=True)
 class FrictionDamperParameters:
-    """A damper in its place: ends at the rest pose, bushings at the ends, law. `engaged` 0 takes it out."""
+    """A damper in its place: ends at the rest pose, end bushings, law. `engaged` 0 takes it out."""
 
     p_ToA_T: FloatArray
     p_WH: FloatArray
@@ -152,7 +152,7 @@ def end_moment(direction, rate, axis, bushing):
 
 @law
 def evaluate_friction_damper(x, state, p, generalized_force, force, rate):
-    """Write the force of a damper strut; arguments as in `ElementSystem`, numbers of `FRICTION_DAMPER`."""
+    """Write the force of a damper strut; arguments as in `ElementSystem`."""
     deformation = state[0] if len(state) > 0 else 0.0 * x[0]
     motion, q = tub_motion(numbers(x)), numbers(p)
     arm, line = friction_damper_line(motion, q, 0)

@@ -18,17 +18,18 @@ TREE_STATE = PackedLayout(
 )
 """State of a tree of the plant: a floating body and one joint from it.
 
-Roll, pitch, yaw of the body, its position p_WTo, angle or extension of the joint; w_WT, v_WTo, rate of the joint.
-The body is the tub or another one. [rad, m, rad or m; rad/s, m/s, rad/s or m/s]"""
+Roll, pitch, yaw of the body, its position p_WTo, angle or extension of the joint; w_WT, v_WTo, rate
+of the joint. The body is the tub or another one. [rad, m, rad or m; rad/s, m/s, rad/s or m/s]"""
 read_tree_state = TREE_STATE.read
 
-PLANT_STATE_SIZE = TREE_STATE.fixed_size or 0
+PLANT_STATE_SIZE = TREE_STATE.fixed_size
 """State of the plant of a rigid machine, a `TREE_STATE`: the tub floats, the drum turns in it."""
 GENERALIZED_FORCE_SIZE = 7
 """Moment about To and force on the tub in W, then the torque on the drum joint."""
 
 TubMotion = namedtuple("TubMotion", ("rotation", "position", "angular_velocity", "velocity"))
-"""R_WT by rows, p_WTo [m], w_WT [rad/s], v_WTo [m/s] of the tub or of another body: tuples of scalars, in W."""
+"""R_WT by rows, p_WTo [m], w_WT [rad/s], v_WTo [m/s] of the tub or of another body: tuples of
+scalars, in W."""
 
 
 @law
@@ -46,7 +47,7 @@ def motion_at(x, at):
 
 @law
 def motion_from_sines(x, at, roll, pitch, yaw):
-    """Return the motion of the body whose `TREE_STATE` begins at `at`, with sine and cosine of each angle given."""
+    """Return the motion of a body from its `TREE_STATE`, and sine and cosine of each angle."""
     state = read_tree_state(x, at)
     return TubMotion(
         rotation_from_sines(roll, pitch, yaw),
@@ -58,7 +59,7 @@ def motion_from_sines(x, at, roll, pitch, yaw):
 
 @law
 def rpy_rates(w, pitch, yaw):
-    """Return the rates of roll, pitch, yaw from the angular velocity in W, as Drake's RpyFloatingJoint does. [rad/s]
+    """Return the rates of roll, pitch, yaw, as Drake's RpyFloatingJoint defines them. [rad/s]
 
     Args:
         w: Angular velocity in W. [rad/s]

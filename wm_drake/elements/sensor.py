@@ -12,7 +12,7 @@ MEASURED_POINT = PackedLayout(
 coordinate along that direction at the rest pose [m]."""
 
 read_measured_point = MEASURED_POINT.read
-POINT_SIZE = MEASURED_POINT.fixed_size or 0
+POINT_SIZE = MEASURED_POINT.fixed_size
 """Numbers of a measured point."""
 
 

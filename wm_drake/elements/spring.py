@@ -21,7 +21,8 @@ SPRING = PackedLayout(
     preload=SCALAR,
     stiffness=CURVE,
 )
-"""Tub hook (T) and housing hook (W) [m], rest length [m], preload [N], stiffness [N/m or a table]."""
+"""Tub hook (T) and housing hook (W) [m], rest length [m], preload [N], stiffness [N/m or a
+table]."""
 read_spring = SPRING.read
 
 

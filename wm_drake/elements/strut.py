@@ -15,7 +15,8 @@ def strut_line(motion, arm, p_WH):
         p_WH: Housing end H. [m]
 
     Returns:
-        Length |HA| [m], its rate [m/s], unit vector from H to A, velocity of A [m/s], and 1 / length.
+        Length |HA| [m], its rate [m/s], unit vector from H to A, velocity of A [m/s], and 1 /
+        length.
     """
     line = subtract(add(motion.position, arm), p_WH)
     square = dot(line, line)
@@ -34,6 +35,6 @@ def transverse(a, direction):
 
 @law
 def wrench_at_origin(arm, force, moment):
-    """Return moment about To and force, as six numbers, of a force at `arm` from To and a moment."""
+    """Return moment about To and force (six numbers) of a force at `arm` from To and a moment."""
     m = add(cross(arm, force), moment)
     return (m[0], m[1], m[2], force[0], force[1], force[2])

@@ -1,4 +1,4 @@
-"""Telescopic damper: outer and inner tube are bodies, each held by a six-component bushing, friction along the joint."""
+"""Telescopic damper: two tubes as bodies, a bushing at each end, friction along the joint."""
 
 from dataclasses import dataclass, replace
 
@@ -27,8 +27,8 @@ from wm_drake.elements.motion import (
 from wm_drake.parameters.types import FloatArray
 
 FORCE_SIZE = 13
-"""Own forces: tension; force and moment of the bushing at the tub on the outer tube; force and moment of the other
-bushing on the housing."""
+"""Own forces: tension; force and moment of the bushing at the tub on the outer tube; force and
+moment of the other bushing on the housing."""
 
 TELESCOPIC_DAMPER = PackedLayout(
     "TelescopicDamperNumbers",
@@ -38,7 +38,8 @@ TELESCOPIC_DAMPER = PackedLayout(
     housing_bushing=LAYOUT(BUSHING),
     law=LAW,
 )
-"""Direction of the joint in the frame of the outer tube, 1 or 0 for a law that is taken out, bushings, law."""
+"""Direction of the joint in the frame of the outer tube, 1 or 0 for a law that is taken out,
+bushings, law."""
 read_telescopic_damper = TELESCOPIC_DAMPER.read
 
 
@@ -47,11 +48,12 @@ class TelescopicDamperParameters:
     """A telescopic damper in its place.
 
     Attributes:
-        axis: Direction of the joint in the frame of the outer tube; the damper is longer when the inner one moves
-            along it.
-        tub_bushing: Between tub and outer tube: its tub side is on the tub, its ground side on the outer tube.
-        housing_bushing: Between inner tube and housing; its tub-side frame is given in the outer tube's frame, at
-            extension 0.
+        axis: Direction of the joint in the frame of the outer tube; the damper is longer when the
+            inner one moves along it.
+        tub_bushing: Between tub and outer tube: its tub side is on the tub, its ground side on the
+            outer tube.
+        housing_bushing: Between inner tube and housing; its tub-side frame is given in the outer
+            tube's frame, at extension 0.
         packed_law: Law along the joint.
         engaged: 0 takes the law out, not the tubes.
     """
@@ -69,7 +71,7 @@ class TelescopicDamperParameters:
 
     @property
     def structure(self) -> list[int]:
-        """What must be equal in a batch: number of the law, points of the tables of law and bushings."""
+        """What must be equal in a batch: number of the law, points of the tables."""
         return [
             *self.tub_bushing.structure,
             *self.housing_bushing.structure,
@@ -77,7 +79,7 @@ class TelescopicDamperParameters:
         ]
 
     def without_friction(self) -> "TelescopicDamperParameters":
-        """Return the damper with the elastic and viscous parts of its bushings only: what a mode is made of."""
+        """Return the damper without law and friction: the part of it that is linear in a mode."""
         return replace(
             self,
             tub_bushing=self.tub_bushing.without_friction(),
@@ -107,9 +109,9 @@ def telescopic_damper_forces(tub, outer, extension, extension_rate, deformation,
         p, at: Array that holds the numbers of `TELESCOPIC_DAMPER`, and where they begin.
 
     Returns:
-        Moment about To and force on the tub; moment about the origin of the outer tube and force on both tubes;
-        force on the joint; rate of deformation; tension; force and moment of the first bushing on the outer tube
-        (in its frame), of the second on the housing.
+        Moment about To and force on the tub; moment about the origin of the outer tube and force on
+        both tubes; force on the joint; rate of deformation; tension; force and moment of the first
+        bushing on the outer tube (in its frame), of the second on the housing.
     """
     damper = read_telescopic_damper(p, at)
     axis = rotate(outer.rotation, damper.axis)
@@ -157,8 +159,8 @@ def _forces_at(x, deformation, p):
 def evaluate_telescopic_damper(x, state, p, generalized_force, force, rate):
     """Write the forces of a telescopic damper; arguments as in `ElementSystem`.
 
-    x: states of two trees of the plant, one after the other: tub and drum; outer tube and joint. The generalized
-    force is that on both.
+    x: states of two trees of the plant, one after the other: tub and drum; outer tube and joint.
+    The generalized force is that on both.
     """
     deformation = state[0] if len(state) > 0 else 0.0 * x[0]
     y, q = numbers(x), numbers(p)
@@ -179,7 +181,7 @@ def evaluate_telescopic_damper(x, state, p, generalized_force, force, rate):
 
 @law
 def telescopic_damper_history(states, own_states, p, forces):
-    """Write the own forces at each row of a sampled motion: `evaluate_telescopic_damper` without Drake, for records."""
+    """Write the own forces at each row of a sampled motion, as `evaluate_telescopic_damper`."""
     align_stack()
     x_numbers, own_numbers = np.empty(2 * PLANT_STATE_SIZE * WIDTH), np.empty(WIDTH)
     force_numbers, p_numbers = np.empty(FORCE_SIZE * WIDTH), in_each_lane(p)

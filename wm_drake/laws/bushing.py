@@ -16,23 +16,26 @@ from wm_drake.laws.table import stiffness_force
 def bushing_force(d, d_rate, r, w, bushing):
     """Return force and moment of a six-component bushing on its tub-side frame.
 
-        F = -(k d or curve(d)) - c d'                           per axis; [A] Eq. (7), (8); [B] Fig. 4
+        F = -(k d or curve(d)) - c d'                      per axis; [A] Eq. (7), (8); [B] Fig. 4
         T = -(k r or curve(r)) - c r' + HAVSIN(r'; v_t, p)      per axis of the rotation vector r
 
-    The stiffness acts in the ground-side frame G: all vectors are expressed there. T does work on the rates r'
-    of the rotation vector. The moment that does the same work on the angular velocity acts on the body, so
-    elastic energy is stored and given back exactly. [A] writes angles, which agree for small ones.
+    The stiffness acts in the ground-side frame G: all vectors are expressed there. T does work on
+    the rates r' of the rotation vector. The moment that does the same work on the angular velocity
+    acts on the body, so elastic energy is stored and given back exactly. [A] writes angles, which
+    agree for small ones.
 
     Args:
-        d, d_rate: Position of the tub-side frame from the ground-side frame, and its rate, in G. [m, m/s]
+        d, d_rate: Position of the tub-side frame from the ground-side frame, and its rate, in G.
+            [m, m/s]
         r: Rotation vector of the tub-side frame against G. [rad]
         w: Angular velocity of the tub-side frame against G, in G. [rad/s]
-        bushing: Named numbers of a bushing, as `wm_drake.elements.bushing.BUSHING_LAW` reads them: stiffness
-            [k, curve], damping [c], friction_torque [p] and full_friction_rate [v_t] of each axis.
+        bushing: Named numbers of a bushing, as `wm_drake.elements.bushing.BUSHING_LAW` reads them:
+            stiffness [k, curve], damping [c], friction_torque [p] and full_friction_rate [v_t] of
+            each axis.
 
     Returns:
-        Force [N] and moment [N m] on the tub side at the tub-side point, in G; the reaction acts at the same
-        point.
+        Force [N] and moment [N m] on the tub side at the tub-side point, in G; the reaction acts at
+        the same point.
     """
     coefficient = rotation_vector_coefficient(dot(r, r))
     r_rate = rotation_vector_rate(r, w, coefficient)

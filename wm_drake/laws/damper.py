@@ -1,11 +1,11 @@
 """Friction dampers along their line: tension, and the rate of their state if they have one.
 
-The first argument of a damper law is the rate of elongation of the strut [m/s]; the tension is > 0 while the
-strut pulls its ends together [N]. A law with a sponge also takes the deformation of the sponge and returns
-its rate; a law without one returns the tension alone. The deformation is delta = Y - X [m] (driven end less
-slider) and needs no reference length; the slider of [C] is X = Y - delta. The other arguments carry the names
-of the machine file (`wm_drake.parameters.damper_laws`), where each law is registered; a docstring gives the
-symbol of the paper in brackets.
+The first argument of a damper law is the rate of elongation of the strut [m/s]; the tension is > 0
+while the strut pulls its ends together [N]. A law with a sponge also takes the deformation of the
+sponge and returns its rate; a law without one returns the tension alone. The deformation is delta =
+Y - X [m] (driven end less slider) and needs no reference length; the slider of [C] is X = Y -
+delta. The other arguments carry the names of the machine file (`wm_drake.parameters.damper_laws`),
+where each law is registered; a docstring gives the symbol of the paper in brackets.
 """
 
 from wm_drake.compiler.compilation import law
@@ -65,24 +65,26 @@ def havsin_damper(rate, friction_force, full_friction_velocity, damping):
 def slider_rate(b, v, c, friction_force, friction_damping, regularisation_velocity):
     """Solve for the velocity of a massless slider under MSTV friction, in closed form.
 
-    Own derivation. Force balance of [C] Eq. (3) with m = 0, with the friction `mstv_friction` and u = v - w:
+    Own derivation. Force balance of [C] Eq. (3) with m = 0, the friction `mstv_friction` and
+    u = v - w:
 
         b = c w + g(w) sgn(w)               for |w| >= |u|   (slips)
         b = c w + g(w) w / (|u| + eps)      for |w| <  |u|   (sticks),     g(w) = f_max + c_m |w|
 
-    w has the sign of b; turn signs so that b >= 0. Then the sticking branch is a quadratic with one positive
-    root:
+    w has the sign of b; turn signs so that b >= 0. Then the sticking branch is a quadratic with one
+    positive root:
 
-        v > 0, u = v - w:    (c_m - c) w^2 + (c (v + eps) + f_max + b) w - b (v + eps) = 0,  valid up to v/2
-        v <= 0, u = v - w:   (c_m + c) w^2 + (c (|v| + eps) + f_max - b) w - b (|v| + eps) = 0,  always valid
+        v > 0, u = v - w:    (c_m - c) w^2 + (c (v + eps) + f_max + b) w - b (v + eps) = 0
+        v <= 0, u = v - w:   (c_m + c) w^2 + (c (|v| + eps) + f_max - b) w - b (|v| + eps) = 0
 
-    (at v = 0, where [C] has both branches meet, the limit from below), and the slipping one is
-    w = (b - f_max) / (c + c_m). The right sides grow with w, so the balance has one solution. At w = v/2 the
-    friction jumps by a relative eps/v, where the slider keeps w = v/2.
+    The first is valid up to w = v/2, the second always (at v = 0, where [C] has both branches meet,
+    it is the limit from below). The slipping branch is w = (b - f_max) / (c + c_m). The right sides
+    grow with w, so the balance has one solution. At w = v/2 the friction jumps by a relative eps/v;
+    there the slider keeps w = v/2.
 
     Args:
-        b: Force of the sponge on the slider less what depends on w: k1 delta + c1 v in [C], K(delta) delta in
-            [A]. [N]
+        b: Force of the sponge on the slider less what depends on w: k1 delta + c1 v in [C],
+            K(delta) delta in [A]. [N]
         v: Velocity of the driven end. [m/s]
         c: Sum of the dashpots that oppose w (c1 + c2 in [C], 0 in [A]), >= 0; c + c_m > 0. [N s/m]
         friction_force: Friction force at rest [f_max], >= 0. [N]
@@ -90,7 +92,8 @@ def slider_rate(b, v, c, friction_force, friction_damping, regularisation_veloci
         regularisation_velocity: Regularisation of MSTV [eps], > 0. [m/s]
 
     Returns:
-        Slider velocity w = X'. [m/s] Its sensitivity to b is at most 1/c: the damper is no stiffer than k1/c.
+        Slider velocity w = X'. [m/s] Its sensitivity to b is at most 1/c: the damper is no stiffer
+        than k1/c.
     """
     f_max, c_m = friction_force, friction_damping
     sign = where(b >= 0.0, 1.0, -1.0)
@@ -109,10 +112,11 @@ def slider_rate(b, v, c, friction_force, friction_damping, regularisation_veloci
 
 @law
 def root_as_quotient(a2, a1, a0):
-    """Solve a2 w^2 + a1 w - a0 = 0, a0 >= 0, for its positive root (the smaller one if a2 < 0 < a1).
+    """Return the positive root of a2 w^2 + a1 w - a0 = 0, a0 >= 0 (the smaller one if a2 < 0 < a1).
 
     Returns:
-        Numerator and denominator, without cancellation; 0 and 1 where there is neither friction nor force.
+        Numerator and denominator, without cancellation; 0 and 1 where there is neither friction nor
+        force.
     """
     radicand = a1 * a1 + 4.0 * a2 * a0
     free = radicand <= 0.0  # the root of zero has no derivative
@@ -135,13 +139,13 @@ def mstv_damper(
 ):
     """Return tension and deformation rate of a friction damper with a massless sponge.
 
-        s = k1 delta + c1 (v - w),   s = c2 w - f_mstv(w, v - w)      [C] Eq. (2), (3) with M = m = 0
+        s = k1 delta + c1 (v - w),   s = c2 w - f_mstv(w, v - w)      [C] Eq. (2), (3), M = m = 0
 
     Args:
         rate: Rate of elongation v. [m/s]
         deformation: Deformation of the sponge delta. [m]
-        friction_force, friction_damping, regularisation_velocity: MSTV friction [f_max, c_m, epsilon].
-            [N, N s/m, m/s]
+        friction_force, friction_damping, regularisation_velocity: MSTV friction [f_max, c_m,
+            epsilon]. [N, N s/m, m/s]
         sponge_stiffness, sponge_damping: Sponge [k1, c1]. [N/m, N s/m]
         slider_damping: Air resistance of the slider [c2]. [N s/m]
 
@@ -179,7 +183,8 @@ def mstv_sponge_with_mass(
     Args:
         deformation, deformation_rate: Y - X and its rate. [m, m/s]
         slider_rate: X'. [m/s]
-        friction_force, friction_damping, regularisation_velocity: As for `mstv_damper`. [N, N s/m, m/s]
+        friction_force, friction_damping, regularisation_velocity: As for `mstv_damper`. [N, N s/m,
+            m/s]
         sponge_stiffness, sponge_damping, slider_damping: As for `mstv_damper`. [N/m, N s/m, N s/m]
 
     Returns:
@@ -202,12 +207,13 @@ def stv_sponge_damper(
     sponge_damping,
     slider_damping,
 ):
-    """Return tension and deformation rate of a damper with a massless sponge under STV or Coulomb friction.
+    """Return tension and deformation rate of a massless sponge under STV or Coulomb friction.
 
-        s = k1 delta + c1 (v - w),   s = c2 w - f_stv(w)      [C] Eq. (2), (3), (4), (6) with M = m = 0
+        s = k1 delta + c1 (v - w),   s = c2 w - f_stv(w)   [C] Eq. (2), (3), (4), (6), M = m = 0
 
-    Own derivation: with b = k1 delta + c1 v and c = c1 + c2 the balance c w + f_max clip(w / v_st, -1, 1) = b
-    has the one solution w = b v_st / (f_max + c v_st) for |b| <= f_max + c v_st, else sgn(b) (|b| - f_max) / c.
+    Own derivation: with b = k1 delta + c1 v and c = c1 + c2 the balance c w + f_max clip(w / v_st,
+    -1, 1) = b has the one solution w = b v_st / (f_max + c v_st) for |b| <= f_max + c v_st, else
+    sgn(b) (|b| - f_max) / c.
 
     Args:
         rate: Rate of elongation v. [m/s]
@@ -242,7 +248,7 @@ def free_stroke_damper(
 ):
     """Return tension and deformation rate of a free-stroke damper with a massless sponge.
 
-        tension = f_d(delta) + f_b,   f_d = K(delta) delta = f_m,   f_b = HAVSIN(v)      [A] Eq. (2)-(6)
+        tension = f_d(delta) + f_b,   f_d = K(delta) delta = f_m,   f_b = HAVSIN(v)   [A] (2)-(6)
 
     Inside the free stroke f_d = 0 and the sponge stays with the inner tube: w = 0.
 
@@ -251,8 +257,10 @@ def free_stroke_damper(
         deformation: Outer tube less sponge, delta. [m]
         friction_force, friction_damping, regularisation_velocity: Main friction, MSTV
             [f_max, c_m, epsilon]. [N, N s/m, m/s]
-        basic_friction_force, basic_full_friction_velocity: Basic friction, HAVSIN [p_b, v_b]. [N, m/s]
-        sponge: Sponge curve f_d over delta, packed, as array and index (`wm_drake.laws.table`). [m, N]
+        basic_friction_force, basic_full_friction_velocity: Basic friction, HAVSIN [p_b, v_b]. [N,
+            m/s]
+        sponge: Sponge curve f_d over delta, packed, as array and index (`wm_drake.laws.table`). [m,
+            N]
 
     Returns:
         Tension [N] and the rate of deformation v - w [m/s].

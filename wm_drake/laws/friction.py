@@ -1,8 +1,9 @@
 """Laws of dry friction.
 
-Each law is odd in the velocity, never does positive work, and is bounded by its full force; the tests check
-this. Reversing all velocities reverses the force. Misprints of the papers are corrected; the docstrings name
-them. Arguments carry the names of the machine file; a docstring gives the symbol of the paper in brackets.
+Each law is odd in the velocity, never does positive work, and is bounded by its full force; the
+tests check this. Reversing all velocities reverses the force. Misprints of the papers are
+corrected; the docstrings name them. Arguments carry the names of the machine file; a docstring
+gives the symbol of the paper in brackets.
 """
 
 import numpy as np
@@ -15,7 +16,7 @@ from wm_drake.compiler.elementary import anywhere, sine_over_angle, sqrt, where
 def coulomb_friction(v, friction_force):
     """Return the Coulomb friction force.
 
-        f = -f_max sgn(v),  f(0) = 0      [C] Eq. (4); printed -sgn|v|, a misprint: it would not change sign
+        f = -f_max sgn(v),  f(0) = 0      [C] Eq. (4); printed -sgn|v|, which would not change sign
 
     Args:
         v: Sliding velocity. [m/s]
@@ -54,10 +55,10 @@ def stv_friction(v, transition_velocity, friction_force):
 def havsin_friction(v, full_friction_velocity, friction_force):
     """Return the smoothed Coulomb friction force or torque (HAVSIN).
 
-        f = -p sin(pi v / (2 v_t)),  |v| < v_t;   f = -p sgn(v) beyond      [A] Eq. (2), (3) corrected
+        f = -p sin(pi v / (2 v_t)),  |v| < v_t;   f = -p sgn(v) beyond   [A] Eq. (2), (3) corrected
 
-    The printed HAVSIN of (3) is discontinuous at both ends. With pi inside the sine and (h1 - h0)/2 before
-    it, it is this function. It serves forces [N, m/s] and torques [N m, rad/s].
+    The printed HAVSIN of (3) is discontinuous at both ends. With pi inside the sine and (h1 - h0)/2
+    before it, it is this function. It serves forces [N, m/s] and torques [N m, rad/s].
 
     Args:
         v: Sliding velocity. [m/s or rad/s]
@@ -77,7 +78,7 @@ def havsin_friction(v, full_friction_velocity, friction_force):
 
 @law
 def havsin_friction_per_rate(rate_squared, full_friction_rate, friction_torque):
-    """Return f / v of `havsin_friction`; times a vector of velocity or rate it is the friction against it.
+    """Return f / v of `havsin_friction`: times a vector of velocity, it is the friction against it.
 
     Args:
         rate_squared: Square of the magnitude of the vector. [m^2/s^2 or rad^2/s^2]
@@ -85,7 +86,8 @@ def havsin_friction_per_rate(rate_squared, full_friction_rate, friction_torque):
         friction_torque: Full friction force or torque [p], >= 0. [N or N m]
 
     Returns:
-        Force or torque per rate, <= 0. [N s/m or N m s] Smooth at rest, where it is -pi p / (2 v_t).
+        Force or torque per rate, <= 0. [N s/m or N m s] Smooth at rest, where it is -pi p / (2
+        v_t).
     """
     slope = (0.5 * np.pi) / full_friction_rate
     x_squared = slope * slope * rate_squared
@@ -104,9 +106,9 @@ def mstv_friction(w, u, friction_force, friction_damping, regularisation_velocit
         f = -g sgn(w),               |w| >= |u|      [C] Eq. (7), [A] Eq. (4) corrected
         f = -g w / (|u| + epsilon),  |w| <  |u|
 
-    The stick transition velocity is the deformation rate of the sponge. Both papers print the second branch
-    with the wrong sign (it would feed energy in), and [A] prints c_m w for c_m |w| (the force must be odd).
-    [C] has c_m = 0.
+    The stick transition velocity is the deformation rate of the sponge. Both papers print the
+    second branch with the wrong sign (it would feed energy in), and [A] prints c_m w for c_m |w|
+    (the force must be odd). [C] has c_m = 0.
 
     Args:
         w: Slider velocity. [m/s]

@@ -8,8 +8,9 @@ from wm_drake.laws.table import stiffness_force
 def spring_tension(length, rest_length, preload, stiffness):
     """Return the tension of a suspension spring under a preload.
 
-        t = preload + F(length - rest_length)      own derivation: Hooke's law about the rest pose, F = k x
-                                                   or a table
+        t = preload + F(length - rest_length)      own derivation: Hooke's law about the rest pose
+
+    F = k x, or a table.
 
     Args:
         length: Distance between the hooks. [m]

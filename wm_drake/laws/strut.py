@@ -9,10 +9,11 @@ from wm_drake.laws.friction import havsin_friction_per_rate
 def bending_moment(direction, rate, axis, stiffness, damping, friction_torque, full_friction_rate):
     """Return the moment on a strut of the bushing at one end (Hooke joint of [B] section 3).
 
-        m = -(k a + c a') + HAVSIN(|a'|) a'/|a'|      physics of [A] Eq. (7) for bending; own vector form
+        m = -(k a + c a') + HAVSIN(|a'|) a'/|a'|      [A] Eq. (7) for bending; own vector form
 
-    a: angle between the strut and the axis fixed in the body, as a vector about which the strut is bent away;
-    a': the transverse angular velocity of the strut against the body. Spin about the strut's own axis is free.
+    a: angle between the strut and the axis fixed in the body, as a vector about which the strut is
+    bent away; a': the transverse angular velocity of the strut against the body. Spin about the
+    strut's own axis is free.
 
     Args:
         direction: Unit vector e along the strut, in W.
@@ -34,9 +35,10 @@ def bending_moment(direction, rate, axis, stiffness, damping, friction_torque, f
 
 @law
 def transverse_couple(moment, direction, inverse_length):
-    """Return the force on the tub end of a massless strut; the force on its housing end is the opposite.
+    """Return the force on the tub end of a massless strut; that on its housing end is the opposite.
 
-    f = (m_tub + m_housing) x e / L      balance of moments of the strut, own derivation ([B] section 3)
+    f = (m_tub + m_housing) x e / L      balance of moments of the strut, own derivation ([B]
+    section 3)
 
     Args:
         moment: Moment of the bushings at both ends on the strut, transverse to e. [N m]

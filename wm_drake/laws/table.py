@@ -1,9 +1,10 @@
 """Stiffness: a number, or a table interpolated monotonically.
 
-A packed stiffness (`CURVE` in a packed layout) is either ``[0, k]`` or ``[n, x_1, y_1, a_1, b_1, c_1, x_2, ..,
-c_(n-1), x_n, a_n]``: for each piece between two of the n points its begin and the cubic y + a t + b t^2 + c t^3
-in t = x - x_i, then the last point and the slope there. The cubics are scipy's PCHIP
-(`wm_drake.elements.layouts.packed_stiffness`), which keeps the curve monotone between monotone points.
+A packed stiffness (`CURVE` in a packed layout) is either ``[0, k]`` or ``[n, x_1, y_1, a_1, b_1,
+c_1, x_2, .., c_(n-1), x_n, a_n]``: for each piece between two of the n points its begin and the
+cubic y + a t + b t^2 + c t^3 in t = x - x_i, then the last point and the slope there. The cubics
+are scipy's PCHIP (`wm_drake.elements.layouts.packed_stiffness`), which keeps the curve monotone
+between monotone points.
 """
 
 import numpy as np
@@ -25,8 +26,8 @@ PIECE_SIZE, END_SIZE = _PIECE.fixed_size, _END.fixed_size
 def stiffness_force(x, packed, at):
     """Return the elastic force (or torque) at a displacement (or angle).
 
-    Linear: k x. Table: a cubic between two points [Fritsch and Carlson 1980, through scipy], a straight line with
-    the slope of the end point beyond them.
+    Linear: k x. Table: a cubic between two points [Fritsch and Carlson 1980, through scipy], a
+    straight line with the slope of the end point beyond them.
 
     Args:
         x: Displacement. [m or rad]
@@ -44,7 +45,7 @@ def stiffness_force(x, packed, at):
     lower, end = read_piece(packed, first), read_end(packed, last)
     before, after = x < lower.begin, x > end.x
     inside = where(before, lower.begin, where(after, end.x, x))
-    # motions stay within a few pieces next to zero: those that all lanes have behind them cost a comparison
+    # motions stay near zero: pieces that all lanes have behind them cost a comparison
     common = 0
     while common < n - 2 and everywhere(inside >= packed[first + PIECE_SIZE * (common + 1)]):
         common += 1
@@ -81,7 +82,8 @@ def pack_table(x, cubics, end_slope):
 
     Args:
         x: Abscissas (n,).
-        cubics: Coefficients (n - 1, 4) of the piece that begins at each but the last, the constant first.
+        cubics: Coefficients (n - 1, 4) of the piece that begins at each but the last, the constant
+            first.
         end_slope: Slope at the last point.
     """
     pieces = [
@@ -92,7 +94,7 @@ def pack_table(x, cubics, end_slope):
 
 
 def number_of_points(packed, at):
-    """Return how many points a packed stiffness has, 0 for a number; in a list, for `Part.structure`."""
+    """Return how many points a packed stiffness has, 0 for a number, in a list."""
     return [whole_number(packed[at])]
 
 

@@ -1,8 +1,9 @@
-"""Damper laws: the numbers that a machine file gives for each, and the registry of all that depends on a law.
+"""Damper laws: their numbers in a machine file, and the registry of all that depends on a law.
 
-A law is registered once. The file types, the compiled engine, the systems, the rigs, the identification and the
-command line read the registry. To add a law, write a law function in `wm_drake.laws`, a class here whose fields
-carry the names of the function's arguments, and an entry of the registry.
+A law is registered once. The file types, the compiled engine, the systems, the rigs, the
+identification and the command line read the registry. To add a law, write a law function in
+`wm_drake.laws`, a class here whose fields carry the names of the function's arguments, and an entry
+of the registry.
 """
 
 import functools
@@ -25,9 +26,10 @@ from wm_drake.parameters.elements import (
     PositiveVelocity,
 )
 
-Search: TypeAlias = Literal["force", "stiffness", "damping", "speed"] | tuple[float, float]
-"""Where the identification searches a number: in the range of its kind, which follows from the measured loops,
-or between two bounds in SI."""
+Kind: TypeAlias = Literal["force", "stiffness", "damping", "speed"]
+Search: TypeAlias = Kind | tuple[float, float]
+"""Where the identification searches a number: in the range of its kind, which follows from the
+measured loops, or between two bounds in SI."""
 
 
 class DamperNumbers(Frozen):
@@ -78,14 +80,14 @@ class MstvDamper(DamperNumbers):
     def _slider_rate_is_finite(self) -> "MstvDamper":
         if self.sponge_damping + self.slider_damping + self.friction_damping <= 0.0:
             raise ValueError(
-                "sponge_damping, slider_damping and friction_damping are all zero: a massless slider "
-                "needs one"
+                "sponge_damping, slider_damping and friction_damping are all zero: a massless "
+                "slider needs one"
             )
         return self
 
 
 class StvSpongeDamper(DamperNumbers):
-    """Massless sponge with STV friction [C] Eq. (2), (3), (6); Coulomb's Eq. (4) at transition velocity 0."""
+    """Massless sponge with STV friction [C] Eq. (2), (3), (6); Coulomb's (4) at velocity 0."""
 
     law: Literal["stv_sponge"]
     friction_force: NonNegativeForce
@@ -104,7 +106,7 @@ class StvSpongeDamper(DamperNumbers):
 
 
 class FreeStrokeDamper(DamperNumbers):
-    """Free-stroke damper [A] Eq. (2)-(6) with a massless sponge; the curve is zero inside the free stroke."""
+    """Free-stroke damper [A] Eq. (2)-(6), massless sponge; its curve is zero in the free stroke."""
 
     law: Literal["free_stroke"]
     friction_force: NonNegativeForce
@@ -121,16 +123,18 @@ class DamperLaw:
 
     Attributes:
         number: Number in packed arrays.
-        parameters: Numbers of the law in a machine file; the order of its fields is the packed order.
-        response: Law (rate, fields) that returns the tension, or (rate, deformation, fields) that returns tension
-            and deformation rate of a sponge. [m/s, m -> N, m/s]
+        parameters: Numbers of the law in a machine file; the order of its fields is the packed
+            order.
+        response: Law (rate, fields) that returns the tension, or (rate, deformation, fields) that
+            returns tension and deformation rate of a sponge. [m/s, m -> N, m/s]
         equations: Where the papers have it.
-        unknowns: Numbers that an identification searches, and where. It also searches each curve of the law; another
-            number keeps its value unless the user gives it bounds.
-        sponge_with_mass: Law (deformation, deformation_rate, slider_rate, fields) that returns tension and force on
-            a sponge with mass, for the bench; None if its sponge is always massless.
-        slider_friction: Law (slider_rate, deformation_rate, some fields) that returns the friction on the slider, for
-            a figure; None for no figure.
+        unknowns: Numbers that an identification searches, and where. It also searches each curve of
+            the law; another number keeps its value unless the user gives it bounds.
+        sponge_with_mass: Law (deformation, deformation_rate, slider_rate, fields) that returns
+            tension and force on a sponge with mass, for the bench; None if its sponge is always
+            massless.
+        slider_friction: Law (slider_rate, deformation_rate, some fields) that returns the friction
+            on the slider, for a figure; None for no figure.
     """
 
     number: int

@@ -1,4 +1,4 @@
-"""Force elements of a machine: springs, dampers, bushings. Frozen, SI; field names are the key paths of the machine file."""
+"""Springs, dampers, bushings of a machine: frozen, SI; fields are the keys of the machine file."""
 
 import itertools
 from typing import Annotated, Any, TypeAlias
@@ -12,7 +12,7 @@ from wm_drake.parameters.types import FloatArray
 
 
 class Frozen(BaseModel):
-    """A frozen record that refuses unknown fields."""
+    """A frozen type that allows no unknown fields."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -106,7 +106,7 @@ PositiveRate: TypeAlias = Annotated[u.AngularVelocity, Field(gt=0.0)]
 
 
 class SpringType(Frozen):
-    """A suspension spring as bought. Its preload follows from static equilibrium, so it is not written."""
+    """A suspension spring as bought. Its preload is no input: static equilibrium decides it."""
 
     stiffness: Stiffness
 
@@ -120,7 +120,7 @@ class Spring(Frozen):
 
 
 class EndBushing(Frozen):
-    """Bushing at each end of a damper, where it bends against tub and housing (Hooke joints of [B]). Zero is legal."""
+    """Bushing at each end of a damper (Hooke joints of [B]). Zero is legal."""
 
     stiffness: Annotated[u.RotationalStiffness, Field(ge=0.0)] = 0.0
     damping: NonNegativeRotationalDamping = 0.0
@@ -160,21 +160,30 @@ class BushingType(Frozen):
 
 
 class Bushing(BushingType):
-    """A six-component bushing in its place; the gasket of [B] Fig. 4 is one. Stiffness lives in the housing-side frame."""
+    """A six-component bushing in its place, such as the gasket of [B] Fig. 4.
+
+    Its stiffness acts along the axes of the housing-side frame.
+    """
 
     tub_frame: str
     housing_frame: str
 
 
 class TelescopicDamper(Frozen):
-    """A damper whose tubes are bodies ([A] Fig. 20): tub - bushing - outer tube - joint - inner tube - bushing - housing.
+    """A damper whose tubes are bodies ([A] Fig. 20).
+
+    It is the chain tub - bushing - outer tube - joint - inner tube - bushing - housing.
 
     Attributes:
-        type: Law along the joint, one of `damper_types`; its end_bushing is for dampers without tubes.
-        joint: Prismatic joint of the SDF from the outer tube, which is otherwise free, to the inner one; positive when longer.
-        tub_bushing, housing_bushing: Of `bushing_types`. Stiffness lives in outer_frame, and in housing_frame.
-        tub_frame, outer_frame: Of the first, on tub and outer tube; at the same place when drawn.
-        inner_frame, housing_frame: Of the second, on inner tube and housing.
+        type: Law along the joint, one of `damper_types`; its end_bushing is for dampers without
+            tubes.
+        joint: Prismatic joint of the SDF from the outer tube, which is otherwise free, to the inner
+            one; positive when longer.
+        tub_bushing, housing_bushing: Names in `bushing_types`. The stiffness of the first acts
+            along the axes of outer_frame, that of the second along those of housing_frame.
+        tub_frame, outer_frame: Frames of the first bushing, on tub and outer tube; at the same
+            place when drawn.
+        inner_frame, housing_frame: Frames of the second bushing, on inner tube and housing.
     """
 
     type: str

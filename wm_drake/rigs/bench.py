@@ -51,7 +51,8 @@ class DamperBench:
 
     Attributes:
         packed: Law number and parameters, from `packed_damper_law`.
-        sponge_mass: Mass of the sponge, for a law that has one on the bench; 0 as in the machine. [kg]
+        sponge_mass: Mass of the sponge, for a law that has one on the bench; 0 as in the machine.
+            [kg]
     """
 
     packed: FloatArray
@@ -79,7 +80,7 @@ class DamperBench:
 
     @property
     def state_size(self) -> int:
-        """Number of states: none, deformation of the sponge, or position and velocity of a sponge with mass."""
+        """Number of states: 0, 1 (deformation of the sponge) or 2 (sponge with mass)."""
         return 2 if self.sponge_mass > 0.0 else int(law_of(self.packed).has_sponge)
 
 
@@ -110,7 +111,7 @@ class BushingBench:
 
     @property
     def rotates(self) -> bool:
-        """Whether its motion is an angle and its force a moment; with an arm they are those of the arm's end."""
+        """Whether motion and force are angle and moment; through an arm they are not."""
         return self.axis.startswith("about") and self.arm == 0.0
 
     @property
@@ -123,7 +124,7 @@ Bench: TypeAlias = DamperBench | BushingBench
 
 
 def damper_bench(damper: DamperNumbers, sponge_mass: float = 0.0) -> DamperBench:
-    """Return the bench of a damper of a machine file; its end bushings do not matter along its line."""
+    """Return the bench of a damper of a machine file; its end bushings have no effect there."""
     return DamperBench(packed_damper_law(damper), sponge_mass)
 
 

@@ -1,4 +1,4 @@
-"""Forces that the bench measures, from motion and state of the component, with the laws of the machine."""
+"""Forces on the bench, from motion and state of the component, with the laws of the machine."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from wm_drake.rigs.bench import AXES, BushingBench
 
 @long_running
 def damper_tensions(rate, deformation, packed):  # type: ignore[no-untyped-def]
-    """Return the tension of a damper at rates of elongation (n,) and deformations of its sponge (n,). [N]
+    """Return the tension of a damper (n,). [N]
 
     Args:
         rate: Rates of elongation. [m/s]
@@ -74,9 +74,9 @@ def bushing_reactions(position, rate, packed, axis):  # type: ignore[no-untyped-
 def bushing_loads(bench: BushingBench, position: FloatArray, rate: FloatArray) -> FloatArray:
     """Return force or moment at the driven end of a bushing (n,). [N; N m]
 
-    Through a jig arm of radius R the actuator moves by d = R sin(theta), and the moment M needs the force
-    F = M / (R cos(theta)), which does the same work. [A] section 2.2 takes M = F R, which differs by less than 0.1 %
-    up to d = 4 mm at R = 100 mm.
+    Through a jig arm of radius R the actuator moves by d = R sin(theta), and the moment M needs the
+    force F = M / (R cos(theta)), which does the same work. [A] section 2.2 takes M = F R, which
+    differs by less than 0.1 % up to d = 4 mm at R = 100 mm.
 
     Args:
         bench: The bushing.

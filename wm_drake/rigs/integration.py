@@ -1,8 +1,8 @@
 """Steady motion of sponges on the bench: adaptive, stiff integration of many benches at once.
 
-All benches of a call are one system of equations over the phase of their motion, states in units of their
-amplitudes: one pass of LSODA in C instead of one per bench, which makes a fit to many loops short. The Jacobian is
-a band.
+All benches of a call are one system of equations over the phase of their motion, states in units of
+their amplitudes: one pass of LSODA in C instead of one per bench, which makes a fit to many loops
+short. The Jacobian is a band.
 """
 
 import warnings
@@ -25,8 +25,8 @@ PIECES = (
     slice(POINTS // 4, 3 * POINTS // 4 + 1),
     slice(3 * POINTS // 4, POINTS + 1),
 )
-"""Pieces of `PHASE` from reversal to reversal of the driven end, where friction has a corner: the integrator begins
-anew there."""
+"""Pieces of `PHASE` from reversal to reversal of the driven end, where friction has a corner: the
+integrator begins anew there."""
 
 MOST_PERIODS = 200
 STEADY = 1e-7
@@ -34,7 +34,8 @@ STEADY = 1e-7
 
 TOLERANCES = {1: {"rtol": 2e-8, "atol": 2e-9}, 2: {"rtol": 1e-6, "atol": 1e-6}}
 """Tolerances by the number of states of a bench, in amplitudes. With a mass, MSTV friction jumps by
-f_max epsilon / |u| as the sponge begins to slip: integrators chatter or break down at tighter ones."""
+f_max epsilon / |u| as the sponge begins to slip: integrators chatter or break down at tighter
+ones."""
 
 
 class NotSteadyError(WmDrakeError):
@@ -50,10 +51,12 @@ def steady_states(
         packed: Law number and parameters of a damper with sponge (r, s).
         mass: Mass of each sponge (r,). [kg]
         amplitude, omega: Amplitude and angular frequency of each motion (r,). [m, rad/s]
-        size: States of each bench: 1, the deformation, or with mass 2, position and velocity of the sponge.
+        size: States of each bench: 1, the deformation, or with mass 2, position and velocity of the
+            sponge.
 
     Returns:
-        (POINTS + 1, r, size); deformation and position in amplitudes, velocity in amplitude times omega.
+        (POINTS + 1, r, size); deformation and position in amplitudes, velocity in amplitude times
+        omega.
 
     Raises:
         NotSteadyError: The motion is not steady within `MOST_PERIODS`, or cannot be integrated.
@@ -108,10 +111,10 @@ def _closed_loop(
 ) -> FloatArray:
     """Repeat periods until one ends where it began.
 
-    With `leap`, for states that do not act on each other, each leaps to where the secant through its last two
-    periods closes (Aitken's delta-squared): a sponge that creeps towards its steady place over hundreds of periods
-    is there in a few. The ends of a scalar equation keep the order of its beginnings, so the secant has a slope of
-    0 to 1.
+    With `leap`, for states that do not act on each other, each leaps to where the secant through
+    its last two periods closes (Aitken's delta-squared): a sponge that creeps towards its steady
+    place over hundreds of periods is there in a few. The ends of a scalar equation keep the order
+    of its beginnings, so the secant has a slope of 0 to 1.
     """
     before: tuple[FloatArray, FloatArray] | None = None
     for _ in range(MOST_PERIODS):
@@ -147,7 +150,7 @@ def deformation_rates(phase, deformation, packed, amplitude, omega, rates):  # t
 
 @long_running
 def sponge_rates(phase, state, packed, mass, amplitude, omega, rates):  # type: ignore[no-untyped-def]
-    """Write the rates by phase of position and velocity of sponges with mass: m X'' = force of the law."""
+    """Write the rates by phase of position and velocity of sponges with mass."""
     for i in range(len(amplitude)):
         speed = amplitude[i] * omega[i]
         y, v = amplitude[i] * np.sin(phase), speed * np.cos(phase)

@@ -14,14 +14,15 @@ from wm_drake.rigs.integration import PHASE, steady_states
 
 @dataclass(frozen=True, eq=False)
 class ForceLoop:
-    """One steady period of a component on the bench, equally spaced, without the point that closes it.
+    """One steady period of a component on the bench, equally spaced, without its closing point.
 
     Attributes:
         motion: Motion of the driven end.
         rotates: Whether motion and force are angle and moment.
         time: From the passage through the middle, upwards (n,). [s]
         displacement, velocity: Motion of the driven end (n,). [m, m/s; rad, rad/s]
-        force: On the component at the driven end, > 0 in the direction of the displacement (n,). [N; N m]
+        force: On the component at the driven end, > 0 in the direction of the displacement (n,).
+            [N; N m]
     """
 
     motion: Harmonic
@@ -34,13 +35,15 @@ class ForceLoop:
 
 @dataclass(frozen=True)
 class LoopMeasures:
-    """Measures of a loop; moments and angles in place of forces and displacements where the component is turned.
+    """Measures of a loop; moments and angles in place of forces and displacements in a rotation.
 
     Attributes:
         peak_force: Largest absolute force. [N; N m]
         energy_per_cycle: Work done on the component in a period, the area of the loop. [J]
-        equivalent_damping: Damping of the dashpot that takes the same energy, E / (pi 2 pi f A^2). [N s/m; N m s/rad]
-        dynamic_stiffness: Amplitude of the fundamental of the force by that of the displacement. [N/m; N m/rad]
+        equivalent_damping: Damping of the dashpot that takes the same energy, E / (pi 2 pi f A^2).
+            [N s/m; N m s/rad]
+        dynamic_stiffness: Amplitude of the fundamental of the force by that of the displacement.
+            [N/m; N m/rad]
         loss_angle: By which the fundamental of the force leads that of the displacement. [rad]
     """
 
@@ -84,7 +87,7 @@ def force_loops(bench: Bench, motions: Sequence[Harmonic]) -> list[ForceLoop]:
 def steady_deformations(
     bench: DamperBench, packed: FloatArray, amplitude: FloatArray, omega: FloatArray
 ) -> FloatArray:
-    """Return the deformation of massless sponges over a steady period, at `PHASE` (r, POINTS + 1). [m]
+    """Return the deformation of massless sponges over a steady period, at `PHASE`. [m]
 
     Args:
         bench: A damper of the same law; the deformation is zero if the law has no sponge.

@@ -1,4 +1,4 @@
-"""From a recorded loop to the motion of the bench: frequency, amplitude, and the phase of every sample."""
+"""From a recorded loop to the motion of the bench: frequency, amplitude, phase of each sample."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,8 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import Harmonic
 
 LARGEST_DISTORTION = 0.2
-"""Largest root mean square of what is neither fundamental nor drift in the displacement, in amplitudes."""
+"""Largest root mean square of what is neither fundamental nor drift in the displacement, in
+amplitudes."""
 
 
 WHOLE_PERIOD = 0.97
@@ -25,9 +26,10 @@ class MeasuredMotion:
     Attributes:
         loop: The recorded loop.
         motion: The fundamental of the displacement.
-        phase: Phase of each sample, 0 at an upward passage through the middle, from 0 to 2 pi (n,). [rad]
-        baseline: Columns (n, 1 or 2): offset of an instrument and, where two periods or more separate it from the
-            loop, its drift.
+        phase: Phase of each sample, 0 at an upward passage through the middle, from 0 to 2 pi (n,).
+            [rad]
+        baseline: Columns (n, 1 or 2): offset of an instrument and, where two periods or more
+            separate it from the loop, its drift.
     """
 
     loop: MeasuredLoop
@@ -37,7 +39,7 @@ class MeasuredMotion:
 
 
 def measured_motion(loop: MeasuredLoop) -> MeasuredMotion:
-    """Return the harmonic motion of a bench by least squares; samples may lie anywhere, offset and drift are removed.
+    """Return the harmonic motion of a bench by least squares; offset and drift are removed.
 
     The middle of the motion counts as the component's zero.
 
@@ -76,7 +78,7 @@ def measured_motion(loop: MeasuredLoop) -> MeasuredMotion:
 
 
 def _projected(time: FloatArray, values: FloatArray, frequency: float) -> tuple[FloatArray, float]:
-    """Return the amounts of sine, cosine, offset (and drift) at a frequency, and the square sum they leave."""
+    """Return the amounts of sine, cosine, offset (and drift), and the square sum they leave."""
     angle = 2.0 * np.pi * frequency * time
     columns = [np.sin(angle), np.cos(angle), np.ones_like(time)]
     if frequency * time[-1] >= 2.0:

@@ -34,8 +34,9 @@ MATRICES: dict[str, dict[str, tuple[Harmonic, ...]]] = {
         "gasket": {"A": _A_GASKET},
     }.items()
 }
-"""Motions by component and paper: [C] Table 1; the frequencies and amplitudes of [A] Tables 2, 4, 5 and 7, all with
-all. Rotations are driven through the jig arm, so these amplitudes are its displacements."""
+"""Motions by component and paper: [C] Table 1; the frequencies and amplitudes of [A] Tables 2, 4, 5
+and 7, all with all. Rotations are driven through the jig arm, so these amplitudes are its
+displacements."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +77,7 @@ def run_rig(
 def slider_friction_curves(
     bench: Bench, deformation_rates: Sequence[float], rates: FloatArray
 ) -> FloatArray | None:
-    """Return the friction over the velocity of the slider at held deformation rates, the form of [C] Fig. 12. [N]
+    """Return the friction on a slider at held deformation rates, the form of [C] Fig. 12. [N]
 
     Args:
         bench: The component.

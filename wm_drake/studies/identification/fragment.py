@@ -1,4 +1,4 @@
-"""Identified numbers as a file: a fragment that starts from a machine and changes one component, or a component file."""
+"""Identified numbers as a file: a fragment that changes one component, or a component file."""
 
 import os
 from collections.abc import Mapping
@@ -34,13 +34,14 @@ def fragment(
     copies: Mapping[str, str],
     out: Path,
 ) -> str:
-    """Return the text of a YAML file with identified numbers; comments name those the data do not determine.
+    """Return the text of a YAML file with identified numbers; comments name the undetermined ones.
 
     Args:
         fit: Fit of the model.
         model: Model of the component.
         target: The component as it was, for the keys of another law that have to go.
-        machine: Machine that the fragment starts from, as it was named; "" for a component file that stands alone.
+        machine: Machine that the fragment starts from, as it was named; "" for a component file
+            that stands alone.
         key: Key path of the component in the machine.
         copies: Fields that get the value of another, such as z of an axisymmetric bushing from x.
         out: Folder the file goes to, from which a machine file is named.
@@ -138,8 +139,8 @@ def _normalised(fit: Fit) -> float:
 def _table(value: Mapping[str, Any], fit: Fit) -> dict[str, str]:
     units = {"displacement": _LENGTH, "angle": _ANGLE, "force": FORCE, "torque": TORQUE}
     shown = {
-        name: f"({', '.join(f'{units[name].from_si(x):.6g}' for x in values)}) {_plain(units[name])}"
-        for name, values in value.items()
+        name: f"({', '.join(f'{units[name].from_si(x):.6g}' for x in given)}) {_plain(units[name])}"
+        for name, given in value.items()
     }
     return {
         **shown,
@@ -160,7 +161,7 @@ def _leaving(entries: dict[str, Any], target: Component) -> dict[str, Any]:
 
 
 def _whole(entries: dict[str, Any], target: Component) -> dict[str, Any]:
-    """Return a component file: identified numbers, and old numbers that still belong to the component."""
+    """Return a component file: identified numbers, and old ones that still belong to it."""
     if "law" in entries and entries["law"] != getattr(target.parameters, "law", None):
         return entries
     kept = {

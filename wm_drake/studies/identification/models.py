@@ -1,7 +1,7 @@
-"""Models of components: which numbers are unknown, between which bounds, and how parameters follow from a point.
+"""Models of components: unknown numbers, their bounds, and how parameters follow from a point.
 
-Default bounds come from the loops: no force can exceed what was measured by much, no stiffness the steepest loop by
-orders of magnitude. They are where a search begins; the user may replace them.
+Default bounds come from the loops: no force can exceed what was measured by much, no stiffness the
+steepest loop by orders of magnitude. They are where a search begins; the user may replace them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,7 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters import DAMPER_LAWS, DamperType, ForceTable, TorqueTable
-from wm_drake.parameters.damper_laws import DamperLaw, DamperNumbers, Search
+from wm_drake.parameters.damper_laws import DamperLaw, DamperNumbers, Kind
 from wm_drake.parameters.elements import BushingType
 from wm_drake.parameters.keys import unit_of
 from wm_drake.parameters.types import FloatArray
@@ -37,8 +37,8 @@ KNOTS = 5
 """Knots of a table on each side of zero."""
 
 BUSHING_LAWS = {"voigt": slice(0, 2), "table": slice(1, 2), "voigt_havsin": slice(0, 4)}
-"""Laws of a bushing, and which of `_bushing_kinds` are unknown numbers: stiffness and damping; monotone table and
-damping; for rotations, stiffness, damping and HAVSIN friction."""
+"""Laws of a bushing, and which of `_bushing_kinds` are unknown numbers: stiffness and damping;
+monotone table and damping; for rotations, stiffness, damping and HAVSIN friction."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,8 @@ class ComponentModel:
     Attributes:
         law: Name of the law.
         unknowns: Numbers that are searched.
-        fields: Function of a point (p,) that returns the component's fields, in SI; a table as a mapping.
+        fields: Function of a point (p,) that returns the component's fields, in SI; a table as a
+            mapping.
         bench: Function of a point that returns the component on the bench.
     """
 
@@ -67,7 +68,8 @@ def damper_model(
 ) -> ComponentModel:
     """Return a damper with unknown numbers.
 
-    Numbers of the law that are not unknown keep their default unless the user fixes them or gives them bounds.
+    Numbers of the law that are not unknown keep their default unless the user fixes them or gives
+    them bounds.
 
     Args:
         law: As in a machine file.
@@ -168,8 +170,8 @@ def bushing_model(
     )
 
 
-def _bushing_kinds(axis: str) -> dict[str, Search]:
-    """Return the fields of a bushing along or about an axis with their kinds: stiffness, damping, friction."""
+def _bushing_kinds(axis: str) -> dict[str, Kind]:
+    """Return the fields of a bushing along or about an axis with their kinds."""
     prefix, letter = ("rotational_" if axis.startswith("about") else ""), axis[-1]
     return {
         f"{prefix}stiffness_{letter}": "stiffness",
@@ -181,7 +183,7 @@ def _bushing_kinds(axis: str) -> dict[str, Search]:
 
 @dataclass(frozen=True)
 class _Fields:
-    """Fields of a component at a point (p,): the known ones, its unknown numbers, then the rises of its tables."""
+    """Fields of a component at a point (p,): known ones, numbers, then rises of its tables."""
 
     known: Mapping[str, Any]
     numbers: tuple[Unknown, ...]
@@ -210,13 +212,13 @@ def units_of_fields() -> dict[str, Unit]:
     found = {name: unit for law in DAMPER_LAWS.values() for name, unit in _units(law).items()}
     for letter in "xyz":
         along, about = _bushing_kinds(letter), _bushing_kinds(f"about_{letter}")
-        found |= {name: ALONG[str(kind)] for name, kind in list(along.items())[:2]}
-        found |= {name: ABOUT[str(kind)] for name, kind in about.items()}
+        found |= {name: ALONG[kind] for name, kind in list(along.items())[:2]}
+        found |= {name: ABOUT[kind] for name, kind in about.items()}
     return found
 
 
 def unit_of_field(name: str) -> Unit | None:
-    """Return the unit of a number of `units_of_fields` or of a rise of a table; None if there is no such number."""
+    """Return the unit of a number of `units_of_fields` or of a rise of a table; None if unknown."""
     field, _, rise = name.partition(".")
     if rise.startswith("rise_"):
         return TORQUE if field.startswith("rotational") else FORCE

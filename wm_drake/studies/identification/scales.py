@@ -29,7 +29,8 @@ ABOUT = {
 """Units by kind of a number, along an axis and about one."""
 
 DASHPOT = 1e-4
-"""Lowest damping that is searched, relative to the highest: a lower one has no effect that can be measured."""
+"""Lowest damping that is searched, relative to the highest: a lower one has no effect that can be
+measured."""
 MAGNITUDES = 30.0
 """Quotient of two bounds from which on the order of magnitude of a number counts as unknown."""
 
@@ -46,7 +47,7 @@ class Scale:
     stroke: float
 
     def bounds(self, search: Search) -> tuple[float, float, bool]:
-        """Return lower and upper default bound of a number, and whether its order of magnitude is unknown.
+        """Return lower and upper default bound, and whether the order of magnitude is unknown.
 
         Args:
             search: Kind of the number, or its bounds. [SI]
@@ -62,7 +63,7 @@ class Scale:
 
 
 def scale_of(motions: Sequence[MeasuredMotion], arm: float = 0.0) -> Scale:
-    """Return the scale of measured loops; with the arm of a jig [m], of the angles and moments at its axis."""
+    """Return the scale of measured loops; with the arm of a jig [m], of angles and moments."""
     force, stiffness, damping, speeds, strokes = [], [], [], [], []
     for measured in motions:
         size = 0.5 * float(np.ptp(measured.loop.force)) * (arm or 1.0)

@@ -1,4 +1,4 @@
-"""Curves of force over displacement whose rises from knot to knot are the unknowns, so that they never fall."""
+"""Curves of force over displacement that never fall: the rises between knots are the unknowns."""
 
 import numpy as np
 
