@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.bodies import add_bodies, add_load, set_bodies
-from wm_drake.simulation.runs import as_record
+from wm_drake.simulation.records import as_record
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
 
@@ -74,8 +74,8 @@ class EnergyBook:
     def gasket(self):
         """Elastic energy and dissipated power of the gasket; its frames coincide with the axes of W at rest."""
         g, placed = self.parameters.gasket, self.setup.bushings["gasket"]
-        arm = self.rotation.apply(placed.p_ToB_T)
-        d = self.position + arm - placed.p_WG
+        arm = self.rotation.apply(placed.tub_side_point)
+        d = self.position + arm - placed.ground_side_point
         d_rate = self.v + np.cross(self.w, arm)
         r = self.rotation.as_rotvec()
         c = np.array([g.damping_x, g.damping_y, g.damping_z])
@@ -165,7 +165,6 @@ def dense_record(machine, case, step):
     profile, context = case.profile, setup.context
     simulator = Simulator(machine.diagram, context)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", step).set_fixed_step_mode(True)
-    source_context = machine.source.GetMyContextFromRoot(context)
     plant_context = setup.plant_context
     accelerations = machine.plant.get_generalized_acceleration_output_port()
     dampers = [damper.GetMyContextFromRoot(context) for damper in machine.dampers.values()]
@@ -182,7 +181,7 @@ def dense_record(machine, case, step):
     for begin, stop, alpha in zip(
         profile.time, profile.time[1:], profile.acceleration(), strict=False
     ):
-        machine.source.set_acceleration(source_context, alpha)
+        machine.set_drum_acceleration(context, alpha)
         simulator.Initialize()
         sample(alpha)
         for moment in np.linspace(begin, stop, int(np.ceil((stop - begin) / step)) + 1)[1:]:

@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.laws.table import stiffness_force
-from wm_drake.parameters import load_component, load_machine, packed_stiffness
+from wm_drake.parameters import load_component, load_machine
 
 COULOMB = "law: coulomb\nfriction_force: 60 N\n"
 KINDS = (("", "N/mm"), ("rotational_", "N mm/rad"))
@@ -263,7 +264,7 @@ BAD_FILE = "time_s,displacement_mm,force_N\n" + "\n".join(
         ),
         (
             ("identify", "damper", "good.csv", "--fix", "friction_force"),
-            "--fix: 'friction_force' is not KEY=VALUE",
+            "--fix: 'friction_force' does not have the form KEY=VALUE",
         ),
         (
             ("identify", "gasket", "good.csv", "--axis", "tilt"),

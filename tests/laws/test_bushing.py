@@ -5,9 +5,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from wm_drake.laws.bushing import bushing_force
+from wm_drake.elements.bushing import BUSHING_LAW, read_bushing_law
+from wm_drake.elements.layouts import packed_stiffness
+from wm_drake.laws import bushing
 from wm_drake.laws.table import stiffness_force
-from wm_drake.parameters.elements import ForceTable, packed_stiffness
+from wm_drake.parameters.elements import ForceTable
 
 ZERO = (0.0, 0.0, 0.0)
 STIFFNESS = (8e3, 3e3, 8e3)  # N/m: gasket, [A] Table 8
@@ -24,8 +26,25 @@ vectors = st.tuples(*[st.floats(-2.0, 2.0)] * 3)
 
 
 def packed(damping=ZERO, rotational_damping=ZERO, friction=ZERO, curves=(0.0,) * 6):
-    constants = [*damping, *rotational_damping, *friction, *FULL_FRICTION_RATE]
-    return np.concatenate([constants, *map(packed_stiffness, curves)])
+    kinds = {
+        "damping": damping,
+        "rotational_damping": rotational_damping,
+        "friction_torque": friction,
+        "full_friction_rate": FULL_FRICTION_RATE,
+        "stiffness": [packed_stiffness(curve) for curve in curves[:3]],
+        "rotational_stiffness": [packed_stiffness(curve) for curve in curves[3:]],
+    }
+    return BUSHING_LAW.pack(
+        **{
+            f"{kind}_{axis}": value
+            for kind, values in kinds.items()
+            for axis, value in zip("xyz", values, strict=True)
+        }
+    )
+
+
+def bushing_force(d, d_rate, r, w, p, at):
+    return bushing.bushing_force(d, d_rate, r, w, read_bushing_law(p, at))
 
 
 ELASTIC = packed(curves=(STIFFNESS[0], CURVE, STIFFNESS[2], *ROTATIONAL_STIFFNESS))

@@ -8,14 +8,9 @@ from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 from scipy.optimize import brentq
 
 from wm_drake.compiler.compilation import generic
+from wm_drake.elements.damper_law import damper_response
+from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.laws.damper import (
-    COULOMB,
-    FREE_STROKE,
-    HAVSIN,
-    MSTV,
-    STV,
-    STV_SPONGE,
-    damper_response,
     free_stroke_damper,
     mstv_damper,
     slider_rate,
@@ -23,7 +18,7 @@ from wm_drake.laws.damper import (
 )
 from wm_drake.laws.friction import mstv_friction, stv_friction
 from wm_drake.laws.table import stiffness_force
-from wm_drake.parameters.elements import ForceTable, packed_stiffness
+from wm_drake.parameters import DAMPER_LAWS, ForceTable
 
 K1, C1, C2 = 176e3, 90.0, 400.0  # N/m, N s/m, N s/m: fit of [C]
 F_MAX, C_M, P_B, V_B = 35.0, 60.0, 10.5, 0.09  # N, N s/m, N, m/s: [A] Table 1
@@ -150,7 +145,7 @@ def test_in_its_free_stroke_a_damper_has_basic_friction_only_and_the_sponge_stay
     rate, deformation
 ):
     tension, deformation_rate = free_stroke_damper(
-        rate, deformation, F_MAX, C_M, EPSILON, P_B, V_B, SPONGE, 0
+        rate, deformation, F_MAX, C_M, EPSILON, P_B, V_B, (SPONGE, 0)
     )
     basic = P_B * np.sin(0.5 * np.pi * np.clip(rate / V_B, -1.0, 1.0))
     assert tension == pytest.approx(basic, rel=1e-12, abs=1e-14)
@@ -162,32 +157,32 @@ def test_beyond_its_free_stroke_the_sponge_slips_as_its_force_exceeds_friction()
     slip = (force - F_MAX) / C_M  # m/s; [A] Eq. (4) turned round
     rate = 1.5 * slip  # less than twice: slips
     tension, deformation_rate = free_stroke_damper(
-        rate, 0.014, F_MAX, C_M, EPSILON, P_B, V_B, SPONGE, 0
+        rate, 0.014, F_MAX, C_M, EPSILON, P_B, V_B, (SPONGE, 0)
     )
     assert force > F_MAX
     assert deformation_rate == pytest.approx(0.5 * slip)
     assert tension == pytest.approx(force + P_B)  # rate > v_b
 
 
-PACKED = {
-    COULOMB: [60.0, 25.0],  # f_max N, damping N s/m
-    STV: [60.0, 0.05, 25.0],  # f_max N, v_st m/s, damping N s/m
-    HAVSIN: [P_B, V_B, 25.0],  # p N, v_t m/s, damping N s/m
-    MSTV: [60.0, 30.0, EPSILON, K1, C1, C2],
-    STV_SPONGE: [60.0, 0.01, K1, C1, C2],  # f_max N, v_st m/s, k1 N/m, c1, c2 N s/m
-    FREE_STROKE: [F_MAX, C_M, EPSILON, P_B, V_B, *SPONGE],
+PACKED = {  # law -> its numbers in the order of its class
+    "coulomb": [60.0, 25.0],  # f_max N, damping N s/m
+    "stv": [60.0, 0.05, 25.0],  # f_max N, v_st m/s, damping N s/m
+    "havsin": [P_B, V_B, 25.0],  # p N, v_t m/s, damping N s/m
+    "mstv": [60.0, 30.0, EPSILON, K1, C1, C2],
+    "stv_sponge": [60.0, 0.01, K1, C1, C2],  # f_max N, v_st m/s, k1 N/m, c1, c2 N s/m
+    "free_stroke": [F_MAX, C_M, EPSILON, P_B, V_B, *SPONGE],
 }
 
 
-def direct_response(law_number, v, deformation):
+def direct_response(law, v, deformation):
     """Tension and deformation rate, typed from the papers."""
-    if law_number == COULOMB:
+    if law == "coulomb":
         return 25.0 * v + 60.0 * np.sign(v), 0.0
-    if law_number == STV:
+    if law == "stv":
         return 25.0 * v + 60.0 * np.clip(v / 0.05, -1.0, 1.0), 0.0
-    if law_number == HAVSIN:
+    if law == "havsin":
         return 25.0 * v + P_B * np.sin(0.5 * np.pi * np.clip(v / V_B, -1.0, 1.0)), 0.0
-    if law_number == MSTV:
+    if law == "mstv":
         w = brentq(
             lambda w: (
                 C2 * w
@@ -199,7 +194,7 @@ def direct_response(law_number, v, deformation):
             9.0,
         )
         return K1 * deformation + C1 * (v - w), v - w
-    if law_number == STV_SPONGE:
+    if law == "stv_sponge":
         w = brentq(
             lambda w: C2 * w - stv_friction(w, 0.01, 60.0) - K1 * deformation - C1 * (v - w),
             -9.0,
@@ -212,14 +207,18 @@ def direct_response(law_number, v, deformation):
     return f_d + P_B * np.sin(0.5 * np.pi * np.clip(v / V_B, -1.0, 1.0)), v - w
 
 
-@pytest.mark.parametrize("law_number", PACKED)
+def test_every_registered_law_is_tested_here():
+    assert set(PACKED) == set(DAMPER_LAWS)
+
+
+@pytest.mark.parametrize("law", PACKED)
 @pytest.mark.parametrize("rate", [-0.3, -0.04, -1e-3, 0.02, 0.2])  # m/s
-def test_each_law_answers_through_the_common_face_as_its_formula_does(law_number, rate):
-    packed = np.array([9.9, 9.9, 9.9, *PACKED[law_number]])
+def test_each_law_answers_by_its_number_as_its_formula_does(law, rate):
+    packed = np.array([9.9, 9.9, 9.9, DAMPER_LAWS[law].number, *PACKED[law]])
     for deformation in (-0.013, -3.1e-4, 2.2e-4, 0.015):  # m
-        response = damper_response(law_number, rate, deformation, packed, 3)
+        response = damper_response(rate, deformation, packed, 3)
         assert response == pytest.approx(
-            direct_response(law_number, rate, deformation), rel=1e-9, abs=1e-9
+            direct_response(law, rate, deformation), rel=1e-9, abs=1e-9
         )
 
 
@@ -275,7 +274,7 @@ def test_under_coulomb_friction_the_slider_holds_up_to_full_friction_and_then_sl
 @given(rate=velocities, deformation=st.floats(-0.03, 0.03))
 def test_the_free_stroke_damper_never_gives_back_more_than_its_sponge_stores(rate, deformation):
     tension, deformation_rate = free_stroke_damper(
-        rate, deformation, F_MAX, C_M, EPSILON, P_B, V_B, SPONGE, 0
+        rate, deformation, F_MAX, C_M, EPSILON, P_B, V_B, (SPONGE, 0)
     )
     stored = stiffness_force(deformation, SPONGE, 0) * deformation_rate  # W
     assert tension * rate - stored >= -1e-10 * (abs(tension * rate) + abs(stored))
@@ -287,6 +286,6 @@ def test_derivatives_of_a_free_stroke_damper_without_main_friction_are_finite():
     )  # m, N
     rate, deformation = InitializeAutoDiff(np.array([0.1, 0.0])).ravel()  # m/s, m
     _, deformation_rate = generic(free_stroke_damper)(
-        rate, deformation, 0.0, 60.0, 1e-6, 10.5, 0.09, sponge, 0
+        rate, deformation, 0.0, 60.0, 1e-6, 10.5, 0.09, (sponge, 0)
     )
     assert np.all(np.isfinite(ExtractGradient(np.array([[deformation_rate]]))))

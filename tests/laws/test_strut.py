@@ -6,19 +6,12 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from wm_drake.elements.motion import TubMotion
+from wm_drake.elements.strut import transverse
 from wm_drake.laws.friction import havsin_friction
-from wm_drake.laws.strut import (
-    bending_moment,
-    strut_line,
-    transverse,
-    transverse_couple,
-    wrench_at_origin,
-)
+from wm_drake.laws.strut import bending_moment, transverse_couple
 
 ZERO = (0.0, 0.0, 0.0)
 K, C, P, V_T = 12.0, 0.3, 0.9, 0.5  # N m/rad, N m s/rad, N m, rad/s
-SLOPE = 0.5 * np.pi / V_T  # s/rad
 
 directions = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda a: np.linalg.norm(a) > 0.1)
 rates = st.tuples(*[st.floats(-3.0, 3.0)] * 3)  # rad/s
@@ -36,32 +29,9 @@ def angle_between(a, b):
     return np.arctan2(np.linalg.norm(np.cross(a, b)), np.dot(a, b))
 
 
-def test_strut_line_gives_length_direction_and_their_rates():
-    arm, p_WT, p_WH = (
-        np.array([0.2, -0.1, -0.25]),
-        np.array([0.01, -0.02, 0.03]),
-        np.array([0.3, -0.1, -0.6]),
-    )  # m
-    w, v = np.array([0.3, -0.2, 0.5]), np.array([0.4, 0.1, -0.3])  # rad/s, m/s
-    length, rate, direction, v_A, inverse_length = strut_line(
-        TubMotion((), tuple(p_WT), tuple(w), tuple(v)), tuple(arm), tuple(p_WH)
-    )
-    line = p_WT + arm - p_WH
-    assert length == pytest.approx(np.linalg.norm(line))
-    assert inverse_length * length == pytest.approx(1.0, rel=1e-15)
-    assert direction == pytest.approx(line / np.linalg.norm(line))
-    assert v_A == pytest.approx(v + np.cross(w, arm))
-    h = 1e-6  # s
-
-    def length_at(t):
-        return np.linalg.norm(p_WT + v * t + turned(arm, w * t) - p_WH)
-
-    assert rate == pytest.approx((length_at(h) - length_at(-h)) / (2.0 * h), rel=1e-8)
-
-
 def test_no_moment_at_rest():
     axis = tuple(map(float, unit((1.0, 2.0, -4.0))))
-    assert bending_moment(axis, ZERO, axis, K, C, P, SLOPE) == pytest.approx(ZERO, abs=1e-15)
+    assert bending_moment(axis, ZERO, axis, K, C, P, V_T) == pytest.approx(ZERO, abs=1e-15)
 
 
 def test_a_bent_strut_is_pushed_back_with_stiffness_times_angle():
@@ -71,16 +41,16 @@ def test_a_bent_strut_is_pushed_back_with_stiffness_times_angle():
             0.0,
             float(np.cos(angle)),
         )  # turned by angle about y, away from z
-        moment = bending_moment(direction, ZERO, (0.0, 0.0, 1.0), K, 0.0, 0.0, SLOPE)
+        moment = bending_moment(direction, ZERO, (0.0, 0.0, 1.0), K, 0.0, 0.0, V_T)
         assert moment == pytest.approx((0.0, -K * angle, 0.0), rel=1e-12, abs=1e-18)
 
 
 def test_hand_values_of_damping_and_friction():
     z = (0.0, 0.0, 1.0)
-    slow = bending_moment(z, (V_T / 2, 0.0, 0.0), z, 0.0, C, P, SLOPE)
+    slow = bending_moment(z, (V_T / 2, 0.0, 0.0), z, 0.0, C, P, V_T)
     assert slow == pytest.approx((-0.3 * 0.25 - 0.9 * np.sin(np.pi / 4), 0.0, 0.0))
     fast = bending_moment(
-        z, (0.0, -2.0, 0.0), z, 0.0, C, P, SLOPE
+        z, (0.0, -2.0, 0.0), z, 0.0, C, P, V_T
     )  # the body turns under a strut at rest
     assert fast == pytest.approx((0.0, 0.3 * 2.0 + 0.9, 0.0))
 
@@ -96,7 +66,7 @@ def test_elastic_power_is_minus_the_rate_of_half_k_angle_squared(axis, direction
     assume(angle_between(axis, direction) < 3.0)
     w_strut = w_strut - (w_strut @ direction) * direction
     rate = transverse(tuple(w_strut - w_body), tuple(direction))
-    moment = bending_moment(tuple(direction), rate, tuple(axis), K, 0.0, 0.0, SLOPE)
+    moment = bending_moment(tuple(direction), rate, tuple(axis), K, 0.0, 0.0, V_T)
     h = 1e-5  # s
 
     def energy(t):
@@ -112,7 +82,7 @@ def test_elastic_power_is_minus_the_rate_of_half_k_angle_squared(axis, direction
 @given(axis=directions, direction=directions, w=rates)
 def test_damping_and_friction_dissipate(axis, direction, w):
     rate = transverse(w, tuple(unit(direction)))
-    moment = bending_moment(tuple(unit(direction)), rate, tuple(unit(axis)), 0.0, C, P, SLOPE)
+    moment = bending_moment(tuple(unit(direction)), rate, tuple(unit(axis)), 0.0, C, P, V_T)
     assert np.dot(moment, w) <= 1e-12
     assert abs(np.dot(moment, unit(direction))) <= 1e-13 * (1.0 + np.linalg.norm(moment))
 
@@ -121,7 +91,7 @@ def test_damping_and_friction_dissipate(axis, direction, w):
 def test_spin_about_the_struts_own_axis_is_free(direction, spin):
     direction = tuple(map(float, unit(direction)))
     rate = transverse(tuple(spin * e for e in direction), direction)
-    moment = bending_moment(direction, rate, direction, K, C, P, SLOPE)
+    moment = bending_moment(direction, rate, direction, K, C, P, V_T)
     assert moment == pytest.approx(ZERO, abs=1e-13)
 
 
@@ -130,7 +100,7 @@ def test_spin_about_the_struts_own_axis_is_free(direction, spin):
 )  # rad/s
 def test_bending_friction_is_that_of_havsin(rate):
     z = (0.0, 0.0, 1.0)
-    assert bending_moment(z, (rate, 0.0, 0.0), z, 0.0, 0.0, P, SLOPE)[0] == pytest.approx(
+    assert bending_moment(z, (rate, 0.0, 0.0), z, 0.0, 0.0, P, V_T)[0] == pytest.approx(
         havsin_friction(rate, V_T, P), rel=1e-14
     )
 
@@ -140,7 +110,7 @@ def test_bending_friction_is_that_of_havsin(rate):
 )  # rad; the series gives way at sin = 0.1
 def test_bending_is_smooth_where_the_series_gives_way_to_the_arctangent(angle):
     direction = (float(np.sin(angle)), 0.0, float(np.cos(angle)))
-    assert bending_moment(direction, ZERO, (0.0, 0.0, 1.0), K, 0.0, 0.0, SLOPE)[1] == pytest.approx(
+    assert bending_moment(direction, ZERO, (0.0, 0.0, 1.0), K, 0.0, 0.0, V_T)[1] == pytest.approx(
         -K * angle, rel=1e-14
     )
 
@@ -156,10 +126,3 @@ def test_transverse_couple_balances_the_moments_on_the_strut(direction, m_tub, m
         moments + np.cross(length * e, on_strut), 0.0, atol=1e-14 * (1.0 + np.linalg.norm(moments))
     )
     assert on_tub @ e == pytest.approx(0.0, abs=1e-12)
-
-
-def test_wrench_at_origin_is_moment_about_to_then_force():
-    arm, force, moment = (0.1, 0.2, -0.3), (5.0, -7.0, 11.0), (0.5, 0.6, 0.7)  # m, N, N m
-    assert wrench_at_origin(arm, force, moment) == pytest.approx(
-        (*(np.cross(arm, force) + moment), *force)
-    )

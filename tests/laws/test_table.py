@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import PchipInterpolator
 
+from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.laws.table import packed_size, stiffness_force
-from wm_drake.parameters.elements import ForceTable, TorqueTable, packed_stiffness
+from wm_drake.parameters.elements import ForceTable, TorqueTable
 
 PROGRESSIVE = ForceTable(
     displacement=(-0.02, -0.012, -0.008, 0.008, 0.012, 0.03),  # m

@@ -8,6 +8,7 @@ from pydantic import TypeAdapter, ValidationError
 from ruamel.yaml import YAML
 from scipy.interpolate import PchipInterpolator
 
+from wm_drake.elements.layouts import packed_stiffness, packed_stiffnesses
 from wm_drake.laws.table import PIECE_SIZE, packed_size, stiffness_force
 from wm_drake.parameters import (
     Bushing,
@@ -17,8 +18,6 @@ from wm_drake.parameters import (
     MstvDamper,
     SpringType,
     TorqueTable,
-    packed_stiffness,
-    packed_stiffnesses,
 )
 
 X, Y = (-0.02, -0.005, 0.0, 0.01, 0.03), (-90.0, -20.0, 0.0, 0.0, 150.0)

@@ -1,11 +1,12 @@
-"""What `rig` and `identify` share: which component, on which axis, and numbers with units from the command line."""
+"""Shared options of `rig` and `identify`: the component, its axis, numbers with units."""
 
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from wm_drake.cli.common import load_parameters, with_sets
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
@@ -53,12 +54,32 @@ AXIS_WORDS = {
     "tilt": ("about_x", "about_z"),
     "twist": ("about_y",),
 }
-"""Axes of an axisymmetric bushing: y is its axis; the first of each is what goes on the bench."""
+"""Axes of an axisymmetric bushing: y is its axis; the first of each goes on the bench."""
+
+
+class DamperCommand(TyperCommand):
+    """A command whose help names the registered damper laws, which take a second to import.
+
+    ``{laws}`` in the help of an option becomes the names of all laws, ``{laws_with_mass}`` the
+    names of those whose sponge may have a mass on the bench.
+    """
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help with the names of the laws."""
+        from wm_drake.parameters import DAMPER_LAWS
+
+        with_mass = [law.name for law in DAMPER_LAWS.values() if law.sponge_with_mass is not None]
+        names = {"{laws}": ", ".join(DAMPER_LAWS), "{laws_with_mass}": " or ".join(with_mass)}
+        described: list[Any] = [option for option in self.params if getattr(option, "help", None)]
+        for option in described:
+            for mark, text in names.items():
+                option.help = option.help.replace(mark, text)
+        super().format_help(ctx, formatter)
 
 
 @dataclass(frozen=True)
 class Target:
-    """A component and where it came from: a machine as it was named, and its key there; both "" for a component file."""
+    """A component, the machine as it was named, and its key there; both "" for a component file."""
 
     component: "Component"
     machine: str
@@ -68,14 +89,14 @@ class Target:
 def target_of(
     kind: str, machine: str, name: str | None, component: str | None, sets: list[str] | None
 ) -> Target:
-    """The component that a command is about.
+    """Return the component that a command is about.
 
     Args:
         kind: damper, bushing or gasket.
         machine, name, component, sets: Options of the command.
 
     Raises:
-        InputError: it is not there, or of another kind.
+        InputError: There is no such component, or it is of another kind.
     """
     if component is not None:
         return Target(_of_file(kind, component, sets), "", "")
@@ -106,7 +127,7 @@ def _of_file(kind: str, component: str, sets: list[str] | None) -> "Component":
 
 
 def _key_of(kind: str, parameters: "MachineParameters", name: str | None) -> str:
-    """Key path of a component of a machine; of its first of that kind without a name."""
+    """Return the key path of a component of a machine; without a name, of the first of its kind."""
     from wm_drake.parameters import shipped_components
 
     if kind == "gasket":
@@ -119,19 +140,23 @@ def _key_of(kind: str, parameters: "MachineParameters", name: str | None) -> str
     keys = {entry: f"{table}.{entry}" for table in tables for entry in getattr(parameters, table)}
     if not keys:
         shipped = ", ".join(shipped_components())
-        message = f"'{parameters.name}' has no {tables[0]}; name another machine, or a component file or shipped one ({shipped})"
+        message = (
+            f"'{parameters.name}' has no {tables[0]}; name another machine, or a component file or "
+            f"shipped one ({shipped})"
+        )
         raise input_error(message, where="--machine")
     name = name or next(iter(keys))
     if name not in keys:
         raise input_error(
-            f"no '{name}' in {' or '.join(tables)} of '{parameters.name}'{nearest_names(name, keys)}",
+            f"no '{name}' in {' or '.join(tables)} of '{parameters.name}'"
+            f"{nearest_names(name, keys)}",
             where="--name",
         )
     return keys[name]
 
 
 def axes_of(word: str) -> tuple[str, ...]:
-    """The axes that a word means, the one for the bench first."""
+    """Return the axes that a word means, the one for the bench first."""
     from wm_drake.rigs import AXES
 
     if word in AXIS_WORDS:
@@ -144,7 +169,7 @@ def axes_of(word: str) -> tuple[str, ...]:
 
 
 def quantities_of(text: str, unit: "Unit", option: str) -> tuple[float, ...]:
-    """Several with one unit, ``(1, 3, 5) mm`` or ``1,3,5 mm``, in SI."""
+    """Return numbers with one unit, ``(1, 3, 5) mm`` or ``1,3,5 mm``, in SI."""
     from wm_drake.parameters.units import convert
 
     body = text.strip()
@@ -166,13 +191,17 @@ def quantities_of(text: str, unit: "Unit", option: str) -> tuple[float, ...]:
 
 
 def _digits(text: str) -> str:
-    """The leading numbers of a text, commas between them."""
+    """Return the leading numbers of a text, with the commas between them."""
     match = re.match(r"[\s,]*(?:[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[\s,]*)*", text.strip())
     return match[0] if match else ""
 
 
 def existing_files(paths: list[Path]) -> list[Path]:
-    """The paths, if all are files."""
+    """Return the paths.
+
+    Raises:
+        InputError: A path is no file.
+    """
     problems = [Problem(str(path), "", "no such file") for path in paths if not path.is_file()]
     if problems:
         raise InputError(problems)

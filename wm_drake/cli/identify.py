@@ -20,6 +20,7 @@ from wm_drake.cli.components import (
     ArmOption,
     AxisOption,
     ComponentOption,
+    DamperCommand,
     NameOption,
     Target,
     axes_of,
@@ -27,7 +28,8 @@ from wm_drake.cli.components import (
     quantities_of,
     target_of,
 )
-from wm_drake.cli.progress import progress_bar, result_folder
+from wm_drake.cli.progress import progress_bar
+from wm_drake.cli.result_folder import result_folder
 from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:
@@ -81,7 +83,7 @@ OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results."
 
 @dataclass(frozen=True)
 class _Asked:
-    """What all three commands ask alike."""
+    """Options that all three commands have."""
 
     files: list[Path]
     units: str | None
@@ -91,14 +93,12 @@ class _Asked:
     as_json: bool
 
 
-@app.command("damper")
+@app.command("damper", cls=DamperCommand)
 def identify_damper(
     files: FilesArgument,
     law: Annotated[
         str | None,
-        typer.Option(
-            help="coulomb, stv, havsin, mstv, stv_sponge, free_stroke; the component's by default."
-        ),
+        typer.Option(help="{laws}; the component's by default."),
     ] = None,
     method: MethodOption = "least-squares",
     bounds: BoundsOption = None,
@@ -113,21 +113,21 @@ def identify_damper(
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
-    """A friction damper; free_stroke finds the curve of its sponge as a monotone table."""
+    """Identify a friction damper; a curve of its law is found as a monotone table."""
     from wm_drake.studies.identification import damper_model
 
     target = target_of("damper", machine, name, component, sets)
     own = str(target.component.parameters.law)  # type: ignore[union-attr]
     asked = _Asked(files, units, method, seed, out, as_json)
     motions = _motions(asked, rotates=False)
-    kept = _kept_fields(target, law or own)
-    fixed = kept | _single(fix, "--fix")
-    model = damper_model(law or own, motions, _ranges(bounds), fixed, knots)
+    ranges = _ranges(bounds)
+    fixed = _kept_fields(target, law or own, ranges) | _single(fix, "--fix")
+    model = damper_model(law or own, motions, ranges, fixed, knots)
     _run(asked, f"damper {target.component.name}, law {model.law}", target, model, motions, {})
 
 
 def _axis_command(kind: str) -> Callable[..., None]:
-    """The command of a component that is tested axis by axis: bushing or gasket."""
+    """Return the command of a component that is tested axis by axis: bushing or gasket."""
 
     def identify_axis(
         files: FilesArgument,
@@ -178,14 +178,14 @@ app.command("gasket", help="One axis of the gasket.")(_axis_command("gasket"))
 
 
 def _copies(model: "ComponentModel", axes: tuple[str, ...]) -> dict[str, str]:
-    """Fields of a bushing that what was found on the first of some axes alike holds for, and those they are copied from."""
+    """Return the fields of a bushing's other axes, and the field that each is copied from."""
     ours, others = axes[0][-1], [other[-1] for other in axes[1:]]
     fields = [unknown.name.split(".")[0] for unknown in model.unknowns]
     return {f"{field[: -len(ours)]}{other}": field for field in fields for other in others}
 
 
 def _motions(asked: _Asked, *, rotates: bool) -> "list[MeasuredMotion]":
-    """The loops of the files, with the motion each made."""
+    """Return the loops of the files, with the motion of each."""
     from wm_drake.errors import InputError, Problem
     from wm_drake.parameters import read_loops
     from wm_drake.rigs.measured import measured_motion
@@ -223,15 +223,16 @@ def _motions(asked: _Asked, *, rotates: bool) -> "list[MeasuredMotion]":
     )
 
 
-def _kept_fields(target: Target, law: str) -> dict[str, float]:
-    """Numbers of the component that no loop shall change: of the same law, those that are not unknown."""
-    from wm_drake.parameters import quantities
-    from wm_drake.studies.identification import DAMPER_LAWS
+def _kept_fields(
+    target: Target, law: str, bounds: "dict[str, tuple[float, float]]"
+) -> dict[str, float]:
+    """Return the numbers of a component of the same law that are not unknown and have no bounds."""
+    from wm_drake.parameters import DAMPER_LAWS, quantities
 
     parameters = target.component.parameters
     if law not in DAMPER_LAWS or getattr(parameters, "law", None) != law:
         return {}
-    free = set(DAMPER_LAWS[law])
+    free = {*DAMPER_LAWS[law].unknowns, *bounds}
     return {
         key: value for key, value, _ in quantities(parameters) if "." not in key and key not in free
     }
@@ -259,7 +260,7 @@ def _single(entries: list[str] | None, option: str) -> dict[str, float]:
 
 
 def _unit_of_field(key: str, option: str) -> "Unit":
-    """Unit of a component's field, or of a rise of one of its tables."""
+    """Return the unit of a component's field, or of a rise of one of its tables."""
     from wm_drake.studies.identification.models import unit_of_field, units_of_fields
 
     unit = unit_of_field(key)
@@ -327,5 +328,6 @@ def _print(title: str, fit: "Fit", out: Path) -> None:
     for sentence in (*undetermined_sentences(fit), *fit.notes):
         console.print(sentence, highlight=False)
     console.print(
-        f"Results in {out}: report.html, identified.yaml, parameters.csv, errors.csv, loops.csv, fit.json"
+        f"Results in {out}: report.html, identified.yaml, parameters.csv, errors.csv, loops.csv, "
+        "fit.json"
     )

@@ -1,4 +1,4 @@
-"""`wm-drake rig`: a component on a bench, its force loops, and what is read off them."""
+"""`wm-drake rig`: a component on a bench, its force loops, and their measures."""
 
 import json
 from collections.abc import Callable
@@ -12,12 +12,14 @@ from wm_drake.cli.components import (
     ArmOption,
     AxisOption,
     ComponentOption,
+    DamperCommand,
     NameOption,
     axes_of,
     quantities_of,
     target_of,
 )
-from wm_drake.cli.progress import progress_bar, result_folder
+from wm_drake.cli.progress import progress_bar
+from wm_drake.cli.result_folder import result_folder
 from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:
@@ -53,7 +55,7 @@ MatrixOption = Annotated[
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.", metavar="DIR")]
 
 
-@app.command("damper")
+@app.command("damper", cls=DamperCommand)
 def rig_damper(
     frequency: FrequencyOption = None,
     amplitude: AmplitudeOption = None,
@@ -64,7 +66,7 @@ def rig_damper(
     sponge_mass: Annotated[
         str | None,
         typer.Option(
-            help="Mass of the sponge of an mstv damper, e.g. '10 g'; none in the machine.",
+            help="Mass of the sponge, law {laws_with_mass} only, e.g. '10 g'; none in the machine.",
             metavar="MASS",
         ),
     ] = None,
@@ -72,7 +74,7 @@ def rig_damper(
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
-    """A friction damper along its line."""
+    """Test a friction damper along its line."""
     from wm_drake.parameters.units import Unit
     from wm_drake.rigs import damper_bench
 
@@ -86,7 +88,7 @@ def rig_damper(
 
 
 def _axis_command(kind: str) -> Callable[..., None]:
-    """The command of a component that is tested axis by axis: bushing or gasket."""
+    """Return the command of a component that is tested axis by axis: bushing or gasket."""
 
     def rig_axis(
         axis: AxisOption,
@@ -112,7 +114,8 @@ def _axis_command(kind: str) -> Callable[..., None]:
         bench = bushing_bench(chosen.parameters, turned, radius)  # type: ignore[arg-type]
         motions = _motions(kind, bench, frequency, amplitude, matrix)
         what = kind if chosen.name == kind else f"{kind} {chosen.name}"
-        title = f"{what}, axis {turned.replace('_', ' ')}{f', through an arm of {1e3 * radius:g} mm' if radius else ''}"
+        through = f", through an arm of {1e3 * radius:g} mm" if radius else ""
+        title = f"{what}, axis {turned.replace('_', ' ')}{through}"
         _run(title, bench, motions, chosen, out, as_json)
 
     return rig_axis

@@ -1,11 +1,14 @@
-"""One source for each law, run three ways: compiled for floats or for lanes of several runs, interpreted for other scalars.
+"""Compilation of laws: one source, compiled for floats and SIMD lanes, interpreted for others.
 
-A law is a plain function of scalars (or short tuples and arrays of scalars). ``@law`` compiles it with numba for floats, and
-for lanes (`wm_drake.compiler.lanes`) when a compiled loop calls it with them. ``generic(law)`` runs the very same source in
-Python, so that automatic differentiation sees every operation; a law that calls other laws calls their generic forms then.
-Rules for the source: choose between values with ``where``, and take functions from `wm_drake.compiler.elementary`; an ``if``
-may ask what is the same in all lanes. ``np.sign`` drops derivatives, a square root of zero has none. Numbers of other
-modules become constants of the compiled code: they must lie in files that `_cache_folder` looks at.
+A law is a plain function of scalars (or short tuples and arrays of scalars). ``@law`` compiles it
+with numba for floats, and for lanes (`wm_drake.compiler.lanes`) when a compiled loop calls it with
+them. ``generic(law)`` runs the same source in Python, so that automatic differentiation applies to
+every operation; a law that calls other laws calls their generic forms then.
+
+Rules for the source: choose between values with ``where``, and take functions from
+`wm_drake.compiler.elementary`; the condition of an ``if`` must be the same in all lanes, such as a
+`whole_number`. ``np.sign`` drops derivatives, a square root of zero has none. Numbers of other
+modules become constants of the compiled code: they must be in files that `_cache_folder` hashes.
 """
 
 import functools
@@ -20,31 +23,49 @@ import numba
 from numba.core import config
 from numba.core.dispatcher import Dispatcher
 
-_ROOM = Path(__file__).parents[1]
+from wm_drake.compiler.lanes import LawCompiler
+
+_PACKAGE = Path(__file__).parents[1]
+
+
+_COMPILED_ROOMS = {"compiler", "laws", "parameters", "elements"}
+"""Rooms all of whose files compiled code may depend on: the fields of a type of the machine file,
+for example, are the packed order of its numbers."""
 
 
 def _cache_folder() -> str:
-    """A folder of compiled code that belongs to exactly these sources: the laws and all that compiles them in.
+    """Return the folder of compiled code that belongs to exactly these sources.
 
-    numba looks only at the file of the function it compiles: after an edit of a called law, its cached callers would go on
-    with the old one. A folder named by the hash of all sources cannot go stale.
+    numba checks only the file of the function that it compiles: after an edit of a called law, its
+    cached callers would keep the old one. The folder is named by the hash of all sources that
+    compiled code depends on.
     """
     digest = hashlib.sha256()
-    for source in sorted(_ROOM.rglob("*.py")):
+    for source in sorted(_PACKAGE.rglob("*.py")):
         text = source.read_text(encoding="utf-8")
-        if "compiler.compilation" in text or "numba" in text:
+        room = source.relative_to(_PACKAGE).parts[0]
+        if room in _COMPILED_ROOMS or "wm_drake.compiler" in text or "numba" in text:
             digest.update(text.encode())
     home = os.environ.get("NUMBA_CACHE_DIR") or Path.home() / ".cache" / "wm_drake"
     return str(Path(home) / digest.hexdigest()[:16])
 
 
 def law(function: Callable[..., Any]) -> Any:
-    """Compiles a law, with a cache on disk. Products and sums may fuse into one rounding; nothing else is reordered."""
-    return _compiled(function, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
+    """Compile a law, with a cache on disk.
+
+    Products and sums may fuse into one rounding; nothing else is reordered.
+    """
+    return _compiled(
+        function,
+        pipeline_class=LawCompiler,
+        error_model="numpy",
+        forceinline=True,
+        fastmath={"contract", "nsz"},
+    )
 
 
 def long_running(function: Callable[..., Any]) -> Any:
-    """Compiles a loop that calls laws for milliseconds and more: other threads of Python go on meanwhile."""
+    """Compile a loop that calls laws for milliseconds and more; Python threads run meanwhile."""
     return _compiled(function, error_model="numpy", nogil=True, fastmath={"contract", "nsz"})
 
 
@@ -62,10 +83,10 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
 
 @functools.cache
 def generic(compiled: Any) -> Callable[..., Any]:
-    """The same source as `compiled`, interpreted, for scalars such as Drake's AutoDiffXd."""
+    """Return the interpreted form of a compiled law, for scalars such as Drake's AutoDiffXd."""
     source = compiled.py_func
     names = dict(source.__globals__)
-    for name in source.__code__.co_names:  # the laws it calls
+    for name in source.__code__.co_names:  # names of the laws that it calls
         if isinstance(names.get(name), Dispatcher):
             names[name] = generic(names[name])
     return types.FunctionType(

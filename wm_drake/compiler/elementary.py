@@ -1,8 +1,9 @@
-"""What laws are written with where plain Python would branch or call the C library: it works on any scalar.
+"""Elementary functions of laws, in place of branches and of the C library: they take any scalar.
 
-Floats, lanes of several runs (`wm_drake.compiler.lanes`) and automatic differentiation alike. Compiled, sine and cosine are
-polynomials without a branch, to the last bit or two of the C library's, so that lanes can carry them and every machine
-gives the same digits; interpreted, they are numpy's.
+A scalar is a float, a lane of several runs (`wm_drake.compiler.lanes`), or one of automatic
+differentiation. Compiled, sine and cosine are polynomials without a branch, to the last bit or two
+of the C library's, so that lanes can carry them and every machine gives the same digits;
+interpreted, they are numpy's.
 """
 
 import numpy as np
@@ -23,7 +24,7 @@ from wm_drake.compiler.lanes import (
 
 
 def where(condition, a, b):
-    """`a` where the condition holds, else `b`. Both are computed; what is not chosen may be no number."""
+    """Return `a` where the condition holds, else `b`. Both are computed; either may be NaN."""
     return a if condition else b
 
 
@@ -35,7 +36,7 @@ def _compiled_where(condition, a, b):
 
 
 def anywhere(condition):
-    """Whether the condition holds for some lane: guards a costly alternative between which `where` then chooses."""
+    """Return whether the condition holds for some lane: to skip a costly alternative of `where`."""
     return condition
 
 
@@ -47,7 +48,7 @@ def _compiled_anywhere(condition):
 
 
 def everywhere(condition):
-    """Whether the condition holds for all lanes."""
+    """Return whether the condition holds for all lanes."""
     return condition
 
 
@@ -59,7 +60,7 @@ def _compiled_everywhere(condition):
 
 
 def sqrt(x):
-    """Square root; NaN below zero."""
+    """Return the square root; NaN below zero."""
     return np.sqrt(x)
 
 
@@ -71,7 +72,7 @@ def _compiled_sqrt(x):
 
 
 def floor(x):
-    """Largest whole number not above x, as a float."""
+    """Return the largest whole number not above x, as a float."""
     return np.floor(x)
 
 
@@ -83,7 +84,7 @@ def _compiled_floor(x):
 
 
 def sine_cosine(x):
-    """Sine and cosine of an angle, |x| < 1e5. [rad]"""
+    """Return sine and cosine of an angle, |x| < 1e5. [rad]"""
     return np.sin(x), np.cos(x)
 
 
@@ -93,7 +94,7 @@ def _compiled_sine_cosine(x):
 
 
 def _polynomial_sine_cosine(x):
-    """Reduction to a quarter turn about zero in three parts where needed, then polynomials [Cephes library, sin.c]."""
+    """Reduce to a quarter turn about zero, then use polynomials [Cephes library, sin.c]."""
     sine, cosine = _sine_cosine_near_zero(x)
     if anywhere(abs(x) > 0.25 * np.pi):
         turns = floor(x * (2.0 / np.pi) + 0.5)
@@ -111,7 +112,7 @@ def _polynomial_sine_cosine(x):
 
 @law
 def _sine_cosine_near_zero(r):
-    """Minimax polynomials for |r| <= pi/4."""
+    """Return sine and cosine from minimax polynomials, for |r| <= pi/4."""
     z = r * r
     s = 1.58962301576546568060e-10 * z - 2.50507477628578072866e-8
     s = (
@@ -126,7 +127,7 @@ def _sine_cosine_near_zero(r):
 
 
 def angle_of(sine, cosine):
-    """Angle between 0 and pi from its sine, >= 0, and cosine. [rad]"""
+    """Return the angle between 0 and pi from its sine, >= 0, and cosine. [rad]"""
     return np.arctan2(sine, cosine)
 
 
@@ -136,7 +137,7 @@ def _compiled_angle_of(sine, cosine):
 
 
 def _rational_angle_of(sine, cosine):
-    """Reduction to tangents below 0.66, then a minimax fraction [Cephes library, atan.c]."""
+    """Reduce to tangents below 0.66, then evaluate a minimax fraction [Cephes library, atan.c]."""
     size = abs(cosine)
     steep = sine > size
     t = where(steep, size, sine) / where(steep, sine, size)
@@ -158,11 +159,10 @@ def _rational_angle_of(sine, cosine):
 
 @law
 def sine_over_angle(angle_squared):
-    """sin(x) / x from x^2, for |x| <= pi/2: the power series to x^20, where its next term is below 1e-17."""
+    """Return sin(x) / x from x^2, for |x| <= pi/2: power series, its next term is below 1e-17."""
     z = angle_squared
-    y = (
-        z * z
-    )  # terms of even and of odd power apart: two short chains of operations instead of a long one
+    # terms of even and of odd power apart: two short chains of operations instead of a long one
+    y = z * z
     even = 1.0 / 355687428096000.0 + y * (1.0 / 51090942171709440000.0)
     even = 1.0 / 6227020800.0 + y * even
     even = 1.0 / 362880.0 + y * even
@@ -174,8 +174,22 @@ def sine_over_angle(angle_squared):
     return (1.0 + y * even) - z * odd
 
 
+def whole_number(x):
+    """Return a number that counts something as an integer, also of lanes and of an AutoDiffXd.
+
+    Laws use it for what is the same in all lanes and has no derivative: number of a law, points of
+    a table.
+    """
+    return int(x.value() if hasattr(x, "value") else x)
+
+
+@overload(whole_number)
+def _compiled_whole_number(x):
+    return lambda x: int(x)
+
+
 def numbers(array):
-    """An array of numbers as laws take it fastest; the array itself where it is not one of floats."""
+    """Return an array of floats in the form that laws read fastest; any other array as it is."""
     return array
 
 
@@ -186,7 +200,7 @@ def _compiled_numbers(array):
 
 @law
 def in_each_lane(array):
-    """The numbers of an array, each in every lane; for `lane_array`."""
+    """Return the numbers of an array, each in every lane; for `lane_array`."""
     copies = np.empty(len(array) * WIDTH)
     for k in range(len(array)):
         copies[k * WIDTH : (k + 1) * WIDTH] = array[k]
@@ -195,18 +209,16 @@ def in_each_lane(array):
 
 @law
 def rows_to_lanes(rows, begin, numbers):
-    """Writes `WIDTH` rows of a table, from row `begin`, side by side for an array of lanes; past its end, the last row."""
+    """Write `WIDTH` rows of a table, from row `begin`, side by side; past its end, the last row."""
     last = len(rows) - 1
-    for k in range(
-        rows.shape[1]
-    ):  # the long way round, which the compiler makes one loop of vectors
+    for k in range(rows.shape[1]):  # in this order, which the compiler makes one loop of vectors
         for lane in range(WIDTH):
             numbers[k * WIDTH + lane] = rows[min(begin + lane, last), k]
 
 
 @law
 def lanes_to_rows(numbers, begin, rows):
-    """The way back of `rows_to_lanes`."""
+    """Write lanes back to rows of a table, the inverse of `rows_to_lanes`."""
     for k in range(rows.shape[1]):
         for lane in range(min(WIDTH, len(rows) - begin)):
             rows[begin + lane, k] = numbers[k * WIDTH + lane]

@@ -1,4 +1,4 @@
-"""Bearing of the drum where it gives: a six-component bushing between the tub and what carries the drum."""
+"""Compliant bearing of the drum: a six-component bushing between the tub and the drum's carrier."""
 
 import numpy as np
 
@@ -10,17 +10,22 @@ from wm_drake.elements.bushing import motion_between, six_component_bushing_betw
 from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE, motion_at, tub_motion
 
 FORCE_SIZE = 12
-"""Own numbers: displacement and rotation vector of the drum's carrier against the tub, force and moment on the tub."""
+"""Own numbers: displacement and rotation vector of the drum's carrier against the tub, force and
+moment on the tub."""
 
 
 @law
 def drum_bearing_forces(tub, carrier, p, at):
-    """Moment about the origin and force on the tub, and on the carrier (six numbers each, W), and `FORCE_SIZE` own ones.
+    """Return the wrenches of the bearing on tub and carrier, and its own numbers.
 
     Args:
         tub, carrier: `TubMotion` of the two bodies.
-        p, at: Array that holds what `SixComponentBushingParameters.packed` gives, the tub being the ground, and where that
-            begins. Displacement and force are in the frame on the tub: y along the drum axis.
+        p, at: Array that holds the numbers of `BUSHING`, the tub being the ground, and where they
+            begin.
+
+    Returns:
+        Moment about its origin and force on the tub, and on the carrier (six numbers each, W);
+        `FORCE_SIZE` own numbers, in the frame on the tub: y along the drum axis.
     """
     on_carrier, on_tub, own = six_component_bushing_between(carrier, tub, p, at)
     _, _, r_ground, displaced, relative = motion_between(carrier, tub, p, at)
@@ -29,10 +34,10 @@ def drum_bearing_forces(tub, carrier, p, at):
 
 @law
 def evaluate_drum_bearing(x, state, p, generalized_force, force, rate):
-    """Forces of the bearing; arguments as in `ElementSystem`.
+    """Write the forces of the bearing; arguments as in `ElementSystem`.
 
-    x: states of two trees of the plant, one after the other: tub and drum; the drum's carrier and drum. The generalized force
-    is that on both.
+    x: states of two trees of the plant, one after the other: tub and drum; the drum's carrier and
+    drum. The generalized force is that on both.
     """
     y, q = numbers(x), numbers(p)
     on_tub, on_carrier, own = drum_bearing_forces(
@@ -49,7 +54,7 @@ def evaluate_drum_bearing(x, state, p, generalized_force, force, rate):
 
 @law
 def drum_bearing_history(states, own_states, p, forces):
-    """Own numbers at each row of a sampled motion: `evaluate_drum_bearing` without Drake, for records."""
+    """Write the own numbers at each row of a sampled motion, as `evaluate_drum_bearing`."""
     align_stack()
     x_numbers, own_numbers = np.empty(2 * PLANT_STATE_SIZE * WIDTH), np.empty(FORCE_SIZE * WIDTH)
     p_numbers = in_each_lane(p)

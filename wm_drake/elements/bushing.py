@@ -1,11 +1,13 @@
-"""Six-component bushing between a frame of the tub and a frame of the housing; the gasket is one."""
+"""Six-component bushing between frames of the tub and of the housing; the gasket is one."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import numbers
+from wm_drake.compiler.packed import LAYOUT, ROTATION, SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import (
     add,
     compose,
@@ -17,86 +19,121 @@ from wm_drake.compiler.vectors import (
     subtract,
 )
 from wm_drake.compiler.vectors import transpose as transposed
+from wm_drake.elements.layouts import layout_of, packed_fields
 from wm_drake.elements.motion import tub_motion
+from wm_drake.elements.strut import wrench_at_origin
 from wm_drake.laws.bushing import bushing_force
-from wm_drake.laws.strut import wrench_at_origin
-from wm_drake.laws.table import packed_size
-from wm_drake.parameters.elements import BushingType, packed_stiffnesses
+from wm_drake.laws.table import stiffness_force
+from wm_drake.parameters.elements import BushingType
 from wm_drake.parameters.types import FloatArray
 
 AXES = ("x", "y", "z")
 
+BUSHING_LAW = layout_of("BushingNumbers", BushingType, tuple(BushingType.model_fields))
+"""Numbers of `BushingType` by name: damping, rotational damping, friction torque, full friction
+rate of each axis, then the six stiffnesses."""
+BUSHING = PackedLayout(
+    "SixComponentBushingNumbers",
+    tub_side_point=VECTOR,
+    tub_side_rotation=ROTATION,
+    ground_side_point=VECTOR,
+    ground_side_rotation=ROTATION,
+    engaged=SCALAR,
+    law=LAYOUT(BUSHING_LAW),
+)
+"""Frame on each side, in the frame of its body, 1 or 0 for a bushing that is taken out, law."""
+read_bushing_law, read_bushing = BUSHING_LAW.read, BUSHING.read
+
 
 def packed_bushing_law(bushing: BushingType) -> FloatArray:
-    """Parameters in the order of `wm_drake.laws.bushing.bushing_force`."""
-    kinds = ("damping", "rotational_damping", "friction_torque", "full_friction_rate")
-    constants = [getattr(bushing, f"{kind}_{axis}") for kind in kinds for axis in AXES]
-    curves = [
-        getattr(bushing, f"{kind}_{axis}")
-        for kind in ("stiffness", "rotational_stiffness")
-        for axis in AXES
-    ]
-    return np.concatenate([constants, *packed_stiffnesses(curves)])
+    """Return the numbers of `BUSHING_LAW`."""
+    return packed_fields(BUSHING_LAW, bushing)
 
 
 @dataclass(frozen=True)
 class SixComponentBushingParameters:
-    """A bushing in its place: its two frames at the rest pose and its law. `engaged` 0 takes it out of the machine."""
+    """A bushing in its place: its two frames at the rest pose, and its law.
 
-    p_ToB_T: FloatArray
-    R_TB: FloatArray
-    p_WG: FloatArray
-    R_WG: FloatArray
+    Attributes:
+        tub_side_point, tub_side_rotation: Frame on the tub side, in the frame of the tub-side body:
+            T, if that is the tub. [m]
+        ground_side_point, ground_side_rotation: Frame G on the ground side, in the frame of the
+            ground-side body: W, if that is the housing. The stiffness acts along its axes. [m]
+        packed_law: Numbers of `BUSHING_LAW`.
+        engaged: 1, or 0 for a bushing that is taken out.
+    """
+
+    tub_side_point: FloatArray
+    tub_side_rotation: FloatArray
+    ground_side_point: FloatArray
+    ground_side_rotation: FloatArray
     packed_law: FloatArray
     engaged: float = 1.0
 
     @property
     def structure(self) -> list[int]:
         """Numbers of points of its six tables, 0 for those that are a number."""
-        points, at = [], 12
-        for _ in range(6):
-            points.append(int(self.packed_law[at]))
-            at += packed_size(self.packed_law, at)
-        return points
+        return BUSHING_LAW.structure(self.packed_law)
+
+    @property
+    def damping(self) -> FloatArray:
+        """Damping along x, y, z and about them (6,). [N s/m, N m s/rad]"""
+        return np.array(self._by_axis("damping"))
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """Stiffness along x, y, z and about them (6,), if all are numbers. [N/m, N m/rad]"""
+        return np.array([stiffness_force(1.0, p, at) for p, at in self._by_axis("stiffness")])
+
+    def _by_axis(self, quantity: str) -> list[Any]:
+        named = BUSHING_LAW.unpack(self.packed_law)
+        fields = [f"{kind}{quantity}_{axis}" for kind in ("", "rotational_") for axis in AXES]
+        return [getattr(named, field) for field in fields]
+
+    def without_friction(self) -> "SixComponentBushingParameters":
+        """Return the bushing without friction: what a mode of the machine is made of."""
+        frictionless = {f"friction_torque_{axis}": 0.0 for axis in AXES}
+        return replace(self, packed_law=BUSHING_LAW.replaced(self.packed_law, **frictionless))
 
     def packed(self) -> FloatArray:
-        """Flat: tub-side point (T) and rotation by rows, housing-side point (W) and rotation by rows, engaged, law."""
-        return np.concatenate(
-            [
-                self.p_ToB_T,
-                self.R_TB.ravel(),
-                self.p_WG,
-                self.R_WG.ravel(),
-                [self.engaged],
-                self.packed_law,
-            ]
+        """Return the numbers of `BUSHING`."""
+        return BUSHING.pack(
+            tub_side_point=self.tub_side_point,
+            tub_side_rotation=self.tub_side_rotation,
+            ground_side_point=self.ground_side_point,
+            ground_side_rotation=self.ground_side_rotation,
+            engaged=self.engaged,
+            law=self.packed_law,
         )
 
 
 @law
 def six_component_bushing_wrench(motion, p, at):
-    """Moment about To and force on the tub (six numbers, W) of a bushing, and its force and moment on the housing (six, G).
+    """Return the wrench of a bushing on the tub, and its force and moment on the housing.
 
     Args:
         motion: `TubMotion`.
-        p, at: Array that holds what `SixComponentBushingParameters.packed` gives, and where that begins.
+        p, at: Array that holds the numbers of `BUSHING`, and where they begin.
+
+    Returns:
+        Moment about To and force on the tub (six numbers, W); force and moment on the housing (six,
+        G).
     """
-    r_tub = nine(p, at + 3)
-    r_ground = nine(p, at + 15)
-    arm = rotate(motion.rotation, (p[at], p[at + 1], p[at + 2]))
-    displaced = subtract(add(motion.position, arm), (p[at + 12], p[at + 13], p[at + 14]))
+    bushing = read_bushing(p, at)
+    r_ground = bushing.ground_side_rotation
+    arm = rotate(motion.rotation, bushing.tub_side_point)
+    displaced = subtract(add(motion.position, arm), bushing.ground_side_point)
     v_B = add(motion.velocity, cross(motion.angular_velocity, arm))
-    relative = compose(transposed(r_ground), compose(motion.rotation, r_tub))
+    relative = compose(transposed(r_ground), compose(motion.rotation, bushing.tub_side_rotation))
     f, m = bushing_force(
         rotate_back(r_ground, displaced),
         rotate_back(r_ground, v_B),
         rotation_vector(relative),
         rotate_back(r_ground, motion.angular_velocity),
-        p,
-        at + 25,
+        read_bushing_law(*bushing.law),
     )
-    f = scale(p[at + 24], f)
-    m = scale(p[at + 24], m)
+    f = scale(bushing.engaged, f)
+    m = scale(bushing.engaged, m)
     return wrench_at_origin(arm, rotate(r_ground, f), rotate(r_ground, m)), (
         -f[0],
         -f[1],
@@ -109,15 +146,18 @@ def six_component_bushing_wrench(motion, p, at):
 
 @law
 def six_component_bushing_between(motion, ground, p, at):
-    """The same between two bodies that move: its ground side is fixed to the second.
+    """Return the wrenches of a bushing on two bodies; its ground side is fixed to the second.
 
     Args:
         motion, ground: `TubMotion` of the two bodies.
-        p, at: As there; the housing-side point and rotation are in the frame of the second body.
+        p, at: Array that holds the numbers of `BUSHING`, and where they begin; the ground-side
+            point and rotation are in the frame of the second body.
 
     Returns:
-        Moment about its origin and force on each body (six numbers, W), and force and moment on the second, in G.
+        Moment about its origin and force on each body (six numbers, W), and force and moment on the
+        second, in G.
     """
+    bushing = read_bushing(p, at)
     arm, ground_arm, r_ground, displaced, relative = motion_between(motion, ground, p, at)
     v_B = add(motion.velocity, cross(motion.angular_velocity, arm))
     v_ground = add(ground.velocity, cross(ground.angular_velocity, ground_arm))
@@ -126,11 +166,10 @@ def six_component_bushing_between(motion, ground, p, at):
         rotate_back(r_ground, subtract(v_B, v_ground)),
         rotation_vector(relative),
         rotate_back(r_ground, subtract(motion.angular_velocity, ground.angular_velocity)),
-        p,
-        at + 25,
+        read_bushing_law(*bushing.law),
     )
-    f = scale(p[at + 24], f)
-    m = scale(p[at + 24], m)
+    f = scale(bushing.engaged, f)
+    m = scale(bushing.engaged, m)
     force, moment = rotate(r_ground, f), rotate(r_ground, m)
     on_ground = wrench_at_origin(ground_arm, scale(-1.0, force), scale(-1.0, moment))
     return (
@@ -142,40 +181,29 @@ def six_component_bushing_between(motion, ground, p, at):
 
 @law
 def motion_between(motion, ground, p, at):
-    """Where the bushing of `six_component_bushing_between` is; arguments as there.
+    """Return where the bushing of `six_component_bushing_between` is.
+
+    Args:
+        motion, ground, p, at: As for `six_component_bushing_between`.
 
     Returns:
-        From the origins of the two bodies to its point on the first, in W [m]; rotation of its frame G on the second;
-        displacement of the first's frame from G, in W [m]; rotation of the first's frame in G.
+        From the origins of the two bodies to its point on the first, in W [m]; rotation of its
+        frame G on the second; displacement of the first's frame from G, in W [m]; rotation of the
+        first's frame in G.
     """
-    r_ground = compose(ground.rotation, nine(p, at + 15))
-    arm = rotate(motion.rotation, (p[at], p[at + 1], p[at + 2]))
+    bushing = read_bushing(p, at)
+    r_ground = compose(ground.rotation, bushing.ground_side_rotation)
+    arm = rotate(motion.rotation, bushing.tub_side_point)
     place = add(motion.position, arm)
     ground_arm = subtract(place, ground.position)
-    displaced = subtract(ground_arm, rotate(ground.rotation, (p[at + 12], p[at + 13], p[at + 14])))
-    relative = compose(transposed(r_ground), compose(motion.rotation, nine(p, at + 3)))
+    displaced = subtract(ground_arm, rotate(ground.rotation, bushing.ground_side_point))
+    relative = compose(transposed(r_ground), compose(motion.rotation, bushing.tub_side_rotation))
     return arm, ground_arm, r_ground, displaced, relative
 
 
 @law
-def nine(p, at):
-    """A rotation by rows, from where it begins in an array."""
-    return (
-        p[at],
-        p[at + 1],
-        p[at + 2],
-        p[at + 3],
-        p[at + 4],
-        p[at + 5],
-        p[at + 6],
-        p[at + 7],
-        p[at + 8],
-    )
-
-
-@law
 def evaluate_six_component_bushing(x, state, p, generalized_force, force, rate):
-    """Force of a bushing; arguments as in `ElementSystem`, parameters as in `SixComponentBushingParameters.packed`."""
+    """Write the force of a bushing; arguments as in `ElementSystem`, numbers of `BUSHING`."""
     wrench, on_housing = six_component_bushing_wrench(tub_motion(numbers(x)), numbers(p), 0)
     for i in range(6):
         generalized_force[i] = wrench[i]

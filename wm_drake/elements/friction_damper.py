@@ -3,84 +3,43 @@
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import numbers
+from wm_drake.compiler.packed import LAYOUT, SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import add, cross, rotate, scale, subtract
-from wm_drake.elements.motion import tub_motion
-from wm_drake.laws.damper import (
-    COULOMB,
-    FREE_STROKE,
-    HAVSIN,
-    MSTV,
-    STV,
-    STV_SPONGE,
+from wm_drake.elements.damper_law import (
+    LAW,
     damper_response,
+    law_of,
+    law_structure,
+    packed_damper_law,
 )
-from wm_drake.laws.strut import (
-    bending_moment,
-    strut_line,
-    transverse,
-    transverse_couple,
-    wrench_at_origin,
-)
-from wm_drake.parameters.elements import (
-    CoulombDamper,
-    DamperType,
-    EndBushing,
-    FreeStrokeDamper,
-    HavsinDamper,
-    StvDamper,
-    StvSpongeDamper,
-    packed_stiffness,
-)
+from wm_drake.elements.layouts import layout_of, packed_fields
+from wm_drake.elements.motion import tub_motion
+from wm_drake.elements.strut import strut_line, transverse, wrench_at_origin
+from wm_drake.laws.strut import bending_moment, transverse_couple
+from wm_drake.parameters.elements import EndBushing
 from wm_drake.parameters.types import FloatArray
 
-
-def packed_damper_law(damper: DamperType) -> FloatArray:
-    """Law number, then its parameters in the order of `wm_drake.laws.damper`."""
-    match damper:
-        case CoulombDamper():
-            return np.array([COULOMB, damper.friction_force, damper.damping])
-        case StvDamper():
-            return np.array(
-                [STV, damper.friction_force, damper.transition_velocity, damper.damping]
-            )
-        case HavsinDamper():
-            return np.array(
-                [HAVSIN, damper.friction_force, damper.full_friction_velocity, damper.damping]
-            )
-    if isinstance(damper, StvSpongeDamper):
-        sponge = [damper.sponge_stiffness, damper.sponge_damping, damper.slider_damping]
-        return np.array([STV_SPONGE, damper.friction_force, damper.transition_velocity, *sponge])
-    friction = [damper.friction_force, damper.friction_damping, damper.regularisation_velocity]
-    if isinstance(damper, FreeStrokeDamper):
-        basic = [damper.basic_friction_force, damper.basic_full_friction_velocity]
-        return np.concatenate([[FREE_STROKE], friction, basic, packed_stiffness(damper.sponge)])
-    return np.array(
-        [MSTV, *friction, damper.sponge_stiffness, damper.sponge_damping, damper.slider_damping]
-    )
-
-
-def has_sponge(packed_law: FloatArray) -> bool:
-    """Whether a packed law has a state."""
-    return int(packed_law[0]) in (MSTV, FREE_STROKE, STV_SPONGE)
-
-
-def law_structure(packed_law: FloatArray) -> list[int]:
-    """Number of a packed law, and of the points of its sponge's table if it has one."""
-    number = int(packed_law[0])
-    return [number, int(packed_law[6])] if number == FREE_STROKE else [number]
-
-
-ENGAGED = 13
-"""Where the packed parameters say whether the damper is in the machine."""
+END_BUSHING = layout_of("EndBushingNumbers", EndBushing, tuple(EndBushing.model_fields))
+"""Numbers of the bushings at both ends, in the order of `EndBushing`."""
+FRICTION_DAMPER = PackedLayout(
+    "FrictionDamperNumbers",
+    p_ToA_T=VECTOR,
+    p_WH=VECTOR,
+    axis=VECTOR,
+    engaged=SCALAR,
+    end_bushing=LAYOUT(END_BUSHING),
+    law=LAW,
+)
+"""Tub end (T) and housing end (W) [m], unit vector from the housing end to the tub end at the rest
+pose, 1 or 0 for a damper that is taken out, end bushings, law."""
+read_end_bushing, read_friction_damper = END_BUSHING.read, FRICTION_DAMPER.read
 
 
 @dataclass(frozen=True)
 class FrictionDamperParameters:
-    """A damper in its place: ends at the rest pose, law, bushings at the ends. `engaged` 0 takes it out of the machine."""
+    """A damper in its place: ends at the rest pose, end bushings, law. `engaged` 0 takes it out."""
 
     p_ToA_T: FloatArray
     p_WH: FloatArray
@@ -91,7 +50,7 @@ class FrictionDamperParameters:
     @property
     def has_sponge(self) -> bool:
         """Whether the law has a state."""
-        return has_sponge(self.packed_law)
+        return law_of(self.packed_law).has_sponge
 
     @property
     def structure(self) -> list[int]:
@@ -99,65 +58,101 @@ class FrictionDamperParameters:
         return law_structure(self.packed_law)
 
     def packed(self) -> FloatArray:
-        """Flat: tub end (T), housing end (W), axis; end bushing k, c, p, pi / (2 v_t); engaged; law number, its parameters."""
+        """Return the numbers of `FRICTION_DAMPER`."""
         line = self.p_ToA_T - self.p_WH
-        b = self.end_bushing
-        bushing = [
-            b.stiffness,
-            b.damping,
-            b.friction_torque,
-            0.5 * np.pi / b.full_friction_rate,
-            self.engaged,
-        ]
-        return np.concatenate(
-            [
-                self.p_ToA_T,
-                self.p_WH,
-                line / math.dist(self.p_ToA_T, self.p_WH),
-                bushing,
-                self.packed_law,
-            ]
+        return FRICTION_DAMPER.pack(
+            p_ToA_T=self.p_ToA_T,
+            p_WH=self.p_WH,
+            axis=line / math.dist(self.p_ToA_T, self.p_WH),
+            engaged=self.engaged,
+            end_bushing=packed_fields(END_BUSHING, self.end_bushing),
+            law=self.packed_law,
         )
 
 
 @law
 def friction_damper_line(motion, p, at):
-    """Arm of the tub end in W and `strut_line` of a damper.
+    """Return the arm of the tub end in W, and `strut_line`, of a damper.
 
     Args:
         motion: `TubMotion`.
-        p, at: Array that holds what `FrictionDamperParameters.packed` gives, and where that begins.
+        p, at: Array that holds the numbers of `FRICTION_DAMPER`, and where they begin.
     """
-    arm = rotate(motion.rotation, (p[at], p[at + 1], p[at + 2]))
-    return arm, strut_line(motion, arm, (p[at + 3], p[at + 4], p[at + 5]))
+    damper = read_friction_damper(p, at)
+    arm = rotate(motion.rotation, damper.p_ToA_T)
+    return arm, strut_line(motion, arm, damper.p_WH)
 
 
 @law
 def friction_damper_tension(elongation_rate, deformation, p, at):
-    """Tension and rate of deformation; `deformation` of the sponge is any number for a law without one. [N, m/s; m]"""
-    return damper_response(int(p[at + 14]), elongation_rate, deformation, p, at + 15)
+    """Return the tension that the law of a damper gives, and the deformation rate of its sponge.
+
+    Args:
+        elongation_rate: Rate of its length. [m/s]
+        deformation: Deformation of the sponge; any number for a law without one. [m]
+        p, at: Array that holds the numbers of `FRICTION_DAMPER`, and where they begin.
+
+    Returns:
+        Tension [N], also of a damper that is taken out, and deformation rate [m/s].
+    """
+    return damper_response(elongation_rate, deformation, *read_friction_damper(p, at).law)
+
+
+@law
+def friction_damper_force(motion, deformation, p, at):
+    """Return the own force of a damper, which is its tension, 0 of a damper that is taken out. [N]
+
+    Args:
+        motion: `TubMotion`.
+        deformation: As for `friction_damper_tension`. [m]
+        p, at: Array that holds the numbers of `FRICTION_DAMPER`, and where they begin.
+    """
+    _, line = friction_damper_line(motion, p, at)
+    tension, _ = friction_damper_tension(line[1], deformation, p, at)
+    return read_friction_damper(p, at).engaged * tension
 
 
 @law
 def friction_damper_wrench(motion, arm, line, tension, p, at):
-    """Moment about To and force on the tub (six numbers, W) of a damper under a tension; arguments as above."""
+    """Return moment about To and force on the tub (six numbers, W) of a damper under a tension.
+
+    Args:
+        motion: `TubMotion`.
+        arm, line: From `friction_damper_line`.
+        tension: From `friction_damper_tension`. [N]
+        p, at: Array that holds the numbers of `FRICTION_DAMPER`, and where they begin.
+    """
     _, _, direction, v_A, inverse_length = line
-    axis, engaged = (p[at + 6], p[at + 7], p[at + 8]), p[at + ENGAGED]
-    bushing = (p[at + 9], p[at + 10], p[at + 11], p[at + 12])
+    damper = read_friction_damper(p, at)
+    bushing = read_end_bushing(*damper.end_bushing)
     w_strut = scale(inverse_length, cross(direction, v_A))
     against_tub = subtract(w_strut, transverse(motion.angular_velocity, direction))
-    on_strut_by_tub = bending_moment(
-        direction, against_tub, rotate(motion.rotation, axis), *bushing
+    on_strut_by_tub = end_moment(
+        direction, against_tub, rotate(motion.rotation, damper.axis), bushing
     )
-    on_strut_by_housing = bending_moment(direction, w_strut, axis, *bushing)
+    on_strut_by_housing = end_moment(direction, w_strut, damper.axis, bushing)
     couple = transverse_couple(add(on_strut_by_tub, on_strut_by_housing), direction, inverse_length)
-    force = scale(engaged, add(scale(-tension, direction), couple))
-    return wrench_at_origin(arm, force, scale(-engaged, on_strut_by_tub))
+    force = scale(damper.engaged, add(scale(-tension, direction), couple))
+    return wrench_at_origin(arm, force, scale(-damper.engaged, on_strut_by_tub))
+
+
+@law
+def end_moment(direction, rate, axis, bushing):
+    """Return `bending_moment` of an end bushing, from the numbers of `END_BUSHING`. [N m]"""
+    return bending_moment(
+        direction,
+        rate,
+        axis,
+        stiffness=bushing.stiffness,
+        damping=bushing.damping,
+        friction_torque=bushing.friction_torque,
+        full_friction_rate=bushing.full_friction_rate,
+    )
 
 
 @law
 def evaluate_friction_damper(x, state, p, generalized_force, force, rate):
-    """Force of a damper strut; arguments as in `ElementSystem`, parameters as in `FrictionDamperParameters.packed`."""
+    """Write the force of a damper strut; arguments as in `ElementSystem`."""
     deformation = state[0] if len(state) > 0 else 0.0 * x[0]
     motion, q = tub_motion(numbers(x)), numbers(p)
     arm, line = friction_damper_line(motion, q, 0)
@@ -166,6 +161,20 @@ def evaluate_friction_damper(x, state, p, generalized_force, force, rate):
     for i in range(6):
         generalized_force[i] = wrench[i]
     generalized_force[6] = 0.0 * tension
-    force[0] = p[ENGAGED] * tension
+    force[0] = read_friction_damper(q, 0).engaged * tension
     if len(rate) > 0:
         rate[0] = deformation_rate
+
+
+__all__ = [
+    "END_BUSHING",
+    "FRICTION_DAMPER",
+    "FrictionDamperParameters",
+    "evaluate_friction_damper",
+    "friction_damper_force",
+    "friction_damper_line",
+    "friction_damper_tension",
+    "friction_damper_wrench",
+    "packed_damper_law",
+    "read_friction_damper",
+]

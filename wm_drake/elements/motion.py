@@ -1,46 +1,70 @@
-"""Motion of the tub, as the force elements see it."""
+"""Motion of the tub, as the force elements take it."""
 
 from collections import namedtuple
 
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import sine_cosine
+from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import rotation_from_sines
 
-PLANT_STATE_SIZE = 14
-"""q = [roll, pitch, yaw, x, y, z, drum angle] and v = [w_WT, v_WTo, drum rate] of the plant."""
+TREE_STATE = PackedLayout(
+    "TreeState",
+    angles=VECTOR,
+    position=VECTOR,
+    joint_position=SCALAR,
+    angular_velocity=VECTOR,
+    velocity=VECTOR,
+    joint_rate=SCALAR,
+)
+"""State of a tree of the plant: a floating body and one joint from it.
+
+Roll, pitch, yaw of the body, its position p_WTo, angle or extension of the joint; w_WT, v_WTo, rate
+of the joint. The body is the tub or another one. [rad, m, rad or m; rad/s, m/s, rad/s or m/s]"""
+read_tree_state = TREE_STATE.read
+
+PLANT_STATE_SIZE = TREE_STATE.fixed_size
+"""State of the plant of a rigid machine, a `TREE_STATE`: the tub floats, the drum turns in it."""
 GENERALIZED_FORCE_SIZE = 7
 """Moment about To and force on the tub in W, then the torque on the drum joint."""
 
 TubMotion = namedtuple("TubMotion", ("rotation", "position", "angular_velocity", "velocity"))
-"""R_WT by rows, p_WTo [m], w_WT [rad/s], v_WTo [m/s]: tuples of scalars, in W. Of the tub, or of another body."""
+"""R_WT by rows, p_WTo [m], w_WT [rad/s], v_WTo [m/s] of the tub or of another body: tuples of
+scalars, in W."""
 
 
 @law
 def tub_motion(x):
-    """Motion of the tub from the plant's state: roll, pitch, yaw, x, y, z, drum angle, then w_WT, v_WTo, drum rate."""
+    """Return the motion of the tub from the state of the plant (`TREE_STATE`)."""
     return motion_at(x, 0)
 
 
 @law
 def motion_at(x, at):
-    """Motion of a body whose state stands like the tub's from index `at` on: angles, position, one more, w, v, one more."""
-    return motion_from_sines(
-        x, at, sine_cosine(x[at]), sine_cosine(x[at + 1]), sine_cosine(x[at + 2])
-    )
+    """Return the motion of the body whose `TREE_STATE` begins at index `at`."""
+    roll, pitch, yaw = read_tree_state(x, at).angles
+    return motion_from_sines(x, at, sine_cosine(roll), sine_cosine(pitch), sine_cosine(yaw))
 
 
 @law
 def motion_from_sines(x, at, roll, pitch, yaw):
-    """The same, with sine and cosine of each angle known."""
-    position, w = (x[at + 3], x[at + 4], x[at + 5]), (x[at + 7], x[at + 8], x[at + 9])
+    """Return the motion of a body from its `TREE_STATE`, and sine and cosine of each angle."""
+    state = read_tree_state(x, at)
     return TubMotion(
-        rotation_from_sines(roll, pitch, yaw), position, w, (x[at + 10], x[at + 11], x[at + 12])
+        rotation_from_sines(roll, pitch, yaw),
+        state.position,
+        state.angular_velocity,
+        state.velocity,
     )
 
 
 @law
 def rpy_rates(w, pitch, yaw):
-    """Rates of roll, pitch, yaw from the angular velocity in W, as Drake's RpyFloatingJoint has them. [rad/s]"""
+    """Return the rates of roll, pitch, yaw, as Drake's RpyFloatingJoint defines them. [rad/s]
+
+    Args:
+        w: Angular velocity in W. [rad/s]
+        pitch, yaw: Sine and cosine of each angle.
+    """
     s_p, c_p = pitch
     s_y, c_y = yaw
     roll_rate = (c_y * w[0] + s_y * w[1]) / c_p

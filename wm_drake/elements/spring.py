@@ -3,20 +3,32 @@
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import numbers
+from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import rotate, scale
 from wm_drake.elements.motion import tub_motion
+from wm_drake.elements.strut import strut_line, wrench_at_origin
 from wm_drake.laws.spring import spring_tension
-from wm_drake.laws.strut import strut_line, wrench_at_origin
+from wm_drake.laws.table import CURVE
 from wm_drake.parameters.types import FloatArray
+
+SPRING = PackedLayout(
+    "SpringNumbers",
+    p_ToA_T=VECTOR,
+    p_WH=VECTOR,
+    rest_length=SCALAR,
+    preload=SCALAR,
+    stiffness=CURVE,
+)
+"""Tub hook (T) and housing hook (W) [m], rest length [m], preload [N], stiffness [N/m or a
+table]."""
+read_spring = SPRING.read
 
 
 @dataclass(frozen=True)
 class SpringStrutParameters:
-    """A spring in its place: hooks at the rest pose, law, preload."""
+    """A spring in its place: hooks at the rest pose, preload, packed stiffness."""
 
     p_ToA_T: FloatArray
     p_WH: FloatArray
@@ -31,32 +43,37 @@ class SpringStrutParameters:
     @property
     def structure(self) -> list[int]:
         """Number of points of its table, 0 without one."""
-        return [int(self.packed_stiffness[0])]
+        return CURVE.structure(self.packed_stiffness, 0)
 
     def packed(self) -> FloatArray:
-        """Flat: tub hook (T), housing hook (W), rest length, preload, packed stiffness."""
-        return np.concatenate(
-            [self.p_ToA_T, self.p_WH, [self.rest_length, self.preload], self.packed_stiffness]
+        """Return the numbers of `SPRING`."""
+        return SPRING.pack(
+            p_ToA_T=self.p_ToA_T,
+            p_WH=self.p_WH,
+            rest_length=self.rest_length,
+            preload=self.preload,
+            stiffness=self.packed_stiffness,
         )
 
 
 @law
 def spring_strut_wrench(motion, p, at):
-    """Moment about To and force on the tub (six numbers, W), and tension, of a spring strut.
+    """Return moment about To and force on the tub (six numbers, W), and tension, of a spring strut.
 
     Args:
         motion: `TubMotion`.
-        p, at: Array that holds what `SpringStrutParameters.packed` gives, and where that begins.
+        p, at: Array that holds the numbers of `SPRING`, and where they begin.
     """
-    arm = rotate(motion.rotation, (p[at], p[at + 1], p[at + 2]))
-    length, _, direction, _, _ = strut_line(motion, arm, (p[at + 3], p[at + 4], p[at + 5]))
-    tension = spring_tension(length, p[at + 6], p[at + 7], p, at + 8)
+    spring = read_spring(p, at)
+    arm = rotate(motion.rotation, spring.p_ToA_T)
+    length, _, direction, _, _ = strut_line(motion, arm, spring.p_WH)
+    tension = spring_tension(length, spring.rest_length, spring.preload, spring.stiffness)
     return wrench_at_origin(arm, scale(-tension, direction), (0.0, 0.0, 0.0)), tension
 
 
 @law
 def evaluate_spring_strut(x, state, p, generalized_force, force, rate):
-    """Force of a spring strut; arguments as in `ElementSystem`, parameters as in `SpringStrutParameters.packed`."""
+    """Write the force of a spring strut; arguments as in `ElementSystem`, numbers of `SPRING`."""
     wrench, tension = spring_strut_wrench(tub_motion(numbers(x)), numbers(p), 0)
     for i in range(6):
         generalized_force[i] = wrench[i]

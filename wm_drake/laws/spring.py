@@ -5,19 +5,20 @@ from wm_drake.laws.table import stiffness_force
 
 
 @law
-def spring_tension(length, rest_length, preload, packed, at):
-    """Tension of a suspension spring that hangs under a preload.
+def spring_tension(length, rest_length, preload, stiffness):
+    """Return the tension of a suspension spring under a preload.
 
-        t = preload + F(length - rest_length)      own derivation: Hooke's law about the rest pose, F = k x or a table
+        t = preload + F(length - rest_length)      own derivation: Hooke's law about the rest pose
+
+    F = k x, or a table.
 
     Args:
         length: Distance between the hooks. [m]
-        rest_length: The same at the rest pose of the empty machine. [m]
+        rest_length: Distance between the hooks at the rest pose of the empty machine. [m]
         preload: Tension at the rest pose; follows from static equilibrium. [N]
-        packed: Array that holds the packed stiffness (`wm_drake.laws.table`).
-        at: Index where it begins.
+        stiffness: Packed stiffness, as array and index (`wm_drake.laws.table`).
 
     Returns:
         Tension, > 0 when it pulls the hooks together. [N]
     """
-    return preload + stiffness_force(length - rest_length, packed, at)
+    return preload + stiffness_force(length - rest_length, *stiffness)

@@ -27,19 +27,18 @@ def max_bearing_eigenvalue(
     """
     moving = np.concatenate([state_layout.tub, state_layout.carrier])
     mass = plant.CalcMassMatrix(context)[np.ix_(moving, moving)]
-    damping, stiffness = bearing.packed_law[:6], bearing.packed_law[13:24:2]
     relative = _relative_motion(bearing)
     rates = np.zeros((24, 24))
     rates[:12, 12:] = np.eye(12)
-    rates[12:, :12] = -np.linalg.solve(mass, relative.T @ (stiffness[:, None] * relative))
-    rates[12:, 12:] = -np.linalg.solve(mass, relative.T @ (damping[:, None] * relative))
+    rates[12:, :12] = -np.linalg.solve(mass, relative.T @ (bearing.stiffness[:, None] * relative))
+    rates[12:, 12:] = -np.linalg.solve(mass, relative.T @ (bearing.damping[:, None] * relative))
     return float(np.max(np.abs(np.linalg.eigvals(rates))))
 
 
 def _relative_motion(bearing: SixComponentBushingParameters) -> FloatArray:
     """From angular velocity and velocity of tub and carrier to velocity and angular velocity in the bearing, when drawn."""
-    x, y, z = bearing.p_WG
+    x, y, z = bearing.ground_side_point
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])  # p x .
-    turn = bearing.R_WG.T
+    turn = bearing.ground_side_rotation.T
     of_carrier = np.block([[-turn @ cross, turn], [turn, np.zeros((3, 3))]])
     return np.hstack([-of_carrier, of_carrier])

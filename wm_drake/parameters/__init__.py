@@ -1,26 +1,33 @@
-"""Numbers enter here: frozen types of a machine, a load, a spin profile, in SI; files and units are read and checked."""
+"""Read and check what a user writes: machine, component, load, spin profile, study files.
+
+Enters: YAML and CSV files, and text with units. Leaves: frozen types in SI units
+(`MachineParameters`, `Component`, `Load`, `SpinProfile`, `Factor`, `MeasuredLoop`) or an
+`InputError` that names file, line and key. `with_value` is the one way to change a number.
+May import: `laws`, `compiler` and `errors`; no pydrake.
+"""
 
 from wm_drake.parameters.bearing import Bearing
 from wm_drake.parameters.components import Component, load_component, shipped_components
-from wm_drake.parameters.elements import (
-    Bushing,
-    BushingType,
+from wm_drake.parameters.damper_laws import (
+    DAMPER_LAWS,
     CoulombDamper,
-    Damper,
     DamperType,
-    EndBushing,
-    ForceTable,
     FreeStrokeDamper,
     HavsinDamper,
     MstvDamper,
-    Spring,
-    SpringType,
     StvDamper,
     StvSpongeDamper,
+)
+from wm_drake.parameters.elements import (
+    Bushing,
+    BushingType,
+    Damper,
+    EndBushing,
+    ForceTable,
+    Spring,
+    SpringType,
     TelescopicDamper,
     TorqueTable,
-    packed_stiffness,
-    packed_stiffnesses,
 )
 from wm_drake.parameters.factors import (
     GASKET_FACTORS,
@@ -58,6 +65,7 @@ from wm_drake.parameters.measured import measured_amplitudes
 from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
 
 __all__ = [
+    "DAMPER_LAWS",
     "GASKET_FACTORS",
     "TABLES",
     "Bearing",
@@ -105,8 +113,6 @@ __all__ = [
     "machine_yaml",
     "measured_amplitudes",
     "nominal_stiffness",
-    "packed_stiffness",
-    "packed_stiffnesses",
     "quantities",
     "read_loop",
     "read_loops",

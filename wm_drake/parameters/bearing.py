@@ -1,4 +1,4 @@
-"""The bearing of the drum, where it gives."""
+"""Parameters of a compliant bearing of the drum."""
 
 from typing import Annotated
 
@@ -9,15 +9,21 @@ from wm_drake.parameters.elements import BushingType, Frozen
 
 
 class Bearing(Frozen):
-    """What holds the drum's axis in the tub, where that gives: without it the drum turns in a perfect revolute joint.
+    """A compliant bearing between drum and tub.
 
-    Nothing of it is published: every number is an assumption of whoever gives it.
+    A machine without these parameters has a rigid bearing: a revolute joint. None of the numbers is
+    published; every number in a machine file is an assumption of its author.
 
     Attributes:
-        radial_stiffness, axial_stiffness, tilting_stiffness: Across the drum axis, along it, against tilting of it.
-        torsional_stiffness: About it, where the motor's reaction passes to the tub; as against tilting if None.
-        radial_damping, axial_damping, tilting_damping, torsional_damping: Likewise.
-        y: Where it acts: along the drum axis, from the origin of its joint in the direction of the joint's axis.
+        radial_stiffness: Stiffness perpendicular to the drum axis. [N/m]
+        axial_stiffness: Stiffness along the drum axis. [N/m]
+        tilting_stiffness: Stiffness against tilting of the drum axis. [N m/rad]
+        torsional_stiffness: Stiffness about the drum axis, in the path of the motor's reaction
+            torque to the tub; if None, the tilting stiffness is used. [N m/rad]
+        radial_damping, axial_damping: Damping in the same directions. [N s/m]
+        tilting_damping, torsional_damping: Damping of the rotations; if the torsional one is None,
+            the tilting one is used. [N m s/rad]
+        y: Position of the bearing along the axis of the drum's joint, from the joint's origin. [m]
     """
 
     radial_stiffness: Annotated[u.LinearStiffness, Field(gt=0.0)]
@@ -31,9 +37,9 @@ class Bearing(Frozen):
     y: u.Length
 
     def as_bushing(self) -> BushingType:
-        """Six components in a frame whose y axis is the drum's."""
+        """Return the bearing as a bushing in a frame whose y axis is the drum axis."""
 
-        def or_tilting(torsional: float | None, tilting: float) -> float:
+        def torsional_or_tilting(torsional: float | None, tilting: float) -> float:
             return tilting if torsional is None else torsional
 
         return BushingType(
@@ -41,12 +47,14 @@ class Bearing(Frozen):
             stiffness_y=self.axial_stiffness,
             stiffness_z=self.radial_stiffness,
             rotational_stiffness_x=self.tilting_stiffness,
-            rotational_stiffness_y=or_tilting(self.torsional_stiffness, self.tilting_stiffness),
+            rotational_stiffness_y=torsional_or_tilting(
+                self.torsional_stiffness, self.tilting_stiffness
+            ),
             rotational_stiffness_z=self.tilting_stiffness,
             damping_x=self.radial_damping,
             damping_y=self.axial_damping,
             damping_z=self.radial_damping,
             rotational_damping_x=self.tilting_damping,
-            rotational_damping_y=or_tilting(self.torsional_damping, self.tilting_damping),
+            rotational_damping_y=torsional_or_tilting(self.torsional_damping, self.tilting_damping),
             rotational_damping_z=self.tilting_damping,
         )

@@ -1,7 +1,10 @@
-"""Component rigs: one law on a bench, harmonic motion, steady force loops.
+"""Test one component on a bench: harmonic motion, steady force loops.
 
-from wm_drake.rigs import Harmonic, damper_bench, force_loop, measures_of
-loop = force_loop(damper_bench(machine.damper_types["friction"]), Harmonic(frequency=3.0, amplitude=0.005))
+Enters: parameters of a component and motions, or recorded loops. Leaves: force loops, measures.
+No pydrake. May import: `elements`, `laws`, `parameters`, `compiler`.
+
+from wm_drake.rigs import Harmonic, damper_bench, force_loop, measures_of loop =
+force_loop(damper_bench(machine.damper_types["friction"]), Harmonic(frequency=3.0, amplitude=0.005))
 measures_of(loop).energy_per_cycle
 """
 

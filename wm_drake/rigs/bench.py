@@ -1,4 +1,4 @@
-"""What is clamped into the bench: a component, one axis of it, and the harmonic motion it is given."""
+"""Component on the bench, the axis that is driven, and its harmonic motion."""
 
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -6,10 +6,9 @@ from typing import TypeAlias
 import numpy as np
 
 from wm_drake.elements.bushing import packed_bushing_law
-from wm_drake.elements.friction_damper import has_sponge, packed_damper_law
+from wm_drake.elements.damper_law import law_of, packed_damper_law
 from wm_drake.errors import input_error
-from wm_drake.laws.damper import MSTV
-from wm_drake.parameters import DamperType
+from wm_drake.parameters.damper_laws import DAMPER_LAWS, DamperNumbers
 from wm_drake.parameters.elements import BushingType
 from wm_drake.parameters.types import FloatArray
 
@@ -30,7 +29,11 @@ class Harmonic:
     amplitude: float
 
     def __post_init__(self) -> None:
-        """Refuses what is no motion."""
+        """Check that it is a motion.
+
+        Raises:
+            InputError: Frequency or amplitude is not > 0.
+        """
         for name in ("frequency", "amplitude"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
@@ -47,32 +50,38 @@ class DamperBench:
     """A friction damper along its line: one end held, the other driven.
 
     Attributes:
-        packed: Law number and parameters, as `packed_damper_law` gives them.
-        sponge_mass: Mass of the sponge, for the law MSTV only; 0 as in the machine. [kg]
+        packed: Law number and parameters, from `packed_damper_law`.
+        sponge_mass: Mass of the sponge, for a law that has one on the bench; 0 as in the machine.
+            [kg]
     """
 
     packed: FloatArray
     sponge_mass: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuses a mass where the law has no sponge to carry it."""
+        """Check the mass.
+
+        Raises:
+            InputError: It is < 0, or the law has no sponge that can have a mass.
+        """
         if self.sponge_mass < 0.0:
             raise input_error(f"is {self.sponge_mass:g} kg; allowed is >= 0", key="sponge_mass")
-        if self.sponge_mass > 0.0 and int(self.packed[0]) != MSTV:
+        if self.sponge_mass > 0.0 and law_of(self.packed).sponge_with_mass is None:
+            names = [law.name for law in DAMPER_LAWS.values() if law.sponge_with_mass is not None]
             raise input_error(
-                "only the law mstv has a sponge that can have a mass on the bench",
+                f"only the law {' or '.join(names)} has a sponge that can have a mass on the bench",
                 key="sponge_mass",
             )
 
     @property
     def rotates(self) -> bool:
-        """Whether it is turned, not pushed."""
+        """Whether its motion is an angle and its force a moment."""
         return False
 
     @property
     def state_size(self) -> int:
-        """Number of states: none, deformation of the sponge, or position and velocity of a sponge with mass."""
-        return 2 if self.sponge_mass > 0.0 else int(has_sponge(self.packed))
+        """Number of states: 0, 1 (deformation of the sponge) or 2 (sponge with mass)."""
+        return 2 if self.sponge_mass > 0.0 else int(law_of(self.packed).has_sponge)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +89,7 @@ class BushingBench:
     """One axis of a six-component bushing, the others held.
 
     Attributes:
-        packed: Parameters, as `packed_bushing_law` gives them.
+        packed: Parameters, from `packed_bushing_law`.
         axis: One of `AXES`.
         arm: Radius of the jig through which a rotation is driven; 0 turns it directly. [m]
     """
@@ -90,7 +99,11 @@ class BushingBench:
     arm: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuses axes that there are not, and arms that turn nothing."""
+        """Check axis and arm.
+
+        Raises:
+            InputError: There is no such axis, or the arm turns nothing.
+        """
         if self.axis not in AXES:
             raise input_error(f"no axis '{self.axis}'; allowed are {', '.join(AXES)}", key="axis")
         if self.arm < 0.0 or (self.arm > 0.0 and not self.axis.startswith("about")):
@@ -98,7 +111,7 @@ class BushingBench:
 
     @property
     def rotates(self) -> bool:
-        """Whether its motion is an angle and its force a moment; with an arm they are displacement and force of the arm."""
+        """Whether motion and force are angle and moment; through an arm they are not."""
         return self.axis.startswith("about") and self.arm == 0.0
 
     @property
@@ -110,11 +123,11 @@ class BushingBench:
 Bench: TypeAlias = DamperBench | BushingBench
 
 
-def damper_bench(damper: DamperType, sponge_mass: float = 0.0) -> DamperBench:
-    """A damper of a machine file on the bench; its end bushings do not matter along its line."""
+def damper_bench(damper: DamperNumbers, sponge_mass: float = 0.0) -> DamperBench:
+    """Return the bench of a damper of a machine file; its end bushings have no effect there."""
     return DamperBench(packed_damper_law(damper), sponge_mass)
 
 
 def bushing_bench(bushing: BushingType, axis: str, arm: float = 0.0) -> BushingBench:
-    """A bushing or gasket of a machine file on the bench."""
+    """Return the bench of a bushing or gasket of a machine file."""
     return BushingBench(packed_bushing_law(bushing), axis, arm)

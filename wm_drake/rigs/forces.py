@@ -1,28 +1,59 @@
-"""Forces that the bench measures, from motion and state of the component, by the laws of the machine."""
+"""Forces on the bench, from motion and state of the component, with the laws of the machine."""
 
 import numpy as np
 
 from wm_drake.compiler.compilation import long_running
+from wm_drake.elements.bushing import read_bushing_law
+from wm_drake.elements.damper_law import damper_response, sponge_with_mass
 from wm_drake.laws.bushing import bushing_force
-from wm_drake.laws.damper import damper_response
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import AXES, BushingBench
 
 
 @long_running
 def damper_tensions(rate, deformation, packed):  # type: ignore[no-untyped-def]
-    """Tension of a damper at rates of elongation (n,) and deformations of its sponge (n,). [m/s, m -> N]"""
+    """Return the tension of a damper (n,). [N]
+
+    Args:
+        rate: Rates of elongation. [m/s]
+        deformation: Deformations of the sponge. [m]
+        packed: Packed law.
+    """
     force = np.empty(len(rate))
     for i in range(len(rate)):
-        tension, _ = damper_response(int(packed[0]), rate[i], deformation[i], packed, 1)
+        tension, _ = damper_response(rate[i], deformation[i], packed, 0)
+        force[i] = tension
+    return force
+
+
+@long_running
+def tensions_with_mass(deformation, deformation_rate, slider_rate, packed):  # type: ignore[no-untyped-def]
+    """Return the tension of a damper whose sponge has a mass (n,). [N]
+
+    Args:
+        deformation, deformation_rate: Deformation of the sponge and its rate (n,). [m, m/s]
+        slider_rate: Velocity of the sponge (n,). [m/s]
+        packed: Packed law.
+    """
+    force = np.empty(len(slider_rate))
+    for i in range(len(slider_rate)):
+        tension, _ = sponge_with_mass(
+            deformation[i], deformation_rate[i], slider_rate[i], packed, 0
+        )
         force[i] = tension
     return force
 
 
 @long_running
 def bushing_reactions(position, rate, packed, axis):  # type: ignore[no-untyped-def]
-    """Force or moment that moves a bushing along or about one axis (n,); the law's own resists. [m, m/s; rad, rad/s]"""
-    force = np.empty(len(rate))
+    """Return the force or moment that moves a bushing along or about one axis (n,). [N; N m]
+
+    Args:
+        position, rate: Displacement or angle, and its rate (n,). [m, m/s; rad, rad/s]
+        packed: Packed law.
+        axis: Index in `AXES`.
+    """
+    force, bushing = np.empty(len(rate)), read_bushing_law(packed, 0)
     zero = (0.0, 0.0, 0.0)
     for i in range(len(rate)):
         x, v = position[i], rate[i]
@@ -33,23 +64,23 @@ def bushing_reactions(position, rate, packed, axis):  # type: ignore[no-untyped-
         else:
             d, d_rate = (0.0, 0.0, x), (0.0, 0.0, v)
         if axis < 3:
-            f, _ = bushing_force(d, d_rate, zero, zero, packed, 0)
+            f, _ = bushing_force(d, d_rate, zero, zero, bushing)
         else:
-            _, f = bushing_force(zero, zero, d, d_rate, packed, 0)
+            _, f = bushing_force(zero, zero, d, d_rate, bushing)
         force[i] = -(f[0] + f[1] + f[2])  # the others are zero
     return force
 
 
 def bushing_loads(bench: BushingBench, position: FloatArray, rate: FloatArray) -> FloatArray:
-    """Force or moment at the driven end of a bushing (n,).
+    """Return force or moment at the driven end of a bushing (n,). [N; N m]
 
-    Through a jig arm of radius R the actuator moves by d = R sin(theta), and the moment M asks for the force
-    F = M / (R cos(theta)), which does the same work. [A] section 2.2 reckons M = F R, which differs by less than 0.1 % up
-    to d = 4 mm at R = 100 mm.
+    Through a jig arm of radius R the actuator moves by d = R sin(theta), and the moment M needs the
+    force F = M / (R cos(theta)), which does the same work. [A] section 2.2 takes M = F R, which
+    differs by less than 0.1 % up to d = 4 mm at R = 100 mm.
 
     Args:
         bench: The bushing.
-        position, rate: Of the driven end. [m, m/s; rad, rad/s if it rotates]
+        position, rate: Motion of the driven end. [m, m/s; rad, rad/s if it rotates]
     """
     axis = AXES.index(bench.axis)
     if not bench.arm:

@@ -1,7 +1,8 @@
-"""The steady motion of a sponge on the bench: adaptive, stiff integration of many benches at once.
+"""Steady motion of sponges on the bench: adaptive, stiff integration of many benches at once.
 
-All benches of a call run as one system of equations over the phase of their motion, states in units of their amplitudes: one
-pass of LSODA in C instead of one per bench, which is what makes a fit to many loops short. The Jacobian is a band.
+All benches of a call are one system of equations over the phase of their motion, states in units of
+their amplitudes: one pass of LSODA in C instead of one per bench, which makes a fit to many loops
+short. The Jacobian is a band.
 """
 
 import warnings
@@ -11,13 +12,12 @@ import numpy as np
 from scipy.integrate import ODEintWarning, odeint
 
 from wm_drake.compiler.compilation import long_running
+from wm_drake.elements.damper_law import damper_response, sponge_with_mass
 from wm_drake.errors import WmDrakeError
-from wm_drake.laws.damper import damper_response
-from wm_drake.laws.friction import mstv_friction
 from wm_drake.parameters.types import FloatArray
 
 POINTS = 1440
-"""Of a period, equally spaced; reversals fall on points."""
+"""Points of a period, equally spaced; reversals fall on points."""
 
 PHASE = 2.0 * np.pi * np.arange(POINTS + 1) / POINTS
 PIECES = (
@@ -25,37 +25,41 @@ PIECES = (
     slice(POINTS // 4, 3 * POINTS // 4 + 1),
     slice(3 * POINTS // 4, POINTS + 1),
 )
-"""Of `PHASE`, from reversal to reversal of the driven end, where friction has a corner: the integrator begins anew there."""
+"""Pieces of `PHASE` from reversal to reversal of the driven end, where friction has a corner: the
+integrator begins anew there."""
 
 MOST_PERIODS = 200
 STEADY = 1e-7
 """A period repeats the one before if no state differs by more, in amplitudes."""
 
 TOLERANCES = {1: {"rtol": 2e-8, "atol": 2e-9}, 2: {"rtol": 1e-6, "atol": 1e-6}}
-"""By the number of states of a bench, in amplitudes. With a mass, MSTV friction jumps by f_max epsilon / |u| as the sponge
-begins to slip: integrators chatter or break down if asked for more."""
+"""Tolerances by the number of states of a bench, in amplitudes. With a mass, MSTV friction jumps by
+f_max epsilon / |u| as the sponge begins to slip: integrators chatter or break down at tighter
+ones."""
 
 
 class NotSteadyError(WmDrakeError):
-    """A bench whose motion does not become steady, or cannot be integrated."""
+    """Error of a bench whose motion does not become steady, or cannot be integrated."""
 
 
 def steady_states(
     packed: FloatArray, mass: FloatArray, amplitude: FloatArray, omega: FloatArray, size: int
 ) -> FloatArray:
-    """States of benches over one steady period.
+    """Return the states of benches over one steady period.
 
     Args:
         packed: Law number and parameters of a damper with sponge (r, s).
-        mass: Of each sponge (r,). [kg]
-        amplitude, omega: Of each motion (r,). [m, rad/s]
-        size: States of each bench: 1, the deformation, or with mass 2, position and velocity of the sponge.
+        mass: Mass of each sponge (r,). [kg]
+        amplitude, omega: Amplitude and angular frequency of each motion (r,). [m, rad/s]
+        size: States of each bench: 1, the deformation, or with mass 2, position and velocity of the
+            sponge.
 
     Returns:
-        (POINTS + 1, r, size); deformation and position in amplitudes, velocity in amplitude times omega.
+        (POINTS + 1, r, size); deformation and position in amplitudes, velocity in amplitude times
+        omega.
 
     Raises:
-        NotSteadyError: within `MOST_PERIODS`.
+        NotSteadyError: The motion is not steady within `MOST_PERIODS`, or cannot be integrated.
     """
     rows = len(packed)
     rates = np.empty(rows * size)
@@ -105,11 +109,12 @@ def steady_states(
 def _closed_loop(
     period: Callable[[FloatArray], FloatArray], state: FloatArray, tolerance: float, *, leap: bool
 ) -> FloatArray:
-    """Repeats periods until one ends where it began.
+    """Repeat periods until one ends where it began.
 
-    With `leap`, for states that do not act on each other, each leaps to where the secant through its last two periods
-    closes (Aitken's delta-squared): a sponge that creeps towards its steady place over hundreds of periods is there in a few.
-    The ends of a scalar equation keep the order of its beginnings, so the secant has a slope of 0 to 1.
+    With `leap`, for states that do not act on each other, each leaps to where the secant through
+    its last two periods closes (Aitken's delta-squared): a sponge that creeps towards its steady
+    place over hundreds of periods is there in a few. The ends of a scalar equation keep the order
+    of its beginnings, so the secant has a slope of 0 to 1.
     """
     before: tuple[FloatArray, FloatArray] | None = None
     for _ in range(MOST_PERIODS):
@@ -134,27 +139,22 @@ def _closed_loop(
 
 @long_running
 def deformation_rates(phase, deformation, packed, amplitude, omega, rates):  # type: ignore[no-untyped-def]
-    """Rates by phase of the deformations of massless sponges, both in amplitudes."""
+    """Write the rates by phase of the deformations of massless sponges, both in amplitudes."""
     for i in range(len(amplitude)):
         speed = amplitude[i] * omega[i]
         _, rate = damper_response(
-            int(packed[i, 0]), speed * np.cos(phase), amplitude[i] * deformation[i], packed[i], 1
+            speed * np.cos(phase), amplitude[i] * deformation[i], packed[i], 0
         )
         rates[i] = rate / speed
 
 
 @long_running
 def sponge_rates(phase, state, packed, mass, amplitude, omega, rates):  # type: ignore[no-untyped-def]
-    """Rates by phase of position and velocity of sponges with mass.
-
-    m X'' = k1 (Y - X) + c1 (Y' - X') - c2 X' + f_mstv(X', Y' - X')      [C] Eq. (3), (7)
-    """
+    """Write the rates by phase of position and velocity of sponges with mass."""
     for i in range(len(amplitude)):
         speed = amplitude[i] * omega[i]
         y, v = amplitude[i] * np.sin(phase), speed * np.cos(phase)
         x, w = amplitude[i] * state[2 * i], speed * state[2 * i + 1]
-        f_max, c_m, epsilon = packed[i, 1], packed[i, 2], packed[i, 3]
-        k1, c1, c2 = packed[i, 4], packed[i, 5], packed[i, 6]
-        force = k1 * (y - x) + c1 * (v - w) - c2 * w + mstv_friction(w, v - w, f_max, c_m, epsilon)
+        _, force = sponge_with_mass(y - x, v - w, w, packed[i], 0)
         rates[2 * i] = state[2 * i + 1]
         rates[2 * i + 1] = force / (mass[i] * speed * omega[i])

@@ -1,4 +1,4 @@
-"""Steady force loops of components on the bench, and what is read off them."""
+"""Steady force loops of components on the bench, and their measures."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,20 +8,21 @@ import numpy as np
 from wm_drake.errors import input_error
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import Bench, BushingBench, DamperBench, Harmonic
-from wm_drake.rigs.forces import bushing_loads, damper_tensions
+from wm_drake.rigs.forces import bushing_loads, damper_tensions, tensions_with_mass
 from wm_drake.rigs.integration import PHASE, steady_states
 
 
 @dataclass(frozen=True, eq=False)
 class ForceLoop:
-    """One steady period of a component on the bench, equally spaced, without the point that closes it.
+    """One steady period of a component on the bench, equally spaced, without its closing point.
 
     Attributes:
-        motion: What it was given.
+        motion: Motion of the driven end.
         rotates: Whether motion and force are angle and moment.
         time: From the passage through the middle, upwards (n,). [s]
-        displacement, velocity: Of the driven end (n,). [m, m/s; rad, rad/s]
-        force: On the component at the driven end, > 0 in the direction of the displacement (n,). [N; N m]
+        displacement, velocity: Motion of the driven end (n,). [m, m/s; rad, rad/s]
+        force: On the component at the driven end, > 0 in the direction of the displacement (n,).
+            [N; N m]
     """
 
     motion: Harmonic
@@ -34,13 +35,15 @@ class ForceLoop:
 
 @dataclass(frozen=True)
 class LoopMeasures:
-    """What is read off a loop; moments and angles in place of forces and displacements where the component is turned.
+    """Measures of a loop; moments and angles in place of forces and displacements in a rotation.
 
     Attributes:
         peak_force: Largest absolute force. [N; N m]
         energy_per_cycle: Work done on the component in a period, the area of the loop. [J]
-        equivalent_damping: Of the dashpot that takes the same energy, E / (pi 2 pi f A^2). [N s/m; N m s/rad]
-        dynamic_stiffness: Amplitude of the fundamental of the force by that of the displacement. [N/m; N m/rad]
+        equivalent_damping: Damping of the dashpot that takes the same energy, E / (pi 2 pi f A^2).
+            [N s/m; N m s/rad]
+        dynamic_stiffness: Amplitude of the fundamental of the force by that of the displacement.
+            [N/m; N m/rad]
         loss_angle: By which the fundamental of the force leads that of the displacement. [rad]
     """
 
@@ -52,17 +55,17 @@ class LoopMeasures:
 
 
 def force_loop(bench: Bench, motion: Harmonic) -> ForceLoop:
-    """The steady loop of a component under harmonic motion, after its transient has decayed.
+    """Return the steady loop of a component under harmonic motion, after its transient has decayed.
 
     Raises:
-        NotSteadyError: it does not.
-        InputError: the motion is wider than the jig arm is long.
+        NotSteadyError: The transient does not decay.
+        InputError: The motion is wider than the jig arm is long.
     """
     return force_loops(bench, [motion])[0]
 
 
 def force_loops(bench: Bench, motions: Sequence[Harmonic]) -> list[ForceLoop]:
-    """The same for several motions, integrated side by side."""
+    """Return the steady loops of a component under several motions, integrated side by side."""
     phase = PHASE[:-1]
     if isinstance(bench, BushingBench):
         return [
@@ -84,12 +87,12 @@ def force_loops(bench: Bench, motions: Sequence[Harmonic]) -> list[ForceLoop]:
 def steady_deformations(
     bench: DamperBench, packed: FloatArray, amplitude: FloatArray, omega: FloatArray
 ) -> FloatArray:
-    """Deformation of massless sponges over a steady period, at `PHASE` (r, POINTS + 1); zero where the law has none. [m]
+    """Return the deformation of massless sponges over a steady period, at `PHASE`. [m]
 
     Args:
-        bench: A damper of the same law.
+        bench: A damper of the same law; the deformation is zero if the law has no sponge.
         packed: Law number and parameters of each (r, s).
-        amplitude, omega: Of the motion of each (r,). [m, rad/s]
+        amplitude, omega: Amplitude and angular frequency of each motion (r,). [m, rad/s]
     """
     if bench.state_size != 1:
         return np.zeros((len(packed), len(PHASE)))
@@ -98,7 +101,7 @@ def steady_deformations(
 
 
 def measures_of(loop: ForceLoop) -> LoopMeasures:
-    """What is read off a loop."""
+    """Return the measures of a loop."""
     period = 1.0 / loop.motion.frequency
     energy = float(np.mean(loop.force * loop.velocity)) * period
     fundamental = np.fft.rfft(loop.force)[1] / np.fft.rfft(loop.displacement)[1]
@@ -113,7 +116,7 @@ def measures_of(loop: ForceLoop) -> LoopMeasures:
 
 
 def _driven(bench: Bench, motion: Harmonic, phase: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Displacement and velocity of the driven end."""
+    """Return displacement and velocity of the driven end."""
     if isinstance(bench, BushingBench) and bench.arm and motion.amplitude >= bench.arm:
         raise input_error(
             f"is {motion.amplitude:g} m; allowed is less than the arm, {bench.arm:g} m",
@@ -121,9 +124,8 @@ def _driven(bench: Bench, motion: Harmonic, phase: FloatArray) -> tuple[FloatArr
         )
     speed = motion.amplitude * motion.angular_frequency
     velocity = speed * np.cos(phase)
-    velocity[np.abs(velocity) < 1e-12 * speed] = (
-        0.0  # at its reversals it stands still, and dry friction must know
-    )
+    # at its reversals it stands still, where dry friction is zero
+    velocity[np.abs(velocity) < 1e-12 * speed] = 0.0
     return motion.amplitude * np.sin(phase), velocity
 
 
@@ -138,11 +140,9 @@ def _tension_of_heavy_sponge(bench: DamperBench, motion: Harmonic) -> FloatArray
         2,
     )[:-1, 0]
     displacement, velocity = _driven(bench, motion, phase)
-    k1, c1 = bench.packed[4], bench.packed[5]
-    return np.asarray(
-        k1 * (displacement - amplitude * states[:, 0])
-        + c1 * (velocity - amplitude * omega * states[:, 1])
-    )
+    rate = amplitude * omega * states[:, 1]
+    deformation = displacement - amplitude * states[:, 0]
+    return np.asarray(tensions_with_mass(deformation, velocity - rate, rate, bench.packed))
 
 
 def _loop(bench: Bench, motion: Harmonic, force: FloatArray) -> ForceLoop:

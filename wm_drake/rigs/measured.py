@@ -1,4 +1,4 @@
-"""From what a bench recorded to the motion it made: frequency, amplitude, and the phase of every sample."""
+"""From a recorded loop to the motion of the bench: frequency, amplitude, phase of each sample."""
 
 from dataclasses import dataclass
 
@@ -11,11 +11,12 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import Harmonic
 
 LARGEST_DISTORTION = 0.2
-"""Of the displacement: root mean square of what is neither fundamental nor drift, in amplitudes."""
+"""Largest root mean square of what is neither fundamental nor drift in the displacement, in
+amplitudes."""
 
 
 WHOLE_PERIOD = 0.97
-"""Of a period: samples of a whole one end a step before its end."""
+"""Part of a period that counts as a whole one: its samples end a step before its end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,10 +24,12 @@ class MeasuredMotion:
     """A measured loop on the clock of its own motion.
 
     Attributes:
-        loop: What was recorded.
+        loop: The recorded loop.
         motion: The fundamental of the displacement.
-        phase: Of each sample, 0 at an upward passage through the middle, from 0 to 2 pi (n,). [rad]
-        baseline: Offset and, where two periods or more tell it from the loop, drift of an instrument: columns (n, 1 or 2).
+        phase: Phase of each sample, 0 at an upward passage through the middle, from 0 to 2 pi (n,).
+            [rad]
+        baseline: Columns (n, 1 or 2): offset of an instrument and, where two periods or more
+            separate it from the loop, its drift.
     """
 
     loop: MeasuredLoop
@@ -36,12 +39,12 @@ class MeasuredMotion:
 
 
 def measured_motion(loop: MeasuredLoop) -> MeasuredMotion:
-    """Finds the harmonic motion of a bench by least squares; samples may lie anywhere, offset and drift are taken out.
+    """Return the harmonic motion of a bench by least squares; offset and drift are removed.
 
     The middle of the motion counts as the component's zero.
 
     Raises:
-        InputError: less than a period, or a motion that is not harmonic.
+        InputError: The loop covers less than a period, or the motion is not harmonic.
     """
     time = loop.time - loop.time[0]
     length = float(time[-1])
@@ -63,8 +66,8 @@ def measured_motion(loop: MeasuredLoop) -> MeasuredMotion:
     distortion = float(np.sqrt(error / len(time))) / amplitude if amplitude > 0.0 else np.inf
     if distortion > LARGEST_DISTORTION:
         raise input_error(
-            f"displacement is not harmonic: {100.0 * distortion:.0f} % of its amplitude is not at {frequency:.3g} Hz; "
-            f"allowed is {100.0 * LARGEST_DISTORTION:.0f} %",
+            f"displacement is not harmonic: {100.0 * distortion:.0f} % of its amplitude is not at "
+            f"{frequency:.3g} Hz; allowed is {100.0 * LARGEST_DISTORTION:.0f} %",
             where=loop.path,
         )
     phase = np.mod(2.0 * np.pi * frequency * time + np.arctan2(amounts[1], amounts[0]), 2.0 * np.pi)
@@ -75,7 +78,7 @@ def measured_motion(loop: MeasuredLoop) -> MeasuredMotion:
 
 
 def _projected(time: FloatArray, values: FloatArray, frequency: float) -> tuple[FloatArray, float]:
-    """Amounts of sine, cosine, offset (and drift) at a frequency, and the square sum they leave."""
+    """Return the amounts of sine, cosine, offset (and drift), and the square sum they leave."""
     angle = 2.0 * np.pi * frequency * time
     columns = [np.sin(angle), np.cos(angle), np.ones_like(time)]
     if frequency * time[-1] >= 2.0:
@@ -86,7 +89,7 @@ def _projected(time: FloatArray, values: FloatArray, frequency: float) -> tuple[
 
 
 def _guessed_frequency(time: FloatArray, values: FloatArray) -> float:
-    """Peak of the spectrum, samples laid on an even grid."""
+    """Return the peak of the spectrum, with the samples on an even grid. [Hz]"""
     count = min(max(4 * len(time), 256), 1 << 17)
     even = np.linspace(0.0, time[-1], count)
     straight = np.polynomial.Polynomial.fit(time, values, 1)

@@ -1,4 +1,4 @@
-"""Many loops of one component, as a test report has them; the test matrices of the papers."""
+"""Many loops of one component, as in a test report; the test matrices of the papers."""
 
 import itertools
 from collections.abc import Callable, Sequence
@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wm_drake.laws.damper import MSTV
-from wm_drake.laws.friction import mstv_friction
+from wm_drake.elements.damper_law import law_numbers, law_of
+from wm_drake.parameters.damper_laws import DamperLaw
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import Bench, DamperBench, Harmonic
 from wm_drake.rigs.loops import ForceLoop, LoopMeasures, force_loops, measures_of
@@ -34,8 +34,9 @@ MATRICES: dict[str, dict[str, tuple[Harmonic, ...]]] = {
         "gasket": {"A": _A_GASKET},
     }.items()
 }
-"""By component and paper: [C] Table 1; the frequencies and amplitudes of [A] Tables 2, 4, 5 and 7, all with all. Rotations are
-driven through the jig arm, so these amplitudes are its displacements."""
+"""Motions by component and paper: [C] Table 1; the frequencies and amplitudes of [A] Tables 2, 4, 5
+and 7, all with all. Rotations are driven through the jig arm, so these amplitudes are its
+displacements."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +45,7 @@ class RigRun:
 
     Attributes:
         title: What is on the bench, in words.
-        bench: It.
+        bench: The component on the bench.
         numbers: Its parameters for reading: key, value with unit, source.
         loops, measures: One of each for every motion.
     """
@@ -63,7 +64,7 @@ def run_rig(
     numbers: tuple[tuple[str, str, str], ...] = (),
     progress: Callable[[int], None] = lambda done: None,
 ) -> RigRun:
-    """Runs all motions, those of one frequency side by side."""
+    """Run all motions, those of one frequency side by side, and return their loops."""
     found: dict[Harmonic, ForceLoop] = {}
     for frequency in dict.fromkeys(motion.frequency for motion in motions):
         together = [motion for motion in motions if motion.frequency == frequency]
@@ -73,13 +74,23 @@ def run_rig(
     return RigRun(title, bench, numbers, loops, tuple(map(measures_of, loops)))
 
 
-def mstv_friction_curves(
+def slider_friction_curves(
     bench: Bench, deformation_rates: Sequence[float], rates: FloatArray
 ) -> FloatArray | None:
-    """Friction over the velocity of the slider at held deformation rates, as [C] Fig. 12; None for other laws. [m/s -> N]"""
-    if not isinstance(bench, DamperBench) or int(bench.packed[0]) != MSTV:
+    """Return the friction on a slider at held deformation rates, the form of [C] Fig. 12. [N]
+
+    Args:
+        bench: The component.
+        deformation_rates: Rates at which the sponge is deformed (k,). [m/s]
+        rates: Velocities of the slider (n,). [m/s]
+
+    Returns:
+        Friction (k, n), or None for a law without such a friction.
+    """
+    if not isinstance(bench, DamperBench):
         return None
-    f_max, c_m, epsilon = bench.packed[1:4]
-    return np.array(
-        [[mstv_friction(w, u, f_max, c_m, epsilon) for w in rates] for u in deformation_rates]
-    )
+    friction, numbers = law_of(bench.packed).slider_friction, law_numbers(bench.packed)
+    if friction is None:
+        return None
+    own = [getattr(numbers, name) for name in DamperLaw.arguments(friction)[2:]]
+    return np.array([[friction(w, u, *own) for w in rates] for u in deformation_rates])

@@ -18,7 +18,7 @@ from wm_drake.studies.fitting import (
     identify,
     point_by_point,
 )
-from wm_drake.studies.fitting.assessment import correlation_time
+from wm_drake.studies.fitting.assessment import assess, correlation_time
 from wm_drake.studies.fitting.surfaces import (
     QuadraticSurface,
     Region,
@@ -250,6 +250,23 @@ def test_a_model_that_fails_in_places_is_searched_elsewhere():
     for method in METHODS:
         fit = identify(FitProblem(UNKNOWNS, planted().measurements, fails_above_four), method)
         assert fit.values == pytest.approx(TRUTH, rel=1e-4)
+
+
+@pytest.mark.parametrize("slope", [1.0, -1.0])
+def test_an_unknown_that_the_data_limit_to_one_side_is_not_determined(slope):
+    """A search ends at the corner beyond which the unknown has no effect, or anywhere beyond it."""
+    corner, unknowns = 0.655, (Unknown("level", 0.0, 2.0), Unknown("limit", 0.0, 1.0))
+
+    def model(points):
+        beyond = np.maximum(slope * (points[:, 1] - corner), 0.0)
+        return points[:, :1] + beyond[:, None] * TIME
+
+    problem = FitProblem(unknowns, (Measurement("m", np.ones(200)),), model)
+    for limit in (corner, corner - slope * 0.2):
+        fit = assess(problem, np.array([0.5, limit]), method="", seed=0, evaluations=0, history=())
+        assert fit["level"].determined
+        assert not fit["limit"].determined
+        assert [direction.names for direction in fit.undetermined] == [("limit",)]
 
 
 def test_correlated_samples_claim_less():

@@ -19,6 +19,9 @@ AT_BOUND = 1e-3
 DIFFERENCE = 1e-3
 """Step of the central differences, in ranges."""
 
+FLAT_SIDE = 0.1
+"""Effect of a step to one side by that of a step to the other, below which that side is flat."""
+
 RESOLUTION = 1e-4
 """Errors below this part of the measured values are not told from errors of model and integration."""
 
@@ -45,7 +48,7 @@ def assess(
     of its samples where they follow each other, so that tests sampled densely do not claim more than they know.
     """
     residuals = problem.residuals(point[None])[0]
-    jacobian = central_differences(problem, point)
+    jacobian, evaluated = central_differences(problem, point, residuals)
     bound = _bounds_hit(problem, point, jacobian)
     free = np.flatnonzero(bound == 0)
     spread = _spread(problem, residuals, jacobian[:, free])
@@ -66,7 +69,7 @@ def assess(
         covariance=covariance,
         condition=spread.condition,
         undetermined=spread.undetermined([problem.unknowns[k].name for k in free]),
-        evaluations=evaluations + 2 * p + 2,
+        evaluations=evaluations + evaluated + 2,
         history=history,
         notes=notes,
     )
@@ -79,13 +82,50 @@ def _bounds_hit(problem: FitProblem, point: FloatArray, jacobian: FloatArray) ->
     return np.where(unseen, 0, bound)  # those came there by chance
 
 
-def central_differences(problem: FitProblem, point: FloatArray) -> FloatArray:
-    """Derivatives of the residuals by the unknowns (n, p), in unit coordinates; one-sided at a bound."""
+def central_differences(
+    problem: FitProblem, point: FloatArray, residuals: FloatArray
+) -> tuple[FloatArray, int]:
+    """Return the derivatives of the residuals by the unknowns, in unit coordinates.
+
+    They are one-sided at a bound. They are also one-sided at a corner, where a step to one side has
+    nearly no effect: the friction force of a damper that just does not slip is such a corner. The
+    data do not limit the unknown to that side, and a mean of both sides would claim that they do.
+    The step to that side is long, because a short one shows the errors of integration instead.
+
+    Args:
+        problem: The problem.
+        point: In unit coordinates (p,).
+        residuals: Residuals at the point (n,).
+
+    Returns:
+        Derivatives (n, p), and how many points were evaluated.
+    """
     steps = DIFFERENCE * np.eye(len(point))
     sides = np.clip(np.concatenate([point + steps, point - steps]), 0.0, 1.0)
     above, below = np.split(problem.residuals(sides), 2)
     width = np.diag(sides[: len(point)] - sides[len(point) :])
-    return np.asarray(((above - below) / width[:, None]).T)
+    found = (above - below) / width[:, None]
+    flat = _flat_sides(point, residuals, above, below)
+    corners = np.flatnonzero(flat)
+    if len(corners):
+        far = point + WIDEST * np.diag(flat)[corners]
+        far = np.clip(far, 0.0, 1.0)
+        length = np.sum(far - point, axis=1)
+        found[corners] = (problem.residuals(far) - residuals) / length[:, None]
+    return np.asarray(found.T), len(sides) + len(corners)
+
+
+def _flat_sides(
+    point: FloatArray, residuals: FloatArray, above: FloatArray, below: FloatArray
+) -> FloatArray:
+    """Return for each unknown the side, 1 or -1, to which a step has nearly no effect; 0 if none."""
+    upwards = np.linalg.norm(above - residuals, axis=1)
+    downwards = np.linalg.norm(below - residuals, axis=1)
+    side = np.where(
+        upwards < FLAT_SIDE * downwards, 1.0, np.where(downwards < FLAT_SIDE * upwards, -1.0, 0.0)
+    )
+    at_bound = (point < DIFFERENCE) | (point > 1.0 - DIFFERENCE)
+    return np.where(at_bound, 0.0, side)
 
 
 class _Spread:

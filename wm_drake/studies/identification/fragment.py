@@ -1,4 +1,4 @@
-"""What was identified, as a file: a fragment that starts from a machine and changes one component, or a component file."""
+"""Identified numbers as a file: a fragment that changes one component, or a component file."""
 
 import os
 from collections.abc import Mapping
@@ -9,10 +9,17 @@ import numpy as np
 from ruamel.yaml import YAML
 
 from wm_drake.errors import input_error
-from wm_drake.parameters import Component, quantities, shipped_machines
+from wm_drake.parameters import (
+    DAMPER_LAWS,
+    Component,
+    ForceTable,
+    TorqueTable,
+    quantities,
+    shipped_machines,
+)
 from wm_drake.parameters.units import Unit
 from wm_drake.studies.fitting import Fit
-from wm_drake.studies.identification.models import DAMPER_LAWS, ComponentModel
+from wm_drake.studies.identification.models import ComponentModel
 from wm_drake.studies.identification.scales import FORCE, TORQUE
 
 _LENGTH, _ANGLE = Unit("m", "mm"), Unit("rad", "deg")
@@ -27,24 +34,30 @@ def fragment(
     copies: Mapping[str, str],
     out: Path,
 ) -> str:
-    """The text of a YAML file with what was identified; what the data do not determine is left out, and said.
+    """Return the text of a YAML file with identified numbers; comments name the undetermined ones.
 
     Args:
-        fit: Of the model.
-        model: Of the component.
+        fit: Fit of the model.
+        model: Model of the component.
         target: The component as it was, for the keys of another law that have to go.
-        machine: Machine that the fragment starts from, as it was named; "" for a component file that stands alone.
-        key: Place of the component in the machine.
+        machine: Machine that the fragment starts from, as it was named; "" for a component file
+            that stands alone.
+        key: Key path of the component in the machine.
         copies: Fields that get the value of another, such as z of an axisymmetric bushing from x.
         out: Folder the file goes to, from which a machine file is named.
+
+    Raises:
+        InputError: The data do not determine a number that a new law needs.
     """
     entries, comments = _entries(fit, model, target)
     for field, source in copies.items():
         if source in entries:
             entries[field] = entries[source]
+    tests = ", ".join(test.name for test in fit.tests)
+    unit = "N m" if any(unknown.unit == TORQUE for unknown in fit.problem.unknowns) else "N"
     head = [
-        f"# Identified by least RMSE, method {fit.method}, seed {fit.seed}, from {', '.join(t.name for t in fit.tests)}.",
-        f"# RMSE {fit.rmse:.4g} {'N m' if any(u.unit == TORQUE for u in fit.problem.unknowns) else 'N'} over all tests.",
+        f"# Identified by least RMSE, method {fit.method}, seed {fit.seed}, from {tests}.",
+        f"# RMSE {fit.rmse:.4g} {unit} over all tests.",
         *(f"# {line}" for line in comments),
     ]
     if not machine:
@@ -67,14 +80,14 @@ class _Lines:
         self._lines = lines
 
     def write(self, part: str | bytes) -> None:
-        """As a stream."""
+        """Keep a part of the text."""
         self._lines.append(part if isinstance(part, str) else part.decode())
 
 
 def _entries(
     fit: Fit, model: ComponentModel, target: Component
 ) -> tuple[dict[str, Any], list[str]]:
-    """Values with sources by field, and comments on what is missing."""
+    """Return values with sources by field, and comments on what is missing."""
     fields = model.fields(fit.values)
     estimates = {estimate.name: estimate for estimate in fit.estimates}
     units = {unknown.name: unknown.unit for unknown in fit.problem.unknowns}
@@ -88,7 +101,8 @@ def _entries(
             ]
             if open_ends:
                 comments.append(
-                    f"The data do not determine {', '.join(open_ends)}: the table's rises there are not to be trusted."
+                    f"The data do not determine {', '.join(open_ends)}: "
+                    "the table's rises there are not to be trusted."
                 )
         elif name in estimates:
             estimate, unit = estimates[name], units[name]
@@ -101,7 +115,8 @@ def _entries(
             if estimate.at_bound:
                 text += f"; at the {estimate.at_bound} bound of the search"
             elif np.isfinite(estimate.lower):
-                text += f"; 95 % interval {unit.from_si(estimate.lower):.4g} to {unit.from_si(estimate.upper):.4g} {_plain(unit)}"
+                lower, upper = unit.from_si(estimate.lower), unit.from_si(estimate.upper)
+                text += f"; 95 % interval {lower:.4g} to {upper:.4g} {_plain(unit)}"
             entries[name] = {"value": f"{unit.from_si(value):.7g} {_plain(unit)}", "source": text}
     missing = [name for name in _required(target, entries) if name not in entries]
     if missing and "law" in entries and entries["law"] != getattr(target.parameters, "law", None):
@@ -113,7 +128,8 @@ def _entries(
 
 
 def _required(target: Component, entries: Mapping[str, Any]) -> list[str]:
-    return list(DAMPER_LAWS.get(entries.get("law", ""), {})) if target.is_damper else []
+    law = DAMPER_LAWS.get(entries.get("law", "")) if target.is_damper else None
+    return list(law.unknowns) if law else []
 
 
 def _normalised(fit: Fit) -> float:
@@ -123,8 +139,8 @@ def _normalised(fit: Fit) -> float:
 def _table(value: Mapping[str, Any], fit: Fit) -> dict[str, str]:
     units = {"displacement": _LENGTH, "angle": _ANGLE, "force": FORCE, "torque": TORQUE}
     shown = {
-        name: f"({', '.join(f'{units[name].from_si(x):.6g}' for x in values)}) {_plain(units[name])}"
-        for name, values in value.items()
+        name: f"({', '.join(f'{units[name].from_si(x):.6g}' for x in given)}) {_plain(units[name])}"
+        for name, given in value.items()
     }
     return {
         **shown,
@@ -137,7 +153,7 @@ def _plain(unit: Unit) -> str:
 
 
 def _leaving(entries: dict[str, Any], target: Component) -> dict[str, Any]:
-    """With null for what belongs to the component's old law only."""
+    """Return the entries with null for each number of the component's old law only."""
     if "law" not in entries or entries["law"] == getattr(target.parameters, "law", None):
         return entries
     old = target.parameters.model_fields_set - {"law", "end_bushing"}
@@ -145,7 +161,7 @@ def _leaving(entries: dict[str, Any], target: Component) -> dict[str, Any]:
 
 
 def _whole(entries: dict[str, Any], target: Component) -> dict[str, Any]:
-    """A component file: what was identified, and of the old numbers what still belongs to it."""
+    """Return a component file: identified numbers, and old ones that still belong to it."""
     if "law" in entries and entries["law"] != getattr(target.parameters, "law", None):
         return entries
     kept = {
@@ -157,7 +173,7 @@ def _whole(entries: dict[str, Any], target: Component) -> dict[str, Any]:
         entries
     ):  # tables, which are no single quantity
         table = getattr(target.parameters, name)
-        if hasattr(table, "packed"):
+        if isinstance(table, ForceTable | TorqueTable):
             kept[name] = {key: unit.text(value) for key, value, unit in quantities(table)}
     return {**entries, **kept}
 

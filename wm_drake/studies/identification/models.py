@@ -1,18 +1,21 @@
-"""What of a component is unknown, between which bounds, and how its parameters follow from a point.
+"""Models of components: unknown numbers, their bounds, and how parameters follow from a point.
 
-A model knows the fields of one law. Default bounds come from the loops themselves: no force can exceed what was measured by
-much, no stiffness the steepest loop by orders of magnitude. They are starts of a search, and the user's to replace.
+Default bounds come from the loops: no force can exceed what was measured by much, no stiffness the
+steepest loop by orders of magnitude. They are where a search begins; the user may replace them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.parameters import DamperType, ForceTable, TorqueTable
+from wm_drake.parameters import DAMPER_LAWS, DamperType, ForceTable, TorqueTable
+from wm_drake.parameters.damper_laws import DamperLaw, DamperNumbers, Kind
 from wm_drake.parameters.elements import BushingType
+from wm_drake.parameters.keys import unit_of
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.rigs import Bench, bushing_bench, damper_bench
@@ -22,7 +25,6 @@ from wm_drake.studies.identification.scales import (
     ABOUT,
     ALONG,
     FORCE,
-    SPEED,
     TORQUE,
     check_names,
     scale_of,
@@ -32,41 +34,11 @@ from wm_drake.studies.identification.scales import (
 from wm_drake.studies.identification.tables import OddTable, TwoSidedTable
 
 KNOTS = 5
-"""Of a table on each side of zero."""
-
-DAMPER_LAWS: dict[str, dict[str, str]] = {
-    "coulomb": {"friction_force": "force", "damping": "damping"},
-    "stv": {"friction_force": "force", "transition_velocity": "speed", "damping": "damping"},
-    "havsin": {"friction_force": "force", "full_friction_velocity": "speed", "damping": "damping"},
-    "mstv": {
-        "friction_force": "force",
-        "sponge_stiffness": "stiffness",
-        "sponge_damping": "damping",
-        "slider_damping": "damping",
-    },
-    "stv_sponge": {
-        "friction_force": "force",
-        "transition_velocity": "speed",
-        "sponge_stiffness": "stiffness",
-        "sponge_damping": "damping",
-        "slider_damping": "damping",
-    },
-    "free_stroke": {
-        "friction_force": "force",
-        "friction_damping": "damping",
-        "basic_friction_force": "force",
-        "basic_full_friction_velocity": "speed",
-    },
-}
-"""What is unknown of each damper law, and of what kind; of free_stroke the curve of the sponge too. What is not listed keeps
-its value (of MSTV the growth of friction and the regularisation), unless the user gives it bounds."""
-
-OPTIONAL = {"mstv": {"friction_damping": "damping"}}
-"""What may be unknown if the user asks."""
+"""Knots of a table on each side of zero."""
 
 BUSHING_LAWS = {"voigt": slice(0, 2), "table": slice(1, 2), "voigt_havsin": slice(0, 4)}
-"""Stiffness and damping; monotone table and damping; for rotations, stiffness, damping and HAVSIN friction. Which of
-`_bushing_kinds` are numbers to be found."""
+"""Laws of a bushing, and which of `_bushing_kinds` are unknown numbers: stiffness and damping;
+monotone table and damping; for rotations, stiffness, damping and HAVSIN friction."""
 
 
 @dataclass(frozen=True)
@@ -74,10 +46,11 @@ class ComponentModel:
     """A law of a component whose numbers are unknown.
 
     Attributes:
-        law: Its name.
-        unknowns: What is searched.
-        fields: The component's fields that a point (p,) determines, in SI; a table among them as a mapping.
-        bench: The component on the bench at a point.
+        law: Name of the law.
+        unknowns: Numbers that are searched.
+        fields: Function of a point (p,) that returns the component's fields, in SI; a table as a
+            mapping.
+        bench: Function of a point that returns the component on the bench.
     """
 
     law: str
@@ -93,38 +66,45 @@ def damper_model(
     fixed: Mapping[str, float] | None = None,
     knots: int = KNOTS,
 ) -> ComponentModel:
-    """A damper with unknown numbers.
+    """Return a damper with unknown numbers.
+
+    Numbers of the law that are not unknown keep their default unless the user fixes them or gives
+    them bounds.
 
     Args:
         law: As in a machine file.
-        motions: What was measured, for default bounds and for the stroke that a table must cover.
-        bounds: Of unknowns, by field, in place of the default ones. [SI]
+        motions: Measured loops, for default bounds and for the stroke that a table must cover.
+        bounds: Bounds of unknowns, by field, in place of the default ones. [SI]
         fixed: Values that are known, by field. [SI]
-        knots: Points of the sponge's curve beyond zero, for the law free_stroke.
+        knots: Points of each curve of the law on each side of zero.
 
     Raises:
-        InputError: no such law, or no such field.
+        InputError: There is no such law, or no such field.
     """
     if law not in DAMPER_LAWS:
         raise input_error(
             f"no law '{law}' of a damper{nearest_names(law, DAMPER_LAWS)}", where="--law"
         )
-    kinds, scale = DAMPER_LAWS[law] | OPTIONAL.get(law, {}), scale_of(motions)
-    kept = ["regularisation_velocity"] if law in ("mstv", "free_stroke") else []
-    table = OddTable("sponge", scale, knots) if law == "free_stroke" else None
-    check_names([*kinds, *kept, *_rises(table)], bounds, fixed)
-    searched = {
-        name: kind
-        for name, kind in kinds.items()
-        if name in DAMPER_LAWS[law] or name in (bounds or {})
-    }
-    numbers = unknowns_of(searched, ALONG, scale, bounds, fixed)
-    fields = _Fields({"law": law, **(fixed or {})}, numbers, table)
-    unknowns = (*numbers, *with_bounds(table.unknowns if table else (), bounds))
+    registered, scale = DAMPER_LAWS[law], scale_of(motions)
+    tables = tuple(OddTable(curve, scale, knots) for curve in registered.curves)
+    numbers_of_law = [name for name in registered.fields if name not in registered.curves]
+    check_names([*numbers_of_law, *_rises(tables)], bounds, fixed)
+    bounded = {name: own for name, own in (bounds or {}).items() if name in numbers_of_law}
+    searched = {**registered.unknowns, **bounded}
+    numbers = unknowns_of(searched, _units(registered), scale, bounds, fixed)
+    fields = _Fields({"law": law, **(fixed or {})}, numbers, tables)
+    unknowns = (*numbers, *with_bounds(_unknown_rises(tables), bounds))
     return ComponentModel(law, unknowns, fields, lambda point: damper_bench(_damper(fields(point))))
 
 
-def _damper(fields: dict[str, Any]) -> DamperType:
+def _units(law: DamperLaw) -> dict[str, Unit]:
+    """Return the unit of each number of a damper law, from its class."""
+    fields = law.parameters.model_fields
+    units = {name: unit_of(fields[name].annotation, fields[name].metadata) for name in law.fields}
+    return {name: unit for name, unit in units.items() if unit and name not in law.curves}
+
+
+def _damper(fields: dict[str, Any]) -> DamperNumbers:
     try:
         return TypeAdapter(DamperType).validate_python(fields)
     except ValidationError as error:
@@ -146,17 +126,17 @@ def bushing_model(
     fixed: Mapping[str, float] | None = None,
     knots: int = KNOTS,
 ) -> ComponentModel:
-    """One axis of a bushing with unknown numbers.
+    """Return one axis of a bushing with unknown numbers.
 
     Args:
         law: One of `BUSHING_LAWS`.
         motions, bounds, fixed, knots: As for `damper_model`.
         base: The bushing whose other axes stay as they are.
         axis: One of `wm_drake.rigs.AXES`.
-        arm: Of the jig, where displacements and forces of its end were measured. [m]
+        arm: Radius of the jig, where displacements and forces of its end were measured. [m]
 
     Raises:
-        InputError: no such law (or not along an axis), or no such field.
+        InputError: There is no such law (or not along an axis), or no such field.
     """
     if law not in BUSHING_LAWS:
         raise input_error(
@@ -169,11 +149,13 @@ def bushing_model(
         )
     scale, kinds = scale_of(motions, arm), _bushing_kinds(axis)
     stiffness = next(iter(kinds))
-    table = TwoSidedTable(stiffness, scale, knots, about) if law == "table" else None
+    tables = (TwoSidedTable(stiffness, scale, knots, about),) if law == "table" else ()
     searched = {name: kinds[name] for name in list(kinds)[BUSHING_LAWS[law]]}
-    check_names([*searched, *_rises(table)], bounds, fixed)
-    numbers = unknowns_of(searched, ABOUT if about else ALONG, scale, bounds, fixed)
-    fields = _Fields(fixed or {}, numbers, table)
+    check_names([*searched, *_rises(tables)], bounds, fixed)
+    kinds_of_units = ABOUT if about else ALONG
+    units = {name: kinds_of_units[kind] for name, kind in searched.items()}
+    numbers = unknowns_of(searched, units, scale, bounds, fixed)
+    fields = _Fields(fixed or {}, numbers, tables)
 
     def bench(point: FloatArray) -> Bench:
         kind = TorqueTable if about else ForceTable
@@ -184,12 +166,12 @@ def bushing_model(
         return bushing_bench(base.model_copy(update=values), axis, arm)
 
     return ComponentModel(
-        law, (*numbers, *with_bounds(table.unknowns if table else (), bounds)), fields, bench
+        law, (*numbers, *with_bounds(_unknown_rises(tables), bounds)), fields, bench
     )
 
 
-def _bushing_kinds(axis: str) -> dict[str, str]:
-    """Fields of a bushing along or about an axis, and of what kind: stiffness, damping, and those of its friction."""
+def _bushing_kinds(axis: str) -> dict[str, Kind]:
+    """Return the fields of a bushing along or about an axis with their kinds."""
     prefix, letter = ("rotational_" if axis.startswith("about") else ""), axis[-1]
     return {
         f"{prefix}stiffness_{letter}": "stiffness",
@@ -201,32 +183,33 @@ def _bushing_kinds(axis: str) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class _Fields:
-    """Fields of a component at a point (p,): those that are known, its unknown numbers, then the rises of its table."""
+    """Fields of a component at a point (p,): known ones, numbers, then rises of its tables."""
 
     known: Mapping[str, Any]
     numbers: tuple[Unknown, ...]
-    table: OddTable | TwoSidedTable | None
+    tables: tuple[OddTable | TwoSidedTable, ...]
 
     def __call__(self, point: FloatArray) -> dict[str, Any]:
         named = {u.name: float(value) for u, value in zip(self.numbers, point, strict=False)}
-        curve = (
-            {self.table.name: self.table.curve(point[len(self.numbers) :])} if self.table else {}
-        )
-        return {**self.known, **named, **curve}
+        sizes = [len(self.numbers), *(len(table.unknowns) for table in self.tables)]
+        rises = np.split(point, np.cumsum(sizes)[:-1])[1:]
+        curves = {
+            table.name: table.curve(own) for table, own in zip(self.tables, rises, strict=True)
+        }
+        return {**self.known, **named, **curves}
 
 
-def _rises(table: OddTable | TwoSidedTable | None) -> list[str]:
-    return [unknown.name for unknown in table.unknowns] if table else []
+def _unknown_rises(tables: tuple[OddTable | TwoSidedTable, ...]) -> tuple[Unknown, ...]:
+    return tuple(unknown for table in tables for unknown in table.unknowns)
+
+
+def _rises(tables: tuple[OddTable | TwoSidedTable, ...]) -> list[str]:
+    return [unknown.name for unknown in _unknown_rises(tables)]
 
 
 def units_of_fields() -> dict[str, Unit]:
-    """Unit of every number of a component that can be unknown or fixed."""
-    found = {
-        name: ALONG[kind]
-        for law in (*DAMPER_LAWS.values(), *OPTIONAL.values())
-        for name, kind in law.items()
-    }
-    found["regularisation_velocity"] = SPEED
+    """Return the unit of every number of a component that can be unknown or fixed."""
+    found = {name: unit for law in DAMPER_LAWS.values() for name, unit in _units(law).items()}
     for letter in "xyz":
         along, about = _bushing_kinds(letter), _bushing_kinds(f"about_{letter}")
         found |= {name: ALONG[kind] for name, kind in list(along.items())[:2]}
@@ -235,7 +218,7 @@ def units_of_fields() -> dict[str, Unit]:
 
 
 def unit_of_field(name: str) -> Unit | None:
-    """Unit of such a number, or of a rise of a table; None if there is no such."""
+    """Return the unit of a number of `units_of_fields` or of a rise of a table; None if unknown."""
     field, _, rise = name.partition(".")
     if rise.startswith("rise_"):
         return TORQUE if field.startswith("rotational") else FORCE

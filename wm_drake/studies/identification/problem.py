@@ -1,4 +1,4 @@
-"""The identification problem of a component: its rig computes what the files measured."""
+"""Identification problem of a component: its rig computes the measured forces."""
 
 from collections.abc import Sequence
 
@@ -14,12 +14,15 @@ from wm_drake.studies.fitting import FitProblem, Measurement
 from wm_drake.studies.identification.models import ComponentModel
 
 MOST_ROWS = 32
-"""Benches that are integrated side by side. More share hardly more work, and all step as the hardest one asks: at scattered
-points 256 rows took three times as long."""
+"""Benches that are integrated side by side. More of them share hardly more work, and all step as
+the stiffest one needs: at scattered points 256 rows took three times as long."""
 
 
 def fit_problem(model: ComponentModel, motions: Sequence[MeasuredMotion]) -> FitProblem:
-    """The problem of finding a component's unknowns from measured loops, with offset and drift of each force taken out."""
+    """Return the problem of finding a component's unknowns from measured loops.
+
+    Offset and drift of each measured force are taken out.
+    """
     measurements = tuple(
         Measurement(measured.loop.name, measured.loop.force, measured.baseline, correlated=True)
         for measured in motions
@@ -32,7 +35,7 @@ def fit_problem(model: ComponentModel, motions: Sequence[MeasuredMotion]) -> Fit
 def computed_forces(
     model: ComponentModel, motions: Sequence[MeasuredMotion], points: FloatArray
 ) -> FloatArray:
-    """Forces at the samples of all loops, at each point (k, n); NaN where a point has no steady loop."""
+    """Return the forces at the samples of all loops, at each point (k, n); NaN if not steady."""
     benches = [model.bench(point) for point in points]
     if isinstance(benches[0], BushingBench):
         return np.array(

@@ -1,4 +1,4 @@
-"""Unknowns of a component: their units, bounds from what was measured, and the user's in place of those."""
+"""Unknowns of a component: their units, and bounds from the measured loops or from the user."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wm_drake.errors import input_error, nearest_names
+from wm_drake.parameters.damper_laws import Search
 from wm_drake.parameters.units import Unit
 from wm_drake.rigs.measured import MeasuredMotion
 from wm_drake.studies.fitting import Unknown
@@ -25,10 +26,13 @@ ABOUT = {
     "damping": ROTATIONAL_DAMPING,
     "speed": RATE,
 }
-"""Units of the kinds of numbers of what moves along an axis, and of what turns about one."""
+"""Units by kind of a number, along an axis and about one."""
 
 DASHPOT = 1e-4
-"""Lowest damping that is searched, in the highest: from there on it does nothing that can be measured."""
+"""Lowest damping that is searched, relative to the highest: a lower one has no effect that can be
+measured."""
+MAGNITUDES = 30.0
+"""Quotient of two bounds from which on the order of magnitude of a number counts as unknown."""
 
 
 @dataclass(frozen=True)
@@ -42,18 +46,24 @@ class Scale:
     fastest: float
     stroke: float
 
-    def bounds(self, kind: str) -> tuple[float, float, bool]:
-        """Lower and upper default bound of a kind of number, and whether its order of magnitude is unknown."""
+    def bounds(self, search: Search) -> tuple[float, float, bool]:
+        """Return lower and upper default bound, and whether the order of magnitude is unknown.
+
+        Args:
+            search: Kind of the number, or its bounds. [SI]
+        """
+        if isinstance(search, tuple):
+            return *search, search[0] > 0.0 and search[1] > MAGNITUDES * search[0]
         return {
             "force": (0.0, 1.5 * self.force, False),
             "stiffness": (0.1 * self.stiffness, 10.0 * self.stiffness, True),
             "damping": (DASHPOT * self.damping, self.damping, True),
             "speed": (1e-3 * self.fastest, 2.0 * self.fastest, True),
-        }[kind]
+        }[search]
 
 
 def scale_of(motions: Sequence[MeasuredMotion], arm: float = 0.0) -> Scale:
-    """Scale of measured loops; with the arm of a jig, of the angles and moments at its axis. [m]"""
+    """Return the scale of measured loops; with the arm of a jig [m], of angles and moments."""
     force, stiffness, damping, speeds, strokes = [], [], [], [], []
     for measured in motions:
         size = 0.5 * float(np.ptp(measured.loop.force)) * (arm or 1.0)
@@ -70,29 +80,34 @@ def scale_of(motions: Sequence[MeasuredMotion], arm: float = 0.0) -> Scale:
 
 
 def unknowns_of(
-    kinds: Mapping[str, str],
+    searches: Mapping[str, Search],
     units: Mapping[str, Unit],
     scale: Scale,
     bounds: Mapping[str, tuple[float, float]] | None,
     fixed: Mapping[str, float] | None,
 ) -> tuple[Unknown, ...]:
-    """Unknowns of fields of some kind, less those that are fixed."""
+    """Return the unknowns of some fields.
+
+    Args:
+        searches: Kind or default bounds of each field.
+        units: Unit of each field.
+        scale: Scale of the measured loops.
+        bounds: Bounds that the user gives in place of the default ones. [SI]
+        fixed: Fields that are no unknowns. [SI]
+    """
     found = []
-    for name, kind in kinds.items():
+    for name, search in searches.items():
         if name in (fixed or {}):
             continue
-        lower, upper, logarithmic = scale.bounds(kind)
-        if name in (bounds or {}):
-            lower, upper = (bounds or {})[name]
-            logarithmic = lower > 0.0 and upper > 30.0 * lower
-        found.append(Unknown(name, lower, upper, units[kind], logarithmic=logarithmic))
+        lower, upper, logarithmic = scale.bounds((bounds or {}).get(name, search))
+        found.append(Unknown(name, lower, upper, units[name], logarithmic=logarithmic))
     return tuple(found)
 
 
 def with_bounds(
     unknowns: tuple[Unknown, ...], bounds: Mapping[str, tuple[float, float]] | None
 ) -> tuple[Unknown, ...]:
-    """The same unknowns between the user's bounds where there are some."""
+    """Return the unknowns with the user's bounds where there are some."""
     given = bounds or {}
     return tuple(Unknown(u.name, *given.get(u.name, (u.lower, u.upper)), u.unit) for u in unknowns)
 
@@ -102,7 +117,11 @@ def check_names(
     bounds: Mapping[str, tuple[float, float]] | None,
     fixed: Mapping[str, float] | None,
 ) -> None:
-    """Refuses names that no field has, and what is both bounded and fixed."""
+    """Check names of fields.
+
+    Raises:
+        InputError: No field has the name, or it has bounds and is fixed.
+    """
     for option, given in (("--bounds", bounds), ("--fix", fixed)):
         for name in given or {}:
             if name not in known:

@@ -1,4 +1,4 @@
-"""Curves of force over displacement whose rises from knot to knot are the unknowns, so that they never fall."""
+"""Curves of force over displacement that never fall: the rises between knots are the unknowns."""
 
 import numpy as np
 
@@ -8,10 +8,10 @@ from wm_drake.studies.identification.scales import FORCE, TORQUE, Scale
 
 
 class OddTable:
-    """A curve through zero with the same rises to either side."""
+    """Curve through zero with the same rises to either side."""
 
     def __init__(self, name: str, scale: Scale, knots: int) -> None:
-        """Knots of each side, equally spaced up to the stroke."""
+        """Space the knots of each side equally up to the stroke."""
         self.name = name
         self.displacement = scale.stroke * np.arange(1, knots + 1) / knots
         self.unknowns = tuple(
@@ -19,7 +19,7 @@ class OddTable:
         )
 
     def curve(self, rises: FloatArray) -> dict[str, tuple[float, ...]]:
-        """The table of these rises, as a mapping."""
+        """Return the table of these rises, as a mapping."""
         force = np.cumsum(rises)
         return {
             "displacement": (*(-self.displacement[::-1]), 0.0, *self.displacement),
@@ -28,10 +28,17 @@ class OddTable:
 
 
 class TwoSidedTable:
-    """A curve through zero with its own rises on each side."""
+    """Curve through zero with its own rises on each side."""
 
     def __init__(self, name: str, scale: Scale, knots: int, about: bool) -> None:
-        """Knots of each side, equally spaced up to the stroke; of angle and torque if it turns about an axis."""
+        """Space the knots of each side equally up to the stroke.
+
+        Args:
+            name: Field of the component.
+            scale: Scale of the measured loops.
+            knots: Knots of each side.
+            about: Whether it is a curve of torque over angle.
+        """
         self.name = name
         self.position = scale.stroke * np.arange(1, knots + 1) / knots
         self._names = ("angle", "torque") if about else ("displacement", "force")
@@ -43,7 +50,7 @@ class TwoSidedTable:
         )
 
     def curve(self, rises: FloatArray) -> dict[str, tuple[float, ...]]:
-        """The table of these rises, as a mapping."""
+        """Return the table of these rises, as a mapping."""
         plus, minus = (np.cumsum(part) for part in np.split(rises, 2))
         ends = ((*(-self.position[::-1]), 0.0, *self.position), (*(-minus[::-1]), 0.0, *plus))
         return dict(zip(self._names, ends, strict=True))

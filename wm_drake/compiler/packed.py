@@ -1,0 +1,201 @@
+"""Named packed layouts: one declaration orders the numbers of a component in a flat array.
+
+A layout is declared once, with a name and a kind for each field:
+
+    SPRING = PackedLayout("SpringNumbers", p_ToA_T=VECTOR, preload=SCALAR, stiffness=CURVE)
+
+It packs values by name (`pack`), and it generates a law (`read`) that returns the numbers which
+begin at an index as a named tuple. Compiled laws and interpreted ones use the same reader. A field
+is either of fixed size, a number or a tuple of numbers, or it is a part: packed numbers of their
+own, such as a table of points or the numbers of another layout. A part is read as the pair ``(p,
+at)`` of the array and the index where it begins, which a law passes on: ``stiffness_force(x,
+*numbers.stiffness)``.
+"""
+
+import linecache
+from collections import namedtuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wm_drake.compiler.compilation import generic, law
+
+_FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A field of fixed size: one number, or several that are read as a tuple."""
+
+    size: int
+    is_tuple: bool = True
+
+    def expression(self, at: str, offset: int) -> str:
+        """Return the source that reads the field at an offset from the variable `at`."""
+        entries = [f"p[{_sum(at, offset + k)}]" for k in range(self.size)]
+        return f"({', '.join(entries)},)" if self.is_tuple else entries[0]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A field with packed numbers of its own, whose size may depend on them.
+
+    Attributes:
+        size: Law (p, at) that returns how many numbers the part has; None for a part that must be
+            last.
+        structure: Function (p, at) that returns the whole numbers which must be equal in all
+            machines of a batch, such as the number of points of a table.
+    """
+
+    size: Any
+    structure: Callable[[_FloatArray, int], list[int]]
+
+
+SCALAR = Fixed(1, is_tuple=False)
+VECTOR = Fixed(3)
+"""Three components, as `wm_drake.compiler.vectors` takes them."""
+ROTATION = Fixed(9)
+"""A rotation matrix by rows, as `wm_drake.compiler.vectors` takes it."""
+SYMMETRIC = Fixed(6)
+"""A symmetric matrix xx, yy, zz, xy, xz, yz, as `wm_drake.compiler.matrices` takes it."""
+
+
+def ARRAY(size: int) -> Fixed:  # a kind, like the constants above
+    """Return the kind of a field of so many numbers, which is read as a tuple."""
+    return Fixed(size)
+
+
+def LAYOUT(layout: "PackedLayout") -> Part:
+    """Return the kind of a field that holds the numbers of another layout."""
+    return Part(layout.size, layout.structure)
+
+
+class PackedLayout:
+    """The order of named numbers in a flat array.
+
+    Attributes:
+        name: Name of the named tuple that `read` returns.
+        fields: Kind of each field, in packed order.
+        read: Law (p, at) that returns the numbers which begin at index `at` as a named tuple.
+        size: Law (p, at) that returns how many numbers there are.
+        offsets: Offset of each field whose offset is the same in all machines.
+    """
+
+    def __init__(self, name: str, **fields: Fixed | Part) -> None:
+        """Generate the reader.
+
+        Raises:
+            ValueError: A part without a size is not the last field.
+        """
+        self.name = name
+        self.fields: Mapping[str, Fixed | Part] = fields
+        self.offsets: dict[str, int] = {}
+        self._tuple = namedtuple(f"{name}", tuple(fields))  # type: ignore[misc]
+        self._write_laws()
+
+    def _write_laws(self) -> None:
+        names: dict[str, Any] = {"Numbers": self._tuple}
+        steps, entries = list[str](), list[str]()
+        begin, offset = "at", 0  # of the next field; `begin` is a variable of the generated source
+        open_ended = False
+        for field, kind in self.fields.items():
+            if open_ended:
+                raise ValueError(f"{self.name}: the part before '{field}' has no size")
+            if begin == "at":
+                self.offsets[field] = offset
+            if isinstance(kind, Fixed):
+                entries.append(kind.expression(begin, offset))
+                offset += kind.size
+                continue
+            entries.append(f"(p, {_sum(begin, offset)})")
+            open_ended = kind.size is None
+            if not open_ended:
+                names[f"size_of_{field}"] = kind.size
+                after = f"after_{field}"
+                place = _sum(begin, offset)
+                steps.append(f"    {after} = {place} + size_of_{field}(p, {place})\n")
+                begin, offset = after, 0
+        self._fixed_size = offset if begin == "at" and not open_ended else None
+        chain = "".join(steps)
+        self.read = generated(
+            f"read_{self.name}",
+            f"def read_{self.name}(p, at):\n{chain}    return Numbers({', '.join(entries)})\n",
+            names,
+        )
+        size = f"def size_of_{self.name}(p, at):\n{chain}    return {_sum(begin, offset)} - at\n"
+        self.size = None if open_ended else generated(f"size_of_{self.name}", size, names)
+
+    @property
+    def fixed_size(self) -> int:
+        """Number of entries of a layout without variable parts.
+
+        Raises:
+            ValueError: The layout has a part of variable size.
+        """
+        if self._fixed_size is None:
+            raise ValueError(f"{self.name} has no fixed size")
+        return self._fixed_size
+
+    def pack(self, **values: Any) -> _FloatArray:
+        """Return the packed numbers of named values; a part is given packed.
+
+        Raises:
+            ValueError: A value is missing, is unknown, or has another size than its field.
+        """
+        if set(values) != set(self.fields):
+            odd = ", ".join(sorted(set(values) ^ set(self.fields)))
+            raise ValueError(f"{self.name}: values and fields differ in {odd}")
+        return np.concatenate([self._flat(field, values[field]) for field in self.fields])
+
+    def _flat(self, field: str, value: Any) -> _FloatArray:
+        flat = np.asarray(value, dtype=float).ravel()
+        kind = self.fields[field]
+        if isinstance(kind, Fixed) and len(flat) != kind.size:
+            raise ValueError(
+                f"{self.name}: {field} has {len(flat)} numbers; allowed are {kind.size}"
+            )
+        return flat
+
+    def unpack(self, packed: Any, at: int = 0) -> Any:
+        """Return the numbers that begin at an index as a named tuple, for Python code."""
+        return generic(self.read)(packed, at)
+
+    def replaced(self, packed: _FloatArray, **values: Any) -> _FloatArray:
+        """Return a copy of packed numbers with fields of fixed size and offset replaced."""
+        copy = packed.copy()
+        for field, value in values.items():
+            flat = self._flat(field, value)
+            copy[self.offsets[field] : self.offsets[field] + len(flat)] = flat
+        return copy
+
+    def structure(self, packed: _FloatArray, at: int = 0) -> list[int]:
+        """Return the whole numbers of all parts, which must be equal in all machines of a batch."""
+        numbers = self.unpack(packed, at)
+        return [
+            number
+            for field, kind in self.fields.items()
+            if isinstance(kind, Part)
+            for number in kind.structure(*getattr(numbers, field))
+        ]
+
+
+def generated(name: str, source: str, names: Mapping[str, Any]) -> Any:
+    """Return the law of a generated source.
+
+    Args:
+        name: Name of the function that the source defines.
+        source: Source of one function.
+        names: Global names of the function.
+    """
+    filename = f"<generated {name}>"
+    lines = source.splitlines(keepends=True)
+    linecache.cache[filename] = (len(source), None, lines, filename)  # for tracebacks
+    namespace = dict(names)
+    exec(compile(source, filename, "exec"), namespace)
+    return law(namespace[name])
+
+
+def _sum(variable: str, offset: int) -> str:
+    return f"{variable} + {offset}" if offset else variable

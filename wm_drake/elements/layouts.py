@@ -1,0 +1,75 @@
+"""From the frozen types of a machine file to packed numbers: curves, and the layout of a type."""
+
+import functools
+from collections.abc import Sequence
+
+import numpy as np
+from pydantic import BaseModel
+from scipy.interpolate import PchipInterpolator
+
+from wm_drake.compiler.packed import SCALAR, PackedLayout
+from wm_drake.laws.table import CURVE, pack_table
+from wm_drake.parameters.elements import ForceTable, TorqueTable
+from wm_drake.parameters.types import FloatArray
+
+
+def layout_of(name: str, kind: type[BaseModel], fields: Sequence[str]) -> PackedLayout:
+    """Return the layout of fields of a type: its numbers in the order of the type, then its curves.
+
+    Args:
+        name: Name of the layout.
+        kind: Type of a machine file.
+        fields: Names of its fields; what is not a plain number is a curve.
+    """
+    numbers = [field for field in fields if kind.model_fields[field].annotation is float]
+    curves = [field for field in fields if field not in numbers]
+    return PackedLayout(name, **dict.fromkeys(numbers, SCALAR), **dict.fromkeys(curves, CURVE))
+
+
+def packed_fields(layout: PackedLayout, values: BaseModel) -> FloatArray:
+    """Return the packed numbers of a layout that `layout_of` made, from an instance of its type."""
+    named = {field: getattr(values, field) for field in layout.fields}
+    curves = [field for field, kind in layout.fields.items() if kind is CURVE]
+    packed = packed_stiffnesses([named[field] for field in curves])
+    return layout.pack(**named | dict(zip(curves, packed, strict=True)))
+
+
+def packed_stiffness(stiffness: float | ForceTable | TorqueTable) -> FloatArray:
+    """Return a stiffness in the packed form of `wm_drake.laws.table`."""
+    return packed_stiffnesses([stiffness])[0]
+
+
+def packed_stiffnesses(stiffnesses: Sequence[float | ForceTable | TorqueTable]) -> list[FloatArray]:
+    """Return several packed stiffnesses; tables over the same points share one call of scipy.
+
+    A study makes thousands of such calls.
+    """
+    packed = [
+        np.array([0.0, s]) if isinstance(s, float | int) else np.empty(0) for s in stiffnesses
+    ]
+    curves = {
+        index: s.curve
+        for index, s in enumerate(stiffnesses)
+        if isinstance(s, ForceTable | TorqueTable)
+    }
+    for points in dict.fromkeys(x for x, _ in curves.values()):
+        alike = [index for index, (x, _) in curves.items() if x == points]
+        for index, curve in zip(
+            alike, _packed_curves(points, tuple(curves[index][1] for index in alike)), strict=True
+        ):
+            packed[index] = curve
+    return packed
+
+
+@functools.lru_cache(maxsize=256)  # a study packs the same curves for each run
+def _packed_curves(x: tuple[float, ...], ys: tuple[tuple[float, ...], ...]) -> FloatArray:
+    """Return packed tables, a row for each: scipy's monotone cubics (PCHIP) through the points."""
+    cubics = PchipInterpolator(x, ys, axis=1).c[::-1]  # (4, pieces, curves)
+    h, (_, a, b, c) = x[-1] - x[-2], cubics[:, -1]
+    # rounding can make a flat end fall by 1e-11
+    end_slopes = np.maximum(a + h * (2.0 * b + h * 3.0 * c), 0.0)
+    packed = np.array(
+        [pack_table(x, cubics[:, :, curve].T, float(end_slopes[curve])) for curve in range(len(ys))]
+    )
+    packed.flags.writeable = False
+    return packed
