@@ -1,7 +1,8 @@
-"""How fast are the engines, does the cost of many runs grow linearly, and do the lanes of the compiled one use vector units?
+"""How fast are the engines, and how does the time of a batch grow with the number of its runs?
 
-Prints medians of several after a warm-up, with the processor and its load: absolute times mean little on a shared machine,
-ratios of one session do.
+Prints medians of several runs after a warm-up, with the processor and its load. On a shared machine
+absolute times mean little; compare ratios of one session. Also prints whether the lanes of the
+compiled engine use the vector units.
 """
 
 import argparse
@@ -33,7 +34,7 @@ from wm_drake import (
     with_values,
 )
 from wm_drake.compiler.lanes import WIDTH
-from wm_drake.engines.compiled.alone import Alone
+from wm_drake.engines.compiled.derivative import StateDerivative
 from wm_drake.engines.compiled.integration import integrate_lanes
 from wm_drake.engines.compiled.packing import initial_state
 from wm_drake.model.machine import Machine
@@ -61,7 +62,7 @@ begin = time.perf_counter(); wm.simulate_many(machine, [case]); print(time.perf_
 
 @dataclass(frozen=True)
 class Size:
-    """How much to do."""
+    """The extent of the benchmark."""
 
     profile: SpinProfile
     repeats: int
@@ -70,7 +71,7 @@ class Size:
 
 
 def median_s(work: Callable[[], object], repeats: int) -> float:
-    """Median time of a piece of work. [s]"""
+    """Return the median time of a piece of work. [s]"""
     walls = []
     for _ in range(repeats):
         begin = time.perf_counter()
@@ -80,7 +81,7 @@ def median_s(work: Callable[[], object], repeats: int) -> float:
 
 
 def processor() -> str:
-    """Name of the processor, as well as the system tells it."""
+    """Return the name of the processor as the system reports it."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
         return next(line.split(":")[1].strip() for line in lines if line.startswith("model name"))
@@ -89,7 +90,10 @@ def processor() -> str:
 
 
 def gasket_cases(machine: Machine, profile: SpinProfile, count: int) -> Iterator[Case]:
-    """Two loads on each of count/2 random gaskets, half to one and a half times as stiff and damped."""
+    """Yield two loads for each of count/2 random gaskets.
+
+    Their stiffness and damping are 0.5 to 1.5 times the nominal ones.
+    """
     rng = np.random.default_rng(0)
     nominal = [
         (key, value)
@@ -110,7 +114,7 @@ def gasket_cases(machine: Machine, profile: SpinProfile, count: int) -> Iterator
 
 
 def one_run(machine: Machine, size: Size) -> Iterator[str]:
-    """The engines on one run, and scipy's LSODA on the right-hand side of the compiled one."""
+    """Time both engines on one run, and scipy's LSODA on the compiled time derivative."""
     case, scene = (
         Case("middle", machine.parameters.loads["middle"], size.profile),
         Scene(machine.parameters),
@@ -127,18 +131,24 @@ def one_run(machine: Machine, size: Size) -> Iterator[str]:
         median_s(run["drake"], size.drake_repeats),
     )
     lsoda = median_s(lambda: by_lsoda(machine, case), size.drake_repeats)
-    yield f"one run of {case.profile.duration:g} s: {1e3 * compiled:.0f} ms compiled, {1e3 * measured:.0f} ms with all measures"
+    yield (
+        f"one run of {case.profile.duration:g} s: {1e3 * compiled:.0f} ms compiled, "
+        f"{1e3 * measured:.0f} ms with all measures"
+    )
     yield f"the same, Drake engine: {drake:.2f} s, {drake / compiled:.0f} times as long"
-    yield f"the same, LSODA (rtol 1e-6) on the compiled right-hand side: {lsoda:.2f} s, {lsoda / compiled:.0f} times as long"
+    yield (
+        f"the same, LSODA (rtol 1e-6) on the compiled time derivative: {lsoda:.2f} s, "
+        f"{lsoda / compiled:.0f} times as long"
+    )
 
 
 def by_lsoda(machine: Machine, case: Case) -> None:
-    """The motion by scipy's stiff integrator, piece by piece of the profile."""
+    """Integrate the motion with scipy's stiff integrator, one piece of the profile at a time."""
     setup = machine.set_up(case.load)
-    alone, x = Alone(setup), initial_state(setup, case.profile)
+    derivative, x = StateDerivative(setup), initial_state(setup, case.profile)
 
     def rate(_: float, x: np.ndarray, acceleration: float) -> np.ndarray:
-        return alone.derivative(x, acceleration)
+        return derivative(x, acceleration)
 
     corners = case.profile.time
     for begin, end, acceleration in zip(
@@ -152,7 +162,7 @@ def by_lsoda(machine: Machine, case: Case) -> None:
 
 
 def many_runs(machine: Machine, size: Size) -> Iterator[str]:
-    """Cost against the number of runs, and the peak of the process's memory."""
+    """Time batches of different numbers of runs, and read the peak memory of the process."""
     parameters = machine.parameters
     constant = build_machine(
         at_levels(parameters, levels_of(parameters, load_factors(GASKET_FACTORS)), [0] * 8)
@@ -168,11 +178,14 @@ def many_runs(machine: Machine, size: Size) -> Iterator[str]:
             simulate_many(kind, gasket_cases(kind, size.profile, count), measures=measures)
             wall = time.perf_counter() - begin
             memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-            yield f"{count} runs with {what}: {wall:.2f} s, {1e3 * wall / count:.2f} ms each; {memory:.0f} MB at most so far"
+            yield (
+                f"{count} runs with {what}: {wall:.2f} s, {1e3 * wall / count:.2f} ms each; "
+                f"{memory:.0f} MB at most so far"
+            )
 
 
 def assembly() -> str:
-    """What the lanes were compiled to, from a copy compiled here."""
+    """Count the vector instructions in the compiled kernel, from a copy compiled here."""
     fresh = numba.njit(error_model="numpy", nogil=True, fastmath={"contract", "nsz"})(
         integrate_lanes.py_func
     )
@@ -186,11 +199,12 @@ def assembly() -> str:
         for name in ("zmm", "ymm", "xmm")
     }
     counts = ", ".join(f"{count} on {name}" for name, count in wide.items())
-    return f"{WIDTH} lanes compiled to arithmetic: {counts}, {sum(kind == 'sd' for kind, _ in arithmetic)} on one number"
+    scalar = sum(kind == "sd" for kind, _ in arithmetic)
+    return f"{WIDTH} lanes compiled to arithmetic: {counts}, {scalar} on one number"
 
 
 def first_calls() -> Iterator[str]:
-    """Time of the first run ever, and of the first in a process that finds the laws compiled."""
+    """Time the first run with an empty cache, and the first run of a process with a filled one."""
     with tempfile.TemporaryDirectory() as folder:
         environment = os.environ | {"NUMBA_CACHE_DIR": folder}
         for what in ("nothing compiled yet", "compiled before"):
@@ -198,11 +212,14 @@ def first_calls() -> Iterator[str]:
             told = subprocess.run(
                 command, env=environment, capture_output=True, text=True, check=True
             ).stdout.split()
-            yield f"first run of a process, {what}: simulate {float(told[0]):.1f} s, then simulate_many {float(told[1]):.1f} s"
+            yield (
+                f"first run of a process, {what}: simulate {float(told[0]):.1f} s, "
+                f"then simulate_many {float(told[1]):.1f} s"
+            )
 
 
 def main() -> None:
-    """Runs the benchmark and prints one line a figure."""
+    """Run the benchmark and print one line for each result."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "--quick", action="store_true", help="runs of 2 s instead of 70 s, a few dozen of them"
@@ -215,7 +232,7 @@ def main() -> None:
         size = Size(SpinProfile(time=(0.0, 2.0), speed=(0.0, 9.0)), 3, 1, (16, 32))
     simulate_many(
         machine, gasket_cases(machine, size.profile, 2)
-    )  # warms up: compiles, or reads from the cache
+    )  # warm-up: compile, or read from the cache
     lines = [f"processor: {processor()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.2f}"]
     print(lines[0])
     parts = [one_run(machine, size), many_runs(machine, size)]

@@ -1,7 +1,8 @@
-"""How long does a fit to twelve measured loops take, by law and method?
+"""How long does a fit to twelve measured loops take, for each law and method?
 
-The loops are computed, with noise of 2 %, at frequencies and amplitudes of [C] and [A]. Prints seconds, the RMSE in parts of
-the noise (1: nothing is left to fit), and how often the model was asked.
+The loops are computed at frequencies and amplitudes of [C] and [A], with noise of 2 %. The script
+prints one line per fit: the time in seconds, the RMSE relative to the noise (1 means that the fit
+explains everything but the noise), and the number of evaluated points. It takes about one minute.
 """
 
 import argparse
@@ -24,7 +25,7 @@ SAMPLES = 400
 
 
 def dampers() -> dict[str, tuple[DamperType, list[Harmonic]]]:
-    """What is fitted, and the motions it is tested with."""
+    """Return the damper of each law with the motions of its test."""
     free_stroke = load_machine("free_stroke").damper_types["free_stroke"]
     tests = {
         "mstv": (
@@ -40,7 +41,7 @@ def dampers() -> dict[str, tuple[DamperType, list[Harmonic]]]:
 
 
 def measured(damper: DamperType, motions: list[Harmonic]) -> list[MeasuredMotion]:
-    """Noisy loops over three periods."""
+    """Return computed loops over three periods, with noise added to the force."""
     rng, found = np.random.default_rng(0), []
     for number, (motion, loop) in enumerate(
         zip(motions, force_loops(damper_bench(damper), motions), strict=True)
@@ -61,14 +62,14 @@ def measured(damper: DamperType, motions: list[Harmonic]) -> list[MeasuredMotion
 
 
 def main() -> None:
-    """Fits, and prints a line a fit."""
+    """Run the fits and print one line per fit."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="two loops, one law, least squares")
     parser.add_argument(
         "--method",
         choices=list(METHODS),
         action="append",
-        help="least-squares by default; repeatable",
+        help="method of the fit; repeatable; default: least-squares",
     )
     parser.add_argument("--out", type=Path, help="also write the lines to this file")
     arguments = parser.parse_args()
@@ -87,8 +88,9 @@ def main() -> None:
         wall_s = time.perf_counter() - begin
         noise = np.sqrt(np.mean([(NOISE * np.max(np.abs(loop.loop.force))) ** 2 for loop in loops]))
         lines.append(
-            f"{law}, {method}: {len(fit.estimates)} unknowns, {len(loops)} loops in {wall_s:.1f} s; "
-            f"RMSE {fit.rmse / noise:.2f} of the noise; {fit.evaluations} points; {'; '.join(fit.notes)}"
+            f"{law}, {method}: {len(fit.estimates)} unknowns, {len(loops)} loops, {wall_s:.1f} s; "
+            f"RMSE {fit.rmse / noise:.2f} times the noise; {fit.evaluations} points; "
+            f"{'; '.join(fit.notes)}"
         )
         print(lines[-1], flush=True)
     if arguments.out:

@@ -1,8 +1,10 @@
-"""Which machine moves as the one that was measured in [B]? Finds it, tests what it predicts, and writes it down.
+"""Which machine moves like the one that was measured in [B]?
 
-Searches the free quantities of reference_free.yaml for the 36 amplitudes of [B] Tables 1 and 3. With --write the best machine
-goes into wm_drake/machines/reference.yaml and its SDF model, each number with its uncertainty beside it. The report page and
-all tables: `wm-drake calibrate` with the command that is printed.
+The script fits the free quantities of reference_free.yaml to the 36 amplitudes of [B] Tables 1 and
+3, and predicts held-out loads. It prints the errors of the best machine and of the predictions.
+With --write, the best machine is written to wm_drake/data/machines/reference.yaml and to its SDF
+model, with the uncertainty beside each number. `wm-drake calibrate` makes a report page of such a
+fit. The script takes about an hour.
 """
 
 import argparse
@@ -22,23 +24,25 @@ from wm_drake.studies.calibration.prediction import Prediction, predict
 from wm_drake.studies.calibration.targets import targets_of
 
 FREE = Path(__file__).with_name("reference_free.yaml")
-LEFT_OUT = (("back", "front"), ("middle",), ("counter",), ("back",), ("front",))
+HELD_OUT = (("back", "front"), ("middle",), ("counter",), ("back",), ("front",))
+"""Loads that are held out together, one group per prediction."""
 WEIGHTS = {"middle:Yf": 1.3}
-"""Of amplitudes that stay off most without; without gasket it is 1.1 mm, at a kink."""
+"""Weights of amplitudes with large errors. This one is 1.1 mm without gasket and has a kink."""
 PLAN = Plan(method="basin-hopping", starts=3, iterations=2, deviation=0.025)
 PREDICTION = replace(PLAN, starts=1, iterations=8)
-"""Without the starting values of the free file, which had seen all loads: eight hops from what is expected."""
+"""Plan of a prediction: eight hops from the expected values. The starting values of the free file
+are not used, because they come from a fit to all loads."""
 
 
 def main() -> None:
-    """Calibrates, says how good it is, and writes the machine if asked to."""
+    """Run the calibration and the predictions, print the errors, and write the machine."""
     arguments = _arguments()
     machine = build_machine(load_machine("reference"))
-    free, plan, blind, left_out = load_free(FREE), PLAN, PREDICTION, LEFT_OUT
+    free, plan, prediction_plan, held_out = load_free(FREE), PLAN, PREDICTION, HELD_OUT
     if arguments.quick:
         few = dict(list(free.quantities.items())[:3])
-        free, left_out = FreeFile(quantities=few), LEFT_OUT[:1]
-        plan = blind = Plan(starts=1, iterations=1)
+        free, held_out = FreeFile(quantities=few), HELD_OUT[:1]
+        plan = prediction_plan = Plan(starts=1, iterations=1)
     targets = targets_of(machine.parameters, measured_amplitudes(machine.parameters)).weighted(
         WEIGHTS
     )
@@ -51,9 +55,11 @@ def main() -> None:
         if arguments.write:
             _write(calibration)
         predictions = []
-        with progress_bar(len(left_out), "predictions") as done:
-            for number, group in enumerate(left_out, start=1):
-                predictions += predict(machine, free, calibration, [group], ledger, plan=blind)
+        with progress_bar(len(held_out), "predictions") as done:
+            for number, group in enumerate(held_out, start=1):
+                predictions += predict(
+                    machine, free, calibration, [group], ledger, plan=prediction_plan
+                )
                 done(number)
         ledger.mark_finished()
     text = "\n".join(_lines(calibration, predictions))
@@ -66,16 +72,16 @@ def _arguments() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "--quick", action="store_true", help="three quantities, one step: only to see that it runs"
+        "--quick", action="store_true", help="use three quantities and one step, to test the script"
     )
     parser.add_argument(
         "--out",
         type=Path,
         default=Path("calibrate_reference.txt"),
-        help="text; evaluations go beside it",
+        help="file for the result; the ledger of evaluations is written beside it",
     )
     parser.add_argument(
-        "--write", action="store_true", help="put the best machine into the shipped files"
+        "--write", action="store_true", help="write the best machine to the shipped files"
     )
     return parser.parse_args()
 
@@ -84,7 +90,7 @@ def _lines(calibration: Calibration, predictions: list[Prediction]) -> list[str]
     targets, best = calibration.targets, calibration.solutions[0]
     errors = 100.0 * best.errors(targets)
     lines = [
-        f"{len(calibration.ended)} searches, {len(calibration.solutions)} distinct good solutions"
+        f"searches: {len(calibration.ended)}, distinct good solutions: {len(calibration.solutions)}"
     ]
     for (load, gasket), row in zip(targets.loads, errors, strict=True):
         shown = "  ".join(
@@ -96,23 +102,24 @@ def _lines(calibration: Calibration, predictions: list[Prediction]) -> list[str]
     with_gasket = [gasket for _, gasket in targets.loads]
     for name, part in (("all", errors), ("with gasket", errors[with_gasket])):
         mean, largest = mean_and_largest(part)
-        lines.append(f"{name}: {mean:.1f} % in the mean, {largest:.1f} % at most")
+        lines.append(f"{name}: mean {mean:.1f} %, largest {largest:.1f} %")
     for prediction in predictions:
         parts = (prediction.calibrated, prediction.predicted, prediction.seen)
         texts = [
-            "{:.1f} % in the mean, {:.1f} % at most".format(*mean_and_largest(100.0 * part))
+            "mean {:.1f} %, largest {:.1f} %".format(*mean_and_largest(100.0 * part))
             for part in parts
         ]
         lines.append(
-            f"{', '.join(prediction.loads)}: calibrated {texts[0]}; predicted {texts[1]} (the others: {texts[2]})"
+            f"{', '.join(prediction.loads)}: calibrated {texts[0]}; held out {texts[1]} "
+            f"(other loads: {texts[2]})"
         )
     return lines
 
 
 def _write(calibration: Calibration) -> None:
-    solved = solved_machine(calibration.turning, calibration.solutions[0])
+    solved = solved_machine(calibration.parameter_map, calibration.solutions[0])
     path, model = machine_path("reference"), sdf_path(solved.model)
-    keys = [".".join(value.path) for value in calibration.turning.values]
+    keys = [".".join(value.path) for value in calibration.parameter_map.values]
     own = [key for key in dict.fromkeys(keys) if not key.startswith(("bodies.", "frames."))]
     texts = {
         path: machine_file_with(path, solved, own),

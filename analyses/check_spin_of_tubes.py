@@ -1,8 +1,10 @@
-"""Does the treatment of the damper tubes' spin change the answer?
+"""Does the raised spin inertia of the damper tubes change the results?
 
-The friction about a damper's axis is stiff against the tiny inertia of its tubes about it. The machine file gives the outer
-tubes more of it, so that explicit steps can follow. Here the tubes have their true inertia and the motion is found by an
-implicit method (Radau IIA of fifth order) on the same right-hand side; RMS displacements per region are compared.
+The friction torque about the axis of a damper is large compared with the small inertia of its tubes
+about this axis, which makes the motion stiff. The machine file therefore raises the inertia of the
+outer tubes, so that explicit steps are stable. This script gives the tubes their true inertia and
+integrates the same right-hand side with an implicit method (Radau IIA of fifth order). It prints
+the differences of the RMS displacements per region, one line per case. It takes about five minutes.
 """
 
 import argparse
@@ -15,26 +17,27 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from wm_drake import Case, build_machine, load_machine, simulate
-from wm_drake.engines.compiled.alone import Alone
+from wm_drake.engines.compiled.derivative import StateDerivative
 from wm_drake.engines.compiled.packing import initial_state
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
-from wm_drake.simulation.runs import point_displacements
+from wm_drake.simulation.outputs import point_displacements
 from wm_drake.simulation.vibration import HIGH_PASS_HZ, high_passed, region_rms, relative_error
 
 PERIOD = 5e-3
+"""Sampling period. [s]"""
 
 
 def by_radau(machine: Machine, case: Case, rtol: float) -> tuple[np.ndarray, np.ndarray]:
-    """States every 5 ms, and displacements of the accelerometers."""
+    """Return the states every 5 ms, and the displacements of the accelerometers."""
     setup = machine.set_up(case.load)
-    alone, x = Alone(setup), initial_state(setup, case.profile)
+    derivative, x = StateDerivative(setup), initial_state(setup, case.profile)
     (acceleration,) = case.profile.acceleration()
 
     def rate(_: float, x: np.ndarray) -> np.ndarray:
-        return alone.derivative(x, acceleration)
+        return derivative(x, acceleration)
 
     samples = np.arange(round(case.profile.duration / PERIOD) + 1) * PERIOD
     limits = {"rtol": rtol, "atol": 1e-3 * rtol, "max_step": 0.01}
@@ -47,13 +50,13 @@ def by_radau(machine: Machine, case: Case, rtol: float) -> tuple[np.ndarray, np.
 
 
 def physical(parameters: MachineParameters) -> MachineParameters:
-    """The machine with the tubes of its SDF."""
+    """Return the machine with the tube inertia of its SDF."""
     bodies = {name: body for name, body in parameters.bodies.items() if not name.endswith("_outer")}
     return parameters.model_copy(update={"bodies": bodies})
 
 
 def compared(quick: bool) -> list[str]:
-    """One line a case."""
+    """Return one line of differences per case."""
     parameters = load_machine("free_stroke")
     raised, true = build_machine(parameters), build_machine(physical(parameters))
     end, speed = (1.0, 8.0) if quick else (12.0, 37.0)
@@ -82,20 +85,23 @@ def compared(quick: bool) -> list[str]:
         ]
         error = relative_error(*rms)
         lines.append(
-            f"{1e3 * front:.0f} g in front, {1e3 * rear:.0f} g at the rear, {np.rad2deg(phase):.0f} deg: RMS per region "
-            f"differs by at most {100 * error.max():.4f} %, single numbers by "
-            f"{100 * np.abs(rms[0] / rms[1] - 1.0).max():.4f} % "
-            f"(Radau {wall:.0f} s)"
+            f"{1e3 * front:.0f} g at the front, {1e3 * rear:.0f} g at the rear, "
+            f"{np.rad2deg(phase):.0f} deg: RMS per region differs by at most "
+            f"{100 * error.max():.4f} %, single values by at most "
+            f"{100 * np.abs(rms[0] / rms[1] - 1.0).max():.4f} % (Radau: {wall:.0f} s)"
         )
     return lines
 
 
 def main() -> None:
-    """Prints the differences, and writes them to a file if asked."""
+    """Print the differences and write them to a file."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="a second of one case")
+    parser.add_argument("--quick", action="store_true", help="run one second of one case")
     parser.add_argument(
-        "--out", type=Path, default=Path(tempfile.gettempdir()) / "spin_of_tubes.txt"
+        "--out",
+        type=Path,
+        default=Path(tempfile.gettempdir()) / "spin_of_tubes.txt",
+        help="file for the result",
     )
     arguments = parser.parse_args()
     text = "\n".join(compared(arguments.quick))

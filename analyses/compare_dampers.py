@@ -1,7 +1,10 @@
-"""When is a massless strut enough for a damper, and what do tubes as bodies cost?
+"""When is a massless strut a sufficient model of a damper, and what do tubes as bodies cost?
 
-The machine free_stroke, and the same with massless struts in place of the tubes on their bushings, run through the cases that
-[A] shows; then tubes of a tenth of the mass, and bushings ten times as stiff, to tell what of the difference comes from which.
+The machine free_stroke has damper tubes as bodies on bushings. The script runs it, and the same
+machine with massless struts, through the cases that [A] shows. Two more variants, with tubes of a
+tenth of the mass and with bushings ten times as stiff, show the cause of the difference. The script
+prints a table of RMS displacements and differences per region, and the run times. It takes about
+one minute.
 """
 
 import argparse
@@ -23,7 +26,10 @@ NAMES = ("2", "5", "29")
 
 
 def lighter(machine: Machine) -> MachineParameters:
-    """Tubes of a tenth of their mass, the outer ones with half their (raised) inertia, for the sake of the step."""
+    """Return the machine with tubes of a tenth of their mass.
+
+    The outer tubes keep half of their raised inertia, so that the step need not be too short.
+    """
     bodies = {}
     for damper in machine.parameters.telescopic_dampers:
         for part in ("outer", "inner"):
@@ -41,7 +47,7 @@ def lighter(machine: Machine) -> MachineParameters:
 
 
 def stiffer(parameters: MachineParameters) -> MachineParameters:
-    """Bushings ten times as stiff."""
+    """Return the machine with bushings that are ten times as stiff."""
     kinds = parameters.model_dump()["bushing_types"]
     stiff = {f"stiffness_{axis}": 10.0 * kinds["connecting"]["stiffness_x"] for axis in "xyz"}
     tree = parameters.model_dump(exclude_unset=True) | {
@@ -53,7 +59,10 @@ def stiffer(parameters: MachineParameters) -> MachineParameters:
 def run(
     parameters: MachineParameters, profile: SpinProfile, step: float | None = None
 ) -> tuple[np.ndarray, float]:
-    """RMS displacements (case, region, sensor-axis) [m], and seconds a case beside others."""
+    """Return the RMS displacements (case, region, sensor-axis) [m], and the time per case [s].
+
+    The cases run as one batch, so the time per case is shorter than that of a single run.
+    """
     machine = build_machine(parameters)
     chosen = [case for case in load_unbalance_cases() if case.name in NAMES]
     cases = [Case(case.name, case.load(parameters), profile) for case in chosen]
@@ -65,7 +74,7 @@ def run(
 
 
 def compared(quick: bool, folder: Path) -> list[str]:
-    """A table of RMS displacements and differences, a line a region."""
+    """Return a table of RMS displacements and differences, one line per region."""
     full = load_machine("free_stroke")
     profile = load_profile("spin_cycle")
     if quick:
@@ -75,9 +84,13 @@ def compared(quick: bool, folder: Path) -> list[str]:
     tubes, wall = run(full, profile)
     light, _ = run(lighter(build_machine(full)), profile, 6.25e-5)
     stiff, _ = run(stiffer(full), profile, 6.25e-5)
-    lines = ["largest RMS displacement, mm, of cases 2, 5, 29 of [A] Table 9 (400 g in front; at the rear; both, opposite),",
-             "and by how much others differ from the tubes, %, norm over sensors and axes, worst case",
-             "region   tubes  struts   struts differ  tubes of a tenth of the mass  bushings ten times as stiff"]  # fmt: skip
+    lines = [
+        "cases 2, 5, 29 of [A] Table 9 (400 g at the front; at the rear; both, opposite)",
+        "columns 2, 3: largest RMS displacement, mm, with tubes as bodies and with massless struts",
+        "columns 4 to 6: difference from tubes as bodies, %, norm over sensors and axes, worst",
+        "region   tubes  struts         struts  tubes of a tenth of the mass  "
+        "bushings ten times as stiff",
+    ]
     for index, region in enumerate(profile.regions):
         sizes = [1e3 * rms[:, index].max() for rms in (tubes, strut)]
         apart = [
@@ -85,24 +98,32 @@ def compared(quick: bool, folder: Path) -> list[str]:
             for rms in (strut, light, stiff)
         ]
         lines.append(
-            f"{region.name:6} {sizes[0]:7.2f} {sizes[1]:7.2f}  {apart[0]:13.2f}  {apart[1]:28.3f}  {apart[2]:27.2f}"
+            f"{region.name:6} {sizes[0]:7.2f} {sizes[1]:7.2f}  {apart[0]:13.2f}  "
+            f"{apart[1]:28.3f}  {apart[2]:27.2f}"
         )
     largest = relative_error(strut.max(axis=1), tubes.max(axis=1)).max()
     lines.append(
-        f"largest displacements of a run (any region) differ by at most {100 * largest:.1f} %"
+        "with struts, the largest displacements of a run (over all regions) differ by at most "
+        f"{100 * largest:.1f} %"
     )
     lines.append(
-        f"cost of a case: {wall:.2f} s with tubes, {strut_wall:.2f} s with struts, {wall / strut_wall:.1f} times"
+        f"time per case: {wall:.2f} s with tubes, {strut_wall:.2f} s with struts, "
+        f"ratio {wall / strut_wall:.1f}"
     )
     return lines
 
 
 def main() -> None:
-    """Prints the table, and writes it to a file if asked."""
+    """Print the table and write it to a file."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="two seconds instead of a spin cycle")
     parser.add_argument(
-        "--out", type=Path, default=Path(tempfile.gettempdir()) / "compare_dampers.txt"
+        "--quick", action="store_true", help="run two seconds instead of a spin cycle"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path(tempfile.gettempdir()) / "compare_dampers.txt",
+        help="file for the result",
     )
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:

@@ -1,7 +1,10 @@
-"""Which design tells most about the gasket for its runs: D-optimal 1000, orthogonal 243 and 729, random 1000, or the full 6561?
+"""Which design gives the most information about the gasket for its number of runs?
 
-The full factorial of both loads is run once; every design is a part of it, so its contributions can be held against those of
-the full one, term by term. Seconds are those of making the design and its analysis; the runs cost the same each.
+The designs are D-optimal with 1000 trials, orthogonal with 243 and 729, random with 1000, and the
+full factorial with 6561. The full factorial is run once for both loads. Every design is a part of
+it, so the contributions that follow from a design are compared with those of the full factorial,
+term by term. The script prints one line per design with its largest errors. The time of a line
+includes making the design, its runs, and its analysis. The script takes about three minutes.
 """
 
 import argparse
@@ -13,17 +16,17 @@ import pandas as pd
 
 from wm_drake import build_machine, load_machine, progress_bar, simulate_many
 from wm_drake.parameters import GASKET_FACTORS, SpinProfile, at_levels, levels_of, load_factors
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe import Design, make_design
 from wm_drake.studies.gasket.screening import Responses, analyse, contributions
 from wm_drake.studies.gasket.study import LOADS, MEASURES, GasketTrials
 
-LEAST_PERCENT = 1.0
-"""Terms that contribute more to a response of the full factorial are compared."""
+SMALLEST_PERCENT = 1.0
+"""Smallest contribution to a response of the full factorial with which a term is compared."""
 
 
 def designs(names: tuple[str, ...], trials: int) -> dict[str, tuple[Design, float]]:
-    """The designs by name, and the time it took to make each. [s]"""
+    """Return the designs by name, with the time that it took to make each. [s]"""
     full = make_design("full", names)
     rows = np.sort(np.random.default_rng(0).choice(full.trials, trials, replace=False))
     makers = {
@@ -41,7 +44,7 @@ def designs(names: tuple[str, ...], trials: int) -> dict[str, tuple[Design, floa
 
 
 def part_of(full: Responses, design: Design) -> Responses:
-    """What a design would have given, taken from the runs of the full factorial."""
+    """Return the responses of a design, taken from the runs of the full factorial."""
     places = (design.levels.astype(int) + 1) @ 3 ** np.arange(len(design.factors) - 1, -1, -1)
     return Responses(
         {load: values.iloc[places].reset_index(drop=True) for load, values in full.values.items()},
@@ -51,9 +54,9 @@ def part_of(full: Responses, design: Design) -> Responses:
 
 
 def main() -> None:
-    """Runs the full factorial, and prints a line a design."""
+    """Run the full factorial and print one line per design."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="five factors and runs of 2 s")
+    parser.add_argument("--quick", action="store_true", help="use five factors and runs of 2 s")
     parser.add_argument("--out", type=Path, help="also write the table to this file")
     arguments = parser.parse_args()
     reference = load_machine("reference")
@@ -62,9 +65,8 @@ def main() -> None:
         profile, trials = SpinProfile(time=(0.0, 2.0), speed=(0.0, 9.0)), 100
         known = {name: known[name] for name in list(known)[:5]}
     levels = levels_of(reference, known)
-    middle = at_levels(
-        reference, levels, [0] * len(levels)
-    )  # where stiffnesses are tables, numbers stand in their place
+    # at the middle levels, numbers replace the stiffnesses that are tables
+    middle = at_levels(reference, levels, [0] * len(levels))
     machine = build_machine(middle)
     study = GasketTrials(
         middle, levels, [Case(name, middle.loads[name], profile) for name in LOADS]
@@ -81,7 +83,7 @@ def main() -> None:
     for name, (design, made_s) in made.items():
         begin = time.perf_counter()
         error = (contributions(analyse(design, part_of(runs, design))) - reference)[
-            reference > LEAST_PERCENT
+            reference > SMALLEST_PERCENT
         ].abs()
         seconds = made_s + design.trials * each_s + time.perf_counter() - begin
         errors = {f"largest error, {load}": error[load].max(axis=None) for load in LOADS}
@@ -96,7 +98,7 @@ def main() -> None:
             | errors
         )
     text = pd.DataFrame(rows).round(2).to_string(index=False)
-    print(f"contributions above {LEAST_PERCENT:g} %, largest error in points of percent\n{text}")
+    print(f"contributions above {SMALLEST_PERCENT:g} %, largest error in percentage points\n{text}")
     if arguments.out:
         arguments.out.write_text(text + "\n")
 

@@ -1,9 +1,12 @@
-"""Does the Coulomb model, fitted to loops of the MSTV model one by one, show the drift of [C] Table 2? And with which f_max?
+"""Do Coulomb fits to loops of the MSTV model drift as in [C] Table 2, and for which f_max?
 
-[C] fits k1 and c1 of the Coulomb model to each test (genetic algorithm, bounds 50-300 N/mm and 0-10 N s/mm) and prints how they
-drift with frequency and amplitude; its MSTV model, which needs no drift, has k1 = 176 N/mm, c1 = 0.09, c2 = 0.4 N s/mm and an
-f_max that is not printed. If MSTV is right, Coulomb fits to its loops drift alike: of all that is printed, only this drift says
-something of f_max. Assumptions: one f_max in both models, c2 in both ([C] Eq. (3) serves all laws).
+[C] fits k1 and c1 of the Coulomb model to each test (genetic algorithm, bounds 50-300 N/mm and 0-10
+N s/mm) and prints how they drift with frequency and amplitude. Its MSTV model needs no drift: it
+has k1 = 176 N/mm, c1 = 0.09 N s/mm, c2 = 0.4 N s/mm, and an f_max that is not printed. If the MSTV
+model is right, Coulomb fits to its loops drift in the same way. This drift is the only printed
+result that depends on f_max. Assumptions: both models have the same f_max and the same c2 ([C] Eq.
+(3) holds for all laws). The script prints the agreement for each f_max, and the fits beside the
+printed values for the f_max with the best agreement. It takes about two minutes.
 """
 
 import argparse
@@ -29,7 +32,10 @@ MM = 1e-3
 
 
 def coulomb_fits(table: pd.DataFrame, f_max: float) -> pd.DataFrame:
-    """The table with k1 and c1 (N/mm, N s/mm) of the Coulomb model at each of its points, and the fit's error."""
+    """Return the table with the fitted k1 and c1 of the Coulomb model at each of its points.
+
+    Units are N/mm and N s/mm. A last column holds the RMSE of the fit, relative to the peak force.
+    """
     mstv = load_component("mstv_damper").parameters.model_copy(update={"friction_force": f_max})
     motions = [Harmonic(row.frequency_hz, row.amplitude_mm * MM) for row in table.itertuples()]
     known = {
@@ -50,7 +56,11 @@ def coulomb_fits(table: pd.DataFrame, f_max: float) -> pd.DataFrame:
 
 
 def agreement(found: pd.DataFrame) -> dict[str, float]:
-    """Rank correlations with the printed table, root mean square of the logarithms of the ratios, and how often c1 falls."""
+    """Return measures of the agreement with the printed table.
+
+    These are the rank correlations, the root mean square of ln(fitted / printed), and the
+    percentage of steps in frequency or amplitude over which c1 falls.
+    """
     c1 = found.pivot_table(
         index="frequency_hz", columns="amplitude_mm", values="c1 fitted"
     ).to_numpy()
@@ -69,14 +79,14 @@ def agreement(found: pd.DataFrame) -> dict[str, float]:
 
 
 def main() -> None:
-    """Prints the agreement for each f_max, and the table for the one that agrees best."""
+    """Print the agreement for each f_max, and the fits for the f_max that agrees best."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
         "--quick",
         action="store_true",
-        help="four corners of the table and two values of f_max only",
+        help="use only four corners of the table and two values of f_max",
     )
     parser.add_argument("--out", type=Path, help="also write the result to this file")
     arguments = parser.parse_args()
@@ -94,7 +104,8 @@ def main() -> None:
     text = [
         "agreement of Coulomb fits to MSTV loops with [C] Table 2, by f_max",
         scores.round(3).to_string(),
-        f"c1 drifts most alike with f_max = {best:g} N. Its fits beside the printed ones (k1 N/mm, c1 N s/mm):",
+        f"The drift of c1 agrees best for f_max = {best:g} N. Its fits beside the printed values "
+        "(k1 in N/mm, c1 in N s/mm):",
         shown.round(3).to_string(index=False),
     ]
     print("\n".join(text))

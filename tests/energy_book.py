@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.bodies import add_bodies, add_load, set_bodies
-from wm_drake.simulation.runs import as_record
+from wm_drake.simulation.records import as_record
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
 
@@ -165,7 +165,6 @@ def dense_record(machine, case, step):
     profile, context = case.profile, setup.context
     simulator = Simulator(machine.diagram, context)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", step).set_fixed_step_mode(True)
-    source_context = machine.source.GetMyContextFromRoot(context)
     plant_context = setup.plant_context
     accelerations = machine.plant.get_generalized_acceleration_output_port()
     dampers = [damper.GetMyContextFromRoot(context) for damper in machine.dampers.values()]
@@ -182,7 +181,7 @@ def dense_record(machine, case, step):
     for begin, stop, alpha in zip(
         profile.time, profile.time[1:], profile.acceleration(), strict=False
     ):
-        machine.source.set_acceleration(source_context, alpha)
+        machine.set_drum_acceleration(context, alpha)
         simulator.Initialize()
         sample(alpha)
         for moment in np.linspace(begin, stop, int(np.ceil((stop - begin) / step)) + 1)[1:]:

@@ -88,7 +88,7 @@ def machines_of_each_kind():
             )
         },
     )
-    machines["more struts of a kind than stand side by side"] = changed(
+    machines["eight springs, seven dampers of two laws"] = changed(
         gasket=None,
         spring_types=reference["spring_types"] | {"table": {"stiffness": LINEAR_TABLE}},
         springs={

@@ -1,4 +1,4 @@
-"""The wheel holds all that the command needs: installed away from the checkout, it finds machine files and SDF models."""
+"""The wheel has all files that the command needs, and works away from the checkout."""
 
 import json
 import os
@@ -38,7 +38,7 @@ def run(*command, cwd):
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
-    """Built from a copy of what git knows or would take in, so that old build folders cannot help."""
+    """Return a wheel built from a copy of what git has or would add, without old build folders."""
     copy = tmp_path_factory.mktemp("copy")
     listed = run(
         "git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", cwd=CHECKOUT
@@ -54,7 +54,7 @@ def wheel(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def python(wheel, tmp_path_factory):
-    """Interpreter of a fresh environment: the wheel installed in it, its dependencies borrowed from ours."""
+    """Return the interpreter of an environment with the wheel; it borrows our dependencies."""
     home = tmp_path_factory.mktemp("environment")
     venv.create(home, with_pip=False, symlinks=True)
     python = home / "bin" / "python"
@@ -84,8 +84,9 @@ def test_wheel_holds_the_data_and_nothing_else(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     for folder, pattern in (
         ("sdf", "*"),
-        ("wm_drake", "machines/*"),
-        ("wm_drake", "cycles/*"),
+        ("wm_drake", "data/machines/*"),
+        ("wm_drake", "data/cycles/*"),
+        ("wm_drake", "data/components/*"),
         ("wm_drake", "report/*"),
         ("wm_drake", "parameters/*"),
         ("wm_drake", "**/*.py"),
@@ -98,10 +99,15 @@ def test_wheel_holds_the_data_and_nothing_else(wheel):
         ] == []
     assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"wm_drake"}
     assert [name for name in names if name.endswith((".pyc", ".nbi", ".nbc"))] == []
+    assert "wm_drake/py.typed" in names
+    assert [name for name in names if name.endswith(".md")] == ["wm_drake/sdf/README.md"]
 
 
 def test_package_and_bodies_come_from_the_wheel(python, tmp_path):
-    code = "import wm_drake, wm_drake.model.bodies as b; print(wm_drake.__file__); print(b.SDF_FOLDER); print(b.sdf_path('oscillating_group.sdf'))"
+    code = (
+        "import wm_drake, wm_drake.model.bodies as b; print(wm_drake.__file__); "
+        "print(b.SDF_FOLDER); print(b.sdf_path('oscillating_group.sdf'))"
+    )
     for line in run(python, "-c", code, cwd=tmp_path).split():
         assert Path(line).is_relative_to(python.parents[1])
         assert Path(line).exists()
@@ -111,7 +117,7 @@ def test_command_checks_and_shows_the_shipped_machine(python, tmp_path):
     command = python.parent / "wm-drake"
     assert (
         run(command, "machine", "check", "reference", cwd=tmp_path)
-        == "reference: machine 'reference' is in order\n"
+        == "reference: machine 'reference' is valid\n"
     )
     shown = json.loads(run(command, "machine", "show", "--json", cwd=tmp_path))
     assert len(shown["natural_frequencies_hz"]) == 6

@@ -1,93 +1,143 @@
-"""README tells the truth where a machine can check it."""
+"""README and the how-to pages are checked where a machine can: commands, snippets, machine files."""
 
-import re
-from pathlib import Path
+import shlex
 
+import pytest
+import typer
+from documents import CHECKOUT, HOW_TO, README, blocks, commands, name_of
+
+from wm_drake.cli import app
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import SpinProfile, load_machine
 from wm_drake.parameters.free import load_free
 from wm_drake.report.diagram import mermaid
-from wm_drake.simulation.runs import Case, simulate
-from wm_drake.studies.calibration.parameter_map import turning_of
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.runs import simulate
+from wm_drake.studies.calibration.parameter_map import parameter_map_of
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
-
-
-def test_the_picture_is_the_diagrams_own_graph():
-    drawn = re.search(r"```mermaid\n(.*?)\n```", README, re.DOTALL)[1]
-    assert drawn == mermaid(build_machine(load_machine("reference")).diagram)
+PAGES = [README, *HOW_TO]
+SHORT = SpinProfile(time=(0.0, 6.0), speed=(0.0, 12.0))
 
 
-def test_the_short_python_way_runs():
-    code = re.search(r"```python\n(.*?)\n```", README, re.DOTALL)[1]
-    lines = [line for line in code.splitlines() if line.strip()]
-    assert len(lines) == 3
+def page(name):
+    return CHECKOUT / "docs" / "how-to" / f"{name}.md"
+
+
+def written(tmp_path, path, index=0):
+    """Return the path of a file with one of a page's YAML blocks."""
+    file = tmp_path / "example.yaml"
+    file.write_text(blocks(path, "yaml")[index], encoding="utf-8")
+    return file
+
+
+def parsed(arguments):
+    """Return the command that arguments call; raise its error if it refuses what follows its name."""
+    command, context, rest = typer.main.get_command(app), None, list(arguments)
+    while hasattr(command, "commands") and rest:
+        context = type(command).context_class(command, parent=context, info_name="wm-drake")
+        _, command, rest = command.resolve_command(context, rest)
+    if rest:
+        command.make_context(command.name, rest, parent=context)
+    return command
+
+
+def test_the_picture_is_the_diagrams_own_graph(machine):
+    (drawn,) = blocks(README, "mermaid")
+    assert drawn == mermaid(machine.diagram)
+
+
+@pytest.mark.parametrize(
+    "line", sorted({line for path in PAGES for line in commands(path)}), ids=str
+)
+def test_every_command_of_the_pages_is_one(line):
+    name, *arguments = shlex.split(line)
+    assert name == "wm-drake"
+    assert parsed(arguments).name in arguments
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "spin --lod middle",
+        "spinn",
+        "rig damper --component",
+        "study gasket --trials many",
+        "rig gasket -f '1 Hz'",
+    ],
+)
+def test_a_planted_fault_in_a_command_is_found(line):
+    with pytest.raises(Exception, match=r"No such|requires an argument|valid integer|Missing"):
+        parsed(shlex.split(line))
+
+
+@pytest.fixture
+def short_machine(monkeypatch):
+    """Let `wm.load_machine` return machines with a profile of some seconds."""
+    monkeypatch.setattr(
+        "wm_drake.parameters.load_machine",
+        lambda name: load_machine(name).model_copy(update={"profile": SHORT}),
+    )
+
+
+@pytest.mark.usefixtures("short_machine")
+@pytest.mark.parametrize("path", [path for path in PAGES if blocks(path, "python")], ids=name_of)
+def test_the_python_snippets_run(path):
     import matplotlib
 
     matplotlib.use("Agg")
     names = {}
-    exec(
-        code.replace('"middle"', "case").replace(
-            "import wm_drake as wm", "import wm_drake as wm\n" + SHORT_CASE
-        ),
-        names,
-    )
-    assert names["record"].sizes["time"] == 401
+    for code in blocks(path, "python"):
+        exec(code, names)
+    if path == page("drake-users"):
+        assert names["displacement"].shape == (6, 51)
+        assert names["linear"].C().shape[0] == 6
+        return
+    assert names["record"].sizes["time"] == round(SHORT.duration / 5e-3) + 1
+    if path == page("batch"):
+        table = names["table"]
+        assert list(table.case.values[:2]) == ["0 % softer", "5 % softer"]
+        force = table.gasket_force.sel(axis="x").values
+        assert list(force) == sorted(force, reverse=True)
 
 
-def test_the_python_way_to_many_runs_runs():
-    code = re.findall(r"```python\n(.*?)\n```", README, re.DOTALL)[1]
-    code = code.replace("parameters.profile", "short").replace("range(0, 40, 5)", "(0, 30)")
-    names = {}
-    exec(
-        "import wm_drake as wm\nfrom wm_drake.parameters import SpinProfile\n"
-        + SHORT_PROFILE
-        + code,
-        names,
-    )
-    assert names["table"].sizes["run"] == 2
-    assert names["table"].case.values[1] == "30 % softer"
-    assert (
-        names["table"].gasket_force.sel(axis="x")[1] < names["table"].gasket_force.sel(axis="x")[0]
-    )
+def test_the_snippet_of_the_readme_is_short():
+    (code,) = blocks(README, "python")
+    assert len([line for line in code.splitlines() if line.strip()]) == 3
 
 
-SHORT_PROFILE = "short = SpinProfile(time=(0.0, 6.0), speed=(0.0, 12.0))\n"
-SHORT_CASE = """
-from wm_drake.parameters import SpinProfile
-loads = wm.load_machine("reference").loads
-case = wm.Case("middle", loads["middle"], SpinProfile(time=(0.0, 2.0), speed=(0.0, 10.0)))
-"""
-
-
-def test_the_example_of_an_own_machine_is_in_order(tmp_path):
-    example = re.search(r"```yaml\n(.*?)\n```", README, re.DOTALL)[1]
-    path = tmp_path / "mine.yaml"
-    path.write_text(example)
-    mine = load_machine(path)
-    setup = build_machine(mine).set_up(mine.loads["towel"])
-    assert setup.plant_context is not None
+@pytest.mark.parametrize("path", [README, page("own-machine")], ids=name_of)
+def test_the_example_of_an_own_machine_is_in_order(path, tmp_path):
+    mine = load_machine(written(tmp_path, path))
+    setup = build_machine(mine).set_up(mine.loads.get("towel", mine.loads["middle"]))
     assert mine.bodies["upper_counterweight"].mass == 11.0
     assert max(abs(setup.residual)) < 1e-9
 
 
+def test_the_example_of_imperfections_is_in_order(tmp_path):
+    imperfections = load_machine(written(tmp_path, page("own-machine"), 1)).imperfections
+    assert imperfections.residual_imbalance.mass == pytest.approx(0.02)
+    assert imperfections.phase_error == pytest.approx(0.0873, rel=1e-3)
+
+
+def test_the_example_of_a_component_is_in_order(tmp_path):
+    from wm_drake.parameters.components import load_component
+
+    component = load_component(written(tmp_path, page("bench-to-machine")))
+    assert component.parameters.sponge_stiffness == 100e3
+
+
 def test_the_example_of_a_free_file_fits_the_reference_machine(tmp_path, machine):
-    example = re.findall(r"```yaml\n(.*?)\n```", README, re.DOTALL)[1]
-    path = tmp_path / "free.yaml"
-    path.write_text(example)
-    turning = turning_of(machine, load_free(path))
-    made = turning.parameters_at(turning.expected)
+    parameter_map = parameter_map_of(machine, load_free(written(tmp_path, page("calibrate"))))
+    frames = parameter_map.parameters_at(parameter_map.expected).frames
     assert (
-        made.frames["damper_left_housing"].position[0]
-        == -made.frames["damper_right_rear_housing"].position[0]
+        frames["damper_left_housing"].position[0]
+        == -frames["damper_right_rear_housing"].position[0]
         == -0.05
     )
 
 
-def test_the_example_of_a_bearing_runs(tmp_path):
-    path = tmp_path / "whirling.yaml"
-    path.write_text(re.findall(r"```yaml\n(.*?)\n```", README, re.DOTALL)[2])
-    whirling = load_machine(path)
+def test_the_example_of_a_compliant_bearing_runs(tmp_path):
+    whirling = load_machine(written(tmp_path, page("compliant-bearing")))
     record = simulate(
         build_machine(whirling),
         Case("front", whirling.loads["front"], SpinProfile(time=(0.0, 1.0), speed=(8.0, 12.0))),
@@ -98,7 +148,12 @@ def test_the_example_of_a_bearing_runs(tmp_path):
     assert 1e-6 < float(abs(record.drum_displacement).max()) < 1e-4  # m
 
 
-def test_every_file_named_in_the_reading_order_exists():
-    root = Path(__file__).parents[1]
-    for name in re.findall(r"`((?:wm_drake|sdf|tests|analyses)/[\w/.]*)`", README):
-        assert (root / name).exists(), name
+def test_every_yaml_block_is_one_of_those_above():
+    counted = {name_of(path): len(blocks(path, "yaml")) for path in PAGES if blocks(path, "yaml")}
+    assert counted == {
+        "README.md": 1,
+        "docs/how-to/bench-to-machine.md": 1,
+        "docs/how-to/calibrate.md": 1,
+        "docs/how-to/compliant-bearing.md": 1,
+        "docs/how-to/own-machine.md": 2,
+    }

@@ -5,24 +5,13 @@ from pydrake.multibody.plant import MultibodyPlant
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
 
-from wm_drake.engines.compiled.alone import Alone
-from wm_drake.engines.compiled.packing import initial_state
-from wm_drake.engines.compiled.samples import trajectory_of
-from wm_drake.engines.schedule import schedule_of
+from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.model.bodies import add_bodies, add_load, set_bodies
 
 
-def dense_states(setup, profile, step):
-    """States (n, size) at every step, torque of the motor, and the layout."""
-    machine, schedule, x = (
-        Alone(setup),
-        schedule_of(profile, step, step),
-        initial_state(setup, profile),
-    )
-    samples = np.full((len(schedule.time), len(x) + machine.layout.rates_size), np.nan)
-    machine.integrate(schedule, 0, len(schedule.step), x, samples)
-    torque = trajectory_of(samples, schedule, machine.p, machine.layout).motor_torque
-    return schedule.time, samples[:, : len(x)], torque, machine.layout
+def dense_run(setup, profile, step):
+    """Return the trajectory of a run with a sample at every step."""
+    return run_compiled(setup, profile, step, lambda fraction: None, period=step)
 
 
 class Motion:
@@ -96,8 +85,8 @@ def bushing(kind, a, p_a, r_a, b, p_b, r_b):
 def balance(machine, setup, load, profile, step):
     """Work of the drive, change of stored energy, dissipated energy. [J]"""
     parameters = setup.parameters
-    time, samples, torque, layout = dense_states(setup, profile, step)
-    motion, deformation, tubes, _ = layout.parts(samples)
+    run = dense_run(setup, profile, step)
+    time, motion, deformation, tubes = run.time, run.state, run.deformation, run.tubes
     tub, ground = Motion(motion), still(len(time))
     stored, power = 0.0, 0.0
     for name, spring in setup.springs.items():
@@ -156,5 +145,5 @@ def balance(machine, setup, load, profile, step):
             state[tree] = block
         plant.SetPositionsAndVelocities(context, state)
         bodies.append(plant.CalcKineticEnergy(context) + plant.CalcPotentialEnergy(context))
-    drive = np.trapezoid(torque * motion[:, 13], time)
+    drive = np.trapezoid(run.motor_torque * motion[:, 13], time)
     return drive, bodies[1] - bodies[0] + stored[-1] - stored[0], np.trapezoid(power, time)

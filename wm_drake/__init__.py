@@ -4,30 +4,32 @@
     record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
     wm.envelopes(record).upper.sel(sensor="Xr").plot()
 
-The rooms, in the order data flows: `parameters`, `laws`, `systems`, `machine`, `simulation`, `measures`, `studies`, `report`,
-`cli`.
+The rooms, in the order of the data flow: `parameters`, `laws`, `elements`, `systems`, `model`,
+`engines`, `simulation`, `batch`, `rigs`, `studies`, `report`, `cli`.
 """
 
 import importlib
 from typing import Any
 
 _HOMES = {
-    "Case": "simulation.runs",
+    "Case": "simulation.cases",
     "Scene": "model.scene",
+    "add_washing_machine": "model.machine",
+    "advance_to": "engines.drake",
     "build_machine": "model.machine",
-    "case_of": "simulation.runs",
+    "case_of": "simulation.cases",
     "describe": "studies.description.description",
     "envelopes": "simulation.measures",
     "filtered_displacement": "simulation.measures",
     "load_load": "parameters",
     "load_machine": "parameters",
     "load_profile": "parameters",
-    "load_record": "simulation.runs",
+    "load_record": "simulation.records",
     "measure": "simulation.measures",
     "natural_modes": "studies.description.modal",
     "progress_bar": "cli.progress",
     "run_spin": "studies.spin.study",
-    "save_record": "simulation.runs",
+    "save_record": "simulation.records",
     "simulate": "simulation.runs",
     "simulate_many": "batch",
     "with_value": "parameters",
@@ -38,7 +40,7 @@ __all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str) -> Any:
-    """Loads a public name from its room when it is first used: Drake takes a second to import."""
+    """Load a public name from its room when it is first used, because importing Drake takes 1 s."""
     if name not in _HOMES:
         raise AttributeError(f"module 'wm_drake' has no attribute '{name}'")
     return getattr(importlib.import_module(f"wm_drake.{_HOMES[name]}"), name)

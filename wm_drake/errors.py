@@ -1,4 +1,4 @@
-"""What can go wrong by a user's hand, said in one line each."""
+"""Errors that a user can correct, with one line of message for each problem."""
 
 import difflib
 from collections.abc import Iterable
@@ -6,38 +6,58 @@ from dataclasses import dataclass
 
 
 class WmDrakeError(Exception):
-    """Something the user can mend; the text is the whole message."""
+    """An error that the user can correct; its text is the complete message."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing wrong in an input: where it stands, what it is, what is allowed."""
+    """One problem of an input.
+
+    Attributes:
+        where: Location, such as ``file:line`` or the name of an option; may be empty.
+        key: Key path of the value; may be empty.
+        message: What is wrong and what is allowed.
+    """
 
     where: str
     key: str
     message: str
 
     def __str__(self) -> str:
-        """One line: ``file:line: key.path: message``."""
+        """Return one line: ``file:line: key.path: message``."""
         return ": ".join(part for part in (self.where, self.key, self.message) if part)
 
 
 class InputError(WmDrakeError):
-    """An input that cannot be used, with one line per problem."""
+    """An input that cannot be used; the message has one line per problem."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
-        """Args: problems, at least one."""
+        """Store the problems, of which there must be at least one."""
         self.problems = tuple(problems)
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
 
 def input_error(message: str, *, where: str = "", key: str = "") -> InputError:
-    """An `InputError` with a single problem."""
+    """Return an `InputError` with a single problem.
+
+    Args:
+        message: What is wrong and what is allowed.
+        where: Location, such as ``file:line`` or the name of an option.
+        key: Key path of the value.
+    """
     return InputError([Problem(where, key, message)])
 
 
 def nearest_names(name: str, known: Iterable[str]) -> str:
-    """`` (did you mean 'x'? known: x, y, z)``: the nearest known name, and all of them while they are few."""
+    """Return a hint for an unknown name, such as `` (did you mean 'x'? known: x, y, z)``.
+
+    The hint contains the most similar name if there is one. It lists all known names if they are
+    at most 24, or if none is similar.
+
+    Args:
+        name: The unknown name.
+        known: All known names.
+    """
     names = sorted(known)
     if not names:
         return " (there are none)"

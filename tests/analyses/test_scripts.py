@@ -1,4 +1,4 @@
-"""Every analysis script runs with --quick and says what it found."""
+"""Test that every analysis script runs with --quick and writes its result."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""A study on a dask.distributed cluster gives the tables of one computer, also when a worker dies on the way."""
+"""A study on a dask cluster returns the tables of one computer, also if a worker dies."""
 
 import os
 import signal
@@ -9,16 +9,16 @@ import xarray as xr
 
 from wm_drake.batch import simulate_many
 from wm_drake.batch.cluster import (
-    PARCEL,
+    CASES_PER_WORK_ITEM,
     check_workers,
     cluster_client,
-    run_parcel,
+    run_work_item,
     simulate_on_cluster,
 )
 from wm_drake.batch.ledger import Ledger, open_ledger
 from wm_drake.errors import InputError
 from wm_drake.parameters import SpinProfile, with_value
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 
 SHORT = SpinProfile(time=(0.0, 3.0), speed=(5.0, 20.0))
 
@@ -29,7 +29,7 @@ def cases_of(reference, count):
         yield Case(f"case {index}", reference.loads["middle"], SHORT, parameters=changed)
 
 
-def test_nobody_at_the_address():
+def test_no_scheduler_at_the_address():
     with pytest.raises(
         InputError, match=r"--cluster: no scheduler answers at 'tcp://127\.0\.0\.1:9'"
     ):
@@ -45,19 +45,19 @@ def test_worker_with_other_sources_is_refused():
         check_workers(Client())
 
 
-def test_parcel_gives_results_by_key(reference, machine):
+def test_work_item_returns_results_by_key(reference, machine):
     cases = list(cases_of(reference, 3))
-    results = run_parcel(reference, tuple(zip("abc", cases, strict=True)), ("extremes",), 2.5e-3)
+    results = run_work_item(reference, tuple(zip("abc", cases, strict=True)), ("extremes",), 2.5e-3)
     table = simulate_many(machine, cases, measures=("extremes",))
     assert list(results) == ["a", "b", "c"]
     assert results["b"].values["gasket_force"].tolist() == table.gasket_force.values[1].tolist()
 
 
 @pytest.mark.slow
-def test_tables_are_the_same_though_a_worker_is_killed(reference, machine, tmp_path):
+def test_tables_are_the_same_if_a_worker_is_killed(reference, machine, tmp_path):
     from distributed import LocalCluster
 
-    count = 12 * PARCEL
+    count = 12 * CASES_PER_WORK_ITEM
     killed = []
     with (
         LocalCluster(
@@ -73,7 +73,7 @@ def test_tables_are_the_same_though_a_worker_is_killed(reference, machine, tmp_p
         pids = client.run(os.getpid)
 
         def kill_one(done):
-            if done >= 2 * PARCEL and not killed:
+            if done >= 2 * CASES_PER_WORK_ITEM and not killed:
                 killed.append(next(iter(pids.values())))
                 os.kill(killed[0], signal.SIGKILL)
 
@@ -90,14 +90,14 @@ def test_tables_are_the_same_though_a_worker_is_killed(reference, machine, tmp_p
 
 
 @pytest.mark.slow
-def test_command_on_a_cluster_that_loses_a_worker_gives_the_same_tables(wm_drake, monkeypatch):
+def test_command_writes_the_same_tables_if_the_cluster_loses_a_worker(wm_drake, monkeypatch):
     from distributed import LocalCluster
 
     Path("p.yaml").write_text("time: (0, 8) s\nspeed: (0, 60) rpm\n")
     factors = ("--factor", "K_Lx", "--factor", "C_L", "--factor", "K_Ty", "--factor", "C_T")
     study = ("study", "gasket", "--design", "full", *factors, "--profile", "p.yaml")
     assert wm_drake(*study, "--out", "here").code == 0
-    monkeypatch.setattr("wm_drake.batch.runs.integrate_lanes", None)  # this process runs nothing
+    monkeypatch.setattr("wm_drake.batch.runs.integrate_runs", None)  # this process runs nothing
     put_all, killed = Ledger.put_all, []
 
     def put_and_kill(ledger, results):

@@ -1,4 +1,4 @@
-"""The ledger keeps what was put into it through kills, refuses what is not its own, and says why."""
+"""The ledger keeps results through kills and refuses other files with a message."""
 
 import os
 import resource
@@ -39,7 +39,7 @@ def filled(path, count=3):
     return path
 
 
-def test_what_was_put_is_got_after_reopening(path):
+def test_results_are_the_same_after_reopening(path):
     values = {
         "scalar": 0.1,
         "grid": np.arange(6.0).reshape(2, 3) / 7,
@@ -111,7 +111,7 @@ def test_nothing_reported_is_lost_by_a_kill(path):
         assert all(ledger.get(str(number)).values["x"] == number for number in range(last + 1))
 
 
-def test_unfinished_study_asks_for_resume_and_a_finished_one_does_not(path):
+def test_unfinished_study_needs_resume_and_a_finished_one_does_not(path):
     filled(path)
     with pytest.raises(
         InputError,
@@ -137,21 +137,23 @@ def refusal(path, identity=IDENTITY):
 def test_another_study_is_refused_by_what_differs(path):
     filled(path)
     text = refusal(path, IDENTITY | {"trials": "500"})
-    assert "belongs to another study or version: trials is '1000' there and '500' here" in text
-    assert "sources is '' there and 'abc' here" in refusal(path, IDENTITY | {"sources": "abc"})
+    message = "belongs to another study or version: trials is '1000' in the ledger and '500' now"
+    assert message in text
+    text = refusal(path, IDENTITY | {"sources": "abc"})
+    assert "sources is '' in the ledger and 'abc' now" in text
 
 
 def test_another_layout_is_refused(path, monkeypatch):
     filled(path)
     monkeypatch.setattr("wm_drake.batch.ledger.FORMAT", "wm_drake ledger 2")
-    assert f"format is '{FORMAT}' there and 'wm_drake ledger 2' here" in refusal(path)
+    assert f"format is '{FORMAT}' in the ledger and 'wm_drake ledger 2' now" in refusal(path)
 
 
 def test_other_databases_and_other_files_are_refused(path):
     with sqlite3.connect(path) as connection:
         connection.execute("CREATE TABLE recipes (name TEXT)")
     connection.close()
-    assert "is a database, but no ledger" in refusal(path)
+    assert "is a database but not a ledger" in refusal(path)
     path.write_text("not a database, but long enough to be looked at as one" * 20)
     assert "is damaged" in refusal(path)
 
@@ -202,7 +204,7 @@ def test_folder_that_is_not_there_or_no_folder(tmp_path):
 
 @pytest.fixture
 def closed_folder():
-    """A folder of another user's, as seen by one who may not write there; works for root too, who may write anywhere."""
+    """Provide a folder without write permission; works for root as well."""
     folder = Path(tempfile.mkdtemp())
     yield folder
     os.seteuid(os.getuid())
@@ -241,7 +243,7 @@ with open_ledger(Path(sys.argv[1]), {"study": "test", "trials": "1000"}) as ledg
 """
 
 
-def test_full_disk_is_said_and_loses_nothing(path):
+def test_full_disk_is_reported_and_loses_nothing(path):
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] == resource.RLIM_INFINITY
     ended = subprocess.run(
         [sys.executable, "-c", FULL, str(path)], capture_output=True, text=True, check=True
@@ -253,7 +255,7 @@ def test_full_disk_is_said_and_loses_nothing(path):
         assert all(ledger.get(str(n)).values["x"][0] == n for n in range(int(number)))
 
 
-def test_full_database_is_said(path):
+def test_full_database_is_reported(path):
     with open_ledger(path, IDENTITY) as ledger:
         ledger._connection.execute("PRAGMA max_page_count = 20")
         with pytest.raises(LedgerError, match="is the disk full"):

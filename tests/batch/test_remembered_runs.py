@@ -1,4 +1,4 @@
-"""simulate_remembered gives the table of simulate_many, whatever the ledger held, and runs only what it did not hold."""
+"""simulate_remembered returns the table of simulate_many and runs only the missing cases."""
 
 import itertools
 
@@ -10,7 +10,7 @@ from wm_drake.batch import SimulationInterrupted, run_keys, simulate_many, simul
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import SpinProfile, with_value
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 
 SHORT = SpinProfile(time=(0.0, 3.0), speed=(5.0, 20.0))
 IDENTITY = {"study": "test"}
@@ -34,20 +34,20 @@ def plain(machine, reference):
     return simulate_many(machine, cases_of(reference), measures=("extremes",))
 
 
-def test_second_time_nothing_is_run_and_the_table_is_the_same(
+def test_nothing_is_run_the_second_time_and_the_table_is_the_same(
     machine, reference, plain, tmp_path, monkeypatch
 ):
     path = tmp_path / "ledger"
     first, run = remembered(path, machine, cases_of(reference))
     assert run == 20
-    monkeypatch.setattr("wm_drake.batch.runs.integrate_lanes", None)  # whoever runs now, fails
+    monkeypatch.setattr("wm_drake.batch.runs.integrate_runs", None)  # a run would fail now
     second, run = remembered(path, machine, cases_of(reference))
     assert run == 0
     xr.testing.assert_identical(first, plain)
     xr.testing.assert_identical(second, plain)
 
 
-def test_what_is_missing_is_run_in_any_company(machine, reference, plain, tmp_path):
+def test_missing_cases_are_run_whatever_the_ledger_holds(machine, reference, plain, tmp_path):
     cases = list(cases_of(reference))
     remembered(tmp_path / "ledger", machine, cases[3:14:2])
     done = []
@@ -73,7 +73,7 @@ def test_interrupted_runs_are_kept(machine, reference, plain, tmp_path):
     xr.testing.assert_identical(table, plain)
 
 
-def test_diverged_run_is_remembered_as_such(machine, reference, tmp_path):
+def test_divergence_of_a_run_is_stored(machine, reference, tmp_path):
     violent = with_value(reference, "loads.middle.unbalances.0.mass", 2000.0)
     case = Case("violent", violent.loads["middle"], SpinProfile(time=(0.0, 8.0), speed=(0.0, 40.0)))
     first, _ = remembered(tmp_path / "ledger", machine, [case])
@@ -83,7 +83,7 @@ def test_diverged_run_is_remembered_as_such(machine, reference, tmp_path):
     xr.testing.assert_identical(first, second)
 
 
-def test_keys_tell_apart_all_that_determines_a_run_and_nothing_else(reference, tmp_path):
+def test_keys_depend_on_all_that_determines_a_run_and_nothing_else(reference, tmp_path):
     other_sdf = tmp_path / "other.sdf"
     from wm_drake.model.bodies import sdf_path
 
@@ -111,7 +111,7 @@ def test_keys_tell_apart_all_that_determines_a_run_and_nothing_else(reference, t
     assert list(run_keys(reference, same, measures=["extremes"])) == keys[:1]
 
 
-def test_cases_are_taken_as_they_are_needed(machine, reference, tmp_path):
+def test_cases_are_taken_as_needed(machine, reference, tmp_path):
     endless = (case for _ in itertools.count() for case in cases_of(reference))
 
     def stop(done):
@@ -123,7 +123,7 @@ def test_cases_are_taken_as_they_are_needed(machine, reference, tmp_path):
     assert np.all(np.isfinite(caught.value.finished.gasket_force))
 
 
-def test_table_of_numbers_that_were_tables_too(reference, tmp_path):
+def test_parameters_that_are_tables_are_stored_too(reference, tmp_path):
     curve = {"displacement": (-0.02, 0.0, 0.02), "force": (-80.0, 0.0, 80.0)}
     hardening = with_value(reference, "gasket.stiffness_x", curve)
     built = build_machine(hardening)

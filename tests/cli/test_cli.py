@@ -1,4 +1,4 @@
-"""The command `wm-drake`: what it prints and writes, and how it answers bad input."""
+"""Tests of the command `wm-drake`: its output, its files, and its errors for bad input."""
 
 import json
 import os
@@ -14,7 +14,7 @@ import pytest
 
 from wm_drake import load_record
 from wm_drake.cli import main
-from wm_drake.cli.progress import result_folder
+from wm_drake.cli.result_folder import result_folder
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import load_machine
 
@@ -92,13 +92,17 @@ FAULTY_SPINS = {
         ["--load", "midle"],
         "neither a load of machine 'reference' nor a file (did you mean 'middle'?",
     ),
-    "unknown engine": ({}, ["--engine", "drak"], "no engine 'drak' (did you mean 'drake'?"),
+    "unknown engine": ({}, ["--engine", "drak"], "unknown engine 'drak' (did you mean 'drake'?"),
     "unknown key": (
         {},
         ["--set", "gasket.stifness_x=3 N/mm"],
         "gasket.stifness_x: unknown key 'stifness_x' (did you mean",
     ),
-    "set without =": ({}, ["--set", "gasket.stiffness_x"], "'gasket.stiffness_x' is not KEY=VALUE"),
+    "set without =": (
+        {},
+        ["--set", "gasket.stiffness_x"],
+        "'gasket.stiffness_x' does not have the form KEY=VALUE",
+    ),
     "set without unit": (
         {},
         ["--set", "gasket.stiffness_x=3"],
@@ -117,12 +121,12 @@ FAULTY_SPINS = {
     "same load twice": (
         {},
         ["--load", "middle", "--load", "middle"],
-        "'middle' is asked for twice",
+        "'middle' is given twice",
     ),
     "load file named as a load": (
         {"middle.yaml": "unbalances: []\n"},
         ["--load", "middle", "--load", "middle.yaml"],
-        "'middle' is asked for twice",
+        "'middle' is given twice",
     ),
     "bad load file": (
         {"l.yaml": "unbalances: [{mass: -1 kg, radius: 1 mm, y: 0 mm}]\n"},
@@ -141,7 +145,11 @@ FAULTY_SPINS = {
         ["--profile", "p.csv"],
         "row 2 of the data",
     ),
-    "out is a file": ({"file": ""}, ["--out", "file"], "file: is a file, needs to be a folder"),
+    "out is a file": (
+        {"file": ""},
+        ["--out", "file"],
+        "file: this path is a file, but a folder is needed",
+    ),
     "out is below a file": ({"file": ""}, ["--out", "file/out"], "file/out: cannot be written to"),
 }
 
@@ -254,7 +262,7 @@ def test_check_of_the_reference(wm_drake):
     ended = wm_drake("machine", "check", "reference")
     assert (ended.code, ended.out, ended.err) == (
         0,
-        "reference: machine 'reference' is in order\n",
+        "reference: machine 'reference' is valid\n",
         "",
     )
 
@@ -348,7 +356,7 @@ def strict_json(text):
 
 @dataclass(frozen=True)
 class PlainRun:
-    """A run of the reference machine in a process of its own, and the folder it was run in."""
+    """Run of the reference machine in a separate process, with its folder."""
 
     ended: subprocess.CompletedProcess
     folder: Path
@@ -465,7 +473,7 @@ def test_replay_is_one_self_contained_page(plain):
 
 
 def is_self_contained(page):
-    """Whether a page loads nothing from elsewhere; links to read on are fine."""
+    """Return whether a page loads nothing from other places; links for reading are allowed."""
     loads = re.findall(r"<(?:script|img|iframe|source)[^>]*\ssrc=\"([^\"]{0,20})", page)
     loads += re.findall(r"<link[^>]*\shref=\"([^\"]{0,20})", page)
     return page.lstrip().lower().startswith("<!doctype html") and all(
@@ -525,7 +533,7 @@ def test_tables_are_printed_without_json(wm_drake):
     assert ended.code == 0
     assert ended.err.strip() == ""
     for text in (
-        "Amplitudes in mm, machine 'reference'",
+        "Displacement amplitudes of machine 'reference', in mm",
         "wm_drake",
         "middle: smallest gap ",
         "Results in out: report.html",

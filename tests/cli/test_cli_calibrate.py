@@ -1,4 +1,4 @@
-"""`wm-drake calibrate`: what it writes, how it resumes, and how it answers bad input."""
+"""Tests of `wm-drake calibrate`: its files, its resumption, and its errors for bad input."""
 
 import json
 from pathlib import Path
@@ -9,8 +9,9 @@ import pytest
 
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import load_machine, with_value
+from wm_drake.simulation.cases import case_of
 from wm_drake.simulation.measures import measure
-from wm_drake.simulation.runs import case_of, simulate
+from wm_drake.simulation.runs import simulate
 
 SHORT = "extends: reference\nname: short\nmeasured: []\nprofile: {time: '(0, 12) s', speed: '(40, 270) rpm'}\n"
 FREE = """quantities:
@@ -27,7 +28,7 @@ SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
 
 @pytest.fixture
 def folder(tmp_path):
-    """A folder with a machine, a free file, and amplitudes that a machine with other friction gives."""
+    """Return a folder with a machine, a free file, and amplitudes for another friction force."""
     (tmp_path / "short.yaml").write_text(SHORT)
     (tmp_path / "free.yaml").write_text(FREE)
     machine = build_machine(load_machine(tmp_path / "short.yaml"))
@@ -109,7 +110,10 @@ FAULTS = {
     ),
     "all loads left out": (["--leave-out", "back,middle"], "leaves no load"),
     "weight of nothing": (["--weight", "Q=2"], "'Q' is no load, sensor"),
-    "weight that is no number": (["--weight", "Xr=much"], "--weight: 'Xr=much' is not NAME=NUMBER"),
+    "weight that is no number": (
+        ["--weight", "Xr=much"],
+        "--weight: 'Xr=much' does not have the form NAME=NUMBER",
+    ),
 }
 
 
@@ -137,6 +141,6 @@ def test_free_file_that_does_not_fit_is_refused_with_its_line(wm_drake, tmp_path
     ended = wm_drake("calibrate", "--free", "free.yaml", "--out", "out")
     assert ended.code == 2
     assert ended.err.startswith(
-        "free.yaml:2: quantities.friction.sets: 'damper_types.friction.fricton_force' is no number"
+        "free.yaml:2: quantities.friction.sets: 'damper_types.friction.fricton_force' is not a number"
     )
     assert not Path("out").exists()

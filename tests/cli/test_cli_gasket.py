@@ -1,4 +1,4 @@
-"""`wm-drake study gasket`: what it prints and writes, how it answers bad input, kills, full disks and company."""
+"""Tests of `wm-drake study gasket`: output, bad input, kills, full disks, parallel processes."""
 
 import json
 import os
@@ -36,14 +36,14 @@ SMALL = ("--design", "full", *FACTORS, "--profile", "p.yaml")
 
 @pytest.fixture
 def study(wm_drake):
-    """Runs a small study of 27 trials and two loads in this process: study("--resume").code == 0."""
+    """Return a function that runs a small study (27 trials, two loads) with extra arguments."""
     Path("p.yaml").write_text(PROFILE)
     return lambda *arguments: wm_drake("study", "gasket", *SMALL, "--out", "out", *arguments)
 
 
 @pytest.fixture
 def study_without_page(study, monkeypatch):
-    """The same without figures, which take most of its time, for what depends on runs and tables alone."""
+    """Return the small study without its figures, which take most of its time."""
     monkeypatch.setattr("wm_drake.report.gasket.report.gasket_report", lambda *_: "")
     return study
 
@@ -53,7 +53,7 @@ def tables(folder="out"):
 
 
 def no_runs(monkeypatch):
-    monkeypatch.setattr("wm_drake.batch.runs.integrate_lanes", None)  # whoever runs now, fails
+    monkeypatch.setattr("wm_drake.batch.runs.integrate_runs", None)  # whoever runs now, fails
 
 
 def test_study_writes_tables_and_prints_them(study):
@@ -139,22 +139,22 @@ FAULTS = {
         ("--design", "d-optimal", "--trials", "10"),
         "10 trials cannot determine the 19 coefficients",
     ),
-    "model": (("--model", "mian"), "no model 'mian' (did you mean 'main'?"),
+    "model": (("--model", "mian"), "unknown model 'mian' (did you mean 'main'?"),
     "factor": (
         ("--factor", "gasket.stifness_x"),
         "gasket.stifness_x: unknown key 'stifness_x' (did you mean 'stiffness_x'?",
     ),
-    "factor twice": (("--factor", "K_Lx"), "a factor is named twice"),
+    "factor twice": (("--factor", "K_Lx"), "a factor is given twice"),
     "bounds": (("--factor", "K_Lz=1 N..2 N"), "unit 'N' does not fit"),
     "impossible bound": (("--factor", "K_Lz=-10 %..50 %"), "gasket.stiffness_z: '-"),
-    "tables": (("--tables", "curved"), "no way 'curved'"),
+    "tables": (("--tables", "curved"), "unknown treatment 'curved'"),
     "load": (
         ("--load", "midle"),
         "neither a load of machine 'reference' nor a file (did you mean 'middle'?",
     ),
     "factor file": (("--factors", "nosuch.yaml"), "no such file 'nosuch.yaml'"),
     "machine": (("--machine", "nosuch.yaml"), "no such file, and no shipped machine"),
-    "out": (("--out", "p.yaml"), "p.yaml: is a file, needs to be a folder"),
+    "out": (("--out", "p.yaml"), "p.yaml: this path is a file, but a folder is needed"),
     "out below a file": (("--out", "p.yaml/out"), "p.yaml/out: cannot be written to"),
 }
 
@@ -185,7 +185,7 @@ def test_interrupt_keeps_what_had_finished(study_without_page, monkeypatch):
         interrupted_after(10, changed, KeyboardInterrupt())
         ended = study_without_page()
     assert ended.code == 130
-    assert "finished runs are kept in out/ledger.sqlite: go on with --resume" in ended.err
+    assert "finished runs are kept in out/ledger.sqlite; continue with --resume" in ended.err
     assert [path.name for path in Path("out").iterdir()] == ["ledger.sqlite"]
     ended = study_without_page()
     assert ended.code == 2
@@ -230,7 +230,7 @@ def test_other_version_of_the_sources_is_refused(study_without_page, monkeypatch
     monkeypatch.setattr("wm_drake.batch.sources_version", lambda: "0123")
     ended = study_without_page("--resume")
     assert ended.code == 2
-    assert "and '0123' here" in ended.err
+    assert "and '0123' now" in ended.err
 
 
 def test_damaged_ledger_is_refused_and_left(study_without_page):

@@ -264,7 +264,7 @@ BAD_FILE = "time_s,displacement_mm,force_N\n" + "\n".join(
         ),
         (
             ("identify", "damper", "good.csv", "--fix", "friction_force"),
-            "--fix: 'friction_force' is not KEY=VALUE",
+            "--fix: 'friction_force' does not have the form KEY=VALUE",
         ),
         (
             ("identify", "gasket", "good.csv", "--axis", "tilt"),

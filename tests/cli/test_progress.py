@@ -1,15 +1,17 @@
-"""What a user sees of long work."""
+"""Test of the progress bar."""
 
 from rich.console import Console
 
-from wm_drake.cli import progress as outputs
+from wm_drake.cli import progress as progress_module
 
 
 def test_progress_bar_counts_up_to_the_total_on_standard_error(monkeypatch, capsys):
     monkeypatch.setattr(
-        outputs, "Console", lambda **options: Console(**options, force_terminal=True, width=100)
+        progress_module,
+        "Console",
+        lambda **options: Console(**options, force_terminal=True, width=100),
     )
-    with outputs.progress_bar(40, "machines") as progress:
+    with progress_module.progress_bar(40, "machines") as progress:
         progress(10)
         progress(40)
     seen = capsys.readouterr()

@@ -1,4 +1,4 @@
-"""`wm-drake study spin-cycle`: what it prints and writes, that it goes on where it was interrupted, bad input."""
+"""Tests of `wm-drake study spin-cycle`: output, files, resumption after interruption, bad input."""
 
 import json
 from pathlib import Path
@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from machine_with_bearing import BEARING, UNITS
 
-from wm_drake.simulation.runs import versions
+from wm_drake.simulation.records import versions
 
 PROFILE = """
 time: (0, 4, 6) s
@@ -56,14 +56,14 @@ def test_prints_one_json_object_and_writes_what_it_says(study):
     table = pd.read_csv("out/rms.csv")
     np.testing.assert_allclose(table["rms_mm"].to_numpy().reshape(rms.shape), rms, rtol=1e-5)
     page = Path("out/report.html").read_text(encoding="utf-8")
-    assert "Case both: 400 g in front and 400 g at the rear, 180° apart" in page
+    assert "Case both: 400 g at the front and 400 g at the rear, 180° apart" in page
     assert "http" not in page.replace("http://www.w3.org", "")
     assert versions()["drake"] in page
 
 
 def test_second_time_nothing_is_run_and_its_own_table_is_a_perfect_measurement(study, monkeypatch):
     first = json.loads(study("--json").out)
-    monkeypatch.setattr("wm_drake.batch.runs.integrate_lanes", None)  # whoever runs now, fails
+    monkeypatch.setattr("wm_drake.batch.runs.integrate_runs", None)  # whoever runs now, fails
     again = study("--json", "--measured", "out/rms.csv")
     assert again.code == 0
     shown = json.loads(again.out)
@@ -81,7 +81,7 @@ def test_drakes_engine_runs_a_case_too(study):
         assert ended.code == 0
         shown[engine] = json.loads(ended.out)["cases"][0]
     for name in ("rms_mm", "rms_from_acceleration_mm"):
-        np.testing.assert_allclose(shown["drake"][name], shown["compiled"][name], rtol=1e-6)
+        np.testing.assert_allclose(shown["drake"][name], shown["compiled"][name], rtol=5e-4)
     # Drake's distance of two shapes is good to some micrometres
     np.testing.assert_allclose(
         shown["drake"]["smallest_gap_mm"], shown["compiled"]["smallest_gap_mm"], atol=1e-2
@@ -94,7 +94,7 @@ def test_interrupted_it_keeps_what_had_ended(study, monkeypatch):
         ended = study()
         assert ended.code == 130
         assert [path.name for path in Path("out").iterdir()] == ["ledger.sqlite"]
-    monkeypatch.setattr("wm_drake.batch.runs.integrate_lanes", None)
+    monkeypatch.setattr("wm_drake.batch.runs.integrate_runs", None)
     assert study().code == 0
 
 
@@ -107,8 +107,8 @@ def interrupted(*_):
     [
         (("--profile", "nosuch"), "no such file, and no shipped profile"),
         (("--cases", "nosuch.csv"), "--cases: no such file"),
-        (("--case", "fron"), "no case 'fron' (did you mean 'front'?"),
-        (("--engine", "drak"), "no engine 'drak'"),
+        (("--case", "fron"), "unknown case 'fron' (did you mean 'front'?"),
+        (("--engine", "drak"), "unknown engine 'drak'"),
         (("--measured", "nosuch.csv"), "--measured: no such file"),
         (("--accelerations", "nosuch"), "has no file CASE.csv"),
         (("--set", "imperfections.phase_eror=1 deg"), "did you mean 'phase_error'"),
@@ -127,7 +127,7 @@ def test_bad_input_is_refused_in_one_line_and_nothing_is_written(study, argument
         ("case,region,sensor,axis\n", "needs the columns"),
         ("case,region,sensor,axis,rms_mm\nfront,R9,S1,x,1\n", "no region 'R9' in this study"),
         ("case,region,sensor,axis,rms_mm\nfront,R1,S1,x,-1\n", "not a number of at least 0"),
-        ("case,region,sensor,axis,rms_mm\nfront,R1,S1,x,1\nfront,R1,S1,x,2\n", "is there twice"),
+        ("case,region,sensor,axis,rms_mm\nfront,R1,S1,x,1\nfront,R1,S1,x,2\n", "occurs twice"),
     ],
 )
 def test_bad_measurements_are_refused(study, text, message):
@@ -162,10 +162,8 @@ def test_a_drum_that_can_whirl_is_run_and_said(study, whirling_file):
     rms, perfect = (np.array([case["rms_mm"] for case in told["cases"]]) for told in (shown, plain))
     assert 1e-5 < np.abs(rms / perfect - 1.0).max() < 0.05
     page = Path("out/report.html").read_text(encoding="utf-8")
-    assert (
-        "The drum can whirl: its bearing gives by 4000 N/mm across its axis and 50000 N m/rad."
-        in page
-    )
+    assert "The drum bearing is compliant, so the drum can whirl" in page
+    assert "radial stiffness is 4000 N/mm and the tilting stiffness 50000 N m/rad" in page
 
 
 def test_a_step_too_long_for_the_bearing_is_refused(wm_drake, whirling_file):

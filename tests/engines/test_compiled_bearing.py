@@ -7,13 +7,14 @@ import pytest
 from machine_with_bearing import with_bearing
 from machines_of_each_kind import machines_of_each_kind
 
-from wm_drake.engines.compiled.alone import Alone
+from wm_drake.engines.compiled.derivative import StateDerivative
 from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.errors import InputError
 from wm_drake.model.bodies import sdf_path
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, load_machine
-from wm_drake.simulation.runs import Case, simulate
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.runs import simulate
 
 LOAD = Load(
     unbalances=(
@@ -69,9 +70,9 @@ def random_states(rng, coordinates, sponges):
 
 
 def worst_difference(machine, setup, count=1000, seed=5):
-    """Largest relative difference of the derivative of Drake's state and the compiled machine's, per vector."""
+    """Return the largest relative difference between the time derivatives of both engines, per vector."""
     rng, context, trees = np.random.default_rng(seed), setup.context, machine.state_layout.states()
-    alone = Alone(setup)
+    derivative = StateDerivative(setup)
     struts, tubes = len(setup.dampers), len(setup.telescopes)
     worst = 0.0
     without_joint = np.delete(np.arange(14), (6, 13))
@@ -85,9 +86,7 @@ def worst_difference(machine, setup, count=1000, seed=5):
         if struts + tubes:
             state[-struts - tubes :] = sponges
         context.SetContinuousState(state)
-        machine.source.set_acceleration(
-            machine.source.GetMyContextFromRoot(context), rng.uniform(-20.0, 20.0)
-        )
+        machine.set_drum_acceleration(context, rng.uniform(-20.0, 20.0))
         told = machine.diagram.EvalTimeDerivatives(context).CopyToVector()
         own = told[len(told) - struts - tubes :]
         drake = [told[trees[0]], own[:struts]]
@@ -102,7 +101,7 @@ def worst_difference(machine, setup, count=1000, seed=5):
             for block, delta in zip(blocks[1:-1], sponges[struts:], strict=True)
         ]
         x = np.concatenate([*x, blocks[-1][without_joint]])
-        dx = alone.derivative(x, told[trees[0]][DRUM_RATE])
+        dx = derivative(x, told[trees[0]][DRUM_RATE])
         compiled = np.split(dx, np.cumsum([len(part) for part in drake])[:-1])
         compiled[-1] = np.insert(compiled[-1], (6, 12), (told[trees[0]][6], told[trees[0]][13]))
         for mine, its in zip(compiled, drake, strict=True):
@@ -174,17 +173,18 @@ def test_a_joint_that_is_no_revolute_one_from_the_tub_is_refused(tmp_path):
 def test_a_run_moves_as_in_drake(name):
     machine = build_machine(MACHINES[name])
     case = Case("two", LOAD, SpinProfile(time=(0.0, 0.301, 1.0), speed=(8.0, 16.0, 40.0)))
-    drake, compiled = (simulate(machine, case, engine) for engine in ("drake", "compiled"))
+    drake = simulate(machine, case, "drake")
+    compiled = simulate(machine, case, step=machine.parameters.step / 4)
     assert list(drake.data_vars) == list(compiled.data_vars)
     for variable, largest in (
-        ("displacement", 1e-6),
-        ("drum_displacement", 1e-6),
-        ("drum_tilt", 1e-6),
-        ("bearing_force", 1e-6),
+        ("displacement", 2e-4),
+        ("drum_displacement", 2e-4),
+        ("drum_tilt", 2e-4),
+        ("bearing_force", 2e-4),
     ):
         size = float(np.abs(drake[variable]).max())
         np.testing.assert_allclose(
             compiled[variable], drake[variable], atol=largest * size, err_msg=variable
         )
     torque = float(np.abs(drake.motor_torque).max())
-    np.testing.assert_allclose(compiled.motor_torque, drake.motor_torque, atol=1e-5 * torque)
+    np.testing.assert_allclose(compiled.motor_torque, drake.motor_torque, atol=1e-3 * torque)

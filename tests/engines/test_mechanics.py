@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from machines_of_each_kind import changed, machines_of_each_kind
 
-from wm_drake.engines.compiled.alone import Alone
+from wm_drake.engines.compiled.derivative import StateDerivative
 from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.errors import InputError
@@ -28,30 +28,30 @@ SIZES = np.array(
 SPONGE = 0.01  # m
 
 
-def both_derivatives(machine, setup, state, acceleration):
-    """Of the Drake diagram, and of the compiled machine at the drum acceleration that Drake's finite drive inertia leaves."""
+def both_derivatives(machine, setup, compiled, state, acceleration):
+    """Return the time derivatives of the diagram and of the compiled machine, at the drum acceleration of the diagram."""
     context = setup.context
     context.SetContinuousState(state)
-    machine.source.set_acceleration(machine.source.GetMyContextFromRoot(context), acceleration)
+    machine.set_drum_acceleration(context, acceleration)
     by_drake = machine.diagram.EvalTimeDerivatives(context).CopyToVector()
     # sponges of laws that have one are Drake's states; the compiled machine keeps a number for each damper
     sponges = [index for index, damper in enumerate(setup.dampers.values()) if damper.has_sponge]
     x = np.concatenate([state[:14], np.zeros(len(setup.dampers))])
     x[14 + np.array(sponges, dtype=int)] = state[14:]
-    dx = Alone(setup).derivative(x, by_drake[DRUM_RATE])
+    dx = compiled(x, by_drake[DRUM_RATE])
     assert not dx[14:][~np.isin(np.arange(len(setup.dampers)), sponges)].any()
     return by_drake, np.concatenate([dx[:14], dx[14 + np.array(sponges, dtype=int)]])
 
 
 def worst_difference(machine, setup, count=1000, seed=5):
-    """Largest relative difference, per vector: angle rates, velocity, angular acceleration, acceleration, sponges."""
+    """Return the largest relative difference, per vector: angle rates, velocity, angular acceleration, acceleration, sponges."""
     rng = np.random.default_rng(seed)
-    states = setup.context.num_continuous_states()
+    states, derivative = setup.context.num_continuous_states(), StateDerivative(setup)
     worst = 0.0
     for _ in range(count):
         state = rng.uniform(-1.0, 1.0, states) * np.append(SIZES, np.full(states - 14, SPONGE))
         acceleration = rng.uniform(-20.0, 20.0)
-        drake, compiled = both_derivatives(machine, setup, state, acceleration)
+        drake, compiled = both_derivatives(machine, setup, derivative, state, acceleration)
         assert drake[DRUM_RATE] == pytest.approx(
             acceleration, abs=1e-4
         )  # torques of some kN m over 1e8 kg m2

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from element_ports import own_outputs
 from machine_with_bearing import BEARING, stiffer, with_bearing
 from pydrake.multibody.plant import MultibodyPlant
 from simple_machines import DAMPING, STIFFNESS, constant_speed, isotropic_machine, unbalance
-from tube_energy import Motion, bushing, dense_states, still
+from tube_energy import Motion, bushing, dense_run, still
 
 from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
@@ -20,8 +21,9 @@ from wm_drake.parameters import (
     machine_yaml,
     with_value,
 )
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
-from wm_drake.simulation.runs import Case, simulate
+from wm_drake.simulation.runs import simulate
 from wm_drake.studies.description.modal import natural_modes
 
 RUN_UP = SpinProfile(time=(0.0, 3.0), speed=(5.0, 30.0))
@@ -62,9 +64,7 @@ def drum_weight_and_depth(machine, setup):
 def test_the_drum_sags_by_its_weight_over_the_stiffness(whirling):
     setup = whirling.set_up()
     weight, depth = drum_weight_and_depth(whirling, setup)
-    own = whirling.bearing.GetOutputPort("force").Eval(
-        whirling.bearing.GetMyContextFromRoot(setup.context)
-    )
+    own = own_outputs(whirling.bearing, whirling.bearing.GetMyContextFromRoot(setup.context))
     np.testing.assert_allclose(
         own[:3], [0.0, 0.0, -weight / BEARING["radial_stiffness"]], atol=1e-12
     )  # m
@@ -81,6 +81,7 @@ def test_preloads_balance_the_machine_with_its_drum_sagged(whirling, machine):
     assert np.abs(setup.rest_pose).max() < 1e-12
     for name, spring in setup.springs.items():
         assert spring.preload == pytest.approx(perfect.springs[name].preload, rel=1e-3)
+    whirling.set_drum_acceleration(setup.context, 0.0)
     assert np.abs(whirling.diagram.EvalTimeDerivatives(setup.context).CopyToVector()).max() < 1e-9
 
 
@@ -168,8 +169,8 @@ def test_energy_of_a_run_is_balanced():
     machine = build_machine(parameters)
     load, profile = unbalance(0.5, y=-0.1), SpinProfile(time=(0.0, 2.0), speed=(30.0, 120.0))
     setup = machine.set_up(load)
-    time, samples, torque, layout = dense_states(setup, profile, 1e-4)
-    motion, _, _, carrier = layout.parts(samples)
+    run = dense_run(setup, profile, 1e-4)
+    time, motion, carrier, torque = run.time, run.state, run.carrier, run.motor_torque
     tub, drum = Motion(motion), Motion(np.insert(carrier, (6, 12), 0.0, axis=1))
     stored, power = 0.0, 0.0
     for kind, a, placed, b in (
@@ -259,11 +260,12 @@ def test_modes_of_the_tub_hardly_change(whirling, machine):
 def test_machines_with_and_without_do_not_mix(whirling, machine, reference):
     with pytest.raises(
         InputError,
-        match=r"imperfections.bearing: gives; that of the built machine does not: build a new one",
+        match=r"imperfections.bearing: is compliant; the built machine has a rigid bearing: rebuild",
     ):
         machine.set_up(parameters=whirling.parameters)
     with pytest.raises(
-        InputError, match=r"imperfections.bearing: does not give; that of the built machine does"
+        InputError,
+        match=r"imperfections.bearing: is rigid; the built machine has a compliant bearing: rebuild",
     ):
         whirling.set_up(parameters=reference)
     cases = [
@@ -297,7 +299,7 @@ def test_a_step_too_long_for_the_bearing_is_refused_with_the_longest_one(
     if pieces == 5:  # the longest one holds in both engines
         records = [simulate(whirling, case, engine, step=1e-3) for engine in ("compiled", "drake")]
         assert [record.attrs["diverged"] for record in records] == ["", ""]
-        np.testing.assert_allclose(records[0].displacement, records[1].displacement, atol=1e-8)  # m
+        np.testing.assert_allclose(records[0].displacement, records[1].displacement, atol=3e-6)  # m
 
 
 @pytest.mark.parametrize(
@@ -317,7 +319,7 @@ def test_wrong_numbers_are_refused(whirling, key, value, message):
 def test_a_number_of_a_bearing_that_is_not_there_is_refused(reference):
     with pytest.raises(
         InputError,
-        match=r"the machine has none; a machine file describes 'imperfections.bearing' whole",
+        match=r"the machine has no 'imperfections.bearing'; to add it, write all of it in a",
     ):
         with_value(reference, "imperfections.bearing.radial_stiffness", "5 N/mm")
 

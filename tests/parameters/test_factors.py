@@ -1,10 +1,10 @@
-"""Factors: which numbers they move, how far, and what is refused."""
+"""Factors: the numbers they change, their levels, and errors."""
 
 import numpy as np
 import pytest
 
-from wm_drake.errors import InputError
 from wm_drake.elements.layouts import packed_stiffness
+from wm_drake.errors import InputError
 from wm_drake.laws.table import stiffness_force
 from wm_drake.parameters import (
     GASKET_FACTORS,
@@ -28,7 +28,7 @@ HARDENING = ForceTable(
 
 @pytest.fixture
 def plain(reference):
-    """The reference machine with plain numbers for the stiffnesses of its gasket, whatever the shipped file has."""
+    """The reference machine with plain numbers for the stiffnesses of its gasket."""
     for index, name in enumerate(STIFFNESSES):
         reference = with_value(reference, f"gasket.{name}", 3000.0 + 100.0 * index)
     return reference
@@ -154,7 +154,7 @@ FAULTS = {
     "falling": ("K_Lx=150 %..50 %", "do not rise"),
     "zero": ("damper_types.friction.friction_damping", "do not rise (the value is 0)"),
     "unit": ("K_Lx=1 N..2 N", "unit 'N' does not fit"),
-    "form": ("K_Lx=1 N/mm", "is not NAME=LOW..HIGH"),
+    "form": ("K_Lx=1 N/mm", "is not of the form NAME=LOW..HIGH"),
     "range": ("K_Lx=-50 %..50 %", "out of range"),
     "percent of the SDF's": ("bodies.tub.mass", "is in the SDF"),
     "list": ("profile.time", "is a list of numbers"),
@@ -171,11 +171,11 @@ def test_faults_are_refused_in_one_line(plain, fault):
 
 
 def test_two_factors_may_not_move_one_number(reference):
-    with pytest.raises(InputError, match="moves with factor C_L already"):
+    with pytest.raises(InputError, match="belongs to factor C_L already"):
         levels_of(reference, KNOWN | {"other": Factor(keys=("gasket.damping_x",))})
 
 
-def test_machine_without_gasket_says_so(reference):
+def test_machine_without_gasket_is_refused(reference):
     tree = reference.model_dump() | {"gasket": None}
     with pytest.raises(InputError, match="the machine has no gasket"):
         levels_of(type(reference).model_validate(tree), KNOWN)

@@ -53,7 +53,7 @@ def test_written_machine_is_read_back_the_same(write, reference):
     assert numbers(again) == numbers(reference)
 
 
-def test_written_file_speaks_the_engineers_units(reference):
+def test_written_file_has_display_units(reference):
     text = machine_yaml(reference)
     stiffness = reference.spring_types["suspension"].stiffness
     assert (
@@ -101,7 +101,7 @@ def test_name_that_breaks_key_paths_or_file_names_is_refused(write, name):
     assert f"'{name}'" in problem
 
 
-def test_extended_machine_changes_what_it_names(write, reference):
+def test_extending_file_changes_only_its_entries(write, reference):
     path = write(
         "extends: reference\nname: heavy\nbodies:\n  upper_counterweight:\n    mass: {value: 12 kg, source: guess}\n"
     )
@@ -195,7 +195,7 @@ def test_bad_yaml_is_refused_with_its_line(write, text, line, message):
         (b"name: \x00\n", "is not YAML: "),
     ],
 )
-def test_file_that_is_no_mapping_is_refused(tmp_path, content, message):
+def test_file_that_is_not_a_mapping_is_refused(tmp_path, content, message):
     path = tmp_path / "machine.yaml"
     path.write_bytes(content)
     (problem,) = refused(path)
@@ -345,7 +345,7 @@ def test_copied_shipped_machine_is_the_same_machine(tmp_path, reference):
     assert copy.model_copy(update={"measured": ()}) == reference.model_copy(update={"measured": ()})
 
 
-def test_numbers_are_written_into_a_file_that_stays_as_it_is_written(write, reference):
+def test_numbers_are_replaced_and_the_rest_of_the_file_stays(write, reference):
     path = write(machine_path("reference").read_text(encoding="utf-8"))
     changed = with_value(reference, "damper_types.friction.friction_force", 31.5)
     changed = changed.model_copy(

@@ -1,4 +1,4 @@
-"""Key paths: the one way to change a number."""
+"""Key paths, with which numbers are changed."""
 
 import pytest
 
@@ -69,7 +69,7 @@ def test_numbers_are_listed_with_value_and_unit(reference):
     assert len(listed) == len(KEYS) >= 50
 
 
-def test_override_of_a_body_comes_into_being(reference):
+def test_override_of_a_body_is_added(reference):
     changed = with_value(reference, "bodies.upper_counterweight.mass", "12 kg")
     assert changed.bodies == {"upper_counterweight": BodyOverride(mass=12.0)}
     again = with_value(changed, "bodies.upper_counterweight.centre_of_mass", (0.0, 0.0, 0.2))
@@ -79,7 +79,7 @@ def test_override_of_a_body_comes_into_being(reference):
     assert ("bodies.upper_counterweight.mass", 12.0) in [(k, v) for k, v, _ in quantities(again)]
 
 
-def test_override_of_a_frame_comes_into_being(reference):
+def test_override_of_a_frame_is_added(reference):
     changed = with_value(reference, "frames.sensor_Xr.position", "(0, 201, -210) mm")
     assert changed.frames == {"sensor_Xr": FrameOverride(position=(0.0, 0.201, -0.21))}
 
@@ -102,9 +102,9 @@ def test_number_may_become_a_table(reference):
         ("loads.midle.unbalances.0.mass", "unknown key 'midle' .did you mean 'middle'"),
         ("bodies.tub.mas", "unknown key 'mas' .did you mean 'mass'"),
         ("damper_types.friction.end_bushing.stifness", "did you mean 'stiffness'"),
-        ("loads.middle.unbalances.1.mass", "'1' leads nowhere"),
-        ("loads.middle.unbalances.first.mass", "'first' leads nowhere"),
-        ("gravity.x", "'x' leads nowhere"),
+        ("loads.middle.unbalances.1.mass", "'1' does not exist; allowed are 0 to 0"),
+        ("loads.middle.unbalances.first.mass", "'first' does not exist; allowed are 0 to 0"),
+        ("gravity.x", "'x' does not exist; the path must end before it"),
         ("", "unknown key ''"),
         ("gasket..stiffness_x", "unknown key ''"),
     ],
@@ -136,7 +136,7 @@ def test_value_that_is_not_allowed_is_refused(reference, key, value, message):
     assert [problem.key for problem in refused.value.problems] == [key]
 
 
-def test_what_an_inertia_lacks_is_named(reference):
+def test_missing_parts_of_an_inertia_are_named(reference):
     with pytest.raises(InputError, match=r"yy.*is missing\n.*zz.*is missing"):
         with_value(reference, "bodies.tub.inertia.xx", 1.0)
 
@@ -147,7 +147,7 @@ def test_source_is_the_nearest_above(reference):
     assert source_of(reference, "drive.joint") == ""
 
 
-def test_several_values_at_once_are_those_one_after_another(reference):
+def test_setting_several_values_at_once_equals_setting_them_one_by_one(reference):
     values = {
         "gasket.damping_x": "0.03 N s/mm",
         "gasket.stiffness_x": {"displacement": "(-9, 0, 9) mm", "force": "(-20, 0, 30) N"},
@@ -175,7 +175,7 @@ def test_two_values_that_only_fit_together_are_set_together(reference):
     assert with_values(reference, longer).gasket.stiffness_x.force == (-9.0, 0.0, 9.0)
 
 
-def test_every_fault_among_several_values_is_said_of_its_key(reference):
+def test_every_problem_among_several_values_names_its_key(reference):
     with pytest.raises(InputError) as refused:
         with_values(
             reference,

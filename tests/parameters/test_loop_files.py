@@ -38,7 +38,7 @@ def changed(number, text):
         ("T [s], X [m], F [N]", (1.0, 1.0, 1.0)),
     ],
 )
-def test_units_of_the_header_are_turned_into_si(tmp_path, head, factor):
+def test_units_of_the_header_are_converted_to_si(tmp_path, head, factor):
     loop = read_loop(written(tmp_path, head))
     assert loop.time == pytest.approx(factor[0] * TIME, abs=1e-6)
     assert loop.displacement == pytest.approx(factor[1] * 5.0 * np.sin(TIME), abs=1e-6)
@@ -46,7 +46,7 @@ def test_units_of_the_header_are_turned_into_si(tmp_path, head, factor):
     assert not loop.rotates
 
 
-def test_columns_may_stand_in_any_order_among_others(tmp_path):
+def test_columns_may_be_in_any_order_among_others(tmp_path):
     lines = [
         f"{f};{k};{t};{d}"
         for k, (t, d, f) in enumerate(
@@ -102,7 +102,7 @@ def test_angle_and_moment_are_a_rotation(tmp_path):
         (HEAD, changed(3, "0.1,1.0,inf"), ":6: force [N]: 'inf' is not a finite number"),
         (HEAD, changed(3, "0.1,1.0,-"), ":6: force [N]: '-' is not a number"),
         (HEAD, changed(3, "0.1,5 mm,3.0"), ":6: displacement [mm]: '5 mm' is not a number"),
-        (HEAD, changed(3, "0.1,1.0"), ":6: has 2 values, the header 3 columns"),
+        (HEAD, changed(3, "0.1,1.0"), ":6: has 2 values but the header has 3 columns"),
         (HEAD, changed(5, "0.01,1.0,2.0"), ":8: time [s]: time does not rise: 0.01 after 0.102564"),
         (HEAD, rows(force=np.full(40, 7.0)), ":3: force [N]: is constant (7 on lines 3 to 42)"),
         (HEAD, rows(displacement=np.zeros(40)), ":3: displacement [mm]: is constant"),
@@ -117,14 +117,14 @@ def test_a_bad_file_gets_one_message_with_file_and_line(tmp_path, head, lines, m
     assert str(told.value).startswith(f"{path}{message}")
 
 
-def test_units_that_contradict_are_told(tmp_path):
+def test_contradicting_units_are_refused(tmp_path):
     with pytest.raises(
         InputError, match=r":2: force \[N\]: is in N by the header, in kN by --units"
     ):
         read_loop(written(tmp_path), ("s", "mm", "kN"))
 
 
-def test_all_bad_files_are_told_at_once_and_kinds_are_not_mixed(tmp_path):
+def test_all_bad_files_are_reported_at_once_and_kinds_are_not_mixed(tmp_path):
     good, rotation = (
         written(tmp_path),
         written(tmp_path, "time_s,angle_deg,moment_Nm", name="turned.csv"),
@@ -135,7 +135,7 @@ def test_all_bad_files_are_told_at_once_and_kinds_are_not_mixed(tmp_path):
     assert [problem.where for problem in told.value.problems] == [f"{bad[0]}:6", str(bad[1])]
     with pytest.raises(
         InputError,
-        match=r"holds angles and moments, .* displacements and forces; a fit takes one kind",
+        match=r"holds angles and moments, .* displacements and forces; all files of a fit must",
     ):
         read_loops([good, rotation])
 

@@ -46,7 +46,7 @@ def test_no_tables_give_the_columns_alone(machine):
         (HEADER.replace("Zf", "Zg") + ROW, "needs the columns"),
         (HEADER.replace("\n", ",extra\n") + ROW.replace("\n", ",1\n"), "needs the columns"),
         (HEADER + ROW.replace("\n", ",1\n"), "a row has more values than columns"),
-        (HEADER + ROW.replace("yes", "perhaps"), "gasket is neither yes nor no"),
+        (HEADER + ROW.replace("yes", "perhaps"), "in the column gasket is neither yes nor no"),
         (HEADER + ROW.replace("3.5", "big"), "not a finite number"),
         (HEADER + ROW.replace("3.5", ""), "not a finite number"),
         (HEADER + ROW.replace("3.5", "inf"), "not a finite number"),

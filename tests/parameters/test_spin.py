@@ -87,7 +87,7 @@ def test_bad_profile_is_refused(tmp_path, text, message):
     )
 
 
-def test_misspelt_key_of_a_step_is_answered_with_the_keys_of_a_step(tmp_path):
+def test_message_for_a_misspelt_key_of_a_step_names_the_keys_of_a_step(tmp_path):
     with pytest.raises(InputError, match="did you mean 'ramp_to'"):
         from_steps(tmp_path, "{ramp_t: 5 rpm, rate: 1 rpm/s}")
 
@@ -136,7 +136,7 @@ def test_bad_csv_is_refused(tmp_path, text, message):
     assert refused.value.problems[0].where == str(tmp_path / "profile.csv")
 
 
-def test_csv_that_is_no_text_is_refused(tmp_path):
+def test_csv_that_is_not_text_is_refused(tmp_path):
     path = tmp_path / "profile.csv"
     path.write_bytes(b"time_s,speed_rpm\n0,0\n1,\xff\xfe\n")
     with pytest.raises(InputError, match="cannot be read as CSV"):
@@ -147,7 +147,7 @@ def test_csv_that_is_no_text_is_refused(tmp_path):
     ("phase", "place"),
     [(0.0, (0.0, 0.1, 0.25)), (math.pi / 2.0, (0.25, 0.1, 0.0)), (math.pi, (0.0, 0.1, -0.25))],
 )
-def test_unbalance_goes_round_from_above_to_the_right(phase, place):
+def test_phase_turns_an_unbalance_from_the_top_to_the_right(phase, place):
     assert Unbalance(mass=1.0, radius=0.25, y=0.1, phase=phase).position() == pytest.approx(
         place, abs=1e-15
     )

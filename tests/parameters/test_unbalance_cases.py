@@ -23,7 +23,7 @@ def test_the_33_cases_come_in_the_order_of_table_9():
     )  # [A] section 4.2 prints mean and standard deviation
     assert errors.std() == pytest.approx(
         4.10, abs=0.005
-    )  # of the 33, not of what they are a sample of
+    )  # standard deviation of the 33 values, not of a sample
 
 
 def test_a_case_is_a_load_in_the_planes_of_the_machine(reference):
@@ -43,7 +43,7 @@ def test_phase_error_shifts_the_rear_mass_of_pairs_only(reference):
     assert cases[4].load(wrong) == cases[4].load(reference)
 
 
-def test_a_machine_without_places_for_unbalances_is_refused(reference):
+def test_machine_without_positions_for_unbalances_is_refused(reference):
     bare = reference.model_copy(update={"loads": {"middle": reference.loads["middle"]}})
     with pytest.raises(InputError, match="unbalance_planes: is missing"):
         unbalance_planes(bare)
@@ -56,7 +56,7 @@ def test_a_machine_without_places_for_unbalances_is_refused(reference):
         ("case,front,rear\n1,2,3\n", "needs the columns case,front_g"),
         (HEAD + "1,-200,0,0\n", "case 1.front: '-200 g' is out of range"),
         (HEAD + "1,x,0,0\n", "case 1.front: 'x g' is not a number"),
-        (HEAD + "1,200,0,0\n1,400,0,0\n", "case '1' is there twice"),
+        (HEAD + "1,200,0,0\n1,400,0,0\n", "case '1' occurs twice"),
     ],
 )
 def test_bad_tables_are_refused(tmp_path, text, message):
@@ -90,15 +90,15 @@ def test_regions_of_a_csv_reach_from_row_to_row(tmp_path):
 @pytest.mark.parametrize(
     ("regions", "message"),
     [
-        ("[{name: A, begin: 0 s, end: 9 s}]", "is not a stretch"),
-        ("[{name: A, begin: 1 s, end: 1 s}]", "is not a stretch"),
+        ("[{name: A, begin: 0 s, end: 9 s}]", "end at the end of the profile"),
+        ("[{name: A, begin: 1 s, end: 1 s}]", "end after its begin"),
         (
             "[{name: A, begin: 0 s, end: 2 s}, {name: B, begin: 1 s, end: 3 s}]",
-            "is not a stretch after the one before",
+            "must begin at",
         ),
         (
             "[{name: A, begin: 0 s, end: 1 s}, {name: A, begin: 1 s, end: 3 s}]",
-            "'A' is there twice",
+            "'A' occurs twice",
         ),
         ("[{name: A, begin: 0, end: 1 s}]", "'0' has no unit"),
         ("[{name: 'a b', begin: 0 s, end: 1 s}]", "is not a name"),

@@ -1,4 +1,4 @@
-"""The door for units: text in, SI out, and back again without loss."""
+"""Units: text is converted to SI and back without loss."""
 
 import math
 from types import SimpleNamespace
@@ -65,7 +65,7 @@ def test_vector_becomes_si():
 @pytest.mark.parametrize(
     ("text", "unit"),
     [
-        ("1 N mm", ROTATIONAL_STIFFNESS),  # a torque is no torque per angle
+        ("1 N mm", ROTATIONAL_STIFFNESS),  # a torque is not a torque per angle
         ("1 N/mm", ROTATIONAL_STIFFNESS),
         ("1 N", STIFFNESS),
         ("1 N mm/rad", Unit("N*m", "N*mm")),
@@ -134,7 +134,7 @@ def test_bad_vector_is_refused(text):
     [math.nan, math.inf, 10**400, True, None, [], {}, "", "mm", "long"],
     ids=lambda v: repr(v)[:9],
 )
-def test_what_is_no_finite_number_is_refused_in_code_too(value):
+def test_value_that_is_not_a_finite_number_is_refused_in_code_too(value):
     with pytest.raises(ValueError, match="number"):
         to_si(value, IN_CODE, LENGTH)
 
@@ -154,7 +154,7 @@ def test_shown_value():
     unit=st.sampled_from(ALL_UNITS),
     value=st.floats(-1e9, 1e9).filter(lambda x: x == 0.0 or abs(x) > 1e-12),
 )
-def test_text_is_read_back_as_the_very_same_number(unit, value):
+def test_text_is_read_back_as_exactly_the_same_number(unit, value):
     assert to_si(unit.text(value), IN_FILE, unit) == value
 
 

@@ -1,4 +1,4 @@
-"""The page of a calibration says what its numbers say."""
+"""Tests of the calibration page: its text agrees with the numbers."""
 
 import re
 
@@ -7,10 +7,10 @@ import pytest
 
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.free import load_free
-from wm_drake.report.calibration.report import calibration_report, knowledge, summary
-from wm_drake.simulation.runs import Case
+from wm_drake.report.calibration.report import calibration_report, certainty, summary
+from wm_drake.simulation.cases import Case
 from wm_drake.studies.calibration.calibration import Calibration, Plan
-from wm_drake.studies.calibration.parameter_map import turning_of
+from wm_drake.studies.calibration.parameter_map import parameter_map_of
 from wm_drake.studies.calibration.prediction import Prediction
 from wm_drake.studies.calibration.solutions import Solution
 from wm_drake.studies.calibration.targets import Targets
@@ -30,7 +30,7 @@ LOADS = (("middle", False), ("middle", True), ("back", True))
 def calibration(machine, tmp_path_factory):
     path = tmp_path_factory.mktemp("free") / "free.yaml"
     path.write_text(FREE)
-    turning = turning_of(machine, load_free(path))
+    parameter_map = parameter_map_of(machine, load_free(path))
     sensors = tuple(machine.parameters.sensors)
     measured = np.full((3, 6), 0.01)
     targets = Targets(LOADS, sensors, measured, np.ones((3, 6)))
@@ -39,11 +39,11 @@ def calibration(machine, tmp_path_factory):
     point = np.array([40.0, 4.001, 0.24])
     slopes = np.zeros((18, 3))
     slopes[:2] = [[10.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
-    coordinates = (point - turning.expected) / turning.deviation
+    coordinates = (point - parameter_map.expected) / parameter_map.deviation
     best = Solution(0, point, coordinates, computed, 20.0, 2.0, slopes, 123)
     other = Solution(1, point, -coordinates, computed, 21.0, 2.0, slopes, 77)
     bad = Solution(2, point, coordinates, 2.0 * computed, 2000.0, 2.0, slopes, 55)
-    return Calibration(turning, targets, Plan(starts=3), (best, other), (best, other, bad))
+    return Calibration(parameter_map, targets, Plan(starts=3), (best, other), (best, other, bad))
 
 
 @pytest.fixture(scope="module")
@@ -62,17 +62,17 @@ def page(machine, calibration):
 
 def test_summary_has_mean_largest_and_their_place(calibration):
     text = summary(calibration, [])
-    assert "18 measured amplitudes by 1.4 %" in text
-    assert "by −25 % at most: sensor Yf, load middle with gasket" in text
-    assert "3 searches ended in 2 distinct good solutions" in text
+    assert "compared with 18 measured amplitudes. The mean absolute difference is 1.4 %" in text
+    assert "−25 %, at sensor Yf with load middle (with gasket)" in text
+    assert "3 searches found 2 distinct good solutions" in text
 
 
-def test_knowledge_sorts_the_quantities(calibration):
-    found = dict(knowledge(calibration))
+def test_certainty_sorts_the_quantities(calibration):
+    found = dict(certainty(calibration))
     assert found["Determined by the data"] == "friction"
     assert found["At a bound"] == "motor"
-    assert found["By data and prior together"] == "radius"
-    assert found["By the prior only"] == "none"
+    assert found["Determined by data and prior"] == "radius"
+    assert found["Determined by the prior only"] == "none"
 
 
 def test_page_needs_nothing_else_and_escapes_the_command(page):
@@ -81,7 +81,7 @@ def test_page_needs_nothing_else_and_escapes_the_command(page):
 
 
 def test_page_shows_every_search_prediction_and_quantity(page):
-    for text in ("2000.0", "31.0", "4.001 ± ", "held by", "bound", "123", "back"):
+    for text in ("2000.0", "31.0", "4.001 ± ", "determined by", "bound", "123", "back"):
         assert text in page
     assert page.count("<h3>Load ") == 3
 

@@ -1,4 +1,4 @@
-"""The page of a gasket study says what its numbers say, whatever the number of loads, factors and responses."""
+"""Tests of the gasket page, for any number of loads, factors and responses."""
 
 import re
 
@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 
 from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors
+from wm_drake.report.gasket.findings import about_residual, conflicts, load_findings, summary
 from wm_drake.report.gasket.report import gasket_report
 from wm_drake.report.gasket.tables import digits
-from wm_drake.report.gasket.words import about_residual, conflicts, load_findings, summary
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket.screening import Responses, run_screening
 from wm_drake.studies.gasket.study import RESPONSES, GasketTrials
@@ -20,7 +20,11 @@ UNITS = {name: {"D": "mm", "F": "N", "M": "N m"}[name[0]] for name in RESPONSES}
 
 
 def planted(design):
-    """Dx falls with C_L by 4 mm, Mx rises with it by 2 N m; Dy is lowest at level 0 of C_T; Fz is an interaction; the rest small."""
+    """Return responses with known effects.
+
+    Dx falls with C_L by 4 mm, and Mx rises with it by 2 N m. Dy is lowest at level 0 of C_T. Fz is an
+    interaction. All other effects are small.
+    """
     x = dict(zip(design.factors, design.levels.T.astype(float), strict=True))
     small = 0.01 * x["K_Ly"]
     values = dict.fromkeys(RESPONSES, 10.0 + small)
@@ -52,18 +56,16 @@ def trials(reference):
 
 def test_words_come_from_the_numbers(screening):
     found = load_findings(screening, "middle")
-    assert (
-        found[0] == "Dx, 20.0 mm in the mean, falls by 4.00 mm from level −1 to +1 of C_L (100 %)."
-    )
-    assert found[1] == "Dy, 8.67 mm in the mean, is lowest at level 0 of C_T, by 1.00 mm (100 %)."
-    assert found[5] == "Fz, 30.0 N in the mean, depends on K_Lx × K_Ly (100 %) jointly."
+    assert found[0] == "Dx (mean 20.0 mm) falls by 4.00 mm from level −1 to +1 of C_L (100 %)."
+    assert found[1] == "Dy (mean 8.67 mm) is lowest at level 0 of C_T, by up to 1.00 mm (100 %)."
+    assert found[5] == "Fz (mean 30.0 N) depends on the interaction K_Lx × K_Ly (100 %)."
     assert conflicts(screening, "middle") == ["Load middle: raising C_L lowers Dx but raises Mx."]
     text = summary(screening)
     assert (
         "162 runs: 81 trials of 4 factors (full, D-efficiency 100.00 %) with load middle and load towel & co."
         in text
     )
-    assert "p-values would only rank that lack of fit" in about_residual(screening)
+    assert "It consists of the interactions of three and more factors." in about_residual(screening)
 
 
 def test_page_is_whole(screening, trials):
@@ -97,7 +99,7 @@ def test_page_of_few_factors_and_failed_runs(trials, model):
         run_screening(make_design("full", NAMES[:3], model=model), evaluate), trials
     )
     assert "Trial 3, load middle: the run diverged at 1.2 s" in page
-    assert ("all interactions, which the model of main effects leaves out" in page) == (
+    assert ("all interactions, because the model contains main effects only" in page) == (
         model == "main"
     )
 

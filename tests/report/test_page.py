@@ -1,4 +1,4 @@
-"""What all report pages share."""
+"""Tests of the parts that all report pages share."""
 
 import re
 

@@ -12,12 +12,15 @@ import xarray as xr
 from wm_drake.model.scene import Gap
 from wm_drake.parameters import MachineParameters, SpinProfile, load_machine, quantities
 from wm_drake.parameters.units import Unit
-from wm_drake.report.figures import outline, revolution_starts
+from wm_drake.report.formatting import number, percent
+from wm_drake.report.spin.figures import revolution_starts, simplified_indices
 from wm_drake.report.spin.report import amplitude_table, spin_report
-from wm_drake.report.tables import differences, profiles, readable
-from wm_drake.report.wording import number, percent
+from wm_drake.report.spin.tables import differences, profiles
+from wm_drake.report.tables import readable
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
-from wm_drake.simulation.runs import Case, Record, point_displacements
+from wm_drake.simulation.outputs import point_displacements
+from wm_drake.simulation.records import Record
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 SENSOR_POINTS = {
@@ -35,7 +38,10 @@ VOID = ("meta", "img", "br", "hr", "link", "input")
 def harmonic_record(
     parameters: MachineParameters, load: str, gasket: bool, size: float, samples: int = 400
 ) -> Record:
-    """2 s of a tub that swings at 4 Hz, its drum at 240 rpm: every variable that as_record makes, by hand."""
+    """Return a hand-made record of 2 s, with the tub moving at 4 Hz and the drum at 240 rpm.
+
+    It has every variable of a real record.
+    """
     time = 5e-3 * np.arange(samples)
     wave = np.sin(2.0 * np.pi * 4.0 * time)[:, None]
     angle, position = wave * [0.01, 0.002, 0.02], wave * [size, 0.3 * size, 0.5 * size]
@@ -129,14 +135,14 @@ def page(result: SpinResult) -> str:
 
 @pytest.fixture
 def without_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For tests of words and tables: the figures are made, but not drawn, which is what takes long."""
+    """Skip the slow drawing of the figures, for tests of texts and tables."""
     monkeypatch.setattr(
         "wm_drake.report.page.inline_svg_or_png", lambda figure: "data:image/png;base64,"
     )
 
 
 class Tags(HTMLParser):
-    """Checks that tags close in order and keeps what they load and say."""
+    """HTML parser that checks that tags close in order, and keeps their attributes and words."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -251,9 +257,9 @@ def test_diverged_case_is_warned_of_and_left_out_of_the_summary(machine: Machine
     assert Tags(page).open == []
     box = page[page.index('<section class="warning"') :]
     assert DIVERGED in box[: box.index("</section>")]
-    assert "1 diverged and is left out" in page
-    assert "moves most with load back" in page
-    assert "too short for the filter" in page
+    assert "1 run diverged and is excluded from this summary" in page
+    assert "The largest amplitude occurs with load back" in page
+    assert "too short for the band-pass filter" in page
 
 
 @pytest.mark.usefixtures("without_drawing")
@@ -262,7 +268,7 @@ def test_all_cases_diverged_still_give_a_page(machine: MachineParameters) -> Non
     bad.record.attrs["diverged"] = DIVERGED
     page = spin_report(spin_result(machine, [bad]))
     assert DIVERGED in page
-    assert "nothing to sum up" in page
+    assert "no result to summarize" in page
     assert "<img" not in page
 
 
@@ -272,7 +278,7 @@ def test_overlap_and_foreign_profile_are_warned_of(machine: MachineParameters) -
     slow = SpinProfile(time=(0.0, 2.0), speed=(0.0, 10.0))
     page = spin_report(spin_result(machine, [replace(case, case=replace(case.case, profile=slow))]))
     assert "tub shell and wall right overlap by 3.0 mm" in page
-    assert "the spin profile is not the machine file" in page
+    assert "the spin profile differs from the one in the machine file" in page
 
 
 def test_names_cannot_inject_markup(machine: MachineParameters) -> None:
@@ -352,8 +358,8 @@ def test_percent_difference_row_by_hand(machine: MachineParameters) -> None:
     assert row is not None
     cells = [word for word in Tags(row[1]).words if word]
     assert cells == ["+20 %", "0 %", "−50 %", "0 %", "−50 %", "−90 %", "35 %"]  # 210 / 6
-    assert "by 35 % in the mean" in page
-    assert "−90 % at most: sensor Zf" in page
+    assert "The mean absolute difference is 35 %" in page
+    assert "The largest difference is −90 %, at sensor Zf" in page
 
 
 @pytest.mark.usefixtures("without_drawing")
@@ -378,9 +384,9 @@ def test_page_is_small(page: str) -> None:
 def test_outline_keeps_corners_within_tolerance() -> None:
     x = np.linspace(0.0, 10.0, 1001)
     tent = np.interp(x, [0.0, 3.0, 10.0], [0.0, 6.0, -1.0])
-    assert x[outline(x, tent, 1e-6)].tolist() == [0.0, 3.0, 10.0]
+    assert x[simplified_indices(x, tent, 1e-6)].tolist() == [0.0, 3.0, 10.0]
     wave = np.sin(x)
-    kept = outline(x, wave, 0.01)
+    kept = simplified_indices(x, wave, 0.01)
     assert len(kept) < 50
     assert np.abs(np.interp(x, x[kept], wave[kept]) - wave).max() <= 0.01
 

@@ -1,15 +1,17 @@
-"""What a record says of each element, by name, against that element's port in Drake."""
+"""Outputs of a record for each element, by name, against the port of that element in Drake."""
 
 import numpy as np
 import pytest
+from element_ports import own_outputs
 from machines_of_each_kind import machines_of_each_kind
 
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance
-from wm_drake.simulation.runs import Case, simulate
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.runs import simulate
 
 
-def test_each_element_of_a_record_is_what_its_port_says():
+def test_record_of_each_element_equals_its_port():
     parameters = machines_of_each_kind()["two bushings, five dampers of three laws"]
     machine = build_machine(parameters)
     load = Load(unbalances=(Unbalance(mass=0.8, radius=0.25, y=-0.1),))
@@ -32,7 +34,7 @@ def test_each_element_of_a_record_is_what_its_port_says():
         setup.context.SetContinuousState(np.concatenate(plant))
 
         def port(element):
-            return element.GetOutputPort("force").Eval(element.GetMyContextFromRoot(setup.context))
+            return own_outputs(element, element.GetMyContextFromRoot(setup.context))
 
         for name, spring in machine.springs.items():
             assert float(sample.spring_tension.sel(spring=name)) == pytest.approx(
@@ -43,19 +45,19 @@ def test_each_element_of_a_record_is_what_its_port_says():
                 port(damper)[0], rel=1e-9
             )
         for name, bushing in machine.bushings.items():
-            said = np.concatenate(
+            recorded = np.concatenate(
                 [sample[f"bushing_{kind}"].sel(bushing=name) for kind in ("force", "moment")]
             )
-            np.testing.assert_allclose(said, port(bushing), rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(recorded, port(bushing), rtol=1e-9, atol=1e-9)
         for name, sensor in parameters.sensors.items():
             poses = np.concatenate([sample.tub_angle, sample.tub_position]), setup.rest_pose
-            there, at_rest = (place(machine, pose, setup.sensor_points[name]) for pose in poses)
-            moved = (there - at_rest)["xyz".index(sensor.axis)]
-            assert float(sample.displacement.sel(sensor=name)) == pytest.approx(moved, abs=1e-12)
+            now, at_rest = (position(machine, pose, setup.sensor_points[name]) for pose in poses)
+            expected = (now - at_rest)["xyz".index(sensor.axis)]
+            assert float(sample.displacement.sel(sensor=name)) == pytest.approx(expected, abs=1e-12)
 
 
-def place(machine, pose, point):
-    """In W, of a point of the tub, as Drake's plant has it."""
+def position(machine, pose, point):
+    """Return the position in W of a point of the tub, computed by Drake's plant."""
     context = machine.plant.CreateDefaultContext()
     positions = machine.plant.GetPositions(context)
     positions[machine.state_layout.tub] = pose

@@ -1,22 +1,18 @@
-"""The run-up of the reference machine in each engine: speed, torque, energy, convergence, symmetries, divergence."""
+"""Run-up of the reference machine in each engine: speed, energy, convergence, symmetry."""
 
 import numpy as np
 import pytest
 from energy_book import EnergyBook, dense_record
 from pydrake.systems.analysis import Simulator
 
+from wm_drake.engines.drake import advance_to
 from wm_drake.errors import InputError
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, with_value
+from wm_drake.simulation.cases import Case, case_of
 from wm_drake.simulation.measures import measure
-from wm_drake.simulation.runs import (
-    Case,
-    DivergenceWarning,
-    case_of,
-    load_record,
-    save_record,
-    simulate,
-)
+from wm_drake.simulation.records import load_record, save_record
+from wm_drake.simulation.runs import DivergenceWarning, simulate
 
 RPM = np.pi / 30.0
 FAST_RUN_UP = SpinProfile(time=(0.0, 8.0, 9.0), speed=(0.0, 280 * RPM, 280 * RPM))
@@ -56,21 +52,26 @@ def test_drum_follows_a_profile_with_corners_off_the_grid(machine, reference, en
     )
 
 
-def test_motor_torque_is_what_inverse_dynamics_and_the_power_balance_ask(
-    machine, reference, run_up
-):
+def test_motor_torque_agrees_with_inverse_dynamics(machine, reference, run_up):
     load = reference.loads["middle"]
     setup = machine.set_up(load)
     book = EnergyBook(setup, load, run_up)
     for index in range(1000, 14000, 1300):
         sample = run_up.isel(time=index)
         state = np.concatenate(
-            [sample.tub_angle, sample.tub_position, [sample.drum_angle], sample.tub_angular_velocity, sample.tub_velocity,
-             [sample.drum_speed], sample.damper_deformation]
-        )  # fmt: skip
+            [
+                sample.tub_angle,
+                sample.tub_position,
+                [sample.drum_angle],
+                sample.tub_angular_velocity,
+                sample.tub_velocity,
+                [sample.drum_speed],
+                sample.damper_deformation,
+            ]
+        )
         setup.context.SetContinuousState(state)
         alpha = reference.profile.acceleration()[0 if float(sample.time) < 400 / 7 else 1]
-        machine.source.set_acceleration(machine.source.GetMyContextFromRoot(setup.context), alpha)
+        machine.set_drum_acceleration(setup.context, alpha)
         rate = machine.diagram.EvalTimeDerivatives(setup.context).CopyToVector()[7:14]
         elements = machine.plant.get_applied_generalized_force_input_port().Eval(
             setup.plant_context
@@ -93,7 +94,7 @@ def check_energy(machine, case, step):
 
 
 def test_energy_balances_over_a_fast_run_up(machine, reference):
-    # friction's corners limit every integrator here: the residual falls with the step, and 0.3125 ms is below 1e-5
+    # corners of the friction law limit every integrator: the residual falls with the step size
     profile = SpinProfile(time=(0.0, 3.0, 4.0), speed=(12.0, 24.0, 24.0))
     assert (
         check_energy(machine, Case("middle", reference.loads["middle"], profile), 3.125e-4) < 1e-5
@@ -135,10 +136,8 @@ def test_error_controlled_integration_agrees(machine, reference, engine):
     integrator = simulator.get_mutable_integrator()  # Drake's default: RK3 with error control
     integrator.set_target_accuracy(1e-6)
     integrator.set_maximum_step_size(5e-3)
-    source = machine.source.GetMyContextFromRoot(setup.context)
-    for end, alpha in zip(case.profile.time[1:], case.profile.acceleration(), strict=True):
-        machine.source.set_acceleration(source, alpha)
-        simulator.AdvanceTo(end)
+    machine.set_profile(setup.context, case.profile)
+    advance_to(simulator, case.profile.duration, case.profile)
     assert not integrator.get_fixed_step_mode()
     final = machine.plant.GetPositions(setup.plant_context)
     fixed = np.concatenate([record.tub_angle.values[-1], record.tub_position.values[-1]])
@@ -148,7 +147,7 @@ def test_error_controlled_integration_agrees(machine, reference, engine):
 
 
 def redrawn(parameters: MachineParameters, move) -> MachineParameters:
-    """The machine with every frame and centre of mass moved by a function of its position. Its numbers stay."""
+    """Return the machine with frames and centres of mass moved by a function of position."""
     setup = build_machine(parameters).set_up()
     plant, context = setup.machine.plant, setup.plant_context
     tree = parameters.model_dump()
@@ -210,9 +209,9 @@ def test_phase_shift_of_the_load_is_a_shift_of_the_start_angle(machine):
 
 
 def test_moving_the_world_moves_the_machine_with_it(machine, reference, engine):
-    """Galilean: the same machine drawn elsewhere in the tub's own frame gives the same displacements.
+    """A machine shifted along y has the same displacements.
 
-    Every frame and centre of mass is shifted along y by the same amount, tub and housing alike; so is the load.
+    Every frame and centre of mass of tub and housing and the load are shifted by the same amount.
     """
     shift = np.array([0.0, 0.07, 0.0])
     moved = redrawn(reference, lambda p: p + shift)
@@ -228,7 +227,7 @@ def test_moving_the_world_moves_the_machine_with_it(machine, reference, engine):
     assert float(np.abs(here.displacement).max()) > 1e-3
 
 
-def test_a_run_that_diverges_stops_keeps_its_record_and_says_when_and_why(machine, engine):
+def test_diverging_run_stops_keeps_its_record_and_reports_time_and_reason(machine, engine):
     violent = Case(
         "violent", Load(unbalances=(Unbalance(mass=60.0, radius=0.3, y=0.1),)), FAST_RUN_UP
     )
@@ -240,8 +239,8 @@ def test_a_run_that_diverges_stops_keeps_its_record_and_says_when_and_why(machin
     assert np.max(np.abs(record.tub_position)) <= 0.5
 
 
-def test_a_run_that_ends_in_no_number_says_so_too(machine, reference, engine):
-    # a sponge so stiff that the second sample is NaN already; Drake says so itself
+def test_run_that_ends_in_nan_reports_it(machine, reference, engine):
+    # the sponge is so stiff that the second sample is NaN; Drake reports this itself
     parameters = with_value(reference, "damper_types.friction.sponge_stiffness", 1e15)
     case = Case("stiff", reference.loads["middle"], FAST_RUN_UP, parameters=parameters)
     why = {"compiled": "roll = nan rad", "drake": "Detected NaN"}[engine]
@@ -268,7 +267,7 @@ def test_records_are_reproducible_and_survive_the_disk(machine, reference, engin
     assert not record.bushing_force.any()
 
 
-def test_what_is_changed_in_one_record_is_not_in_the_next(machine, reference):
+def test_changes_of_one_record_do_not_reach_the_next(machine, reference):
     case = Case("middle", reference.loads["middle"], SpinProfile(time=(0.0, 0.1), speed=(0.0, 1.0)))
     record = simulate(machine, case)
     for name in record.coords:

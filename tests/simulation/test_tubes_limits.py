@@ -1,4 +1,4 @@
-"""What must hold of the machine with tubes: energy, the massless limit, what the treatment of the tubes' spin changes."""
+"""Limits of the machine with damper tubes: energy, massless tubes, spin inertia of the tubes."""
 
 import pytest
 from telescopic_machine import OUTER_TUBES, RUN_UP, changed, telescopic, with_bushing, with_tubes
@@ -7,7 +7,7 @@ from tube_energy import balance
 from wm_drake.batch import simulate_many
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.vibration import relative_error
 from wm_drake.studies.spin_cycle.damper_topology import strut_machine
 
@@ -40,7 +40,10 @@ def test_steps_are_fine_enough(built):
 
 
 def stiffer_and_lighter(built, share):
-    """Tubes of so many times less mass on bushings so many times as stiff, that rub in bending only as a strut's do."""
+    """Return the machine with tube masses divided and bushing stiffnesses multiplied by `share`.
+
+    The bushings have friction in bending only, like those of a strut.
+    """
     stiff = {f"stiffness_{axis}": 2e5 * share for axis in "xyz"} | {
         f"damping_{axis}": 40.0 for axis in "xyz"
     }
@@ -55,19 +58,22 @@ def test_light_tubes_on_stiff_bushings_move_as_the_strut_machine(built, tmp_path
     for share in (1, 4):
         machine = build_machine(stiffer_and_lighter(built, share))
         errors.append(relative_error(regions(machine, 2.5e-4 / share), strut).max())
-    assert errors[1] < 0.3 * errors[0]  # in proportion to mass and give
+    assert errors[1] < 0.3 * errors[0]  # the error is proportional to mass and compliance
     assert errors[1] < 6e-3
 
 
 @pytest.mark.slow
-def test_they_converge(built, tmp_path):
+def test_light_tubes_converge_to_the_strut_machine(built, tmp_path):
     strut = regions(build_machine(strut_machine(stiffer_and_lighter(built, 1), tmp_path)), 2.5e-4)
     machine = build_machine(stiffer_and_lighter(built, 16))
     assert relative_error(regions(machine, 2.5e-4 / 16), strut).max() < 1.5e-3
 
 
-def test_spin_of_the_tubes_may_have_more_inertia_than_it_has(built):
-    """Against small explicit steps with the inertia of the SDF; analyses/check_spin_of_tubes.py does it with an implicit method."""
+def test_larger_spin_inertia_of_the_tubes_changes_little(built):
+    """The reference uses small explicit steps and the inertia of the SDF.
+
+    analyses/check_spin_of_tubes.py makes the same comparison with an implicit method.
+    """
     kept = {name: body for name, body in telescopic().bodies.items() if name not in OUTER_TUBES}
     true = changed(telescopic(), bodies=kept)
     error = relative_error(regions(built), regions(built, 2.5e-5, true))

@@ -1,4 +1,4 @@
-"""RMS displacements in regions: hand values, acceleration integrated twice, and the batch against single runs."""
+"""RMS displacements in regions: hand values, integrated acceleration, batch and single runs."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,9 @@ from wm_drake.batch import simulate_many
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance, with_value
 from wm_drake.parameters.spin import Region
-from wm_drake.simulation.runs import Case, simulate
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.outputs import point_positions
+from wm_drake.simulation.runs import simulate
 from wm_drake.simulation.vibration import (
     HIGH_PASS_HZ,
     high_passed,
@@ -42,7 +44,7 @@ def test_rms_by_hand():
     np.testing.assert_allclose(region_rms(signal, PERIOD, PROFILE), [[3.0], [5.0]])
 
 
-def test_regions_a_run_did_not_get_through_have_no_number():
+def test_regions_that_a_run_does_not_complete_are_nan():
     rms = region_rms(np.ones((1000, 2)), PERIOD, PROFILE)
     np.testing.assert_array_equal(rms, [[1.0, 1.0], [np.nan, np.nan]])
 
@@ -87,12 +89,12 @@ def test_accelerations_of_points_are_the_second_differences_of_their_positions(m
     )
     acceleration = np.hstack([record.tub_angular_acceleration, record.tub_acceleration])
     points = np.array([[0.1, -0.2, 0.25]])
-    told = point_accelerations(motion, acceleration, points)[:, 0]
-    from wm_drake.simulation.runs import point_positions
+    computed = point_accelerations(motion, acceleration, points)[:, 0]
 
     positions = point_positions(motion, points)[:, 0]
     differences = np.diff(positions, 2, axis=0) / PERIOD**2
-    np.testing.assert_allclose(told[201:-1], differences[200:], atol=0.02 * np.abs(told).max())
+    largest = np.abs(computed).max()
+    np.testing.assert_allclose(computed[201:-1], differences[200:], atol=0.02 * largest)
 
 
 def test_relative_error_by_hand():
@@ -129,10 +131,10 @@ def test_a_residual_imbalance_is_a_load_of_its_own(machine, reference):
         Case("residual", pair(0.3, 0.2), PROFILE, parameters=residual),
         Case("load", as_load, PROFILE),
     ]
-    told = simulate_many(
+    table = simulate_many(
         machine, [*cases, Case("without", pair(0.3, 0.2), PROFILE)], measures=["regions"]
     )
-    residual_rms, load_rms, without = told.region_displacement.values
+    residual_rms, load_rms, without = table.region_displacement.values
     np.testing.assert_allclose(residual_rms, load_rms, rtol=1e-9)
     assert np.abs(residual_rms / without - 1.0).max() > 0.02
 
@@ -143,7 +145,7 @@ def isotropic():
 
 
 class TestClosedForms:
-    """Of static and dynamic unbalance, on a machine whose centre of mass is on the drum axis, at the first instant."""
+    """Static and dynamic unbalance at time 0; the centre of mass is on the drum axis."""
 
     SPEED, MASS, RADIUS, Y = 30.0, 0.4, 0.25, 0.1
 
@@ -155,7 +157,7 @@ class TestClosedForms:
     def test_equal_masses_in_phase_push_and_do_not_turn(self, isotropic):
         acceleration, turning = self.rates(isotropic, 0.0)
         force = 2.0 * self.MASS * self.RADIUS * self.SPEED**2  # both up at the first instant
-        # the masses ride on the tub too: their own inertia about its centre lets the push turn nothing
+        # the masses add to the mass of the tub; the pair is symmetric in y: no moment about To
         np.testing.assert_allclose(
             acceleration, [0.0, 0.0, force / (42.0 + 2.0 * self.MASS)], rtol=2e-3, atol=1e-3
         )
@@ -179,7 +181,7 @@ class TestClosedForms:
             )[0]
             for load in (
                 pair(0.6, 0.2, phase),
-                Load(  # the same seen in a mirror between front and rear: what was ahead stays ahead
+                Load(  # the load mirrored between front and rear; the leading mass keeps leading
                     unbalances=(
                         Unbalance(mass=0.2, radius=0.25, y=-0.1, phase=phase),
                         Unbalance(mass=0.6, radius=0.25, y=0.1),

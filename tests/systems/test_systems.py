@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoDiff
+from element_ports import own_outputs
+from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
 from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RollPitchYaw, RotationMatrix
 from scipy.interpolate import PchipInterpolator
@@ -14,21 +15,22 @@ from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bush
 from wm_drake.elements.friction_damper import FrictionDamperParameters, packed_damper_law
 from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.elements.spring import SpringStrutParameters
-from wm_drake.parameters import (
-    Bushing,
+from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.damper_laws import (
     CoulombDamper,
-    EndBushing,
-    ForceTable,
     FreeStrokeDamper,
     HavsinDamper,
     MstvDamper,
     StvDamper,
 )
-from wm_drake.simulation.histories import reading_history
+from wm_drake.parameters.elements import Bushing, EndBushing, ForceTable
+from wm_drake.simulation.histories import output_history
 from wm_drake.systems.friction_damper import FrictionDamper
 from wm_drake.systems.six_component_bushing import SixComponentBushing
-from wm_drake.systems.speed_source import REFLECTED_INERTIA, SpeedSource
+from wm_drake.systems.speed_source import REFLECTED_INERTIA, MotorTorque, SpeedSource
+from wm_drake.systems.spin_profile_source import SpinProfileSource
 from wm_drake.systems.spring_strut import SpringStrut
+from wm_drake.systems.tub_force import TubForce
 
 SPRING_CURVE = ForceTable(
     displacement=(-0.03, -0.01, 0.0, 0.01, 0.04), force=(-200.0, -50.0, 0.0, 60.0, 300.0)
@@ -346,7 +348,7 @@ def test_a_bushing_acts_at_its_tub_side_point_along_the_axes_of_its_housing_fram
             port(bushing, context, "generalized_force"), expected, rtol=1e-9, atol=1e-10
         )
         np.testing.assert_allclose(
-            port(bushing, context, "force"), [*-force, *-moment], rtol=1e-9, atol=1e-10
+            own_outputs(bushing, context), [*-force, *-moment], rtol=1e-9, atol=1e-10
         )
 
 
@@ -358,7 +360,7 @@ def test_the_logged_force_of_a_bushing_is_the_reaction_to_what_acts_on_the_tub()
         context = context_of(bushing, x)
         on_tub, on_housing = (
             port(bushing, context, "generalized_force"),
-            port(bushing, context, "force"),
+            own_outputs(bushing, context),
         )
         force, moment = (
             placed.ground_side_rotation @ on_housing[:3],
@@ -379,21 +381,21 @@ def test_readings_repeat_the_force_port_row_by_row(element):
         np.zeros(int(element.kind is kind), dtype=int)
         for kind in (SpringStrut, FrictionDamper, SixComponentBushing)
     ]
-    forces = np.empty((len(states), system.GetOutputPort("force").size()))
-    reading_history(states, sponges, np.empty(0), element.packed, *begins, forces)
+    forces = np.empty((len(states), 6 if element.kind is SixComponentBushing else 1))
+    output_history(states, sponges, np.empty(0), element.packed, *begins, forces)
     for x, own, force in zip(states, sponges[:, : len(element.state)], forces, strict=True):
-        assert np.array_equal(port(system, context_of(system, x, own), "force"), force)
+        assert np.array_equal(own_outputs(system, context_of(system, x, own)), force)
 
 
 def computed(system, context):
-    """All that a system computes, as one array: generalized force, own force, rate of its state."""
+    """All that a system computes, as one array: generalized force, own outputs, rate of its state."""
     rate = (
         system.EvalTimeDerivatives(context).CopyToVector()
         if context.num_continuous_states()
         else []
     )
     return np.array(
-        [*port(system, context, "generalized_force"), *port(system, context, "force"), *rate]
+        [*port(system, context, "generalized_force"), *own_outputs(system, context), *rate]
     )
 
 
@@ -461,23 +463,6 @@ def test_the_ports_follow_what_changes_in_a_context(element):
 
 
 @every_element
-def test_parameters_at_hand_are_those_of_their_context_as_it_is(element):
-    system, x = element.system(), random_plant_states(1, seed=30)[0]
-    moved = moved_on_the_tub(element)
-    held, other = (context_of(system, x, element.state) for _ in range(2))
-    before = computed(system, other)
-    system.hold(held)
-    assert np.array_equal(computed(system, held), before)
-    system.set_parameters(held, moved)
-    after = computed(system, held)
-    assert not np.array_equal(after, before)
-    assert np.array_equal(computed(system, context_of(system, x, element.state)), before)
-    system.release()
-    system.set_parameters(held, element.packed)
-    assert np.array_equal(computed(system, held), before)
-
-
-@every_element
 def test_parameters_of_another_length_are_refused(element):
     system = element.system()
     system.set_name("left")
@@ -495,16 +480,72 @@ def test_a_disengaged_element_exerts_nothing_at_all(damper):
         system = FrictionDamper(placed.packed(), int(placed.has_sponge))
     context = context_of(system, random_plant_states(1, seed=32)[0], state)
     assert not np.any(port(system, context, "generalized_force"))
-    assert not np.any(port(system, context, "force"))
+    assert not np.any(own_outputs(system, context))
 
 
 def test_the_speed_source_actuates_with_its_inertia_times_the_acceleration():
     source = SpeedSource()
     context = source.CreateDefaultContext()
-    assert port(source, context, "actuation") == [0.0]
-    source.set_acceleration(context, 0.73)  # rad/s^2: 7 rpm/s
+    source.GetInputPort("profile_acceleration").FixValue(context, [0.73])  # rad/s^2: 7 rpm/s
     assert port(source, context, "actuation") == [REFLECTED_INERTIA * 0.73]
+    source.GetInputPort("drum_acceleration").FixValue(context, [-2.0])  # takes precedence
+    assert port(source, context, "actuation") == [REFLECTED_INERTIA * -2.0]
+
+
+PROFILE = SpinProfile(time=(0.0, 2.0, 5.0), speed=(1.0, 7.0, 4.0))  # s, rad/s
+
+
+@pytest.mark.parametrize(
+    ("time", "acceleration", "speed"),
+    [(0.0, 3.0, 1.0), (1.0, 3.0, 4.0), (2.0, -1.0, 7.0), (4.0, -1.0, 5.0), (9.0, 0.0, 4.0)],
+)
+def test_the_spin_profile_source_follows_its_profile(time, acceleration, speed):
+    source = SpinProfileSource(PROFILE)
+    context = source.CreateDefaultContext()
+    context.SetTime(time)
+    assert port(source, context, "acceleration") == pytest.approx([acceleration])
+    assert port(source, context, "speed") == pytest.approx([speed])
+    differentiable = source.ToAutoDiffXd()
+    copied = differentiable.CreateDefaultContext()
+    copied.SetTime(AutoDiffXd(time, [1.0]))
+    assert port(differentiable, copied, "speed")[0].derivatives() == pytest.approx([acceleration])
+
+
+def test_a_profile_set_in_a_context_goes_with_it_to_autodiff():
+    source, other = SpinProfileSource(PROFILE), SpinProfile(time=(0.0, 1.0), speed=(0.0, 9.0))
+    context = source.CreateDefaultContext()
+    source.set_profile(context, other)
+    assert port(source, context, "acceleration") == [9.0]
+    assert port(source, source.CreateDefaultContext(), "acceleration") == [3.0]
     differentiable = source.ToAutoDiffXd()
     copied = differentiable.CreateDefaultContext()
     copied.SetTimeStateAndParametersFrom(context)
-    assert port(differentiable, copied, "actuation")[0].value() == REFLECTED_INERTIA * 0.73
+    assert port(differentiable, copied, "acceleration")[0].value() == 9.0
+
+
+def test_motor_torque_is_what_the_reflected_inertia_does_not_take_up():
+    torque = MotorTorque(9, 6)
+    context = torque.CreateDefaultContext()
+    rates = np.zeros(9)
+    rates[6] = 0.5
+    torque.GetInputPort("actuation").FixValue(context, [REFLECTED_INERTIA * 0.5 + 3.25])
+    torque.GetInputPort("generalized_acceleration").FixValue(context, rates)
+    assert port(torque, context, "torque") == [3.25]
+
+
+@pytest.mark.parametrize("scalar", [float, AutoDiffXd])
+def test_the_force_on_the_tub_is_passed_on_or_zero(scalar):
+    system = TubForce() if scalar is float else TubForce().ToAutoDiffXd()
+    context = system.CreateDefaultContext()
+    given = [scalar(value) for value in (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)]
+    values = [
+        float(v) if scalar is float else v.value()
+        for v in port(system, context, "generalized_force")
+    ]
+    assert values == [0.0] * 7
+    system.GetInputPort("tub_force").FixValue(context, given)
+    values = [
+        float(v) if scalar is float else v.value()
+        for v in port(system, context, "generalized_force")
+    ]
+    assert values == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.0]

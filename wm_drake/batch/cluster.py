@@ -1,6 +1,8 @@
-"""Runs on a dask.distributed cluster: plain parameters go out in parcels, rows of numbers come back into the ledger.
+"""Runs of many cases on a dask.distributed cluster.
 
-Needs the extra `cluster`. A worker that dies loses the parcel it was at, which another one runs again.
+The cases are sent as plain parameters, grouped into work items. The results come back as numbers
+and are stored in the ledger. If a worker dies, the cluster sends its work item to another worker.
+This module needs the extra `cluster`.
 """
 
 import functools
@@ -18,24 +20,32 @@ from wm_drake.batch.runs import MEASURES
 from wm_drake.errors import WmDrakeError, input_error
 from wm_drake.model.machine import Machine, build_machine
 from wm_drake.parameters import MachineParameters
-from wm_drake.simulation.runs import DEFAULT_STEP, Case
+from wm_drake.parameters.machine import DEFAULT_STEP
+from wm_drake.simulation.cases import Case
 
-PARCEL = 32
-"""Runs a parcel: a fifth of a second of work, against some milliseconds to send it."""
+CASES_PER_WORK_ITEM = 32
+"""Number of cases that are sent together.
 
-AHEAD = 4
-"""Parcels for each thread of the cluster that are sent before the first comes back."""
+They take about 0.2 s to run and a few milliseconds to send.
+"""
 
-DEATHS = 10
-"""Workers that may die over one parcel before it is given up."""
+WORK_ITEMS_PER_THREAD = 4
+"""Number of work items in flight for each thread of the cluster."""
+
+RETRY_LIMIT = 10
+"""Number of times that a work item is sent again after it failed, for example with its worker."""
 
 
 @contextmanager
 def cluster_client(address: str) -> Iterator[Any]:
-    """A client of the scheduler at an address, e.g. tcp://host:8786.
+    """Open a client of the scheduler at an address and close it at the end.
+
+    Args:
+        address: Address of the scheduler, for example tcp://host:8786.
 
     Raises:
-        InputError: the extra is not installed, nobody answers, or workers have other sources.
+        InputError: the extra `cluster` is not installed, no scheduler answers, there are no
+            workers, or a worker has other sources or library versions.
     """
     try:
         from distributed import Client
@@ -47,7 +57,9 @@ def cluster_client(address: str) -> Iterator[Any]:
         client = Client(address, timeout=10, set_as_default=False)
     except (OSError, ValueError) as error:
         raise input_error(
-            f"no scheduler answers at '{address}' ({type(error).__name__})", where="--cluster"
+            f"no scheduler answers at '{address}' ({type(error).__name__}); "
+            "give the address of a running dask scheduler, such as tcp://host:8786",
+            where="--cluster",
         ) from None
     try:
         check_workers(client)
@@ -57,14 +69,21 @@ def cluster_client(address: str) -> Iterator[Any]:
 
 
 def check_workers(client: Any) -> None:
-    """Refuses a cluster without workers, or whose workers would compute with other sources or libraries."""
+    """Check that a cluster has workers and that all have the sources and versions of this computer.
+
+    Raises:
+        InputError: there are no workers, or one has other sources or library versions.
+    """
     found = client.run(sources_version)
     if not found:
-        raise input_error("the cluster has no workers", where="--cluster")
+        raise input_error("the cluster has no workers; start at least one", where="--cluster")
     for worker, version in found.items():
         if version != sources_version():
-            message = f"worker {worker} has other sources or versions ({version}) than this computer ({sources_version()})"
-            raise input_error(message, where="--cluster")
+            raise input_error(
+                f"worker {worker} has other sources or versions ({version}) than this computer "
+                f"({sources_version()}); install the same wm-drake and libraries on both",
+                where="--cluster",
+            )
 
 
 def simulate_on_cluster(
@@ -77,14 +96,22 @@ def simulate_on_cluster(
     step: float = DEFAULT_STEP,
     progress: Callable[[int], None] = lambda done: None,
 ) -> xr.Dataset:
-    """As `simulate_remembered`, with the runs on a cluster.
+    """Run the cases whose results are not in a ledger on a cluster, and return the table of all.
+
+    The table equals that of `simulate_many`. Results are stored in the ledger as they come back.
 
     Args:
-        machine, cases, ledger, measures, step, progress: As there.
-        client: From `cluster_client`.
+        machine: A built machine.
+        cases: Cases to run. They are taken one by one as needed.
+        ledger: An open ledger.
+        client: Client of the cluster, from `cluster_client`.
+        measures: Names of measures, keys of `wm_drake.batch.runs.MEASURES`.
+        step: Step size. [s]
+        progress: Called with the number of results in the ledger.
 
     Raises:
-        WmDrakeError: a parcel was given up; what came back before is in the ledger.
+        WmDrakeError: a work item failed more often than the retry limit allows, or the connection
+            to the cluster broke. Results that came back before are in the ledger.
     """
     from distributed import as_completed
 
@@ -101,32 +128,39 @@ def simulate_on_cluster(
                 yield key, case
 
     queue = missing()
-    parcels: Iterator[tuple[tuple[str, Case], ...]] = iter(
-        lambda: tuple(itertools.islice(queue, PARCEL)), ()
+    work_items: Iterator[tuple[tuple[str, Case], ...]] = iter(
+        lambda: tuple(itertools.islice(queue, CASES_PER_WORK_ITEM)), ()
     )
 
-    def send(parcel: tuple[tuple[str, Case], ...]) -> Any:
+    def send(work_item: tuple[tuple[str, Case], ...]) -> Any:
         return client.submit(
-            run_parcel, machine.parameters, parcel, wanted, step, pure=False, retries=DEATHS
+            run_work_item,
+            machine.parameters,
+            work_item,
+            wanted,
+            step,
+            pure=False,
+            retries=RETRY_LIMIT,
         )
 
-    ahead = AHEAD * max(1, sum(client.nthreads().values()))
+    in_flight = WORK_ITEMS_PER_THREAD * max(1, sum(client.nthreads().values()))
     running = as_completed(
-        [send(parcel) for parcel in itertools.islice(parcels, ahead)], loop=client.loop
+        [send(work_item) for work_item in itertools.islice(work_items, in_flight)],
+        loop=client.loop,
     )
-    held = len(ledger)
-    progress(held)
+    progress(len(ledger))
     try:
         for future in running:
             ledger.put_all(future.result())
             progress(len(ledger))
-            for parcel in itertools.islice(parcels, 1):
-                running.add(send(parcel))
+            for work_item in itertools.islice(work_items, 1):
+                running.add(send(work_item))
     except WmDrakeError:
         raise
-    except Exception as error:  # of a worker or of the way to it; the cluster has many kinds
+    except Exception as error:  # workers and the connection raise many types of errors
         raise WmDrakeError(
-            f"--cluster: {type(error).__name__}: {error}; finished runs are kept, go on with --resume"
+            f"--cluster: {type(error).__name__}: {error}; finished runs are kept: go on with "
+            "--resume"
         ) from None
     rows = {}
     for number, (name, key) in enumerate(zip(names, keys, strict=True)):
@@ -139,30 +173,39 @@ def simulate_on_cluster(
     return as_table(machine.parameters, wanted, rows)
 
 
-def run_parcel(
+def run_work_item(
     parameters: MachineParameters,
-    parcel: tuple[tuple[str, Case], ...],
+    work_item: tuple[tuple[str, Case], ...],
     measures: tuple[str, ...],
     step: float,
 ) -> dict[str, Result]:
-    """What a worker does: runs a parcel of cases in its own process, and gives the results by key."""
-    cases = [case for _, case in parcel]
+    """Run the cases of a work item in the process of a worker and return their results by key.
+
+    Args:
+        parameters: The machine.
+        work_item: Pairs of the key of a run and its case.
+        measures: Names of measures, keys of `wm_drake.batch.runs.MEASURES`.
+        step: Step size. [s]
+    """
+    cases = [case for _, case in work_item]
     results: dict[str, Result] = {}
     simulate_many(
-        _built(parameters.model_dump_json(exclude={"sources"}), parameters),
+        _built_machine(
+            _HashableParameters(parameters.model_dump_json(exclude={"sources"}), parameters)
+        ),
         cases,
         measures=measures,
         step=step,
         workers=1,
         finished=lambda run: results.update(
-            {parcel[run.number][0]: Result(run.values, run.diverged)}
+            {work_item[run.number][0]: Result(run.values, run.diverged)}
         ),
     )
     return results
 
 
-class _Keyed:
-    """Parameters under a text that tells them apart: they do not hash."""
+class _HashableParameters:
+    """Machine parameters that are hashed and compared by their JSON text, as a key of a cache."""
 
     def __init__(self, text: str, parameters: MachineParameters) -> None:
         self.text, self.parameters = text, parameters
@@ -171,14 +214,13 @@ class _Keyed:
         return hash(self.text)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Keyed) and self.text == other.text
-
-
-def _built(text: str, parameters: MachineParameters) -> Machine:
-    return _built_once(_Keyed(text, parameters))
+        return isinstance(other, _HashableParameters) and self.text == other.text
 
 
 @functools.lru_cache(maxsize=2)
-def _built_once(keyed: _Keyed) -> Machine:
-    """A Drake diagram is never freed: a worker builds each machine once."""
-    return build_machine(keyed.parameters)
+def _built_machine(hashable: _HashableParameters) -> Machine:
+    """Return the built machine, from the cache if it was built before.
+
+    A Drake diagram is never freed, so a worker builds each machine only once.
+    """
+    return build_machine(hashable.parameters)

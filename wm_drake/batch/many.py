@@ -1,4 +1,4 @@
-"""simulate_many(machine, cases): thousands of cases on all cores, measured as they end, in flat memory."""
+"""simulate_many(machine, cases): run thousands of cases on all cores, with constant memory."""
 
 import os
 from collections.abc import Callable, Iterable
@@ -13,22 +13,24 @@ from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.runs import AXES, Case, checked_step
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.outputs import AXES
+from wm_drake.simulation.runs import checked_step
 
 _VARIABLES = {
     "detergent_displacement": (
         "axis",
         "m",
-        "largest displacement of the tub point nearest the detergent box, D of [B]",
+        "largest displacement of the tub point nearest to the detergent box, D of [B]",
     ),
     "gasket_force": ("axis", "N", "largest force of the gasket on the housing, F of [B]"),
     "gasket_moment": ("axis", "N m", "largest moment of the gasket on the housing, M of [B]"),
     "amplitude": ("sensor", "m", "largest absolute value of the envelopes"),
-    "critical_speed": ("sensor", "rad/s", "drum speed where it occurs"),
+    "critical_speed": ("sensor", "rad/s", "drum speed at which the amplitude occurs"),
     "power_mean": (
         "sensor",
         "m",
-        "mean of order 20 of the filtered displacement: a smooth stand-in for the amplitude",
+        "power mean of order 20 of the filtered displacement; a smooth substitute of the amplitude",
     ),
     "smallest_gap": ("", "m", "smallest distance between tub group and housing"),
     "region_displacement": (
@@ -39,16 +41,16 @@ _VARIABLES = {
     "region_displacement_integrated": (
         "region accelerometer axis",
         "m",
-        "the same from acceleration, integrated twice",
+        "RMS displacement in each region, from the acceleration integrated twice",
     ),
 }
 
 
 class SimulationInterrupted(KeyboardInterrupt):
-    """Ctrl-C during `simulate_many`; `finished` is the table of the runs that had ended."""
+    """Ctrl-C was pressed during `simulate_many`; `finished` is the table of the finished runs."""
 
     def __init__(self, finished: xr.Dataset) -> None:
-        """Keeps the table of what had ended."""
+        """Store the table of the finished runs."""
         super().__init__(f"interrupted after {finished.sizes['run']} runs")
         self.finished = finished
 
@@ -64,30 +66,38 @@ def simulate_many(
     progress: Callable[[int], None] = lambda done: None,
     finished: Callable[[RunResult], None] = lambda ended: None,
 ) -> xr.Dataset:
-    """Runs many cases of one machine with the compiled engine, several side by side in the vector units of each core.
+    """Run many cases of one machine with the compiled engine and return a table of their measures.
 
-    The numbers of a run do not depend on how many workers there are or what it runs beside.
+    Each core runs several cases at once, one per SIMD lane. The results of a run do not depend on
+    the number of workers or on the other cases.
 
     Args:
         machine: A built machine.
-        cases: What to run; taken one by one as they are needed, so a generator keeps memory flat.
-        measures: Keys of `MEASURES`: "extremes" are D, F, M of [B], "amplitudes" those of `measure` with their speeds, "power
-            means" are smooth stand-ins for them (`measures.power_means`), "gap"
-            is the smallest distance between tub group and housing (NaN if the SDF has no shapes), "regions" the RMS
-            displacements of the accelerometers in the regions of the profile, by number (`wm_drake.simulation.vibration`).
-        step: As for `simulate`.
-        histories: Whether each run handed to `finished` shall carry its record, as `simulate` gives it.
-        workers: Threads; as many as cores by default.
-        progress: Called with the number of runs that have ended; `outputs.progress_bar` shows them with an estimate.
-        finished: Called with each run as it ends.
+        cases: Cases to run. They are taken one by one as needed, so memory stays constant if this
+            is a generator.
+        measures: Names of measures, keys of `MEASURES`:
+            "extremes": D, F and M of [B];
+            "amplitudes": amplitudes and critical speeds as in `Measures`;
+            "power means": smooth substitutes for the amplitudes (`measures.power_means`);
+            "gap": smallest distance between tub group and housing, NaN if the SDF has no shapes;
+            "regions": RMS displacements of the accelerometers in the regions of the profile
+            (`wm_drake.simulation.vibration`).
+        step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
+            step size of the machine is used. [s]
+        histories: Whether each `RunResult` contains the record of the run, as from `simulate`.
+        workers: Number of threads; None for the number of cores.
+        progress: Called with the number of finished runs; `wm_drake.progress_bar` displays it.
+        finished: Called with each run when it is finished.
 
     Returns:
-        Table over `run`, the number of the case: coordinate `case` with its name; the measures as in `Measures` (SI,
-        attrs["units"]); `diverged`: when and why a run stopped early, "" if it did not; its measures are those up to there.
+        Table over `run`, the number of the case. The coordinate `case` holds its name. The
+        variables are the measures (SI, attrs["units"]) and `diverged`: time and reason if a run
+        diverged, else "". The measures of a run that diverged cover the time until then.
 
     Raises:
-        InputError: a case or an argument at fault; runs that had ended were handed to `finished`.
-        SimulationInterrupted: Ctrl-C.
+        InputError: a case or an argument is wrong. `finished` was called for the runs that had
+            ended before.
+        SimulationInterrupted: Ctrl-C was pressed.
     """
     wanted = tuple(dict.fromkeys(measures))
     for name in wanted:
@@ -97,7 +107,7 @@ def simulate_many(
     results: dict[int, tuple[str, str, list[FloatArray]]] = {}
 
     def collect(runs: list[RunResult]) -> None:
-        for run in runs:  # first of all into the table, whatever the callbacks do
+        for run in runs:  # fill the table first: the callbacks may raise
             results[run.number] = (run.case.name, run.diverged, list(run.values.values()))
         for run in runs:
             finished(run)
@@ -116,7 +126,17 @@ def as_table(
     measures: tuple[str, ...],
     results: dict[int, tuple[str, str, list[FloatArray]]],
 ) -> xr.Dataset:
-    """The table of runs by number: name of the case, when and why it diverged, its measures in the order of `MEASURES`."""
+    """Return the table of runs that `simulate_many` describes.
+
+    Args:
+        parameters: Machine, for the names of the sensors.
+        measures: Names of measures, keys of `MEASURES`.
+        results: For each number of a run: name of the case, text of `diverged`, and the values of
+            the variables that the measures have in `MEASURES`, in this order.
+
+    Raises:
+        InputError: the runs have different numbers of regions.
+    """
     numbers = sorted(results)
     labels = {
         "run": numbers,
@@ -144,16 +164,17 @@ def as_table(
 def _region_count(
     measures: tuple[str, ...], results: dict[int, tuple[str, str, list[FloatArray]]]
 ) -> int:
-    """How many regions the profile of all runs has.
+    """Return the number of regions, which must be the same for all runs.
 
     Raises:
-        InputError: not all have equally many.
+        InputError: the runs have different numbers of regions.
     """
     names = [name for measure in measures for name in MEASURES[measure]]
     counts = {len(values[names.index("region_displacement")]) for _, _, values in results.values()}
     if len(counts) > 1:
         raise input_error(
-            f"have {' and '.join(map(str, sorted(counts)))} regions; runs of one table need equally many",
+            f"the profiles have {' and '.join(map(str, sorted(counts)))} regions; "
+            "all runs of one table need the same number",
             key="profile",
         )
     return counts.pop() if counts else 0
@@ -166,7 +187,11 @@ def _run_all(
     workers: int,
     collect: Callable[[list[RunResult]], None],
 ) -> None:
-    """Feeds batches to threads, no more of them than keeps those busy, and hands on what ends."""
+    """Run all cases in threads and pass finished runs to `collect`.
+
+    At most one batch more than there are workers is prepared at a time, so that memory stays
+    constant.
+    """
     running: set[Future[list[RunResult]]] = set()
 
     def gather(at_most: int) -> None:
@@ -177,14 +202,14 @@ def _run_all(
 
     with ThreadPoolExecutor(workers) as pool:
         try:
-            for kind, work_items in preparation.batches(cases):
-                running.add(pool.submit(runner.run, kind, work_items))
-                gather(workers)  # one waits while the others run
+            for key, work_items in preparation.batches(cases):
+                running.add(pool.submit(runner.run, key, work_items))
+                gather(workers)  # one batch waits while the others run
             gather(0)
         except BaseException:
             runner.stopped.set()
             pool.shutdown(wait=True, cancel_futures=True)
-            # what had ended meanwhile is not lost
+            # collect the runs that finished in the meantime
             good = [f for f in running if f.done() and not f.cancelled() and f.exception() is None]
             collect([run for future in good for run in future.result()])
             raise

@@ -1,4 +1,4 @@
-"""simulate_many with a memory: runs that a ledger holds are not run again, others enter it the moment they end."""
+"""simulate_remembered: run the cases whose results are not in a ledger yet, and store them."""
 
 import functools
 import hashlib
@@ -13,18 +13,20 @@ from wm_drake.batch.runs import MEASURES, RunResult
 from wm_drake.model.bodies import sdf_path
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
-from wm_drake.simulation.runs import Case, checked_step, versions
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.records import versions
+from wm_drake.simulation.runs import checked_step
 
 _ROOMS_AFTER = ("cli", "batch/ledger.py", "report", "rigs", "studies")
-"""What of the package does not determine a run."""
+"""Parts of the package that do not influence the result of a run."""
 
-_NO_NUMBERS = {"name", "about", "measured", "sources", "loads", "profile"}
-"""Parts of a machine that do not determine a run, or that the case has as its own."""
+_EXCLUDED = {"name", "about", "measured", "sources", "loads", "profile"}
+"""Fields of a machine that do not influence a run, or that the case replaces by its own."""
 
 
 @functools.cache
 def sources_version() -> str:
-    """A hash of all that computes a run, apart from its numbers: our sources and the versions of the libraries."""
+    """Return a hash of the program that computes a run: the sources and the library versions."""
     root = Path(__file__).parents[1]
     digest = hashlib.sha256(repr(sorted(versions().items())).encode())
     for path in sorted(root.rglob("*.py")):
@@ -35,7 +37,7 @@ def sources_version() -> str:
 
 
 def model_version(parameters: MachineParameters) -> str:
-    """A hash of the SDF of a machine."""
+    """Return a hash of the SDF file of a machine."""
     return hashlib.sha256(sdf_path(parameters.model).read_bytes()).hexdigest()[:16]
 
 
@@ -46,7 +48,20 @@ def run_keys(
     measures: Iterable[str],
     step: float | None = None,
 ) -> Iterator[str]:
-    """The key of each case: of its numbers, its load and profile, SDF, step, engine, measures, sources, versions."""
+    """Yield the key of each case in a ledger: a hash of all that determines the result.
+
+    This includes parameters, load, profile, gasket, SDF file, step size, engine, measures, sources
+    and library versions. The name of the case is not included.
+
+    Args:
+        parameters: Machine of the cases that have no parameters of their own.
+        cases: Cases.
+        measures: Names of measures, keys of `wm_drake.batch.runs.MEASURES`.
+        step: Step size; None for that of the machine. [s]
+
+    Raises:
+        InputError: the step size does not divide the output period.
+    """
     common: dict[str, object] = {
         "model": model_version(parameters),
         "sources": sources_version(),
@@ -55,7 +70,7 @@ def run_keys(
     common |= {"step": checked_step(parameters, step)}
     common |= {"measures": sorted(set(measures))}
     for case in cases:
-        numbers = (case.parameters or parameters).model_dump_json(exclude=_NO_NUMBERS)
+        numbers = (case.parameters or parameters).model_dump_json(exclude=_EXCLUDED)
         yield key_of(
             **common, numbers=numbers, load=case.load, profile=case.profile, gasket=case.gasket
         )
@@ -71,43 +86,51 @@ def simulate_remembered(
     workers: int | None = None,
     progress: Callable[[int], None] = lambda done: None,
 ) -> xr.Dataset:
-    """As `simulate_many`, and gives the same table, but takes runs from the ledger where it can.
+    """Run the cases whose results are not in a ledger and return the table of all cases.
+
+    The table equals that of `simulate_many`. Results are stored in the ledger when a run is
+    finished, so an interruption or an error loses none of them.
 
     Args:
-        machine, cases, measures, step, workers: As there.
-        ledger: Open; what had ended before an interruption or a fault is in it.
-        progress: Called with the number of runs that there are results of.
+        machine: A built machine.
+        cases: Cases to run. They are taken one by one as needed.
+        ledger: An open ledger.
+        measures: Names of measures, keys of `wm_drake.batch.runs.MEASURES`.
+        step: Step size; None for that of the machine. [s]
+        workers: Number of threads; None for the number of cores.
+        progress: Called with the number of cases that have a result.
 
     Raises:
-        InputError, SimulationInterrupted: As there.
-        LedgerError: the ledger cannot be written to, or is damaged.
+        InputError: a case or an argument is wrong.
+        SimulationInterrupted: Ctrl-C was pressed.
+        LedgerError: the ledger cannot be written to, or it is damaged.
     """
     wanted = tuple(dict.fromkeys(measures))
     names: list[str] = []
     keys: list[str] = []
-    to_run: list[int] = []  # numbers of the cases that are run, in the order they are taken
-    kept = 0
+    to_run: list[int] = []  # numbers of the cases that are run, in the order of running
+    done = 0
 
     def missing() -> Iterator[Case]:
-        nonlocal kept
+        nonlocal done
         for case in cases:
             (key,) = run_keys(machine.parameters, [case], measures=wanted, step=step)
             names.append(case.name)
             keys.append(key)
             if key in ledger:
-                kept += 1
-                progress(kept)
+                done += 1
+                progress(done)
             else:
                 to_run.append(len(keys) - 1)
                 yield case
 
-    def keep(run: RunResult) -> None:
-        nonlocal kept
+    def store(run: RunResult) -> None:
+        nonlocal done
         ledger.put(keys[to_run[run.number]], run.values, run.diverged)
-        kept += 1
-        progress(kept)
+        done += 1
+        progress(done)
 
-    simulate_many(machine, missing(), measures=wanted, step=step, workers=workers, finished=keep)
+    simulate_many(machine, missing(), measures=wanted, step=step, workers=workers, finished=store)
     rows = {}
     for number, (name, key) in enumerate(zip(names, keys, strict=True)):
         result = ledger.get(key)

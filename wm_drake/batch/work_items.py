@@ -1,4 +1,4 @@
-"""Cases -> work_items: packed numbers, in batches that can run side by side."""
+"""Cases -> work items: packed numbers, in batches that can run side by side."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -10,24 +10,25 @@ from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.engines.compiled.packing import Layout, initial_state, pack_bodies, pack_elements
 from wm_drake.errors import InputError, Problem, input_error
-from wm_drake.model.machine import Machine, Setup
+from wm_drake.model.machine import Machine
+from wm_drake.model.setup import Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.outputs import measured_points
-from wm_drake.simulation.runs import Case, check_bearing
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.runs import check_bearing
 
 KEPT_BODIES, KEPT_NUMBERS = 64, 2048
-"""How many sets of bodies with a load, and of other numbers, are remembered for cases to come."""
+"""How many sets of bodies with a load, and of other numbers, are cached."""
 
 
 @dataclass(frozen=True)
 class PackedParameters:
-    """What is packed of a set of numbers apart from bodies and load.
+    """The packed numbers of a machine, without bodies and load.
 
     Attributes:
-        setup: From which it was packed, without load; its Context has been used again since.
+        setup: The setup that was packed, without load; its Context has been used again since.
         elements, layout: From `pack_elements`.
-        points: What is measured of the motion, `readings.measured_points` one after the other.
+        points: Measured points, from `outputs.measured_points`, one after the other.
         rest: State of rest.
     """
 
@@ -40,14 +41,14 @@ class PackedParameters:
 
 @dataclass(frozen=True)
 class WorkItem:
-    """A case, packed: all that its run needs.
+    """A packed case: all that its run needs.
 
     Attributes:
-        number: Of the case, in the order given.
-        case: What to run.
-        numbers: Shared by the cases with these parameters.
-        packed: From `pack`.
-        begin: State to begin with.
+        number: Number of the case, in the given order.
+        case: The case.
+        numbers: Shared by all cases with these parameters.
+        packed: All packed numbers, as from `pack`.
+        begin: State at the start of the run.
     """
 
     number: int
@@ -59,17 +60,20 @@ class WorkItem:
 
 @dataclass(frozen=True)
 class BatchKey:
-    """What runs side by side must have in common."""
+    """What runs must have in common to run side by side."""
 
     profile: SpinProfile
     layout: Layout
 
 
 class Preparation:
-    """Packs cases of one machine. To set it up takes a good part of the time of a run, so that is done as rarely as can be."""
+    """Packs cases of one machine.
+
+    To set a machine up takes a good part of the time of a run, so its results are cached.
+    """
 
     def __init__(self, machine: Machine, step: float) -> None:
-        """For a built machine, and the step that it will run with. [s]"""
+        """Prepare for a built machine and a step size. [s]"""
         self.machine, self.step = machine, step
         self.sensors = list(machine.parameters.sensors)
         self._context: Context | None = None
@@ -77,22 +81,24 @@ class Preparation:
         self._known_numbers: dict[tuple[int, bool], PackedParameters] = {}
 
     def batches(self, cases: Iterable[Case]) -> Iterator[tuple[BatchKey, list[WorkItem]]]:
-        """Up to `WIDTH` work_items each that can run side by side, in the order of the cases as far as that goes.
+        """Yield batches of up to `WIDTH` work items that can run side by side.
+
+        Items are in the order of the cases as far as possible.
 
         Raises:
-            InputError: of a case; says which.
+            InputError: a case is wrong; the message names it.
         """
         waiting: dict[BatchKey, list[WorkItem]] = {}
         for number, case in enumerate(cases):
-            item = self._job(number, case)
-            kind = BatchKey(case.profile, item.numbers.layout)
-            work_items = waiting.setdefault(kind, [])
+            item = self._work_item(number, case)
+            key = BatchKey(case.profile, item.numbers.layout)
+            work_items = waiting.setdefault(key, [])
             work_items.append(item)
             if len(work_items) == WIDTH:
-                yield kind, waiting.pop(kind)
+                yield key, waiting.pop(key)
         yield from waiting.items()
 
-    def _job(self, number: int, case: Case) -> WorkItem:
+    def _work_item(self, number: int, case: Case) -> WorkItem:
         try:
             bodies, numbers = self._bodies(case), self._numbers(case)
         except InputError as error:
@@ -104,7 +110,7 @@ class Preparation:
         return WorkItem(number, case, numbers, np.concatenate([bodies, numbers.elements]), begin)
 
     def _bodies(self, case: Case) -> FloatArray:
-        """Packed bodies: the same for all cases with these bodies, frames and load."""
+        """Return the packed bodies, which cases with the same bodies, frames and load share."""
         parameters = case.parameters or self.machine.parameters
         key = (
             parameters.bodies,
@@ -124,15 +130,15 @@ class Preparation:
         return bodies
 
     def _numbers(self, case: Case) -> PackedParameters:
-        """All else of a case: the same whatever its load."""
-        # the parameters are held by the setup, so that no others can take their id meanwhile
+        """Return all other packed numbers of a case, which do not depend on its load."""
+        # the cached setup holds the parameters, so that no others can get the same id
         key = (id(case.parameters or self.machine.parameters), case.gasket)
         if key not in self._known_numbers:
             if len(self._known_numbers) >= KEPT_NUMBERS:
                 del self._known_numbers[next(iter(self._known_numbers))]
             setup = self._set_up(case)
             elements, layout = pack_elements(setup)
-            points, rest = measured_points(setup).ravel(), initial_state(setup, case.profile)
+            points, rest = setup.measured_points.ravel(), initial_state(setup, case.profile)
             self._known_numbers[key] = PackedParameters(setup, elements, layout, points, rest)
         return self._known_numbers[key]
 

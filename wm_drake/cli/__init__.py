@@ -1,4 +1,8 @@
-"""The command `wm-drake`, a module per command. No physics and no statistics here: it reads, calls a study, and writes."""
+"""Command `wm-drake`, one module per command.
+
+A command reads options and files, calls a study, and writes the results. This room holds no physics
+and no statistics.
+"""
 
 import sys
 
@@ -22,7 +26,7 @@ app.command()(calibrate.calibrate)
 
 
 def main() -> None:
-    """Runs the command; the user's mistakes end it with their message and exit code 2."""
+    """Run the command; an error of the input ends it with a message and exit code 2."""
     try:
         app()
     except WmDrakeError as error:

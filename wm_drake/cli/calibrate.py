@@ -1,4 +1,4 @@
-"""`wm-drake calibrate`: turn a machine's unknown numbers until it moves as was measured."""
+"""Command `wm-drake calibrate`: fit unknown numbers of a machine to measured amplitudes."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -18,10 +18,10 @@ from wm_drake.cli.common import (
     interruptible,
     load_parameters,
 )
-from wm_drake.cli.progress import result_folder
+from wm_drake.cli.result_folder import result_folder
 from wm_drake.errors import InputError, input_error
 
-if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.parameters import MachineParameters
     from wm_drake.studies.calibration.calibration import Calibration, Plan
     from wm_drake.studies.calibration.prediction import Prediction
@@ -35,56 +35,63 @@ DEFAULT_OUT = Path("wm-drake-calibrate")
 def calibrate(
     free: Annotated[
         Path,
-        typer.Option(help="Which quantities are free, with bounds and priors.", metavar="FILE"),
+        typer.Option(help="YAML file of the free quantities, bounds and priors.", metavar="FILE"),
     ],
     machine: MachineOption = "reference",
     targets: Annotated[
         list[Path] | None,
         typer.Option(
-            help="Measured amplitudes. Repeatable; those of the machine file by default.",
+            help="Measured amplitudes. Repeatable. Default: those of the machine file.",
             metavar="CSV",
         ),
     ] = None,
     method: Annotated[
         str,
         typer.Option(
-            help="least-squares, basin-hopping (slower, goes further) or evolution.", metavar="NAME"
+            help="Search method: least-squares, basin-hopping (slower, searches more widely) or "
+            "evolution.",
+            metavar="NAME",
         ),
     ] = "least-squares",
-    starts: Annotated[int, typer.Option(help="Searches, each from a start of its own.")] = 8,
+    starts: Annotated[
+        int, typer.Option(help="Number of searches, each with its own starting point.")
+    ] = 8,
     iterations: Annotated[
-        int, typer.Option(help="Of each search at most; 0: as many as the method takes.")
+        int,
+        typer.Option(help="Largest number of iterations per search; 0: default of the method."),
     ] = 0,
-    seed: Annotated[int, typer.Option(help="Of the starts.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the random starting points.")] = 0,
     deviation: Annotated[
         float, typer.Option(help="Standard deviation of a measured amplitude, in percent.")
     ] = 5.0,
-    resolution: Annotated[float, typer.Option(help="Amplitudes are rounded to this, mm.")] = 0.1,
+    resolution: Annotated[
+        float, typer.Option(help="Step to which measured amplitudes are rounded, in mm.")
+    ] = 0.1,
     weight: Annotated[
         list[str] | None,
         typer.Option(
-            help="Weight of a load, a sensor, or LOAD:SENSOR; 1 by default. Repeatable.",
+            help="Weight of a load, a sensor, or LOAD:SENSOR. Default: 1. Repeatable.",
             metavar="NAME=NUMBER",
         ),
     ] = None,
     leave_out: Annotated[
         list[str] | None,
         typer.Option(
-            help="Loads to calibrate without, then to predict: back,front. Repeatable.",
+            help="Loads to hold out: calibrate without them, then predict them. Repeatable.",
             metavar="LOAD[,LOAD]",
         ),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(help="Threads; as many as cores by default.")
+        int | None, typer.Option(help="Number of threads. Default: number of cores.")
     ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with an interrupted calibration.")
+        bool, typer.Option("--resume", help="Continue an interrupted calibration.")
     ] = False,
     out: Annotated[Path, typer.Option(help="Folder for the results.", metavar="DIR")] = DEFAULT_OUT,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
-    """Find machines that move as was measured, within bounds and priors."""
+    """Fit unknown numbers of a machine to measured amplitudes, within bounds and with priors."""
     from wm_drake.studies.calibration.calibration import Plan
 
     parameters = _with_targets(load_parameters(machine, sets), targets)
@@ -92,7 +99,7 @@ def calibrate(
     check_buildable(machine, parameters)
     plan = Plan(method, starts, seed, iterations, deviation / 100.0, 1e-3 * resolution)
     groups = [entry.split(",") for entry in leave_out or []]
-    with interruptible(f"what was evaluated is in {out}: go on with --resume"):
+    with interruptible(f"finished evaluations are kept in {out}; continue with --resume"):
         calibration, predictions = _run(
             parameters, free, wanted, plan, groups, out, workers, resume
         )
@@ -105,7 +112,7 @@ def calibrate(
 
 
 def _with_targets(parameters: "MachineParameters", files: list[Path] | None) -> "MachineParameters":
-    """The machine with other files of measured amplitudes than its own, if any are given."""
+    """Return the machine with other files of measured amplitudes, if any are given."""
     if not files:
         return parameters
     return parameters.model_copy(
@@ -133,7 +140,9 @@ def _weights(entries: list[str] | None) -> dict[str, float]:
         try:
             weights[name] = float(number)
         except ValueError:
-            raise input_error(f"'{entry}' is not NAME=NUMBER", where="--weight") from None
+            raise input_error(
+                f"'{entry}' does not have the form NAME=NUMBER", where="--weight"
+            ) from None
     return weights
 
 
@@ -142,30 +151,28 @@ def _run(
     free: Path,
     targets: "Targets",
     plan: "Plan",
-    left_out: list[list[str]],
+    held_out: list[list[str]],
     out: Path,
     workers: int | None,
     resume: bool,
 ) -> "tuple[Calibration, list[Prediction]]":
-    """Calibrates, with its ledger in the folder of the results from the first evaluation on."""
+    """Run the calibration and the predictions, with a ledger of evaluations in the folder `out`."""
     from wm_drake.batch.ledger import open_ledger
     from wm_drake.model.machine import build_machine
     from wm_drake.parameters import located
     from wm_drake.parameters.free import load_free
     from wm_drake.studies.calibration.calibration import calibrate, identity_of
-    from wm_drake.studies.calibration.parameter_map import turning_of
-    from wm_drake.studies.calibration.prediction import check_left_out, predict
+    from wm_drake.studies.calibration.parameter_map import parameter_map_of
+    from wm_drake.studies.calibration.prediction import check_held_out, predict
 
     free_file, built = load_free(existing_file(free, "--free")), build_machine(parameters)
     plan.check()
-    check_left_out(targets, left_out)
+    check_held_out(targets, held_out)
     try:
-        turning_of(built, free_file)
+        parameter_map_of(built, free_file)
     except InputError as error:
         raise located(error, free) from None
-    with result_folder(
-        out
-    ):  # nothing to move in yet: finds out whether the place can be written to
+    with result_folder(out):  # checks before the search that the folder can be written to
         pass
     with open_ledger(
         out / "ledger.sqlite", identity_of(built, free_file, targets, plan), resume=resume
@@ -174,9 +181,9 @@ def _run(
             calibration = calibrate(
                 built, free_file, targets, plan, ledger, workers=workers, report=report
             )
-        with _progress(len(left_out) * plan.starts) as report:
+        with _progress(len(held_out) * plan.starts) as report:
             predictions = predict(
-                built, free_file, calibration, left_out, ledger, workers=workers, report=report
+                built, free_file, calibration, held_out, ledger, workers=workers, report=report
             )
         ledger.mark_finished()
     return calibration, predictions
@@ -184,7 +191,10 @@ def _run(
 
 @contextmanager
 def _progress(searches: int) -> Iterator[Callable[[int, int, float], None]]:
-    """A bar over searches on standard error, with what the running one has reached and the time that is left."""
+    """Show a progress bar of the searches on standard error, and yield the function to update it.
+
+    The bar shows the number of machines and the least cost of the current search.
+    """
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -203,7 +213,7 @@ def _progress(searches: int) -> Iterator[Callable[[int, int, float], None]]:
     )
     with Progress(
         *columns,
-        TextColumn("left"),
+        TextColumn("remaining"),
         TimeRemainingColumn(),
         console=Console(stderr=True),
         transient=True,
@@ -234,7 +244,7 @@ def _write(
     from wm_drake.studies.calibration.outcome import amplitude_rows, quantity_table, solved_machine
 
     for number, solution in enumerate(calibration.solutions, start=1):
-        text = machine_yaml(solved_machine(calibration.turning, solution))
+        text = machine_yaml(solved_machine(calibration.parameter_map, solution))
         (folder / f"machine_{number}.yaml").write_text(text, encoding="utf-8")
     quantity_table(calibration).to_csv(folder / "quantities.csv", index=False, float_format="%.6g")
     amplitude_rows(calibration).to_csv(folder / "amplitudes.csv", index=False, float_format="%.4f")
@@ -246,14 +256,14 @@ def _write(
 def _shown(
     parameters: "MachineParameters", calibration: "Calibration"
 ) -> "tuple[SpinResult, list[tuple[str, Modes]]]":
-    """Spin runs and modes of the best solution, for the report."""
+    """Return spin runs and natural modes of the best solution, for the report."""
     from wm_drake.model.machine import build_machine
-    from wm_drake.simulation.runs import case_of
+    from wm_drake.simulation.cases import case_of
     from wm_drake.studies.calibration.outcome import solved_machine
     from wm_drake.studies.description.modal import natural_modes
     from wm_drake.studies.spin.study import run_spin
 
-    solved = solved_machine(calibration.turning, calibration.solutions[0])
+    solved = solved_machine(calibration.parameter_map, calibration.solutions[0])
     cases = [case_of(solved, name, gasket=gasket) for name, gasket in calibration.targets.loads]
     built = build_machine(solved)
     titles = (
@@ -270,24 +280,23 @@ def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Pat
     best = calibration.solutions[0]
     mean, largest = mean_and_largest(best.errors(calibration.targets))
     typer.echo(
-        f"{len(calibration.ended)} searches, {len(calibration.solutions)} distinct good solutions"
+        f"Searches: {len(calibration.ended)}. Distinct good solutions: "
+        f"{len(calibration.solutions)}."
     )
-    typer.echo(
-        f"best: amplitudes differ by {100 * mean:.1f} % in the mean, {100 * largest:.1f} % at most"
-    )
+    typer.echo("Absolute differences of the amplitudes from the experiment:")
+    typer.echo(f"  best solution: mean {100 * mean:.1f} %, largest {100 * largest:.1f} %")
     for prediction in predictions:
         pairs = [
             mean_and_largest(errors)
             for errors in (prediction.calibrated, prediction.predicted, prediction.seen)
         ]
-        known, blind, others = (
-            f"{100 * mean:.1f} % in the mean, {100 * largest:.1f} % at most"
-            for mean, largest in pairs
+        calibrated, predicted, others = (
+            f"mean {100 * mean:.1f} %, largest {100 * largest:.1f} %" for mean, largest in pairs
         )
-        loads = ", ".join(prediction.loads)
-        typer.echo(
-            f"{loads}: {known} when calibrated with; {blind} when predicted from the others ({others})"
-        )
+        typer.echo(f"  load {', '.join(prediction.loads)}:")
+        typer.echo(f"    used for the calibration: {calibrated}")
+        typer.echo(f"    held out and predicted: {predicted}")
+        typer.echo(f"    other loads in that calibration: {others}")
     typer.echo(f"Results in {out}: report.html, machine_<n>.yaml, quantities.csv, amplitudes.csv")
 
 

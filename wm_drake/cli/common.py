@@ -1,4 +1,4 @@
-"""What commands share: options, and the way from their texts to parameters."""
+"""Options that several commands share, and functions that turn them into parameters and cases."""
 
 import shlex
 import sys
@@ -11,36 +11,43 @@ import typer
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 
-if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.parameters import MachineParameters
     from wm_drake.parameters.keys import Tree
-    from wm_drake.simulation.runs import Case
+    from wm_drake.simulation.cases import Case
 
 MachineOption = Annotated[
-    str, typer.Option("--machine", help="Shipped machine or machine file.", metavar="NAME|FILE")
+    str,
+    typer.Option(
+        "--machine", help="Name of a shipped machine, or machine file.", metavar="NAME|FILE"
+    ),
 ]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
-        help="Change a number: gasket.stiffness_x='5 N/mm'. Repeatable.",
+        help="Change a number of the machine file: gasket.stiffness_x='5 N/mm'. Repeatable.",
         metavar="KEY=VALUE",
     ),
 ]
 JsonOption = Annotated[
     bool,
-    typer.Option("--json", help="Print one JSON object on standard output and nothing else there."),
+    typer.Option("--json", help="Print one JSON object on standard output instead of tables."),
 ]
 
 
 def command_line() -> str:
-    """This command as a user would type it."""
+    """Return the running command as a user would type it."""
     return shlex.join(["wm-drake", *sys.argv[1:]])
 
 
 @contextmanager
 def interruptible(kept: str = "nothing was written") -> Iterator[None]:
-    """Ends the command on Ctrl-C, with a word on what is kept."""
+    """End the command with exit code 130 on Ctrl-C, and print which results are kept.
+
+    Args:
+        kept: What is kept, for the message.
+    """
     try:
         yield
     except KeyboardInterrupt:
@@ -50,7 +57,7 @@ def interruptible(kept: str = "nothing was written") -> Iterator[None]:
 
 @contextmanager
 def located_in(file: str) -> Iterator[None]:
-    """Adds file and line to problems that show only once the machine is built."""
+    """Add file and line of a machine file to the problems that the block raises."""
     from wm_drake.parameters import located, machine_path
 
     try:
@@ -60,7 +67,7 @@ def located_in(file: str) -> Iterator[None]:
 
 
 def load_parameters(file: str, sets: list[str] | None) -> "MachineParameters":
-    """The machine of a file or a shipped name, with the numbers that `--set` changes."""
+    """Return the machine of a file or a shipped name, changed by the `--set` options."""
     from wm_drake.parameters import load_machine
 
     parameters = load_machine(file)
@@ -71,7 +78,7 @@ def load_parameters(file: str, sets: list[str] | None) -> "MachineParameters":
 def with_sets(
     parameters: "Tree", sources: Mapping[str, str], sets: list[str] | None
 ) -> "tuple[Tree, dict[str, str]]":
-    """Parameters and sources of numbers, with what `--set` changes."""
+    """Return parameters and the sources of their numbers, changed by the `--set` options."""
     from wm_drake.parameters import with_value
 
     changed = dict(sources)
@@ -85,12 +92,12 @@ def with_sets(
 
 
 def pairs_of(entries: list[str] | None, option: str) -> list[tuple[str, str]]:
-    """Keys and values of a repeatable option."""
+    """Return the keys and values of a repeatable option KEY=VALUE."""
     found = []
     for entry in entries or []:
         key, separator, text = entry.partition("=")
         if not separator:
-            raise input_error(f"'{entry}' is not KEY=VALUE", where=option)
+            raise input_error(f"'{entry}' does not have the form KEY=VALUE", where=option)
         found.append((key.strip(), text.strip()))
     return found
 
@@ -98,9 +105,9 @@ def pairs_of(entries: list[str] | None, option: str) -> list[tuple[str, str]]:
 def cases_of(
     parameters: "MachineParameters", loads: list[str] | None, gasket: bool, profile: Path | None
 ) -> "list[Case]":
-    """The cases that `--load`, `--no-gasket` and `--profile` ask for."""
+    """Return the cases that `--load`, `--no-gasket` and `--profile` select."""
     from wm_drake.parameters import load_load, load_profile
-    from wm_drake.simulation.runs import Case
+    from wm_drake.simulation.cases import Case
 
     spin_profile = (
         parameters.profile if profile is None else load_profile(existing_file(profile, "--profile"))
@@ -121,20 +128,21 @@ def cases_of(
     for name in names:
         if names.count(name) > 1:
             raise input_error(
-                f"'{name}' is asked for twice; record_{name}.nc can hold one", where="--load"
+                f"'{name}' is given twice, but file record_{name}.nc can hold only one run",
+                where="--load",
             )
     return cases
 
 
 def existing_file(path: Path, option: str) -> Path:
-    """The path, if it is a file."""
+    """Return the path if it is a file; otherwise raise an InputError for the option."""
     if not path.is_file():
         raise input_error(f"no such file '{path}'", where=option)
     return path
 
 
 def check_buildable(file: str, parameters: "MachineParameters") -> None:
-    """Finds the faults that show only in the built machine."""
+    """Raise an InputError for faults that only building the machine reveals."""
     from wm_drake.model.machine import build_machine
     from wm_drake.parameters import measured_amplitudes
     from wm_drake.simulation.runs import check_bearing, checked_step

@@ -28,7 +28,8 @@ from wm_drake.cli.components import (
     quantities_of,
     target_of,
 )
-from wm_drake.cli.progress import progress_bar, result_folder
+from wm_drake.cli.progress import progress_bar
+from wm_drake.cli.result_folder import result_folder
 from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""`wm-drake machine`: look at machine files."""
+"""Command `wm-drake machine`: check and show machine files."""
 
 import json
 from typing import Annotated
@@ -7,15 +7,15 @@ import typer
 
 from wm_drake.cli.common import JsonOption, SetOption, check_buildable, load_parameters, located_in
 
-app = typer.Typer(help="Look at machine files.", no_args_is_help=True)
+app = typer.Typer(help="Check and show machine files.", no_args_is_help=True)
 
 
 @app.command("check")
 def machine_check(file: Annotated[str, typer.Argument(metavar="NAME|FILE")]) -> None:
-    """Check a machine file: exit 0, or 2 with one line per problem."""
+    """Check a machine file. The exit code is 0, or 2 with one line per problem."""
     parameters = load_parameters(file, None)
     check_buildable(file, parameters)
-    typer.echo(f"{file}: machine '{parameters.name}' is in order")
+    typer.echo(f"{file}: machine '{parameters.name}' is valid")
 
 
 @app.command("show")
@@ -24,7 +24,10 @@ def machine_show(
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
-    """Show a machine resolved in SI: bodies, elements, preloads, equilibrium, natural frequencies."""
+    """Show a machine in SI units.
+
+    The output has bodies, elements, preloads, the equilibrium and the natural frequencies.
+    """
     from wm_drake.model.machine import build_machine
     from wm_drake.studies.description.description import as_text, describe
 

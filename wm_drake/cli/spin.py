@@ -1,4 +1,4 @@
-"""`wm-drake spin`: run the drum up, and report how the tub moves."""
+"""Command `wm-drake spin`: simulate a spin run and report the motion of the tub."""
 
 import json
 import logging
@@ -17,12 +17,12 @@ from wm_drake.cli.common import (
     interruptible,
     load_parameters,
 )
-from wm_drake.cli.progress import result_folder
+from wm_drake.cli.result_folder import result_folder
 from wm_drake.errors import input_error, nearest_names
 
-if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.parameters import MachineParameters
-    from wm_drake.simulation.runs import Case
+    from wm_drake.simulation.cases import Case
     from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 DEFAULT_OUT = Path("wm-drake-spin")
@@ -33,31 +33,42 @@ def spin(
     load: Annotated[
         list[str] | None,
         typer.Option(
-            help="Load of the machine, or load file. Repeatable; all of the machine's by default.",
+            help="Load of the machine, or load file. Repeatable. Default: all loads of the "
+            "machine.",
             metavar="NAME|FILE",
         ),
     ] = None,
-    no_gasket: Annotated[bool, typer.Option("--no-gasket", help="Take the gasket out.")] = False,
+    no_gasket: Annotated[bool, typer.Option("--no-gasket", help="Run without the gasket.")] = False,
     profile: Annotated[
         Path | None,
-        typer.Option(help="Spin profile, YAML or CSV (time_s,speed_rpm).", metavar="FILE"),
+        typer.Option(
+            help="Spin profile, YAML or CSV (time_s, speed_rpm). Default: that of the machine.",
+            metavar="FILE",
+        ),
     ] = None,
     engine: Annotated[
-        str | None, typer.Option(help="Engine that integrates the motion.", metavar="NAME")
+        str | None,
+        typer.Option(
+            help="Engine that integrates the motion: compiled (default) or drake (slow reference).",
+            metavar="NAME",
+        ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.", metavar="DIR")] = DEFAULT_OUT,
     replay: Annotated[
-        bool, typer.Option("--replay", help="Also write 3D replays around the largest motion.")
+        bool,
+        typer.Option("--replay", help="Also write a 3D replay of the largest motion of each load."),
     ] = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
-    """Run the drum up through the resonances, and report how the tub moves."""
+    """Simulate the run-up of the drum through the resonances, and report the motion of the tub."""
     from wm_drake.simulation.runs import DEFAULT_ENGINE, ENGINES
 
     engine = engine or DEFAULT_ENGINE
     if engine not in ENGINES:
-        raise input_error(f"no engine '{engine}'{nearest_names(engine, ENGINES)}", where="--engine")
+        raise input_error(
+            f"unknown engine '{engine}'{nearest_names(engine, ENGINES)}", where="--engine"
+        )
     parameters = load_parameters(machine, sets)
     cases = cases_of(parameters, load, not no_gasket, profile)
     check_buildable(machine, parameters)
@@ -103,7 +114,7 @@ def _run(parameters: "MachineParameters", cases: "list[Case]", engine: str) -> "
 
 def _write(result: "SpinResult", folder: Path, replay: bool) -> None:
     from wm_drake.report.spin.report import amplitude_table, spin_report
-    from wm_drake.simulation.runs import save_record
+    from wm_drake.simulation.records import save_record
 
     for case in result.results:
         save_record(case.record, folder / f"record_{case.case.name}.nc")
@@ -120,7 +131,8 @@ def _replay(result: "SpinResult", case: "CaseResult") -> str:
     from wm_drake.model.scene import replay_page
     from wm_drake.simulation.measures import largest_motion
 
-    logging.getLogger("drake").setLevel(logging.WARNING)  # Meshcat would tell of its server
+    # Meshcat would print the address of its server
+    logging.getLogger("drake").setLevel(logging.WARNING)
     time, positions = largest_motion(case.record)
     return replay_page(result.parameters, time, positions)
 
@@ -132,7 +144,7 @@ def _print_tables(result: "SpinResult", out: Path) -> None:
     from wm_drake.parameters.units import Unit
     from wm_drake.report.spin.report import amplitude_table
 
-    table = Table(title=f"Amplitudes in mm, machine '{result.parameters.name}'")
+    table = Table(title=f"Displacement amplitudes of machine '{result.parameters.name}', in mm")
     amplitudes = amplitude_table(result)
     for name in amplitudes.columns:
         table.add_column(
@@ -151,8 +163,8 @@ def _print_tables(result: "SpinResult", out: Path) -> None:
         gap = case.measures.smallest_gap
         if gap:
             console.print(
-                f"{case.case.name}: smallest gap {millimetre.from_si(gap.distance):.1f} mm at {gap.time:.2f} s, "
-                f"{gap.moving} to {gap.fixed}"
+                f"{case.case.name}: smallest gap {millimetre.from_si(gap.distance):.1f} mm between "
+                f"{gap.moving} and {gap.fixed}, at {gap.time:.2f} s"
             )
     console.print(f"Results in {out}: report.html, amplitudes.csv, record_<load>.nc")
 
@@ -173,9 +185,8 @@ def _case_as_json(case: "CaseResult") -> dict[str, Any]:
 
     def numbers(values: Any, unit: Unit, prefix: str = "") -> dict[str, float | None]:
         labels = [f"{prefix}{label}" for label in values[values.dims[0]].values]
-        shown = [
-            unit.from_si(float(value)) if value == value else None for value in values.values
-        ]  # JSON has no NaN
+        # JSON has no NaN
+        shown = [unit.from_si(float(value)) if value == value else None for value in values.values]
         return dict(zip(labels, shown, strict=True))
 
     return {

@@ -23,6 +23,8 @@ import numba
 from numba.core import config
 from numba.core.dispatcher import Dispatcher
 
+from wm_drake.compiler.lanes import LawCompiler
+
 _PACKAGE = Path(__file__).parents[1]
 
 
@@ -53,7 +55,13 @@ def law(function: Callable[..., Any]) -> Any:
 
     Products and sums may fuse into one rounding; nothing else is reordered.
     """
-    return _compiled(function, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
+    return _compiled(
+        function,
+        pipeline_class=LawCompiler,
+        error_model="numpy",
+        forceinline=True,
+        fastmath={"contract", "nsz"},
+    )
 
 
 def long_running(function: Callable[..., Any]) -> Any:

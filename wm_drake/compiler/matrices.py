@@ -1,23 +1,23 @@
-"""Symmetric matrices of three by three as six numbers: xx, yy, zz, xy, xz, yz; and packed numbers as vectors."""
+"""Symmetric 3x3 matrices as six numbers (xx, yy, zz, xy, xz, yz), vectors from packed numbers."""
 
 from wm_drake.compiler.compilation import law
 
 
 @law
 def three(p, at):
-    """Three numbers as a vector."""
+    """Return three numbers as a vector."""
     return (p[at], p[at + 1], p[at + 2])
 
 
 @law
 def six(p, at):
-    """Six numbers: a symmetric matrix as xx, yy, zz, xy, xz, yz."""
+    """Return six numbers as a symmetric matrix: xx, yy, zz, xy, xz, yz."""
     return (p[at], p[at + 1], p[at + 2], p[at + 3], p[at + 4], p[at + 5])
 
 
 @law
 def times(i, a):
-    """Symmetric matrix times vector."""
+    """Return the product of a symmetric matrix and a vector."""
     return (
         i[0] * a[0] + i[3] * a[1] + i[4] * a[2],
         i[3] * a[0] + i[1] * a[1] + i[5] * a[2],
@@ -27,7 +27,7 @@ def times(i, a):
 
 @law
 def inverse(i):
-    """Inverse of a symmetric matrix."""
+    """Return the inverse of a symmetric matrix."""
     xx, yy, zz = i[1] * i[2] - i[5] * i[5], i[0] * i[2] - i[4] * i[4], i[0] * i[1] - i[3] * i[3]
     xy, xz, yz = i[4] * i[5] - i[3] * i[2], i[3] * i[5] - i[4] * i[1], i[3] * i[4] - i[5] * i[0]
     s = 1.0 / (i[0] * xx + i[3] * xy + i[4] * xz)
@@ -36,7 +36,7 @@ def inverse(i):
 
 @law
 def less_square(i, a, c):
-    """i - c a a^T."""
+    """Return i - c a a^T."""
     return (
         i[0] - c * a[0] * a[0],
         i[1] - c * a[1] * a[1],
@@ -49,7 +49,13 @@ def less_square(i, a, c):
 
 @law
 def about_centre(i, m, q):
-    """Inertia about the centre of mass, from that about another point, the first moment m about it, and 1/M = q."""
+    """Return the inertia about the centre of mass.
+
+    Args:
+        i: Inertia about another point.
+        m: First moment about that point.
+        q: 1/M, the inverse of the mass.
+    """
     return (
         i[0] - q * (m[1] * m[1] + m[2] * m[2]),
         i[1] - q * (m[0] * m[0] + m[2] * m[2]),
@@ -62,5 +68,5 @@ def about_centre(i, m, q):
 
 @law
 def plus(a, b):
-    """Sum of two wrenches."""
+    """Return the sum of two wrenches."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])

@@ -1,391 +1,403 @@
-"""The machine: SDF bodies and force systems as one Drake diagram, and the Contexts in which its numbers are set."""
+"""The machine in Drake: add it to a diagram, build it alone, set its numbers in a Context."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
+import numpy as np
+from pydrake.geometry import Meshcat
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, InputPort, OutputPort
 
-from wm_drake.elements.bushing import SixComponentBushingParameters
-from wm_drake.elements.friction_damper import FrictionDamperParameters
-from wm_drake.elements.spring import SpringStrutParameters
-from wm_drake.elements.telescopic_damper import TelescopicDamperParameters
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.bodies import add_bodies, add_load, set_bodies
-from wm_drake.model.equilibrium import generalized_force, preloaded, put_to_rest
-from wm_drake.model.frame_poses import (
-    FramePoses,
-    placed_bearing,
-    placed_bushings,
-    placed_dampers,
-    placed_springs,
-    placed_telescopes,
-)
+from wm_drake.model.equilibrium import preloaded, put_to_rest
+from wm_drake.model.frame_poses import FramePoses
+from wm_drake.model.placed_elements import AppliedForce, PlacedElements, placed_elements
+from wm_drake.model.same_elements import check_same_elements
+from wm_drake.model.setup import Setup, TubPoints, measured_points
 from wm_drake.model.state_layout import StateLayout, state_layout_of
+from wm_drake.model.visualization import add_visualizer
 from wm_drake.model.whirl import max_bearing_eigenvalue
-from wm_drake.model.wiring import Link, connect
-from wm_drake.parameters import Load, MachineParameters, Sensor
+from wm_drake.model.wiring import Link, Wiring
+from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.systems.drum_bearing import DrumBearing
 from wm_drake.systems.friction_damper import FrictionDamper
+from wm_drake.systems.sensors import Sensors
 from wm_drake.systems.six_component_bushing import SixComponentBushing
-from wm_drake.systems.speed_source import SpeedSource
+from wm_drake.systems.speed_source import MotorTorque, SpeedSource
+from wm_drake.systems.spin_profile_source import SpinProfileSource
 from wm_drake.systems.spring_strut import SpringStrut
 from wm_drake.systems.telescopic_damper import TelescopicDamper
+from wm_drake.systems.tub_force import TubForce
 
 OUTPUT_PERIOD = 5e-3
-"""Time between samples of a record, as the measurements of [B]. [s]"""
-
-
-class _Elements(NamedTuple):
-    """Elements in their places, by name."""
-
-    springs: dict[str, SpringStrutParameters]
-    dampers: dict[str, FrictionDamperParameters]
-    bushings: dict[str, SixComponentBushingParameters]
-    telescopes: dict[str, TelescopicDamperParameters]
+"""Time between samples of a record, as in the measurements of [B]. [s]"""
 
 
 @dataclass(frozen=True)
-class Setup:
-    """A machine set up in a Context: numbers chosen, preloads solved, at rest at its rest pose.
+class MachineSystems:
+    """The systems of a machine in a diagram, and the ports that other systems may connect to.
+
+    Numbers live in a Context of the diagram: see `set_up`.
 
     Attributes:
-        machine: The built machine.
-        parameters: The numbers in force.
-        context: Root Context of the diagram.
-        springs, dampers, bushings, telescopes: The elements in their places, by name.
-        bearing: That of the drum, if it gives: between what carries the drum and the tub, which is its ground side.
-        sensor_points: By sensor name, the point in T. [m]
-        detergent_point: Tub point nearest the detergent box, in T. [m]
-        accelerometer_points: By name of the vibration sensor, the point in T. [m]
-        rest_pose: Equilibrium of the empty machine: roll, pitch, yaw, x, y, z. [rad, m]
-        residual: What remains there of moment about To and force on the tub, in W. [N m, N]
-        tube_rest: (telescopic dampers, 7) angles and position of each outer tube and extension of the damper there. [rad, m]
-        carrier_rest: Angles and position there of what carries the drum in its bearing, if that gives; else empty. [rad, m]
-        bearing_rate: Fastest motion of the empty drum in its bearing; 0 if that does not give. [rad/s]
-    """
-
-    machine: "Machine"
-    parameters: MachineParameters
-    context: Context
-    springs: dict[str, SpringStrutParameters]
-    dampers: dict[str, FrictionDamperParameters]
-    bushings: dict[str, SixComponentBushingParameters]
-    telescopes: dict[str, TelescopicDamperParameters]
-    bearing: SixComponentBushingParameters | None
-    sensor_points: dict[str, FloatArray]
-    detergent_point: FloatArray
-    accelerometer_points: dict[str, FloatArray]
-    rest_pose: FloatArray
-    residual: FloatArray
-    tube_rest: FloatArray
-    carrier_rest: FloatArray
-    bearing_rate: float
-
-    @property
-    def plant_context(self) -> Context:
-        """The plant's part of the Context."""
-        return self.machine.plant.GetMyContextFromRoot(self.context)
-
-    @property
-    def sensors(self) -> dict[str, Sensor]:
-        """Sensors by name."""
-        return self.parameters.sensors
-
-
-@dataclass(frozen=True)
-class Machine:
-    """A built machine: diagram, plant and handles to every system in it. Numbers live in a Context: see `set_up`.
-
-    `blank` is a Context in which nothing is set; `places` remembers where frames are.
+        parameters: The numbers it was built from.
+        plant: The bodies.
+        state_layout: Where the plant keeps what.
+        spin_profile, speed_source, sensors: Systems that drive the drum and measure the tub.
+        springs, dampers, bushings, telescopes: Element systems by name.
+        bearing: System of the compliant bearing; None for a rigid one.
+        inputs: By name: "drum_acceleration" (1) [rad/s^2], followed in place of the spin profile if a
+            value is connected or fixed; "tub_force" (6), moment about To and force on the tub in W
+            [N m, N], zero if nothing is connected.
+        outputs: By name: "state" of the plant; "displacement" of the sensors, "detergent_displacement",
+            "drum_speed"; "motor_torque"; and for each element its own outputs, such as
+            "spring_left_force", "damper_left_force", "gasket_force", "gasket_moment".
     """
 
     parameters: MachineParameters
-    diagram: Diagram
     plant: MultibodyPlant
     state_layout: StateLayout
-    source: SpeedSource
+    spin_profile: SpinProfileSource
+    speed_source: SpeedSource
+    sensors: Sensors
     springs: dict[str, SpringStrut]
     dampers: dict[str, FrictionDamper]
     bushings: dict[str, SixComponentBushing]
     telescopes: dict[str, TelescopicDamper]
     bearing: DrumBearing | None
-    blank: Context
-    places: list[FramePoses] = field(default_factory=list, repr=False, compare=False)
+    inputs: dict[str, InputPort]
+    outputs: dict[str, OutputPort]
+    _poses: list[FramePoses] = field(default_factory=list, repr=False, compare=False, kw_only=True)
 
     def set_up(
         self,
-        load: Load | None = None,
+        load: Load | str | None = None,
         *,
+        context: Context,
         parameters: MachineParameters | None = None,
+        profile: SpinProfile | None = None,
         gasket: bool = True,
         dampers: bool = True,
-        context: Context | None = None,
     ) -> Setup:
-        """A Context at the rest pose, with these numbers.
+        """Set numbers and load in a Context, at the rest pose of the empty machine and the first speed.
 
-        Setting numbers in a Context of one built machine gives, bit for bit, what a machine built from them gives.
+        Setting numbers in a Context of one built machine gives, bit for bit, what a machine built from
+        them gives. A default Context holds the bodies of the SDF, not at rest: call this first.
 
         Args:
-            load: Point masses in the drum; None for the empty machine. Preloads and rest pose are those of the empty machine.
-            parameters: Numbers to use; those it was built from if None. Same elements, same laws, tables of the same length.
-            gasket, dampers: False takes them out of the machine.
-            context: A Context of an earlier Setup to use again, which is over then; a fresh one if None.
+            load: Point masses in the drum, or the name of one of the machine's loads; None for the
+                empty machine. Preloads and rest pose are always those of the empty machine.
+            context: Root Context of the diagram; what belongs to the machine is overwritten in it.
+            parameters: Numbers to use; those it was built from if None. They must have the same
+                elements, the same laws and tables of the same length.
+            profile: Spin profile to follow; that of the parameters if None.
+            gasket, dampers: False disengages them.
 
         Raises:
-            InputError: other elements than were built, names unknown to the SDF, or no static equilibrium.
+            InputError: other elements than were built, names unknown to the SDF, or no equilibrium.
         """
         parameters = parameters or self.parameters
-        _check_same_elements(self.parameters, parameters)
+        check_same_elements(self.parameters, parameters)
+        load = self._load(load, parameters)
         context = self.set_up_bodies(None, parameters, context)
         plant_context = self.plant.GetMyContextFromRoot(context)
-        places = self._places(plant_context, parameters)
-        bearing = placed_bearing(self.plant, parameters)
-        self._set(context, self._bearings, {"bearing": bearing})
-        elements = self._put_in(context, places, parameters)
-        if not gasket:
-            self._take_gasket_out(context, elements)
-        if not dampers:
-            self._take_friction_out(context, elements)
-        residual = put_to_rest(self.plant, plant_context, self.state_layout)
-        fastest = (
-            max_bearing_eigenvalue(self.plant, plant_context, self.state_layout, bearing)
-            if bearing
-            else 0.0
-        )
-        self._hang_in(plant_context, parameters, load)
-        positions = self.plant.GetPositions(plant_context)
-        points = {
-            name: places("tub", sensor.frame)[0] for name, sensor in parameters.sensors.items()
-        }
-        detergent_point = places("tub", parameters.clearance.detergent_frame)[0]
-        vibrations = {
-            name: places("tub", frame)[0]
-            for name, frame in parameters.accelerometer_frames().items()
-        }
-        whole = self.state_layout
-        rest = positions[whole.tub], residual, positions[whole.tubes], positions[whole.carrier]
-        return Setup(
-            self,
-            parameters,
-            context,
-            *elements,
-            bearing,
-            points,
-            detergent_point,
-            vibrations,
-            *rest,
-            fastest,
+        poses = self._frame_poses(plant_context, parameters)
+        unloaded = placed_elements(self.plant, poses, parameters)
+        layout = self.state_layout
+        elements = preloaded(self.plant, plant_context, layout, unloaded)
+        elements = elements if gasket else elements.without_gasket()
+        elements = elements if dampers else elements.without_dampers()
+        residual = put_to_rest(self.plant, plant_context, layout, elements)
+        fastest = 0.0
+        if elements.bearing:
+            fastest = max_bearing_eigenvalue(self.plant, plant_context, layout, elements.bearing)
+        self._add_load(plant_context, parameters, load)
+        q = self.plant.GetPositions(plant_context)
+        points = _tub_points(poses, parameters)
+        profile = profile or parameters.profile
+        self._set_systems(context, elements, measured_points(parameters, points, q[layout.tub]))
+        self.set_profile(context, profile)
+        rest = q[layout.tub], residual, q[layout.tubes], q[layout.carrier]
+        return Setup(self, parameters, context, elements, points, *rest, fastest)
+
+    def set_up_bodies(
+        self, load: Load | None, parameters: MachineParameters, context: Context
+    ) -> Context:
+        """Set bodies, frames and load in a Context and return it; all positions are zero, as drawn.
+
+        Raises:
+            InputError: names unknown to the SDF.
+        """
+        plant_context = self.plant.GetMyContextFromRoot(context)
+        self.plant.SetDefaultContext(plant_context)
+        set_bodies(self.plant, plant_context, parameters)
+        self._add_load(plant_context, parameters, load)
+        return context
+
+    def set_profile(self, context: Context, profile: SpinProfile) -> None:
+        """Set the spin profile to follow in a root Context, and the drum to its first speed."""
+        self.spin_profile.set_profile(self.spin_profile.GetMyContextFromRoot(context), profile)
+        plant_context = self.plant.GetMyContextFromRoot(context)
+        velocities = self.plant.GetVelocities(plant_context)
+        velocities[self.state_layout.drum] = profile.speed[0]
+        self.plant.SetVelocities(plant_context, velocities)
+
+    def set_drum_acceleration(self, context: Context, acceleration: float) -> None:
+        """Fix the drum's acceleration in a root Context, in place of the spin profile. [rad/s^2]
+
+        The port "drum_acceleration" must not be connected.
+        """
+        self.inputs["drum_acceleration"].FixValue(
+            self.speed_source.GetMyContextFromRoot(context), [acceleration]
         )
 
-    def _put_in(
-        self, context: Context, places: FramePoses, parameters: MachineParameters
-    ) -> _Elements:
-        """Elements in their places, their numbers in the Context; springs with the preload that the empty machine needs."""
-        bushings, dampers = placed_bushings(places, parameters), placed_dampers(places, parameters)
-        telescopes = placed_telescopes(self.plant, places, parameters)
-        unloaded = placed_springs(places, parameters)
-        for systems, placed in (
-            (self.bushings, bushings),
-            (self.dampers, dampers),
-            (self.telescopes, telescopes),
-            (self.springs, unloaded),
-        ):
-            self._set(context, systems, placed)
-        springs = preloaded(
-            self.plant, self.plant.GetMyContextFromRoot(context), self.state_layout, unloaded
+    def elastic_and_gravity_force(self, setup: Setup) -> FloatArray:
+        """Return moment about To and force on the tub in W at the pose of a setup's Context.
+
+        All elements and gravity. (6,) [N m, N]
+        """
+        context = setup.plant_context
+        applied = AppliedForce(setup.elements, self.state_layout)
+        force = applied(self.plant.GetPositionsAndVelocities(context))
+        force += self.plant.CalcGravityGeneralizedForces(context)
+        return np.asarray(force[self.state_layout.tub])
+
+    def _load(self, load: Load | str | None, parameters: MachineParameters) -> Load | None:
+        if not isinstance(load, str):
+            return load
+        if load not in parameters.loads:
+            raise input_error(
+                f"no load '{load}' in machine '{parameters.name}'"
+                f"{nearest_names(load, parameters.loads)}",
+                key="loads",
+            )
+        return parameters.loads[load]
+
+    def _add_load(
+        self, plant_context: Context, parameters: MachineParameters, load: Load | None
+    ) -> None:
+        """Add a load to the drum, and with it the drum's residual imbalance; neither without a load."""
+        if load is not None:
+            add_load(self.plant, plant_context, load)
+            imbalance = parameters.imperfections.residual_imbalance
+            add_load(self.plant, plant_context, Load(unbalances=(imbalance,)))
+
+    def _frame_poses(self, plant_context: Context, parameters: MachineParameters) -> FramePoses:
+        """Return the frame poses; those of the last set-up if its overrides were the same."""
+        if not self._poses or self._poses[0].frames != parameters.frames:
+            self._poses[:] = [FramePoses(self.plant, parameters.frames, plant_context)]
+        self._poses[0].context = plant_context
+        return self._poses[0]
+
+    def _set_systems(self, context: Context, elements: PlacedElements, points: FloatArray) -> None:
+        """Set the parameters of elements and sensors in a root Context, and relax the sponges."""
+        pairs: list[tuple[Mapping[str, Any], Mapping[str, Any]]] = [
+            (self.springs, elements.springs),
+            (self.dampers, elements.dampers),
+            (self.bushings, elements.bushings),
+            (self.telescopes, elements.telescopes),
+        ]
+        if self.bearing:
+            pairs.append(({"": self.bearing}, {"": elements.bearing}))
+        for systems, placed in pairs:
+            for name, system in systems.items():
+                own = system.GetMyContextFromRoot(context)
+                system.set_parameters(own, placed[name].packed())
+                if system.state_size:
+                    own.SetContinuousState(np.zeros(system.state_size))
+        self.sensors.set_points(self.sensors.GetMyContextFromRoot(context), points)
+
+
+@dataclass(frozen=True)
+class Machine(MachineSystems):
+    """A machine as a diagram of its own. The named ports are exported: inputs and outputs.
+
+    Attributes:
+        diagram: The diagram.
+    """
+
+    diagram: Diagram
+
+    def set_up(
+        self,
+        load: Load | str | None = None,
+        *,
+        context: Context | None = None,
+        parameters: MachineParameters | None = None,
+        profile: SpinProfile | None = None,
+        gasket: bool = True,
+        dampers: bool = True,
+    ) -> Setup:
+        """Set numbers and load in a Context, at rest; a fresh Context at time 0 if None is given.
+
+        See `MachineSystems.set_up`.
+        """
+        return super().set_up(
+            load,
+            context=context or self.diagram.CreateDefaultContext(),
+            parameters=parameters,
+            profile=profile,
+            gasket=gasket,
+            dampers=dampers,
         )
-        self._set(context, self.springs, springs)
-        return _Elements(springs, dampers, bushings, telescopes)
-
-    def _take_gasket_out(self, context: Context, elements: _Elements) -> None:
-        """Of a machine that has one."""
-        if "gasket" in elements.bushings:
-            elements.bushings["gasket"] = replace(elements.bushings["gasket"], engaged=0.0)
-            self._set(context, self.bushings, elements.bushings)
-
-    def _take_friction_out(self, context: Context, elements: _Elements) -> None:
-        """Dampers; of telescopic ones, their laws and the friction in their bushings."""
-        for name, damper in elements.dampers.items():
-            elements.dampers[name] = replace(damper, engaged=0.0)
-        for name, telescope in elements.telescopes.items():
-            elements.telescopes[name] = telescope.without_friction()
-        self._set(context, self.dampers, elements.dampers)
-        self._set(context, self.telescopes, elements.telescopes)
 
     def set_up_bodies(
         self, load: Load | None, parameters: MachineParameters, context: Context | None = None
     ) -> Context:
-        """A Context, fresh or used again, in which bodies, frames and load are set and nothing else; raises as `set_up`."""
-        if context is None:
-            context = self.diagram.CreateDefaultContext()
-        else:
-            context.SetTimeStateAndParametersFrom(self.blank)
-        plant_context = self.plant.GetMyContextFromRoot(context)
-        set_bodies(self.plant, plant_context, parameters)
-        self._hang_in(plant_context, parameters, load)
-        return context
+        """Set bodies, frames and load in a Context, a fresh one if None; see `MachineSystems`."""
+        context = context or self.diagram.CreateDefaultContext()
+        return super().set_up_bodies(load, parameters, context)
 
-    def _hang_in(
-        self, plant_context: Context, parameters: MachineParameters, load: Load | None
-    ) -> None:
-        """The load, and with it what the drum is out of balance by itself; neither in the empty machine."""
-        if load is not None:
-            add_load(self.plant, plant_context, load)
-            add_load(
-                self.plant,
-                plant_context,
-                Load(unbalances=(parameters.imperfections.residual_imbalance,)),
-            )
-
-    def _places(self, plant_context: Context, parameters: MachineParameters) -> FramePoses:
-        """Where frames are; remembered from the last set-up, if that had the same overrides."""
-        if not self.places or self.places[0].frames != parameters.frames:
-            self.places[:] = [FramePoses(self.plant, parameters.frames, plant_context)]
-        self.places[0].context = plant_context
-        return self.places[0]
-
-    def _set(self, context: Context, systems: dict[str, Any], placed: dict[str, Any]) -> None:
-        for name, system in systems.items():
-            system.set_parameters(system.GetMyContextFromRoot(context), placed[name].packed())
-
-    @contextmanager
-    def held(self, context: Context) -> Iterator[None]:
-        """For a run: all elements keep the parameters of this Context at hand, which makes it a fifth faster."""
-        tables = (self.springs, self.dampers, self.bushings, self.telescopes, self._bearings)
-        elements = [element for table in tables for element in table.values()]
-        try:
-            for element in elements:
-                element.hold(element.GetMyContextFromRoot(context))
-            yield
-        finally:
-            for element in elements:
-                element.release()
-
-    @property
-    def _bearings(self) -> dict[str, DrumBearing]:
-        return {"bearing": self.bearing} if self.bearing else {}
-
-    def elastic_and_gravity_force(self, context: Context) -> FloatArray:
-        """Moment about To and force on the tub in W at the Context's pose: all elements and gravity. [N m, N]"""
-        return generalized_force(self.plant, self.plant.GetMyContextFromRoot(context))[
-            self.state_layout.tub
-        ]
+    def set_drum_acceleration(self, context: Context, acceleration: float) -> None:
+        """Fix the drum's acceleration in a root Context; see `MachineSystems`. [rad/s^2]"""
+        self.diagram.GetInputPort("drum_acceleration").FixValue(context, [acceleration])
 
 
-def build_machine(parameters: MachineParameters) -> Machine:
-    """Builds the diagram of a machine.
+def add_washing_machine(
+    builder: DiagramBuilder, parameters: MachineParameters, *, name: str = ""
+) -> MachineSystems:
+    """Add a washing machine to a diagram.
 
-    Build once and reuse: a Drake diagram with Python systems is never freed. Everything numeric can be changed afterwards in
-    a Context (`Machine.set_up`).
+    Connect your own systems to the ports of the result, build the diagram, and call `set_up` with a
+    Context of it.
+
+    Args:
+        builder: Any DiagramBuilder.
+        parameters: The machine.
+        name: Prefix of the names of its systems, for several machines in one diagram.
 
     Raises:
-        InputError: SDF or machine file at fault.
+        InputError: the SDF or the machine file is at fault.
     """
-    builder = DiagramBuilder()
-    plant = builder.AddNamedSystem("bodies", MultibodyPlant(time_step=0.0))
+    prefix = f"{name}_" if name else ""
+    plant = builder.AddNamedSystem(f"{prefix}bodies", MultibodyPlant(time_step=0.0))
     add_bodies(plant, parameters)
-    state_layout = state_layout_of(plant, parameters)
+    layout = state_layout_of(plant, parameters)
     context = plant.CreateDefaultContext()
     set_bodies(
         plant, context, parameters
     )  # reports unknown names before anything is placed by them
-    places = FramePoses(plant, parameters.frames, context)
-    springs = {
-        name: SpringStrut(placed.packed())
-        for name, placed in placed_springs(places, parameters).items()
-    }
+    poses = FramePoses(plant, parameters.frames, context)
+    placed = placed_elements(plant, poses, parameters)
+    points = measured_points(parameters, _tub_points(poses, parameters), np.zeros(6))
+    wiring = Wiring(builder, plant, layout, prefix)
+    springs = {key: SpringStrut(spring.packed()) for key, spring in placed.springs.items()}
     dampers = {
-        name: FrictionDamper(placed.packed(), int(placed.has_sponge))
-        for name, placed in placed_dampers(places, parameters).items()
+        key: FrictionDamper(damper.packed(), int(damper.has_sponge))
+        for key, damper in placed.dampers.items()
     }
-    bushings = {
-        name: SixComponentBushing(placed.packed())
-        for name, placed in placed_bushings(places, parameters).items()
-    }
-    source = builder.AddNamedSystem("speed_source", SpeedSource())
+    bushings = {key: SixComponentBushing(bush.packed()) for key, bush in placed.bushings.items()}
     telescopes = {
-        name: TelescopicDamper(placed.packed(), int(placed.has_sponge))
-        for name, placed in placed_telescopes(plant, places, parameters).items()
+        key: TelescopicDamper(telescope.packed(), int(telescope.has_sponge))
+        for key, telescope in placed.telescopes.items()
     }
-    elements = {"spring": springs, "damper": dampers, "bushing": bushings}
-    labels = [
-        (_label(kind, name), system)
-        for kind, systems in elements.items()
-        for name, system in systems.items()
-    ]
-    links = [
-        Link(f"damper_{name}", name, system, 1 + index)
-        for index, (name, system) in enumerate(telescopes.items())
-    ]
-    placed = placed_bearing(plant, parameters)
-    bearing = DrumBearing(placed.packed()) if placed else None
-    if bearing:
-        links.append(Link("drum_bearing", "drum_bearing", bearing, len(state_layout.trees) - 1))
-    connect(builder, plant, state_layout, labels, links)
-    builder.Connect(source.get_output_port(), plant.get_actuation_input_port())
-    diagram = builder.Build()
-    diagram.set_name(parameters.name)
-    context = diagram.CreateDefaultContext()
-    return Machine(
-        parameters,
-        diagram,
-        plant,
-        state_layout,
-        source,
-        springs,
-        dampers,
-        bushings,
-        telescopes,
-        bearing,
-        context,
+    bearing = DrumBearing(placed.bearing.packed()) if placed.bearing else None
+    on_tub, links = _labelled(springs, dampers, bushings, telescopes, bearing)
+    profile, source, torque = _add_drive(wiring, parameters)
+    tub_force, sensors = TubForce(), Sensors(points)
+    tub_state = wiring.tub_state()
+    wiring.connect_elements(tub_state, [*on_tub, ("tub_force", tub_force)], links)
+    builder.Connect(tub_state, wiring.add("sensors", sensors).GetInputPort("plant_state"))
+    inputs = {"drum_acceleration": source.GetInputPort("drum_acceleration")}
+    inputs["tub_force"] = tub_force.GetInputPort("tub_force")
+    outputs = {"state": plant.get_state_output_port()}
+    for port in ("displacement", "detergent_displacement", "drum_speed"):
+        outputs[port] = sensors.GetOutputPort(port)
+    outputs["motor_torque"] = torque.GetOutputPort("torque")
+    for label, system in [*on_tub, *((link.label, link.system) for link in links)]:
+        for port in _own_outputs(system):
+            outputs[f"{label}_{port}"] = system.GetOutputPort(port)
+    systems = springs, dampers, bushings, telescopes, bearing
+    return MachineSystems(
+        parameters, plant, layout, profile, source, sensors, *systems, inputs, outputs
     )
 
 
-def _label(kind: str, name: str) -> str:
-    return "gasket" if (kind, name) == ("bushing", "gasket") else f"{kind}_{name}"
+def build_machine(parameters: MachineParameters, *, meshcat: Meshcat | None = None) -> Machine:
+    """Build the diagram of a machine alone, with its named ports exported.
+
+    Build once and reuse: a Drake diagram with Python systems is never freed. Every number can be
+    changed afterwards in a Context (`Machine.set_up`).
+
+    Args:
+        parameters: The machine.
+        meshcat: Shows the moving machine if given; the shapes cannot touch the dynamics.
+
+    Raises:
+        InputError: the SDF or the machine file is at fault.
+    """
+    builder = DiagramBuilder()
+    systems = add_washing_machine(builder, parameters)
+    if meshcat is not None:
+        add_visualizer(builder, parameters, systems.state_layout, systems.outputs["state"], meshcat)
+    for name, port in systems.inputs.items():
+        builder.ExportInput(port, name)
+    for name, port in systems.outputs.items():
+        builder.ExportOutput(port, name)
+    diagram = builder.Build()
+    diagram.set_name(parameters.name)
+    values = {key: value for key, value in vars(systems).items() if key != "_poses"}
+    return Machine(**values, diagram=diagram)
 
 
-def _check_same_elements(built: MachineParameters, wanted: MachineParameters) -> None:
-    """Refuses numbers for another machine than the built one."""
-    for key in ("model", "gravity"):
-        if getattr(wanted, key) != getattr(built, key):
-            raise input_error(
-                f"{getattr(wanted, key)} is not the built machine's {getattr(built, key)}; build a new one",
-                key=key,
-            )
-    for table in ("springs", "dampers", "all_bushings", "telescopic_dampers"):
-        names = [set(t() if callable(t := getattr(p, table)) else t) for p in (built, wanted)]
-        if names[0] != names[1]:
-            other = sorted(names[0] ^ names[1])[0]
-            raise input_error(
-                f"'{other}' is not in both machines{nearest_names(other, names[0])}; build a new machine",
-                key=table.removeprefix("all_"),
-            )
-    if (wanted.imperfections.bearing is None) != (built.imperfections.bearing is None):
-        given, other = (
-            ("gives", "does not") if wanted.imperfections.bearing else ("does not give", "does")
-        )
-        raise input_error(
-            f"{given}; that of the built machine {other}: build a new one",
-            key="imperfections.bearing",
-        )
-    for table in ("dampers", "telescopic_dampers"):
-        for name, damper in getattr(wanted, table).items():
-            built_damper = getattr(built, table)[name]
-            law, built_law = (
-                wanted.damper_types[damper.type].law,
-                built.damper_types[built_damper.type].law,
-            )
-            if law != built_law:
-                raise input_error(
-                    f"law '{law}' is not the built machine's '{built_law}'; build a new machine",
-                    key=f"{table}.{name}",
-                )
-            if getattr(damper, "joint", "") != getattr(built_damper, "joint", ""):
-                raise input_error(
-                    "is not the built machine's; build a new one", key=f"{table}.{name}.joint"
-                )
+def _labelled(
+    springs: Mapping[str, Any],
+    dampers: Mapping[str, Any],
+    bushings: Mapping[str, Any],
+    telescopes: Mapping[str, Any],
+    bearing: DrumBearing | None,
+) -> tuple[list[tuple[str, Any]], list[Link]]:
+    """Return the elements on the tub with their labels, and the links to other trees."""
+    on_tub = [(f"spring_{name}", system) for name, system in springs.items()]
+    on_tub += [(f"damper_{name}", system) for name, system in dampers.items()]
+    on_tub += [
+        ("gasket" if name == "gasket" else f"bushing_{name}", system)
+        for name, system in bushings.items()
+    ]
+    links = [
+        Link(f"damper_{name}", system, tree)
+        for tree, (name, system) in enumerate(telescopes.items(), start=1)
+    ]
+    if bearing:
+        links.append(Link("drum_bearing", bearing, 1 + len(telescopes)))
+    return on_tub, links
+
+
+def _add_drive(
+    wiring: Wiring, parameters: MachineParameters
+) -> tuple[SpinProfileSource, SpeedSource, MotorTorque]:
+    """Add spin profile, speed source and motor torque, and connect them to the plant."""
+    builder, plant = wiring.builder, wiring.plant
+    profile = wiring.add("spin_profile", SpinProfileSource(parameters.profile))
+    source = wiring.add("speed_source", SpeedSource())
+    size, drum = plant.num_velocities(), wiring.layout.drum
+    torque = wiring.add("motor_torque", MotorTorque(size, drum))
+    actuation = source.GetOutputPort("actuation")
+    builder.Connect(
+        profile.GetOutputPort("acceleration"), source.GetInputPort("profile_acceleration")
+    )
+    builder.Connect(actuation, plant.get_actuation_input_port())
+    builder.Connect(actuation, torque.GetInputPort("actuation"))
+    builder.Connect(
+        plant.get_generalized_acceleration_output_port(),
+        torque.GetInputPort("generalized_acceleration"),
+    )
+    return profile, source, torque
+
+
+def _own_outputs(system: Any) -> list[str]:
+    """Return the names of the element's own output ports."""
+    names = [system.get_output_port(i).get_name() for i in range(system.num_output_ports())]
+    return [name for name in names if name not in ("generalized_force", "state")]
+
+
+def _tub_points(poses: FramePoses, parameters: MachineParameters) -> TubPoints:
+    """Return the measured points of the tub."""
+    sensors = {name: poses("tub", sensor.frame)[0] for name, sensor in parameters.sensors.items()}
+    detergent = poses("tub", parameters.clearance.detergent_frame)[0]
+    frames = parameters.accelerometer_frames()
+    accelerometers = {name: poses("tub", frame)[0] for name, frame in frames.items()}
+    return TubPoints(sensors, detergent, accelerometers)

@@ -1,11 +1,11 @@
-"""Elements joined to the bodies: who sees which part of the plant's state, and where each one's force goes."""
+"""Connect elements to the plant: the part of the state that each reads, and where its force goes."""
 
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import Adder, Demultiplexer, MatrixGain, Multiplexer
 
 from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE
@@ -18,69 +18,86 @@ class Link:
 
     Attributes:
         label: Name of its system in the diagram.
-        name: Its own.
-        system: A `ElementSystem` of two trees.
+        system: An `ElementSystem` of two trees.
         tree: Number of the other tree.
     """
 
     label: str
-    name: str
     system: Any
     tree: int
 
 
-def connect(
-    builder: DiagramBuilder,
-    plant: MultibodyPlant,
-    state_layout: StateLayout,
-    elements: list[tuple[str, Any]],
-    links: list[Link],
-) -> None:
-    """Adds elements of tub and drum, by name, and links to the diagram, and their forces to those on the plant."""
-    if links:
-        _connect_trees(builder, plant, state_layout, elements, links)
-        return
-    total = builder.AddNamedSystem("total_force", Adder(len(elements), GENERALIZED_FORCE_SIZE))
-    for index, (label, system) in enumerate(elements):
-        builder.AddNamedSystem(label, system)
-        builder.Connect(plant.get_state_output_port(), system.GetInputPort("plant_state"))
-        builder.Connect(system.GetOutputPort("generalized_force"), total.get_input_port(index))
-    builder.Connect(total.get_output_port(), plant.get_applied_generalized_force_input_port())
+class Wiring:
+    """Adds systems to a diagram, with one prefix before their names, and connects them."""
 
+    def __init__(
+        self, builder: DiagramBuilder, plant: MultibodyPlant, layout: StateLayout, prefix: str
+    ) -> None:
+        """Connect to a finalized plant that is in the builder."""
+        self.builder, self.plant, self.layout, self._prefix = builder, plant, layout, prefix
 
-def _connect_trees(
-    builder: DiagramBuilder,
-    plant: MultibodyPlant,
-    state_layout: StateLayout,
-    elements: list[tuple[str, Any]],
-    links: list[Link],
-) -> None:
-    """Where there is more than tub and drum: elements see their part of the state, other trees get forces of their own."""
-    size = GENERALIZED_FORCE_SIZE
-    total = builder.AddNamedSystem("total_force", Adder(len(elements) + len(links), size))
-    all_forces = builder.AddNamedSystem("all_forces", Multiplexer([size] * len(state_layout.trees)))
-    states, trees = np.eye(plant.num_multibody_states()), state_layout.states()
-    of_tub = builder.AddNamedSystem("state_of_tub", MatrixGain(states[trees[0]]))
-    builder.Connect(plant.get_state_output_port(), of_tub.get_input_port())
-    for index, (label, system) in enumerate(elements):
-        builder.AddNamedSystem(label, system)
-        builder.Connect(of_tub.get_output_port(), system.GetInputPort("plant_state"))
-        builder.Connect(system.GetOutputPort("generalized_force"), total.get_input_port(index))
-    for index, link in enumerate(links):
-        builder.AddNamedSystem(link.label, link.system)
-        chosen = np.concatenate([trees[0], trees[link.tree]])
-        state = builder.AddNamedSystem(f"state_of_{link.name}", MatrixGain(states[chosen]))
-        split = builder.AddNamedSystem(f"forces_of_{link.name}", Demultiplexer([size, size]))
-        builder.Connect(plant.get_state_output_port(), state.get_input_port())
-        builder.Connect(state.get_output_port(), link.system.GetInputPort("plant_state"))
-        builder.Connect(link.system.GetOutputPort("generalized_force"), split.get_input_port())
-        builder.Connect(split.get_output_port(0), total.get_input_port(len(elements) + index))
-        builder.Connect(split.get_output_port(1), all_forces.get_input_port(link.tree))
-    builder.Connect(total.get_output_port(), all_forces.get_input_port(0))
-    forces = all_forces.get_output_port()
-    if not np.array_equal(np.concatenate(state_layout.trees), np.arange(state_layout.size)):
-        gathered = np.eye(state_layout.size)[:, np.concatenate(state_layout.trees)]
-        in_order = builder.AddNamedSystem("forces_in_order", MatrixGain(gathered))
-        builder.Connect(forces, in_order.get_input_port())
-        forces = in_order.get_output_port()
-    builder.Connect(forces, plant.get_applied_generalized_force_input_port())
+    def add(self, name: str, system: System) -> Any:
+        """Add a system under its name, with the prefix, and return it."""
+        return self.builder.AddNamedSystem(self._prefix + name, system)
+
+    def tub_state(self) -> OutputPort:
+        """Return the port of the state of tub and drum (14), which most elements read."""
+        if len(self.layout.trees) == 1:
+            return self.plant.get_state_output_port()
+        return self._part_of_state("state_of_tub", [0])
+
+    def connect_elements(
+        self, tub_state: OutputPort, elements: list[tuple[str, Any]], links: list[Link]
+    ) -> None:
+        """Add elements of tub and drum, by label, and links, and sum up their forces on the plant.
+
+        Args:
+            tub_state: From `tub_state`.
+            elements: Systems with a port "generalized_force" on tub and drum, and "plant_state" if
+                they read the state.
+            links: Elements between tub and drum and another tree.
+        """
+        total = self.add("total_force", Adder(len(elements) + len(links), GENERALIZED_FORCE_SIZE))
+        for index, (label, system) in enumerate(elements):
+            self.add(label, system)
+            if system.HasInputPort("plant_state"):
+                self.builder.Connect(tub_state, system.GetInputPort("plant_state"))
+            self.builder.Connect(
+                system.GetOutputPort("generalized_force"), total.get_input_port(index)
+            )
+        forces = total.get_output_port()
+        if links:
+            forces = self._with_links(forces, total, len(elements), links)
+        self.builder.Connect(forces, self.plant.get_applied_generalized_force_input_port())
+
+    def _with_links(
+        self, on_tub: OutputPort, total: Adder, first: int, links: list[Link]
+    ) -> OutputPort:
+        """Connect the links; return the port of the forces on all trees, in the plant's order."""
+        size, trees = GENERALIZED_FORCE_SIZE, self.layout.trees
+        all_forces = self.add("all_forces", Multiplexer([size] * len(trees)))
+        self.builder.Connect(on_tub, all_forces.get_input_port(0))
+        for index, link in enumerate(links):
+            self.add(link.label, link.system)
+            state = self._part_of_state(f"state_of_{link.label}", [0, link.tree])
+            split = self.add(f"forces_of_{link.label}", Demultiplexer([size, size]))
+            self.builder.Connect(state, link.system.GetInputPort("plant_state"))
+            self.builder.Connect(
+                link.system.GetOutputPort("generalized_force"), split.get_input_port()
+            )
+            self.builder.Connect(split.get_output_port(0), total.get_input_port(first + index))
+            self.builder.Connect(split.get_output_port(1), all_forces.get_input_port(link.tree))
+        order = np.concatenate(trees)
+        if np.array_equal(order, np.arange(self.layout.size)):
+            return all_forces.get_output_port()
+        in_order = self.add("forces_in_order", MatrixGain(np.eye(self.layout.size)[:, order]))
+        self.builder.Connect(all_forces.get_output_port(), in_order.get_input_port())
+        return in_order.get_output_port()
+
+    def _part_of_state(self, name: str, trees: list[int]) -> OutputPort:
+        """Add a gain that selects the states of some trees from the plant's; return its port."""
+        states = self.layout.states()
+        chosen = np.concatenate([states[tree] for tree in trees])
+        part = self.add(name, MatrixGain(np.eye(self.plant.num_multibody_states())[chosen]))
+        self.builder.Connect(self.plant.get_state_output_port(), part.get_input_port())
+        return part.get_output_port()

@@ -1,4 +1,10 @@
-"""Numbers enter here: frozen types of a machine, a load, a spin profile, in SI; files and units are read and checked."""
+"""Read and check what a user writes: machine, component, load, spin profile, study files.
+
+Enters: YAML and CSV files, and text with units. Leaves: frozen types in SI units
+(`MachineParameters`, `Component`, `Load`, `SpinProfile`, `Factor`, `MeasuredLoop`) or an
+`InputError` that names file, line and key. `with_value` is the one way to change a number.
+May import: `laws`, `compiler` and `errors`; no pydrake.
+"""
 
 from wm_drake.parameters.bearing import Bearing
 from wm_drake.parameters.components import Component, load_component, shipped_components

@@ -1,4 +1,4 @@
-"""Compliant bearing of the drum."""
+"""Parameters of a compliant bearing of the drum."""
 
 from typing import Annotated
 
@@ -9,20 +9,21 @@ from wm_drake.parameters.elements import BushingType, Frozen
 
 
 class Bearing(Frozen):
-    """Compliant bearing of the drum in the tub; a machine without one has a perfect revolute joint.
+    """A compliant bearing between drum and tub.
 
-    No paper has these numbers: each is an assumption of its author.
+    A machine without these parameters has a rigid bearing: a revolute joint. None of the numbers is
+    published; every number in a machine file is an assumption of its author.
 
     Attributes:
-        radial_stiffness, axial_stiffness: Across and along the drum axis. [N/m]
-        tilting_stiffness: Against tilting of the drum axis. [N m/rad]
-        torsional_stiffness: About the drum axis, where the reaction of the motor acts on the tub;
-            the tilting stiffness if None. [N m/rad]
-        radial_damping, axial_damping: Across and along the drum axis. [N s/m]
-        tilting_damping: Against tilting of the drum axis. [N m s/rad]
-        torsional_damping: About the drum axis; the tilting damping if None. [N m s/rad]
-        y: Place of the bearing on the drum axis, from the origin of its joint in the direction of
-            the joint's axis. [m]
+        radial_stiffness: Stiffness perpendicular to the drum axis. [N/m]
+        axial_stiffness: Stiffness along the drum axis. [N/m]
+        tilting_stiffness: Stiffness against tilting of the drum axis. [N m/rad]
+        torsional_stiffness: Stiffness about the drum axis, in the path of the motor's reaction
+            torque to the tub; if None, the tilting stiffness is used. [N m/rad]
+        radial_damping, axial_damping: Damping in the same directions. [N s/m]
+        tilting_damping, torsional_damping: Damping of the rotations; if the torsional one is None,
+            the tilting one is used. [N m s/rad]
+        y: Position of the bearing along the axis of the drum's joint, from the joint's origin. [m]
     """
 
     radial_stiffness: Annotated[u.LinearStiffness, Field(gt=0.0)]
@@ -36,9 +37,9 @@ class Bearing(Frozen):
     y: u.Length
 
     def as_bushing(self) -> BushingType:
-        """Return the bushing of six components in a frame whose y axis is the drum's."""
+        """Return the bearing as a bushing in a frame whose y axis is the drum axis."""
 
-        def or_tilting(torsional: float | None, tilting: float) -> float:
+        def torsional_or_tilting(torsional: float | None, tilting: float) -> float:
             return tilting if torsional is None else torsional
 
         return BushingType(
@@ -46,12 +47,14 @@ class Bearing(Frozen):
             stiffness_y=self.axial_stiffness,
             stiffness_z=self.radial_stiffness,
             rotational_stiffness_x=self.tilting_stiffness,
-            rotational_stiffness_y=or_tilting(self.torsional_stiffness, self.tilting_stiffness),
+            rotational_stiffness_y=torsional_or_tilting(
+                self.torsional_stiffness, self.tilting_stiffness
+            ),
             rotational_stiffness_z=self.tilting_stiffness,
             damping_x=self.radial_damping,
             damping_y=self.axial_damping,
             damping_z=self.radial_damping,
             rotational_damping_x=self.tilting_damping,
-            rotational_damping_y=or_tilting(self.torsional_damping, self.tilting_damping),
+            rotational_damping_y=torsional_or_tilting(self.torsional_damping, self.tilting_damping),
             rotational_damping_z=self.tilting_damping,
         )

@@ -1,4 +1,4 @@
-"""Parameter files of single components: a damper type or a bushing, written as in a machine file; some are shipped."""
+"""Parameter files of single components: a damper type or a bushing type as in a machine file."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +19,13 @@ ComponentParameters: TypeAlias = DamperType | BushingType
 
 @dataclass(frozen=True)
 class Component:
-    """A component with a name and the sources of its numbers by key."""
+    """A component.
+
+    Attributes:
+        name: Name of its file, without the suffix.
+        parameters: Parameters of a damper type or a bushing type.
+        sources: Source of each number, by key.
+    """
 
     name: str
     parameters: ComponentParameters
@@ -27,7 +33,7 @@ class Component:
 
     @property
     def is_damper(self) -> bool:
-        """Whether it is a damper, not a bushing."""
+        """Whether the component is a damper; otherwise it is a bushing."""
         return not isinstance(self.parameters, BushingType)
 
 
@@ -36,15 +42,20 @@ class _DamperFile(Frozen):
 
 
 def shipped_components() -> dict[str, Path]:
-    """Component files that come with the package, by name."""
+    """Return the component files that the package contains, by name."""
     return {path.stem: path for path in sorted(COMPONENTS_FOLDER.glob("*.yaml"))}
 
 
 def load_component(name_or_path: str) -> Component:
-    """Reads a component file: the keys of a damper type (with `law`) or of a bushing type.
+    """Read a component file.
+
+    The file has the keys of a damper type (among them `law`) or those of a bushing type.
+
+    Args:
+        name_or_path: Name of a shipped component or path of a file.
 
     Raises:
-        InputError: with one problem per fault.
+        InputError: the file is missing or wrong, with one problem for each error.
     """
     shipped = shipped_components()
     path = shipped.get(name_or_path, Path(name_or_path))

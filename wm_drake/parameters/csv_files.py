@@ -1,4 +1,4 @@
-"""CSV files: # begins a comment, the first line names the columns."""
+"""CSV files: a # starts a comment, and the first line names the columns."""
 
 import warnings
 from pathlib import Path
@@ -11,10 +11,17 @@ from wm_drake.errors import input_error
 def read_csv(
     path: str | Path, columns: list[str], key: str = "", optional: str = ""
 ) -> pd.DataFrame:
-    """The table in a CSV file that must have exactly these columns, and may have `optional` behind them.
+    """Read a CSV file with given columns.
+
+    Args:
+        path: The file.
+        columns: Names of the columns that the file must have, in this order.
+        key: Key path for messages.
+        optional: Name of a column that may follow; empty for none.
 
     Raises:
-        InputError: not there, not a table, other columns, or a row with more values than columns.
+        InputError: the file cannot be read as CSV, has other columns, or has a row with more values
+            than columns.
     """
     try:
         named = list(pd.read_csv(path, comment="#", skipinitialspace=True, nrows=0).columns)
@@ -22,9 +29,8 @@ def read_csv(
             message = f"needs the columns {','.join(columns)}, has {','.join(map(str, named))}"
             raise input_error(message, where=str(path), key=key)
         with warnings.catch_warnings():
-            warnings.simplefilter(
-                "error", pd.errors.ParserWarning
-            )  # a row too long would only be cut with a warning
+            # pandas cuts a row that is too long and only warns
+            warnings.simplefilter("error", pd.errors.ParserWarning)
             return pd.read_csv(path, comment="#", skipinitialspace=True, index_col=False)
     except pd.errors.ParserWarning:
         raise input_error("a row has more values than columns", where=str(path), key=key) from None

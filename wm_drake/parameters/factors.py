@@ -1,4 +1,4 @@
-"""Factors of a study: names for numbers of a machine that move together, at three levels; from a file, or named by key path."""
+"""Factors of a study: groups of a machine's numbers that vary together at three levels."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -18,15 +18,21 @@ from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.units import Unit
 
 GASKET_FACTORS = Path(__file__).parents[1] / "data" / "gasket_factors.yaml"
-"""The factors of [B] section 4."""
+"""File with the factors of [B] section 4."""
 
 LINEAR_PART = 0.2
-"""The nominal stiffness of a table is the slope of a line fitted to this part of it, about zero ([B] section 4: "slopes of
-linear fit to the first 20 % of the force-displacement and torque-angle curves")."""
+"""Part of a table, on each side of zero, whose fitted line has the nominal stiffness as its slope.
+
+[B] section 4: "slopes of linear fit to the first 20 % of the force-displacement and torque-angle
+curves".
+"""
 
 TABLES = ("linear", "scaled")
-"""What becomes of a stiffness given as a table: a number, level times nominal stiffness, as in [B]; or the table with its
-forces scaled, which keeps its shape."""
+"""How a level changes a stiffness that is given as a table.
+
+"linear": a number replaces the table, the level times the nominal stiffness, as in [B].
+"scaled": the forces of the table are scaled, so that the curve keeps its shape.
+"""
 
 _PERCENT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*%\s*")
 
@@ -34,13 +40,14 @@ Value: TypeAlias = float | ForceTable | TorqueTable
 
 
 class Factor(Frozen):
-    """Numbers of a machine that move together.
+    """A factor: numbers of a machine that vary together.
 
     Attributes:
-        keys: Their key paths.
-        low, high: Levels -1 and 1: percent of the machine's value ("50 %"), or a value ("2 N/mm").
-        middle: Level 0; half way between by default.
-        about: What it is, in words.
+        keys: Key paths of the numbers.
+        low, high: Levels -1 and 1, as percent of the machine's value ("50 %") or as a value
+            ("2 N/mm").
+        middle: Level 0; None for the mean of the two.
+        about: Description of the factor.
     """
 
     keys: tuple[str, ...] = Field(min_length=1)
@@ -52,14 +59,16 @@ class Factor(Frozen):
 
 @dataclass(frozen=True)
 class FactorLevels:
-    """A factor of one machine.
+    """The levels of a factor for one machine.
 
     Attributes:
-        name: Of the factor.
-        about: What it is, in words.
-        settings: For the levels -1, 0 and 1: value by key path, SI.
-        nominal: By key path, the machine's number, or the nominal stiffness of its table, in the unit people read.
-        shown: For the levels -1, 0 and 1: what the first key is set to, in the unit people read.
+        name: Name of the factor.
+        about: Description of the factor.
+        settings: For each of the levels -1, 0 and 1: values by key path, in SI units.
+        nominal: By key path: the machine's number, or the nominal stiffness of its table, as text
+            in the display unit.
+        shown: For each of the levels -1, 0 and 1: the value of the first key, as text in the
+            display unit.
     """
 
     name: str
@@ -70,10 +79,10 @@ class FactorLevels:
 
 
 def load_factors(path: Path) -> dict[str, Factor]:
-    """Reads a factor file: ``NAME: {keys: [KEY, ...], low: BOUND, high: BOUND}``.
+    """Read a factor file with entries ``NAME: {keys: [KEY, ...], low: BOUND, high: BOUND}``.
 
     Raises:
-        InputError: with one problem per fault.
+        InputError: the file is missing or wrong, with one problem for each error.
     """
     factors, problems = {}, []
     for name, entry in read_yaml(path).items():
@@ -87,10 +96,14 @@ def load_factors(path: Path) -> dict[str, Factor]:
 
 
 def factor_of_text(text: str, known: Mapping[str, Factor]) -> tuple[str, Factor]:
-    """A factor as written on a command line: NAME of a known one, KEY, or either with =LOW..HIGH.
+    """Return the name and the factor that a command-line argument means.
+
+    Args:
+        text: NAME of a known factor or KEY path of a number, either one with or without =LOW..HIGH.
+        known: Known factors by name.
 
     Raises:
-        InputError: not of this form.
+        InputError: the text does not have this form.
     """
     name, equals, bounds = (part.strip() for part in text.partition("="))
     factor = known.get(name) or Factor(keys=(name,))
@@ -98,22 +111,25 @@ def factor_of_text(text: str, known: Mapping[str, Factor]) -> tuple[str, Factor]
         return name, factor
     low, dots, high = (part.strip() for part in bounds.partition(".."))
     if not (dots and low and high):
-        raise input_error(f"'{text}' is not NAME=LOW..HIGH; write for example '{name}=50 %..150 %'")
+        raise input_error(
+            f"'{text}' is not of the form NAME=LOW..HIGH; write for example '{name}=50 %..150 %'"
+        )
     return name, factor.model_copy(update={"low": low, "high": high, "middle": None})
 
 
 def levels_of(
     parameters: MachineParameters, factors: Mapping[str, Factor], tables: str = "linear"
 ) -> tuple[FactorLevels, ...]:
-    """What the levels of factors are for a machine.
+    """Return the levels of factors for a machine.
 
     Args:
         parameters: The machine.
-        factors: By name.
-        tables: One of `TABLES`.
+        factors: Factors by name.
+        tables: How a level changes a table, one of `TABLES`.
 
     Raises:
-        InputError: a key that the machine does not have, bounds that are no value of it, or that two factors share.
+        InputError: the machine does not have a key, a level is not allowed for a key, or two
+            factors contain the same key.
     """
     known = {key: (value, unit) for key, value, unit in quantities(parameters)}
     resolved, problems, owner = [], [], dict[str, str]()
@@ -121,7 +137,10 @@ def levels_of(
         try:
             for key in factor.keys:
                 if owner.setdefault(key, name) != name:
-                    raise input_error(f"moves with factor {owner[key]} already", key=key)
+                    raise input_error(
+                        f"belongs to factor {owner[key]} already; a key may be in one factor only",
+                        key=key,
+                    )
             resolved.append(_resolved(parameters, known, name, factor, tables))
         except InputError as error:
             problems += [
@@ -135,7 +154,13 @@ def levels_of(
 def at_levels(
     parameters: MachineParameters, factors: Sequence[FactorLevels], levels: Sequence[int]
 ) -> MachineParameters:
-    """The machine with each factor at a level, -1, 0 or 1."""
+    """Return the machine with each factor set to its level.
+
+    Args:
+        parameters: The machine.
+        factors: Factors with their levels for this machine.
+        levels: One level (-1, 0 or 1) for each factor.
+    """
     settings = [
         factor.settings[int(level) + 1] for factor, level in zip(factors, levels, strict=True)
     ]
@@ -145,9 +170,11 @@ def at_levels(
 
 
 def nominal_stiffness(table: ForceTable | TorqueTable) -> float:
-    """Slope of the least-squares line through the curve of a table over its first fifth on both sides. [N/m or N m/rad]
+    """Return the nominal stiffness of a table. [N/m or N m/rad]
 
-    Of a curve that is flat there (a free stroke), the slope of the line through all of it.
+    This is the slope of the least-squares line through the curve over its first 20 % on both sides
+    of zero. If the curve is flat there (a free stroke), it is the slope of the line through the
+    whole curve.
     """
     x = table.curve[0]
     for part in (LINEAR_PART, 1.0):
@@ -165,6 +192,7 @@ def _resolved(
     factor: Factor,
     tables: str,
 ) -> FactorLevels:
+    """Return a factor's levels for a machine; `known` has value and unit of all numbers by key."""
     settings: tuple[dict[str, Value], ...] = ({}, {}, {})
     nominal: dict[str, str] = {}
     shown: tuple[str, ...] = ()
@@ -178,8 +206,10 @@ def _resolved(
         )
         if not low < middle < high:
             texts = f"{factor.low}, {factor.middle or 'half way'}, {factor.high}"
+            reason = " (the value is 0)" if number == 0.0 else ""
             raise input_error(
-                f"levels {texts} do not rise{' (the value is 0)' if number == 0.0 else ''}", key=key
+                f"levels {texts} do not rise{reason}; the low level must be below the high one",
+                key=key,
             )
         original = known[key][0] if key in known else _value_at(parameters, key)
         for level, value in zip(settings, (low, middle, high), strict=True):
@@ -187,9 +217,7 @@ def _resolved(
                 tables == "scaled" or not _takes_numbers(parameters, key)
             )
             level[key] = _scaled(original, value / float(number or 1.0)) if scaled else value
-            with_value(
-                parameters, key, level[key]
-            )  # the machine has the last word on what it can be
+            with_value(parameters, key, level[key])  # raises if the value is not allowed
         nominal[key] = "" if number is None else _text(number, unit)
         if not shown:
             shown = tuple(_text(value, unit) for value in (low, middle, high))
@@ -199,12 +227,12 @@ def _resolved(
 def _nominal(
     parameters: MachineParameters, known: Mapping[str, tuple[Any, Unit]], key: str
 ) -> tuple[float | None, Unit | None]:
-    """The machine's number and its unit; None for a number that only the SDF has."""
+    """Return the machine's number and its unit; None for a number that only the SDF has."""
     if key in known:
         value, unit = known[key]
         if isinstance(value, tuple):
             raise input_error(
-                "is a list of numbers; name one of them by its place, from 0: " + f"{key}.0",
+                f"is a list of numbers; name one of them by its index, for example {key}.0",
                 key=key,
             )
         return (None if value is None else float(value)), unit
@@ -226,7 +254,7 @@ def _nominal(
 
 
 def _value_at(parameters: MachineParameters, key: str) -> Any:
-    """What stands at a key path; None where only the SDF has a value."""
+    """Return the value at a key path; None if only the SDF has a value."""
     node: Any = parameters
     parts = key.split(".")
     for place, part in enumerate(parts):
@@ -258,13 +286,16 @@ def _bound(parameters: MachineParameters, key: str, text: str, nominal: float | 
     percent = _PERCENT.fullmatch(text)
     if percent and nominal is None:
         raise input_error(
-            f"is in the SDF, not in the machine file, so '{text}' of it is not known; give a value",
+            f"is in the SDF but not in the machine file, so '{text}' is unknown; write a value "
+            "with a unit",
             key=key,
         )
     if percent:
         return 0.01 * float(percent[1]) * float(nominal or 0.0)
     if key.rpartition(".")[2].isdigit():
-        raise input_error(f"'{text}': one number of a list takes bounds in percent", key=key)
+        raise input_error(
+            f"'{text}' is not in percent; the bounds of one number of a list must be", key=key
+        )
     value = _value_at(with_value(parameters, key, text), key)
     if not isinstance(value, float):
         raise input_error(f"'{text}' is not a number for this key", key=key)
@@ -272,7 +303,7 @@ def _bound(parameters: MachineParameters, key: str, text: str, nominal: float | 
 
 
 def _takes_numbers(parameters: MachineParameters, key: str) -> bool:
-    """Whether the field of a table may hold a number in its place."""
+    """Return whether the field of a table accepts a number instead of a table."""
     parent, _, name = key.rpartition(".")
     field = type(_value_at(parameters, parent)).model_fields[name]
     return unit_of(field.annotation, field.metadata) is not None
@@ -286,7 +317,7 @@ def _scaled(table: ForceTable | TorqueTable, factor: float) -> ForceTable | Torq
 
 
 def _text(value: float, unit: Unit | None) -> str:
-    """A value for the eye."""
+    """Return a value as text in the display unit."""
     return (
         f"{value:.6g}"
         if unit is None

@@ -1,4 +1,7 @@
-"""Machine, load and profile files: YAML (profiles also CSV) in, YAML out. Every message names file, line and key path."""
+"""Machine, load and profile files in YAML, profiles also in CSV.
+
+Every message names the file, the line and the key path.
+"""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -26,19 +29,20 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def shipped_machines() -> dict[str, Path]:
-    """Machine files that come with the package, by name."""
+    """Return the machine files that the package contains, by name."""
     return {path.stem: path for path in sorted(MACHINES_FOLDER.glob("*.yaml"))}
 
 
 def load_machine(name_or_path: str | Path = "reference") -> MachineParameters:
-    """Reads a machine file.
+    """Read a machine file.
+
+    A file with ``extends: NAME_OR_PATH`` contains only the changes to another machine.
 
     Args:
-        name_or_path: Name of a shipped machine, or path of a YAML file. ``extends: NAME_OR_PATH`` in a file starts from
-            another machine and changes what the file names.
+        name_or_path: Name of a shipped machine or path of a YAML file.
 
     Raises:
-        InputError: with one problem per fault.
+        InputError: the file is missing or wrong, with one problem for each error.
     """
     path = machine_path(name_or_path)
     plain, sources = _without_sources(_extended(path, ()))
@@ -47,42 +51,52 @@ def load_machine(name_or_path: str | Path = "reference") -> MachineParameters:
 
 
 def machine_path(name_or_path: str | Path) -> Path:
-    """The file of a shipped machine's name or of a path."""
+    """Return the path of a machine file, given the name of a shipped machine or a path.
+
+    Raises:
+        InputError: there is no such machine and no such file.
+    """
     shipped = shipped_machines()
     if str(name_or_path) in shipped:
         return shipped[str(name_or_path)]
     path = Path(name_or_path)
     if not path.is_file():
-        what = "is a folder" if path.is_dir() else "no such file"
-        raise input_error(
-            f"{what}, and no shipped machine of that name{nearest_names(str(name_or_path), shipped)}",
-            where=str(path),
-        )
+        reason = "is a folder" if path.is_dir() else "no such file"
+        hint = nearest_names(str(name_or_path), shipped)
+        raise input_error(f"{reason}, and no shipped machine of that name{hint}", where=str(path))
     return path
 
 
 def load_load(path: Path) -> Load:
-    """Reads a load file: ``unbalances: [{mass, radius, y, phase}, ...]``, written as in a machine file."""
+    """Read a load file: ``unbalances: [{mass, radius, y, phase}, ...]`` as in a machine file.
+
+    Raises:
+        InputError: the file is missing or wrong, with one problem for each error.
+    """
     tree = read_yaml(path)
     return _validated(Load, _without_sources(tree)[0], path)
 
 
 def read_mapping(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
-    """A YAML file as plain text values, and the sources of its numbers by key path."""
+    """Return the values of a YAML file as text, and the sources of its numbers by key path.
+
+    Raises:
+        InputError: the file is missing, is not YAML, or is not a mapping.
+    """
     return _without_sources(read_yaml(path))
 
 
 def read_model(model: type[Model], path: Path) -> Model:
-    """Reads a YAML file of any other kind, as the model says.
+    """Read a YAML file whose content a pydantic model describes.
 
     Raises:
-        InputError: with one problem per fault, its line and key path.
+        InputError: the file is missing or wrong, with line and key path of each error.
     """
     return _validated(model, read_yaml(path), path)
 
 
 def shipped_profiles() -> dict[str, Path]:
-    """Spin profiles that come with the package, by name."""
+    """Return the spin profiles that the package contains, by name of their files."""
     return {
         path.stem: path
         for path in sorted(CYCLES_FOLDER.iterdir())
@@ -91,14 +105,16 @@ def shipped_profiles() -> dict[str, Path]:
 
 
 def load_profile(name_or_path: str | Path) -> SpinProfile:
-    """Reads a spin profile: YAML as in a machine file, or CSV (# begins a comment).
+    """Read a spin profile from YAML, written as in a machine file, or from CSV.
+
+    A CSV file has the columns time_s and speed_rpm. A third column, region, is optional: it has the
+    name of the region that begins or continues in a row, and is empty outside of all regions.
 
     Args:
-        name_or_path: Name of a shipped profile, or a file. CSV has the columns time_s and speed_rpm, and perhaps region: the
-            name of the region that a row begins or goes on; empty outside of all.
+        name_or_path: Name of a shipped profile or path of a file.
 
     Raises:
-        InputError: with one problem per fault.
+        InputError: the file is missing or wrong, with one problem for each error.
     """
     shipped = shipped_profiles()
     path = shipped.get(f"profile_{name_or_path}", Path(name_or_path))
@@ -113,7 +129,7 @@ def load_profile(name_or_path: str | Path) -> SpinProfile:
         return _validated(SpinProfile, _without_sources(tree)[0], path)
     table = read_csv(path, ["time_s", "speed_rpm"], optional="region")
     if table.empty:
-        raise input_error("is empty: a profile needs at least two points", where=str(path))
+        raise input_error("is empty; a profile needs at least two points", where=str(path))
     numbers = table[["time_s", "speed_rpm"]].apply(pd.to_numeric, errors="coerce")
     finite = np.isfinite(numbers.to_numpy(dtype=float)).all(axis=1)
     if not finite.all():
@@ -135,7 +151,7 @@ def load_profile(name_or_path: str | Path) -> SpinProfile:
 
 
 def _regions(times: list[float], names: list[str]) -> list[dict[str, str]]:
-    """Stretches of equal name between the rows of a profile."""
+    """Return the regions of a profile: consecutive rows with the same name."""
     regions: list[dict[str, str]] = []
     for begin, end, name, before in zip(times, times[1:], names, ["", *names], strict=False):
         name = name.strip()
@@ -147,7 +163,7 @@ def _regions(times: list[float], names: list[str]) -> list[dict[str, str]]:
 
 
 def machine_yaml(parameters: MachineParameters) -> str:
-    """The machine as the text of a machine file, in engineers' units, each number with its source if it has one."""
+    """Return a machine as the text of a machine file, with display units and sources of numbers."""
     tree = parameters.model_dump(mode="json", exclude={"sources"}, exclude_unset=True)
     for key, value, unit in list(quantities(parameters)):
         *parents, name = key.split(".")
@@ -155,7 +171,7 @@ def machine_yaml(parameters: MachineParameters) -> str:
         for part in parents:
             node = node[int(part)] if isinstance(node, list) else node.get(part)
             if node is None:
-                break  # a default that was not set
+                break  # a default that the file does not set
         if node is None or name not in node:
             continue
         source = source_of(parameters, key)
@@ -166,12 +182,14 @@ def machine_yaml(parameters: MachineParameters) -> str:
 
 
 def machine_file_with(path: Path, parameters: MachineParameters, keys: Iterable[str]) -> str:
-    """A machine file as it is written, with comments and order, but some numbers and their sources those of `parameters`.
+    """Return the text of a machine file with some numbers replaced.
+
+    Comments, order and all other numbers stay as they are in the file.
 
     Args:
-        path: The file; the keys stand in it, not in one it extends.
-        parameters: Whose numbers and sources to write.
-        keys: Key paths of the numbers.
+        path: The file. It must contain the keys itself; a file that it extends does not count.
+        parameters: Machine with the new numbers and their sources.
+        keys: Key paths of the numbers to replace.
     """
     tree = read_yaml(path)
     known = {key: (value, unit) for key, value, unit in quantities(parameters)}
@@ -181,7 +199,7 @@ def machine_file_with(path: Path, parameters: MachineParameters, keys: Iterable[
         node: Any = tree
         for part in parents:
             node = node[int(part)] if isinstance(node, list) else node[part]
-        if isinstance(value, tuple):  # of a table, which has one source
+        if isinstance(value, tuple):  # the columns of a table share one source
             node[name], node["source"] = unit.text(value), source_of(parameters, key)
             continue
         if not isinstance(node[name], CommentedMap):
@@ -201,7 +219,10 @@ class _TextStream:
 
 
 class _TextResolver(VersionedResolver):
-    """Reads every plain scalar as text, null apart: numbers need units anyway, and no date or huge integer can trip it."""
+    """A YAML resolver that reads every plain scalar except null as text.
+
+    Numbers need units, so they are parsed later. Dates and huge integers need no special treatment.
+    """
 
     @property
     def versioned_resolver(self) -> dict[str, list[tuple[Any, Any]]]:
@@ -221,10 +242,10 @@ def _yaml() -> YAML:
 
 
 def read_yaml(path: Path) -> CommentedMap:
-    """The mapping in a YAML file; every plain scalar is text.
+    """Return the mapping in a YAML file, with every plain scalar except null as text.
 
     Raises:
-        InputError: not there, not YAML, not a mapping.
+        InputError: the file is missing, is not YAML, or is not a mapping.
     """
     try:
         tree = _yaml().load(path.read_text(encoding="utf-8"))
@@ -258,7 +279,7 @@ def _extended(path: Path, seen: tuple[Path, ...]) -> CommentedMap:
     if base_path.resolve() in (*seen, path.resolve()):
         raise input_error("extends itself", where=str(path), key="extends")
     base_tree = _extended(base_path, (*seen, path.resolve()))
-    for key in ("model", "measured"):  # paths are meant relative to the file that names them
+    for key in ("model", "measured"):  # paths are relative to the file that contains them
         if key in base_tree:
             base_tree[key] = _with_absolute_paths({key: base_tree[key]}, base_path)[key]
     _merge(base_tree, tree)
@@ -266,7 +287,10 @@ def _extended(path: Path, seen: tuple[Path, ...]) -> CommentedMap:
 
 
 def _merge(base: CommentedMap, changes: Mapping[str, Any]) -> None:
-    """Puts `changes` over `base`, mapping by mapping; null removes an entry. A number replaces its old source too."""
+    """Change `base` in place: merge mappings, replace other values, remove entries that are null.
+
+    A new number replaces the old number together with its source.
+    """
     for key, value in changes.items():
         old = base.get(key)
         if value is None:
@@ -278,12 +302,15 @@ def _merge(base: CommentedMap, changes: Mapping[str, Any]) -> None:
 
 
 def _is_whole(value: Mapping[str, Any]) -> bool:
-    """Whether a mapping is one value (a number with source, a table, a profile), to be replaced and not merged."""
+    """Return whether a mapping is replaced as a whole: a number with source, table or profile."""
     return any(key in value for key in ("value", "force", "torque", "steps", "time"))
 
 
 def _without_sources(node: Any, key: str = "") -> tuple[Any, dict[str, str]]:
-    """The tree without its ``source`` texts and ``{value, source}`` wrappers, and the sources by key path."""
+    """Return a tree of values without their sources, and the sources by key path.
+
+    ``{value, source}`` mappings are replaced by their value.
+    """
     sources: dict[str, str] = {}
     if isinstance(node, Mapping):
         if "source" in node:
@@ -308,7 +335,10 @@ def _without_sources(node: Any, key: str = "") -> tuple[Any, dict[str, str]]:
 
 
 def _with_absolute_paths(tree: dict[str, Any], path: Path) -> dict[str, Any]:
-    """File names in a machine file are relative to it; the shipped SDF models go by their bare name."""
+    """Return a machine's values with absolute file names.
+
+    File names are relative to the machine file. The name of a shipped SDF model is not changed.
+    """
     changed = dict(tree)
     model = tree.get("model")
     if isinstance(model, str) and (path.parent / model).is_file():
@@ -330,7 +360,12 @@ def _validated(model: type[Model], plain: Any, path: Path) -> Model:
 
 
 def located(error: InputError, path: Path) -> InputError:
-    """The same problems, that showed when the machine was built, with the file the user gave and its line if it has one."""
+    """Return an error with the file and, where known, the line of each problem added.
+
+    Args:
+        error: Error that was found later, when the machine was built.
+        path: The machine file of the user.
+    """
     tree = read_yaml(path)
     problems = []
     for problem in error.problems:
@@ -342,7 +377,10 @@ def located(error: InputError, path: Path) -> InputError:
 
 
 def _place(path: Path, key: str) -> str:
-    """file:line of a key path, in the file of the chain that holds most of it."""
+    """Return ``file:line`` of a key path.
+
+    If a file extends others, the one that contains the most parts of the key path is named.
+    """
     best_depth, best = 0, str(path)
     while path.suffix.lower() != ".csv":
         tree = read_yaml(path)
@@ -356,7 +394,7 @@ def _place(path: Path, key: str) -> str:
 
 
 def _line_of(tree: CommentedMap, key: str) -> tuple[int, int]:
-    """How many parts of a key path a file holds, and the line of the last of them."""
+    """Return how many parts of a key path a file contains, and the line of the last of them."""
     node: Any = tree
     depth, line = 0, 1
     for part in key.split("."):

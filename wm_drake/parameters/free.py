@@ -1,4 +1,4 @@
-"""Free files: which quantities of a machine a calibration may turn, within which bounds, and what is thought of them before."""
+"""Free files: the quantities that a calibration may change, with their bounds and priors."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,12 +12,12 @@ from wm_drake.parameters.machine import Name
 
 
 class Measured(Frozen):
-    """One number or several with a unit, of whatever dimension: what ``12 kg`` or ``(-1, 0, 1) mm`` says.
+    """One number or several numbers with a unit, such as ``12 kg`` or ``(-1, 0, 1) mm``.
 
     Attributes:
-        values: In SI.
-        unit: As written.
-        is_list: Whether written in parentheses.
+        values: Numbers in SI units.
+        unit: Unit in which they are written.
+        is_list: Whether there is more than one number.
     """
 
     values: tuple[float, ...]
@@ -53,15 +53,16 @@ _Pair = Annotated[Measured, BeforeValidator(_pair)]
 
 
 class FreeQuantity(Frozen):
-    """One number a calibration may turn.
+    """One number that a calibration may change.
 
     Attributes:
-        bounds: Smallest and largest value allowed.
-        prior: Expected value and standard deviation: what is known of it before any measurement of the machine.
-        sets: Values of the machine it enters, by key path, each with a factor: a value is the sum of factor times quantity
-            over all quantities that enter it. A factor may have a unit, and one number for each point of a table.
-        source: Why these bounds and this prior.
-        start: Where searches begin; at the expected value if None.
+        bounds: Smallest and largest allowed value.
+        prior: Expected value and standard deviation before any measurement of the machine.
+        sets: Factors by key path of the machine's values that depend on this quantity. Such a value
+            is the sum of factor times quantity over all quantities that list it. A factor may have
+            a unit, and it may be a list with one number for each point of a table.
+        source: Reason for the bounds and the prior.
+        start: Start value of searches; None for the expected value.
     """
 
     bounds: _Pair
@@ -76,7 +77,7 @@ class FreeQuantity(Frozen):
 
     @property
     def unit(self) -> str:
-        """In which its numbers are written and shown."""
+        """Unit in which the numbers are written and displayed."""
         return self.bounds.unit
 
     @model_validator(mode="after")
@@ -84,10 +85,11 @@ class FreeQuantity(Frozen):
         lower, upper = self.bounds.values
         if u.dimension(self.prior.unit) != u.dimension(self.unit):
             raise ValueError(
-                f"the prior is in {self.prior.unit or 'pure numbers'}, the bounds in {self.unit or 'pure numbers'}"
+                f"the prior is in {self.prior.unit or 'pure numbers'}, "
+                f"the bounds in {self.unit or 'pure numbers'}; both need one dimension"
             )
         if not lower < upper:
-            raise ValueError("the bounds must rise")
+            raise ValueError("the lower bound must be below the upper bound")
         if not lower <= self.prior.values[0] <= upper:
             raise ValueError("the expected value is outside the bounds")
         if not self.prior.values[1] > 0.0:
@@ -103,11 +105,13 @@ class FreeQuantity(Frozen):
 
 
 class ExpectedPreload(Frozen):
-    """What is known of the springs' preloads, which are no numbers of the machine file but follow from the weight.
+    """Prior of the spring preloads.
+
+    The preloads are not numbers of the machine file; they follow from the weight.
 
     Attributes:
         prior: Expected value and standard deviation, the same for each spring.
-        source: Why.
+        source: Reason for the prior.
     """
 
     prior: _Pair
@@ -116,21 +120,24 @@ class ExpectedPreload(Frozen):
     @model_validator(mode="after")
     def _force(self) -> "ExpectedPreload":
         if u.dimension(self.prior.unit) != u.dimension("N"):
-            raise ValueError(f"the prior is in {self.prior.unit or 'pure numbers'}, a preload in N")
+            raise ValueError(
+                f"the prior is in {self.prior.unit or 'pure numbers'}; a preload needs a unit of "
+                "force such as N"
+            )
         if not self.prior.values[1] > 0.0:
             raise ValueError("the standard deviation must be above 0")
         return self
 
 
 class FreeFile(Frozen):
-    """All free quantities of a calibration, by name, and what the springs should carry."""
+    """The free quantities of a calibration, by name, and the prior of the spring preloads."""
 
     about: str = ""
     spring_preload: ExpectedPreload | None = None
     quantities: dict[Name, FreeQuantity] = Field(min_length=1)
 
     def without_starts(self) -> "FreeFile":
-        """The same, with searches that begin at the expected values."""
+        """Return a copy without start values, so that searches start at the expected values."""
         quantities = {
             name: quantity.model_copy(update={"start": None})
             for name, quantity in self.quantities.items()
@@ -139,9 +146,9 @@ class FreeFile(Frozen):
 
 
 def load_free(path: Path) -> FreeFile:
-    """Reads a free file.
+    """Read a free file.
 
     Raises:
-        InputError: with one problem per fault, its line and key path.
+        InputError: the file is missing or wrong, with line and key path of each error.
     """
     return read_model(FreeFile, path)

@@ -1,4 +1,4 @@
-"""Key paths such as ``gasket.stiffness_x``: the one way to change a number, and the list of all that can be changed."""
+"""Key paths such as ``gasket.stiffness_x``: change numbers, and list all that can be changed."""
 
 import typing
 from collections.abc import Iterator, Mapping
@@ -16,29 +16,35 @@ Tree = typing.TypeVar("Tree", bound=BaseModel)
 
 
 def with_value(parameters: Tree, key: str, value: Any) -> Tree:
-    """A copy with one value changed.
+    """Return a copy of a machine with one value changed.
 
     Args:
-        parameters: The machine; any part of one, such as a damper type, does as well.
-        key: Path of names from the top, joined by dots: ``gasket.stiffness_x``, ``loads.middle.unbalances.0.mass``.
-            ``bodies.NAME`` and ``frames.NAME`` need not be in the machine file.
+        parameters: The machine, or a part of one such as a damper type.
+        key: Names from the top, joined by dots, such as ``gasket.stiffness_x`` or
+            ``loads.middle.unbalances.0.mass``. ``bodies.NAME`` and ``frames.NAME`` need not be in
+            the machine file.
         value: SI number or text with a unit (``"5 N/mm"``); a mapping for a group of values.
 
     Raises:
-        InputError: unknown key (with the nearest known one) or a value that is not allowed.
+        InputError: the key is unknown (the message names similar ones), or the value is not
+            allowed.
     """
     return with_values(parameters, {key: value})
 
 
 def with_values(parameters: Tree, values: Mapping[str, Any]) -> Tree:
-    """A copy with several values changed at once, which costs little more than one: each group is checked once.
+    """Return a copy of a machine with several values changed.
+
+    This takes little more time than changing one value, because each group of values is checked
+    once.
 
     Args:
-        parameters: As for `with_value`.
-        values: By key path, as for `with_value`. Of two keys the later wins if one is part of the other.
+        parameters: The machine, or a part of one such as a damper type.
+        values: Values by key path as in `with_value`. If one key is part of another, the later one
+            in the mapping wins.
 
     Raises:
-        InputError: as `with_value`.
+        InputError: a key is unknown (the message names similar ones), or a value is not allowed.
     """
     return typing.cast(
         Tree,
@@ -50,7 +56,13 @@ def with_values(parameters: Tree, values: Mapping[str, Any]) -> Tree:
 
 @dataclass(frozen=True)
 class _Change:
-    """A value on its way down a tree: `path` leads to it from here."""
+    """A change of one value in a tree.
+
+    Attributes:
+        key: Complete key path, for messages.
+        path: Names that lead from the current node to the value.
+        value: The new value.
+    """
 
     key: str
     path: list[str]
@@ -59,7 +71,7 @@ class _Change:
 
 def _replaced(node: Any, changes: list[_Change]) -> Any:
     last = max((number for number, change in enumerate(changes) if not change.path), default=None)
-    if last is not None:  # the whole node is replaced; what is named after that is changed in it
+    if last is not None:  # the whole node is replaced; later changes apply to the new node
         return (
             _replaced(changes[last].value, changes[last + 1 :])
             if changes[last + 1 :]
@@ -81,10 +93,16 @@ def _replaced(node: Any, changes: list[_Change]) -> Any:
         if node is None:
             whole = inner[0].key.removesuffix("." + ".".join([name, *inner[0].path]))
             raise input_error(
-                f"the machine has none; a machine file describes '{whole}' whole", key=inner[0].key
+                f"the machine has no '{whole}'; to add it, write all of it in a machine file",
+                key=inner[0].key,
             )
         if not (isinstance(node, tuple) and name.isdigit() and int(name) < len(node)):
-            raise input_error(f"'{name}' leads nowhere: the path ends before it", key=inner[0].key)
+            allowed = (
+                f"allowed are 0 to {len(node) - 1}"
+                if isinstance(node, tuple)
+                else "the path must end before it"
+            )
+            raise input_error(f"'{name}' does not exist; {allowed}", key=inner[0].key)
     return tuple(
         _replaced(entry, parts[str(i)]) if str(i) in parts else entry
         for i, entry in enumerate(node)
@@ -99,19 +117,20 @@ def _replaced_in_model(node: BaseModel, parts: dict[str, list[_Change]]) -> Base
             raise input_error(
                 f"unknown key '{name}'" + nearest_names(name, fields), key=changes[0].key
             )
-        values[name] = _entered(node, name, changes)
+        values[name] = _changed_field(node, name, changes)
     try:
         return type(node).model_validate(values)
     except ValidationError as error:
         changes = [change for inner in parts.values() for change in inner]
         here = ".".join(changes[0].key.split(".")[: -1 - len(changes[0].path)])
         raise InputError(
-            _said_of(problem, changes) for problem in problems_of(error, type(node), here)
+            _with_key_of_change(problem, changes)
+            for problem in problems_of(error, type(node), here)
         ) from None
 
 
-def _said_of(problem: Problem, changes: list[_Change]) -> Problem:
-    """A problem of a group, said of the change that led to it."""
+def _with_key_of_change(problem: Problem, changes: list[_Change]) -> Problem:
+    """Return a problem of a group of values with the key of the change that caused it."""
     return next(
         (
             replace(problem, key=change.key)
@@ -122,18 +141,18 @@ def _said_of(problem: Problem, changes: list[_Change]) -> Problem:
     )
 
 
-def _entered(node: BaseModel, name: str, changes: list[_Change]) -> Any:
+def _changed_field(node: BaseModel, name: str, changes: list[_Change]) -> Any:
     child = getattr(node, name)
     if name not in ("bodies", "frames"):
         return _replaced(child, changes)
-    # overrides of the SDF come into being when they are first named
+    # an override of the SDF is added when a change names it for the first time
     new = [change for change in changes if change.path and change.path[0] not in child]
     known = [change for change in changes if change not in new]
     return {**(_replaced(child, known) if known else child), **(_nested(new) if new else {})}
 
 
 def _nested(changes: list[_Change]) -> Any:
-    """Changes as mappings in mappings."""
+    """Return changes as nested mappings."""
     tree: Any = {}
     for change in changes:
         if not change.path:
@@ -143,7 +162,7 @@ def _nested(changes: list[_Change]) -> Any:
 
 
 def unit_of(annotation: Any, metadata: typing.Iterable[Any] = ()) -> Unit | None:
-    """The unit of a field, wherever in its annotation it stands; None for names and groups."""
+    """Return the unit in the annotation of a field; None for names and groups of values."""
     for item in metadata:
         if isinstance(item, Unit):
             return item
@@ -156,7 +175,7 @@ def unit_of(annotation: Any, metadata: typing.Iterable[Any] = ()) -> Unit | None
 
 
 def quantities(node: Any, path: str = "") -> Iterator[tuple[str, Any, Unit]]:
-    """Every number of a tree of parameters: key path, SI value, unit."""
+    """Yield key path, SI value and unit of every number in a tree of parameters."""
     if isinstance(node, BaseModel):
         for name, field in type(node).model_fields.items():
             value = getattr(node, name)
@@ -174,7 +193,7 @@ def quantities(node: Any, path: str = "") -> Iterator[tuple[str, Any, Unit]]:
 
 
 def source_of(parameters: MachineParameters, key: str) -> str:
-    """Where a number comes from: its own source, or the nearest one above it; empty if none is given."""
+    """Return the source of a number, or that of the nearest group around it; empty if none."""
     parts = key.split(".")
     while parts:
         if ".".join(parts) in parameters.sources:

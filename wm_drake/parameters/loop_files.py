@@ -1,4 +1,4 @@
-"""Measured loops: CSV files of time, displacement (or angle) and force (or moment), with units in the header or beside it."""
+"""Measured loops: CSV files of time, displacement (or angle) and force (or moment)."""
 
 import csv
 import re
@@ -13,7 +13,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit, convert
 
 FEWEST = 20
-"""Samples of a loop."""
+"""Smallest number of samples of a loop."""
 
 _TIME, _LENGTH, _ANGLE, _FORCE, _TORQUE = (
     Unit("s", "s"),
@@ -33,15 +33,15 @@ _SHORTHAND = {"Nm": "N*m", "Nmm": "N*mm", "-": None, "": None}
 
 @dataclass(frozen=True, eq=False)
 class MeasuredLoop:
-    """What a bench recorded, in SI.
+    """A force-displacement loop that was recorded on a bench, in SI units.
 
     Attributes:
-        name: Of the file, without its ending.
-        path: Of the file, for messages.
-        time: Rising (n,). [s]
-        displacement: Of the driven end (n,). [m; rad]
-        force: On the component there (n,). [N; N m]
-        rotates: Whether they are angle and moment.
+        name: Name of the file, without the suffix.
+        path: Path of the file, for messages.
+        time: (n,) strictly increasing. [s]
+        displacement: (n,) displacement or angle of the driven end. [m; rad]
+        force: (n,) force or moment on the component at the driven end. [N; N m]
+        rotates: Whether displacement and force are an angle and a moment.
     """
 
     name: str
@@ -53,53 +53,60 @@ class MeasuredLoop:
 
 
 def read_loop(path: Path, units: tuple[str, str, str] | None = None) -> MeasuredLoop:
-    """Reads a loop.
+    """Read a measured loop.
 
-    The first line that is no comment (#) names the columns, in any order: ``time [s], displacement [mm], force [N]`` or
-    ``time_s,displacement_mm,force_N``; ``angle`` and ``moment`` for rotations. Other columns are left alone.
+    The first line that is not a comment (#) names the columns, in any order: ``time [s],
+    displacement [mm], force [N]`` or ``time_s,displacement_mm,force_N``; for rotations ``angle``
+    and ``moment``. Other columns are ignored.
 
     Args:
-        path: CSV with commas, semicolons or tabs.
-        units: Of time, displacement and force, where the header has none.
+        path: CSV file with commas, semicolons or tabs.
+        units: Units of time, displacement and force if the header has none.
 
     Raises:
-        InputError: with file and line: columns, units, a value that is no finite number, time that does not rise, a signal
-            that does not change, too few samples.
+        InputError: columns or units are wrong, a value is not a finite number, the time does not
+            rise, a signal is constant, or there are too few samples. The message names file and
+            line.
     """
     rows = list(_rows(path))
     if not rows:
         raise input_error("is empty; needs the columns time, displacement, force", where=str(path))
     line, head = rows[0]
-    where, factors, rotates = _columns(head, units, f"{path}:{line}")
+    columns, factors, rotates = _columns(head, units, f"{path}:{line}")
     table = np.array(
-        [_numbers(cells, head, where, f"{path}:{at}") for at, cells in rows[1:]]
+        [_numbers(cells, head, columns, f"{path}:{at}") for at, cells in rows[1:]]
     ).reshape(-1, 3)
     if len(table) < FEWEST:
         raise input_error(
             f"has {len(table)} samples; a loop needs at least {FEWEST}", where=str(path)
         )
     lines = [at for at, _ in rows[1:]]
-    stuck = np.flatnonzero(np.diff(table[:, 0]) <= 0.0)
-    if len(stuck):
-        at = int(stuck[0]) + 1
+    not_rising = np.flatnonzero(np.diff(table[:, 0]) <= 0.0)
+    if len(not_rising):
+        at = int(not_rising[0]) + 1
         raise input_error(
             f"time does not rise: {table[at, 0]:g} after {table[at - 1, 0]:g}",
             where=f"{path}:{lines[at]}",
-            key=head[where[0]],
+            key=head[columns[0]],
         )
     for column in (1, 2):
         if np.ptp(table[:, column]) == 0.0:
             message = f"is constant ({table[0, column]:g} on lines {lines[0]} to {lines[-1]})"
-            raise input_error(message, where=f"{path}:{lines[0]}", key=head[where[column]])
+            raise input_error(message, where=f"{path}:{lines[0]}", key=head[columns[column]])
     time, displacement, force = (table * factors).T
     return MeasuredLoop(path.stem, str(path), time, displacement, force, rotates)
 
 
 def read_loops(paths: list[Path], units: tuple[str, str, str] | None = None) -> list[MeasuredLoop]:
-    """Reads several loops of one kind; files of one name are told apart by their folders.
+    """Read several loops, either all of displacement and force or all of angle and moment.
+
+    Args:
+        paths: The files.
+        units: Units of time, displacement and force if a header has none.
 
     Raises:
-        InputError: all problems of all files; or some files hold angles and others displacements.
+        InputError: a file is wrong (the error has all problems of all files), or some files contain
+            angles and others displacements.
     """
     loops: list[MeasuredLoop] = []
     problems: list[Problem] = []
@@ -115,13 +122,14 @@ def read_loops(paths: list[Path], units: tuple[str, str, str] | None = None) -> 
             kinds = ("angles and moments", "displacements and forces")
             first, other = kinds if loops[0].rotates else kinds[::-1]
             raise input_error(
-                f"holds {other}, {loops[0].path} {first}; a fit takes one kind", where=loop.path
+                f"holds {other}, {loops[0].path} {first}; all files of a fit must be of one kind",
+                where=loop.path,
             )
     return loops
 
 
 def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Number and cells of each line that is neither empty nor a comment."""
+    """Yield number and cells of each line that is neither empty nor a comment."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
@@ -144,7 +152,17 @@ def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
 def _columns(
     head: list[str], units: tuple[str, str, str] | None, place: str
 ) -> tuple[tuple[int, int, int], tuple[float, float, float], bool]:
-    """Indices of time, displacement and force, the factors that turn them into SI, and whether they are of a rotation."""
+    """Return indices, unit factors and kind of the columns time, displacement and force.
+
+    Args:
+        head: Cells of the header.
+        units: Units of the three columns if the header has none.
+        place: File and line, for messages.
+
+    Returns:
+        Indices of the three columns, factors that convert them to SI units, and whether the loop is
+        one of angle and moment.
+    """
     found: dict[str, tuple[int, Unit, str | None]] = {}
     for index, cell in enumerate(head):
         match = _HEAD.match(cell)
@@ -158,7 +176,8 @@ def _columns(
     missing = [column for column in _COLUMNS if column not in found]
     if missing:
         raise input_error(
-            f"no column {', '.join(missing)} among '{', '.join(head)}'; needs time, displacement (or angle), force (or moment)",
+            f"no column {', '.join(missing)} among '{', '.join(head)}'; needs time, displacement "
+            "(or angle), force (or moment)",
             where=place,
         )
     rotates = found["displacement"][1] == _ANGLE
@@ -181,13 +200,23 @@ def _columns(
 def _factor(
     head: str, column: str, unit: Unit, given: tuple[str | None, str | None], place: str
 ) -> float:
-    """That turns a column into SI, by the unit in its header or on the command line."""
-    own, asked = given
-    if own and asked and own != asked:
+    """Return the factor that converts a column to SI units.
+
+    Args:
+        head: The column's cell of the header.
+        column: Which column it is: time, displacement or force.
+        unit: SI unit and display unit of the column.
+        given: Unit in the header and unit on the command line; None for none.
+        place: File and line, for messages.
+    """
+    in_header, in_option = given
+    if in_header and in_option and in_header != in_option:
         raise input_error(
-            f"is in {own} by the header, in {asked} by --units", where=place, key=head
+            f"is in {in_header} by the header, in {in_option} by --units; both must be the same",
+            where=place,
+            key=head,
         )
-    text = own or asked
+    text = in_header or in_option
     if not text:
         message = f"has no unit; write '{column} [{unit.shown}]' in the header or use --units"
         raise input_error(message, where=place, key=head)
@@ -198,12 +227,14 @@ def _factor(
 
 
 def _numbers(
-    cells: list[str], head: list[str], where: tuple[int, int, int], place: str
+    cells: list[str], head: list[str], columns: tuple[int, int, int], place: str
 ) -> list[float]:
     if len(cells) != len(head):
-        raise input_error(f"has {len(cells)} values, the header {len(head)} columns", where=place)
+        raise input_error(
+            f"has {len(cells)} values but the header has {len(head)} columns", where=place
+        )
     values = []
-    for index in where:
+    for index in columns:
         try:
             value = float(cells[index])
         except ValueError:

@@ -1,4 +1,4 @@
-"""All that describes a machine, as one frozen tree of SI numbers."""
+"""Parameters of a machine: one frozen tree of numbers in SI units."""
 
 from typing import Annotated, Any, Literal
 
@@ -21,16 +21,22 @@ from wm_drake.parameters.elements import (
 from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
-"""Of an entry: it becomes part of key paths and of file names."""
+"""Name of an entry. It becomes part of key paths and of file names."""
 
 
 DEFAULT_STEP = 2.5e-3
-"""Integration step; a whole part of the output period. At a tenth of it the compiled engine's peaks with
-gasket move by less than 0.05 %, Drake's by less than 0.1 % (tested); DECISIONS, "Default step 2.5 ms", has the rest. [s]"""
+"""Default step size; the output period is an integer multiple of it. [s]
+
+With a tenth of this step size, peaks with gasket change by less than 0.05 % in the compiled engine
+and by less than 0.1 % in the Drake engine (tested). See docs/decisions/0007.
+"""
 
 
 class InertiaMatrix(Frozen):
-    """Inertia about the centre of mass, in the axes of T (or D). Products as elements of the matrix: xy = -sum(m x y)."""
+    """Inertia matrix about the centre of mass, in the axes of T (or D).
+
+    The products of inertia are elements of the matrix: xy = -sum(m x y).
+    """
 
     xx: Annotated[u.Inertia, Field(gt=0.0)]
     yy: Annotated[u.Inertia, Field(gt=0.0)]
@@ -47,20 +53,24 @@ class InertiaMatrix(Frozen):
             [self.xz, self.yz, self.zz],
         ]
         smallest, middle, largest = np.linalg.eigvalsh(matrix)
+        moments = f"{smallest:g}, {middle:g}, {largest:g} kg m^2"
         if smallest <= 0.0:
             raise ValueError(
-                f"is not positive definite: principal moments {smallest:g}, {middle:g}, {largest:g} kg m^2"
+                f"is not positive definite: the principal moments {moments} must be above 0"
             )
         if smallest + middle < largest * (1.0 - 1e-12):
             raise ValueError(
-                f"belongs to no body: of the principal moments {smallest:g}, {middle:g}, {largest:g} kg m^2 the largest must "
-                "not exceed the sum of the others"
+                f"belongs to no body: of the principal moments {moments} the largest must not "
+                "exceed the sum of the others"
             )
         return self
 
 
 class BodyOverride(Frozen):
-    """Mass properties that replace those of the SDF. A new mass alone scales the inertia with it."""
+    """Mass properties that replace those of the SDF.
+
+    If only the mass is given, the inertia is scaled with it.
+    """
 
     mass: Annotated[u.Mass, Field(gt=0.0)] | None = None
     centre_of_mass: u.Position | None = None
@@ -68,57 +78,62 @@ class BodyOverride(Frozen):
 
 
 class FrameOverride(Frozen):
-    """Position that replaces the one in the SDF, in the frame the SDF attaches it to."""
+    """Position of a frame in the frame that the SDF attaches it to; it replaces that in the SDF."""
 
     position: u.Position
 
 
 class Sensor(Frozen):
-    """A displacement along one world axis of one point of the tub."""
+    """A sensor of the displacement of one point of the tub along one world axis."""
 
     frame: str
     axis: Literal["x", "y", "z"]
 
 
 class Drive(Frozen):
-    """The motor: which joint it turns."""
+    """The motor, with the name of the joint that it drives."""
 
     joint: str = "drum_axis"
 
 
 class Clearance(Frozen):
-    """Where the tub comes near: the tub point nearest the detergent box ([B] section 4)."""
+    """Data for the clearance: the tub point nearest to the detergent box ([B] section 4)."""
 
     detergent_frame: str
 
 
 class Accelerometer(Frozen):
-    """A vibration sensor with three axes, along those of W at rest, at one point of the tub ([A] section 4.1)."""
+    """A vibration sensor at one point of the tub ([A] section 4.1).
+
+    It has three axes, which are parallel to those of W at rest.
+    """
 
     frame: str
 
 
 class UnbalancePlace(Frozen):
-    """Where unbalance masses are put in the drum: on which radius, how deep."""
+    """Position of an unbalance mass in the drum: its radius and its coordinate y in D."""
 
     radius: Annotated[u.Length, Field(gt=0.0)]
     y: u.Length
 
 
 class UnbalancePlanes(Frozen):
-    """The two places of unbalance masses in [A] section 4.1."""
+    """The two positions of unbalance masses in [A] section 4.1."""
 
     front: UnbalancePlace
     rear: UnbalancePlace
 
 
 class Imperfections(Frozen):
-    """What [A] section 4.2 names as causes of error. None by default.
+    """Imperfections that [A] section 4.2 names as causes of error. By default there are none.
 
     Attributes:
-        residual_imbalance: Mass that a drum is out of balance by itself; in every run beside the load.
-        phase_error: By how much the rear mass of the spin cycle's cases is farther ahead than said.
-        bearing: What the drum turns in, if it gives so that the drum can whirl; None for a perfect revolute joint.
+        residual_imbalance: Unbalance of the empty drum. It is added to the load in every run.
+        phase_error: Angle by which the rear mass of a spin-cycle case leads more than its phase.
+            [rad]
+        bearing: Compliant bearing, in which the drum can whirl; None for a rigid bearing (a
+            revolute joint).
     """
 
     residual_imbalance: Unbalance = Unbalance(mass=0.0, radius=0.0, y=0.0)
@@ -127,7 +142,7 @@ class Imperfections(Frozen):
 
 
 class MachineParameters(Frozen):
-    """A machine: the SDF model it stands on and all that is not a body. SI; W, T and D as in the project's conventions."""
+    """A machine: the name of its SDF model and all other parameters, in SI units."""
 
     name: str
     about: str = ""
@@ -163,7 +178,7 @@ class MachineParameters(Frozen):
             tables |= {"tub_bushing": "bushing_types", "housing_bushing": "bushing_types"}
         for key, table in tables.items():
             known = info.data.get(table)
-            if known is None:  # the table itself is faulty and reported already
+            if known is None:  # the table itself is wrong, which is reported already
                 continue
             for name, place in places.items():
                 if getattr(place, key) not in known:
@@ -175,10 +190,10 @@ class MachineParameters(Frozen):
 
     @field_validator("telescopic_dampers")
     @classmethod
-    def _other_names(cls, places: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+    def _names_are_unique(cls, places: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
         both = sorted(set(places) & set(info.data.get("dampers", ())))
         if both:
-            raise ValueError(f"{both[0]}: is the name of a damper too")
+            raise ValueError(f"{both[0]}: is the name of a damper too; rename one of them")
         return places
 
     @field_validator("springs", "sensors", "loads")
@@ -191,11 +206,17 @@ class MachineParameters(Frozen):
     @model_validator(mode="after")
     def _gasket_is_not_a_bushing(self) -> "MachineParameters":
         if "gasket" in self.bushings:
-            raise ValueError("bushings: the name 'gasket' belongs to the key 'gasket'")
+            raise ValueError(
+                "bushings: the name 'gasket' is reserved for the key 'gasket'; use another name"
+            )
         return self
 
     def accelerometer_frames(self) -> dict[str, str]:
-        """Frame of each vibration sensor; without any, S1 to S3 are at the points of every second displacement sensor."""
+        """Return the frame of each vibration sensor, by name.
+
+        If the machine file has none, the sensors S1 to S3 are placed at the first, third and fifth
+        point that has displacement sensors.
+        """
         if self.accelerometers:
             return {name: sensor.frame for name, sensor in self.accelerometers.items()}
         frames = list(dict.fromkeys(sensor.frame for sensor in self.sensors.values()))
@@ -203,5 +224,5 @@ class MachineParameters(Frozen):
         return {f"S{number}": frame for number, frame in enumerate(chosen, start=1)}
 
     def all_bushings(self) -> dict[str, Bushing]:
-        """The six-component bushings by name, the gasket among them under its own."""
+        """Return the six-component bushings by name, including the gasket as 'gasket'."""
         return ({"gasket": self.gasket} if self.gasket else {}) | self.bushings

@@ -1,4 +1,4 @@
-"""Measured amplitudes that a machine file names, to stand beside the computed ones."""
+"""Measured amplitudes from the files that a machine file names."""
 
 import numpy as np
 import pandas as pd
@@ -11,10 +11,14 @@ _KEYS = ["load", "gasket", "source"]
 
 
 def measured_amplitudes(parameters: MachineParameters) -> pd.DataFrame:
-    """All rows of the CSV files in `measured`: load, gasket (yes, no), source, then one column per sensor. [mm]
+    """Read the measured amplitudes of a machine.
+
+    Returns:
+        All rows of the CSV files in `measured`: load, gasket (yes, no), source, then one column per
+        sensor. [mm]
 
     Raises:
-        InputError: file missing, columns missing or unknown, a value that is not a number.
+        InputError: a file is missing, has other columns, or contains a value that is not a number.
     """
     sensors = list(parameters.sensors)
     tables = [_read(path, sensors) for path in parameters.measured]
@@ -24,7 +28,9 @@ def measured_amplitudes(parameters: MachineParameters) -> pd.DataFrame:
 def _read(path: str, sensors: list[str]) -> pd.DataFrame:
     table = read_csv(path, _KEYS + sensors, key="measured")
     if not set(table["gasket"]) <= {"yes", "no"}:
-        raise input_error("gasket is neither yes nor no in some row", where=path, key="measured")
+        raise input_error(
+            "a value in the column gasket is neither yes nor no", where=path, key="measured"
+        )
     values = table[sensors].apply(pd.to_numeric, errors="coerce")
     if not np.isfinite(values.to_numpy(dtype=float)).all():
         raise input_error("an amplitude is not a finite number", where=path, key="measured")

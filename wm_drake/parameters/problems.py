@@ -1,4 +1,4 @@
-"""What pydantic finds wrong, in our words."""
+"""Translation of pydantic's validation errors into messages for users."""
 
 import types
 import typing
@@ -11,7 +11,13 @@ from wm_drake.parameters.damper_laws import DAMPER_LAWS
 
 
 def problems_of(error: ValidationError, root: type[BaseModel], key: str = "") -> list[Problem]:
-    """pydantic's account of what is wrong, in our words: one problem each, with its key path below `key`."""
+    """Return the problems that pydantic found, one for each error.
+
+    Args:
+        error: Error that pydantic raised.
+        root: Model that was validated.
+        key: Key path of the model, to which that of each problem is appended.
+    """
     problems = []
     for detail in error.errors():
         path = [str(part) for part in detail["loc"] if part not in _TAGS]
@@ -38,7 +44,10 @@ def _message(detail: Any, root: type[BaseModel]) -> str:
         sign, limit = (">", context["gt"]) if kind == "greater_than" else (">=", context["ge"])
         return f"'{given}' is out of range; allowed is {sign} {limit:g}"
     if kind == "string_pattern_mismatch":
-        return f"'{given}' is not a name; allowed are letters, digits, _ and -, with a letter or _ first"
+        return (
+            f"'{given}' is not a name; allowed are letters, digits, _ and -, with a letter or _ "
+            "first"
+        )
     if kind == "union_tag_invalid":
         return f"'{context['tag']}' is not known; allowed are {context['expected_tags']}"
     if kind == "union_tag_not_found":
@@ -49,7 +58,7 @@ def _message(detail: Any, root: type[BaseModel]) -> str:
 
 
 def _fields_at(root: type[BaseModel], path: tuple[str | int, ...]) -> set[str]:
-    """Names of the fields that a model allows at a path of pydantic's."""
+    """Return the names of the fields that a model allows at a path in pydantic's notation."""
     candidates: list[Any] = [root]
     for part in path:
         models = [c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel)]
@@ -76,7 +85,7 @@ def _fields_at(root: type[BaseModel], path: tuple[str | int, ...]) -> set[str]:
 
 
 def _alternatives(annotation: Any) -> list[Any]:
-    """The types an annotation stands for: members of a union, what Annotated annotates."""
+    """Return the types that an annotation allows, with unions and Annotated resolved."""
     origin = typing.get_origin(annotation)
     if hasattr(annotation, "__metadata__"):
         return _alternatives(typing.get_args(annotation)[0])

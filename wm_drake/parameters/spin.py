@@ -1,4 +1,4 @@
-"""What the drum does and carries: spin profiles and loads."""
+"""Spin profiles and loads of the drum."""
 
 from typing import Annotated, Any
 
@@ -11,7 +11,10 @@ from wm_drake.parameters.problems import problems_of
 
 
 class Unbalance(Frozen):
-    """A point mass fixed to the drum, at (r sin(phase), y, r cos(phase)) in D: phase 0 is up while the drum angle is 0."""
+    """A point mass that is fixed to the drum at (r sin(phase), y, r cos(phase)) in D.
+
+    At phase 0 and drum angle 0 the mass is at the top.
+    """
 
     mass: Annotated[u.Mass, Field(ge=0.0)]
     radius: Annotated[u.Length, Field(ge=0.0)]
@@ -19,12 +22,12 @@ class Unbalance(Frozen):
     phase: u.Angle = 0.0
 
     def position(self) -> tuple[float, float, float]:
-        """In the drum frame. [m]"""
+        """Return the position in D. [m]"""
         return self.radius * np.sin(self.phase), self.y, self.radius * np.cos(self.phase)
 
 
 class Load(Frozen):
-    """Laundry, as point masses in the drum."""
+    """The laundry, modelled as point masses in the drum."""
 
     unbalances: tuple[Unbalance, ...]
 
@@ -46,16 +49,19 @@ class _Step(Frozen):
         return self
 
     def after(self, time: float, speed: float) -> tuple[float, float]:
-        """Time and speed at the end of the step that begins at (time, speed)."""
+        """Return time and speed at the end of this step, which begins at `time` and `speed`."""
         if self.hold_until is not None:
             return self.hold_until, speed
-        assert self.ramp_to is not None  # _one_form has seen to it
+        assert self.ramp_to is not None  # _one_form has checked this
         assert self.rate is not None
         return time + abs(self.ramp_to - speed) / self.rate, self.ramp_to
 
 
 class Region(Frozen):
-    """A named stretch of a spin profile, over which vibrations are summed up ([A] section 4.1: R1 to R8)."""
+    """A named time interval of a spin profile, such as R1 to R8 in [A] section 4.1.
+
+    The RMS of vibrations is computed over each region.
+    """
 
     name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
     begin: Annotated[u.Duration, Field(ge=0.0)]
@@ -63,9 +69,10 @@ class Region(Frozen):
 
 
 class SpinProfile(Frozen):
-    """Drum speed over time, linear between the points; in a file also as `steps` from standstill.
+    """Drum speed over time, linear between the points.
 
-    The drum follows it exactly, whatever torque that takes ([B] section 3).
+    A file may give it as `steps` that start from standstill. The drum follows the profile exactly;
+    the motor torque has no limit ([B] section 3).
     """
 
     time: u.Times
@@ -79,7 +86,8 @@ class SpinProfile(Frozen):
             return data
         if not set(data) <= {"steps", "regions"} or not isinstance(data["steps"], list):
             raise ValueError(
-                "a profile is either {steps: [...]} or {time: (...) s, speed: (...) rpm}, each with regions or not"
+                "a profile is either {steps: [...]} or {time: (...) s, speed: (...) rpm}; regions "
+                "are optional"
             )
         points = [(0.0, 0.0)]
         for index, entry in enumerate(data["steps"]):
@@ -94,7 +102,7 @@ class SpinProfile(Frozen):
             points.append(step.after(*points[-1]))
         unit = {name: cls.model_fields[name].metadata[0] for name in ("time", "speed")}
         times, speeds = zip(*points, strict=True)
-        # as text again, for the door of the fields: repr keeps every digit
+        # the fields accept numbers as text with a unit; repr keeps all digits
         points_of = {"time": times, "speed": speeds}
         texts = {
             name: f"({', '.join(map(repr, values))}) {unit[name].si}"
@@ -105,9 +113,11 @@ class SpinProfile(Frozen):
     @model_validator(mode="after")
     def _usable(self) -> "SpinProfile":
         if len(self.time) != len(self.speed):
-            raise ValueError(f"has {len(self.time)} times but {len(self.speed)} speeds")
+            raise ValueError(
+                f"has {len(self.time)} times but {len(self.speed)} speeds; each point needs both"
+            )
         if len(self.time) < 2:
-            raise ValueError("is empty: a profile needs at least two points, or one step")
+            raise ValueError("is empty; a profile needs at least two points or one step")
         if self.time[0] != 0.0:
             raise ValueError(f"must begin at time 0 s, begins at {self.time[0]:g} s")
         if np.any(np.diff(self.time) <= 0.0):
@@ -120,24 +130,25 @@ class SpinProfile(Frozen):
         names = [region.name for region in self.regions]
         for region in self.regions:
             if names.count(region.name) > 1:
-                raise ValueError(f"regions: '{region.name}' is there twice")
+                raise ValueError(f"regions: '{region.name}' occurs twice; names must differ")
             if not before <= region.begin < region.end <= self.time[-1] * (1.0 + 1e-12):
                 raise ValueError(
-                    f"regions: {region.name} from {region.begin:g} s to {region.end:g} s is not a stretch after the one before "
-                    f"it and within the {self.time[-1]:g} s of the profile"
+                    f"regions: {region.name} is from {region.begin:g} s to {region.end:g} s; it "
+                    f"must begin at {before:g} s or later, end after its begin, and end at the end "
+                    f"of the profile ({self.time[-1]:g} s) or before"
                 )
             before = region.end
         return self
 
     @property
     def duration(self) -> float:
-        """End of the profile. [s]"""
+        """End time of the profile. [s]"""
         return self.time[-1]
 
     def acceleration(self) -> list[float]:
-        """Angular acceleration between the points. [rad/s^2]"""
+        """Return the angular acceleration between each two points. [rad/s^2]"""
         return [float(a) for a in np.diff(self.speed) / np.diff(self.time)]
 
     def speed_at(self, time: Any) -> Any:
-        """Drum speed at a time or times. [rad/s]"""
+        """Return the drum speed at one or more times. [rad/s]"""
         return np.interp(time, self.time, self.speed)

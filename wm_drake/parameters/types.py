@@ -5,4 +5,4 @@ from typing import TypeAlias
 import numpy as np
 
 FloatArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
-"""An array of floats; the docstring that uses it says its shape and unit."""
+"""An array of floats; the docstring of each use gives shape and unit."""

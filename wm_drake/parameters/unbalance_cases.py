@@ -1,4 +1,4 @@
-"""Cases of a spin-cycle study: how much unbalance in front and at the rear, and the angle between them ([A] Table 9)."""
+"""Cases of a spin-cycle study: unbalance at front and rear and the angle between ([A] Table 9)."""
 
 from collections.abc import Hashable, Mapping
 from pathlib import Path
@@ -17,7 +17,7 @@ from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.spin import Load, Unbalance
 
 TABLE_9 = CYCLES_FOLDER / "cases_table9.csv"
-"""The 33 cases of [A] Table 9, in its order."""
+"""File with the 33 cases of [A] Table 9, in the same order."""
 
 _COLUMNS = {"front_g": "front", "rear_g": "rear", "phase_deg": "phase"}
 _PUBLISHED = "published_error_percent"
@@ -27,10 +27,11 @@ class UnbalanceCase(Frozen):
     """One row of a table of cases.
 
     Attributes:
-        name: Of the case.
+        name: Name of the case.
         front, rear: Masses in the two planes. [kg]
-        phase: By how much the rear mass is ahead of the front one, in the direction in which the drum turns. [rad]
-        published_error_percent: What [A] Table 9 has for it, its model against its experiment.
+        phase: Angle by which the rear mass leads the front mass, in the direction of rotation of
+            the drum. [rad]
+        published_error_percent: Error of the model of [A] against its experiment, from Table 9.
     """
 
     name: str
@@ -40,12 +41,19 @@ class UnbalanceCase(Frozen):
     published_error_percent: float | None = None
 
     def load(self, parameters: MachineParameters) -> Load:
-        """The masses in the drum of a machine, the error of its phase angle included; the front one is up at angle 0."""
+        """Return the load of this case in the drum of a machine.
+
+        The front mass is at the top at drum angle 0. The rear mass leads by the phase of the case
+        plus the phase error of the machine.
+
+        Raises:
+            InputError: the machine does not define the planes of the masses.
+        """
         planes = unbalance_planes(parameters)
-        ahead = self.phase + (
+        lead = self.phase + (
             parameters.imperfections.phase_error if self.front and self.rear else 0.0
         )
-        masses = ((self.front, planes.front, 0.0), (self.rear, planes.rear, ahead))
+        masses = ((self.front, planes.front, 0.0), (self.rear, planes.rear, lead))
         return Load(
             unbalances=tuple(
                 Unbalance(mass=mass, radius=place.radius, y=place.y, phase=phase)
@@ -56,10 +64,13 @@ class UnbalanceCase(Frozen):
 
 
 def unbalance_planes(parameters: MachineParameters) -> UnbalancePlanes:
-    """Where a machine's unbalances go: as its file says, else where its loads 'front' and 'back' or 'rear' have them.
+    """Return the positions of the unbalance masses of a machine.
+
+    They are `unbalance_planes` of the machine if given. Otherwise they are the positions of the
+    masses in its loads 'front' and 'back' (or 'rear').
 
     Raises:
-        InputError: it has neither.
+        InputError: the machine has neither.
     """
     if parameters.unbalance_planes:
         return parameters.unbalance_planes
@@ -68,7 +79,8 @@ def unbalance_planes(parameters: MachineParameters) -> UnbalancePlanes:
         masses = [parameters.loads[name].unbalances for name in names if name in parameters.loads]
         if not masses or len(masses[0]) != 1:
             raise input_error(
-                "is missing, and there is no load 'front' and 'back' of one mass each to take the places from",
+                "is missing; give it, or loads 'front' and 'back' with one mass each, whose "
+                "positions are then used",
                 key="unbalance_planes",
             )
         found.append(UnbalancePlace(radius=masses[0][0].radius, y=masses[0][0].y))
@@ -76,19 +88,22 @@ def unbalance_planes(parameters: MachineParameters) -> UnbalancePlanes:
 
 
 def load_unbalance_cases(path: Path = TABLE_9) -> list[UnbalanceCase]:
-    """Reads a CSV of cases: columns case, front_g, rear_g, phase_deg, and perhaps published_error_percent.
+    """Read a CSV file of cases.
+
+    The columns are case, front_g, rear_g, phase_deg and, optionally, published_error_percent.
 
     Raises:
-        InputError: not such a table, no row, a value that is not allowed, a case named twice.
+        InputError: the file has other columns or no row, a value is not allowed, or two cases have
+            the same name.
     """
     table = read_csv(path, ["case", *_COLUMNS], optional=_PUBLISHED)
     if table.empty:
-        raise input_error("has no case", where=str(path))
+        raise input_error("has no case; at least one row is needed", where=str(path))
     cases = [_case(path, row) for row in table.to_dict("records")]
     names = [case.name for case in cases]
     twice = [name for name in names if names.count(name) > 1]
     if twice:
-        raise input_error(f"case '{twice[0]}' is there twice", where=str(path))
+        raise input_error(f"case '{twice[0]}' occurs twice; names must differ", where=str(path))
     return cases
 
 

@@ -1,4 +1,4 @@
-"""The door for units: text as engineers write it in, SI floats out, and back again for tables and files."""
+"""Conversion of text with units to floats in SI units, and back for tables and files."""
 
 import functools
 import math
@@ -19,19 +19,28 @@ _VECTOR = re.compile(r"\s*\(([^()]*)\)\s*(\S.*?)?\s*$")
 
 @functools.cache
 def registry() -> pint.UnitRegistry[float]:
-    """pint's units, with the angle as a dimension of its own, so that N m and N m/rad cannot be mixed up."""
+    """Return pint's registry of units, in which the angle is a dimension.
+
+    With this, N m and N m/rad cannot be confused.
+    """
     units: pint.UnitRegistry[float] = pint.UnitRegistry(on_redefinition="ignore")
     units.define("radian = [angle] = rad")
-    units._build_cache()  # pint has worked out rpm and deg as pure numbers by now, and offers no public way to forget it
+    # pint has cached rpm and deg as dimensionless; there is no public way to clear its cache
+    units._build_cache()
     return units
 
 
 @dataclass(frozen=True)
 class Unit:
-    """The SI unit a field holds, and the unit people read and write it in.
+    """The SI unit in which a field is stored, and its display unit.
 
-    As metadata of a pydantic field (``Annotated[float, Unit("N/m", "N/mm")]``) it puts the field behind the door: text with
-    any unit of the same dimension is converted, everything else refused.
+    It is used as metadata of a pydantic field: ``Annotated[float, Unit("N/m", "N/mm")]``. The field
+    then accepts text with any unit of the same dimension and converts it to SI; other text is an
+    error.
+
+    Attributes:
+        si: SI unit of the stored value.
+        shown: Display unit, for files, tables and messages.
     """
 
     si: str
@@ -40,20 +49,21 @@ class Unit:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Parses text before the field's own checks."""
+        """Return a schema that parses text before the other checks of the field."""
         read = to_si if source is float else to_si_vector
         return with_info_before_validator_function(
             lambda value, info: read(value, info, self), handler(source)
         )
 
     def from_si(self, value: float) -> float:
-        """The value in the unit people read."""
+        """Return an SI value in the display unit."""
         return float(registry().Quantity(value, self.si).to(self.shown).magnitude)
 
     def text(self, value: Any) -> str:
-        """An SI value (or a tuple of them) as people write it, such as ``3.2 N/mm``; `to_si` reads the same value back.
+        """Return an SI value, or a tuple of them, as text such as ``3.2 N/mm``.
 
-        Where the unit people read cannot hold it exactly, the text is in SI.
+        `to_si` converts the text back to exactly the same value. If this is not possible with the
+        display unit, the text has the SI unit.
         """
         values = value if isinstance(value, tuple) else (value,)
         shown = [self._exact_digits(number) for number in values]
@@ -74,10 +84,16 @@ class Unit:
 
 
 def convert(magnitude: float, unit_text: str | None, unit: Unit) -> float:
-    """A number with its written unit in SI.
+    """Return a number with a unit as a number in SI units.
+
+    Args:
+        magnitude: The number.
+        unit_text: Its unit; None if it has none.
+        unit: Unit of the field that the number is for.
 
     Raises:
-        ValueError: the unit is missing, unknown or of another dimension, or the number is not finite.
+        ValueError: the unit is missing, unknown or of another dimension, or the number is not
+            finite.
     """
     if unit_text is None:
         raise ValueError(f"'{magnitude:g}' has no unit; write for example '1 {unit.shown}'")
@@ -87,7 +103,7 @@ def convert(magnitude: float, unit_text: str | None, unit: Unit) -> float:
         raise ValueError(
             f"unit '{unit_text}' does not fit; allowed is a unit such as {unit.shown}"
         ) from None
-    except Exception as error:  # pint raises tokenizer, attribute and assertion errors alike on text that is no unit
+    except Exception as error:  # pint raises several types of errors on text that is not a unit
         raise ValueError(
             f"unit '{unit_text}' is not known; write for example '1 {unit.shown}'"
         ) from error
@@ -97,10 +113,14 @@ def convert(magnitude: float, unit_text: str | None, unit: Unit) -> float:
 
 
 def split(text: str) -> tuple[list[float], str, bool]:
-    """``'(9, 12) kg'`` as numbers, unit text ("" for pure numbers), and whether it is a list.
+    """Split text such as ``'(9, 12) kg'`` into numbers and unit.
+
+    Returns:
+        The numbers, the text of the unit ("" for pure numbers), and whether there is more than one
+        number.
 
     Raises:
-        ValueError: not a number or a list of numbers, or an unknown unit.
+        ValueError: the text is not a number or a list of numbers, or the unit is unknown.
     """
     match = _VECTOR.fullmatch(text)
     parts = [part.strip() for part in match[1].split(",")] if match else []
@@ -109,7 +129,8 @@ def split(text: str) -> tuple[list[float], str, bool]:
         parts = [match[1]] if match else []
     if match is None or not all(_BARE.fullmatch(part) for part in parts):
         raise ValueError(
-            f"'{text}' is not a number or a list of numbers with a unit; write for example '12 kg' or '(9, 12) kg'"
+            f"'{text}' is not a number or a list of numbers with a unit; write for example "
+            "'12 kg' or '(9, 12) kg'"
         )
     unit = match[2] or ""
     dimension(unit)
@@ -117,29 +138,38 @@ def split(text: str) -> tuple[list[float], str, bool]:
 
 
 def dimension(unit: str) -> Any:
-    """What a unit measures; equal for units that convert into each other.
+    """Return the dimension of a unit; it is equal for units that convert into each other.
 
     Raises:
-        ValueError: unknown unit.
+        ValueError: the unit is unknown.
     """
     try:
         return registry().Quantity(1.0, unit).dimensionality
-    except Exception as error:  # pint raises tokenizer, attribute and assertion errors alike on text that is no unit
+    except Exception as error:  # pint raises several types of errors on text that is not a unit
         raise ValueError(f"unit '{unit}' is not known; write for example kg, mm or N/mm") from error
 
 
 def to_base(value: float, unit: str) -> float:
-    """A number of any unit in SI."""
+    """Return a number with a unit as a number in SI units."""
     return float(registry().Quantity(value, unit).to_base_units().magnitude)
 
 
 def from_base(value: float, unit: str) -> float:
-    """A number in SI, in a unit."""
+    """Return a number in SI units as a number in another unit."""
     return value / to_base(1.0, unit)
 
 
 def to_si(value: Any, info: ValidationInfo, unit: Unit) -> float:
-    """Reads ``'3.2 N/mm'``; passes an SI float through unless it stands in a file, where every number needs its unit."""
+    """Return a value such as ``'3.2 N/mm'`` or an SI float as a float in SI units.
+
+    Args:
+        value: Text with a unit, or an SI float.
+        info: Context of the validation. In a file every number needs a unit.
+        unit: Unit of the field.
+
+    Raises:
+        ValueError: the value is not a finite number with a fitting unit.
+    """
     example = f"1 {unit.shown}"
     if isinstance(value, str):
         match = _SCALAR.fullmatch(value)
@@ -152,7 +182,16 @@ def to_si(value: Any, info: ValidationInfo, unit: Unit) -> float:
 
 
 def to_si_vector(value: Any, info: ValidationInfo, unit: Unit) -> tuple[float, ...]:
-    """Reads ``'(1, 2, 3) mm'``; passes a sequence of SI floats through unless it stands in a file."""
+    """Return values such as ``'(1, 2, 3) mm'`` or a sequence of SI floats as floats in SI units.
+
+    Args:
+        value: Text with a unit, or a sequence of SI floats.
+        info: Context of the validation. In a file every list of numbers needs a unit.
+        unit: Unit of the field.
+
+    Raises:
+        ValueError: the value is not a list of finite numbers with a fitting unit.
+    """
     example = f"(1, 2, 3) {unit.shown}"
     if isinstance(value, str):
         match = _VECTOR.fullmatch(value)

@@ -1,1 +1,4 @@
-"""Results leave here, as HTML, tables and figures; the only room that imports a plotting library."""
+"""Reports as HTML pages, tables and figures, one folder per page.
+
+This is the only room that imports a plotting library. It turns results of studies into files.
+"""

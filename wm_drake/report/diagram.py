@@ -1,13 +1,13 @@
-"""The diagram of a machine as a picture in text."""
+"""Drawing of a machine's diagram as text."""
 
 from pydrake.systems.framework import Diagram
 
 
 def mermaid(diagram: Diagram) -> str:
-    """The systems of a diagram and what flows between them, as a Mermaid flow chart.
+    """Return a Mermaid flow chart of the systems of a diagram and the signals between them.
 
     Args:
-        diagram: Of a built machine.
+        diagram: Diagram of a built machine.
     """
     systems = diagram.GetSystems()
     lines = ["flowchart LR"]

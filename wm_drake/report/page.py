@@ -1,4 +1,4 @@
-"""What all report pages share: layout and style, pictures, and what stands under "What was run"."""
+"""Parts that all report pages share: layout and style, pictures, contents, software versions."""
 
 import re
 from collections.abc import Mapping
@@ -15,7 +15,13 @@ from wm_drake.report.figures import inline_svg_or_png
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure on the page: data URI, what is said to those who do not see it, caption."""
+    """Figure on a page.
+
+    Attributes:
+        source: Image as data URI.
+        alternative: Text for readers who cannot see the image.
+        caption: Text below the image.
+    """
 
     source: str
     alternative: str
@@ -23,16 +29,17 @@ class Picture:
 
 
 def picture(figure: Figure, alternative: str, caption: str) -> Picture:
-    """A figure as it goes on a page."""
+    """Return a figure in the form that a page shows."""
     return Picture(inline_svg_or_png(figure), alternative, caption)
 
 
 def render(template: str, **values: Any) -> str:
-    """A page as text of one HTML file that needs nothing else.
+    """Return a page as text of one self-contained HTML file.
 
     Args:
-        template: Name of a template of this folder that extends page.html.
-        values: `title`, `about`, `warnings` (list of text), `summary`, and what the template needs.
+        template: Name of a template in this folder that extends page.html.
+        values: `title`, `about`, `warnings` (list of text), `summary`, and the other values that
+            the template uses.
     """
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
@@ -45,15 +52,19 @@ def render(template: str, **values: Any) -> str:
 
 
 def sections(body: str) -> list[tuple[str, Markup]]:
-    """Anchor and heading of each section of a page's text, for its contents; a heading up to its colon."""
+    """Return anchor and heading of each section of a page, for its table of contents.
+
+    A heading is cut at its first colon.
+
+    Args:
+        body: HTML text of the page, with headings that are already escaped.
+    """
     found = re.findall(r'<section id="([^"]+)">\s*<h2>(.*?)</h2>', body, re.DOTALL)
-    return [
-        (anchor, Markup(heading.split(":")[0])) for anchor, heading in found
-    ]  # out of a page: escaped
+    return [(anchor, Markup(heading.split(":")[0])) for anchor, heading in found]
 
 
 def versions_of(attrs: Mapping[str, Any]) -> str:
-    """Versions of the software, from the attributes of a record."""
+    """Return the software versions in the attributes of a record, as one text."""
     prefix = "version_"
     return ", ".join(
         f"{name.removeprefix(prefix)} {text}"

@@ -1,33 +1,21 @@
-"""Sampled motion -> what is read off it, compiled, for one machine or for several side by side."""
+"""Sampled motion -> displacements and forces, as compiled code."""
 
 import numpy as np
 
 from wm_drake.compiler.compilation import law, long_running
-from wm_drake.compiler.elementary import (
-    in_each_lane,
-    lanes_to_rows,
-    rows_to_lanes,
-    where,
-)
+from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, where
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
-from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
-from wm_drake.compiler.vectors import add, dot, rotate, rotation_from_rpy
+from wm_drake.compiler.vectors import add, rotate, rotation_from_rpy
 from wm_drake.elements.bushing import six_component_bushing_wrench
 from wm_drake.elements.friction_damper import friction_damper_force
 from wm_drake.elements.motion import PLANT_STATE_SIZE, tub_motion
+from wm_drake.elements.sensor import POINT_SIZE, displacement_at
 from wm_drake.elements.spring import spring_strut_wrench
-
-MEASURED_POINT = PackedLayout(
-    "MeasuredPointNumbers", p_ToM_T=VECTOR, direction_W=VECTOR, at_rest=SCALAR
-)
-"""Place of a measured point in T [m], direction in W along which it is measured, its value at rest [m]."""
-read_measured_point = MEASURED_POINT.read
-POINT_SIZE = MEASURED_POINT.fixed_size
 
 
 @long_running
 def position_history(samples, points, positions):
-    """Positions in W of points of the tub at each sample. [m]
+    """Evaluate the positions in W of points of the tub at each sample. [m]
 
     Args:
         samples: (n, >= 6) roll, pitch, yaw, x, y, z. [rad, m]
@@ -47,19 +35,19 @@ def position_history(samples, points, positions):
 
 
 @long_running
-def reading_history(state, deformation, points, p, springs, dampers, bushings, readings):
-    """What is read off a motion at each sample: displacements at points, own forces of springs, dampers and bushings.
+def output_history(state, deformation, points, p, springs, dampers, bushings, outputs):
+    """Evaluate displacements at points and forces of springs, dampers and bushings at each sample.
 
     The forces are those of the elements' ports in Drake, from the same functions.
 
     Args:
         state: (n, 14) states of the plant.
-        deformation: (n, >= dampers) of the dampers' sponges. [m]
+        deformation: (n, >= dampers) deformations of the dampers' sponges. [m]
         points: Measured points, one after the other (`POINT_SIZE` numbers each).
         p: Packed numbers of springs, dampers and bushings.
-        springs, dampers, bushings: Where each begins in them, arrays.
-        readings: (n, k) written: displacement at each point [m], tension of each spring and each damper [N], force and moment
-            of each bushing on the housing [N, N m].
+        springs, dampers, bushings: Arrays of the indices of the elements in them.
+        outputs: (n, k) written: displacement at each point [m], tension of each spring and each
+            damper [N], force and moment of each bushing on the housing [N, N m].
     """
     align_stack()
     state_numbers, own_numbers = (
@@ -67,7 +55,7 @@ def reading_history(state, deformation, points, p, springs, dampers, bushings, r
         np.empty(deformation.shape[1] * WIDTH),
     )
     numbers, p_numbers, point_numbers = (
-        np.empty(readings.shape[1] * WIDTH),
+        np.empty(outputs.shape[1] * WIDTH),
         in_each_lane(p),
         in_each_lane(points),
     )
@@ -91,73 +79,59 @@ def reading_history(state, deformation, points, p, springs, dampers, bushings, r
             for k in range(6):
                 answer[column + k] = on_housing[k]
             column += 6
-        lanes_to_rows(numbers, begin, readings)
-
-
-@law
-def displacement_at(motion, points, at):
-    """Return the displacement of the measured point whose numbers begin at `at`, along its direction. [m]"""
-    point = read_measured_point(points, at)
-    moved_to = add(motion.position, rotate(motion.rotation, point.p_ToM_T))
-    return dot(point.direction_W, moved_to) - point.at_rest
+        lanes_to_rows(numbers, begin, outputs)
 
 
 @law
 def in_bounds(x, angle, displacement):
-    """Whether a tub is within the bounds where a run may go on: 1 or 0."""
+    """Return 1 if the tub is within the bounds of angle and displacement, else 0."""
     level = (abs(x[0]) <= angle) & (abs(x[1]) <= angle) & (abs(x[2]) <= angle)
     near = (abs(x[3]) <= displacement) & (abs(x[4]) <= displacement) & (abs(x[5]) <= displacement)
     return where(level & near, 1.0, 0.0)
 
 
 @law
-def measure_samples(samples, rows, size, bounds, p, gasket, points, count, x, moved, extremes):
-    """Displacements at measured points, and the largest values of a run up to the first sample out of bounds.
-
-    Args:
-        samples: Samples, one after the other, each with the state first.
-        rows, size: How many they are, and how many numbers each has.
-        bounds: Largest angle and displacement of the tub at which a run goes on. [rad, m]
-        p, gasket: Packed numbers and where the gasket begins in them, -1 without one.
-        points, count: Measured points, one after the other, and how many they are.
-        x: The plant's part of a state, to work in.
-        moved: Displacement at each sample and point, written. [m]
-        extremes: Written: largest absolute displacement at each point [m]; largest absolute force and moment of the
-            gasket on the housing, x, y, z [N, N m]; number of samples in bounds.
-    """
-    zero = 0.0 * p[0]
-    for k in range(count + 7):
-        extremes[k] = zero
-    good = zero + 1.0
-    for row in range(rows):
-        for k in range(PLANT_STATE_SIZE):
-            x[k] = samples[row * size + k]
-        good = good * in_bounds(x, bounds[0], bounds[1])
-        motion = tub_motion(x)
-        for k in range(count):
-            value = displacement_at(motion, points, k * POINT_SIZE)
-            moved[row * count + k] = value
-            extremes[k] = larger(extremes[k], value, good)
-        if gasket >= 0:
-            _, on_housing = six_component_bushing_wrench(motion, p, gasket)
-            for k in range(6):
-                extremes[count + k] = larger(extremes[count + k], on_housing[k], good)
-        extremes[count + 6] = extremes[count + 6] + good
-
-
-@law
 def larger(largest, value, good):
-    """The largest absolute value so far, after one more, which counts if it is good."""
+    """Return the larger of `largest` and the absolute value, which counts if `good` is 1."""
     size = abs(value)
     return where((good > 0.5) & (size > largest), size, largest)
 
 
 @long_running
-def measure_samples_lanes(
-    samples, rows, size, bounds, p, gasket, points, count, x, moved, extremes
-):
-    """`measure_samples` of `lanes.WIDTH` machines side by side."""
+def measure_samples_lanes(samples, rows, size, bounds, p, gasket, points, count, moved, extremes):
+    """Measure `lanes.WIDTH` runs side by side, each up to its first sample out of bounds.
+
+    All arrays of floats are flat arrays of lanes.
+
+    Args:
+        samples: Samples, one after the other, each with the state first.
+        rows, size: Number of samples, and of the numbers in each.
+        bounds: Largest angle and displacement of the tub at which a run goes on. [rad, m]
+        p, gasket: Packed numbers and index of the gasket in them, -1 without one.
+        points, count: Measured points, one after the other, and their number.
+        moved: Displacement at each sample and point, written. [m]
+        extremes: Written: largest absolute displacement at each point [m]; largest absolute force
+            and moment of the gasket on the housing, x, y, z [N, N m]; number of samples in bounds.
+    """
     align_stack()
-    runs = (lane_array(samples), rows, size, bounds)
-    measured = (lane_array(points), count, lane_array(x), lane_array(moved), lane_array(extremes))
-    measure_samples(*runs, lane_array(p), gasket, *measured)
+    x_numbers = np.empty(PLANT_STATE_SIZE * WIDTH)
+    x, states, numbers = lane_array(x_numbers), lane_array(samples), lane_array(p)
+    measured, values, largest = lane_array(points), lane_array(moved), lane_array(extremes)
+    zero = 0.0 * numbers[0]
+    for k in range(count + 7):
+        largest[k] = zero
+    good = zero + 1.0
+    for row in range(rows):
+        for k in range(PLANT_STATE_SIZE):
+            x[k] = states[row * size + k]
+        good = good * in_bounds(x, bounds[0], bounds[1])
+        motion = tub_motion(x)
+        for k in range(count):
+            value = displacement_at(motion, measured, k * POINT_SIZE)
+            values[row * count + k] = value
+            largest[k] = larger(largest[k], value, good)
+        if gasket >= 0:
+            _, on_housing = six_component_bushing_wrench(motion, numbers, gasket)
+            for k in range(6):
+                largest[count + k] = larger(largest[count + k], on_housing[k], good)
+        largest[count + 6] = largest[count + 6] + good

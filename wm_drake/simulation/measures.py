@@ -1,4 +1,4 @@
-"""Record -> what is measured of it: filtered displacements, envelopes, amplitudes, largest forces, smallest gap."""
+"""Measures of a record: filtered displacements, envelopes, amplitudes, largest forces, gap."""
 
 import functools
 from dataclasses import dataclass
@@ -9,17 +9,24 @@ from scipy.signal import butter, find_peaks, sosfiltfilt
 
 from wm_drake.model.scene import REPLAY_RATE, Gap, Scene
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.runs import Record, point_positions
+from wm_drake.simulation.outputs import point_positions
+from wm_drake.simulation.records import Record
 
 BAND_HZ = (0.5, 20.0)
 """Pass band of the displacements ([B] section 2.2)."""
 
 FILTER_ORDER = 4
-"""Order of the Butterworth filter ([B] section 2.2); run forwards and backwards, so that it shifts nothing."""
+"""Order of the Butterworth filter ([B] section 2.2).
+
+The filter runs forwards and backwards, so that it shifts no phase.
+"""
 
 PADDING = 5.0
-"""How far the displacements are mirrored at both ends before filtering: two periods and a half of the lower band edge. A
-record that ends at a resonance would flare by a third otherwise. [s]"""
+"""Length by which displacements are mirrored at both ends before filtering. [s]
+
+It is two and a half periods of the lower band edge. With the padding that scipy chooses, a record
+that ends at a resonance would show peaks that are a third too large near its end.
+"""
 
 REPLAY_SPAN = 8.0
 """Length of a replay. [s]"""
@@ -27,15 +34,16 @@ REPLAY_SPAN = 8.0
 
 @dataclass(frozen=True)
 class Measures:
-    """What is read off a record. SI.
+    """Measures of one run, in SI units.
 
     Attributes:
         amplitude: (sensor) largest absolute value of the envelopes. [m]
-        critical_speed: (sensor) drum speed where it occurs. [rad/s]
-        detergent_displacement: (axis) largest displacement of the tub point nearest the detergent box from rest, D of [B]. [m]
-        gasket_force, gasket_moment: (axis) largest absolute force and moment of the gasket on the housing, F and M of [B];
-            zero without gasket. [N, N m]
-        smallest_gap: Between tub group and housing; None if not measured.
+        critical_speed: (sensor) drum speed at which the amplitude occurs. [rad/s]
+        detergent_displacement: (axis) largest absolute displacement from rest of the tub point that
+            is nearest to the detergent box; D of [B]. [m]
+        gasket_force, gasket_moment: (axis) largest absolute force and moment of the gasket on the
+            housing; F and M of [B]. Zero without gasket. [N, N m]
+        smallest_gap: Smallest gap between tub group and housing; None if it was not measured.
     """
 
     amplitude: xr.DataArray
@@ -47,16 +55,20 @@ class Measures:
 
 
 def filtered(displacement: FloatArray, period: float) -> FloatArray:
-    """Displacements (n, k) in the band 0.5-20 Hz, fourth-order Butterworth, zero phase. [m]
+    """Return displacements filtered to the band 0.5-20 Hz, without phase shift.
 
-    Fewer samples than the filter needs (of a run that diverged at once) give NaN.
+    The filter is a Butterworth filter of fourth order.
 
     Args:
-        displacement: One column a signal. [m]
-        period: Between samples. [s]
+        displacement: (n, k) one column per signal. [m]
+        period: Time between samples. [s]
+
+    Returns:
+        (n, k) filtered displacements. [m] NaN if there are fewer samples than the filter needs, for
+        example because the run diverged at once.
     """
     padding = min(round(PADDING / period), len(displacement) - 1)
-    if padding <= 6 * FILTER_ORDER + 3:  # what sosfiltfilt itself holds for the least
+    if padding <= 6 * FILTER_ORDER + 3:  # the padding that sosfiltfilt chooses by default
         return np.full(displacement.shape, np.nan)
     return np.asarray(
         sosfiltfilt(_band_pass(period), displacement, axis=0, padtype="even", padlen=padding)
@@ -71,35 +83,48 @@ def _band_pass(period: float) -> FloatArray:
 
 
 def filtered_displacement(record: Record) -> xr.DataArray:
-    """Displacements at the sensors (time, sensor) of a record, as `filtered`. [m]"""
+    """Return the displacements (time, sensor) of a record, filtered to 0.5-20 Hz. [m]"""
     raw = record.displacement
     return raw.copy(data=filtered(raw.values, _period(record)))
 
 
 def _period(record: Record) -> float:
-    """Between samples; any number for fewer than two. [s]"""
+    """Return the time between the samples of a record; 1 if it has fewer than two samples. [s]"""
     time = record.time.values
     return float(time[1] - time[0]) if len(time) > 1 else 1.0
 
 
 def power_means(displacement: FloatArray) -> FloatArray:
-    """Means of order 20, (mean |d|^20)^(1/20), of signals (n, k): near the largest value, but smooth in all parameters. (k)
+    """Return the power mean of order 20, (mean |d|^20)^(1/20), of each signal.
 
-    Where another peak becomes the largest, an amplitude has a kink, which searches by slopes stumble on; this has none.
+    The power mean is close to the largest absolute value but is a smooth function of all
+    parameters. The largest value itself is not: it has a kink where another peak becomes the
+    largest one, and searches that use slopes fail there.
+
+    Args:
+        displacement: (n, k) one column per signal.
+
+    Returns:
+        (k,) in the unit of the signals.
     """
     fourth = np.square(np.square(displacement))
     return np.asarray(np.mean(np.square(np.square(fourth)) * fourth, axis=0) ** (1.0 / 20.0))
 
 
 def amplitudes(displacement: FloatArray) -> tuple[FloatArray, np.ndarray]:
-    """Largest absolute value of the envelopes of signals (n, k), and the samples where it occurs, each (k,).
+    """Return the largest absolute value of the envelopes of each signal, and where it occurs.
 
-    An envelope runs straight from peak to peak, so its largest value is at one of them.
+    An envelope is a straight line from peak to peak, so its largest value is at a peak.
+
+    Args:
+        displacement: (n, k) one column per signal.
+
+    Returns:
+        The largest value in the unit of the signals and the index of its sample, each (k,). A
+        signal that is empty or starts with NaN gives NaN and 0.
     """
-    sizes, samples = (
-        np.full(displacement.shape[1], np.nan),
-        np.zeros(displacement.shape[1], dtype=np.int64),
-    )
+    sizes = np.full(displacement.shape[1], np.nan)
+    samples = np.zeros(displacement.shape[1], dtype=np.int64)
     for column, signal in enumerate(displacement.T):
         signal = np.ascontiguousarray(signal)
         if not len(signal) or np.isnan(signal[0]):
@@ -112,7 +137,10 @@ def amplitudes(displacement: FloatArray) -> tuple[FloatArray, np.ndarray]:
 
 
 def envelopes(record: Record) -> xr.Dataset:
-    """Upper and lower envelope (time, sensor) of the filtered displacements: straight lines from peak to peak. [m]"""
+    """Return the upper and lower envelope (time, sensor) of the filtered displacements. [m]
+
+    An envelope consists of straight lines from peak to peak.
+    """
     displacement = filtered_displacement(record)
     time = displacement.time.values
     upper = np.stack([peak_line(time, column) for column in displacement.values.T], axis=1)
@@ -123,32 +151,37 @@ def envelopes(record: Record) -> xr.Dataset:
 
 
 def peak_line(time: FloatArray, signal: FloatArray) -> FloatArray:
-    """Line through the local maxima of a signal; the first and last are held to the ends."""
+    """Return the line through the local maxima of a signal.
+
+    The line is constant before the first maximum and after the last one. A signal without a local
+    maximum is returned unchanged.
+    """
     peaks = find_peaks(signal)[0]
     return np.interp(time, time[peaks], signal[peaks]) if len(peaks) else signal
 
 
 def percent_difference(value: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
-    """100 (value - reference) / reference; [B] Eq. (1). [%]"""
+    """Return the difference 100 (value - reference) / reference; [B] Eq. (1). [%]"""
     return 100.0 * (value - reference) / reference
 
 
 def axis_motion(record: Record, y: float) -> FloatArray:
-    """Path in W of the point of the drum axis at depth y, for orbits. (n, 3) [m]"""
+    """Return the path (n, 3) in W of the point of the drum axis at depth y in T, for orbits. [m]"""
     pose = np.column_stack([record.tub_angle.values, record.tub_position.values])
     return point_positions(pose, np.array([[0.0, y, 0.0]]))[:, 0]
 
 
 def largest_motion(record: Record) -> tuple[FloatArray, FloatArray]:
-    """The stretch of a record around its largest displacement, thinned out for a replay.
+    """Return the motion around the largest displacement of a record, sampled for a replay.
 
     Returns:
-        Times (n,) [s] and positions of the plant (n, 7 or more): roll, pitch, yaw, x, y, z, drum angle; of damper tubes, if
-        they are bodies, roll to z and the extension. [rad, m]
+        Times (n,) and positions of the plant (n, >= 7): roll, pitch, yaw, x, y, z of the tub and
+        the drum angle; then, for each damper tube that is a body, roll, pitch, yaw, x, y, z of the
+        outer tube and the extension of the damper. [s; rad, m]
     """
     size = abs(record.displacement).max("sensor")
-    moment = float(record.time[int(size.argmax("time"))])
-    stretch = record.sel(time=slice(moment - REPLAY_SPAN / 2, moment + REPLAY_SPAN / 2))
+    middle = float(record.time[int(size.argmax("time"))])
+    stretch = record.sel(time=slice(middle - REPLAY_SPAN / 2, middle + REPLAY_SPAN / 2))
     period = (
         float(record.time[1] - record.time[0]) if record.sizes["time"] > 1 else 1.0 / REPLAY_RATE
     )
@@ -161,15 +194,14 @@ def largest_motion(record: Record) -> tuple[FloatArray, FloatArray]:
 
 
 def measure(record: Record, scene: Scene | None = None) -> Measures:
-    """Reads the measures off a record.
+    """Return the measures of a record.
 
     Args:
-        record: From `wm_drake.simulation.runs.simulate`.
-        scene: The machine's shapes, for the smallest gap; it is left out if None.
+        record: Record of a run, from `wm_drake.simulation.runs.simulate`.
+        scene: Shapes of the machine. If None, the smallest gap is not computed.
     """
-    values = {
-        name: variable.values for name, variable in record.variables.items()
-    }  # attributes of a dataset take longer
+    # a dictionary of arrays is faster than attribute access of a dataset
+    values = {name: variable.values for name, variable in record.variables.items()}
     size, samples = amplitudes(filtered(values["displacement"], _period(record)))
     speed = values["drum_speed"][samples] if record.sizes["time"] else size
     pose = np.column_stack([values["tub_angle"], values["tub_position"]])
@@ -180,7 +212,8 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
     )
     by_sensor, by_axis = record.coords["sensor"].coords, record.coords["axis"].coords
     force, moment = (
-        _of_gasket(values["bushing"], values[f"bushing_{kind}"]) for kind in ("force", "moment")
+        _gasket_history(values["bushing"], values[f"bushing_{kind}"])
+        for kind in ("force", "moment")
     )
     return Measures(
         amplitude=xr.DataArray(size, by_sensor),
@@ -193,12 +226,15 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
 
 
 def _largest(history: FloatArray) -> FloatArray:
-    """Largest absolute value over time (time, axis) along each axis; NaN of no samples."""
-    rows = np.ascontiguousarray(history.T)  # numpy is slow along the long side of a narrow table
+    """Return the largest absolute value over time of each column of a history (time, axis).
+
+    The result is NaN if there are no samples.
+    """
+    rows = np.ascontiguousarray(history.T)  # numpy reduces contiguous rows faster
     return np.abs(rows).max(axis=1) if len(history) else np.full(len(rows), np.nan)
 
 
-def _of_gasket(bushings: FloatArray, history: FloatArray) -> FloatArray:
-    """The part (time, axis) of (time, bushing, axis) that is the gasket's; zero without one."""
+def _gasket_history(bushings: FloatArray, history: FloatArray) -> FloatArray:
+    """Return the gasket's part (time, axis) of a history (time, bushing, axis); else zeros."""
     found = np.flatnonzero(bushings == "gasket")
     return history[:, found[0]] if len(found) else np.zeros((1, history.shape[2]))

@@ -1,4 +1,4 @@
-"""What is read off a trajectory: motion of bodies and points, forces of elements, each with its unit and what it is."""
+"""Outputs of a trajectory: motion of bodies and points and forces of elements, with units."""
 
 from typing import TypeAlias
 
@@ -9,19 +9,19 @@ from wm_drake.elements.bearing import drum_bearing_history
 from wm_drake.elements.telescopic_damper import FORCE_SIZE, telescopic_damper_history
 from wm_drake.engines.compiled.packing import pack_on_tub
 from wm_drake.engines.trajectory import Trajectory
-from wm_drake.model.machine import Setup
+from wm_drake.model.setup import Setup
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.histories import MEASURED_POINT, position_history, reading_history
+from wm_drake.simulation.histories import output_history, position_history
 
 AXES = ("x", "y", "z")
 
 Variables: TypeAlias = dict[str, tuple[tuple[str, ...], FloatArray, str, str]]
-"""By name: dimensions, values, unit, what it is."""
+"""For each variable name: dimensions, values, unit and description."""
 
 
 def variables_of(setup: Setup, trajectory: Trajectory) -> Variables:
-    """All that a record holds of a motion."""
-    displacements, *forces = readings(setup, trajectory)
+    """Return all variables that a record holds of a trajectory."""
+    displacements, *forces = tub_outputs(setup, trajectory)
     if setup.telescopes:
         forces = _with_telescopes(setup, trajectory, *forces)
     return (
@@ -33,12 +33,14 @@ def variables_of(setup: Setup, trajectory: Trajectory) -> Variables:
 
 
 def _motion(setup: Setup, trajectory: Trajectory, displacements: FloatArray) -> Variables:
-    """Of tub, drum and sensors; `displacements` of `measured_points`."""
-    state, acceleration, deformation = (
-        trajectory.state,
-        trajectory.acceleration,
-        trajectory.deformation,
-    )
+    """Return the variables of the motion of tub, drum, sensor points and damper sponges.
+
+    Args:
+        setup: Machine as it was set up for the run.
+        trajectory: Motion of the machine.
+        displacements: (n, k) displacements at the `measured_points`. [m]
+    """
+    state, acceleration = trajectory.state, trajectory.acceleration
     points, accelerometers = (
         np.stack(list(places.values()))
         for places in (setup.sensor_points, setup.accelerometer_points)
@@ -63,7 +65,7 @@ def _motion(setup: Setup, trajectory: Trajectory, displacements: FloatArray) -> 
             ("time", "axis"),
             acceleration[:, :3],
             "rad/s^2",
-            "rate of it in W",
+            "angular acceleration of T in W",
         ),
         "tub_acceleration": (
             ("time", "axis"),
@@ -94,7 +96,7 @@ def _motion(setup: Setup, trajectory: Trajectory, displacements: FloatArray) -> 
         ),
         "damper_deformation": (
             ("time", "damper"),
-            deformation,
+            trajectory.deformation,
             "m",
             "deformation of the damper's sponge",
         ),
@@ -102,7 +104,7 @@ def _motion(setup: Setup, trajectory: Trajectory, displacements: FloatArray) -> 
 
 
 def _tubes(trajectory: Trajectory) -> Variables:
-    """Of machines whose damper tubes are bodies."""
+    """Return the variables of the tubes of telescopic dampers; none without such dampers."""
     tubes = trajectory.tubes
     if not tubes.shape[1]:
         return {}
@@ -117,48 +119,49 @@ def _tubes(trajectory: Trajectory) -> Variables:
             ("time", "tube", "axis"),
             tubes[:, :, 3:6],
             "m",
-            "displacement of their link frames in W",
+            "displacement of the link frames of the outer tubes in W",
         ),
         "tube_extension": (
             ("time", "tube"),
             tubes[:, :, 6],
             "m",
-            "by how much the damper is longer than drawn",
+            "extension of the damper beyond its length in the SDF",
         ),
     }
 
 
 def _whirl(setup: Setup, trajectory: Trajectory) -> Variables:
-    """Of machines whose drum can whirl in its bearing."""
+    """Return the variables of the drum's motion in a compliant bearing; none for a rigid one."""
     if setup.bearing is None:
         return {}
-    carrier, none = trajectory.carrier, np.zeros((len(trajectory.time), 1))
-    own = np.empty((len(carrier), BEARING_FORCE_SIZE))
-    both = np.hstack([trajectory.state, carrier[:, :6], none, carrier[:, 6:], none])
-    drum_bearing_history(both, np.empty((len(carrier), 0)), setup.bearing.packed(), own)
+    carrier, zeros = trajectory.carrier, np.zeros((len(trajectory.time), 1))
+    outputs = np.empty((len(carrier), BEARING_FORCE_SIZE))
+    # the law takes the states of two trees, tub and carrier; each includes the position of a joint
+    states = np.hstack([trajectory.state, carrier[:, :6], zeros, carrier[:, 6:], zeros])
+    drum_bearing_history(states, np.empty((len(carrier), 0)), setup.bearing.packed(), outputs)
     dims, where = ("time", "axis"), "in the tub's frame, y along the drum axis"
     return {
         "drum_displacement": (
             dims,
-            own[:, 0:3],
+            outputs[:, 0:3],
             "m",
             f"displacement of the drum axis in the bearing, {where}",
         ),
         "drum_tilt": (
             dims,
-            own[:, 3:6],
+            outputs[:, 3:6],
             "rad",
             f"rotation vector of the drum's bearing against the tub, {where}",
         ),
         "bearing_force": (
             dims,
-            own[:, 6:9],
+            outputs[:, 6:9],
             "N",
             f"force of the drum on the tub in the bearing, {where}",
         ),
         "bearing_moment": (
             dims,
-            own[:, 9:12],
+            outputs[:, 9:12],
             "N m",
             f"moment of the drum on the tub in the bearing, {where}",
         ),
@@ -168,7 +171,14 @@ def _whirl(setup: Setup, trajectory: Trajectory) -> Variables:
 def _forces(
     trajectory: Trajectory, springs: FloatArray, dampers: FloatArray, bushings: FloatArray
 ) -> Variables:
-    """Of the motor and the elements."""
+    """Return the variables of the motor torque and of the forces of the elements.
+
+    Args:
+        trajectory: Motion of the machine.
+        springs: (n, springs) tensions. [N]
+        dampers: (n, dampers) tensions. [N]
+        bushings: (n, bushings, 6) force and moment on the housing. [N, N m]
+    """
     dims = ("time", "bushing", "axis")
     return {
         "motor_torque": (
@@ -194,18 +204,19 @@ def _forces(
     }
 
 
-def readings(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, ...]:
-    """What is read off the motion of the tub.
+def tub_outputs(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, ...]:
+    """Return the outputs that follow from the motion of the tub.
 
     Returns:
-        Displacements at `measured_points` (n, points) [m]; tensions of the springs (n, springs) and of the strut dampers
-        (n, dampers) [N]; force and moment of the bushings on the housing (n, bushings, 6) [N, N m].
+        Displacements at the `measured_points` (n, points) [m]; tensions of the springs (n, springs)
+        and of the strut dampers (n, dampers) [N]; force and moment of the bushings on the housing
+        (n, bushings, 6) [N, N m].
     """
-    points, (p, indices) = measured_points(setup), pack_on_tub(setup)
+    points, (p, indices) = setup.measured_points, pack_on_tub(setup)
     begins = [np.array(of_kind, dtype=np.int64) for of_kind in indices.values()]
     sizes = [len(points), len(begins[0]), len(begins[1]), 6 * len(begins[2])]
     columns = np.empty((len(trajectory.time), sum(sizes)), order="F")
-    reading_history(trajectory.state, trajectory.deformation, points.ravel(), p, *begins, columns)
+    output_history(trajectory.state, trajectory.deformation, points.ravel(), p, *begins, columns)
     displacements, springs, dampers, bushings = np.split(columns, np.cumsum(sizes)[:-1], axis=1)
     return displacements, springs, dampers, bushings.reshape(len(columns), len(begins[2]), 6)
 
@@ -217,40 +228,39 @@ def _with_telescopes(
     dampers: FloatArray,
     bushings: FloatArray,
 ) -> list[FloatArray]:
-    """Forces of the elements, and behind them those of telescopic dampers: bushings of each at the tub, then at the housing."""
+    """Return the forces of the elements with those of the telescopic dampers appended.
+
+    A telescopic damper adds one damper tension and two bushings: the one at the tub, then the one
+    at the housing.
+
+    Args:
+        setup: Machine as it was set up for the run.
+        trajectory: Motion of the machine.
+        springs: (n, springs) tensions. [N]
+        dampers: (n, dampers) tensions of the strut dampers. [N]
+        bushings: (n, bushings, 6) force and moment on the housing. [N, N m]
+
+    Returns:
+        The same three arrays; dampers and bushings have more columns.
+    """
     for index, telescope in enumerate(setup.telescopes.values()):
         column = len(setup.dampers) + index
-        both, own = (
-            np.hstack([trajectory.state, trajectory.tubes[:, index]]),
-            trajectory.deformation[:, column : column + 1],
-        )
-        forces = np.empty((len(both), FORCE_SIZE))
-        telescopic_damper_history(both, own, telescope.packed(), forces)
+        states = np.hstack([trajectory.state, trajectory.tubes[:, index]])
+        sponge = trajectory.deformation[:, column : column + 1]
+        forces = np.empty((len(states), FORCE_SIZE))
+        telescopic_damper_history(states, sponge, telescope.packed(), forces)
         dampers = np.hstack([dampers, forces[:, :1]])
         bushings = np.hstack([bushings, forces[:, 1:].reshape(-1, 2, 6)])
     return [springs, dampers, bushings]
 
 
-def measured_points(setup: Setup) -> FloatArray:
-    """Points that are measured, packed for `kernel.histories`: the sensors, then the detergent point along x, y, z. (k, 7)"""
-    places = np.array([*setup.sensor_points.values(), *[setup.detergent_point] * 3])
-    axes = [*(AXES.index(sensor.axis) for sensor in setup.sensors.values()), 0, 1, 2]
-    at_rest = point_positions(setup.rest_pose[None, :], places)[0, range(len(axes)), axes]
-    return np.array(
-        [
-            MEASURED_POINT.pack(p_ToM_T=place, direction_W=np.eye(3)[axis], at_rest=rest)
-            for place, axis, rest in zip(places, axes, at_rest, strict=True)
-        ]
-    )
-
-
 def point_displacements(state: FloatArray, points: FloatArray, rest_pose: FloatArray) -> FloatArray:
-    """Displacements from the rest pose of points of the tub.
+    """Return the displacements of points of the tub from the rest pose.
 
     Args:
-        state: (n, >= 6) roll, pitch, yaw, x, y, z. [rad, m]
-        points: (k, 3) in T. [m]
-        rest_pose: (6,) the same coordinates at rest.
+        state: (n, >= 6) roll, pitch, yaw, x, y, z of the tub. [rad, m]
+        points: (k, 3) positions in T. [m]
+        rest_pose: (6,) roll, pitch, yaw, x, y, z at rest. [rad, m]
 
     Returns:
         (n, k, 3) in W. [m]
@@ -261,7 +271,15 @@ def point_displacements(state: FloatArray, points: FloatArray, rest_pose: FloatA
 
 
 def point_positions(state: FloatArray, points: FloatArray) -> FloatArray:
-    """Positions in W of points of the tub; arguments as in `point_displacements`. (n, k, 3) [m]"""
+    """Return the positions of points of the tub.
+
+    Args:
+        state: (n, >= 6) roll, pitch, yaw, x, y, z of the tub. [rad, m]
+        points: (k, 3) positions in T. [m]
+
+    Returns:
+        (n, k, 3) in W. [m]
+    """
     positions = np.empty((len(state), 3 * len(points)))
     position_history(np.ascontiguousarray(state[:, :6]), np.ascontiguousarray(points), positions)
     return positions.reshape(len(state), len(points), 3)

@@ -1,8 +1,9 @@
-"""Motion -> RMS displacement of three-axis sensors in the regions of a spin profile, taken directly and from acceleration.
+"""RMS displacement of three-axis sensors in the regions of a spin profile.
 
-An experiment measures acceleration and integrates it twice ([A] section 4.1), which brings drifts that must be removed; the
-model has the displacement itself. Both go through the same filter here, so that they can be compared, with each other and with
-a measurement.
+It is computed in two ways: directly, and from the acceleration. An experiment measures acceleration
+and integrates it twice ([A] section 4.1). The integration causes drift, which must be removed. The
+model has the displacement itself. Both signals pass the same filter here, so that they can be
+compared with each other and with a measurement.
 """
 
 import functools
@@ -15,22 +16,30 @@ from wm_drake.compiler.compilation import generic
 from wm_drake.compiler.vectors import rotation_from_rpy
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.runs import Record, point_displacements
+from wm_drake.simulation.outputs import point_displacements
+from wm_drake.simulation.records import Record
 
 HIGH_PASS_HZ = 0.5
-"""Slower motion is not vibration: the lower band edge of [B] section 2.2. There is no upper one: RMS sums up all speeds."""
+"""Corner frequency of the filter: the lower band edge of [B] section 2.2.
+
+Slower motion does not count as vibration. There is no upper band edge, because the RMS includes all
+drum speeds.
+"""
 
 DRIFT_HZ = 0.1
-"""Corner below which what two integrations make of errors is taken out; a fifth of the band edge leaves that as it is."""
+"""Corner frequency of the filter that removes the drift after each integration.
+
+It is a fifth of `HIGH_PASS_HZ`, so that it does not change the motion above that frequency.
+"""
 
 ORDER = 4
-"""Of the Butterworth filters; run forwards and backwards, so that they shift nothing."""
+"""Order of the Butterworth filters, which run forwards and backwards and so shift no phase."""
 
 FEWEST = 16
-"""Samples; with fewer there is nothing to filter."""
+"""Smallest number of samples that is filtered; results for fewer samples are NaN."""
 
 PADDING_PERIODS = 2.5
-"""By how much a record is made longer at both ends before filtering, in periods of the corner."""
+"""Length of the padding at both ends before filtering, in periods of the corner frequency."""
 
 
 def region_displacements(
@@ -41,19 +50,21 @@ def region_displacements(
     period: float,
     profile: SpinProfile,
 ) -> tuple[FloatArray, FloatArray]:
-    """RMS displacement of points of the tub in each region of a profile.
+    """Return the RMS displacement of points of the tub in each region of a profile.
 
     Args:
-        motion: (n, >= 13) states of the plant: roll, pitch, yaw, x, y, z, drum angle, angular velocity, velocity of To.
-        acceleration: (n, 6) angular acceleration of the tub and acceleration of To, in W. [rad/s^2, m/s^2]
-        points: (k, 3) in T. [m]
-        rest_pose: (6,) from which displacements count.
-        period: Between samples. [s]
-        profile: With regions.
+        motion: (n, >= 13) states of the plant: roll, pitch, yaw, x, y, z of the tub, drum angle,
+            angular velocity of the tub and velocity of To in W. [rad, m, rad/s, m/s]
+        acceleration: (n, 6) angular acceleration of the tub and acceleration of To, in W.
+            [rad/s^2, m/s^2]
+        points: (k, 3) positions in T. [m]
+        rest_pose: (6,) roll, pitch, yaw, x, y, z from which displacements count. [rad, m]
+        period: Time between samples. [s]
+        profile: Spin profile with regions.
 
     Returns:
-        Taken directly, and by integrating the acceleration twice; each (regions, k, 3), NaN where the run did not get through
-        the region. [m]
+        Two arrays (regions, k, 3) in W: from the displacement itself, and from the acceleration
+        integrated twice. NaN where the run ended before the region did. [m]
     """
     shape = (len(profile.regions), len(points), 3)
     direct = point_displacements(motion, points, rest_pose).reshape(len(motion), -1)
@@ -64,14 +75,23 @@ def region_displacements(
         region_rms(high_passed(signal, period, HIGH_PASS_HZ), period, profile)
         for signal in (direct, integrated)
     )
-    first, second = (rms.reshape(shape) for rms in both)
-    return first, second
+    rms_direct, rms_integrated = (rms.reshape(shape) for rms in both)
+    return rms_direct, rms_integrated
 
 
 def record_region_displacements(
     record: Record, points: FloatArray, profile: SpinProfile
 ) -> tuple[FloatArray, FloatArray]:
-    """`region_displacements` of a record."""
+    """Return the RMS displacements of points in regions for the run of a record.
+
+    Args:
+        record: Record of a run.
+        points: (k, 3) positions in T. [m]
+        profile: Spin profile with regions.
+
+    Returns:
+        Two arrays (regions, k, 3) as returned by `region_displacements`. [m]
+    """
     angle = record.drum_angle.values[:, None]
     motion = [
         record.tub_angle.values,
@@ -93,7 +113,19 @@ def record_region_displacements(
 def point_accelerations(
     motion: FloatArray, acceleration: FloatArray, points: FloatArray
 ) -> FloatArray:
-    """Accelerations in W of points of the tub, (n, k, 3); arguments as for `region_displacements`. [m/s^2]"""
+    """Return the accelerations of points of the tub.
+
+        a_Q = a_To + alpha x r + w x (w x r),   r = R_WT p_Q
+
+    Args:
+        motion: (n, >= 13) states of the plant as in `region_displacements`.
+        acceleration: (n, 6) angular acceleration of the tub and acceleration of To, in W.
+            [rad/s^2, m/s^2]
+        points: (k, 3) positions in T. [m]
+
+    Returns:
+        (n, k, 3) in W. [m/s^2]
+    """
     if not len(motion):
         return np.empty((0, len(points), 3))
     rotation = np.stack(generic(rotation_from_rpy)(*motion[:, :3].T), axis=1).reshape(-1, 3, 3)
@@ -103,8 +135,19 @@ def point_accelerations(
 
 
 def integrated_twice(acceleration: FloatArray, period: float) -> FloatArray:
-    """Displacements from accelerations (n, k), each integral of a cubic spline, with the drift taken out after each. [m]"""
-    if len(acceleration) < FEWEST or not np.isfinite(acceleration).all():  # of a run that diverged
+    """Return displacements from accelerations, integrated twice.
+
+    Each integral is that of a cubic spline through the samples. The drift is removed after each
+    integration.
+
+    Args:
+        acceleration: (n, k) one column per signal. [m/s^2]
+        period: Time between samples. [s]
+
+    Returns:
+        (n, k) displacements. [m] NaN if there are too few samples or if one of them is not finite.
+    """
+    if len(acceleration) < FEWEST or not np.isfinite(acceleration).all():  # the run diverged
         return np.full(acceleration.shape, np.nan)
     velocity = high_passed(_integral(acceleration, period), period, DRIFT_HZ)
     return high_passed(_integral(velocity, period), period, DRIFT_HZ)
@@ -116,9 +159,18 @@ def _integral(signal: FloatArray, period: float) -> FloatArray:
 
 
 def high_passed(signal: FloatArray, period: float, corner_hz: float) -> FloatArray:
-    """Signals (n, k) without what is slower than a corner; NaN if there are too few samples.
+    """Return signals after a high-pass filter without phase shift.
 
-    Before the first sample there was rest. At the end the signal is mirrored: a record ends in full motion.
+    The signals are padded before filtering: by zeros before the first sample, because the machine
+    was at rest, and by mirrored samples after the last one, because a record ends in full motion.
+
+    Args:
+        signal: (n, k) one column per signal.
+        period: Time between samples. [s]
+        corner_hz: Corner frequency. [Hz]
+
+    Returns:
+        (n, k) in the unit of the signals. NaN if there are fewer than `FEWEST` samples.
     """
     if len(signal) < FEWEST:
         return np.full(signal.shape, np.nan)
@@ -136,37 +188,40 @@ def _high_pass(period: float, corner_hz: float) -> FloatArray:
 
 
 def region_rms(signal: FloatArray, period: float, profile: SpinProfile) -> FloatArray:
-    """Root mean square of signals (n, k) in each region of a profile, (regions, k); NaN where they end before the region does.
+    """Return the root mean square of signals in each region of a profile.
 
     Args:
-        signal: From time 0 on.
-        period: Between samples. [s]
-        profile: With regions.
+        signal: (n, k) one column per signal; the first sample is at time 0.
+        period: Time between samples. [s]
+        profile: Spin profile with regions.
+
+    Returns:
+        (regions, k) in the unit of the signals. NaN where the signals end before the region does.
     """
     rows = []
     for region in profile.regions:
         first, last = (
             int(np.ceil(time / period * (1.0 - 1e-12))) for time in (region.begin, region.end)
         )
-        whole = last <= len(signal) and last > first
+        is_complete = last <= len(signal) and last > first
         rows.append(
             np.sqrt(np.mean(signal[first:last] ** 2, axis=0))
-            if whole
+            if is_complete
             else np.full(signal.shape[1], np.nan)
         )
     return np.array(rows).reshape(len(profile.regions), signal.shape[1])
 
 
 def relative_error(computed: FloatArray, measured: FloatArray) -> FloatArray:
-    """Relative error of RMS displacements, over the last axis.
+    """Return the relative error of RMS displacements, with norms over the last axis.
 
         |d_measured - d_computed| / |d_measured|        [A] Eq. (9), Euclidean norms
 
     Args:
-        computed, measured: (..., k) of k sensors and axes, or of one. [m]
+        computed, measured: (..., k) displacements of k pairs of sensor and axis. [m]
 
     Returns:
-        (...) A fraction; NaN where there is nothing measured.
+        (...) relative error as a fraction; NaN where the norm of the measured values is zero.
     """
     size = np.linalg.norm(measured, axis=-1)
     return np.linalg.norm(measured - computed, axis=-1) / np.where(size > 0.0, size, np.nan)

@@ -1,33 +1,43 @@
-"""Bearing of the drum where it gives: a six-component bushing between the tub and what carries the drum."""
+"""Compliant bearing of the drum: a six-component bushing between the tub and the drum carrier."""
 
 from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from wm_drake.elements.bearing import FORCE_SIZE, evaluate_drum_bearing
+from wm_drake.elements.bearing import evaluate_drum_bearing
 from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.element import SCALARS, ElementSystem
+from wm_drake.systems.element_system import SCALARS, ElementSystem
+
+OWN_OUTPUTS = {
+    "displacement": slice(0, 3),
+    "rotation": slice(3, 6),
+    "force": slice(6, 9),
+    "moment": slice(9, 12),
+}
+"""Own output ports, and their part of the own numbers of the element."""
 
 
 @TemplateSystem.define("DrumBearing_", T_list=SCALARS)
 def DrumBearing_(T: type) -> Any:
-    """Template of DrumBearing."""
+    """Return the class DrumBearing for a scalar type."""
 
     class DrumBearing(ElementSystem, LeafSystem_[T]):
-        """The bearing of the drum; law `bushing_force`. Stiffness lives in the frame on the tub, y along the drum axis.
+        """Compliant bearing of the drum; law `bushing_force`. The stiffness lives in a frame of the tub.
 
-            plant_state (28) ──▶ [ DrumBearing ] ──▶ generalized_force (14) on tub and drum, on carrier and drum [N m, N]
-                                                 ──▶ force (12), see `FORCE_SIZE` [m, rad, N, N m]
+        plant_state (28) ──▶ [ DrumBearing ] ──▶ generalized_force (14) on tub and drum, then on carrier
+                                                   and drum [N m, N]
+                                             ──▶ displacement (3), rotation (3) of the carrier [m, rad]
+                                             ──▶ force (3), moment (3) on the tub [N, N m]
 
-        Force and moment on the tub act at the point of the carrier.
+        The own outputs are in the frame of the tub whose y axis is the drum axis. Force and moment on
+        the tub act at the point of the carrier.
+
         """
 
         def _construct(self, parameters: FloatArray, converter: Any = None) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
-            self.declare_element(
-                T, evaluate_drum_bearing, parameters, force_size=FORCE_SIZE, state_size=0, trees=2
-            )
+            self.declare_element(T, evaluate_drum_bearing, parameters, OWN_OUTPUTS, trees=2)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._construct(self, other.packed, converter=converter)

@@ -7,26 +7,31 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.elements.bushing import evaluate_six_component_bushing
 from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.element import SCALARS, ElementSystem
+from wm_drake.systems.element_system import SCALARS, ElementSystem
 
 
 @TemplateSystem.define("SixComponentBushing_", T_list=SCALARS)
 def SixComponentBushing_(T: type) -> Any:
-    """Template of SixComponentBushing."""
+    """Return the class SixComponentBushing for a scalar type."""
 
     class SixComponentBushing(ElementSystem, LeafSystem_[T]):
-        """A six-component bushing; law `bushing_force`. Stiffness lives in the housing-side frame G.
+        """Six-component bushing; law `bushing_force`. The stiffness lives in the housing-side frame G.
 
-            plant_state (14) ──▶ [ SixComponentBushing ] ──▶ generalized_force (7) [N m, N]
-                                                         ──▶ force (6) on the housing, in G: force [N], moment [N m]
+        plant_state (14) ──▶ [ SixComponentBushing ] ──▶ generalized_force (7) [N m, N]
+                                                     ──▶ force (3) on the housing, in G [N]
+                                                     ──▶ moment (3) on the housing, in G [N m]
 
-        The force on the housing acts at the tub-side point, where that of the tub does.
+        Force and moment on the housing act at the tub-side point, where those on the tub act.
+
         """
 
         def _construct(self, parameters: FloatArray, converter: Any = None) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             self.declare_element(
-                T, evaluate_six_component_bushing, parameters, force_size=6, state_size=0
+                T,
+                evaluate_six_component_bushing,
+                parameters,
+                {"force": slice(0, 3), "moment": slice(3, 6)},
             )
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:

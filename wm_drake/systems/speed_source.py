@@ -1,55 +1,83 @@
-"""Speed source of the drum."""
+"""Speed source of the drum, and the torque that the motor needs for it."""
 
 from typing import Any
 
-from pydrake.systems.framework import BasicVector_, LeafSystem_, NumericParameterIndex
+from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from wm_drake.systems.element import SCALARS
+from wm_drake.systems.element_system import SCALARS
 
 REFLECTED_INERTIA = 1e8
-"""Inertia of the drive at the drum joint. [kg m^2] Not physical: it enters only the joint's diagonal of the mass matrix, so
-that actuation J alpha turns the drum with alpha, whatever the tub does, to one part in 1e8. The motor torque is what
-remains: J (alpha - rate of drum speed)."""
+"""Inertia of the drive at the drum joint. [kg m^2] Not physical: it enters only the diagonal of the
+mass matrix at the joint, so that the actuation J alpha turns the drum with alpha, whatever the tub
+does, to one part in 1e8. The motor torque is what remains: J (alpha - rate of drum speed)."""
 
 
 @TemplateSystem.define("SpeedSource_", T_list=SCALARS)
 def SpeedSource_(T: type) -> Any:
-    """Template of SpeedSource."""
+    """Return the class SpeedSource for a scalar type."""
 
     class SpeedSource(LeafSystem_[T]):
-        """Prescribes the angular acceleration of the drum: one straight piece of a spin profile.
+        """Turn the drum with a prescribed angular acceleration alpha.
 
-            [ SpeedSource ] ──▶ actuation (1) [N m]
-              parameter: angular acceleration [rad/s^2]
+            profile_acceleration (1) ──▶ [ SpeedSource ] ──▶ actuation (1) J alpha [N m]
+            drum_acceleration (1)    ──▶ [             ]
 
-        A profile jumps from piece to piece. An explicit integrator must not see a jump inside a step, so whoever runs the
-        simulation ends a step there and sets the next piece's acceleration (`wm_drake.engines.drake`).
+        alpha is that of the port `drum_acceleration` if a value is connected or fixed there, else that
+        of `profile_acceleration`. [rad/s^2]
         """
 
         def _construct(self, converter: Any = None) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
-            self.parameter_index = self.DeclareNumericParameter(BasicVector_[T]([0.0]))
-            needs = {self.numeric_parameter_ticket(NumericParameterIndex(self.parameter_index))}
+            self._profile = self.DeclareVectorInputPort("profile_acceleration", 1)
+            self._wanted = self.DeclareVectorInputPort("drum_acceleration", 1)
+            needs = {self._profile.ticket(), self._wanted.ticket()}
             self.DeclareVectorOutputPort("actuation", 1, self._calc_actuation, needs)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._construct(self, converter=converter)
 
         def _calc_actuation(self, context: Any, output: Any) -> None:
-            output.SetFromVector(
-                REFLECTED_INERTIA
-                * context.get_numeric_parameter(self.parameter_index).CopyToVector()
-            )
-
-        def set_acceleration(self, context: Any, acceleration: float) -> None:
-            """Sets the acceleration [rad/s^2] in the source's own Context."""
-            context.get_mutable_numeric_parameter(self.parameter_index).SetFromVector(
-                [acceleration]
-            )
+            wanted = self._wanted if self._wanted.HasValue(context) else self._profile
+            output.SetFromVector(REFLECTED_INERTIA * wanted.Eval(context))
 
     Impl = SpeedSource
     return SpeedSource
 
 
 SpeedSource = SpeedSource_[None]
+
+
+@TemplateSystem.define("MotorTorque_", T_list=SCALARS)
+def MotorTorque_(T: type) -> Any:
+    """Return the class MotorTorque for a scalar type."""
+
+    class MotorTorque(LeafSystem_[T]):
+        """Torque of the motor on the drum; its reaction acts on the tub.
+
+            actuation (1)                ──▶ [ MotorTorque ] ──▶ torque (1) [N m]
+            generalized_acceleration (n) ──▶ [             ]
+
+        torque = actuation - J vdot: what the reflected inertia J of the drive does not take up.
+        """
+
+        def _construct(self, size: int, drum: int, converter: Any = None) -> None:
+            LeafSystem_[T].__init__(self, converter=converter)
+            self._size, self._drum = size, drum
+            self._actuation = self.DeclareVectorInputPort("actuation", 1)
+            self._rates = self.DeclareVectorInputPort("generalized_acceleration", size)
+            needs = {self._actuation.ticket(), self._rates.ticket()}
+            self.DeclareVectorOutputPort("torque", 1, self._calc_torque, needs)
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._construct(self, other._size, other._drum, converter=converter)
+
+        def _calc_torque(self, context: Any, output: Any) -> None:
+            rate = self._rates.Eval(context)[self._drum : self._drum + 1]
+            output.SetFromVector(self._actuation.Eval(context) - REFLECTED_INERTIA * rate)
+
+    Impl = MotorTorque
+    return MotorTorque
+
+
+MotorTorque = MotorTorque_[None]

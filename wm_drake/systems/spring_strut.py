@@ -7,23 +7,24 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.elements.spring import evaluate_spring_strut
 from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.element import SCALARS, ElementSystem
+from wm_drake.systems.element_system import SCALARS, ElementSystem
 
 
 @TemplateSystem.define("SpringStrut_", T_list=SCALARS)
 def SpringStrut_(T: type) -> Any:
-    """Template of SpringStrut."""
+    """Return the class SpringStrut for a scalar type."""
 
     class SpringStrut(ElementSystem, LeafSystem_[T]):
-        """A suspension spring; law `spring_tension`.
+        """Suspension spring; law `spring_tension`.
 
         plant_state (14) ──▶ [ SpringStrut ] ──▶ generalized_force (7) [N m, N]
                                              ──▶ force (1) tension, > 0 pulls its ends together [N]
+
         """
 
         def _construct(self, parameters: FloatArray, converter: Any = None) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
-            self.declare_element(T, evaluate_spring_strut, parameters, force_size=1, state_size=0)
+            self.declare_element(T, evaluate_spring_strut, parameters, {"force": slice(0, 1)})
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._construct(self, other.packed, converter=converter)

@@ -1,26 +1,42 @@
-"""Telescopic damper: outer and inner tube are bodies, each held by a six-component bushing, friction along the joint."""
+"""Telescopic damper: its tubes are bodies, held by two bushings, with friction along the joint."""
 
 from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE
-from wm_drake.elements.telescopic_damper import FORCE_SIZE, evaluate_telescopic_damper
+from wm_drake.elements.telescopic_damper import evaluate_telescopic_damper
 from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.element import SCALARS, ElementSystem
-from wm_drake.systems.friction_damper import DamperWithSponge
+from wm_drake.systems.element_system import SCALARS, ElementSystem
+
+OWN_OUTPUTS = {
+    "force": slice(0, 1),
+    "tub_bushing_force": slice(1, 4),
+    "tub_bushing_moment": slice(4, 7),
+    "housing_bushing_force": slice(7, 10),
+    "housing_bushing_moment": slice(10, 13),
+}
+"""Own output ports, and their part of the own numbers of the element."""
 
 
-@TemplateSystem.define("TelescopeForce_", T_list=SCALARS)
-def TelescopeForce_(T: type) -> Any:
-    """Template of TelescopeForce."""
+@TemplateSystem.define("TelescopicDamper_", T_list=SCALARS)
+def TelescopicDamper_(T: type) -> Any:
+    """Return the class TelescopicDamper for a scalar type."""
 
-    class TelescopeForce(ElementSystem, LeafSystem_[T]):
-        """Forces of a telescopic damper; laws `bushing_force` twice, and `damper_response`.
+    class TelescopicDamper(ElementSystem, LeafSystem_[T]):
+        """Telescopic damper; laws `bushing_force` twice, and `damper_response` along the joint.
 
-        plant_state (28) ──▶ [ TelescopeForce ] ──▶ generalized_force (14) [N m, N], and the rate (1) of the state [m/s]
-        state (1) [m]    ──▶                    ──▶ force (13), see `FORCE_SIZE` [N, N m]
+        plant_state (28) ──▶ [ TelescopicDamper ] ──▶ generalized_force (14) on tub and drum, then on
+                             [ (state: sponge)  ]       tubes and joint [N m, N]
+                                                  ──▶ force (1) tension of the law [N]
+                                                  ──▶ tub_bushing_force, tub_bushing_moment (3, 3) on the
+                                                        outer tube, in its frame [N, N m]
+                                                  ──▶ housing_bushing_force, housing_bushing_moment (3, 3)
+                                                        on the housing [N, N m]
+                                                  ──▶ state (1) deformation of the sponge [m]
+
+        `state_size` as for `FrictionDamper`.
+
         """
 
         def _construct(
@@ -31,7 +47,7 @@ def TelescopeForce_(T: type) -> Any:
                 T,
                 evaluate_telescopic_damper,
                 parameters,
-                force_size=FORCE_SIZE,
+                OWN_OUTPUTS,
                 state_size=state_size,
                 trees=2,
             )
@@ -39,23 +55,8 @@ def TelescopeForce_(T: type) -> Any:
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._construct(self, other.packed, other.state_size, converter=converter)
 
-    Impl = TelescopeForce
-    return TelescopeForce
+    Impl = TelescopicDamper
+    return TelescopicDamper
 
 
-TelescopeForce = TelescopeForce_[None]
-
-
-class TelescopicDamper(DamperWithSponge):
-    """A telescopic damper; where its law has a sponge, the sponge's deformation is its continuous state.
-
-    plant_state (28) ──▶ [ TelescopicDamper      ] ──▶ generalized_force (14) on tub and drum, on tubes and joint [N m, N]
-                         [ force ──▶ rate        ] ──▶ force (13) own forces [N, N m]
-                         [   ◀── sponge (state)  ] ──▶ state (1) deformation, only with a sponge [m]
-    """
-
-    def __init__(self, parameters: FloatArray, state_size: int) -> None:
-        """Builds the damper from packed parameters; `state_size` is 1 for a law with a sponge, else 0."""
-        super().__init__(
-            TelescopeForce(parameters, state_size), state_size, 2 * GENERALIZED_FORCE_SIZE
-        )
+TelescopicDamper = TelescopicDamper_[None]

@@ -1,4 +1,4 @@
-"""Calibration of a machine: the free file's map, targets, planted machines recovered, interruption, what is known."""
+"""Calibration of a machine: parameter map, targets, recovery of a known machine, interruption."""
 
 from pathlib import Path
 
@@ -13,8 +13,8 @@ from wm_drake.parameters import SpinProfile, load_machine
 from wm_drake.parameters.free import Measured, load_free
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
 from wm_drake.studies.calibration.outcome import amplitude_rows, quantity_table, solved_machine
-from wm_drake.studies.calibration.parameter_map import turning_of
-from wm_drake.studies.calibration.prediction import check_left_out, predict
+from wm_drake.studies.calibration.parameter_map import parameter_map_of
+from wm_drake.studies.calibration.prediction import check_held_out, predict
 from wm_drake.studies.calibration.solutions import Solution, distinct
 from wm_drake.studies.calibration.targets import (
     Targets,
@@ -80,17 +80,17 @@ def free_file(tmp_path, text=FREE):
 
 
 def planted(
-    machine, turning, point, loads=(("middle", True), ("counter", True), ("counter", False))
+    machine, parameter_map, point, loads=(("middle", True), ("counter", True), ("counter", False))
 ):
-    """Targets that a machine at a point gives."""
-    amplitude = amplitudes_at(machine, turning, loads, np.array([point]))[0, 0]
+    """Return the amplitudes of the machine at a point as targets."""
+    amplitude = amplitudes_at(machine, parameter_map, loads, np.array([point]))[0, 0]
     return Targets(loads, tuple(machine.parameters.sensors), amplitude, np.ones(amplitude.shape))
 
 
-def test_quantities_enter_their_values_linearly(short, tmp_path):
-    turning = turning_of(short, free_file(tmp_path, FREE + TABLE))
-    drawn = turning.base.frames
-    made = turning.parameters_at(np.array([40.0, 0.03, 5.5, 4000.0, 10.0]))
+def test_values_depend_linearly_on_the_quantities(short, tmp_path):
+    parameter_map = parameter_map_of(short, free_file(tmp_path, FREE + TABLE))
+    drawn = parameter_map.base.frames
+    made = parameter_map.parameters_at(np.array([40.0, 0.03, 5.5, 4000.0, 10.0]))
     assert made.damper_types["friction"].friction_force == 40.0
     assert made.frames["damper_left_housing"].position == (
         -0.03,
@@ -99,17 +99,17 @@ def test_quantities_enter_their_values_linearly(short, tmp_path):
     assert made.frames["damper_right_rear_housing"].position[0] == 0.03
     assert made.bodies["motor"].mass == 5.5
     assert made.bodies["motor"].inertia.xx == pytest.approx(5.5 * 0.0024)
-    assert made.bodies["motor"].inertia.yy == turning.base.bodies["motor"].inertia.yy
+    assert made.bodies["motor"].inertia.yy == parameter_map.base.bodies["motor"].inertia.yy
     assert made.gasket.stiffness_x.force == pytest.approx((-130.0, 0.0, 130.0))
     assert made.gasket.stiffness_x.displacement == short.parameters.gasket.stiffness_x.displacement
     assert (
-        turning.parameters_at(turning.expected).bodies["motor"].mass == 5.0
+        parameter_map.parameters_at(parameter_map.expected).bodies["motor"].mass == 5.0
     )  # the base was not written into
 
 
-def test_spelled_out_machine_is_the_drawn_one(short, tmp_path):
-    turning = turning_of(short, free_file(tmp_path))
-    one, other = short.set_up(), short.set_up(parameters=turning.base)
+def test_machine_with_explicit_values_is_that_of_the_sdf(short, tmp_path):
+    parameter_map = parameter_map_of(short, free_file(tmp_path))
+    one, other = short.set_up(), short.set_up(parameters=parameter_map.base)
     for name, damper in one.dampers.items():
         assert np.array_equal(damper.packed(), other.dampers[name].packed())
     masses = [short.plant.CalcTotalMass(setup.plant_context) for setup in (one, other)]
@@ -122,7 +122,10 @@ FAULTS = {
         "quantities.friction.bounds: is missing",
     ),
     "one bound": (FREE.replace("(10, 60) N", "10 N"), "is not two numbers with a unit"),
-    "falling bounds": (FREE.replace("(10, 60) N", "(60, 10) N"), "the bounds must rise"),
+    "falling bounds": (
+        FREE.replace("(10, 60) N", "(60, 10) N"),
+        "lower bound must be below the upper",
+    ),
     "prior outside": (
         FREE.replace("(30, 10) N", "(70, 10) N"),
         "the expected value is outside the bounds",
@@ -140,7 +143,7 @@ FAULTS = {
     "nothing free": ("quantities: {}\n", "quantities"),
     "preload that is no force": (
         PRELOAD.replace(") N", ") kg") + FREE,
-        "the prior is in kg, a preload in N",
+        "the prior is in kg; a preload needs a unit of force",
     ),
 }
 
@@ -156,7 +159,7 @@ def test_faulty_free_file_is_refused_with_its_line(fault, tmp_path):
 MISFITS = {
     "unknown key": (
         FREE.replace("friction_force", "fricton_force"),
-        "is no number of the machine (did you mean",
+        "is not a number of the machine (did you mean",
     ),
     "unknown frame": (
         FREE.replace("damper_left_housing", "damper_lft_housing"),
@@ -165,15 +168,15 @@ MISFITS = {
     "unknown body": (FREE.replace("bodies.motor.mass", "bodies.motr.mass"), "no link 'motr'"),
     "wrong dimension": (
         FREE.replace("(10, 60) N", "(10, 60) kg").replace("(30, 10) N", "(30, 10) kg"),
-        "is in N, which kg does not",
+        "needs a unit such as N, but kg is not of this kind",
     ),
     "factor for a table": (
         FREE + TABLE.replace('"(-30, 0, 30) mm"', '"(-30, 30) mm"'),
-        "takes a list of 3 factors, not 2",
+        "needs a list of 3 factors, not 2",
     ),
     "factor of the wrong dimension": (
         FREE.replace("0.0024 m^2", "0.0024 m"),
-        "which kg times m does not give",
+        "but kg times m is not of this kind",
     ),
 }
 
@@ -182,7 +185,7 @@ MISFITS = {
 def test_free_file_that_does_not_fit_the_machine_is_refused(misfit, short, tmp_path):
     text, message = MISFITS[misfit]
     with pytest.raises(InputError) as refused:
-        turning_of(short, free_file(tmp_path, text))
+        parameter_map_of(short, free_file(tmp_path, text))
     assert message in str(refused.value)
 
 
@@ -209,41 +212,43 @@ def test_targets_are_the_rows_of_the_experiment(reference):
             [["midle", "no", "experiment", *range(1, 7)]],
             "no load 'midle' in the machine (did you mean 'middle'?",
         ),
-        ([["back", "no", "experiment", *range(1, 7)]] * 2, "'back' is there twice"),
+        ([["back", "no", "experiment", *range(1, 7)]] * 2, "'back' occurs twice"),
         ([["back", "no", "experiment", *range(6)]], "not above 0"),
         ([["back", "no", "a model", *range(1, 7)]], "has no row of source 'experiment'"),
     ],
 )
-def test_targets_that_cannot_be_aimed_at_are_refused(rows, message, reference):
+def test_targets_that_cannot_be_used_are_refused(rows, message, reference):
     with pytest.raises(InputError) as refused:
         targets_of(reference, measured(rows), "t.csv")
     assert message in str(refused.value)
     assert str(refused.value).startswith("t.csv")
 
 
-def test_point_that_is_no_machine_has_no_amplitudes_and_harms_no_other(short, tmp_path):
+def test_point_without_a_machine_is_nan_and_does_not_change_others(short, tmp_path):
     text = FREE.replace(
         "{bodies.motor.mass: 1, bodies.motor.inertia.xx: 0.0024 m^2}", "bodies.motor.mass"
     ).replace("(4, 6)", "(-6, 6)")
-    turning = turning_of(short, free_file(tmp_path, text))
+    parameter_map = parameter_map_of(short, free_file(tmp_path, text))
     points = np.array([[30.0, 0.0, 5.0], [30.0, 0.0, -5.0], [30.0, 0.0, 5.0]])
-    values = amplitudes_at(short, turning, (("middle", True),), points)
+    values = amplitudes_at(short, parameter_map, (("middle", True),), points)
     assert np.isnan(values[:, 1]).all()
     assert np.array_equal(values[:, 0], values[:, 2])
     assert np.isfinite(values[:, 0]).all()
 
 
-def test_preloads_of_the_springs_are_held_against_what_is_expected(short, tmp_path):
-    turning = turning_of(short, free_file(tmp_path, PRELOAD + FREE))
+def test_preload_residuals_compare_with_the_prior(short, tmp_path):
+    parameter_map = parameter_map_of(short, free_file(tmp_path, PRELOAD + FREE))
     points = np.array(
         [[30.0, 0.02, 5.0], [30.0, 0.02, 500.0]]
     )  # the second has a motor that no spring holds
-    springs = short.set_up(parameters=turning.parameters_at(points[0])).springs.values()
+    springs = short.set_up(parameters=parameter_map.parameters_at(points[0])).springs.values()
     expected = [(spring.preload - 100.0) / 20.0 for spring in springs]
-    residuals = preload_residuals(short, turning, points)
+    residuals = preload_residuals(short, parameter_map, points)
     assert residuals[0] == pytest.approx(expected)
     assert np.isnan(residuals[1]).all()
-    assert preload_residuals(short, turning_of(short, free_file(tmp_path, FREE)), points).shape == (
+    assert preload_residuals(
+        short, parameter_map_of(short, free_file(tmp_path, FREE)), points
+    ).shape == (
         2,
         0,
     )
@@ -255,8 +260,8 @@ def test_expected_preload_is_prior_not_data(short, tmp_path):
     with open_ledger(tmp_path / "ledger.sqlite", {"study": "test"}) as ledger:
         (found,) = calibrate(short, free, targets, Plan(starts=1, iterations=1), ledger).ended
     assert found.slopes.shape == (6, 3)
-    turning = turning_of(short, free)
-    rows = preload_residuals(short, turning, found.point[None])[0]
+    parameter_map = parameter_map_of(short, free)
+    rows = preload_residuals(short, parameter_map, found.point[None])[0]
     assert found.prior_cost == pytest.approx(0.5 * (np.sum(rows**2) + np.sum(found.coordinates**2)))
 
 
@@ -270,13 +275,13 @@ def test_weights_go_by_load_by_sensor_and_by_both():
     for key, factor, message in (
         ("c", 1.0, "'c' is no load"),
         ("a:Q", 1.0, "'a:Q' is no load"),
-        ("a", -1.0, "below 0"),
+        ("a", -1.0, "must be >= 0"),
     ):
         with pytest.raises(InputError, match=message):
             targets.weighted({key: factor})
 
 
-def test_gasket_effect_is_the_change_the_gasket_makes():
+def test_gasket_effect_is_the_relative_change():
     amplitude = np.array([[2.0, 1.0], [3.0, 0.5], [9.0, 9.0]])
     targets = Targets(
         (("a", False), ("a", True), ("b", True)), ("X", "Y"), amplitude, np.ones((3, 2))
@@ -288,13 +293,13 @@ def test_gasket_effect_is_the_change_the_gasket_makes():
 
 @pytest.fixture(scope="module")
 def recovered(short, tmp_path_factory):
-    """A planted machine and its calibration."""
+    """Return a known machine and its calibration."""
     folder = tmp_path_factory.mktemp("calibration")
     free = free_file(folder)
-    turning = turning_of(short, free)
-    truth = turning.expected + np.array([-0.7, 0.6, 0.9]) * turning.deviation
+    parameter_map = parameter_map_of(short, free)
+    truth = parameter_map.expected + np.array([-0.7, 0.6, 0.9]) * parameter_map.deviation
     targets, plan = (
-        planted(short, turning, truth),
+        planted(short, parameter_map, truth),
         Plan(starts=2, seed=4, iterations=12, deviation=0.002, resolution=0.0),
     )
     with open_ledger(folder / "ledger.sqlite", identity_of(short, free, targets, plan)) as ledger:
@@ -304,37 +309,35 @@ def recovered(short, tmp_path_factory):
     return truth, free, targets, plan, calibration, predictions, folder
 
 
-def test_planted_machine_is_recovered_within_what_the_data_are_said_to_know(recovered):
+def test_known_machine_is_recovered_within_its_standard_deviations(recovered):
     truth, _, targets, _, calibration, _, _ = recovered
     best = calibration.solutions[0]
-    turning = calibration.turning
-    sure = best.spread() * turning.deviation
-    assert np.all(np.abs(best.point - truth) < 3.0 * sure + 0.02 * turning.deviation)
+    parameter_map = calibration.parameter_map
+    posterior = best.spread() * parameter_map.deviation
+    assert np.all(np.abs(best.point - truth) < 3.0 * posterior + 0.02 * parameter_map.deviation)
     assert np.nanmax(np.abs(best.errors(targets))) < 0.01
-    assert np.all(
-        best.spread()[:2] < 0.2
-    )  # friction and lean move the tub, the weight of the motor hardly
+    # friction and lean change the amplitudes; the mass of the motor hardly does
+    assert np.all(best.spread()[:2] < 0.2)
     assert np.sum(best.directions() > 1.0) >= 2
 
 
-def test_starting_values_which_may_have_seen_a_load_do_not_help_to_predict_it(
-    short, recovered, tmp_path
-):
+def test_start_values_of_the_free_file_are_not_used_for_predictions(short, recovered, tmp_path):
     truth, free, targets, plan, calibration, predictions, _ = recovered
-    knowing = {
+    quantities = {
         name: quantity.model_copy(
             update={"start": Measured(values=(float(value),), unit=quantity.unit, is_list=False)}
         )
         for (name, quantity), value in zip(free.quantities.items(), truth, strict=True)
     }
-    told = free.model_copy(update={"quantities": knowing})
-    assert np.array_equal(turning_of(short, told).start, truth)
-    with open_ledger(tmp_path / "ledger.sqlite", identity_of(short, told, targets, plan)) as ledger:
-        (again,) = predict(short, told, calibration, [["middle"]], ledger)
+    started = free.model_copy(update={"quantities": quantities})
+    assert np.array_equal(parameter_map_of(short, started).start, truth)
+    identity = identity_of(short, started, targets, plan)
+    with open_ledger(tmp_path / "ledger.sqlite", identity) as ledger:
+        (again,) = predict(short, started, calibration, [["middle"]], ledger)
     assert np.array_equal(again.predicted, predictions[0].predicted)
 
 
-def test_loads_that_were_not_seen_are_predicted_from_the_others(recovered):
+def test_held_out_loads_are_predicted_from_the_others(recovered):
     (prediction,) = recovered[5]
     assert prediction.loads == ("middle",)
     assert prediction.predicted.shape == (1, 6)
@@ -354,7 +357,7 @@ def test_finished_calibration_is_read_back_without_a_run(recovered, short, monke
     assert quantity_table(again).equals(quantity_table(calibration))
 
 
-def test_interrupted_calibration_goes_on_where_it_was(short, tmp_path, recovered):
+def test_interrupted_calibration_continues_where_it_stopped(short, tmp_path, recovered):
     _, free, targets, plan, calibration, _, _ = recovered
     identity = identity_of(short, free, targets, plan)
 
@@ -373,9 +376,9 @@ def test_interrupted_calibration_goes_on_where_it_was(short, tmp_path, recovered
     )  # also: any number of workers
 
 
-def test_solved_machine_carries_the_origin_of_each_number(recovered):
+def test_solved_machine_has_the_source_of_each_number(recovered):
     calibration = recovered[4]
-    solved = solved_machine(calibration.turning, calibration.solutions[0])
+    solved = solved_machine(calibration.parameter_map, calibration.solutions[0])
     value = f"{solved.damper_types['friction'].friction_force:.10g}"
     text = solved.sources["damper_types.friction.friction_force"]
     assert text.startswith(f"fit: friction {value} ± ")
@@ -398,12 +401,12 @@ def test_table_of_amplitudes_is_a_file_of_measured_amplitudes(recovered, short, 
     )
 
 
-def test_unknown_load_cannot_be_left_out_nor_all_of_them():
+def test_unknown_load_or_all_loads_cannot_be_held_out():
     targets = Targets((("a", True), ("b", True)), ("X",), np.ones((2, 1)), np.ones((2, 1)))
     with pytest.raises(InputError, match="no measured load 'c'"):
-        check_left_out(targets, [["c"]])
+        check_held_out(targets, [["c"]])
     with pytest.raises(InputError, match="leaves no load"):
-        check_left_out(targets, [["a", "b"]])
+        check_held_out(targets, [["a", "b"]])
 
 
 def solution(coordinates, amplitude, slopes, cost=1.0):
@@ -420,7 +423,7 @@ def solution(coordinates, amplitude, slopes, cost=1.0):
 
 
 def test_spread_is_that_of_the_normal_distribution():
-    # the first quantity is measured as well as it was expected, the second not at all
+    # the data of the first quantity have the deviation of its prior; the second has no data
     one = solution([0.0, 0.0], [1.0], [[1.0, 0.0]])
     assert one.spread() == pytest.approx([np.sqrt(0.5), 1.0])
     assert one.directions() == pytest.approx([1.0])

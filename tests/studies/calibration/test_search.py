@@ -1,4 +1,4 @@
-"""The search on problems of known answer, without any machine."""
+"""Searches on problems with a known answer, without a machine."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ TRUTH = np.array([0.8, -0.5, 0.3])
 
 
 def curved(points):
-    """Residuals of a planted point, sharp against the prior, with a bend."""
+    """Nonlinear residuals of a known point, with small deviations compared to the prior."""
     offset = points - TRUTH
     return 200.0 * np.column_stack(
         [offset[:, 0], offset[:, 1] + offset[:, 0] ** 2, offset[:, 2] - 0.5 * offset[:, 1] ** 2]
@@ -31,13 +31,13 @@ def problem(residuals=curved, bound=3.0, size=3):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_planted_point_is_found_from_a_far_start(method):
+def test_known_point_is_found_from_a_distant_start(method):
     found = METHODS[method](problem(), np.array([-2.0, 2.0, -2.0]), 50, 3)
     assert found.point == pytest.approx(TRUTH, abs=1e-3)
     assert found.cost == pytest.approx(0.5 * np.sum(TRUTH**2), rel=1e-2)
 
 
-def test_prior_alone_holds_what_the_data_do_not_see():
+def test_prior_determines_a_quantity_without_data():
     found = least_squares_search(
         problem(lambda points: 50.0 * (points[:, :1] - 1.0)), np.array([0.0, 1.5, -1.0]), 30
     )
@@ -45,7 +45,7 @@ def test_prior_alone_holds_what_the_data_do_not_see():
 
 
 def test_weight_between_data_and_prior_is_that_of_their_deviations():
-    # one datum that says 1 +- 1 against a prior that says 0 +- 1: the normal distributions' product is at 1/2
+    # one datum 1 +- 1 and a prior 0 +- 1: the product of the two normal distributions is at 1/2
     found = least_squares_search(problem(lambda points: points - 1.0, size=1), np.array([-1.0]), 30)
     assert found.point == pytest.approx([0.5], abs=1e-5)
 
@@ -63,7 +63,7 @@ def test_bounds_are_kept(search):
     assert found.point[0] == pytest.approx(0.6, abs=1e-3)
 
 
-def test_search_goes_around_where_there_is_no_machine():
+def test_search_avoids_points_without_a_machine():
     def with_a_hole(points):
         values = curved(points)
         values[np.linalg.norm(points - [-0.6, 0.8, -0.8], axis=1) < 0.4] = np.nan
@@ -73,13 +73,13 @@ def test_search_goes_around_where_there_is_no_machine():
     assert found.point == pytest.approx(TRUTH, abs=1e-2)
 
 
-def test_evolution_takes_the_same_way_again_from_its_seed():
+def test_evolution_with_one_seed_is_reproducible():
     first, again, other = (evolution_search(problem(), np.zeros(3), 20, seed) for seed in (7, 7, 8))
     assert np.array_equal(first.point, again.point)
     assert not np.array_equal(first.point, other.point)
 
 
-def test_hops_go_on_where_slopes_are_caught_in_a_ripple():
+def test_hops_leave_a_local_minimum():
     def rippled(points):
         x = points[:, :1]
         values = 10.0 * (x - 0.5) + 8.0 * np.sin(9.0 * x)
@@ -95,7 +95,7 @@ def test_hops_go_on_where_slopes_are_caught_in_a_ripple():
     assert search("basin-hopping").cost < 0.5
 
 
-def test_starts_are_the_expected_machine_and_draws_that_the_seed_fixes():
+def test_starts_are_the_expected_point_and_points_that_the_seed_determines():
     starts = [problem().start(number, 5) for number in range(4)]
     assert not starts[0].any()
     assert np.array_equal(starts[2], problem().start(2, 5))
@@ -103,7 +103,7 @@ def test_starts_are_the_expected_machine_and_draws_that_the_seed_fixes():
     assert len({tuple(start) for start in starts}) == 4
 
 
-def test_progress_tells_points_and_a_cost_that_only_falls():
+def test_progress_reports_evaluations_and_a_falling_cost():
     told = []
     watched = SearchProblem(
         lambda points: (curved(points), curved(points)),
@@ -120,7 +120,7 @@ def test_progress_tells_points_and_a_cost_that_only_falls():
 
 
 def kinked(points):
-    """Two peaks, of which the larger one counts, as an amplitude has; and their smooth mean of order 20."""
+    """The larger of two peaks, like an amplitude, and their power mean of order 20."""
     x, y = points.T
     peaks = np.stack([np.exp(0.5 + x + 0.2 * y), np.exp(0.5 - x + 0.2 * y)])
     hard, smooth = peaks.max(axis=0), np.mean(peaks**20, axis=0) ** (1 / 20)
@@ -130,7 +130,7 @@ def kinked(points):
     )
 
 
-def test_smooth_slopes_lead_past_a_kink():
+def test_slopes_of_smooth_residuals_pass_a_kink():
     wide = np.full(2, 6.0)
     found = least_squares_search(
         SearchProblem(kinked, -wide, wide, 0.0 * wide), np.array([-1.5, 1.0]), 60

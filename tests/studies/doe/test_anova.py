@@ -1,4 +1,4 @@
-"""Analysis of variance against a textbook, statsmodels' own reference tables, planted effects and properties."""
+"""Analysis of variance against a textbook, reference tables of statsmodels and known effects."""
 
 import itertools
 
@@ -13,8 +13,8 @@ from statsmodels.stats.anova import anova_lm
 from wm_drake.studies.doe import d_optimal_levels, level_matrix, orthogonal_levels
 from wm_drake.studies.doe.anova import anova
 
-# Montgomery, Design and Analysis of Experiments, battery life data: hours by plate material (1-3) and temperature (15, 70, 125 deg F),
-# four batteries each; analysis of variance as printed there
+# Montgomery, Design and Analysis of Experiments, battery life data: hours by plate material (1-3)
+# and temperature (15, 70, 125 deg F), four batteries each; analysis of variance as printed there
 BATTERY = {
     (1, 15): (130, 155, 74, 180),
     (1, 70): (34, 40, 80, 75),
@@ -56,9 +56,9 @@ def test_battery_table_of_the_textbook():
     assert table.constant == pytest.approx(105.53, abs=0.005)
 
 
-# R's table of type III with contrasts sum for these data, from statsmodels' test suite (stats/tests/test_anova.py, TestAnovaLM): days
-# in hospital of kidney patients by duration of treatment (1, 2) and weight gain (1, 2, 3), first row of each cell left out in the
-# unbalanced case as there
+# R's table of type III with contrasts sum for these data, from the test suite of statsmodels
+# (stats/tests/test_anova.py, TestAnovaLM): days in hospital of kidney patients by duration of
+# treatment (1, 2) and weight gain (1, 2, 3); the unbalanced case omits the same rows as there
 KIDNEY = """
 0.0 1 1|2.0 1 1|1.0 1 1|3.0 1 1|0.0 1 1|2.0 1 1|0.0 1 1|5.0 1 1|6.0 1 1|8.0 1 1|2.0 1 2|4.0 1 2|7.0 1 2|12.0 1 2|15.0 1 2|4.0 1 2|
 3.0 1 2|1.0 1 2|5.0 1 2|20.0 1 2|15.0 1 3|10.0 1 3|8.0 1 3|5.0 1 3|25.0 1 3|16.0 1 3|7.0 1 3|30.0 1 3|3.0 1 3|27.0 1 3|0.0 2 1|
@@ -111,14 +111,14 @@ def design_of(levels):
 
 
 def planted(levels, main, cross):
-    """A response of known effects: per factor at its levels, and of factors 0 and 1 together."""
+    """Return a response with known effects of each factor and of factors 0 and 1 together."""
     response = 7.0 + sum(effects[levels[:, f] + 1] for f, effects in enumerate(main))
     return response + cross[levels[:, 0] + 1, levels[:, 1] + 1]
 
 
 @settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["full", "orthogonal", "d-optimal", "random"]))
-def test_planted_effects_are_recovered_exactly_by_any_design(seed, kind):
+def test_known_effects_are_recovered_exactly_by_any_design(seed, kind):
     rng = np.random.default_rng(seed)
     full = level_matrix(5)
     levels = {

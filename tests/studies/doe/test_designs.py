@@ -1,4 +1,4 @@
-"""Designs: efficiency by an independent library and by brute force, optimality by search, strength of arrays, files."""
+"""Designs: efficiency by an independent library and by brute force, optimality, strength, files."""
 
 import itertools
 import time
@@ -34,7 +34,10 @@ def d_optimal():
 
 
 def treatment_efficiency(levels, model):
-    """By another coding (indicators), another normalisation (against the full factorial's determinant) and log determinants."""
+    """Return the efficiency by another coding and another normalisation.
+
+    The coding is by indicators; the normalisation is by the determinant of the full factorial.
+    """
 
     def columns(array):
         main = [
@@ -70,15 +73,15 @@ def test_thousand_trials_are_efficient_different_and_quickly_found(d_optimal):
     assert design.efficiency() >= 99.6
     assert len(np.unique(design.levels, axis=0)) == 1000
     assert set(np.unique(design.levels)) == {-1, 0, 1}
-    assert wall_s < 20.0  # some two seconds where nothing else runs
+    assert wall_s < 20.0  # about 2 s on an idle computer
 
 
-def test_main_effects_alone_are_found_nearly_perfectly():
+def test_design_for_main_effects_is_nearly_perfect():
     design = make_design("d-optimal", NAMES, model="main")
     assert design.efficiency() > 99.99
 
 
-def test_seed_decides():
+def test_design_depends_on_the_seed_only():
     first, again, other = (d_optimal_levels(5, 80, "main+2fi", seed) for seed in (0, 0, 1))
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first, other)
@@ -100,10 +103,11 @@ def test_arrays_have_their_strength_by_oapackage(trials, least, factors):
 
 @pytest.mark.parametrize(("model", "columns"), [("main", 17), ("main+2fi", 129)])
 def test_efficiency_by_oapackage(d_optimal, model, columns):
-    """oapackage's own model matrices. It scales each column over the array at hand; here all get the scale of a balanced one.
+    """Compare with the model matrices of oapackage.
 
-    Only its matrix with interactions is used, which begins with the main effects: its matrix of main effects alone (mode m)
-    now and then comes back damaged.
+    oapackage scales each column over the given array; here all have the scale of a balanced one.
+    Only its matrix with interactions is used, which begins with the main effects: its matrix of
+    main effects alone (mode m) is sometimes wrong.
     """
 
     def matrix(levels):
@@ -134,13 +138,13 @@ def test_small_design_is_the_best_of_all():
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_no_design_beats_the_bound(seed):
+def test_no_design_exceeds_the_bound(seed):
     rng = np.random.default_rng(seed)
     levels = rng.integers(-1, 2, size=(rng.integers(1, 120), 4)).astype(np.int8)
     assert 0.0 <= efficiency(levels, "main+2fi") <= 100.0 + 1e-9
 
 
-def test_efficiency_does_not_know_names_of_factors_and_levels(d_optimal):
+def test_efficiency_does_not_depend_on_names_of_factors_and_levels(d_optimal):
     levels = d_optimal[0].levels
     assert efficiency(levels[:, ::-1], "main+2fi") == pytest.approx(
         efficiency(levels, "main+2fi"), rel=1e-10
@@ -185,12 +189,12 @@ def test_impossible_designs_are_refused(fault):
     assert message in str(caught.value)
 
 
-def test_nine_factors_have_no_array_here():
+def test_nine_factors_have_no_array():
     with pytest.raises(InputError, match="at most 8"):
         make_design("orthogonal", tuple("abcdefghi"))
 
 
-def test_design_file_comes_back(tmp_path):
+def test_written_design_is_read_back(tmp_path):
     design = make_design("d-optimal", NAMES, trials=150, seed=3)
     write_design(design, tmp_path / "design.csv")
     read = read_design(tmp_path / "design.csv", NAMES)
@@ -203,10 +207,10 @@ def test_design_file_comes_back(tmp_path):
 
 FAULTY_FILES = {
     "other columns": ("a,c\n0,0\n", "needs the columns a,b"),
-    "level": ("a,b\n0,0\n1,2\n", "row 2: '2' is no level"),
-    "word": ("a,b\n0,low\n", "row 1: 'low' is no level"),
+    "level": ("a,b\n0,0\n1,2\n", "row 2: '2' is not a level"),
+    "word": ("a,b\n0,low\n", "row 1: 'low' is not a level"),
     "nothing": ("a,b\n", "do not determine the 5 coefficients"),
-    "repeated": ("a,b\n0,0\n1,1\n0,0\n", "row 1 is there more than once"),
+    "repeated": ("a,b\n0,0\n1,1\n0,0\n", "row 1 occurs more than once"),
     "too few": ("a,b\n0,0\n1,1\n-1,-1\n", "these 3 trials do not determine the 5 coefficients"),
     "one level missing": ("a,b\n0,0\n1,0\n0,1\n1,1\n0,-1\n1,-1\n", "do not determine"),
     "no text": ("\x00\x01", "design.csv"),

@@ -1,4 +1,4 @@
-"""Screening and the gasket study on functions of known answer."""
+"""Screening and the gasket study on functions with a known answer."""
 
 import numpy as np
 import pandas as pd
@@ -15,8 +15,9 @@ from wm_drake.parameters import (
     levels_of,
     load_factors,
 )
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
-from wm_drake.simulation.runs import Case, simulate
+from wm_drake.simulation.runs import simulate
 from wm_drake.studies.doe import Design, level_matrix, make_design
 from wm_drake.studies.gasket.screening import Responses, leading_terms, mean_at, run_screening
 from wm_drake.studies.gasket.study import RESPONSES, GasketTrials
@@ -38,7 +39,7 @@ def screening():
     return run_screening(make_design("full", NAMES), additive)
 
 
-def test_planted_effects_come_back(screening):
+def test_known_effects_are_recovered(screening):
     table = screening.tables["two", "y"]
     assert table.constant == pytest.approx(20.0)
     a, b, c = table.terms[:3]
@@ -83,7 +84,7 @@ def test_tables_are_the_same_bytes_each_time(screening, tmp_path):
     assert len(pd.read_csv(tmp_path / "first" / "runs.csv")) == 54
 
 
-def test_plain_data_have_the_form_other_programs_read(screening):
+def test_plain_data_have_the_documented_form(screening):
     data = as_plain_data(screening)
     to_json(data)
     assert {"design", "trials", "d_efficiency", "responses"} <= set(data)
@@ -111,7 +112,7 @@ def failing(trials):
     return evaluate
 
 
-def test_failed_runs_are_left_out_while_the_rest_will_do():
+def test_failed_runs_are_omitted_if_the_others_determine_the_effects():
     design = make_design("full", NAMES)
     screening = run_screening(design, failing([3, 20]))
     assert screening.tables["two", "y"].terms[0].effects[(1,)] == pytest.approx(6.0)
@@ -123,7 +124,7 @@ def test_failed_runs_are_left_out_while_the_rest_will_do():
 SHORT = SpinProfile(time=(0.0, 2.0), speed=(5.0, 12.0))
 
 
-def test_trials_run_the_machine_at_their_levels(reference):
+def test_cases_of_trials_have_their_levels(reference):
     texts = ("K_Lx", "loads.middle.unbalances.0.mass=80 %..120 %")
     known = load_factors(GASKET_FACTORS)
     factors = levels_of(reference, dict(factor_of_text(text, known) for text in texts))

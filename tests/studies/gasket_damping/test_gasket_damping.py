@@ -1,4 +1,4 @@
-"""Damping of the gasket: what was planted is found again."""
+"""Damping of the gasket: known values are recovered."""
 
 import json
 from pathlib import Path
@@ -12,7 +12,8 @@ from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import SpinProfile
-from wm_drake.simulation.runs import Case, simulate
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.runs import simulate
 from wm_drake.studies.gasket_damping.study import (
     LOWER,
     UPPER,
@@ -27,7 +28,10 @@ TRUTH = np.array([28.7, 4.98])  # N s/m, N m s/rad
 
 @pytest.fixture(scope="module")
 def fast(reference):
-    """The reference machine, its run-up at five times the rate: the resonances lie between 10 and 20 s, the rest is steady."""
+    """The reference machine with five times the rate of its run-up.
+
+    The resonances are between 10 and 20 s; the rest is steady.
+    """
     profile = SpinProfile(time=(0.0, 8.0, 25.0, 50.0), speed=(0.0, 8.0, 30.0, 30.0))
     return reference.model_copy(update={"profile": profile})
 
@@ -44,7 +48,7 @@ def distance(fast):
     return EnvelopeDistance(fast, records)
 
 
-def test_distance_is_zero_at_what_was_planted_and_grows_away_from_it(distance):
+def test_distance_is_zero_at_the_true_damping_and_grows_away_from_it(distance):
     steps = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [0.0, 0.2], [0.0, 0.4]])
     here, *others = distance([TRUTH + step for step in steps])
     assert here == pytest.approx(0.0, abs=1e-6)
@@ -53,13 +57,13 @@ def test_distance_is_zero_at_what_was_planted_and_grows_away_from_it(distance):
     assert 0.1 < near_torsional < far_torsional
 
 
-def test_value_does_not_depend_on_what_is_computed_beside_it(distance):
+def test_value_does_not_depend_on_the_other_points(distance):
     points = [LOWER, UPPER, TRUTH + 1.0]
     assert distance(points)[2] == pytest.approx(distance([points[2]])[0], rel=1e-9)
 
 
 @pytest.mark.slow
-def test_planted_damping_is_found_from_noisy_records(fast, distance):
+def test_true_damping_is_found_from_noisy_records(fast, distance):
     rng = np.random.default_rng(1)
     noisy = {
         load: record + rng.normal(scale=1e-4, size=record.shape)
@@ -74,7 +78,7 @@ def test_planted_damping_is_found_from_noisy_records(fast, distance):
     assert found.scipy.value <= found.grid.value
 
 
-def test_measured_records_are_put_on_our_samples():
+def test_measured_records_are_interpolated_to_samples_every_5_ms():
     time = np.arange(0.0, 60.0, 0.002)
     record = xr.DataArray(
         np.column_stack([time, 2.0 * time]),
@@ -113,10 +117,10 @@ def test_short_profile_is_refused(reference):
 
 
 @pytest.mark.slow
-def test_command_recovers_its_virtual_experiment_and_says_that_it_is_one(wm_drake):
+def test_command_recovers_its_virtual_experiment_and_names_it_so(wm_drake):
     ended = wm_drake("study", "gasket-damping", "--out", "out", "--json")
     assert ended.code == 0
-    assert "a virtual experiment is run by the Drake engine" in ended.err
+    assert "The Drake engine runs a virtual experiment" in ended.err
     printed = json.loads(ended.out)
     assert printed["virtual_experiment"] is True
     assert printed["scipy"]["C_L"] == pytest.approx(printed["planted"]["C_L"], rel=0.05)
@@ -158,7 +162,7 @@ def test_damping_is_found_from_record_files(wm_drake, reference, machine):
 
 
 def run_of(machine, parameters, load):
-    """Record of a run of the built machine with other numbers."""
+    """Return the record of a run of the built machine with other numbers."""
     cases = [Case(load, parameters.loads[load], parameters.profile, parameters=parameters)]
     ended = []
     simulate_many(machine, cases, histories=True, finished=ended.append)
@@ -168,7 +172,7 @@ def run_of(machine, parameters, load):
 def test_faults_of_the_command_are_refused(wm_drake):
     Path("r.csv").write_text("time_s,Xr\n0,1\n")
     for arguments, message in (
-        (("--record", "r.csv"), "is not LOAD=FILE with a load of the machine"),
+        (("--record", "r.csv"), "does not have the form LOAD=FILE with a load of the machine"),
         (("--record", "middle=nosuch.csv"), "no such file 'nosuch.csv'"),
         (("--record", "middle=r.csv"), "r.csv: needs the columns time_s,Xr,Yr"),
         (("--planted-linear", "3 N"), "unit 'N' does not fit"),

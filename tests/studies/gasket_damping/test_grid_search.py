@@ -1,4 +1,4 @@
-"""The search of [B] section 3.1.2 on functions of known minimum."""
+"""The search of [B] section 3.1.2 on functions with a known minimum."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_first_grid_is_the_region_in_25_points_and_the_next_half_as_wide():
     assert len(second.points) == 25 - 9  # the inner points of the old grid are known
 
 
-def test_search_ends_with_the_gain():
+def test_search_ends_when_the_gain_is_small():
     objective, _ = bowl((1.37, 2.77))
     values = [grid.best_value for grid in grid_search(objective, LOWER, UPPER, 1e-4).rounds]
     gains = -np.diff(values)
@@ -48,7 +48,7 @@ def test_search_ends_with_the_gain():
     assert np.all(gains[:-1] >= 1e-4)
 
 
-def test_points_that_diverge_are_no_minimum():
+def test_points_that_diverge_are_not_a_minimum():
     def objective(points):
         return [np.inf if point[0] < 1.0 else float(point @ point) for point in points]
 

@@ -1,10 +1,10 @@
-"""Spin runs in processes give what one process gives."""
+"""Spin runs in several processes have the results of one process."""
 
 import numpy as np
 import pytest
 
 from wm_drake.parameters import SpinProfile, load_machine
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 from wm_drake.studies.spin.study import run_spin
 
 SHORT = SpinProfile(time=(0.0, 2.0), speed=(0.0, 15.0))
@@ -31,7 +31,7 @@ def test_results_do_not_depend_on_the_number_of_workers(engine):
     assert {index for index, fraction in told if fraction == 1.0} == {0, 1, 2}
 
 
-def test_one_case_runs_here_and_is_measured():
+def test_single_case_runs_in_this_process_and_is_measured():
     parameters = load_machine("reference")
     (result,) = run_spin(parameters, [Case("middle", parameters.loads["middle"], SHORT)]).results
     assert result.wall_s > 0.0

@@ -1,4 +1,4 @@
-"""Numbers of a machine from vibrations of the whole: planted ones recovered, what is not determined named, the command."""
+"""Identification from vibrations of the whole machine: known and undetermined numbers, command."""
 
 import json
 from pathlib import Path
@@ -48,7 +48,7 @@ def reference(tmp_path_factory):
 
 
 def made_up(reference, seen):
-    """A model of known answer: numbers of the first keys shape the displacements, the last one only if it is seen."""
+    """A model with a known answer: the last number changes the displacements only if `seen`."""
     sought = tuple(sought_of(reference, keys) for keys in KEYS)
     labels = labels_of(reference, CASES, PROFILE)
     waves = np.sin(np.arange(3 * 2 * 5 * 9).reshape(3, 2, 5, 3, 3) ** 1.3)
@@ -78,7 +78,7 @@ def made_up(reference, seen):
     return SpinModel(reference, PROFILE, CASES, sought, regions)
 
 
-def test_planted_numbers_are_recovered_and_none_of_them_is_the_machines(reference):
+def test_true_numbers_are_recovered_and_differ_from_the_machines(reference):
     model = made_up(reference, seen=True)
     planted = planted_values(model.sought, seed=3)
     starts = np.array([sought.unknown.start for sought in model.sought])
@@ -94,7 +94,7 @@ def test_planted_numbers_are_recovered_and_none_of_them_is_the_machines(referenc
     )
 
 
-def test_what_the_data_do_not_see_is_named(reference):
+def test_numbers_that_the_data_do_not_determine_are_named(reference):
     model = made_up(reference, seen=False)
     planted = planted_values(model.sought, seed=4)
     result = identify_from_spin(
@@ -131,7 +131,7 @@ def test_numbers_that_are_one_unknown_change_together(reference):
     ("keys", "message"),
     [
         (("gasket.stifness_x",), "no number 'gasket.stifness_x' in machine 'reference'"),
-        (("gasket.stiffness_x", "gasket.damping_x"), "have not the same unit"),
+        (("gasket.stiffness_x", "gasket.damping_x"), "have different units"),
         (
             ("damper_types.friction.friction_damping",),
             "is not positive, so its range must be given",
@@ -166,7 +166,7 @@ def identify(wm_drake):
     return run
 
 
-def test_command_says_that_its_experiment_is_virtual_and_finds_what_was_planted(identify):
+def test_command_names_its_experiment_virtual_and_recovers_the_true_numbers(identify):
     unknowns = (
         "--unknown",
         "gasket.stiffness_x+gasket.stiffness_z=(2, 8) N/mm",
@@ -203,7 +203,7 @@ def test_command_says_that_its_experiment_is_virtual_and_finds_what_was_planted(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "machine 'reference' has not the numbers of [A] Table 8; name others"),
+        ((), "machine 'reference' does not have the numbers of [A] Table 8; give keys"),
         (
             ("--unknown", "gasket.stiffness"),
             "--unknown: gasket.stiffness: no number 'gasket.stiffness'",

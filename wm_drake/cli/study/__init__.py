@@ -1,10 +1,10 @@
-"""`wm-drake study`: questions that take many runs; a module per study."""
+"""Command `wm-drake study`: questions that need many runs, one module per study."""
 
 import typer
 
 from wm_drake.cli.study import gasket, gasket_damping, spin_cycle, spin_identify
 
-app = typer.Typer(help="Answer a question with many runs, and report.", no_args_is_help=True)
+app = typer.Typer(help="Run a study of many runs and write a report.", no_args_is_help=True)
 app.command("gasket")(gasket.gasket)
 app.command("gasket-damping")(gasket_damping.gasket_damping)
 app.command("spin-cycle")(spin_cycle.spin_cycle)

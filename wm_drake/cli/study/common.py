@@ -1,4 +1,4 @@
-"""What studies share: options, and a folder with a ledger that survives interruptions."""
+"""Options that the studies share, and a result folder with a ledger of finished runs."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -7,37 +7,41 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from wm_drake.cli.result_folder import check_is_folder
 from wm_drake.errors import input_error
 
 if TYPE_CHECKING:
     from wm_drake.batch.ledger import Ledger
 
 LEDGER = "ledger.sqlite"
-"""Name of the ledger in a study's folder."""
+"""Name of the ledger file in the folder of a study."""
 
 WorkersOption = Annotated[
-    int | None, typer.Option(help="Cores to use; all by default.", min=1, metavar="N")
+    int | None, typer.Option(help="Number of cores. Default: all.", min=1, metavar="N")
 ]
 ResumeOption = Annotated[
-    bool, typer.Option("--resume", help="Go on with an unfinished study in the same folder.")
+    bool, typer.Option("--resume", help="Continue an unfinished study in the same folder.")
 ]
 ProfileOption = Annotated[
-    Path | None, typer.Option(help="Spin profile, YAML or CSV (time_s,speed_rpm).", metavar="FILE")
+    Path | None,
+    typer.Option(
+        help="Spin profile, YAML or CSV (time_s, speed_rpm). Default: that of the machine.",
+        metavar="FILE",
+    ),
 ]
 
 
 @contextmanager
 def study_ledger(out: Path, identity: Mapping[str, str], resume: bool) -> "Iterator[Ledger]":
-    """The ledger of the study in a folder, which is made if it is not there.
+    """Open the ledger of a study in its folder, and create the folder if it does not exist.
 
-    Ctrl-C ends the command with code 130 and says what is kept. A folder that was made here and holds no result is removed
-    again.
+    Ctrl-C ends the command with exit code 130 and a message about the runs that are kept. If this
+    function created the folder and no run finished, it removes the folder again.
     """
     from wm_drake.batch.ledger import open_ledger
 
-    if out.exists() and not out.is_dir():
-        raise input_error("is a file, needs to be a folder", where=str(out))
-    made = not out.exists()
+    check_is_folder(out)
+    created = not out.exists()
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -51,11 +55,11 @@ def study_ledger(out: Path, identity: Mapping[str, str], resume: bool) -> "Itera
                 kept = len(ledger)
     except KeyboardInterrupt:
         typer.echo(
-            f"interrupted; {kept} finished runs are kept in {out / LEDGER}: go on with --resume",
+            f"interrupted; {kept} finished runs are kept in {out / LEDGER}; continue with --resume",
             err=True,
         )
         raise typer.Exit(130) from None
     finally:
-        if made and not kept:
+        if created and not kept:
             for path in (*out.glob(f"{LEDGER}*"), out):
                 path.unlink() if path.is_file() else path.rmdir()

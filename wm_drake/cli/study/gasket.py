@@ -1,4 +1,4 @@
-"""`wm-drake study gasket`: how stiffness and damping of the gasket act on the tub and on the housing."""
+"""Command `wm-drake study gasket`: effect of gasket stiffness and damping on tub and housing."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -19,17 +19,18 @@ from wm_drake.cli.common import (
     existing_file,
     load_parameters,
 )
-from wm_drake.cli.progress import progress_bar, result_folder
+from wm_drake.cli.progress import progress_bar
+from wm_drake.cli.result_folder import result_folder
 from wm_drake.cli.study.common import ProfileOption, ResumeOption, WorkersOption, study_ledger
 from wm_drake.errors import input_error, nearest_names
 
-if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from collections.abc import Callable
 
     import xarray as xr
 
     from wm_drake.parameters import FactorLevels, MachineParameters
-    from wm_drake.simulation.runs import Case
+    from wm_drake.simulation.cases import Case
     from wm_drake.studies.doe import Design
     from wm_drake.studies.gasket.screening import Screening
     from wm_drake.studies.gasket.study import GasketTrials
@@ -42,42 +43,51 @@ def gasket(
     load: Annotated[
         list[str] | None,
         typer.Option(
-            help="Load of the machine, or load file. Repeatable; middle and counter by default.",
+            help="Load of the machine, or load file. Repeatable. Default: middle and counter.",
             metavar="NAME|FILE",
         ),
     ] = None,
     design: Annotated[
         str,
         typer.Option(
-            help="d-optimal, orthogonal, full, or a CSV file with a column of -1, 0, 1 per factor."
+            help="Design: d-optimal, orthogonal, full, or a CSV file with a column of -1, 0, 1 per "
+            "factor."
         ),
     ] = "d-optimal",
     trials: Annotated[
         int | None,
         typer.Option(
-            help="Trials: 1000 d-optimal; 243 or 729 orthogonal; all full.", min=1, metavar="N"
+            help="Number of trials. Default: 1000 for d-optimal. Allowed for orthogonal: 243 or "
+            "729. A full design has all level combinations.",
+            min=1,
+            metavar="N",
         ),
     ] = None,
     model: Annotated[
         str,
-        typer.Option(help="What is estimated: main effects, or with all two-factor interactions."),
+        typer.Option(
+            help="Effects to estimate: main (main effects) or main+2fi (with two-factor "
+            "interactions)."
+        ),
     ] = "main+2fi",
-    seed: Annotated[int, typer.Option(help="Of the D-optimal design.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the D-optimal design.", min=0)] = 0,
     factor: Annotated[
         list[str] | None,
         typer.Option(
-            help="Factor to study instead of the eight of the gasket: C_L, K_Lx, ... or any key path of the machine file, with "
-            "bounds in percent of its value (50 %..150 % by default) or with a unit. Repeatable.",
+            help="Factor to study instead of the eight factors of the gasket: one of C_L, K_Lx, "
+            "..., or any key of the machine file. Bounds are in percent of its value, or numbers "
+            "with a unit. Default: 50 %..150 %. Repeatable.",
             metavar="NAME|KEY[=LOW..HIGH]",
         ),
     ] = None,
     factors: Annotated[
-        Path | None, typer.Option(help="File of factors, YAML.", metavar="FILE")
+        Path | None, typer.Option(help="YAML file of factors.", metavar="FILE")
     ] = None,
     tables: Annotated[
         str,
         typer.Option(
-            help="A stiffness given as a table becomes: linear, level times its slope at rest; scaled, its forces."
+            help="Treatment of a stiffness that is given as a table. linear: replace it by its "
+            "slope at rest times the level. scaled: multiply its forces by the level."
         ),
     ] = "linear",
     profile: ProfileOption = None,
@@ -85,7 +95,8 @@ def gasket(
     cluster: Annotated[
         str | None,
         typer.Option(
-            help="Run on the dask.distributed cluster of this scheduler.", metavar="ADDRESS"
+            help="Run on a dask.distributed cluster with the scheduler at this address.",
+            metavar="ADDRESS",
         ),
     ] = None,
     resume: ResumeOption = False,
@@ -95,7 +106,7 @@ def gasket(
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
-    """Screen the gasket: which of its stiffnesses and dampings drive displacement, force and moment, and which way."""
+    """Find how stiffness and damping of the gasket affect displacement, force and moment."""
     begin = time.perf_counter()
     from wm_drake.studies.gasket.study import GasketTrials
 
@@ -116,9 +127,12 @@ def gasket(
             with result_folder(out) as folder:
                 _write(screening, work, folder, time.perf_counter() - begin)
         except OSError as error:
-            message = f"cannot be written to: {error.strerror}; all runs are kept, so the same command only has to write again"
+            message = (
+                f"cannot be written to: {error.strerror}; all runs are kept, so repeat the command "
+                "to write the results without running them again"
+            )
             raise input_error(message, where=str(out)) from None
-    _tell(screening, out, as_json, time.perf_counter() - begin)
+    _print_result(screening, out, as_json, time.perf_counter() - begin)
 
 
 def _factors(
@@ -127,11 +141,13 @@ def _factors(
     from wm_drake.parameters import GASKET_FACTORS, TABLES, factor_of_text, levels_of, load_factors
 
     if tables not in TABLES:
-        raise input_error(f"no way '{tables}'{nearest_names(tables, TABLES)}", where="--tables")
+        raise input_error(
+            f"unknown treatment '{tables}'{nearest_names(tables, TABLES)}", where="--tables"
+        )
     known = load_factors(GASKET_FACTORS if file is None else existing_file(file, "--factors"))
     chosen = dict(factor_of_text(text, known) for text in named) if named else known
     if named and len(chosen) < len(named):
-        raise input_error("a factor is named twice", where="--factor")
+        raise input_error("a factor is given twice", where="--factor")
     return levels_of(parameters, chosen, tables)
 
 
@@ -142,7 +158,7 @@ def _design(
 
     names = tuple(factor.name for factor in levels)
     if model not in MODELS:
-        raise input_error(f"no model '{model}'{nearest_names(model, MODELS)}", where="--model")
+        raise input_error(f"unknown model '{model}'{nearest_names(model, MODELS)}", where="--model")
     if kind in DESIGNS:
         return make_design(kind, names, trials=trials, model=model, seed=seed)
     if not Path(kind).is_file():
@@ -151,7 +167,10 @@ def _design(
             where="--design",
         )
     if trials is not None:
-        raise input_error("a design from a file has as many trials as it has", where="--trials")
+        raise input_error(
+            "not allowed with a design from a file, which has its own number of trials",
+            where="--trials",
+        )
     return read_design(Path(kind), names, model)
 
 
@@ -160,8 +179,8 @@ def _loads(
 ) -> "list[Case]":
     from wm_drake.studies.gasket.study import LOADS
 
-    usual = [name for name in LOADS if name in parameters.loads]
-    return cases_of(parameters, loads or usual, gasket=True, profile=profile)
+    default = [name for name in LOADS if name in parameters.loads]
+    return cases_of(parameters, loads or default, gasket=True, profile=profile)
 
 
 def _at_middle(
@@ -173,7 +192,7 @@ def _at_middle(
 
 
 def _identity(work: "GasketTrials", plan: "Design") -> dict[str, str]:
-    """What tells this study from another, in words as far as that goes."""
+    """Return the properties that distinguish this study from others, for its ledger."""
     from wm_drake.batch import sources_version
     from wm_drake.batch.ledger import key_of
     from wm_drake.studies.gasket.study import MEASURES
@@ -198,7 +217,7 @@ def _identity(work: "GasketTrials", plan: "Design") -> dict[str, str]:
 def _runner(
     parameters: "MachineParameters", workers: int | None, cluster: str | None
 ) -> "Iterator[Callable[..., xr.Dataset]]":
-    """What runs cases: the cores of this computer, or a cluster."""
+    """Yield the function that runs cases: on the cores of this computer, or on a cluster."""
     from wm_drake.batch import simulate_remembered
     from wm_drake.batch.cluster import cluster_client, simulate_on_cluster
     from wm_drake.model.machine import build_machine
@@ -234,7 +253,7 @@ def _write(screening: "Screening", work: "GasketTrials", folder: Path, wall_s: f
     )
 
 
-def _tell(screening: "Screening", out: Path, as_json: bool, wall_s: float) -> None:
+def _print_result(screening: "Screening", out: Path, as_json: bool, wall_s: float) -> None:
     from wm_drake.studies.gasket.tables import as_plain_data, to_json
 
     if as_json:
@@ -257,7 +276,7 @@ def _print_table(screening: "Screening") -> None:
     design = screening.design
     about = f"{design.kind}, {design.trials} trials, D-efficiency {design.efficiency():.2f} %"
     table = Table(title=f"Percent of the variance explained ({about})")
-    for name in ("load", "response", "mean", "main", "interactions", "rest"):
+    for name in ("load", "response", "mean", "main", "inter-\nactions", "residual"):
         table.add_column(name, justify="left" if name in ("load", "response") else "right")
     table.add_column("leading terms")
     for (load, name), found in screening.tables.items():

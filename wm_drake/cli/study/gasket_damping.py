@@ -1,4 +1,4 @@
-"""`wm-drake study gasket-damping`: damping of the gasket from measured displacements."""
+"""Command `wm-drake study gasket-damping`: fit the gasket damping to measured displacements."""
 
 import json
 from pathlib import Path
@@ -16,7 +16,7 @@ from wm_drake.cli.common import (
     interruptible,
     load_parameters,
 )
-from wm_drake.cli.progress import result_folder
+from wm_drake.cli.result_folder import result_folder
 from wm_drake.errors import input_error
 
 if TYPE_CHECKING:
@@ -32,23 +32,25 @@ def gasket_damping(
     record: Annotated[
         list[str] | None,
         typer.Option(
-            help="Measured displacements of a load: CSV time_s,Xr,Yr,... in mm, or netCDF as `spin` writes it. Repeatable; "
-            "without any, a virtual experiment takes their place.",
+            help="Measured displacements of a load: CSV with time_s, Xr, Yr, ... in mm, or netCDF "
+            "record of the command spin. Repeatable. Default: the records of a virtual experiment.",
             metavar="LOAD=FILE",
         ),
     ] = None,
     planted_linear: Annotated[
-        str, typer.Option(help="C_L of the virtual experiment.")
+        str, typer.Option(help="Linear damping C_L of the virtual experiment.")
     ] = "0.0287 N s/mm",
     planted_torsional: Annotated[
-        str, typer.Option(help="C_T of the virtual experiment.")
+        str, typer.Option(help="Torsional damping C_T of the virtual experiment.")
     ] = "87 N mm s/deg",
-    seed: Annotated[int, typer.Option(help="Of the virtual experiment's noise.", min=0)] = 0,
+    seed: Annotated[
+        int, typer.Option(help="Seed of the noise of the virtual experiment.", min=0)
+    ] = 0,
     out: Annotated[Path, typer.Option(help="Folder for the results.", metavar="DIR")] = DEFAULT_OUT,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
-    """Find the damping of the gasket that brings computed and measured envelopes nearest."""
+    """Find the gasket damping for which computed and measured envelopes agree best."""
     from wm_drake.studies.gasket_damping.study import identify_damping
 
     parameters = load_parameters(machine, sets)
@@ -65,14 +67,14 @@ def gasket_damping(
     if as_json:
         typer.echo(json.dumps(_as_json(result)))
     else:
-        _tell(result, out)
+        _print_result(result, out)
 
 
 def _read(parameters: "MachineParameters", entries: list[str]) -> "Measured":
     import xarray as xr
 
     from wm_drake.parameters.csv_files import read_csv
-    from wm_drake.simulation.runs import load_record
+    from wm_drake.simulation.records import load_record
     from wm_drake.studies.gasket_damping.study import MM_PER_M, as_measured
 
     measured = {}
@@ -81,7 +83,8 @@ def _read(parameters: "MachineParameters", entries: list[str]) -> "Measured":
         load, equals, name = (part.strip() for part in entry.partition("="))
         if not equals or load not in parameters.loads:
             raise input_error(
-                f"'{entry}' is not LOAD=FILE with a load of the machine ({', '.join(parameters.loads)})",
+                f"'{entry}' does not have the form LOAD=FILE with a load of the machine "
+                f"({', '.join(parameters.loads)})",
                 where="--record",
             )
         path = existing_file(Path(name), "--record")
@@ -118,7 +121,7 @@ def _planted(parameters: "MachineParameters", linear: str, torsional: str) -> "F
     changed = with_values(
         parameters, {"gasket.damping_x": linear, "gasket.rotational_damping_x": torsional}
     )
-    assert changed.gasket is not None  # as above
+    assert changed.gasket is not None
     return np.array([changed.gasket.damping_x, changed.gasket.rotational_damping_x])
 
 
@@ -128,11 +131,13 @@ def _virtual(parameters: "MachineParameters", truth: "FloatArray", seed: int) ->
     for name in LOADS:
         if name not in parameters.loads:
             raise input_error(
-                f"machine '{parameters.name}' has no load '{name}', which the virtual experiment runs",
+                f"machine '{parameters.name}' has no load '{name}', which the virtual experiment "
+                "needs",
                 key="loads",
             )
     typer.echo(
-        "no measured records: a virtual experiment is run by the Drake engine, with another damping and noise",
+        "No measured records were given. The Drake engine runs a virtual experiment with other "
+        "damping values and noise.",
         err=True,
     )
     return virtual_experiment(parameters, truth, seed)
@@ -149,10 +154,10 @@ def _write(result: "Damping", parameters: "MachineParameters", folder: Path) -> 
 
 
 def _as_json(result: "Damping") -> dict[str, Any]:
-    from wm_drake.report.gasket_damping.report import in_papers_units
+    from wm_drake.report.gasket_damping.report import in_units_of_paper
 
     def found(search: Any) -> dict[str, Any]:
-        linear, torsional = in_papers_units(search.best)
+        linear, torsional = in_units_of_paper(search.best)
         return {
             "C_L": linear,
             "C_T": torsional,
@@ -163,7 +168,7 @@ def _as_json(result: "Damping") -> dict[str, Any]:
     truth = (
         None
         if result.truth is None
-        else dict(zip(("C_L", "C_T"), in_papers_units(result.truth), strict=True))
+        else dict(zip(("C_L", "C_T"), in_units_of_paper(result.truth), strict=True))
     )
     return {
         "units": {"C_L": "N s/mm", "C_T": "N mm s/deg"},
@@ -174,7 +179,7 @@ def _as_json(result: "Damping") -> dict[str, Any]:
     }
 
 
-def _tell(result: "Damping", out: Path) -> None:
+def _print_result(result: "Damping", out: Path) -> None:
     from wm_drake.report.gasket_damping.report import summary
 
     typer.echo(summary(result))

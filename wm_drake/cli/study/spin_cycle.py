@@ -1,4 +1,4 @@
-"""`wm-drake study spin-cycle`: vibration per region of a spin cycle, over a table of unbalance cases."""
+"""Command `wm-drake study spin-cycle`: vibration in a spin cycle for a table of unbalance cases."""
 
 import json
 from collections.abc import Iterator
@@ -18,11 +18,12 @@ from wm_drake.cli.common import (
     interruptible,
     load_parameters,
 )
-from wm_drake.cli.progress import progress_bar, result_folder
+from wm_drake.cli.progress import progress_bar
+from wm_drake.cli.result_folder import result_folder
 from wm_drake.cli.study.common import LEDGER, WorkersOption
 from wm_drake.errors import input_error, nearest_names
 
-if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
 
     from wm_drake.batch.ledger import Ledger
@@ -31,6 +32,19 @@ if TYPE_CHECKING:  # Drake takes a second to import, and --help should not
     from wm_drake.studies.spin_cycle.study import SpinCycleResult
 
 DEFAULT_OUT = Path("wm-drake-spin-cycle")
+TERMINAL_HEADS = {
+    "case": "case",
+    "front_g": "front, g",
+    "rear_g": "rear, g",
+    "phase_deg": "phase, deg",
+    "largest_rms_mm": "RMS, mm",
+    "region": "region",
+    "sensor_axis": "sensor axis",
+    "smallest_gap_mm": "gap, mm",
+    "average_error_percent": "error, %",
+    "published_error_percent": "error in [A], %",
+}
+"""Short column heads of the terminal table, by column of the table of cases."""
 
 
 def spin_cycle(
@@ -38,57 +52,68 @@ def spin_cycle(
     profile: Annotated[
         str,
         typer.Option(
-            help="Shipped profile (spin_cycle, run_up, ifb_9kg), or file with regions.",
+            help="Name of a shipped profile (spin_cycle, run_up, ifb_9kg), or file with regions.",
             metavar="NAME|FILE",
         ),
     ] = "spin_cycle",
     cases: Annotated[
         Path | None,
         typer.Option(
-            help="CSV of cases: case,front_g,rear_g,phase_deg. The 33 of [A] Table 9 by default.",
+            help="CSV file of cases: case, front_g, rear_g, phase_deg. Default: the 33 cases of "
+            "[A] Table 9.",
             metavar="FILE",
         ),
     ] = None,
     case: Annotated[
-        list[str] | None, typer.Option(help="Run this case only. Repeatable.", metavar="NAME")
+        list[str] | None, typer.Option(help="Run only this case. Repeatable.", metavar="NAME")
     ] = None,
     measured: Annotated[
         Path | None,
-        typer.Option(help="Measured RMS: CSV case,region,sensor,axis,rms_mm.", metavar="FILE"),
+        typer.Option(
+            help="CSV file of measured RMS displacements: case, region, sensor, axis, rms_mm.",
+            metavar="FILE",
+        ),
     ] = None,
     accelerations: Annotated[
         Path | None,
         typer.Option(
-            help="Folder of measured accelerations, CASE.csv: time_s,S1_x,S1_y,... in m/s^2.",
+            help="Folder of measured accelerations, one file CASE.csv per case: "
+            "time_s, S1_x, S1_y, ... in m/s^2.",
             metavar="DIR",
         ),
     ] = None,
     engine: Annotated[
-        str, typer.Option(help="compiled; or drake, minutes a case.", metavar="NAME")
+        str,
+        typer.Option(
+            help="Engine that integrates the motion: compiled, or drake (takes minutes per case).",
+            metavar="NAME",
+        ),
     ] = "compiled",
     workers: WorkersOption = None,
     out: Annotated[
         Path,
         typer.Option(
-            help="Folder for the results; runs found there are not run again.", metavar="DIR"
+            help="Folder for the results. Runs that it already holds are not repeated.",
+            metavar="DIR",
         ),
     ] = DEFAULT_OUT,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
-    """Run the spin cycle with many unbalances, and report RMS displacements per region, sensor and axis."""
+    """Run a spin cycle with many unbalances, and report RMS displacements per region and sensor."""
     from wm_drake.parameters import load_profile
 
     if engine not in ("compiled", "drake"):
         raise input_error(
-            f"no engine '{engine}'{nearest_names(engine, ('compiled', 'drake'))}", where="--engine"
+            f"unknown engine '{engine}'{nearest_names(engine, ('compiled', 'drake'))}",
+            where="--engine",
         )
     parameters = load_parameters(machine, sets)
     spin_profile = load_profile(profile)
     table = cases_of_table(cases, case)
     comparison = measurement(parameters, table, spin_profile, measured, accelerations)
     check_buildable(machine, parameters)
-    kept = "cases that had ended are kept, the same command goes on from there"
+    kept = "finished cases are kept; repeat the command to continue"
     with interruptible(kept), result_folder(out) as folder, open_runs(out) as ledger:
         result = _run(parameters, table, spin_profile, engine, ledger, workers)
         result = result if comparison is None else _with(result, comparison)
@@ -107,14 +132,14 @@ def spin_cycle(
 
 
 def cases_of_table(path: Path | None, names: list[str] | None) -> "list[UnbalanceCase]":
-    """The cases that `--cases` and `--case` ask for."""
+    """Return the cases that `--cases` and `--case` select."""
     from wm_drake.parameters.unbalance_cases import TABLE_9, load_unbalance_cases
 
     table = load_unbalance_cases(existing_file(path, "--cases") if path else TABLE_9)
     known = {case.name: case for case in table}
     for name in names or []:
         if name not in known:
-            raise input_error(f"no case '{name}'{nearest_names(name, known)}", where="--case")
+            raise input_error(f"unknown case '{name}'{nearest_names(name, known)}", where="--case")
     return [known[name] for name in dict.fromkeys(names)] if names else table
 
 
@@ -125,13 +150,13 @@ def measurement(
     measured: Path | None,
     accelerations: Path | None,
 ) -> "xr.DataArray | None":
-    """What `--measured` or `--accelerations` name."""
+    """Return the measured RMS displacements of `--measured` or `--accelerations`, or None."""
     from wm_drake.studies.spin_cycle.measured import read_accelerations, read_rms
     from wm_drake.studies.spin_cycle.study import labels_of, runs_of
 
     if measured and accelerations:
-        raise input_error("and --measured exclude each other", where="--accelerations")
-    runs_of(parameters, cases, profile)  # refuses what cannot be run
+        raise input_error("not allowed together with --measured", where="--accelerations")
+    runs_of(parameters, cases, profile)  # raises an error for cases that cannot be run
     labels = labels_of(parameters, cases, profile)
     if measured:
         return read_rms(existing_file(measured, "--measured"), labels)
@@ -140,7 +165,7 @@ def measurement(
 
 @contextmanager
 def open_runs(out: Path) -> "Iterator[Ledger]":
-    """The ledger of runs in a folder; what it holds is used without being asked."""
+    """Open the ledger of runs in a folder; the runs that it holds are used without `--resume`."""
     from wm_drake.batch.ledger import open_ledger
 
     out.mkdir(exist_ok=True)
@@ -196,9 +221,12 @@ def _print_table(result: "SpinCycleResult", out: Path) -> None:
     from wm_drake.report.spin_cycle.tables import case_table
 
     numbers = case_table(result)
-    table = Table(title=f"Spin cycle of machine '{result.parameters.name}'")
+    table = Table(
+        title=f"Spin cycle of machine '{result.parameters.name}': largest RMS displacement, "
+        "smallest gap"
+    )
     for name in numbers.columns:
-        table.add_column(name.replace("_", " "), justify="right")
+        table.add_column(TERMINAL_HEADS[str(name)], justify="right", overflow="fold")
     for row in numbers.itertuples(index=False):
         table.add_row(
             *(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row)
@@ -219,7 +247,7 @@ def _as_json(result: "SpinCycleResult", engine: str) -> dict[str, Any]:
     )
 
     def plain(values: Any, scale: float = 1.0) -> Any:
-        """Nested lists; JSON has no NaN."""
+        """Return an array as nested lists, with None for NaN, which JSON does not have."""
         if np.ndim(values):
             return [plain(value, scale) for value in np.asarray(values)]
         return scale * float(values) if np.isfinite(values) else None

@@ -1,4 +1,4 @@
-"""`wm-drake study spin-identify`: numbers of a machine from vibrations of the whole of it in a spin cycle."""
+"""Command `wm-drake study spin-identify`: fit numbers of a machine to a spin cycle."""
 
 import json
 from functools import partial
@@ -16,7 +16,8 @@ from wm_drake.cli.common import (
     interruptible,
     load_parameters,
 )
-from wm_drake.cli.progress import progress_bar, result_folder
+from wm_drake.cli.progress import progress_bar
+from wm_drake.cli.result_folder import result_folder
 from wm_drake.cli.study.common import WorkersOption
 from wm_drake.cli.study.spin_cycle import cases_of_table, measurement, open_runs
 from wm_drake.errors import input_error
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 DEFAULT_OUT = Path("wm-drake-spin-identify")
 PER_CENT = 100
+"""Length of the progress bar of the search."""
 
 
 def spin_identify(
@@ -34,54 +36,68 @@ def spin_identify(
     unknown: Annotated[
         list[str] | None,
         typer.Option(
-            help="Number to find, with or without a range: gasket.stiffness_x+gasket.stiffness_z='(4, 12) N/mm', where + joins "
-            "equal numbers. Repeatable; those of [A] Table 8 by default.",
+            help="Number to find, with or without a range: gasket.stiffness_y='(1, 4) N/mm'. "
+            "KEY1+KEY2 are two keys with the same value. Repeatable. Default: the numbers of [A] "
+            "Table 8.",
             metavar="KEYS[=RANGE]",
         ),
     ] = None,
     profile: Annotated[
         str,
         typer.Option(
-            help="Shipped profile (spin_cycle, run_up, ifb_9kg), or file with regions.",
+            help="Name of a shipped profile (spin_cycle, run_up, ifb_9kg), or file with regions.",
             metavar="NAME|FILE",
         ),
     ] = "spin_cycle",
     cases: Annotated[
         Path | None,
-        typer.Option(help="CSV of cases: case,front_g,rear_g,phase_deg.", metavar="FILE"),
+        typer.Option(help="CSV file of cases: case, front_g, rear_g, phase_deg.", metavar="FILE"),
     ] = None,
     case: Annotated[
         list[str] | None,
         typer.Option(
-            help="Use this case. Repeatable; of [A] Table 9, 2, 5 and 29 by default.",
+            help="Use only this case. Repeatable. Default: cases 2, 5 and 29 of [A] Table 9.",
             metavar="NAME",
         ),
     ] = None,
     measured: Annotated[
         Path | None,
-        typer.Option(help="Measured RMS: CSV case,region,sensor,axis,rms_mm.", metavar="FILE"),
+        typer.Option(
+            help="CSV file of measured RMS displacements: case, region, sensor, axis, rms_mm.",
+            metavar="FILE",
+        ),
     ] = None,
     accelerations: Annotated[
-        Path | None, typer.Option(help="Folder of measured accelerations, CASE.csv.", metavar="DIR")
+        Path | None,
+        typer.Option(
+            help="Folder of measured accelerations, one file CASE.csv per case.", metavar="DIR"
+        ),
     ] = None,
     noise: Annotated[
         float,
-        typer.Option(help="Of a virtual experiment: relative errors of its numbers.", min=0.0),
+        typer.Option(
+            help="Relative standard deviation of the noise in a virtual experiment.", min=0.0
+        ),
     ] = 0.005,
     seed: Annotated[
-        int, typer.Option(help="Of what a virtual experiment plants, and of the search.")
+        int,
+        typer.Option(help="Seed of the planted values of a virtual experiment, and of the search."),
     ] = 0,
     workers: WorkersOption = None,
     out: Annotated[
         Path,
         typer.Option(
-            help="Folder for the results; runs found there are not run again.", metavar="DIR"
+            help="Folder for the results. Runs that it already holds are not repeated.",
+            metavar="DIR",
         ),
     ] = DEFAULT_OUT,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
-    """Find numbers of a machine from RMS displacements; without measurements, from those of a virtual experiment."""
+    """Fit numbers of a machine to RMS displacements in a spin cycle.
+
+    Without measurements, the displacements come from a virtual experiment.
+    """
     from wm_drake.parameters import load_profile
     from wm_drake.studies.spin_identification.study import DEFAULT_CASES, SpinModel
 
@@ -92,7 +108,7 @@ def spin_identify(
     sought = unknowns_of(parameters, unknown)
     check_buildable(machine, parameters)
     model = partial(SpinModel, parameters, spin_profile, tuple(table), sought)
-    kept = "runs that had ended are kept, the same command goes on from there"
+    kept = "finished runs are kept; repeat the command to continue"
     with interruptible(kept), result_folder(out) as folder, open_runs(out) as ledger:
         result = _identify(model, given, noise, seed, ledger, workers)
         _write(result, folder)
@@ -104,7 +120,7 @@ def spin_identify(
 
 
 def unknowns_of(parameters: "MachineParameters", texts: list[str] | None) -> "tuple[Sought, ...]":
-    """The unknowns that `--unknown` names."""
+    """Return the unknowns that `--unknown` names, or those of [A] Table 8 if there are none."""
     from wm_drake.errors import InputError, Problem
     from wm_drake.studies.spin_identification.study import JOIN, TABLE_8, sought_of
 
@@ -117,7 +133,8 @@ def unknowns_of(parameters: "MachineParameters", texts: list[str] | None) -> "tu
         ]
         if missing or parameters.gasket is None:
             raise input_error(
-                f"machine '{parameters.name}' has not the numbers of [A] Table 8; name others",
+                f"machine '{parameters.name}' does not have the numbers of [A] Table 8; give keys "
+                "of this machine",
                 where="--unknown",
             )
         return tuple(sought_of(parameters, keys) for keys in TABLE_8)
@@ -139,7 +156,7 @@ def unknowns_of(parameters: "MachineParameters", texts: list[str] | None) -> "tu
 
 
 def _range(parameters: "MachineParameters", key: str, text: str) -> tuple[float, float]:
-    """`(lower, upper) unit` in SI."""
+    """Return the bounds of a text `(lower, upper) unit` in SI."""
     from wm_drake.parameters.units import convert
     from wm_drake.studies.spin_identification.study import unit_of_key
 
@@ -174,8 +191,11 @@ def _identify(
         if given is None:
             planted = planted_values(ready.sought, seed)
             given = virtual_experiment(ready, planted, noise, seed)
-        tell = lambda fraction, least: progress(round(PER_CENT * fraction))  # noqa: E731
-        return identify_from_spin(ready, given, planted=planted, seed=seed, progress=tell)
+
+        def show(fraction: float, _least: float) -> None:
+            progress(round(PER_CENT * fraction))
+
+        return identify_from_spin(ready, given, planted=planted, seed=seed, progress=show)
 
 
 def _write(result: "SpinIdentification", folder: Path) -> None:
@@ -197,15 +217,18 @@ def _print_table(result: "SpinIdentification", out: Path) -> None:
     console = Console()
     console.print(summary(result))
     shown = unknowns(result)
+    # a narrow first column: keys are broken at their dots, keys of the same value below each other
+    keys = [
+        "\n= ".join(sought.keys[:1] + tuple(key.rsplit(".", 1)[-1] for key in sought.keys[1:]))
+        for sought in result.sought
+    ]
+    keys = [text.replace(".", ".\n") for text in keys]
     table = Table()
-    for name in shown.header:
-        table.add_column(
-            name,
-            justify="left" if name in ("unknown", "equal numbers") else "right",
-            overflow="fold",
-        )
-    for group in shown.groups:
-        table.add_row(group.heading, *group.rows[0].cells)
+    table.add_column("unknown", no_wrap=True)
+    for name in shown.header[2:]:
+        table.add_column(name, justify="right", overflow="fold")
+    for text, group in zip(keys, shown.groups, strict=True):
+        table.add_row(text, *group.rows[0].cells[1:])
     console.print(table)
     for text in directions(result):
         console.print(text)

@@ -1,1 +1,6 @@
-"""The whole machine as one compiled function: packed from a built `Machine`, calling the same laws; mechanics only here."""
+"""Run a whole machine as one compiled function, `WIDTH` runs side by side in the vector units.
+
+Enters: a `Setup`. Leaves: a `Trajectory`. The numbers are packed from the built `Machine`, and the
+laws are those of the Drake systems; only rigid-body mechanics and the integrator are defined here.
+A single run is a batch of one: it takes all lanes, and its numbers do not depend on other runs.
+"""

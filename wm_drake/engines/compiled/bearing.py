@@ -1,15 +1,17 @@
-"""Rigid-body mechanics of a tub and of a drum that whirls in its bearing: two bodies in place of one.
+"""Rigid-body mechanics of a tub and of a drum in a compliant bearing, as two bodies.
 
-Own derivation; the Drake plant is its oracle (tests/kernel). The drum turns in a massless carrier: with it in the tub's place,
-and nothing else in it, `wm_drake.engines.compiled.mechanics.accelerations` holds as it stands. The tub is a plain body; in its frame,
-moments about To, with its first moment S and its inertia I about To:
+Own derivation; the tests compare it with the Drake plant. The drum turns in a massless carrier. For
+carrier and drum, `wm_drake.engines.compiled.mechanics.accelerations` is used with the carrier in
+place of the tub. The tub is one rigid body. In its frame, with moments about To, its first moment S
+and its inertia I about To:
 
     M a_O + w' x S + w x (w x S) = F,    S x a_O + I w' + w x (I w) = tau
 
-Packed numbers, where the bearing's begin: 1/M [1/kg]; S [kg m]; I as xx, yy, zz, xy, xz, yz [kg m^2]; behind them those of
-`SixComponentBushingParameters`.
+Packed numbers, from the index of the bearing: 1/M [1/kg]; S [kg m]; I as xx, yy, zz, xy, xz, yz
+[kg m^2]; then those of `SixComponentBushingParameters`.
 
-State, behind all others: roll, pitch, yaw, position of the carrier; its angular velocity and velocity.
+State, behind all others: roll, pitch, yaw, position of the carrier; its angular velocity and
+velocity.
 """
 
 from wm_drake.compiler.compilation import law
@@ -29,17 +31,19 @@ from wm_drake.elements.motion import TubMotion, rpy_rates
 TUB_SIZE = 10
 """Numbers of the tub's body."""
 CARRIER_STATE_SIZE = 12
+"""Numbers of the carrier in the state."""
 
 
 @law
 def tub_accelerations(motion, wrench, gravity, p, at):
-    """Accelerations of a tub without its drum.
+    """Return the accelerations of a tub without its drum.
 
     Args:
         motion: `TubMotion`.
-        wrench: Moment about To and force of all elements on the tub, in W, without gravity. [N m, N]
+        wrench: Moment about To and force of all elements on the tub, in W, without gravity.
+            [N m, N]
         gravity: Acceleration in W. [m/s^2]
-        p, at: Packed numbers, and where those of the bearing begin.
+        p, at: Packed numbers and index of the bearing in them.
 
     Returns:
         Angular acceleration of the tub and acceleration of To, in W. [rad/s^2, m/s^2]
@@ -57,7 +61,10 @@ def tub_accelerations(motion, wrench, gravity, p, at):
 
 @law
 def carrier_motion(x, dx, k):
-    """Motion of the carrier, whose state begins at index k; writes the rates of its angles and its position into `dx`."""
+    """Return the motion of the carrier, whose state begins at index k.
+
+    The rates of its angles and of its position are written into `dx`.
+    """
     roll, pitch, yaw = sine_cosine(x[k]), sine_cosine(x[k + 1]), sine_cosine(x[k + 2])
     w, v = (x[k + 6], x[k + 7], x[k + 8]), (x[k + 9], x[k + 10], x[k + 11])
     dx[k], dx[k + 1], dx[k + 2] = rpy_rates(w, pitch, yaw)
@@ -67,7 +74,7 @@ def carrier_motion(x, dx, k):
 
 @law
 def carrier_size(bearing):
-    """How many numbers the state of the carrier has."""
+    """Return the size of the state of the carrier; 0 for a rigid bearing (None)."""
     if bearing is None:
         return 0
     return CARRIER_STATE_SIZE

@@ -1,4 +1,4 @@
-"""Setup -> flat numbers and indices that the compiled engine runs on; everything is read from the built machine."""
+"""`Setup` -> flat numbers and indices for the compiled engine, all read from the built machine."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ from wm_drake.engines.compiled.mechanics import (
 )
 from wm_drake.engines.compiled.tubes import TUBES_STATE_SIZE
 from wm_drake.errors import InputError, input_error
-from wm_drake.model.machine import Setup
+from wm_drake.model.setup import Setup
 from wm_drake.model.state_layout import CARRIER
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
@@ -27,13 +27,13 @@ _ON_TUB = ("springs", "dampers", "bushings")
 
 @dataclass(frozen=True)
 class Layout:
-    """Where things begin in the packed numbers of a machine, and what must be the same where machines run side by side.
+    """Indices of a machine's parts in its packed numbers. Machines that run side by side share it.
 
     Attributes:
         springs, dampers, bushings, telescopes: Index of each element.
         gasket: Index of the gasket, -1 without one.
-        bearing: Index of the drum's bearing, -1 if it does not give.
-        structure: Number of each damper's law, and of the points of every table, in order.
+        bearing: Index of the drum's compliant bearing, -1 for a rigid one.
+        structure: Number of each damper's law and number of points of every table, in order.
     """
 
     springs: tuple[int, ...]
@@ -46,18 +46,19 @@ class Layout:
 
     @property
     def elements(self) -> Elements:
-        """As compiled functions take them; None lets them be compiled without tubes, or without a bearing."""
+        """The indices for compiled functions.
+
+        None for tubes or bearing compiles the functions without them.
+        """
         springs, dampers, bushings, telescopes = (
             np.array(indices, dtype=np.int64)
             for indices in (self.springs, self.dampers, self.bushings, self.telescopes)
         )
-        deformations = STATE_SIZE + np.arange(len(dampers))
         bearing = self.bearing if self.bearing >= 0 else None
         tubes = STATE_SIZE + len(dampers)
         return Elements(
             springs,
             dampers,
-            deformations,
             bushings,
             telescopes if self.telescopes else None,
             bearing,
@@ -66,15 +67,16 @@ class Layout:
 
     @property
     def rates_size(self) -> int:
-        """How many numbers of the derivative a sample keeps behind the state."""
+        """How many accelerations a sample has behind the state."""
         return RATES_SIZE if self.bearing < 0 else 2 * RATES_SIZE
 
     def parts(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Of states (n, size).
+        """Split states (n, size) into their parts.
 
         Returns:
-            Those of the plant's first 14, deformations of all dampers, states of the tubes (n, k, 14), state of the drum's
-            carrier (n, 12), or (n, 0) without one.
+            State of tub and drum (n, 14); deformations of all dampers, those of telescopic ones
+            last (n, d); states of the tubes (n, k, 14); state of the drum's carrier (n, 12), or
+            (n, 0) without one.
         """
         tubes_begin = STATE_SIZE + len(self.dampers)
         tubes_end = tubes_begin + TUBES_STATE_SIZE * len(self.telescopes)
@@ -86,7 +88,9 @@ class Layout:
 
 
 def pack(setup: Setup) -> tuple[FloatArray, Layout]:
-    """Packed numbers of a machine as it is set up, laid out as `wm_drake.engines.compiled.mechanics` and the elements say.
+    """Return the packed numbers of a machine as it is set up, and their layout.
+
+    The bodies come first, laid out as in `wm_drake.engines.compiled.mechanics`, then the elements.
 
     Raises:
         InputError: the machine has something that the compiled engine does not represent.
@@ -97,7 +101,7 @@ def pack(setup: Setup) -> tuple[FloatArray, Layout]:
 
 
 def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
-    """The part of `pack` that follows the bodies: springs, dampers, bushings; no load changes it."""
+    """Return the packed numbers behind the bodies, which no load changes, and the layout of all."""
     on_tub, indices = pack_on_tub(setup, BODIES_SIZE)
     parts, size = [on_tub], BODIES_SIZE + len(on_tub)
     structure = [
@@ -125,7 +129,9 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
 
 
 def pack_on_tub(setup: Setup, size: int = 0) -> tuple[FloatArray, dict[str, tuple[int, ...]]]:
-    """Springs, dampers and bushings, whose forces the motion of the tub decides; and by kind, in this order, where each begins.
+    """Return the packed springs, dampers and bushings, and by kind the index of each element.
+
+    Their forces depend on the motion of the tub only.
 
     Args:
         setup: The machine.
@@ -144,14 +150,34 @@ def pack_on_tub(setup: Setup, size: int = 0) -> tuple[FloatArray, dict[str, tupl
 
 
 def aligned(size: int) -> FloatArray:
-    """Zeros at an address from which vectors are loaded in one go."""
+    """Return zeros at an address from which one load reads a whole vector."""
     raw = np.zeros(size + WIDTH)
     begin = (-raw.ctypes.data // raw.itemsize) % WIDTH
     return raw[begin : begin + size]
 
 
+def fill_lanes(lanes: FloatArray, runs: list[FloatArray]) -> FloatArray:
+    """Write arrays of up to `WIDTH` runs into a flat array of lanes.
+
+    Idle lanes repeat the last run.
+
+    Args:
+        lanes: (size * WIDTH,), written.
+        runs: Array (size,) of each run.
+
+    Returns:
+        The array of lanes.
+    """
+    idle = WIDTH - len(runs)
+    lanes.reshape(-1, WIDTH)[:] = np.stack([*runs, *runs[-1:] * idle], axis=1)
+    return lanes
+
+
 def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
-    """The state a run begins with: at rest at the rest pose, the drum at its first speed, sponges undeformed."""
+    """Return the state at the start of a run.
+
+    The machine is at rest at the rest pose, the drum at its first speed, sponges undeformed.
+    """
     x = np.zeros(STATE_SIZE + len(setup.dampers))
     x[:6] = setup.rest_pose
     x[DRUM_RATE] = profile.speed[0]
@@ -162,7 +188,7 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
 
 
 def pack_tubes(setup: Setup, name: str) -> FloatArray:
-    """Bodies of a telescopic damper, as `wm_drake.engines.compiled.tubes` says.
+    """Return the packed bodies of a telescopic damper (`wm_drake.engines.compiled.tubes`).
 
     Raises:
         InputError: its joint has something that the compiled engine does not represent.
@@ -179,7 +205,7 @@ def pack_tubes(setup: Setup, name: str) -> FloatArray:
         )
         for body in (joint.parent_body(), joint.child_body())
     )
-    # of the inner tube in the frame of the outer one, at extension 0
+    # inertia of the inner tube in the frame of the outer one, at extension 0
     frames = joint.frame_on_parent(), joint.frame_on_child()
     X_OI = frames[0].GetFixedPoseInBodyFrame() @ frames[1].GetFixedPoseInBodyFrame().inverse()
     inner_inertia = inner_inertia.ReExpress(X_OI.rotation()).Shift(-X_OI.translation())
@@ -195,7 +221,7 @@ def pack_tubes(setup: Setup, name: str) -> FloatArray:
 
 
 def pack_tub(setup: Setup) -> FloatArray:
-    """The tub without the drum, as `wm_drake.engines.compiled.bearing` says."""
+    """Return the packed tub without the drum (`wm_drake.engines.compiled.bearing`)."""
     plant, context = setup.machine.plant, setup.plant_context
     tub = plant.GetBodyByName("tub")
     group = [body.index() for body in plant.GetBodiesWeldedTo(tub)]
@@ -204,9 +230,9 @@ def pack_tub(setup: Setup) -> FloatArray:
 
 
 def pack_bodies(plant: MultibodyPlant, context: Context, drive: str) -> FloatArray:
-    """The first part of `pack`: bodies and load in a plant Context, which no number of an element changes.
+    """Return the packed bodies with the load of a plant Context; no element changes them.
 
-    Where the drum's bearing gives, what turns in the tub turns in its carrier, and the tub is no part of it.
+    With a compliant bearing these are the carrier and the drum, without the tub.
 
     Args:
         plant: The plant.
@@ -214,7 +240,7 @@ def pack_bodies(plant: MultibodyPlant, context: Context, drive: str) -> FloatArr
         drive: Name of the joint that the drive turns.
 
     Raises:
-        InputError: as `pack`.
+        InputError: the plant has something that the compiled engine does not represent.
     """
     joint = drum_joint(plant, drive)
     tub = plant.GetBodyByName(CARRIER if plant.HasBodyNamed(CARRIER) else "tub")
@@ -235,7 +261,7 @@ def pack_bodies(plant: MultibodyPlant, context: Context, drive: str) -> FloatArr
 
 
 def drum_joint(plant: MultibodyPlant, name: str) -> RevoluteJoint:
-    """The joint that the drive turns.
+    """Return the joint that the drive turns.
 
     Raises:
         InputError: the plant has a joint or a force that the compiled engine does not represent.
@@ -265,7 +291,7 @@ def _not_represented(what: str, key: str) -> InputError:
 
 
 def _moment(inertia: SpatialInertia) -> FloatArray:
-    """First moment about the point the inertia is about. [kg m]"""
+    """Return the first moment about the reference point of an inertia. [kg m]"""
     return np.asarray(inertia.get_mass() * inertia.get_com())
 
 
@@ -280,10 +306,15 @@ def _six(matrix: FloatArray) -> FloatArray:
 def _drum_harmonics(
     inertia: SpatialInertia, axis: FloatArray, angle: float
 ) -> tuple[FloatArray, FloatArray]:
-    """First moment and inertia of the drum about the axis, as harmonics of the drum angle, given what they are at `angle`.
+    """Return first moment and inertia of the drum as harmonics of the drum angle.
 
-    With R = A + B cos + C sin for a rotation about the axis: R s, and R J R^T with products of cosine and sine written in
-    the double angle.
+    With R = A + B cos + C sin for a rotation about the axis they are R s and R J R^T; products of
+    cosine and sine are written in the double angle.
+
+    Args:
+        inertia: About a point of the axis, at `angle`.
+        axis: Unit vector.
+        angle: Drum angle. [rad]
     """
     along = np.outer(axis, axis)
     across = np.eye(3) - along

@@ -1,53 +1,84 @@
-"""The fast engine: the whole machine as one compiled function, at fixed steps of the classical Runge-Kutta scheme."""
+"""Run machines through a spin profile with the compiled engine, at fixed steps."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
-import numpy as np
-
-from wm_drake.engines.compiled.alone import Alone
-from wm_drake.engines.compiled.packing import initial_state
+from wm_drake.compiler.lanes import WIDTH
+from wm_drake.engines.compiled.integration import integrate_lanes
+from wm_drake.engines.compiled.packing import Layout, aligned, fill_lanes, initial_state, pack
 from wm_drake.engines.compiled.samples import trajectory_of
-from wm_drake.engines.schedule import schedule_of
+from wm_drake.engines.schedule import Schedule, schedule_of
 from wm_drake.engines.trajectory import Trajectory, diverging_coordinate
-from wm_drake.model.machine import OUTPUT_PERIOD, Setup
+from wm_drake.model.machine import OUTPUT_PERIOD
+from wm_drake.model.setup import Setup
 from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.types import FloatArray
 
 PAUSE_STEPS = 2000
-"""Steps between looks at the state and reports of progress: some milliseconds."""
+"""Steps between two checks for divergence and reports of progress: some milliseconds."""
 
 
 def run_compiled(
-    setup: Setup, profile: SpinProfile, step: float, progress: Callable[[float], None]
+    setup: Setup,
+    profile: SpinProfile,
+    step: float,
+    progress: Callable[[float], None],
+    period: float = OUTPUT_PERIOD,
 ) -> Trajectory:
-    """Runs a machine through a spin profile without Drake, with its numbers and its laws.
+    """Run a machine through a spin profile without Drake, with its numbers and its laws.
 
-    Steps end at every output time and at every corner of the profile, so no step sees the acceleration jump.
+    Steps end at every output time and at every corner of the profile, so no step sees the
+    acceleration jump. The run is a batch of one: idle lanes repeat it.
 
     Args:
-        setup: Machine at rest in its Context, which stays as it is.
+        setup: Machine at rest in its Context, which is not changed.
         profile: Drum speed over time; followed exactly.
-        step: Integration step. [s]
+        step: Step size. [s]
         progress: Called with the fraction done.
+        period: Time between two samples. [s]
 
     Returns:
-        The motion sampled at the output period; up to the last good sample if it diverged.
+        The sampled motion; up to the last good sample if it diverged.
 
     Raises:
         InputError: the machine has something that this engine does not represent.
     """
-    machine, schedule, x = (
-        Alone(setup),
-        schedule_of(profile, step, OUTPUT_PERIOD),
-        initial_state(setup, profile),
-    )
-    samples = np.full((len(schedule.time), len(x) + machine.layout.rates_size), np.nan)
-    done, steps, over = 0, len(schedule.step), False
-    while done < steps and not over:
-        over = diverging_coordinate(x) is not None
-        begin, done = (
-            done,
-            done + 1 if over else min(done + PAUSE_STEPS, steps),
-        )  # one more: writes the state out of bounds
-        machine.integrate(schedule, begin, done, x, samples)
-        progress(done / steps)
-    return trajectory_of(samples, schedule, machine.p, machine.layout)
+    p, layout = pack(setup)
+    begin, schedule = initial_state(setup, profile), schedule_of(profile, step, period)
+    rows, size = len(schedule.time), len(begin) + layout.rates_size
+    samples = aligned(rows * size * WIDTH)
+    numbers, x = (aligned(len(values) * WIDTH) for values in (p, begin))
+    fill_lanes(numbers, [p])
+    fill_lanes(x, [begin])
+    for done in integrate_runs(schedule, layout, numbers, x, samples):
+        progress(done)
+    return trajectory_of(samples.reshape(rows, size, WIDTH)[..., 0].copy(), schedule, p, layout)
+
+
+def integrate_runs(
+    schedule: Schedule, layout: Layout, p: FloatArray, x: FloatArray, samples: FloatArray
+) -> Iterator[float]:
+    """Integrate `WIDTH` runs side by side until the schedule ends or all of them have diverged.
+
+    A run has diverged at the first sample out of bounds. Samples up to there do not depend on the
+    other runs, nor on where the integration pauses.
+
+    Args:
+        schedule: The steps.
+        layout: What the runs have in common.
+        p, x: Packed numbers and states as flat arrays of lanes; x is advanced.
+        samples: Flat array of lanes for the samples, as `integrate` writes them; NaN behind the
+            last one that was reached.
+
+    Yields:
+        The fraction done, after each `PAUSE_STEPS` steps.
+    """
+    work = (aligned(len(x)), aligned(len(x)), aligned(len(x)))
+    by_sample = samples.reshape(len(schedule.time), -1, WIDTH)
+    done, steps, last, diverged = 0, len(schedule.step), 0, False
+    while done < steps and not diverged:
+        begin, done = done, min(done + PAUSE_STEPS, steps)
+        integrate_lanes(schedule.steps, begin, done, p, layout.elements, x, work, samples)
+        last = max(last, int(schedule.row[begin:done].max()))
+        diverged = all(diverging_coordinate(positions) for positions in by_sample[last, :6].T)
+        yield done / steps
+    by_sample[last + 1 :] = float("nan")

@@ -1,4 +1,4 @@
-"""What the compiled loops sampled -> the motion that an engine hands over."""
+"""Samples of the compiled integration -> `Trajectory`."""
 
 import numpy as np
 
@@ -17,10 +17,11 @@ from wm_drake.parameters.types import FloatArray
 def trajectory_of(
     samples: FloatArray, schedule: Schedule, p: FloatArray, layout: Layout
 ) -> Trajectory:
-    """Motion up to the last good sample, with the motor's torque.
+    """Return the motion up to the last good sample, with the motor's torque.
 
     Args:
-        samples: (rows, size + `Layout.rates_size`) as `kernel.integration` writes them; NaN behind the end of a run.
+        samples: (rows, size + `Layout.rates_size`) as `wm_drake.engines.compiled.integration`
+            writes them; NaN behind the end of a run.
         schedule: The steps.
         p, layout: From `pack`.
     """
@@ -29,15 +30,18 @@ def trajectory_of(
     torque = np.empty((len(samples), 1))
     drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
     torque_history(
-        _of_what_carries_the_drum(motion, carrier), rates[:, -6:], drum_acceleration, p, torque
+        _motion_of_drum_and_carrier(motion, carrier), rates[:, -6:], drum_acceleration, p, torque
     )
     return ended_where_it_diverged(
         Trajectory(schedule.time, motion, deformation, torque[:, 0], rates[:, :6], tubes, carrier)
     )
 
 
-def _of_what_carries_the_drum(motion: FloatArray, carrier: FloatArray) -> FloatArray:
-    """Motion of the tub or, in a bearing that gives, of the drum's carrier, with that of the drum."""
+def _motion_of_drum_and_carrier(motion: FloatArray, carrier: FloatArray) -> FloatArray:
+    """Return the motion of the drum and of the body that carries it, in the layout of `motion`.
+
+    The drum's carrier in a compliant bearing (n, 12) carries it; without one (n, 0) the tub does.
+    """
     if not carrier.shape[1]:
         return motion
     return np.column_stack([carrier[:, :6], motion[:, 6], carrier[:, 6:], motion[:, 13]])
@@ -45,12 +49,14 @@ def _of_what_carries_the_drum(motion: FloatArray, carrier: FloatArray) -> FloatA
 
 @long_running
 def torque_history(motions, rates, acceleration, p, torque):
-    """Torque of the motor on the drum at samples.
+    """Evaluate the torque of the motor on the drum at samples.
 
     Args:
-        motions: (n, 14) motion of what carries the drum, and the drum's, as `TubMotion` is read.
-        rates: (n, 6) its angular acceleration and that of its origin, in W. [rad/s^2, m/s^2]
-        acceleration: Of the drum, (n, 1). [rad/s^2]
+        motions: (n, 14) motion of the body that carries the drum, and of the drum; laid out as the
+            state of the plant.
+        rates: (n, 6) angular acceleration and acceleration of the origin of that body, in W.
+            [rad/s^2, m/s^2]
+        acceleration: (n, 1) acceleration of the drum. [rad/s^2]
         p: Packed numbers of the bodies.
         torque: (n, 1), written. [N m]
     """

@@ -1,21 +1,23 @@
-"""Rigid-body mechanics of a telescopic damper's tubes: an outer tube that floats, and an inner one that slides in it.
+"""Rigid-body mechanics of a telescopic damper: a floating outer tube and an inner one that slides.
 
-Own derivation; the Drake plant is its oracle (tests/kernel). In the frame of the outer tube, moments about its origin O, with
-the joint's direction a, its extension s, and F, tau, f the force, the moment about O and the force along the joint:
+Own derivation; the tests compare it with the Drake plant. In the frame of the outer tube, with
+moments about its origin O, the joint's direction a and extension s, and F, tau, f the force, the
+moment about O and the force along the joint:
 
     M a_O + w' x S + w x (w x S) + m s'' a + 2 m s' w x a                                  = F
     S x a_O + I w' + w x (I w) + S_i x a s'' + 2 s' S_i x (w x a)                          = tau
     a . (m a_O + w' x S_i + w x (w x S_i)) + m s''                                         = f
     S = S_0 + m s a,    S_i = S_i0 + m s a,    I = I_0 + s I_1 + s^2 I_2
 
-M: mass of both, m of the inner tube; S, S_i: first moments of both and of the inner one; I: inertia of both. The first gives
-a_O, the third s'', and there remains a system of three equations with a symmetric matrix for w'.
+M: mass of both tubes, m: of the inner one; S, S_i: first moments of both and of the inner one; I:
+inertia of both. The first equation gives a_O and the third s''. Three equations with a symmetric
+matrix remain for w'.
 
-Packed numbers, at the begin of each damper's: 1/M [1/kg]; m; a; S_0 and S_i0 [kg m]; I_0, I_1, I_2 as xx, yy, zz, xy, xz, yz
-[kg m^2, kg m, kg]; behind them those of `TelescopicDamperParameters`.
+Packed numbers, from the index of each damper: 1/M [1/kg]; m; a; S_0 and S_i0 [kg m]; I_0, I_1, I_2
+as xx, yy, zz, xy, xz, yz [kg m^2, kg m, kg]; then those of `TelescopicDamperParameters`.
 
-State of a damper, behind those of the strut dampers: roll, pitch, yaw, position of the outer tube, extension; angular velocity,
-velocity, rate of extension; deformation of the sponge.
+State of a damper, behind the deformations of the strut dampers: roll, pitch, yaw, position of the
+outer tube, extension; angular velocity, velocity, rate of extension; deformation of the sponge.
 """
 
 from wm_drake.compiler.compilation import law
@@ -29,11 +31,12 @@ INVERSE_MASS, INNER_MASS, AXIS, MOMENT, INNER_MOMENT, INERTIA = 0, 1, 2, 5, 8, 1
 TUBES_SIZE = 29
 """Numbers of the bodies of a damper."""
 TUBES_STATE_SIZE = 15
+"""Numbers of a damper in the state."""
 
 
 @law
 def tube_accelerations(motion, s, s_rate, wrench, along, gravity, p, at):
-    """Accelerations of the tubes of a damper.
+    """Return the accelerations of the tubes of a damper.
 
     Args:
         motion: `TubMotion` of the outer tube.
@@ -41,7 +44,7 @@ def tube_accelerations(motion, s, s_rate, wrench, along, gravity, p, at):
         wrench: Moment about O and force on both tubes, in W, without gravity. [N m, N]
         along: Force on the joint. [N]
         gravity: Acceleration in W. [m/s^2]
-        p, at: Packed numbers, and where those of the damper begin.
+        p, at: Packed numbers and index of the damper in them.
 
     Returns:
         Angular acceleration and acceleration of O, in W [rad/s^2, m/s^2], and s'' [m/s^2].
@@ -69,7 +72,7 @@ def tube_accelerations(motion, s, s_rate, wrench, along, gravity, p, at):
     b = cross(subtract(inner, scale(share, first)), a)
     f = along - dot(a, cross(w, cross(w, inner))) - share * dot(a, force)
     inverse_reduced = 1.0 / (m - m * share)
-    # moments of inertia about the common centre of mass, less what the joint takes along
+    # inertia about the common centre of mass, reduced by the freedom of the joint
     central = less_square(about_centre(i, first, q), b, inverse_reduced)
     w_rate = times(inverse(central), subtract(moment, scale(f * inverse_reduced, b)))
     s_acceleration = (f - dot(b, w_rate)) * inverse_reduced
@@ -82,20 +85,19 @@ def tube_accelerations(motion, s, s_rate, wrench, along, gravity, p, at):
 
 
 @law
-def with_telescopes(x, dx, motion, gravity, p, telescopes, first, total):
-    """Writes the derivatives of the tubes' states into `dx`.
+def add_telescopic_dampers(x, dx, motion, gravity, p, telescopes, first, total):
+    """Return the wrench on the tub with that of all telescopic dampers.
+
+    The time derivatives of the tubes' states are written into `dx`.
 
     Args:
         x, dx: State and its derivative.
         motion: `TubMotion` of the tub.
         gravity: Acceleration in W. [m/s^2]
         p: Packed numbers.
-        telescopes: Where each damper's begin in them; None without any.
-        first: Where the state of the first damper begins.
-        total: Wrench on the tub so far.
-
-    Returns:
-        Wrench on the tub with theirs.
+        telescopes: Index of each damper in them; None if there are none.
+        first: Index in the state where the first damper begins.
+        total: Wrench of other elements on the tub: moment about To and force, in W. [N m, N]
     """
     if telescopes is None:
         return total
@@ -121,8 +123,8 @@ def with_telescopes(x, dx, motion, gravity, p, telescopes, first, total):
 
 
 @law
-def count_of(telescopes):
-    """How many telescopic dampers there are."""
+def telescopic_damper_count(telescopes):
+    """Return the number of telescopic dampers; `telescopes` is None if there are none."""
     if telescopes is None:
         return 0
     return len(telescopes)

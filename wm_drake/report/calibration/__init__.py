@@ -1,1 +1,1 @@
-"""Write the page of `calibration`."""
+"""Report page of `wm-drake calibrate`."""

@@ -6,29 +6,29 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH, plain
-from wm_drake.report.wording import number
+from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH, style_axes
+from wm_drake.report.formatting import number
 from wm_drake.studies.calibration.calibration import Calibration
 from wm_drake.studies.description.modal import Modes
 
 OTHER = "#8a8f98"
-"""Of another model's errors."""
+"""Colour of the errors of another model."""
 
 SHAPE_NAMES = ("roll", "pitch", "yaw", "x", "y", "z")
 _SHAPE_ORDER = (3, 4, 5, 0, 1, 2)
-_ARM = np.array(
-    [0.25, 0.25, 0.25, 1.0, 1.0, 1.0]
-)  # of `Modes`: angles count at a quarter of a metre
+_SHAPE_WEIGHTS = np.array([0.25, 0.25, 0.25, 1.0, 1.0, 1.0])
+"""Weights of the components of a mode shape: angles are multiplied by 0.25 m, as in `Modes`."""
 
 
 def errors_figure(
     rows: Sequence[tuple[str, FloatArray, FloatArray | None]], sensors: Sequence[str]
 ) -> Figure:
-    """Percent differences from the experiment, a panel per case, a dot per sensor.
+    """Draw the percent differences from the experiment, one panel per case, one dot per sensor.
 
     Args:
-        rows: Name of the case, errors of the calibrated machine, and those of another model or None. (sensor) [%]
-        sensors: Names.
+        rows: For each case its name, the errors of the calibrated machine, and the errors of
+            another model or None. Errors have the shape (sensor). [%]
+        sensors: Names of the sensors.
     """
     figure = Figure(figsize=(WIDTH, 0.55 + 2.1 * -(-len(rows) // 3)), layout="constrained")
     panels = figure.subplots(-(-len(rows) // 3), 3, sharex=True, sharey=True, squeeze=False).ravel()
@@ -45,7 +45,7 @@ def errors_figure(
         axes.set_xticks(places, sensors)
         axes.set_ylim(-limit, limit)
         axes.grid(axis="y", color=GRID)
-        plain(axes)
+        style_axes(axes)
     for axes in panels[len(rows) :]:
         axes.set_axis_off()
     figure.supylabel("difference from the experiment, %", fontsize=9.5)
@@ -53,16 +53,18 @@ def errors_figure(
 
 
 def modes_figure(modes: Sequence[tuple[str, Modes]]) -> Figure:
-    """Mode shapes as tables of colour: a row per mode with its frequency, a column per motion; angles count at 0.25 m.
+    """Draw mode shapes as coloured tables: one row per mode, one column per direction of motion.
+
+    Angles are multiplied by 0.25 m. The frequency is at the left of each row.
 
     Args:
-        modes: Title and modes of each state of the machine, side by side.
+        modes: Title and modes of each state of the machine; the states are drawn side by side.
     """
     height = 0.9 + 0.42 * max(len(found.frequency_hz) for _, found in modes)
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
     panels = figure.subplots(1, len(modes), squeeze=False).ravel()
     for axes, (title, found) in zip(panels, modes, strict=True):
-        shape = (found.shape * _ARM)[:, _SHAPE_ORDER]
+        shape = (found.shape * _SHAPE_WEIGHTS)[:, _SHAPE_ORDER]
         axes.imshow(shape, cmap="RdBu", vmin=-1.3, vmax=1.3, aspect="auto")
         for (row, column), value in np.ndenumerate(shape):
             if abs(value) >= 0.1:
@@ -81,14 +83,14 @@ def modes_figure(modes: Sequence[tuple[str, Modes]]) -> Figure:
 
 
 def quantities_figure(calibration: Calibration) -> Figure:
-    """Each free quantity over its bounds: what was expected, and where each solution puts it with what certainty."""
-    turning, solutions = calibration.turning, calibration.solutions
-    count = len(turning.names)
+    """Draw each free quantity between its bounds: prior, and value and deviation of solutions."""
+    parameter_map, solutions = calibration.parameter_map, calibration.solutions
+    count = len(parameter_map.names)
     figure = Figure(figsize=(WIDTH, 0.8 + 0.235 * count), layout="constrained")
     axes = figure.subplots()
-    reach = turning.upper - turning.lower
+    reach = parameter_map.upper - parameter_map.lower
     low, high = (
-        (turning.expected + sign * turning.deviation - turning.lower) / reach
+        (parameter_map.expected + sign * parameter_map.deviation - parameter_map.lower) / reach
         for sign in (-1.0, 1.0)
     )
     places = np.arange(count)
@@ -100,8 +102,8 @@ def quantities_figure(calibration: Calibration) -> Figure:
         color=GRID,
     )
     for rank, solution in reversed(list(enumerate(solutions))):
-        at = (solution.point - turning.lower) / reach
-        wide = solution.spread() * turning.deviation / reach
+        at = (solution.point - parameter_map.lower) / reach
+        wide = solution.spread() * parameter_map.deviation / reach
         colour = OURS if rank == 0 else OTHER
         if rank == 0:
             axes.hlines(
@@ -120,7 +122,7 @@ def quantities_figure(calibration: Calibration) -> Figure:
             linestyle="none",
         )
     axes.plot(
-        (turning.expected - turning.lower) / reach,
+        (parameter_map.expected - parameter_map.lower) / reach,
         places,
         "|",
         color=MEASURED,
@@ -128,10 +130,13 @@ def quantities_figure(calibration: Calibration) -> Figure:
         linestyle="none",
     )
     axes.set_yticks(
-        places, [name.replace("_", " ") for name in turning.names], fontsize=8.5, parse_math=False
+        places,
+        [name.replace("_", " ") for name in parameter_map.names],
+        fontsize=8.5,
+        parse_math=False,
     )
     axes.set_xticks([0.0, 0.5, 1.0], ["lower bound", "", "upper bound"], color=QUIET)
     axes.set(xlim=(-0.02, 1.02), ylim=(count - 0.3, -0.7))
-    plain(axes)
+    style_axes(axes)
     axes.tick_params(axis="y", length=0)
     return figure

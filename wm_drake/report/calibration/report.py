@@ -1,16 +1,17 @@
-"""The report of a calibration: one HTML file that needs nothing else."""
+"""Report of a calibration: one self-contained HTML file."""
 
 from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 
-from wm_drake.report import tables
 from wm_drake.report.calibration.figures import errors_figure, modes_figure, quantities_figure
-from wm_drake.report.figures import envelopes_figure
+from wm_drake.report.formatting import MISSING, MM_PER_M, number, percent, shape_name
 from wm_drake.report.page import Picture, picture, render, versions_of
-from wm_drake.report.tables import EXPERIMENT, Group, Row, Table, amplitude_table, line
-from wm_drake.report.wording import MISSING, MM_PER_M, case_title, number, percent
+from wm_drake.report.spin import tables
+from wm_drake.report.spin.cases import case_title
+from wm_drake.report.spin.figures import envelopes_figure
+from wm_drake.report.tables import Group, Row, Table, line
 from wm_drake.studies.calibration.calibration import Calibration
 from wm_drake.studies.calibration.outcome import mean_and_largest, quantity_table
 from wm_drake.studies.calibration.prediction import Prediction
@@ -25,16 +26,16 @@ def calibration_report(
     modes: Sequence[tuple[str, Modes]],
     command: str = "",
 ) -> str:
-    """The report as text of one HTML file, with style and figures inside.
+    """Return the report as text of one self-contained HTML file.
 
     Args:
-        calibration: What came out.
-        predictions: Of loads that were left out; none if that was not asked for.
-        best: Spin runs of the best solution's machine with the measured cases.
-        modes: Of that machine, by title.
-        command: The command line that made it, to be shown.
+        calibration: Result of the calibration.
+        predictions: Predictions of held-out loads; may be empty.
+        best: Spin runs of the machine of the best solution, for the measured cases.
+        modes: Titles and natural modes of that machine, for each state that is shown.
+        command: Command line of the calibration, shown on the page.
     """
-    table = amplitude_table(best)
+    table = tables.amplitude_table(best)
     others = _other_models(table)
     return render(
         "calibration/page.html",
@@ -46,7 +47,7 @@ def calibration_report(
         comparison=tables.comparison(best, table),
         effects=effects_table(calibration),
         predictions=predictions_table(predictions) if predictions else None,
-        knowledge=knowledge(calibration),
+        certainty=certainty(calibration),
         quantities_picture=_quantities_picture(calibration),
         quantities=quantities_of(calibration),
         searches=searches_table(calibration),
@@ -63,54 +64,57 @@ def calibration_report(
 
 
 def summary(calibration: Calibration, predictions: Sequence[Prediction]) -> str:
-    """One paragraph, made from the numbers."""
+    """Return one paragraph about the agreement and the certainty of the best solution."""
     targets, best = calibration.targets, calibration.solutions[0]
     errors = best.errors(targets)
     mean, _ = mean_and_largest(errors)
     case, sensor = np.unravel_index(int(np.nanargmax(np.abs(errors))), errors.shape)
     name, gasket = targets.loads[case]
     count = len(calibration.solutions)
-    searches = len(calibration.ended)
+    searches, quantities = len(calibration.ended), len(calibration.parameter_map.names)
+    determined = int(np.sum(best.directions() > 1.0))
     text = (
-        f"The best machine found differs from the {np.isfinite(errors).sum()} measured amplitudes by {number(100 * mean)} % "
-        f"in the mean of absolute values and by {percent(100 * errors[case, sensor])} at most: sensor "
-        f"{targets.sensors[sensor]}, load {name} {'with' if gasket else 'without'} gasket. "
-        f"{searches} {'search' if searches == 1 else 'searches'} ended in {count} distinct good "
-        f"{'solution' if count == 1 else 'solutions'}. Of {len(calibration.turning.names)} free quantities the data determine "
-        f"{int(np.sum(best.directions() > 1.0))} combinations better than what was expected of them; the others are held by "
-        "their priors."
+        f"The best machine is compared with {np.isfinite(errors).sum()} measured amplitudes. The "
+        f"mean absolute difference is {number(100 * mean)} %. The largest difference is "
+        f"{percent(100 * errors[case, sensor])}, at sensor {targets.sensors[sensor]} with load "
+        f"{name} ({'with' if gasket else 'without'} gasket). "
+        f"{searches} {'search' if searches == 1 else 'searches'} found {count} distinct good "
+        f"{'solution' if count == 1 else 'solutions'}. The data determine {determined} of "
+        f"{quantities} independent combinations of the free quantities better than the priors do."
     )
     if predictions:
         worst = max(predictions, key=lambda p: mean_and_largest(p.predicted)[0])
         text += (
-            " Loads that a calibration had not seen are predicted within "
-            f"{number(100 * mean_and_largest(worst.predicted)[0])} % in the mean in the worst case ({', '.join(worst.loads)})."
+            " Held-out loads are predicted with a mean absolute difference of at most "
+            f"{number(100 * mean_and_largest(worst.predicted)[0])} % (worst case: "
+            f"{', '.join(worst.loads)})."
         )
     return text
 
 
 def warnings_of(best: SpinResult) -> list[str]:
-    """What a reader must know before using the machine."""
+    """Return a warning for each load with which tub and housing overlap."""
     gaps = [(case, case.measures.smallest_gap) for case in best.results]
     return [
-        f"Load {case_title(case)}: {gap.moving.replace('_', ' ')} and {gap.fixed.replace('_', ' ')} overlap by "
-        f"{number(-MM_PER_M * gap.distance)} mm, and the model has no contact. The measured machine did not strike there, "
-        "or its housing is wider than the drawn one."
+        f"Load {case_title(case)}: {shape_name(gap.moving)} and {shape_name(gap.fixed)} overlap by "
+        f"{number(-MM_PER_M * gap.distance)} mm. The model has no contact forces. If the measured "
+        "machine did not collide there, it moves less or its housing is wider than in the model."
         for case, gap in gaps
         if gap is not None and gap.distance <= 0.0
     ]
 
 
-def knowledge(calibration: Calibration) -> list[tuple[str, str]]:
-    """What the data say and what only the priors do, as pairs of word and text."""
-    best, names = calibration.solutions[0], calibration.turning.names
+def certainty(calibration: Calibration) -> list[tuple[str, str]]:
+    """Return which quantities the data determine, and which only the priors: heading and text."""
+    best, names = calibration.solutions[0], calibration.parameter_map.names
     column = quantity_table(calibration)["held_by_1"]
     sizes = best.directions()
     found = [
         (
-            "Directions",
-            f"the amplitudes know {int(np.sum(sizes > 1.0))} directions among the {len(names)} quantities better than the "
-            f"priors do, the best of them {number(float(sizes[0]), 0)} times better",
+            "Combinations",
+            f"the amplitudes determine {int(np.sum(sizes > 1.0))} independent combinations of the "
+            f"{len(names)} quantities better than the priors do, the best one "
+            f"{number(float(sizes[0]), 0)} times better",
         )
     ]
     for verdict, text in _VERDICTS.items():
@@ -125,14 +129,17 @@ def knowledge(calibration: Calibration) -> list[tuple[str, str]]:
 
 _VERDICTS = {
     "data": "Determined by the data",
-    "data and prior": "By data and prior together",
-    "prior": "By the prior only",
+    "data and prior": "Determined by data and prior",
+    "prior": "Determined by the prior only",
     "bound": "At a bound",
 }
 
 
 def effects_table(calibration: Calibration) -> Table | None:
-    """What putting in the gasket does to each amplitude, measured and computed."""
+    """Return the change of each amplitude due to the gasket, measured and computed.
+
+    The result is None if no load was measured both with and without gasket.
+    """
     targets = calibration.targets
     measured = targets.gasket_effects(targets.amplitude)
     computed = targets.gasket_effects(calibration.solutions[0].amplitude)
@@ -142,18 +149,21 @@ def effects_table(calibration: Calibration) -> Table | None:
         Group(
             name,
             (
-                Row((EXPERIMENT, *(percent(100 * v) for v in measured[name])), "measured"),
+                Row((tables.EXPERIMENT, *(percent(100 * v) for v in measured[name])), "measured"),
                 Row(("calibrated machine", *(percent(100 * v) for v in computed[name])), "ours"),
             ),
         )
         for name in measured
     ]
-    caption = "Change of each amplitude when the gasket is put in, as part of the amplitude without it ([B] Table 1)."
+    caption = (
+        "Change of each amplitude due to the gasket, in percent of the amplitude without gasket "
+        "([B] Table 1)."
+    )
     return Table(caption, ("load", "source", *targets.sensors), tuple(groups), text_columns=2)
 
 
 def predictions_table(predictions: Sequence[Prediction]) -> Table:
-    """Errors of loads when they were part of the calibration and when they were not."""
+    """Return the errors of loads when they were used for the calibration and when held out."""
     groups = []
     for prediction in predictions:
         kinds = (prediction.calibrated, prediction.predicted, prediction.seen)
@@ -161,18 +171,19 @@ def predictions_table(predictions: Sequence[Prediction]) -> Table:
         groups.append(line(", ".join(prediction.loads), cells))
     errors = ("mean, %", "largest, %")
     header = (
-        "loads left out",
+        "held-out loads",
         *(f"{kind}: {error}" for kind in ("calibrated", "predicted", "others") for error in errors),
     )
     caption = (
-        "Absolute differences from the experiment: of the loads left out in the calibration above and where they were "
-        "predicted, and of the others there."
+        "Absolute differences from the experiment. Calibrated: these loads in the calibration "
+        "above, which used them. Predicted: these loads when they were held out. Others: the "
+        "remaining loads in the calibration without them."
     )
     return Table(caption, header, tuple(groups))
 
 
 def quantities_of(calibration: Calibration) -> Table:
-    """Every free quantity: prior, best solution, what holds it, and the other solutions."""
+    """Return the prior and the solutions of every free quantity, and what determines its value."""
     table = quantity_table(calibration)
     others = range(2, len(calibration.solutions) + 1)
     groups = []
@@ -188,7 +199,7 @@ def quantities_of(calibration: Calibration) -> Table:
         groups.append(line(str(row["quantity"]), cells))
     header = (
         "quantity",
-        "held by",
+        "determined by",
         "unit",
         "bounds",
         "expected",
@@ -196,7 +207,7 @@ def quantities_of(calibration: Calibration) -> Table:
         *(f"solution {n}" for n in others),
     )
     return Table(
-        "Free quantities, with standard deviations before and after the fit.",
+        "Free quantities, with their standard deviations before and after the fit.",
         header,
         tuple(groups),
         text_columns=3,
@@ -204,7 +215,7 @@ def quantities_of(calibration: Calibration) -> Table:
 
 
 def searches_table(calibration: Calibration) -> Table:
-    """Where every search ended."""
+    """Return the end point of every search."""
     groups = []
     for end in calibration.ended:
         rank = next(
@@ -221,20 +232,21 @@ def searches_table(calibration: Calibration) -> Table:
         "start",
         "solution",
         "cost of the data",
-        "of the priors",
+        "cost of the priors",
         "mean error, %",
-        "largest, %",
+        "largest error, %",
         "machines tried",
     )
     caption = (
-        "Where each search ended. A solution counts as good if its mean error is near the best one's, and as distinct if it "
-        "differs from every better one by half a prior deviation in the root mean square."
+        "End point of each search. A solution is good if its mean error is close to that of the "
+        "best solution. It is distinct if it differs from every better solution by at least half a "
+        "prior standard deviation (root mean square over the quantities)."
     )
     return Table(caption, header, tuple(groups))
 
 
 def _other_models(table: pd.DataFrame) -> list[str]:
-    return [s for s in dict.fromkeys(table["source"]) if s not in (EXPERIMENT, tables.OURS)]
+    return [s for s in dict.fromkeys(table["source"]) if s not in (tables.EXPERIMENT, tables.OURS)]
 
 
 def _errors_picture(best: SpinResult, table: pd.DataFrame, others: Sequence[str]) -> Picture:
@@ -253,7 +265,7 @@ def _errors_picture(best: SpinResult, table: pd.DataFrame, others: Sequence[str]
                     next((e for o in others if (e := errors(case, o)) is not None), None),
                 )
             )
-    caption = "Percent differences from the experiment. Blue dots: the calibrated machine."
+    caption = "Percent differences from the experiment. Blue dots: calibrated machine."
     if others:
         caption += f" Grey diamonds: {', '.join(others)}."
     return picture(
@@ -265,16 +277,18 @@ def _errors_picture(best: SpinResult, table: pd.DataFrame, others: Sequence[str]
 
 def _quantities_picture(calibration: Calibration) -> Picture:
     caption = (
-        "Free quantities between their bounds. Grey bar and orange tick: expected value and one standard deviation. Blue dot "
-        "and line: best solution and one standard deviation after the fit. Grey ticks: other solutions."
+        "Free quantities between their bounds. Orange tick and grey bar: expected value and one "
+        "standard deviation of the prior. Blue dot and line: best solution and one standard "
+        "deviation after the fit. Grey ticks: other solutions."
     )
     return picture(quantities_figure(calibration), "The numbers are in the table below.", caption)
 
 
 def _modes_picture(modes: Sequence[tuple[str, Modes]]) -> Picture:
     caption = (
-        "Rigid-body modes of the empty tub with free dampers and the drum at rest: natural frequency, the drum speed that "
-        "meets it, and the shape; angles count at 0.25 m, the largest component is 1."
+        "Rigid-body modes of the empty tub without dampers and with the drum at rest: natural "
+        "frequency, drum speed of the same frequency, and mode shape. Angles are multiplied by "
+        "0.25 m. The largest component of each shape is 1."
     )
     alternative = "; ".join(
         f"{title}: {', '.join(number(f, 2) for f in found.frequency_hz)} Hz"
@@ -285,7 +299,10 @@ def _modes_picture(modes: Sequence[tuple[str, Modes]]) -> Picture:
 
 def _envelopes_picture(best: SpinResult, table: pd.DataFrame, index: int) -> Picture:
     case = best.results[index]
-    caption = "Displacement in the band 0.5–20 Hz, from the lower to the upper envelope. Dashed: measured amplitude."
+    caption = (
+        "Displacement in the band 0.5–20 Hz. The shaded area extends from the lower to the upper "
+        "envelope. Dashed lines: measured amplitude."
+    )
     return picture(
         envelopes_figure(case.record, tables.experiment_mm(table, case)),
         f"Envelopes, load {case_title(case)}.",

@@ -1,1 +1,1 @@
-"""Write the page of `gasket`."""
+"""Report page of `wm-drake study gasket`."""

@@ -1,4 +1,4 @@
-"""Figures of a screening study: contributions, spread of the responses, effects, interactions, residuals."""
+"""Figures of a screening study: contributions, spread, effects, interactions, residuals."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -10,35 +10,35 @@ from matplotlib.lines import Line2D
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH
-from wm_drake.report.wording import number
+from wm_drake.report.formatting import number
 from wm_drake.studies.gasket.screening import Label, Screening, contributions, main_effects, mean_at
 
 LEVEL_COLOURS = (OURS, QUIET, MEASURED)
-"""Of levels -1, 0 and 1."""
+"""Colours of the levels -1, 0 and 1."""
 
 LEVEL_MARKS = ("v", "o", "^")
-"""Of levels -1, 0 and 1: told apart in print too."""
+"""Marks of the levels -1, 0 and 1, which stay distinct in grey print."""
 
-FEWEST_PERCENT = 1.0
-"""Terms that reach this contribution in no response are left out of the heat map."""
+SMALLEST_PERCENT = 1.0
+"""Smallest contribution to any response with which a term is shown in the heat map."""
 
 MOST_POINTS = 1500
-"""Of a scatter; of more, evenly taken ones are drawn."""
+"""Largest number of points of a scatter plot; of more points, every n-th is drawn."""
 
 COLUMNS = 3
+"""Number of panels in a row."""
 
 
 def heat_map_figure(screening: Screening) -> Figure:
-    """Contributions in percent: terms down, responses of each load across."""
+    """Draw the contributions in percent: one row per term, one column per load and response."""
     table = contributions(screening).fillna(0.0)
-    shown = table[table.max(axis=1) >= FEWEST_PERCENT]
+    shown = table[table.max(axis=1) >= SMALLEST_PERCENT]
     values = shown.to_numpy()
     labels = list(screening.tables)
     figure = Figure(figsize=(WIDTH, 0.27 * len(shown) + 1.5), layout="constrained")
     axes = figure.subplots()
-    image = axes.imshow(
-        np.sqrt(values), cmap="Blues", vmin=0.0, vmax=10.0, aspect="auto"
-    )  # the root shows small ones too
+    # the square root makes small contributions visible
+    image = axes.imshow(np.sqrt(values), cmap="Blues", vmin=0.0, vmax=10.0, aspect="auto")
     for (row, column), value in np.ndenumerate(values):
         if value >= 0.5:
             colour = "white" if value > 40.0 else MARK
@@ -57,8 +57,17 @@ def heat_map_figure(screening: Screening) -> Figure:
     for index, load in enumerate(screening.loads):
         first = len(screening.names) * index
         middle = first + 0.5 * (len(screening.names) - 1)
-        axes.annotate(f"load {load}", (middle, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 22),
-                      textcoords="offset points", ha="center", fontsize=10, fontweight="bold", parse_math=False)  # fmt: skip
+        axes.annotate(
+            f"load {load}",
+            (middle, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 22),
+            textcoords="offset points",
+            ha="center",
+            fontsize=10,
+            fontweight="bold",
+            parse_math=False,
+        )
         if index:
             axes.axvline(first - 0.5, color="white", linewidth=5.0)
     mains = sum(":" not in str(name) for name in shown.index)
@@ -74,16 +83,19 @@ def heat_map_figure(screening: Screening) -> Figure:
 
 
 def spread_figure(screening: Screening, names: Sequence[str], what: str) -> Figure:
-    """All values of some responses, a panel per load: points, with a box from quartile to quartile ([B] Figs. 10-12)."""
+    """Draw all values of some responses, one panel per load, as [B] Figs. 10-12.
+
+    The values are points, with a box from the first to the third quartile.
+    """
     figure = Figure(figsize=(WIDTH, 3.7), layout="constrained")
     panels = figure.subplots(1, len(screening.loads), squeeze=False, sharey=True)[0]
-    rng = np.random.default_rng(0)  # of the sideways scatter, which means nothing
+    rng = np.random.default_rng(0)  # for the horizontal spread, which has no meaning
     for axes, load in zip(panels, screening.loads, strict=True):
         for place, name in enumerate(names):
-            values = _some(screening.responses.values[load][name].dropna().to_numpy())
-            aside = place + rng.uniform(-0.28, 0.28, len(values))
+            every = screening.responses.values[load][name].dropna().to_numpy()
+            values = _thinned(every)
             axes.plot(
-                aside,
+                place + rng.uniform(-0.28, 0.28, len(values)),
                 values,
                 ".",
                 color=OURS,
@@ -92,21 +104,20 @@ def spread_figure(screening: Screening, names: Sequence[str], what: str) -> Figu
                 markeredgewidth=0.0,
                 rasterized=True,
             )
-            whole = screening.responses.values[load][name].dropna().to_numpy()
-            _box(axes, place, whole, 0.34)
+            _box(axes, place, every, 0.34)
         axes.set_xticks(range(len(names)), list(names))
         axes.set_xlim(-0.6, len(names) - 0.4)
         axes.set_ylim(bottom=0.0)
         axes.set_title(
             f"load {load}", fontsize=10.5, loc="left", fontweight="bold", parse_math=False
         )
-        _plain(axes, "y")
+        _style_panel(axes, "y")
     panels[0].set_ylabel(f"{what}, {screening.responses.units[names[0]]}", fontsize=9.5)
     return figure
 
 
 def main_effects_figure(screening: Screening, load: str) -> Figure:
-    """Mean response at the three levels of each factor, a panel per response."""
+    """Draw the mean response at the three levels of each factor, one panel per response."""
 
     def draw(axes: Axes, label: Label) -> None:
         table = screening.tables[label]
@@ -125,7 +136,7 @@ def main_effects_figure(screening: Screening, load: str) -> Figure:
         axes.set_xticks(
             range(len(factors)), list(factors), rotation=90, fontsize=8.5, parse_math=False
         )
-        _plain(axes, "y")
+        _style_panel(axes, "y")
 
     return _panels(
         screening, load, draw, extra=0.5 + 0.055 * max(map(len, screening.design.factors))
@@ -133,7 +144,10 @@ def main_effects_figure(screening: Screening, load: str) -> Figure:
 
 
 def interactions_figure(screening: Screening, load: str) -> Figure:
-    """For each response its strongest interaction: mean over one factor, a line per level of the other."""
+    """Draw the strongest interaction of each response, one panel per response.
+
+    A panel shows the mean response over one factor, with one line per level of the other factor.
+    """
 
     def draw(axes: Axes, label: Label) -> None:
         pairs = [term for term in screening.tables[label].terms if len(term.factors) == 2]
@@ -157,7 +171,7 @@ def interactions_figure(screening: Screening, load: str) -> Figure:
         axes.set_xticks((-1, 0, 1), ["−1", "0", "1"])
         axes.set_xlabel(first, fontsize=9, parse_math=False)
         axes.margins(0.12)
-        _plain(axes, "y")
+        _style_panel(axes, "y")
 
     figure = _panels(screening, load, draw, extra=0.45)
     handles = [
@@ -171,7 +185,10 @@ def interactions_figure(screening: Screening, load: str) -> Figure:
 
 
 def combinations_figure(screening: Screening, load: str) -> Figure:
-    """Runs at each level combination of the two most influential factors of each response ([B] Fig. 13)."""
+    """Draw the values at each level combination of two factors, as [B] Fig. 13.
+
+    Each panel uses the two most influential factors of its response.
+    """
 
     def draw(axes: Axes, label: Label) -> None:
         first, second = two_most_influential(screening, label)
@@ -194,7 +211,7 @@ def combinations_figure(screening: Screening, load: str) -> Figure:
             color=QUIET,
             parse_math=False,
         )
-        _plain(axes, "y")
+        _style_panel(axes, "y")
 
     figure = _panels(screening, load, draw, extra=0.45)
     handles = [
@@ -206,13 +223,13 @@ def combinations_figure(screening: Screening, load: str) -> Figure:
 
 
 def two_most_influential(screening: Screening, label: Label) -> tuple[str, str]:
-    """Factors of the two largest main effects."""
+    """Return the factors of the two largest main effects."""
     first, second = main_effects(screening.tables[label])[:2]
     return first.name, second.name
 
 
 def residuals_figure(screening: Screening, load: str) -> Figure:
-    """What the model does not say, against what it says."""
+    """Draw residuals against fitted values, one panel per response."""
 
     def draw(axes: Axes, label: Label) -> None:
         table = screening.tables[label]
@@ -223,8 +240,8 @@ def residuals_figure(screening: Screening, load: str) -> Figure:
             "markeredgewidth": 0.0,
             "rasterized": True,
         }
-        axes.plot(_some(table.fitted), _some(table.residual), ".", color=OURS, **shown)
-        _plain(axes, "both")
+        axes.plot(_thinned(table.fitted), _thinned(table.residual), ".", color=OURS, **shown)
+        _style_panel(axes, "both")
 
     return _panels(screening, load, draw, extra=0.1)
 
@@ -232,7 +249,7 @@ def residuals_figure(screening: Screening, load: str) -> Figure:
 def _panels(
     screening: Screening, load: str, draw: Callable[[Axes, Label], None], extra: float
 ) -> Figure:
-    """A panel per response of a load, three in a row, each with name and unit."""
+    """Make one panel per response of a load, three in a row, each with name and unit."""
     names = screening.names
     rows = -(-len(names) // COLUMNS)
     figure = Figure(figsize=(WIDTH, rows * (1.75 + extra) + 0.4), layout="constrained")
@@ -246,7 +263,7 @@ def _panels(
 def _box(
     axes: Axes, place: float, values: FloatArray, half_width: float, colour: str = MARK
 ) -> None:
-    """Smallest to largest value as a line, quartiles as a box, the median as a stroke."""
+    """Draw a line from smallest to largest value, a box between the quartiles, and the median."""
     if not len(values):
         return
     low, first, median, third, high = np.percentile(values, (0, 25, 50, 75, 100))
@@ -277,13 +294,13 @@ def _box(
     )
 
 
-def _some(values: FloatArray) -> FloatArray:
-    """At most so many points of a scatter, evenly taken."""
+def _thinned(values: FloatArray) -> FloatArray:
+    """Return every n-th value, so that at most MOST_POINTS remain."""
     step = -(-len(values) // MOST_POINTS) if len(values) else 1
     return values[::step]
 
 
-def _plain(axes: Axes, grid: str) -> None:
+def _style_panel(axes: Axes, grid: str) -> None:
     axes.set_axisbelow(True)
     axes.grid(axis=grid, color=GRID)  # type: ignore[arg-type]
     axes.tick_params(labelsize=8.5)

@@ -1,24 +1,25 @@
-"""The report of a gasket study: one HTML file that needs nothing else."""
+"""Report of a gasket study: one self-contained HTML file."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
+from wm_drake.parameters.machine import DEFAULT_STEP
+from wm_drake.report.formatting import number
 from wm_drake.report.gasket import figures, tables
-from wm_drake.report.gasket.words import about_residual, findings, load_findings, summary
+from wm_drake.report.gasket.findings import about_residual, findings, load_findings, summary
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.tables import Table, parameter_table
-from wm_drake.report.wording import number
-from wm_drake.simulation.runs import DEFAULT_STEP, versions
+from wm_drake.simulation.records import versions
 from wm_drake.studies.gasket.screening import Screening
 from wm_drake.studies.gasket.study import GasketTrials
 
 KINDS = {"D": "displacement", "F": "force", "M": "moment"}
-"""What the first letter of a response says it is."""
+"""Quantity of a response, by the first letter of its name."""
 
 
 @dataclass(frozen=True)
 class LoadView:
-    """What the page shows of one load."""
+    """Section of the page about one load."""
 
     anchor: str
     title: str
@@ -31,13 +32,13 @@ class LoadView:
 def gasket_report(
     screening: Screening, trials: GasketTrials, command: str = "", wall_s: float = float("nan")
 ) -> str:
-    """The report as text of one HTML file, with style and figures inside.
+    """Return the report as text of one self-contained HTML file.
 
     Args:
-        screening: What came of the study.
-        trials: What was run.
-        command: The command line that made it, to be shown.
-        wall_s: Time it took. [s]
+        screening: Result of the study.
+        trials: Trials that were run.
+        command: Command line of the study, shown on the page.
+        wall_s: Computing time. [s]
     """
     parameters = trials.parameters
     return render(
@@ -64,20 +65,24 @@ def _warnings(screening: Screening, trials: GasketTrials) -> list[str]:
     failed = list(screening.responses.failed.items())
     for (trial, load), reason in failed[:5]:
         found.append(
-            f"Trial {trial + 1}, load {load}: {reason}. The run is left out of the analysis."
+            f"Trial {trial + 1}, load {load}: {reason}. This run is excluded from the analysis."
         )
     if len(failed) > 5:
         found.append(
-            f"{len(failed) - 5} more runs diverged and are left out of the analysis; runs.csv names them."
+            f"{len(failed) - 5} more runs diverged and are excluded from the analysis. They are "
+            "listed in runs.csv."
         )
     if screening.design.efficiency() < 80.0:
         percent = number(screening.design.efficiency(), 0)
         found.append(
-            f"The design's D-efficiency is {percent} %: effects of different terms are hard to tell apart."
+            f"The D-efficiency of the design is only {percent} %. The design separates the effects "
+            "of different terms poorly."
         )
     other = [case.name for case in trials.loads if case.profile != trials.parameters.profile]
     if other:
-        found.append(f"Load {', '.join(other)}: the spin profile is not the machine file's.")
+        found.append(
+            f"Load {', '.join(other)}: the spin profile differs from the one in the machine file."
+        )
     return found
 
 
@@ -89,7 +94,7 @@ def _facts(trials: GasketTrials, command: str, wall_s: float) -> list[tuple[str,
         ("Loads", ", ".join(case.name for case in trials.loads)),
         ("Engine", f"compiled, step {1e3 * DEFAULT_STEP:g} ms"),
         ("Versions", ", ".join(f"{name} {text}" for name, text in versions().items())),
-        ("Computing time", f"{number(wall_s)} s, without this page"),
+        ("Computing time", f"{number(wall_s)} s, excluding this report"),
         ("Command", command),
     ]
     return [(word, text) for word, text in facts if text]
@@ -97,11 +102,11 @@ def _facts(trials: GasketTrials, command: str, wall_s: float) -> list[tuple[str,
 
 def _heat_map(screening: Screening) -> Picture:
     caption = (
-        "Percent of the variance of each response that each term contributes; main effects above, interactions "
-        "below. D: largest "
-        "displacement near the detergent box; F, M: largest force and moment of the gasket on the housing. Terms "
-        "that contribute "
-        f"less than {figures.FEWEST_PERCENT:g} % everywhere are left out. The colour goes with the root of the percentage."
+        "Contribution of each term to the variance of each response, in percent: main effects "
+        "above, interactions below. D: largest displacement of the tub point nearest to the "
+        "detergent box. F, M: largest force and moment of the gasket on the housing. Terms that "
+        f"contribute less than {figures.SMALLEST_PERCENT:g} % to every response are not shown. "
+        "The colour scale follows the square root of the percentage."
     )
     return picture(
         figures.heat_map_figure(screening),
@@ -116,15 +121,15 @@ def _spreads(screening: Screening) -> list[Picture]:
         names = [name for name in screening.names if name.startswith(letter)]
         if names:
             caption = (
-                f"Largest {what} of every run ({', '.join(names)}). Box: quartiles and median; line: smallest to "
-                f"largest value; "
-                "points are spread sideways only to be seen."
+                f"Largest {what} of every run ({', '.join(names)}). Box: quartiles and median. "
+                "Vertical line: smallest to largest value. The horizontal position of the points "
+                "within a column is random and has no meaning."
             )
             figure = figures.spread_figure(screening, names, f"largest {what}")
             shown.append(
                 picture(
                     figure,
-                    f"Strips and boxes of the largest {what} over all trials, by load.",
+                    f"Points and boxes of the largest {what} over all trials, by load.",
                     caption,
                 )
             )
@@ -147,35 +152,38 @@ def _pictures(screening: Screening, load: str) -> list[Picture]:
         picture(
             figures.main_effects_figure(screening, load),
             f"Main effects of every factor on every response, load {load}.",
-            f"Main effects, load {load}: mean response at the levels −1, 0 and +1 of each factor, over all levels "
-            f"of the others. "
-            "Blue: 10 % of the variance or more. Horizontal line: the mean.",
+            f"Main effects, load {load}: mean response at the levels −1, 0 and +1 of each factor, "
+            "averaged over all levels of the other factors. Blue: factors that contribute 10 % of "
+            "the variance or more. Horizontal line: overall mean.",
         )
     ]
     if screening.design.model != "main":
         shown.append(
             picture(
                 figures.interactions_figure(screening, load),
-                f"The strongest interaction of each response, load {load}.",
-                f"Strongest interaction of each response, load {load}, with its contribution: mean response over the levels of "
-                "one factor, a line per level of the other. Parallel lines would be no interaction.",
+                f"Strongest interaction of each response, load {load}.",
+                f"Strongest interaction of each response, load {load}, with its contribution: mean "
+                "response over the levels of one factor, with one line per level of the other "
+                "factor. Without an interaction the lines would be parallel.",
             )
         )
     if len(screening.design.factors) > 1:
         shown.append(
             picture(
                 figures.combinations_figure(screening, load),
-                f"Responses at the level combinations of the two most influential factors, load {load}.",
-                f"Runs at each level combination of the two most influential factors of each response, load {load}: quartiles, "
-                "median, smallest and largest value ([B] Fig. 13).",
+                "Responses at the level combinations of the two most influential factors, "
+                f"load {load}.",
+                "Responses at each level combination of the two most influential factors, load "
+                f"{load}: quartiles, median, smallest and largest value over the runs ([B] Fig. "
+                "13).",
             )
         )
     shown.append(
         picture(
             figures.residuals_figure(screening, load),
             f"Residual against fitted value of every run, load {load}.",
-            f"Residual against fitted value, load {load}, both in the unit of the response. A pattern tells of terms that the "
-            "model leaves out.",
+            f"Residual against fitted value of every run, load {load}, both in the unit of the "
+            "response. A pattern shows that the model lacks terms.",
         )
     )
     return shown

@@ -1,10 +1,10 @@
-"""Results of a screening study as tables of text."""
+"""Tables of text with the results of a screening study."""
 
 from collections.abc import Sequence
 
 from wm_drake.parameters import FactorLevels
+from wm_drake.report.formatting import MISSING, number
 from wm_drake.report.tables import Group, Row, Table
-from wm_drake.report.wording import MISSING, number
 from wm_drake.studies.doe import MODELS
 from wm_drake.studies.gasket.screening import (
     LEADING_INTERACTION_PERCENT,
@@ -15,12 +15,12 @@ from wm_drake.studies.gasket.screening import (
 
 
 def term_title(name: str) -> str:
-    """A term as people write it."""
+    """Return the name of a term for reading: `K_Lx:C_T` becomes `K_Lx × C_T`."""
     return name.replace(":", " × ")
 
 
 def digits(value: float) -> str:
-    """Three significant digits, with a true minus sign."""
+    """Return a value with three significant digits and a true minus sign; NaN becomes a dash."""
     if value != value:
         return MISSING
     size = abs(value)
@@ -31,7 +31,7 @@ def digits(value: float) -> str:
 
 
 def variance(screening: Screening) -> Table:
-    """[B] Table 4."""
+    """Return mean, range and explained variance of each response, as [B] Table 4."""
     groups = []
     for load in screening.loads:
         rows = []
@@ -61,12 +61,15 @@ def variance(screening: Screening) -> Table:
         "interactions, %",
         "residual, %",
     )
-    caption = "Percent of the variance of each response explained by all main effects, by all interactions of two, and by neither."
+    caption = (
+        "Percent of the variance of each response that is explained by all main effects, by all "
+        "two-factor interactions, and by neither of them (residual)."
+    )
     return Table(caption, header, tuple(groups), text_columns=3)
 
 
 def leading(screening: Screening, load: str) -> Table:
-    """[B] Table 5 for a load."""
+    """Return the leading terms of each response of a load with their effects, as [B] Table 5."""
     groups = []
     for name in screening.names:
         table, unit = screening.tables[load, name], screening.responses.units[name]
@@ -87,10 +90,11 @@ def leading(screening: Screening, load: str) -> Table:
                     )
         groups.append(Group(f"{name}, {unit}", tuple(rows)))
     caption = (
-        f"Load {load}: constant, main effects above {LEADING_MAIN_PERCENT:g} % and interactions above "
-        f"{LEADING_INTERACTION_PERCENT:g} %, largest first. Effects are deviations in the unit of the response; "
-        f"those of a factor "
-        "sum to zero. Of an interaction, a line per level of its first factor and a column per level of its second."
+        f"Load {load}: constant, main effects above {LEADING_MAIN_PERCENT:g} % and interactions "
+        f"above {LEADING_INTERACTION_PERCENT:g} %, largest first. Effects are deviations from the "
+        "constant, in the unit of the response. The effects of a factor sum to zero. For an "
+        "interaction, each line is a level of its first factor, and each column a level of its "
+        "second factor."
     )
     return Table(
         caption,
@@ -101,7 +105,7 @@ def leading(screening: Screening, load: str) -> Table:
 
 
 def contributions(screening: Screening, load: str) -> Table:
-    """Every term and response of a load."""
+    """Return the contribution of every term to every response of a load."""
     tables = [screening.tables[load, name] for name in screening.names]
     groups = []
     for index, term in enumerate(tables[0].terms):
@@ -113,12 +117,12 @@ def contributions(screening: Screening, load: str) -> Table:
             (Row(tuple(number(table.residual_percent, 2) for table in tables), "difference"),),
         )
     )
-    caption = f"Load {load}: contribution of every term, percent of the variance."
+    caption = f"Load {load}: contribution of every term, in percent of the variance."
     return Table(caption, ("term", *screening.names), tuple(groups))
 
 
 def design(screening: Screening) -> Table:
-    """The design and how well it determines each model."""
+    """Return the properties of the design and its efficiency for each model."""
     plan = screening.design
     rows = [("kind", plan.kind), ("trials", str(plan.trials)), ("factors", str(len(plan.factors)))]
     if plan.seed is not None:
@@ -126,17 +130,18 @@ def design(screening: Screening) -> Table:
     rows += [
         (f"D-efficiency for {model}", f"{number(plan.efficiency(model), 2)} %") for model in MODELS
     ]
-    rows.append(("analysed with", plan.model))
+    rows.append(("fitted model", plan.model))
     return Table(
-        "The design.",
-        ("", ""),
+        "Design of the experiment. main: main effects. main+2fi: main effects and two-factor "
+        "interactions.",
+        ("property", "value"),
         tuple(Group(word, (Row((text,)),)) for word, text in rows),
         text_columns=2,
     )
 
 
 def factors(levels: Sequence[FactorLevels]) -> Table:
-    """What the levels of the factors stand for."""
+    """Return the values of the machine file that belong to the levels of each factor."""
     groups = []
     for factor in levels:
         keys = list(factor.nominal)
@@ -157,11 +162,14 @@ def factors(levels: Sequence[FactorLevels]) -> Table:
     header = (
         "factor",
         "key of the machine file",
-        "machine's value",
+        "value in the machine",
         "level −1",
         "level 0",
         "level +1",
-        "about",
+        "description",
     )
-    caption = "Factors and their levels. Keys of one factor move together. The value of a table is its slope at rest."
+    caption = (
+        "Factors and their levels. All keys of a factor change together. For a stiffness that is "
+        "given as a table, the value is its slope at rest."
+    )
     return Table(caption, header, tuple(groups), text_columns=7)

@@ -1,1 +1,1 @@
-"""Write the page of `gasket_damping`."""
+"""Report page of `wm-drake study gasket-damping`."""

@@ -1,4 +1,4 @@
-"""The report of the gasket-damping study: optimum, surface of the objective, path of the search, envelopes."""
+"""Report of the gasket-damping study: optimum, objective function, search path, envelopes."""
 
 import numpy as np
 import pandas as pd
@@ -9,18 +9,19 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH
+from wm_drake.report.formatting import MM_PER_M, number, percent
 from wm_drake.report.page import Picture, picture, render, versions_of
 from wm_drake.report.tables import Group, Row, Table, parameter_table
-from wm_drake.report.wording import MM_PER_M, number, percent
 from wm_drake.simulation.measures import envelopes, percent_difference
 from wm_drake.studies.gasket_damping.grid_search import Search
 from wm_drake.studies.gasket_damping.study import NOISE, STOP, UNKNOWNS, WINDOW, Damping
 
 UNITS = (Unit("N*s/m", "N*s/mm"), Unit("N*m*s/rad", "N*mm*s/deg"))
+"""SI units and printed units of C_L and C_T."""
 
 
-def in_papers_units(damping: FloatArray) -> tuple[float, float]:
-    """C_L and C_T. [N s/mm, N mm s/deg]"""
+def in_units_of_paper(damping: FloatArray) -> tuple[float, float]:
+    """Return C_L and C_T in the units of [B]. [N s/mm, N mm s/deg]"""
     linear, torsional = (
         unit.from_si(float(value)) for unit, value in zip(UNITS, damping, strict=True)
     )
@@ -28,7 +29,13 @@ def in_papers_units(damping: FloatArray) -> tuple[float, float]:
 
 
 def gasket_damping_report(result: Damping, parameters: MachineParameters, command: str = "") -> str:
-    """The report as text of one HTML file, with style and figures inside."""
+    """Return the report as text of one self-contained HTML file.
+
+    Args:
+        result: Result of the study.
+        parameters: Machine before the search.
+        command: Command line of the study, shown on the page.
+    """
     record = next(iter(result.at_best.values()))
     facts = [
         ("Machine", parameters.name),
@@ -52,14 +59,16 @@ def gasket_damping_report(result: Damping, parameters: MachineParameters, comman
 
 
 def summary(result: Damping) -> str:
-    """One paragraph, made from the numbers."""
+    """Return one paragraph about the damping that each search found."""
     source = "a virtual experiment" if result.truth is not None else "measured records"
+    loads = f"load{'s' if len(result.measured) > 1 else ''} {' and '.join(result.measured)}"
     text = (
-        f"Against {source} of load {', '.join(result.measured)}, the envelopes are nearest at {_words(result.grid.best)}: the "
-        f"grid search took {result.grid.evaluations} evaluations in {len(result.grid.rounds)} rounds and ended at a "
-        f"distance of "
-        f"{number(result.grid.value, 2)} mm. scipy's bounded Nelder-Mead found {_words(result.scipy.best)} at "
-        f"{number(result.scipy.value, 2)} mm with {result.scipy.evaluations} evaluations."
+        f"The computed envelopes were fitted to {source} of {loads}. The grid search found "
+        f"{_damping_text(result.grid.best)}, with an envelope distance of "
+        f"{number(result.grid.value, 2)} mm, after {result.grid.evaluations} evaluations in "
+        f"{len(result.grid.rounds)} rounds. The bounded Nelder-Mead method of SciPy found "
+        f"{_damping_text(result.scipy.best)}, with an envelope distance of "
+        f"{number(result.scipy.value, 2)} mm, after {result.scipy.evaluations} evaluations."
     )
     if result.truth is None:
         return text
@@ -68,33 +77,35 @@ def summary(result: Damping) -> str:
         for b, t in zip(result.grid.best, result.truth, strict=True)
         if t
     ]
-    return f"{text} Planted were {_words(result.truth)}; the grid search is off by {' and '.join(errors)}."
+    return (
+        f"{text} The planted values are {_damping_text(result.truth)}. The values of the grid "
+        f"search differ from them by {' and '.join(errors)}."
+    )
 
 
 def _warnings(result: Damping) -> list[str]:
     if result.truth is None:
         return []
     return [
-        "No measured records were given. The records here come from a virtual experiment: the same machine, run by "
-        "the Drake engine "
-        f"with {_words(result.truth)}, and noise of {number(MM_PER_M * NOISE, 1)} mm added to each sample. It shows "
-        f"that the study "
-        "finds what it should, and says nothing about a real gasket."
+        "No measured records were given. The records on this page come from a virtual experiment: "
+        f"the Drake engine ran the same machine with {_damping_text(result.truth)}, and noise of "
+        f"{number(MM_PER_M * NOISE, 1)} mm was added to each sample. The experiment shows that the "
+        "study finds known values. It gives no information about a real gasket."
     ]
 
 
-def _words(damping: FloatArray) -> str:
-    linear, torsional = in_papers_units(damping)
+def _damping_text(damping: FloatArray) -> str:
+    linear, torsional = in_units_of_paper(damping)
     return f"C_L = {number(linear, 4)} N s/mm and C_T = {number(torsional, 1)} N mm s/deg"
 
 
 def points_table(result: Damping) -> pd.DataFrame:
-    """Every point of the grid search: round, damping, objective."""
+    """Return every point of the grid search: round, damping and value of the objective."""
     rows = [
         {
             "round": index,
-            "C_L [N s/mm]": in_papers_units(point)[0],
-            "C_T [N mm s/deg]": in_papers_units(point)[1],
+            "C_L [N s/mm]": in_units_of_paper(point)[0],
+            "C_T [N mm s/deg]": in_units_of_paper(point)[1],
             "objective [mm]": value,
         }
         for index, grid in enumerate(result.grid.rounds, start=1)
@@ -105,7 +116,7 @@ def points_table(result: Damping) -> pd.DataFrame:
 
 def _optima(result: Damping) -> Table:
     def line(name: str, search: Search) -> Group:
-        linear, torsional = in_papers_units(search.best)
+        linear, torsional = in_units_of_paper(search.best)
         cells = (
             number(linear, 4),
             number(torsional, 1),
@@ -116,40 +127,39 @@ def _optima(result: Damping) -> Table:
 
     groups = [
         line("grid search of [B]", result.grid),
-        line("scipy, Nelder-Mead within bounds", result.scipy),
+        line("SciPy, bounded Nelder-Mead", result.scipy),
     ]
     if result.truth is not None:
-        linear, torsional = in_papers_units(result.truth)
+        linear, torsional = in_units_of_paper(result.truth)
         groups.append(
             Group("planted", (Row((number(linear, 4), number(torsional, 1), "", ""), "measured"),))
         )
     header = ("found by", "C_L, N s/mm", "C_T, N mm s/deg", "distance, mm", "evaluations")
     caption = (
-        "Distance: sum over the loads of the 2-norm of the differences of upper and lower envelopes at all sensors, "
-        "every 5 ms from "
-        f"{WINDOW[0]:g} to {WINDOW[1]:g} s, [B] Eq. (2), (3). The grid search ends when a round gains less than {STOP:g} mm."
+        "Distance: sum over the loads of the 2-norm of the differences of the upper and lower "
+        f"envelopes at all sensors, every 5 ms from {WINDOW[0]:g} to {WINDOW[1]:g} s, [B] Eq. (2), "
+        f"(3). The grid search ends when a round reduces the distance by less than {STOP:g} mm."
     )
     return Table(caption, header, tuple(groups))
 
 
 def _surface_picture(result: Damping) -> Picture:
     caption = (
-        "Left: points of the grid search, darker from round to round, and the path of its best point. Right: the "
-        "objective over them "
-        "([B] Fig. 7)."
+        "Left: points of the grid search, darker in each later round, and the path of the best "
+        "point. Right: value of the objective function at these points ([B] Fig. 7)."
     )
     return picture(
         surface_figure(result),
-        "Grid points with the path of the search, and the surface of the objective.",
+        "Grid points with the path of the search, and the surface of the objective function.",
         caption,
     )
 
 
 def surface_figure(result: Damping) -> Figure:
-    """Grid and path beside the surface of the objective."""
+    """Draw the grid points and the path of the search, and the surface of the objective."""
     figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
     axes, space = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2, projection="3d")
-    points = np.array([in_papers_units(p) for grid in result.grid.rounds for p in grid.points])
+    points = np.array([in_units_of_paper(p) for grid in result.grid.rounds for p in grid.points])
     values = np.concatenate([grid.values for grid in result.grid.rounds])
     finite = np.isfinite(values)
     levels = axes.tricontourf(
@@ -157,16 +167,16 @@ def surface_figure(result: Damping) -> Figure:
     )
     figure.colorbar(levels, ax=axes, label="distance, mm", pad=0.02)
     for index, grid in enumerate(result.grid.rounds):
-        own = np.array([in_papers_units(p) for p in grid.points]).reshape(-1, 2)
+        own = np.array([in_units_of_paper(p) for p in grid.points]).reshape(-1, 2)
         mark, size = ("o", 5.0) if index == 0 else ("x", 4.0)
         shade = min(1.0, 0.35 + 0.15 * index)
         axes.plot(*own.T, mark, color=MARK, alpha=shade, markersize=size, fillstyle="none")
-    path = np.array([in_papers_units(grid.best) for grid in result.grid.rounds])
+    path = np.array([in_units_of_paper(grid.best) for grid in result.grid.rounds])
     axes.plot(*path.T, "-", color=MEASURED, linewidth=1.6, label="path of the best point")
     axes.plot(*path[-1], "o", color=MEASURED, markersize=6)
     if result.truth is not None:
         axes.plot(
-            *in_papers_units(result.truth),
+            *in_units_of_paper(result.truth),
             "+",
             color=OURS,
             markersize=14,
@@ -184,27 +194,30 @@ def surface_figure(result: Damping) -> Figure:
     space.set_ylabel("C_T, N mm s/deg", fontsize=8.5)
     space.set_zlabel("distance, mm", fontsize=8.5)
     space.tick_params(labelsize=8)
-    space.view_init(
-        30, 40
-    )  # from the far corner: the one with little damping stands high and would hide the valley
+    # seen from the far corner, because the high corner at little damping would hide the valley
+    space.view_init(30, 40)
     return figure
 
 
 def _envelopes_picture(result: Damping, load: str) -> Picture:
     caption = (
-        f"Load {load}: envelopes of the displacement at each sensor, band 0.5–20 Hz, computed at the optimum (band) "
-        f"and compared with "
-        f"(dashed). Compared from {WINDOW[0]:g} to {WINDOW[1]:g} s."
+        f"Load {load}: envelopes of the displacement at each sensor in the band 0.5–20 Hz. Shaded "
+        f"area: computed at the optimum. Dashed lines: {_source(result)}. The envelopes are "
+        f"compared from {WINDOW[0]:g} to {WINDOW[1]:g} s."
     )
     return picture(
         envelopes_figure(result, load),
-        f"Envelopes at the optimum against those compared with, load {load}.",
+        f"Computed envelopes at the optimum and {_source(result)}, load {load}.",
         caption,
     )
 
 
+def _source(result: Damping) -> str:
+    return "measured" if result.truth is None else "virtual experiment"
+
+
 def envelopes_figure(result: Damping, load: str) -> Figure:
-    """Computed and compared envelopes, a panel per sensor."""
+    """Draw the envelopes computed at the optimum and the measured ones, one panel per sensor."""
     ours = MM_PER_M * envelopes(result.at_best[load])
     theirs = MM_PER_M * envelopes(xr.Dataset({"displacement": result.measured[load]}))
     sensors = [str(name) for name in ours.sensor.values]
@@ -230,7 +243,7 @@ def envelopes_figure(result: Damping, load: str) -> Figure:
                 "--",
                 color=MEASURED,
                 linewidth=1.1,
-                label="compared with" if side == "upper" else None,
+                label=_source(result) if side == "upper" else None,
             )
         axes.set_title(name, fontsize=10, loc="left", fontweight="bold", parse_math=False)
         axes.axhline(0.0, color=QUIET, linewidth=0.6)
@@ -252,20 +265,24 @@ def envelopes_figure(result: Damping, load: str) -> Figure:
 
 
 def _amplitudes(result: Damping) -> Table:
-    """[B] Table 2: largest values of the envelopes within the window, computed against compared."""
+    """Return the largest envelope values in the time window with their differences, [B] Table 2."""
     groups = []
     for load, record in result.at_best.items():
         pair = [_largest(record.displacement), _largest(result.measured[load])]
         change = percent_difference(*pair)
-        rows = [Row((name, *(number(MM_PER_M * float(v)) for v in values)), kind) for name, values, kind in (
-            ("computed", pair[0], "ours"), ("compared with", pair[1], "measured"))]  # fmt: skip
+        rows = [
+            Row((name, *(number(MM_PER_M * float(v)) for v in values)), kind)
+            for name, values, kind in (
+                ("computed", pair[0], "ours"),
+                (_source(result), pair[1], "measured"),
+            )
+        ]
         rows.append(Row(("difference", *(percent(float(value)) for value in change)), "difference"))
         groups.append(Group(load, tuple(rows)))
     sensors = next(iter(result.at_best.values())).sensor.values
-    caption = "Amplitudes within the window, and their differences, [B] Eq. (1) and Table 2."
-    return Table(
-        caption, ("load", "", *(f"{name}, mm" for name in sensors)), tuple(groups), text_columns=2
-    )
+    caption = "Amplitudes in the time window and their differences, [B] Eq. (1) and Table 2."
+    header = ("load", "source", *(f"{name}, mm" for name in sensors))
+    return Table(caption, header, tuple(groups), text_columns=2)
 
 
 def _largest(displacement: xr.DataArray) -> xr.DataArray:
@@ -273,4 +290,4 @@ def _largest(displacement: xr.DataArray) -> xr.DataArray:
     return np.maximum(abs(both.upper), abs(both.lower)).max("time")
 
 
-__all__ = ["UNKNOWNS", "gasket_damping_report", "in_papers_units", "points_table", "summary"]
+__all__ = ["UNKNOWNS", "gasket_damping_report", "in_units_of_paper", "points_table", "summary"]

@@ -1,1 +1,1 @@
-"""Write the page of `identify`."""
+"""Report page of `wm-drake identify`."""

@@ -1,4 +1,4 @@
-"""Figures of an identification of a component: measured against fitted loops, course of the search."""
+"""Figures of a component identification: measured and fitted loops, progress of the search."""
 
 from collections.abc import Sequence
 
@@ -8,26 +8,27 @@ from matplotlib.figure import Figure
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figures import MEASURED, OURS, WIDTH
-from wm_drake.report.rig.figures import axes_line, force_scale, motion_scale, plain
+from wm_drake.report.rig.figures import force_scale, legend_line, motion_scale, style_panel
 from wm_drake.rigs.measured import MeasuredMotion
 from wm_drake.studies.fitting import Fit
 
 COLUMNS = 4
+"""Largest number of panels in a row."""
 
 
 def motion_text(measured: MeasuredMotion) -> str:
-    """Frequency and amplitude of a measured loop."""
+    """Return frequency and amplitude of a measured loop with their units."""
     factor, _, unit = motion_scale(measured.loop.rotates)
     return f"{measured.motion.frequency:.3g} Hz, {factor * measured.motion.amplitude:.3g} {unit}"
 
 
 def loops_figure(fit: Fit, motions: Sequence[MeasuredMotion], *, over: str) -> Figure:
-    """A panel for each file: measured samples and the fitted loop; offset and drift taken out of both.
+    """Draw measured samples and the fitted loop without offset and drift, one panel per file.
 
     Args:
-        fit: Of these motions.
-        motions: At least one.
-        over: displacement or velocity.
+        fit: Fit to these motions.
+        motions: Measured motions, at least one.
+        over: Abscissa: displacement or velocity.
     """
     columns = min(COLUMNS, max(2, len(motions)))
     rows = -(-len(motions) // columns)
@@ -51,15 +52,15 @@ def loops_figure(fit: Fit, motions: Sequence[MeasuredMotion], *, over: str) -> F
         if index % columns == 0:
             axes.set_ylabel(", ".join(force_scale(measured.loop.rotates)), fontsize=9.5)
     handles = [
-        axes_line(MEASURED, "measured", marker="o", markersize=3.0, linestyle="none"),
-        axes_line(OURS, "fitted", linewidth=1.8),
+        legend_line(MEASURED, "measured", marker="o", markersize=3.0, linestyle="none"),
+        legend_line(OURS, "fitted", linewidth=1.8),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False, fontsize=9.5)
     return figure
 
 
 def history_figure(fit: Fit) -> Figure:
-    """Least RMSE after each round."""
+    """Draw the smallest RMSE after each round of the search."""
     figure = Figure(figsize=(WIDTH, 2.3), layout="constrained")
     axes = figure.subplots()
     axes.semilogy(
@@ -71,8 +72,8 @@ def history_figure(fit: Fit) -> Figure:
         markersize=3.5,
     )
     axes.set_xlabel("round of the search", fontsize=9.5)
-    axes.set_ylabel("least RMSE", fontsize=9.5)
-    plain(axes)
+    axes.set_ylabel("smallest RMSE", fontsize=9.5)
+    style_panel(axes)
     return figure
 
 
@@ -92,4 +93,4 @@ def _panel(
         amplitude * turn, force, "o", color=MEASURED, markersize=2.0, alpha=0.45, rasterized=True
     )
     axes.plot(amplitude * turn[order], computed[order], color=OURS, linewidth=1.6)
-    plain(axes)
+    style_panel(axes)

@@ -1,15 +1,15 @@
-"""The page and the tables of an identification of a component."""
+"""Report page and tables of an identification of a component."""
 
 from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 
+from wm_drake.report.formatting import MISSING, number
 from wm_drake.report.identify.figures import history_figure, loops_figure, motion_text
 from wm_drake.report.page import picture, render
 from wm_drake.report.rig.figures import force_scale, motion_scale
 from wm_drake.report.tables import Group, Row, Table
-from wm_drake.report.wording import MISSING, number
 from wm_drake.rigs.measured import MeasuredMotion
 from wm_drake.studies.fitting import Estimate, Fit
 
@@ -17,12 +17,19 @@ from wm_drake.studies.fitting import Estimate, Fit
 def identify_report(
     title: str, fit: Fit, motions: Sequence[MeasuredMotion], command: str = ""
 ) -> str:
-    """The report as text of one HTML file, with style and figures inside."""
-    alternative = "Measured samples and the fitted loop, a panel for each file"
+    """Return the report as text of one self-contained HTML file.
+
+    Args:
+        title: Component and law, for the heading.
+        fit: Result of the fit.
+        motions: Measured motions of the fit.
+        command: Command line of the identification, shown on the page.
+    """
+    alternative = "Measured samples and the fitted loop, one panel per file"
     return render(
         "identify/page.html",
         title=f"Identification of {title}",
-        about=f"From {len(motions)} measured loops.",
+        about=f"Fit to {len(motions)} measured loop{'s' if len(motions) > 1 else ''}.",
         warnings=_warnings(fit),
         summary=_summary(fit, motions),
         estimates=_estimates(fit),
@@ -31,22 +38,23 @@ def identify_report(
             picture(
                 loops_figure(fit, motions, over=over),
                 f"{alternative}, over {over}.",
-                f"Force over {over}: measured samples and fitted loop, offset and drift of the instrument taken out of both.",
+                f"Force over {over}: measured samples and fitted loop. The offset and drift of the "
+                "instrument are removed from both.",
             )
             for over in ("displacement", "velocity")
         ],
         errors=_errors(fit, motions),
         history=picture(
             history_figure(fit),
-            "Least RMSE after each round.",
-            "Least RMSE after each round of the search.",
+            "Smallest RMSE after each round of the search.",
+            "Smallest RMSE that was found up to the end of each round of the search.",
         ),
         correlations=_correlations(fit),
         facts=[
             ("Method", fit.method),
             ("Seed", str(fit.seed)),
-            ("Points computed", str(fit.evaluations)),
-            ("Condition", f"{fit.condition:.3g}"),
+            ("Evaluated points", str(fit.evaluations)),
+            ("Condition number", f"{fit.condition:.3g}"),
             *(("Note", note) for note in fit.notes),
             ("Command", command),
         ],
@@ -54,7 +62,7 @@ def identify_report(
 
 
 def estimate_cells(fit: Fit) -> list[tuple[str, str, str, str, str]]:
-    """Name, value, interval, unit and remark of each unknown, for reading."""
+    """Return name, value, interval, unit and remark of each unknown as text."""
     found = []
     for e, unknown in zip(fit.estimates, fit.problem.unknowns, strict=True):
         unit = unknown.unit
@@ -68,17 +76,18 @@ def estimate_cells(fit: Fit) -> list[tuple[str, str, str, str, str]]:
 
 def _remark(e: Estimate) -> str:
     if not e.determined:
-        return "not determined by these data"
+        return "not determined by the data"
     return f"at its {e.at_bound} bound" if e.at_bound else ""
 
 
 def undetermined_sentences(fit: Fit) -> list[str]:
-    """One sentence for each direction that the data do not determine."""
+    """Return a sentence for each unknown, or joint change of unknowns, that is not determined."""
     found = []
     for direction in fit.undetermined:
         if len(direction.names) == 1:
             found.append(
-                f"{direction.names[0]} can take any value within its bounds without a change that could be seen."
+                f"{direction.names[0]} can take any value within its bounds without a visible "
+                "change of the loops."
             )
         else:
             parts = ", ".join(
@@ -86,13 +95,14 @@ def undetermined_sentences(fit: Fit) -> list[str]:
                 for name, part in zip(direction.names, direction.parts, strict=True)
             )
             found.append(
-                f"Together these can change without being seen, in parts of their ranges: {parts}."
+                "These unknowns can change together, by the given fractions of their ranges, "
+                f"without a visible change of the loops: {parts}."
             )
     return found
 
 
 def estimates_table(fit: Fit) -> pd.DataFrame:
-    """What was found, in the units people read."""
+    """Return value, interval and bounds of each unknown in its unit for reading."""
     rows = []
     for e, unknown in zip(fit.estimates, fit.problem.unknowns, strict=True):
         shown = [
@@ -115,7 +125,7 @@ def estimates_table(fit: Fit) -> pd.DataFrame:
 
 
 def errors_table(fit: Fit, motions: Sequence[MeasuredMotion]) -> pd.DataFrame:
-    """RMSE per test, as [A] Tables 2, 4, 5 and 7."""
+    """Return the RMSE of each test, as [A] Tables 2, 4, 5 and 7."""
     rows = []
     for test, measured in zip(fit.tests, motions, strict=True):
         factor, _, unit = motion_scale(measured.loop.rotates)
@@ -133,7 +143,7 @@ def errors_table(fit: Fit, motions: Sequence[MeasuredMotion]) -> pd.DataFrame:
 
 
 def fitted_loops(fit: Fit, motions: Sequence[MeasuredMotion]) -> pd.DataFrame:
-    """Measured and fitted force at every sample, SI."""
+    """Return the measured and the fitted force at every sample. [SI]"""
     parts = [
         pd.DataFrame(
             {
@@ -155,7 +165,10 @@ def _estimates(fit: Fit) -> Table:
         for name, *cells_ in estimate_cells(fit)
         for cells in [tuple(cells_)]
     )
-    caption = "What was found, with 95 % intervals; none where a bound was hit or the data do not determine the value."
+    caption = (
+        "Estimated values with 95 % confidence intervals. There is no interval if the value is at "
+        "a bound or if the data do not determine it."
+    )
     return Table(
         caption, ("unknown", "value", "95 % interval", "unit", "remark"), groups, text_columns=5
     )
@@ -179,10 +192,14 @@ def _errors(fit: Fit, motions: Sequence[MeasuredMotion]) -> Table:
         )
         for test, measured in zip(fit.tests, motions, strict=True)
     )
-    caption = "Error of each test, as [A] Tables 2, 4, 5 and 7: root mean square, absolute and by the largest measured force."
+    name = force_scale(motions[0].loop.rotates)[0]
+    caption = (
+        "Root mean square error (RMSE) of each test, absolute and relative to the largest measured "
+        f"{name}, as [A] Tables 2, 4, 5 and 7."
+    )
     return Table(
         caption,
-        ("file", "motion", "samples", f"RMSE, {unit}", "RMSE / largest"),
+        ("file", "motion", "samples", f"RMSE, {unit}", f"RMSE / largest {name}"),
         groups,
         text_columns=2,
     )
@@ -209,31 +226,31 @@ def _correlations(fit: Fit) -> Table:
         )
         for name, u, s, row in zip(names, fit.problem.unknowns, deviation, correlation, strict=True)
     )
-    caption = "Covariance of the unknowns: standard deviation of each, and correlations."
-    return Table(caption, ("unknown", "deviation", *names), groups, text_columns=2)
+    caption = "Standard deviations of the unknowns, and the correlations between them."
+    return Table(caption, ("unknown", "standard deviation", *names), groups, text_columns=2)
 
 
 def _warnings(fit: Fit) -> list[str]:
-    flat = [
-        e.name for e in fit.estimates if ".rise_" in e.name and e.at_bound == "lower"
-    ]  # of a curve: no fault
+    # A rise of a monotone curve that is zero means a flat piece, which needs no warning.
+    flat = [e.name for e in fit.estimates if ".rise_" in e.name and e.at_bound == "lower"]
     found = [
-        f"{e.name} hit its {e.at_bound} bound."
+        f"The value of {e.name} is at its {e.at_bound} bound."
         for e in fit.estimates
         if e.at_bound and e.name not in flat
     ]
     unknown = [e.name for e in fit.estimates if not e.determined]
     if unknown:
-        found.append(f"These data do not determine {', '.join(unknown)}.")
+        found.append(f"The data do not determine {', '.join(unknown)}.")
     return found
 
 
 def _summary(fit: Fit, motions: Sequence[MeasuredMotion]) -> str:
-    unit = force_scale(motions[0].loop.rotates)[1]
+    name, unit = force_scale(motions[0].loop.rotates)
     normalised = [test.normalised for test in fit.tests]
     determined = sum(e.determined for e in fit.estimates)
     least, most = (f"{100.0 * value:.2g}" for value in (min(normalised), max(normalised)))
     return (
-        f"The fitted loops miss the measured ones by {fit.rmse:.3g} {unit} RMSE over all samples, {least} to {most} % of the "
-        f"largest force of each test. Of {len(fit.estimates)} unknowns the data determine {determined}."
+        "The root mean square difference (RMSE) between fitted and measured loops is "
+        f"{fit.rmse:.3g} {unit} over all samples. For single tests it is {least} to {most} % of "
+        f"the largest {name}. The data determine {determined} of {len(fit.estimates)} unknowns."
     )

@@ -1,1 +1,1 @@
-"""Write the page of `rig`."""
+"""Report page of `wm-drake rig`."""

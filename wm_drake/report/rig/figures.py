@@ -1,4 +1,4 @@
-"""Figures of force loops: over displacement, over velocity, over time; several overlaid."""
+"""Figures of force loops over displacement, velocity and time, single or overlaid."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -11,33 +11,37 @@ from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 
 from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH
-from wm_drake.report.wording import MM_PER_M
+from wm_drake.report.formatting import MM_PER_M
 from wm_drake.rigs import ForceLoop, RigRun
 from wm_drake.rigs.run import slider_friction_curves
 
 COLUMNS = 4
-"""Of small multiples at most."""
+"""Largest number of panels in a row."""
 
 DEG_PER_RAD = 180.0 / math.pi
 
 
 def motion_scale(rotates: bool) -> tuple[float, str, str]:
-    """Factor from SI to what people read, name and unit of a displacement or angle."""
+    """Return the factor from SI to the unit for reading, the name, and this unit of a motion.
+
+    Args:
+        rotates: Whether the motion is an angle in deg, not a displacement in mm.
+    """
     return (DEG_PER_RAD, "angle", "deg") if rotates else (MM_PER_M, "displacement", "mm")
 
 
 def force_scale(rotates: bool) -> tuple[str, str]:
-    """Name and unit of a force or moment."""
+    """Return the name and unit of a force, or of a moment if the motion is a rotation."""
     return ("moment", "N m") if rotates else ("force", "N")
 
 
 def frequency_text(loop: ForceLoop) -> str:
-    """Frequency of a loop."""
+    """Return the frequency of a loop with its unit."""
     return f"{loop.motion.frequency:.3g} Hz"
 
 
 def amplitude_text(loop: ForceLoop) -> str:
-    """Amplitude of a loop."""
+    """Return the amplitude of a loop with its unit."""
     factor, _, unit = motion_scale(loop.rotates)
     return f"{factor * loop.motion.amplitude:.3g} {unit}"
 
@@ -49,12 +53,13 @@ def overlaid_figure(
     *,
     over: str,
 ) -> Figure:
-    """Loops in panels, overlaid: [C] Figs. 6, 7, 14; [A] Figs. 5, 8, 12 (B).
+    """Draw loops in panels, several per panel, as [C] Figs. 6, 7, 14 and [A] Figs. 5, 8, 12 (B).
 
     Args:
-        loops: At least one.
-        panel, line: Text of a loop by which it gets its panel, and its line there.
-        over: displacement or velocity.
+        loops: At least one loop.
+        panel: Function that returns the title of the panel in which a loop is drawn.
+        line: Function that returns the legend text of a loop. It also selects the colour.
+        over: Abscissa: displacement or velocity.
     """
     rising = sorted(loops, key=lambda loop: (loop.motion.frequency, loop.motion.amplitude))
     by_amplitude = sorted(loops, key=lambda loop: (loop.motion.amplitude, loop.motion.frequency))
@@ -94,8 +99,8 @@ def overlaid_figure(
         axes.set_xlabel(head, fontsize=9.5)
         if index % columns == 0:
             axes.set_ylabel(", ".join(force_scale(rotates)), fontsize=9.5)
-        plain(axes)
-    handles = [axes_line(_colour(k, len(lines)), text) for k, text in enumerate(lines)]
+        style_panel(axes)
+    handles = [legend_line(_colour(k, len(lines)), text) for k, text in enumerate(lines)]
     figure.legend(
         handles=handles,
         loc="outside lower center",
@@ -107,7 +112,7 @@ def overlaid_figure(
 
 
 def time_figure(loop: ForceLoop) -> Figure:
-    """Displacement and force over one period, and the loop beside them: [A] Figs. 5, 8, 12; [C] Figs. 4, 5."""
+    """Draw motion and force over one period and the loop, as [A] Figs. 5, 8, 12, [C] Figs. 4, 5."""
     factor, name, unit = motion_scale(loop.rotates)
     force = force_scale(loop.rotates)
     figure = Figure(figsize=(WIDTH, 2.9), layout="constrained")
@@ -122,12 +127,12 @@ def time_figure(loop: ForceLoop) -> Figure:
     )
     left.set_xlabel("time, s", fontsize=9.5)
     left.set_ylabel(f"{name}, {unit} (dashed)", fontsize=9.5, color=QUIET)
-    plain(left)
+    style_panel(left)
     other = left.twinx()
     other.plot(time, _closed(loop.force), color=OURS, linewidth=1.6)
     other.set_ylabel(", ".join(force), fontsize=9.5, color=OURS)
     other.tick_params(labelsize=9)
-    _zero_in_the_middle(left, other)
+    _center_zero(left, other)
     speed = f"{'rate' if loop.rotates else 'velocity'}, {unit}/s"
     for axes, x, head in (
         (middle, loop.displacement, f"{name}, {unit}"),
@@ -136,12 +141,15 @@ def time_figure(loop: ForceLoop) -> Figure:
         axes.plot(factor * _closed(x), _closed(loop.force), color=OURS, linewidth=1.6)
         axes.set_xlabel(head, fontsize=9.5)
         axes.set_ylabel(", ".join(force), fontsize=9.5)
-        plain(axes)
+        style_panel(axes)
     return figure
 
 
 def friction_law_figure(run: RigRun) -> Figure | None:
-    """Friction over slider velocity at held deformation rates, as [C] Fig. 12; None for laws without MSTV friction."""
+    """Draw friction over slider velocity at constant deformation rates, as [C] Fig. 12.
+
+    The result is None for a law without MSTV friction.
+    """
     rates_mm_s = (1.0, 5.0, 20.0, 60.0)
     w = np.concatenate([-np.geomspace(0.08, 1e-5, 200), np.geomspace(1e-5, 0.08, 200)])
     curves = slider_friction_curves(run.bench, [u / MM_PER_M for u in rates_mm_s], w)
@@ -158,9 +166,9 @@ def friction_law_figure(run: RigRun) -> Figure | None:
             linewidth=1.4,
             label=f"{u:g} mm/s",
         )
-    axes.set_xlabel("velocity of the sponge on the tube, mm/s", fontsize=9.5)
-    axes.set_ylabel("friction on the sponge, N", fontsize=9.5)
-    plain(axes)
+    axes.set_xlabel("sliding velocity of the sponge on the tube, mm/s", fontsize=9.5)
+    axes.set_ylabel("friction force on the sponge, N", fontsize=9.5)
+    style_panel(axes)
     legend = {
         "loc": "upper left",
         "bbox_to_anchor": (1.02, 1.0),
@@ -172,8 +180,8 @@ def friction_law_figure(run: RigRun) -> Figure | None:
     return figure
 
 
-def plain(axes: Axes) -> None:
-    """A panel without frame, with grid and zero lines."""
+def style_panel(axes: Axes) -> None:
+    """Apply the style of a panel: grid and zero line, no frame at the top and the right."""
     axes.grid(color=GRID)
     axes.axhline(0.0, color=QUIET, linewidth=0.6)
     axes.set_axisbelow(True)
@@ -182,14 +190,14 @@ def plain(axes: Axes) -> None:
         axes.spines[side].set_visible(False)
 
 
-def axes_line(colour: Any, label: str, **style: Any) -> Any:
-    """A handle of a legend."""
+def legend_line(colour: Any, label: str, **style: Any) -> Any:
+    """Return a line for a legend."""
     from matplotlib.lines import Line2D
 
     return Line2D([], [], color=colour, label=label, **style)
 
 
-def _zero_in_the_middle(*panels: Axes) -> None:
+def _center_zero(*panels: Axes) -> None:
     for axes in panels:
         limit = 1.08 * max(abs(side) for side in axes.get_ylim())
         axes.set_ylim(-limit, limit)
@@ -200,7 +208,7 @@ def _closed(values: Any) -> Any:
 
 
 def _colour(index: int, count: int) -> Any:
-    """From blue to yellow, dark enough to read; alone, ours; of two, ours and the measured one's."""
+    """Return a colour of the scale from blue to yellow; for one or two lines a fixed colour."""
     if count <= 2:
         return (OURS, MEASURED)[index]
     palette: Colormap = colormaps["viridis"]
@@ -210,12 +218,12 @@ def _colour(index: int, count: int) -> Any:
 __all__ = [
     "MARK",
     "amplitude_text",
-    "axes_line",
     "force_scale",
     "frequency_text",
     "friction_law_figure",
+    "legend_line",
     "motion_scale",
     "overlaid_figure",
-    "plain",
+    "style_panel",
     "time_figure",
 ]

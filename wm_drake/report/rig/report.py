@@ -1,9 +1,10 @@
-"""The page and the tables of a rig run."""
+"""Report page and tables of a rig run."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import pandas as pd
 
+from wm_drake.report.formatting import MM_PER_M, number
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.rig.figures import (
     DEG_PER_RAD,
@@ -16,19 +17,23 @@ from wm_drake.report.rig.figures import (
     time_figure,
 )
 from wm_drake.report.tables import Group, Row, Table
-from wm_drake.report.wording import MM_PER_M, number
 from wm_drake.rigs import ForceLoop, RigRun
 
 SAMPLES_KEPT = 4
-"""Every so many samples of a loop go to its file."""
+"""Step between the samples of a loop that are written to its file."""
 
 
 def rig_report(run: RigRun, command: str = "") -> str:
-    """The report as text of one HTML file, with style and figures inside."""
+    """Return the report as text of one self-contained HTML file.
+
+    Args:
+        run: Result of the rig with at least one loop.
+        command: Command line of the run, shown on the page.
+    """
     return render(
         "rig/page.html",
         title=f"Bench test: {run.title}",
-        about="Steady force loops under harmonic motion, computed by the laws of the machine.",
+        about="Steady-state force loops under harmonic motion, computed with the force laws.",
         warnings=[],
         summary=_summary(run),
         pictures=_pictures(run),
@@ -39,12 +44,12 @@ def rig_report(run: RigRun, command: str = "") -> str:
 
 
 def loop_file(loop: ForceLoop) -> str:
-    """Name of the file of a loop."""
+    """Return the file name of a loop, made of its frequency and amplitude."""
     return f"loop_{frequency_text(loop)}_{amplitude_text(loop)}.csv".replace(" ", "")
 
 
 def loop_table(loop: ForceLoop) -> pd.DataFrame:
-    """A loop as a file that `wm-drake identify` reads; units in the heads."""
+    """Return a loop as a table that `wm-drake identify` reads, with units in the column heads."""
     factor, name, unit = motion_scale(loop.rotates)
     force, newton = force_scale(loop.rotates)
     columns = {
@@ -57,7 +62,10 @@ def loop_table(loop: ForceLoop) -> pd.DataFrame:
 
 
 def measures_table(run: RigRun) -> pd.DataFrame:
-    """What is read off each loop, in SI but for frequency, amplitude and loss angle; names carry the units."""
+    """Return the quantities derived from each loop, with units in the column names.
+
+    All values are in SI except frequency, amplitude and loss angle.
+    """
     rotates = run.bench.rotates
     factor, _, unit = motion_scale(rotates)
     rows = []
@@ -86,7 +94,7 @@ def measures_table(run: RigRun) -> pd.DataFrame:
 
 
 def measures_header(run: RigRun) -> tuple[str, ...]:
-    """Heads of `measures_cells`."""
+    """Return the column heads for the cells of `measures_cells`."""
     rotates = run.bench.rotates
     if rotates:
         units = (
@@ -106,7 +114,7 @@ def measures_header(run: RigRun) -> tuple[str, ...]:
 
 
 def measures_cells(run: RigRun) -> list[tuple[str, ...]]:
-    """What is read off each loop, for reading."""
+    """Return the quantities derived from each loop as text, one tuple of cells per loop."""
     found: list[tuple[str, ...]] = []
     per = 1.0 if run.bench.rotates else 1.0 / MM_PER_M
     for loop, m in zip(run.loops, run.measures, strict=True):
@@ -126,8 +134,10 @@ def measures_cells(run: RigRun) -> list[tuple[str, ...]]:
 
 def _measures(run: RigRun) -> Table:
     caption = (
-        "What is read off each loop. Energy: area of the loop. Equivalent damping: of the dashpot that takes the same "
-        "energy. Dynamic stiffness and loss angle: amplitude ratio and lead of the fundamental of the force against the motion."
+        "Quantities derived from each loop. Energy: area of the loop. Equivalent damping: "
+        "coefficient of the viscous damper that dissipates the same energy per cycle. Dynamic "
+        "stiffness and loss angle: amplitude ratio and phase lead of the fundamental of the force "
+        "with respect to the motion."
     )
     groups = tuple(Group(cells[0], (Row(cells[1:]),)) for cells in measures_cells(run))
     return Table(caption, measures_header(run), groups)
@@ -135,7 +145,8 @@ def _measures(run: RigRun) -> Table:
 
 def _numbers(run: RigRun) -> Table:
     groups = tuple(Group(key, (Row((value, source or "–")),)) for key, value, source in run.numbers)
-    return Table("Numbers of the component.", ("key", "value", "source"), groups, text_columns=3)
+    caption = "Parameters of the component."
+    return Table(caption, ("key", "value", "source"), groups, text_columns=3)
 
 
 def _pictures(run: RigRun) -> list[Picture]:
@@ -144,18 +155,20 @@ def _pictures(run: RigRun) -> list[Picture]:
     found = [
         picture(
             time_figure(largest),
-            f"Motion and force over a period, and the loop, at {which}.",
-            f"One period at {which}: motion and force over time, force over displacement and over velocity "
-            "(the form of [A] Figs. 5, 8, 12 and of [C] Figs. 4 and 5).",
+            f"Motion and force over one period, and the loop, at {which}.",
+            f"One period at {which}: motion and force over time, and the force over displacement "
+            "and over velocity (form of [A] Figs. 5, 8, 12 and [C] Figs. 4, 5).",
         )
     ]
-    frequencies, amplitudes = _texts(run.loops, frequency_text), _texts(run.loops, amplitude_text)
+    frequencies = _distinct(run.loops, frequency_text)
+    amplitudes = _distinct(run.loops, amplitude_text)
     if len(run.loops) > 1:
         found += [
             picture(
-                overlaid_figure(run.loops, frequency_text, amplitude_text, over=over),
-                f"Force over {over}, a panel for each frequency.",
-                f"Force over {over}: amplitudes overlaid, a panel for each frequency (the form of [C] Fig. 6).",
+                overlaid_figure(run.loops, panel=frequency_text, line=amplitude_text, over=over),
+                f"Force over {over}, one panel per frequency.",
+                f"Force over {over} for all amplitudes, one panel per frequency (form of [C] Fig. "
+                "6).",
             )
             for over in ("displacement", "velocity")
         ]
@@ -164,9 +177,12 @@ def _pictures(run: RigRun) -> list[Picture]:
         loops = [loop for loop in run.loops if amplitude_text(loop) in shared]
         found.append(
             picture(
-                overlaid_figure(loops, amplitude_text, frequency_text, over="displacement"),
-                "Force over displacement, a panel for each amplitude.",
-                "Force over displacement: frequencies overlaid, a panel for each amplitude (the form of [C] Figs. 7 and 14).",
+                overlaid_figure(
+                    loops, panel=amplitude_text, line=frequency_text, over="displacement"
+                ),
+                "Force over displacement, one panel per amplitude.",
+                "Force over displacement for all frequencies, one panel per amplitude (form of [C] "
+                "Figs. 7 and 14).",
             )
         )
     law = friction_law_figure(run)
@@ -174,15 +190,16 @@ def _pictures(run: RigRun) -> list[Picture]:
         found.append(
             picture(
                 law,
-                "Friction over sponge velocity at several deformation rates.",
-                "The MSTV law: friction over the velocity of the sponge at held deformation rates (the form of [C] Fig. 12).",
+                "Friction force over sliding velocity at several deformation rates.",
+                "MSTV law: friction force over the sliding velocity of the sponge, at constant "
+                "deformation rates (form of [C] Fig. 12).",
             )
         )
     return found
 
 
-def _texts(loops: Sequence[ForceLoop], text: object) -> list[str]:
-    return list(dict.fromkeys(text(loop) for loop in loops))  # type: ignore[operator]
+def _distinct(loops: Sequence[ForceLoop], text: Callable[[ForceLoop], str]) -> list[str]:
+    return list(dict.fromkeys(map(text, loops)))
 
 
 def _summary(run: RigRun) -> str:
@@ -192,12 +209,15 @@ def _summary(run: RigRun) -> str:
     if len(run.loops) == 1:
         loop = run.loops[0]
         return (
-            f"At {frequency_text(loop)} and {amplitude_text(loop)} the peak {force} is {number(peaks[0], 2)} {unit}; a cycle "
-            f"takes {number(energies[0], 2)} mJ."
+            f"At {frequency_text(loop)} and {amplitude_text(loop)}, the peak {force} is "
+            f"{number(peaks[0], 2)} {unit}, and the energy per cycle is "
+            f"{number(energies[0], 2)} mJ."
         )
     first, last = peaks.index(min(peaks)), peaks.index(max(peaks))
     at = [f"{frequency_text(run.loops[k])}, {amplitude_text(run.loops[k])}" for k in (first, last)]
     return (
-        f"{len(run.loops)} loops. The peak {force} goes from {number(peaks[first], 2)} {unit} ({at[0]}) to "
-        f"{number(peaks[last], 2)} {unit} ({at[1]}); a cycle takes {number(min(energies), 2)} to {number(max(energies), 2)} mJ."
+        f"{len(run.loops)} loops were computed. The peak {force} ranges from "
+        f"{number(peaks[first], 2)} {unit} ({at[0]}) to {number(peaks[last], 2)} {unit} ({at[1]}). "
+        f"The energy per cycle ranges from {number(min(energies), 2)} to "
+        f"{number(max(energies), 2)} mJ."
     )

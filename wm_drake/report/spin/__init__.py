@@ -1,1 +1,1 @@
-"""Write the page of `spin`."""
+"""Report page of `wm-drake spin`."""

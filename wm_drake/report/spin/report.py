@@ -1,4 +1,4 @@
-"""The report of a spin run: one HTML file that needs nothing else."""
+"""Report of a spin run: one self-contained HTML file."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,20 +7,19 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.model.scene import Gap
-from wm_drake.report import tables
-from wm_drake.report.figures import envelopes_figure, gaps_figure, gasket_figure, orbits_figure
-from wm_drake.report.page import Picture, picture, render, versions_of
-from wm_drake.report.tables import Table, amplitude_table
-from wm_drake.report.wording import (
+from wm_drake.report.formatting import (
     MM_PER_M,
     RPM_PER_RAD_S,
-    case_title,
-    has_gasket,
     number,
     percent,
     shape_name,
-    speed_rpm,
 )
+from wm_drake.report.page import Picture, picture, render, versions_of
+from wm_drake.report.spin import tables
+from wm_drake.report.spin.cases import case_title, has_gasket, speed_rpm
+from wm_drake.report.spin.figures import envelopes_figure, gaps_figure, gasket_figure, orbits_figure
+from wm_drake.report.spin.tables import amplitude_table
+from wm_drake.report.tables import Table, parameter_table
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 __all__ = ["amplitude_table", "spin_report"]
@@ -28,7 +27,15 @@ __all__ = ["amplitude_table", "spin_report"]
 
 @dataclass(frozen=True)
 class CaseView:
-    """What the page shows of one case; `facts` are short sentences above its figures."""
+    """Section of the page about one case.
+
+    Attributes:
+        anchor: Name for links to the section.
+        title: Heading.
+        facts: Short sentences above the figures.
+        pictures: Figures.
+        changed: Parameters of the case that differ from the machine's, if any.
+    """
 
     anchor: str
     title: str
@@ -38,14 +45,14 @@ class CaseView:
 
 
 def spin_report(result: SpinResult, command: str = "") -> str:
-    """The report as text of one HTML file, with style and figures inside.
+    """Return the report as text of one self-contained HTML file.
 
     Args:
-        result: At least one case.
-        command: The command line that made it, to be shown.
+        result: Result with at least one case.
+        command: Command line of the run, shown on the page.
 
     Raises:
-        InputError: a file of measured amplitudes cannot be used.
+        InputError: A file of measured amplitudes cannot be used.
     """
     table = amplitude_table(result)
     return render(
@@ -63,34 +70,49 @@ def spin_report(result: SpinResult, command: str = "") -> str:
         facts=facts_of_run(result, command),
         loads=tables.loads(result),
         profiles=tables.profiles(result),
-        numbers=tables.parameter_table(result.parameters),
+        numbers=parameter_table(result.parameters),
     )
 
 
 def summary(result: SpinResult, table: pd.DataFrame) -> str:
-    """One paragraph, made from the numbers of the cases that came to their end."""
+    """Return one paragraph about the cases that reached their end."""
     ended = [case for case in result.results if not case.record.attrs["diverged"]]
-    count = len(result.results)
-    runs = "1 case was" if count == 1 else f"{count} cases were"
+    count, diverged = len(result.results), len(result.results) - len(ended)
+    cases = "1 case was" if count == 1 else f"{count} cases were"
     speed = number(RPM_PER_RAD_S * max(max(case.case.profile.speed) for case in result.results), 0)
-    opening = f"{runs} run, at drum speeds up to {speed} rpm, with the {result.engine} engine."
+    opening = f"{cases} run with the {result.engine} engine, at drum speeds up to {speed} rpm."
     if not ended:
-        return f"{opening} None came to its end, so there is nothing to sum up."
-    if len(ended) < count:
-        opening += f" {count - len(ended)} diverged and {'is' if count - len(ended) == 1 else 'are'} left out of this paragraph."
+        return f"{opening} Every run diverged, so there is no result to summarize."
+    if diverged:
+        excluded = "1 run diverged and is" if diverged == 1 else f"{diverged} runs diverged and are"
+        opening += f" {excluded} excluded from this summary."
     return " ".join(
-        filter(None, [opening, _largest_motion(ended), _nearest(ended), _agreement(ended, table)])
+        filter(
+            None,
+            [
+                opening,
+                _largest_amplitude_sentence(ended),
+                _smallest_gap_sentence(ended),
+                _agreement_sentence(ended, table),
+            ],
+        )
     )
 
 
-def _largest_motion(cases: list[CaseResult]) -> str:
+def _largest_amplitude_sentence(cases: list[CaseResult]) -> str:
     case = max(cases, key=lambda case: _peak(case)[0])
     size, sensor, speed = _peak(case)
-    return f"The tub moves most with load {case_title(case)}: {number(size)} mm at sensor {sensor}, at {number(speed, 0)} rpm."
+    return (
+        f"The largest amplitude occurs with load {case_title(case)}: {number(size)} mm at sensor "
+        f"{sensor}, at {number(speed, 0)} rpm."
+    )
 
 
 def _peak(case: CaseResult) -> tuple[float, str, float]:
-    """Largest amplitude [mm], its sensor, and the drum speed there [rpm]; 0 where the run was too short for the filter."""
+    """Return the largest amplitude [mm], its sensor, and the drum speed there [rpm].
+
+    The amplitude is 0 if the run was too short for the filter.
+    """
     amplitude = case.measures.amplitude.fillna(0.0)
     index = int(np.argmax(amplitude.values))
     speed = float(case.measures.critical_speed.values[index])
@@ -101,29 +123,35 @@ def _peak(case: CaseResult) -> tuple[float, str, float]:
     )
 
 
-def _nearest(cases: list[CaseResult]) -> str:
+def _smallest_gap_sentence(cases: list[CaseResult]) -> str:
     found = [(case.measures.smallest_gap, case) for case in cases if case.measures.smallest_gap]
     if not found:
         return ""
     gap, case = min(found, key=lambda pair: pair[0].distance)
-    return f"The smallest gap to the housing occurs with load {case_title(case)}: {_gap_words(case, gap)}."
+    return (
+        f"The smallest gap to the housing occurs with load {case_title(case)}: "
+        f"{_gap_text(case, gap)}."
+    )
 
 
-def _gap_words(case: CaseResult, gap: Gap) -> str:
+def _gap_text(case: CaseResult, gap: Gap) -> str:
     speed = number(speed_rpm(case, gap.time), 0)
-    return f"{number(MM_PER_M * gap.distance)} mm between {shape_name(gap.moving)} and {shape_name(gap.fixed)}, at {speed} rpm"
+    parts = f"{shape_name(gap.moving)} and {shape_name(gap.fixed)}"
+    return f"{number(MM_PER_M * gap.distance)} mm between {parts}, at {speed} rpm"
 
 
 def _case_facts(case: CaseResult) -> str:
     size, sensor, speed = _peak(case)
-    facts = "The run is too short for the filter: it has no amplitudes."
+    facts = "The run is too short for the band-pass filter, so it has no amplitudes."
     if _has_envelopes(case):
-        facts = f"Largest motion: {number(size)} mm at sensor {sensor}, at {number(speed, 0)} rpm."
+        facts = (
+            f"Largest amplitude: {number(size)} mm at sensor {sensor}, at {number(speed, 0)} rpm."
+        )
     gap = case.measures.smallest_gap
-    return f"{facts} Smallest gap to the housing: {_gap_words(case, gap)}." if gap else facts
+    return f"{facts} Smallest gap to the housing: {_gap_text(case, gap)}." if gap else facts
 
 
-def _agreement(cases: list[CaseResult], table: pd.DataFrame) -> str:
+def _agreement_sentence(cases: list[CaseResult], table: pd.DataFrame) -> str:
     changes = [
         change
         for case in cases
@@ -131,39 +159,43 @@ def _agreement(cases: list[CaseResult], table: pd.DataFrame) -> str:
         if np.isfinite(change.percent)
     ]
     if not changes:
-        return "The machine file has no measured amplitudes of these cases to compare with."
+        return "The machine file has no measured amplitudes for these cases."
     mean = float(np.mean([abs(change.percent) for change in changes]))
     worst = max(changes, key=lambda change: abs(change.percent))
     return (
-        f"Against the experiment, {len(changes)} amplitudes can be compared: they differ by {number(mean, 0)} % in the mean "
-        f"of absolute values and by {percent(worst.percent)} at most: sensor {worst.sensor}, load {worst.case}."
+        f"{len(changes)} amplitudes can be compared with the experiment. The mean absolute "
+        f"difference is {number(mean, 0)} %. The largest difference is {percent(worst.percent)}, "
+        f"at sensor {worst.sensor} with load {worst.case}."
     )
 
 
 def warnings_of(result: SpinResult) -> list[str]:
-    """What a reader must know before trusting the numbers: runs that diverged, parts that overlap, another profile."""
+    """Return warnings about runs that diverged, parts that overlap, and another spin profile."""
     found = []
     for case in result.results:
         gap, title = case.measures.smallest_gap, case_title(case)
         if case.record.attrs["diverged"]:
             found.append(
-                f"Load {title}: {case.record.attrs['diverged']}. Its numbers below are those up to then."
+                f"Load {title}: {case.record.attrs['diverged']}. The results below cover the time "
+                "before that."
             )
         if gap is not None and gap.distance <= 0.0:
             parts = f"{shape_name(gap.moving)} and {shape_name(gap.fixed)}"
             found.append(
-                f"Load {title}: {parts} overlap by {number(-MM_PER_M * gap.distance)} mm. The model has no contact: the real "
-                "machine would strike there, and what follows is not to be trusted."
+                f"Load {title}: {parts} overlap by {number(-MM_PER_M * gap.distance)} mm. The "
+                "model has no contact forces. In the real machine these parts would collide, and "
+                "the motion after that is not valid."
             )
         if case.case.profile != result.parameters.profile:
             found.append(
-                f"Load {title}: the spin profile is not the machine file's, to which measured amplitudes belong."
+                f"Load {title}: the spin profile differs from the one in the machine file. "
+                "Measured amplitudes belong to the profile of the machine file."
             )
     return found
 
 
 def facts_of_run(result: SpinResult, command: str) -> list[tuple[str, str]]:
-    """What was run and by what, as pairs of word and text."""
+    """Return what was run and with which software, as pairs of heading and text."""
     attrs = result.results[0].record.attrs
     times = [f"{case_title(case)} {number(case.wall_s)} s" for case in result.results]
     facts = [
@@ -187,7 +219,7 @@ def _case_view(result: SpinResult, index: int, table: pd.DataFrame) -> CaseView:
         case_title(case),
         _case_facts(case),
         shown,
-        tables.changed_numbers(result, case),
+        tables.changed_parameters(result, case),
     )
 
 
@@ -205,11 +237,12 @@ def _envelopes_picture(case: CaseResult, table: pd.DataFrame) -> Picture | None:
         for name in amplitude.sensor.values
     )
     caption = (
-        "Displacement at each sensor over the run, band 0.5–20 Hz. The band reaches from the lower to the upper envelope; the "
-        "dot is where it is widest from zero, with its drum speed written above. All panels have the same scale."
+        "Displacement at each sensor over time, in the band 0.5–20 Hz. The shaded area extends "
+        "from the lower to the upper envelope. The dot marks the largest absolute value; the top "
+        "of the panel gives this value and its drum speed. All panels have the same scale."
     )
     if measured is not None:
-        caption += " Dashed: measured amplitude, on both sides of zero."
+        caption += " Dashed lines: measured amplitude, on both sides of zero."
     alternative = (
         f"Envelopes of the displacement over time, load {case_title(case)}. Largest: {largest}."
     )
@@ -221,10 +254,14 @@ def _orbits_picture(case: CaseResult) -> Picture | None:
         return None
     depths = case.record.sensor_point.sel(axis="y")
     caption = (
-        "Path of the drum axis, seen from the front of the machine, in the planes of the foremost and the rearmost sensor. "
-        "Strong line: the drum revolution in which the axis is farthest from rest; pale line: those before and after it."
+        "Path of the drum axis in the planes of the foremost and the rearmost sensor, seen from "
+        "the front of the machine. Dark line: the drum revolution in which the axis is farthest "
+        "from its rest position. Pale line: the revolutions before and after it."
     )
-    alternative = f"Orbits of the drum axis, front and rear, around the largest motion, load {case_title(case)}."
+    alternative = (
+        "Orbits of the drum axis, front and rear, around the largest motion, "
+        f"load {case_title(case)}."
+    )
     return picture(
         orbits_figure(case.record, float(depths.min()), float(depths.max())), alternative, caption
     )
@@ -237,12 +274,13 @@ def _gasket_picture(case: CaseResult) -> Picture | None:
         np.asarray(values) for values in (case.measures.gasket_force, case.measures.gasket_moment)
     )
     caption = (
-        "Force (upper row, N) and moment (lower row, N m) of the gasket on the housing. The band reaches from the smallest to "
-        "the largest value within each drum revolution; the dot is the largest absolute value."
+        "Force (upper row, N) and moment (lower row, N m) of the gasket on the housing over time. "
+        "The shaded area extends from the smallest to the largest value within each drum "
+        "revolution. The dot marks the largest absolute value."
     )
     alternative = (
-        f"Gasket force and moment over time, load {case_title(case)}. Largest force {number(float(force.max()))} N, largest "
-        f"moment {number(float(moment.max()), 2)} N m."
+        f"Gasket force and moment over time, load {case_title(case)}. Largest force "
+        f"{number(float(force.max()))} N, largest moment {number(float(moment.max()), 2)} N m."
     )
     return picture(gasket_figure(case.record), alternative, caption)
 
@@ -251,7 +289,10 @@ def _gaps_picture(result: SpinResult) -> Picture | None:
     cases = [case for case in result.results if case.measures.smallest_gap]
     if len(cases) < 2:
         return None
-    caption = "Smallest gap of each load, the two parts between which it occurs, and the drum speed at that moment."
+    caption = (
+        "Smallest gap for each load, the two parts between which it occurs, and the drum speed at "
+        "that time."
+    )
     return picture(
         gaps_figure(cases),
         "Smallest gap between tub and housing per load; the numbers are in the table above.",

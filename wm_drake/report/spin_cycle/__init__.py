@@ -1,1 +1,1 @@
-"""Write the page of `spin_cycle`."""
+"""Report page of `wm-drake study spin-cycle`."""

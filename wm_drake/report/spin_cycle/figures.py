@@ -1,4 +1,4 @@
-"""Figures of a spin-cycle study."""
+"""Figures of a spin-cycle study: profile, heat map, bars per region."""
 
 from collections.abc import Sequence
 
@@ -12,23 +12,23 @@ from matplotlib.patches import Patch
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH
-from wm_drake.report.wording import MM_PER_M, RPM_PER_RAD_S, number
+from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
 
-DARK_FROM = 0.55
-"""Part of the colour scale from which writing on it is white."""
+WHITE_TEXT_FROM = 0.55
+"""Fraction of the colour scale above which text on a cell is white."""
 
 
 def profile_figure(profile: SpinProfile) -> Figure:
-    """Drum speed over time, regions shaded and named."""
+    """Draw the drum speed over time, with shaded and named regions."""
     figure = Figure(figsize=(WIDTH, 2.4), layout="constrained")
     axes = figure.subplots()
     top = RPM_PER_RAD_S * max(profile.speed)
-    for number_of, region in enumerate(profile.regions):
+    for index, region in enumerate(profile.regions):
         axes.axvspan(
             region.begin,
             region.end,
             facecolor=OURS,
-            alpha=0.16 if number_of % 2 else 0.07,
+            alpha=0.16 if index % 2 else 0.07,
             linewidth=0.0,
         )
         axes.text(
@@ -54,12 +54,12 @@ def profile_figure(profile: SpinProfile) -> Figure:
 def heat_map_figure(
     values: FloatArray, rows: Sequence[str], columns: Sequence[str], notes: Sequence[Sequence[str]]
 ) -> Figure:
-    """Numbers on colours, one colour scale for all.
+    """Draw a table of numbers on coloured cells, with one colour scale.
 
     Args:
         values: (rows, columns) RMS displacement. [m]
-        rows, columns: Names.
-        notes: (rows, columns) small text below each number, "" for none.
+        rows, columns: Names of the rows and columns.
+        notes: (rows, columns) small text below each number, or "".
     """
     shown = MM_PER_M * values
     figure = Figure(figsize=(WIDTH, 0.55 * len(rows) + 1.2), layout="constrained")
@@ -68,7 +68,7 @@ def heat_map_figure(
     image = axes.imshow(shown, cmap="Blues", vmin=0.0, vmax=top, aspect="auto")
     for row, column in np.ndindex(*shown.shape):
         value = float(shown[row, column])
-        ink = "white" if value > DARK_FROM * top else MARK
+        ink = "white" if value > WHITE_TEXT_FROM * top else MARK
         note = notes[row][column]
         axes.text(
             column,
@@ -107,12 +107,16 @@ def bars_figure(
     measured: xr.DataArray | None,
     name: str = "measured",
 ) -> Figure:
-    """RMS displacement per region, a panel for each axis (columns) of each sensor (rows), as [A] Figs. 24 to 26.
+    """Draw the RMS displacement per region, as [A] Figs. 24 to 26.
+
+    There is one panel for each sensor (rows) and axis (columns). All displacements are those of one
+    case and have the shape (region, accelerometer, axis). [m]
 
     Args:
-        computed, integrated: (region, accelerometer, axis) of one case, direct and from acceleration, if wanted. [m]
-        measured: The same, or None.
-        name: What the measurement is called.
+        computed: Displacements computed directly.
+        integrated: Displacements from integrated acceleration, or None to omit them.
+        measured: Measured displacements, or None if there are none.
+        name: Name of the measurement in the legend.
     """
     sensors, axes_names = (
         list(map(str, computed[dim].values)) for dim in ("accelerometer", "axis")
@@ -162,9 +166,8 @@ def bars_figure(
                 panel.spines[side].set_visible(False)
             panel.spines["left"].set_color(QUIET)
         panels[row, 0].set_ylabel("RMS, mm", fontsize=9.5)
-    panels[0, 0].set_ylim(
-        0.0, 1.25 * panels[0, 0].get_ylim()[1]
-    )  # room for the names of the panels
+    # room for the names of the panels
+    panels[0, 0].set_ylim(0.0, 1.25 * panels[0, 0].get_ylim()[1])
     handles: list[Artist] = [
         Patch(color=OURS, label="wm_drake" if integrated is None else "wm_drake, displacement")
     ]

@@ -1,4 +1,4 @@
-"""The report of a spin-cycle study: one HTML file that needs nothing else."""
+"""Report of a spin-cycle study: one self-contained HTML file."""
 
 import re
 from dataclasses import dataclass
@@ -7,21 +7,21 @@ from pathlib import Path
 import numpy as np
 
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
+from wm_drake.report.formatting import MM_PER_M, number
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.spin_cycle import tables
 from wm_drake.report.spin_cycle.figures import bars_figure, heat_map_figure, profile_figure
 from wm_drake.report.tables import Table, parameter_table
-from wm_drake.report.wording import MM_PER_M, number
-from wm_drake.simulation.runs import versions
+from wm_drake.simulation.records import versions
 from wm_drake.studies.spin_cycle.study import SpinCycleResult, average_errors, disagreement, largest
 
 SHOWN_MASSES = ((0.4, 0.0, 0.0), (0.0, 0.4, 0.0), (0.4, 0.4, 180.0))
-"""Front mass, rear mass, phase of the cases that [A] Figs. 24 to 26 show. [kg, kg, deg]"""
+"""Front mass, rear mass and phase of the cases of [A] Figs. 24 to 26. [kg, kg, deg]"""
 
 
 @dataclass(frozen=True)
 class CaseView:
-    """What the page shows of one case."""
+    """Section of the page about one case."""
 
     anchor: str
     title: str
@@ -30,12 +30,12 @@ class CaseView:
 
 
 def spin_cycle_report(result: SpinCycleResult, engine: str, command: str = "") -> str:
-    """The report as text of one HTML file, with style and figures inside.
+    """Return the report as text of one self-contained HTML file.
 
     Args:
-        result: At least one case.
-        engine: That ran it.
-        command: The command line that made it, to be shown.
+        result: Result with at least one case.
+        engine: Name of the engine of the runs.
+        command: Command line of the study, shown on the page.
     """
     return render(
         "spin_cycle/page.html",
@@ -54,33 +54,35 @@ def spin_cycle_report(result: SpinCycleResult, engine: str, command: str = "") -
 
 
 def summary(result: SpinCycleResult, engine: str) -> str:
-    """One paragraph, made from the numbers."""
+    """Return one paragraph about displacements, gaps, and errors against a measurement."""
     count = len(result.cases)
     sentences = [
-        f"{count} unbalance case{'s were' if count > 1 else ' was'} run through the profile with the {engine} engine."
+        f"{count} unbalance case{'s were' if count > 1 else ' was'} run over the spin profile with "
+        f"the {engine} engine."
     ]
     worst = largest(result.displacement)
     if worst:
         sentences.append(
-            f"The largest RMS displacement is {number(MM_PER_M * worst.value, 2)} mm: case {worst.case} "
-            f"({case_words(_case(result, worst.case))}), region {worst.region}, sensor {worst.accelerometer}, "
-            f"axis {worst.axis}."
+            f"The largest RMS displacement is {number(MM_PER_M * worst.value, 2)} mm. It occurs in "
+            f"case {worst.case} ({case_description(_case(result, worst.case))}), in region "
+            f"{worst.region}, at sensor {worst.accelerometer}, axis {worst.axis}."
         )
     gaps = result.smallest_gap.dropna("case")
     if gaps.size:
         nearest = str(gaps.case.values[int(np.argmin(gaps.values))])
         sentences.append(
-            f"The tub comes nearest to the housing in case {nearest} ({case_words(_case(result, nearest))}): "
-            f"{number(MM_PER_M * float(gaps.min()))} mm."
+            "The smallest gap between tub and housing is "
+            f"{number(MM_PER_M * float(gaps.min()))} mm, in case {nearest} "
+            f"({case_description(_case(result, nearest))})."
         )
     apart = float(disagreement(result).max(skipna=True))
     if np.isfinite(apart):
         sentences.append(
-            f"Displacements taken directly and by integrating acceleration twice differ by at most {number(100 * apart, 2)} % "
-            "in any region."
+            "The RMS displacements computed directly and by integrating the acceleration twice "
+            f"differ by at most {number(100 * apart, 2)} % in any region."
         )
     if result.measured is None:
-        sentences.append("No measurement was given to compare with.")
+        sentences.append("No measurement was given for comparison.")
     else:
         errors = average_errors(result.displacement, result.measured)
         mean, deviation = (
@@ -88,17 +90,18 @@ def summary(result: SpinCycleResult, engine: str) -> str:
             for value in (errors.mean(skipna=True), errors.std(skipna=True))
         )
         sentences.append(
-            f"Against the measurement, the average error is {mean} %, standard deviation over the cases {deviation} % "
-            "([A] reports 20.1 and 4.1 % for its own)."
+            f"Compared with the measurement, the average error is {mean} %, with a standard "
+            f"deviation of {deviation} % over the cases. ([A] reports 20.1 % and 4.1 % for its own "
+            "model and machine.)"
         )
     return " ".join(sentences)
 
 
-def case_words(case: UnbalanceCase) -> str:
-    """Masses and phase of a case."""
+def case_description(case: UnbalanceCase) -> str:
+    """Return the masses and the phase of a case, for example `400 g at the front`."""
     masses = [
         f"{number(1e3 * mass, 0)} g {where}"
-        for mass, where in ((case.front, "in front"), (case.rear, "at the rear"))
+        for mass, where in ((case.front, "at the front"), (case.rear, "at the rear"))
         if mass > 0.0
     ]
     phase = f", {number(float(np.rad2deg(case.phase)), 0)}° apart" if len(masses) == 2 else ""
@@ -106,7 +109,11 @@ def case_words(case: UnbalanceCase) -> str:
 
 
 def shown_cases(result: SpinCycleResult) -> list[UnbalanceCase]:
-    """Those that [A] shows, or the first few where they were not run, and the worst."""
+    """Return the cases that the page shows in detail.
+
+    These are the cases of the figures of [A], or the first three if none of them was run, and the
+    case with the largest RMS displacement.
+    """
     wanted = [
         case
         for masses in SHOWN_MASSES
@@ -119,9 +126,9 @@ def shown_cases(result: SpinCycleResult) -> list[UnbalanceCase]:
 
 
 def warnings_of(result: SpinCycleResult) -> list[str]:
-    """Runs that diverged, parts that overlap, two ways of measuring that do not agree, imperfections that are on."""
+    """Return warnings about divergence, overlap, inaccurate integration, and imperfections."""
     found = [
-        f"Case {case.name} {text}. Regions it did not get through have no number."
+        f"Case {case.name}: {text}. Regions that this run did not complete have no values."
         for case, text in zip(result.cases, result.diverged, strict=True)
         if text
     ]
@@ -134,28 +141,32 @@ def warnings_of(result: SpinCycleResult) -> list[str]:
     ]
     if touching:
         found.append(
-            f"Tub and housing overlap in case {', '.join(touching)}. The model has no contact: the real machine would strike."
+            f"Tub and housing overlap in case {', '.join(touching)}. The model has no contact "
+            "forces. In the real machine, tub and housing would collide."
         )
     apart = float(disagreement(result).max(skipna=True))
     if apart > 0.01:
         found.append(
-            f"Displacements from acceleration are {number(100 * apart, 1)} % off in some region: its motion is too small, or "
-            "too fast for samples every 5 ms, to be integrated."
+            "In at least one region, the RMS displacements from integrated acceleration differ by "
+            f"{number(100 * apart, 1)} % from the direct ones. The motion there is too small for "
+            "the integration, or too fast for a sampling interval of 5 ms."
         )
     faults = result.parameters.imperfections
     if faults.residual_imbalance.mass > 0.0:
         found.append(
-            f"The drum has a residual imbalance of {number(1e3 * faults.residual_imbalance.mass)} g."
+            "The drum has a residual imbalance of "
+            f"{number(1e3 * faults.residual_imbalance.mass)} g."
         )
     if faults.phase_error != 0.0:
         found.append(
-            f"Phases between front and rear are {number(float(np.rad2deg(faults.phase_error)))}° off."
+            "The phase between front and rear masses has an error of "
+            f"{number(float(np.rad2deg(faults.phase_error)))}°."
         )
     if faults.bearing:
         radial, tilting = 1e-3 * faults.bearing.radial_stiffness, faults.bearing.tilting_stiffness
         found.append(
-            f"The drum can whirl: its bearing gives by {number(radial, 0)} N/mm across its axis and "
-            f"{number(tilting, 0)} N m/rad."
+            "The drum bearing is compliant, so the drum can whirl: the radial stiffness is "
+            f"{number(radial, 0)} N/mm and the tilting stiffness {number(tilting, 0)} N m/rad."
         )
     return found
 
@@ -169,7 +180,7 @@ def _profile_picture(result: SpinCycleResult) -> Picture:
     return picture(
         profile_figure(result.profile),
         f"Spin profile with the regions {names}.",
-        "Drum speed over time, and the regions.",
+        "Drum speed over time. Shaded areas: regions.",
     )
 
 
@@ -185,7 +196,12 @@ def _worst_picture(result: SpinCycleResult) -> Picture | None:
         [f"case {result.cases[index].name}" if len(result.cases) > 1 else "" for index in row]
         for row in which
     ]
-    caption = "Largest RMS displacement of any case, by region, sensor and axis, in mm; below it the case."
+    caption = (
+        "Largest RMS displacement of all cases in mm, for each region (rows), sensor and axis "
+        "(columns)."
+    )
+    if len(result.cases) > 1:
+        caption += " The case in which it occurs is given below the number."
     figure = heat_map_figure(
         np.where(values < 0.0, np.nan, values), list(map(str, shown.region.values)), columns, notes
     )
@@ -201,8 +217,11 @@ def _case_view(result: SpinCycleResult, case: UnbalanceCase) -> CaseView:
     measured = result.measured.sel(case=case.name) if result.measured is not None else None
     if measured is not None and not np.isfinite(measured).any():
         measured = None
-    title = f"Case {case.name}: {case_words(case)}"
-    caption = "RMS displacement per region; rows are sensors, columns axes; all panels have the same scale."
+    title = f"Case {case.name}: {case_description(case)}"
+    caption = (
+        "RMS displacement per region. Each row is a sensor, each column an axis. All panels have "
+        "the same scale."
+    )
     shown = picture(
         bars_figure(computed, integrated, measured),
         f"{title}: RMS displacement per region.",
@@ -217,18 +236,19 @@ def _case_view(result: SpinCycleResult, case: UnbalanceCase) -> CaseView:
 
 
 def _facts(result: SpinCycleResult, engine: str, command: str) -> list[tuple[str, str]]:
-    planes = [
-        f"{name} {frame.removeprefix('sensor_')}"
+    sensors = [
+        f"{name} (frame {frame})"
         for name, frame in result.parameters.accelerometer_frames().items()
     ]
     facts = [
         ("Machine", result.parameters.name),
         ("SDF model", Path(result.parameters.model).name),
         ("Engine", engine),
-        ("Sensors", f"at the frames {', '.join(planes)}; axes x to the right, y to the rear, z up"),
+        ("Sensors", f"{', '.join(sensors)}; axes x to the right, y to the rear, z up"),
         (
             "Displacement",
-            "from rest, without what is slower than 0.5 Hz; RMS over all samples of a region, every 5 ms",
+            "from the rest position, with a high-pass filter of 0.5 Hz; RMS over all samples of a "
+            "region, one every 5 ms",
         ),
         ("Versions", ", ".join(f"{name} {text}" for name, text in versions().items())),
         ("Command", command),

@@ -1,11 +1,11 @@
-"""Tables of a spin-cycle study."""
+"""Tables of a spin-cycle study: numbers for files, text for a page."""
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
+from wm_drake.report.formatting import MISSING, MM_PER_M, RPM_PER_RAD_S, number
 from wm_drake.report.tables import Group, Row, Table
-from wm_drake.report.wording import MISSING, MM_PER_M, RPM_PER_RAD_S, number
 from wm_drake.studies.spin_cycle.study import (
     SpinCycleResult,
     average_errors,
@@ -17,7 +17,7 @@ from wm_drake.studies.spin_cycle.study import (
 
 
 def case_table(result: SpinCycleResult) -> pd.DataFrame:
-    """One row a case, in the form of [A] Table 9, with the largest RMS displacement and the smallest gap."""
+    """Return one row per case as [A] Table 9, with largest RMS displacement and smallest gap."""
     errors = (
         average_errors(result.displacement, result.measured)
         if result.measured is not None
@@ -45,7 +45,7 @@ def case_table(result: SpinCycleResult) -> pd.DataFrame:
 
 
 def cases(result: SpinCycleResult) -> Table:
-    """`case_table` as text."""
+    """Return the cases with their results as a table of text."""
     table = case_table(result)
     heads = {
         "front_g": "front mass, g",
@@ -74,20 +74,27 @@ def cases(result: SpinCycleResult) -> Table:
         alarm = row["smallest_gap_mm"] <= 0.0
         groups.append(Group(str(row["case"]), (Row(tuple(cells), "alarm" if alarm else ""),)))
     caption = (
-        "Cases in the order of the table that was run: the largest RMS displacement of any sensor and axis in any region, and "
-        "the smallest gap between tub and housing."
+        "Cases in the order of the input table, with the largest RMS displacement of any sensor "
+        "and axis in any region, and the smallest gap between tub and housing."
     )
     if "average_error_percent" in table:
-        caption += " Average error: mean over regions, sensors and axes of |measured − computed| / measured."
+        caption += (
+            " Average error: mean over regions, sensors and axes of |measured − computed| / "
+            "measured."
+        )
     if "published_error_percent" in table:
         caption += (
-            " [A] Table 9: what that paper's model differs from its experiment, on its machine."
+            " [A] Table 9: average error of the model of [A] against the experiment of [A], with "
+            "its own machine."
         )
     return Table(caption, ("case", *(heads[name] for name in shown)), tuple(groups))
 
 
 def regions(result: SpinCycleResult) -> Table:
-    """What the regions are, how well the two ways of taking displacements agree there, and the errors against a measurement."""
+    """Return limits and results of each region, and its errors if there is a measurement.
+
+    One column compares RMS displacements computed directly and by integrating the acceleration.
+    """
     apart = disagreement(result).max("case")
     header = [
         "region",
@@ -99,7 +106,7 @@ def regions(result: SpinCycleResult) -> Table:
     ]
     if result.measured is not None:
         mean, deviation = mean_and_deviation(region_errors(result.displacement, result.measured))
-        header += ["mean error (9), %", "standard deviation, %"]
+        header += ["mean error, [A] Eq. (9), %", "standard deviation, %"]
     groups = []
     for region in result.profile.regions:
         corners = [
@@ -129,16 +136,20 @@ def regions(result: SpinCycleResult) -> Table:
             ]
         groups.append(Group(region.name, (Row(tuple(cells)),)))
     caption = (
-        "Regions of the spin profile. Direct vs. integrated: how far RMS displacements taken directly and by integrating the "
-        "acceleration twice are apart, norm over all sensors and axes, in the worst case."
+        "Regions of the spin profile. Direct vs. integrated: difference between the RMS "
+        "displacements computed directly and by integrating the acceleration twice, with norms "
+        "over all sensors and axes, for the worst case."
     )
     if result.measured is not None:
-        caption += " Error (9): |measured − computed| / |measured|, norms over sensors and axes, [A] Eq. (9); over the cases."
+        caption += (
+            " Error: |measured − computed| / |measured| with norms over sensors and axes, [A] Eq. "
+            "(9); mean and standard deviation over the cases."
+        )
     return Table(caption, tuple(header), tuple(groups))
 
 
 def displacements(result: SpinCycleResult, case: str) -> Table:
-    """RMS displacements of one case: region x sensor and axis."""
+    """Return the RMS displacements of one case by region (rows), sensor and axis (columns)."""
     values = result.displacement.sel(case=case)
     header = [
         f"{sensor} {axis}" for sensor in values.accelerometer.values for axis in values.axis.values
@@ -154,11 +165,14 @@ def displacements(result: SpinCycleResult, case: str) -> Table:
         )
         for region in values.region.values
     )
-    return Table(f"RMS displacement of case {case}, mm.", ("region", *header), groups)
+    return Table(f"RMS displacement of case {case}, in mm.", ("region", *header), groups)
 
 
 def worst_of_all(displacement: xr.DataArray) -> tuple[np.ndarray, np.ndarray]:
-    """Largest over the cases per region and sensor-axis, and the number of the case, each (regions, sensors * axes). [m]"""
+    """Return the largest value over the cases, and the index of the case in which it occurs.
+
+    Both have the shape (regions, sensors * axes). A value without any number is -1. [m]
+    """
     values = displacement.values.reshape(*displacement.shape[:2], -1)
     filled = np.where(np.isfinite(values), values, -1.0)
     return filled.max(axis=0), filled.argmax(axis=0)

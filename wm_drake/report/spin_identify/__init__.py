@@ -1,1 +1,1 @@
-"""Write the page of `spin_identify`."""
+"""Report page of `wm-drake study spin-identify`."""

@@ -1,30 +1,36 @@
-"""The report of an identification from a spin cycle: one HTML file that needs nothing else."""
+"""Report of an identification from a spin cycle: one self-contained HTML file."""
 
 from pathlib import Path
 
 import numpy as np
 
 from wm_drake.parameters.units import Unit
+from wm_drake.report.formatting import MISSING, number
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.spin_cycle.figures import bars_figure, profile_figure
-from wm_drake.report.spin_cycle.report import case_words
+from wm_drake.report.spin_cycle.report import case_description
 from wm_drake.report.tables import Group, Row, Table
-from wm_drake.report.wording import MISSING, number
-from wm_drake.simulation.runs import versions
+from wm_drake.simulation.records import versions
 from wm_drake.studies.spin_cycle.study import average_errors, region_errors
 from wm_drake.studies.spin_identification.study import JOIN, KNOWN, SpinIdentification
 
 VIRTUAL = (
-    "This is a virtual experiment: nothing was measured. A machine with other numbers, planted at random, was run in place of "
-    "a real one, and the search did not know them. "
+    "This is a virtual experiment: nothing was measured. A machine with randomly planted values "
+    "was simulated in place of a real one, and the search did not use these values. "
 )
+"""First sentences of the summary of a virtual experiment."""
 
 
 def spin_identify_report(result: SpinIdentification, command: str = "") -> str:
-    """The report as text of one HTML file, with style and figures inside."""
+    """Return the report as text of one self-contained HTML file.
+
+    Args:
+        result: Result of the identification.
+        command: Command line of the study, shown on the page.
+    """
     return render(
         "spin_identify/page.html",
-        title=f"Numbers of machine {result.parameters.name} from a spin cycle",
+        title=f"Parameters of machine {result.parameters.name} identified from a spin cycle",
         about=result.parameters.about,
         summary=summary(result),
         warnings=warnings_of(result),
@@ -38,44 +44,53 @@ def spin_identify_report(result: SpinIdentification, command: str = "") -> str:
 
 
 def summary(result: SpinIdentification) -> str:
-    """One paragraph, made from the numbers."""
+    """Return one paragraph about what the data determine and how well the machine agrees."""
     count, known = len(result.sought), sum(result.identifiable)
     begin, end = (
         100.0 * float(average_errors(values, result.measured).mean())
         for values in (result.before, result.after)
     )
     opening = "" if result.planted is None else VIRTUAL
-    sought = f"{count} unknown{'s were' if count > 1 else ' was'} sought"
+    unknowns_were = f"{count} unknown{'s were' if count > 1 else ' was'}"
+    cases = f"{len(result.cases)} case{'s' if len(result.cases) > 1 else ''}"
     text = (
-        f"{opening}{sought} in the RMS displacements of {len(result.cases)} cases. The data determine {known} of them within "
-        f"{number(100 * KNOWN, 0)} % (95 % interval). Average error of a number: {number(begin)} % before, {number(end)} % "
-        "after."
+        f"{opening}{unknowns_were} fitted to the RMS displacements of {cases}. The data determine "
+        f"{known} of {count} to within ±{number(100 * KNOWN, 0)} % (95 % confidence interval). The "
+        f"average error of an RMS displacement is {number(begin)} % before the search and "
+        f"{number(end)} % after it."
     )
     if result.recovered is not None and known:
         worst = np.max(np.abs(result.recovered[np.array(result.identifiable)]))
-        text += f" The planted numbers of those that are determined were found within {number(100 * worst, 2)} %."
+        text += (
+            " The determined unknowns differ from their planted values by at most "
+            f"{number(100 * worst, 2)} %."
+        )
     left = [
         s.unknown.name
         for s, fine in zip(result.sought, result.identifiable, strict=True)
         if not fine
     ]
     if left:
-        text += f" Not determined that well: {', '.join(left)}."
+        text += f" Not determined to this accuracy: {', '.join(left)}."
     return text
 
 
 def warnings_of(result: SpinIdentification) -> list[str]:
-    """What a reader must know before using the numbers."""
-    ends = [f"{e.name} ended at its {e.at_bound} bound" for e in result.fit.estimates if e.at_bound]
-    return [f"{', '.join(ends)}: widen the range, or doubt the model."] if ends else []
+    """Return a warning for each unknown whose search ended at a bound."""
+    return [
+        f"The search for {e.name} ended at its {e.at_bound} bound. Widen the range, or check "
+        "whether the model is right."
+        for e in result.fit.estimates
+        if e.at_bound
+    ]
 
 
 def unknowns(result: SpinIdentification) -> Table:
-    """Each unknown: before, planted, found, how well."""
+    """Return the value of each unknown before the search, planted and found, with its interval."""
     virtual = result.planted is not None
     header = [
         "unknown",
-        "equal numbers",
+        "set to the same value",
         "before",
         *(["planted"] if virtual else []),
         "found",
@@ -101,7 +116,10 @@ def unknowns(result: SpinIdentification) -> Table:
                 (Row((others, *shown), "ours" if result.identifiable[k] else "other"),),
             )
         )
-    caption = f"Numbers found. Strong: determined within {number(100 * KNOWN, 0)} %."
+    caption = (
+        "Values of the unknowns. Bold: determined to within "
+        f"±{number(100 * KNOWN, 0)} % (95 % confidence interval)."
+    )
     return Table(caption, tuple(header), tuple(groups), text_columns=2)
 
 
@@ -110,19 +128,19 @@ def _with_unit(value: float | None, unit: Unit) -> str:
 
 
 def directions(result: SpinIdentification) -> list[str]:
-    """Changes of several unknowns together that the data do not see, in words."""
+    """Return a sentence for each joint change of unknowns that the data do not determine."""
     texts = []
     for direction in result.fit.undetermined:
         moves = ", ".join(
             f"{name.split(JOIN)[0]} {'up' if part > 0 else 'down'}"
             for name, part in zip(direction.names, direction.parts, strict=True)
         )
-        texts.append(f"The data hardly see these change together: {moves}.")
+        texts.append(f"The data hardly change when these unknowns change together: {moves}.")
     return texts
 
 
 def errors(result: SpinIdentification) -> Table:
-    """Relative error (9) per case before and after."""
+    """Return the relative error, [A] Eq. (9), of each case before and after the search."""
     groups = []
     for case in result.cases:
         cells = [
@@ -131,29 +149,30 @@ def errors(result: SpinIdentification) -> Table:
             )
             for values in (result.before, result.after)
         ]
-        groups.append(Group(f"{case.name}: {case_words(case)}", (Row(tuple(cells)),)))
+        groups.append(Group(f"{case.name}: {case_description(case)}", (Row(tuple(cells)),)))
     caption = (
-        "Relative error [A] Eq. (9), norm over sensors and axes, mean over regions, in percent."
+        "Relative error, [A] Eq. (9), with norms over sensors and axes: mean over the regions, "
+        "before and after the search."
     )
-    return Table(caption, ("case", "before", "after"), tuple(groups))
+    return Table(caption, ("case", "before, %", "after, %"), tuple(groups))
 
 
 def _profile_picture(result: SpinIdentification) -> Picture:
     return picture(
         profile_figure(result.profile),
         "Spin profile with its regions.",
-        "Drum speed over time, and the regions.",
+        "Drum speed over time. Shaded areas: regions.",
     )
 
 
 def _bars(result: SpinIdentification, index: int) -> Picture:
     case = result.cases[index]
     measured, after = (values.sel(case=case.name) for values in (result.measured, result.after))
-    title = f"Case {case.name}: {case_words(case)}"
+    title = f"Case {case.name}: {case_description(case)}"
     return picture(
         bars_figure(after, None, measured),
         f"{title}.",
-        f"{title}. RMS displacement per region, with the numbers found.",
+        f"{title}. RMS displacement per region, computed with the values found and measured.",
     )
 
 
@@ -164,13 +183,18 @@ def _facts(result: SpinIdentification, command: str) -> list[tuple[str, str]]:
         ("SDF model", Path(result.parameters.model).name),
         (
             "Search",
-            f"{fit.method}, seed {fit.seed}; {fit.evaluations} points, {len(result.cases)} runs each; {'; '.join(fit.notes)}",
+            f"{fit.method}, seed {fit.seed}; {fit.evaluations} evaluated points with "
+            f"{len(result.cases)} runs each; {'; '.join(fit.notes)}",
         ),
         (
             "Objective",
-            "root mean square of |measured − computed| over the norm of what was measured in its case and region, [A] Eq. (9)",
+            "root mean square of |measured − computed|, divided by the norm of the measured values "
+            "of the same case and region, [A] Eq. (9)",
         ),
-        ("Condition", f"of the Jacobian, scaled by the ranges: {fit.condition:.3g}"),
+        (
+            "Condition number",
+            f"{fit.condition:.3g} (Jacobian, with each unknown scaled by its range)",
+        ),
         ("Versions", ", ".join(f"{name} {text}" for name, text in versions().items())),
         ("Command", command),
     ]

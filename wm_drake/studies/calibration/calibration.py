@@ -1,4 +1,4 @@
-"""calibrate(machine, free, targets): searches from several starts, each evaluation remembered."""
+"""calibrate(machine, free, targets): search from several starts, with each evaluation stored."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,32 +11,39 @@ from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibration.parameter_map import ParameterMap, turning_of
+from wm_drake.studies.calibration.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibration.search import METHODS, SearchProblem
 from wm_drake.studies.calibration.solutions import Solution, distinct
 from wm_drake.studies.calibration.targets import Targets, amplitudes_at, preload_residuals
 
 RELATIVE_DEVIATION = 0.05
-"""Standard deviation of a measured amplitude about the computed one, as part of it: scatter of machines and what no rigid
-body model can say. Weighs the data against the priors."""
+"""Relative standard deviation of a measured amplitude from the computed one.
+
+It covers the scatter between machines and the error of a rigid-body model. It determines the weight
+of the data against the priors.
+"""
 
 RESOLUTION = 1e-4
-"""Of the published amplitudes. [m]"""
+"""Resolution of the published amplitudes. [m]"""
 
 ITERATIONS = {"least-squares": 60, "basin-hopping": 12, "evolution": 300}
+"""Default limit of iterations for each method."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How to search.
+    """Settings of the search.
 
     Attributes:
-        method: Key of `METHODS`.
-        starts: How many; the first is where the free file says, the others are drawn about it.
-        seed: Of the draws.
-        iterations: At most, from each start; hops of basin hopping. 0: as many as the method usually takes.
+        method: Name of a method, key of `METHODS`.
+        starts: Number of starts. The first is the one in the free file; the others are drawn at
+            random around it.
+        seed: Seed of the random numbers.
+        iterations: Limit of iterations from each start; number of hops for basin hopping. 0 for the
+            default of the method.
         deviation: Relative standard deviation of an amplitude.
-        resolution: To which amplitudes are given; rounding adds its standard deviation, resolution / sqrt(12). [m]
+        resolution: Resolution of the measured amplitudes. Rounding adds the standard deviation
+            resolution / sqrt(12). [m]
     """
 
     method: str = "least-squares"
@@ -47,7 +54,11 @@ class Plan:
     resolution: float = RESOLUTION
 
     def check(self) -> None:
-        """Refuses what cannot be done."""
+        """Check the settings.
+
+        Raises:
+            InputError: the method is unknown or a number is out of range.
+        """
         if self.method not in METHODS:
             raise input_error(
                 f"no method '{self.method}'{nearest_names(self.method, METHODS)}", key="method"
@@ -55,26 +66,28 @@ class Plan:
         if self.starts < 1:
             raise input_error(f"{self.starts} starts; allowed is 1 or more", key="starts")
         if not self.deviation > 0.0:
-            raise input_error(f"{self.deviation:g} is not above 0", key="deviation")
+            raise input_error(f"{self.deviation:g} is not allowed; must be > 0", key="deviation")
         if not self.resolution >= 0.0:
-            raise input_error(f"{self.resolution:g} is below 0", key="resolution")
+            raise input_error(f"{self.resolution:g} is not allowed; must be >= 0", key="resolution")
 
     def spread(self, amplitude: FloatArray) -> FloatArray:
-        """Standard deviation of the logarithm of a measured amplitude."""
+        """Return the standard deviations of the logarithms of measured amplitudes."""
         return np.hypot(self.deviation, self.resolution / np.sqrt(12.0) / amplitude)
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What came out.
+    """Result of a calibration.
 
     Attributes:
-        turning, targets, plan: What was asked.
-        solutions: The distinct good ones, best first.
-        ended: Where every start ended, in their order.
+        parameter_map: Map from the free quantities to the machine.
+        targets: Measured amplitudes.
+        plan: Settings of the search.
+        solutions: The distinct good solutions, best first.
+        ended: The point where the search from each start ended, in the order of the starts.
     """
 
-    turning: ParameterMap
+    parameter_map: ParameterMap
     targets: Targets
     plan: Plan
     solutions: tuple[Solution, ...]
@@ -82,7 +95,7 @@ class Calibration:
 
 
 def identity_of(machine: Machine, free: FreeFile, targets: Targets, plan: Plan) -> dict[str, str]:
-    """What makes a calibration this one and no other, for its ledger."""
+    """Return the texts that identify a calibration in its ledger."""
     return {
         "study": "calibration",
         "machine": key_of(
@@ -108,55 +121,61 @@ def calibrate(
     workers: int | None = None,
     report: Callable[[int, int, float], None] = lambda start, evaluations, best: None,
 ) -> Calibration:
-    """Searches for machines that move as was measured.
+    """Search for machines with the measured amplitudes.
 
-    Each evaluation is in the ledger when it is used; a search that is begun again takes the same way, reads what is there and
-    goes on where it was. The result does not depend on the number of workers.
+    Each evaluation is stored in the ledger before it is used. A search that is started again takes
+    the same path, reads stored evaluations and continues where it stopped. The result does not
+    depend on the number of workers.
 
     Args:
-        machine: A built machine, from whose numbers those of the free file are turned.
-        free: What may be turned.
+        machine: A built machine. Numbers that the free file does not name keep its values.
+        free: Quantities that may change, with bounds and priors.
         targets: Measured amplitudes.
-        plan: How to search.
-        ledger: Open, of this calibration.
-        workers: Threads; as many as cores by default.
-        report: Called with the number of the start, how many points it evaluated, and the least cost of it.
+        plan: Settings of the search.
+        ledger: The open ledger of this calibration.
+        workers: Number of threads; None for the number of cores.
+        report: Called with the number of the start, the number of points it has evaluated and its
+            lowest cost so far.
 
     Raises:
-        InputError: free file and machine do not fit, or the plan is not possible.
+        InputError: the free file does not fit the machine, or a setting of the plan is not allowed.
     """
     plan.check()
-    turning = turning_of(machine, free)
-    amplitudes = _Remembered(machine, turning, targets, ledger, workers)
+    parameter_map = parameter_map_of(machine, free)
+    amplitudes = _StoredAmplitudes(machine, parameter_map, targets, ledger, workers)
     ended = [
-        _search(number, turning, targets, plan, amplitudes, report) for number in range(plan.starts)
+        _search(number, parameter_map, targets, plan, amplitudes, report)
+        for number in range(plan.starts)
     ]
-    return Calibration(turning, targets, plan, tuple(distinct(ended, targets)), tuple(ended))
+    return Calibration(parameter_map, targets, plan, tuple(distinct(ended, targets)), tuple(ended))
 
 
 def _search(
     number: int,
-    turning: ParameterMap,
+    parameter_map: ParameterMap,
     targets: Targets,
     plan: Plan,
-    amplitudes: "_Remembered",
+    amplitudes: "_StoredAmplitudes",
     report: Callable[[int, int, float], None],
 ) -> Solution:
     scale = np.sqrt(targets.weight) / plan.spread(targets.amplitude)
 
     def residuals(coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
-        computed = amplitudes(turning.expected + coordinates * turning.deviation)
+        computed = amplitudes(parameter_map.expected + coordinates * parameter_map.deviation)
         logarithms = np.log(computed / targets.amplitude) * scale
-        hard, smooth = logarithms[..., targets.weight > 0.0]
+        exact, smooth = logarithms[..., targets.weight > 0.0]
         preloads = preload_residuals(
-            amplitudes.machine, turning, turning.expected + coordinates * turning.deviation
+            amplitudes.machine,
+            parameter_map,
+            parameter_map.expected + coordinates * parameter_map.deviation,
         )
-        return np.hstack([hard, preloads]), np.hstack([smooth, preloads])
+        return np.hstack([exact, preloads]), np.hstack([smooth, preloads])
 
     lower, upper = (
-        (bound - turning.expected) / turning.deviation for bound in (turning.lower, turning.upper)
+        (bound - parameter_map.expected) / parameter_map.deviation
+        for bound in (parameter_map.lower, parameter_map.upper)
     )
-    first = (turning.start - turning.expected) / turning.deviation
+    first = (parameter_map.start - parameter_map.expected) / parameter_map.deviation
     problem = SearchProblem(
         residuals, lower, upper, first, lambda evaluations, best: report(number, evaluations, best)
     )
@@ -164,10 +183,9 @@ def _search(
     found = METHODS[plan.method](
         problem, problem.start(number, plan.seed), iterations, plan.seed + number
     )
-    point = turning.expected + found.point * turning.deviation
-    measured = np.count_nonzero(
-        targets.weight
-    )  # residuals behind these are of preloads: what is expected, not data
+    point = parameter_map.expected + found.point * parameter_map.deviation
+    # the residuals after these are those of the preloads, which belong to the prior
+    measured = np.count_nonzero(targets.weight)
     squares = residuals(found.point[None])[0][0] ** 2
     data, prior = (
         0.5 * float(np.sum(squares[:measured])),
@@ -189,37 +207,44 @@ def _search(
 _KINDS = ("amplitude", "power_mean")
 
 
-class _Remembered:
-    """Amplitudes at points, from the ledger where they are there."""
+class _StoredAmplitudes:
+    """Function that returns the amplitudes at points and stores them in the ledger.
+
+    Amplitudes that are in the ledger already are not computed again.
+    """
 
     def __init__(
         self,
         machine: Machine,
-        turning: ParameterMap,
+        parameter_map: ParameterMap,
         targets: Targets,
         ledger: Ledger,
         workers: int | None,
     ) -> None:
-        self.machine, self.turning, self.targets, self.ledger, self.workers = (
+        self.machine, self.parameter_map, self.targets, self.ledger, self.workers = (
             machine,
-            turning,
+            parameter_map,
             targets,
             ledger,
             workers,
         )
 
     def __call__(self, points: FloatArray) -> FloatArray:
-        """(2, points, case, sensor) as `amplitudes_at`."""
+        """Return amplitudes and power means (2, points, case, sensor) at points. [m]"""
         keys = [key_of(point=point) for point in points]
         new = [index for index, key in enumerate(keys) if key not in self.ledger]
         if new:
             values = amplitudes_at(
-                self.machine, self.turning, self.targets.loads, points[new], workers=self.workers
+                self.machine,
+                self.parameter_map,
+                self.targets.loads,
+                points[new],
+                workers=self.workers,
             )
-            kept = {
-                keys[i]: Result(dict(zip(_KINDS, values[:, place], strict=True)))
-                for place, i in enumerate(new)
+            results = {
+                keys[i]: Result(dict(zip(_KINDS, values[:, row], strict=True)))
+                for row, i in enumerate(new)
             }
-            self.ledger.put_all(kept)
+            self.ledger.put_all(results)
         found = [self.ledger.get(key).values for key in keys]
         return np.array([[values[kind] for values in found] for kind in _KINDS])

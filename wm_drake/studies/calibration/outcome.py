@@ -1,4 +1,4 @@
-"""A solution as a machine with the source of each number, and as tables."""
+"""Results of a calibration as a machine with the source of each number, and as tables."""
 
 import math
 
@@ -13,19 +13,22 @@ from wm_drake.studies.calibration.solutions import AT_BOUND, DETERMINED, UNDETER
 from wm_drake.studies.calibration.targets import EXPERIMENT, MILLIMETRE
 
 
-def solved_machine(turning: ParameterMap, solution: Solution) -> MachineParameters:
-    """The machine of a solution; the source of each fitted number says fit, its standard deviation, and what was expected."""
+def solved_machine(parameter_map: ParameterMap, solution: Solution) -> MachineParameters:
+    """Return the machine of a solution.
+
+    The source of each fitted number is "fit: " followed by the text of `fit_text`.
+    """
     spread = solution.spread()
     sources: dict[str, list[str]] = {}
-    for value in turning.values:
+    for value in parameter_map.values:
         entering = np.flatnonzero(np.any(value.factors != 0.0, axis=1))
         texts = sources.setdefault(".".join(value.path), [])
         texts.extend(
             text
             for index in entering
-            if (text := fit_text(turning, solution, spread, int(index))) not in texts
+            if (text := fit_text(parameter_map, solution, spread, int(index))) not in texts
         )
-    parameters = turning.parameters_at(_rounded(turning, solution))
+    parameters = parameter_map.parameters_at(_rounded(parameter_map, solution))
     fitted = {key: "fit: " + "; ".join(texts) for key, texts in sources.items()}
     kept = {
         key: text
@@ -35,44 +38,63 @@ def solved_machine(turning: ParameterMap, solution: Solution) -> MachineParamete
     return parameters.model_copy(update={"sources": {**kept, **fitted}})
 
 
-def _rounded(turning: ParameterMap, solution: Solution) -> np.ndarray:
-    """The point in as many digits of its written units as mean anything: a thousandth of what was expected to vary."""
+def _rounded(parameter_map: ParameterMap, solution: Solution) -> np.ndarray:
+    """Return the point of a solution, rounded to about 0.1 % of the prior's standard deviation.
+
+    The rounding is decimal in the unit in which each quantity is written.
+    """
     point = []
-    for index, unit in enumerate(turning.units):
+    for index, unit in enumerate(parameter_map.units):
         value, deviation = (
-            from_base(float(a[index]), unit) for a in (solution.point, turning.deviation)
+            from_base(float(a[index]), unit) for a in (solution.point, parameter_map.deviation)
         )
         point.append(to_base(round(value, 3 - math.floor(math.log10(deviation))), unit))
-    return np.clip(point, turning.lower, turning.upper)
+    return np.clip(point, parameter_map.lower, parameter_map.upper)
 
 
 def _short(number: float) -> str:
     return f"{number:.0f}" if abs(number) >= 100.0 else f"{number:.2g}"
 
 
-def fit_text(turning: ParameterMap, solution: Solution, spread: np.ndarray, index: int) -> str:
-    """``damper_friction 27.5 +- 2.1 N (expected 35 +- 9 N)``."""
-    unit = turning.units[index]
+def fit_text(
+    parameter_map: ParameterMap, solution: Solution, spread: np.ndarray, index: int
+) -> str:
+    """Return a text such as ``damper_friction 27.5 ± 2.1 N (expected 35 ± 9 N)``.
+
+    Args:
+        parameter_map: Map with names, units and priors of the quantities.
+        solution: Solution with the value.
+        spread: Standard deviation of each quantity given the data, in prior deviations.
+        index: Index of the quantity.
+    """
+    unit = parameter_map.units[index]
     expected, deviation = (
-        from_base(float(a[index]), unit) for a in (turning.expected, turning.deviation)
+        from_base(float(a[index]), unit) for a in (parameter_map.expected, parameter_map.deviation)
     )
-    value, sure = (
-        from_base(float(_rounded(turning, solution)[index]), unit),
-        float(spread[index]) * deviation,
-    )
+    value = from_base(float(_rounded(parameter_map, solution)[index]), unit)
+    posterior = float(spread[index]) * deviation
     after, before = (
-        f"{n:.10g} ± {_short(s)} {unit}".rstrip() for n, s in ((value, sure), (expected, deviation))
+        f"{n:.10g} ± {_short(s)} {unit}".rstrip()
+        for n, s in ((value, posterior), (expected, deviation))
     )
-    return f"{turning.names[index]} {after} (expected {before})"
+    return f"{parameter_map.names[index]} {after} (expected {before})"
 
 
-def verdict(turning: ParameterMap, solution: Solution, spread: np.ndarray, index: int) -> str:
-    """What holds a quantity where it is: the data, the prior, both, or a bound."""
-    reach = turning.upper[index] - turning.lower[index]
+def verdict(parameter_map: ParameterMap, solution: Solution, spread: np.ndarray, index: int) -> str:
+    """Return what determines a quantity: "data", "prior", "data and prior" or "bound".
+
+    Args:
+        parameter_map: Map with the bounds of the quantities.
+        solution: Solution with the value.
+        spread: Standard deviation of each quantity given the data, in prior deviations.
+        index: Index of the quantity.
+    """
+    width = parameter_map.upper[index] - parameter_map.lower[index]
     nearest = min(
-        solution.point[index] - turning.lower[index], turning.upper[index] - solution.point[index]
+        solution.point[index] - parameter_map.lower[index],
+        parameter_map.upper[index] - solution.point[index],
     )
-    if nearest < AT_BOUND * reach:
+    if nearest < AT_BOUND * width:
         return "bound"
     if spread[index] < DETERMINED:
         return "data"
@@ -80,22 +102,28 @@ def verdict(turning: ParameterMap, solution: Solution, spread: np.ndarray, index
 
 
 def mean_and_largest(errors: np.ndarray) -> tuple[float, float]:
-    """Of the absolute values of relative errors, without those that are NaN."""
+    """Return mean and largest absolute value of relative errors; NaN values are ignored."""
     return float(np.nanmean(np.abs(errors))), float(np.nanmax(np.abs(errors)))
 
 
 def quantity_table(calibration: Calibration) -> pd.DataFrame:
-    """Every free quantity in its unit: bounds, prior, and for each solution value, standard deviation and what holds it."""
-    turning = calibration.turning
+    """Return a table of the free quantities, each in its unit.
+
+    It has bounds and prior, and for each solution the value, its standard deviation and what
+    determines it (see `verdict`).
+    """
+    parameter_map = calibration.parameter_map
     rows = []
     known = {
-        "lower": turning.lower,
-        "upper": turning.upper,
-        "expected": turning.expected,
-        "deviation": turning.deviation,
+        "lower": parameter_map.lower,
+        "upper": parameter_map.upper,
+        "expected": parameter_map.expected,
+        "deviation": parameter_map.deviation,
     }
     spreads = [solution.spread() for solution in calibration.solutions]
-    for index, (name, unit) in enumerate(zip(turning.names, turning.units, strict=True)):
+    for index, (name, unit) in enumerate(
+        zip(parameter_map.names, parameter_map.units, strict=True)
+    ):
         row: dict[str, object] = {"quantity": name, "unit": unit}
         for head, array in known.items():
             row[head] = from_base(float(array[index]), unit)
@@ -104,13 +132,13 @@ def quantity_table(calibration: Calibration) -> pd.DataFrame:
         ):
             row[f"value_{number}"] = from_base(float(solution.point[index]), unit)
             row[f"deviation_{number}"] = float(spread[index]) * float(str(row["deviation"]))
-            row[f"held_by_{number}"] = verdict(turning, solution, spread, index)
+            row[f"held_by_{number}"] = verdict(parameter_map, solution, spread, index)
         rows.append(row)
     return pd.DataFrame(rows)
 
 
 def amplitude_rows(calibration: Calibration) -> pd.DataFrame:
-    """Measured amplitudes and those of every solution, in the form of a file of measured amplitudes. [mm]"""
+    """Return measured amplitudes and those of each solution as one table of amplitudes. [mm]"""
     targets = calibration.targets
     rows = []
     for index, (load, gasket) in enumerate(targets.loads):

@@ -1,4 +1,4 @@
-"""Free quantities -> parameters of a machine, by a linear map into its values."""
+"""The linear map from free quantities to the values of a machine."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,13 +22,14 @@ COMPONENTS = {"x": 0, "y": 1, "z": 2}
 
 @dataclass(frozen=True)
 class Value:
-    """A value of the machine that free quantities enter.
+    """A value of the machine that depends on free quantities.
 
     Attributes:
-        path: Names and numbers that lead to it in the tree of parameters.
-        component: Of a vector; None for the whole.
-        factors: Of each free quantity, one for a number, several for a table. (quantities, 1 or points)
-        is_list: Whether it is a table's column.
+        path: Names and indices that lead to the value in the tree of parameters.
+        component: Index of the component of a vector; None for the whole value.
+        factors: (quantities, 1 or points) factors of each free quantity: one for a number, several
+            for the column of a table.
+        is_list: Whether the value is the column of a table.
     """
 
     path: tuple[str, ...]
@@ -39,16 +40,19 @@ class Value:
 
 @dataclass(frozen=True)
 class ParameterMap:
-    """What can be turned in a machine, and how. Arrays over the quantities, SI.
+    """The free quantities of a machine and the values that depend on them.
+
+    Arrays have one entry for each quantity, in SI units.
 
     Attributes:
-        base: The machine with all values spelled out that may change.
-        names, units: Of the quantities.
+        base: The machine, with explicit values for all that may change.
+        names, units: Names of the quantities and the units in which they are written.
         lower, upper: Bounds.
-        expected, deviation: Prior.
-        start: Where searches begin.
-        values: What they set.
-        preload: Expected preload of each spring and its standard deviation; None if nothing is expected. [N]
+        expected, deviation: Prior: expected values and standard deviations.
+        start: Point where searches start.
+        values: Values of the machine that depend on the quantities.
+        preload: Expected preload of each spring and its standard deviation; None without a prior.
+            [N]
     """
 
     base: MachineParameters
@@ -64,10 +68,13 @@ class ParameterMap:
     _tree: dict[str, Any]
 
     def parameters_at(self, point: FloatArray) -> MachineParameters:
-        """The machine with these quantities. [SI]
+        """Return the machine at a point.
+
+        Args:
+            point: Values of the free quantities, in SI units.
 
         Raises:
-            InputError: a value that no machine can have.
+            InputError: a value of the machine is not allowed.
         """
         tree = dict(self._tree)
         for value in self.values:
@@ -79,11 +86,12 @@ class ParameterMap:
             raise InputError(problems_of(error, MachineParameters)) from None
 
 
-def turning_of(machine: Machine, free: FreeFile) -> ParameterMap:
-    """What a free file turns in a machine.
+def parameter_map_of(machine: Machine, free: FreeFile) -> ParameterMap:
+    """Return the parameter map of a free file for a machine.
 
     Raises:
-        InputError: keys the machine does not have, factors of the wrong dimension or number.
+        InputError: the machine does not have a key, or a factor has the wrong dimension or the
+            wrong number of values.
     """
     keys = list(
         dict.fromkeys(key for quantity in free.quantities.values() for key in quantity.sets)
@@ -124,7 +132,7 @@ def _value(
     elif key in known:
         shape_key = key
     else:
-        raise ValueError(f"is no number of the machine{nearest_names(key, known)}")
+        raise ValueError(f"is not a number of the machine{nearest_names(key, known)}")
     value, unit = known[shape_key]
     is_list = isinstance(value, tuple) and component is None
     size = len(value) if is_list else 1
@@ -144,18 +152,18 @@ def _factor(
 ) -> FloatArray:
     if factor.is_list != is_list or len(factor.values) != size:
         wanted = f"a list of {size} factors" if is_list else "one factor"
-        raise ValueError(f"takes {wanted}, not {len(factor.values)}")
+        raise ValueError(f"needs {wanted}, not {len(factor.values)}")
     if dimension(quantity_unit) * dimension(factor.unit) != dimension(unit.si):
         written = " times ".join(filter(None, [quantity_unit, factor.unit])) or "a pure number"
-        raise ValueError(f"is in {unit.shown}, which {written} does not give")
+        raise ValueError(f"needs a unit such as {unit.shown}, but {written} is not of this kind")
     return np.array(factor.values)
 
 
 def _set(tree: dict[str, Any], value: Value, number: Any) -> None:
-    """Puts a number in its place; whatever lies on the way there is copied first, the base stays as it is."""
+    """Set a value in a tree; containers on the path are copied, so the base does not change."""
     node: Any = tree
-    *way, last = value.path
-    for part in way:
+    *parents, last = value.path
+    for part in parents:
         at: Any = int(part) if isinstance(node, list) else part
         child = node[at]
         node[at] = dict(child) if isinstance(child, dict) else list(child)

@@ -1,4 +1,4 @@
-"""An honest test: calibrate without some loads, then see how well their amplitudes come out."""
+"""Prediction of held-out loads: calibrate without some loads, then compute their amplitudes."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,13 +14,15 @@ from wm_drake.studies.calibration.targets import Targets
 
 @dataclass(frozen=True)
 class Prediction:
-    """Loads that a calibration had not seen.
+    """Errors of a group of held-out loads.
 
     Attributes:
-        loads: Their names.
-        calibrated: Relative errors of their amplitudes in the calibration that had seen them. (case, sensor)
-        predicted: The same in the calibration that had not. (case, sensor)
-        seen: Of the loads which that calibration had seen. (case, sensor)
+        loads: Names of the held-out loads.
+        calibrated: (case, sensor) relative errors of their amplitudes in the calibration with all
+            loads.
+        predicted: (case, sensor) relative errors of their amplitudes in the calibration without
+            them.
+        seen: (case, sensor) relative errors of the other loads in the calibration without them.
     """
 
     loads: tuple[str, ...]
@@ -33,53 +35,64 @@ def predict(
     machine: Machine,
     free: FreeFile,
     calibration: Calibration,
-    left_out: Sequence[Sequence[str]],
+    held_out: Sequence[Sequence[str]],
     ledger: Ledger,
     *,
     plan: Plan | None = None,
     workers: int | None = None,
     report: Callable[[int, int, float], None] = lambda start, evaluations, best: None,
 ) -> list[Prediction]:
-    """Repeats a calibration once for each group of loads, without them.
+    """Repeat a calibration once for each group of held-out loads.
 
-    The searches begin at what is expected of each quantity, or about it: starting values of a free file may come from a
-    calibration that had seen all loads.
+    These searches start at or around the expected values. The start values of the free file are not
+    used, because they may come from a calibration with all loads.
 
     Args:
-        machine, free, ledger, workers, report: As for `calibrate`.
-        calibration: With all loads.
-        left_out: Groups of names of loads.
-        plan: How to search without them; as with all loads if None.
+        machine: A built machine.
+        free: Quantities that may change, with bounds and priors.
+        calibration: Calibration with all loads.
+        held_out: Groups of names of loads.
+        ledger: The open ledger of this calibration.
+        plan: Settings of these searches; None for those of the calibration.
+        workers: Number of threads; None for the number of cores.
+        report: Called with the number of the start, the number of points it has evaluated and its
+            lowest cost so far.
+
+    Returns:
+        One prediction for each group.
 
     Raises:
-        InputError: a load that was not measured, or no load left.
+        InputError: a load was not measured, or a group contains all loads.
     """
-    check_left_out(calibration.targets, left_out)
+    check_held_out(calibration.targets, held_out)
     targets, plan, found = calibration.targets, plan or calibration.plan, []
-    for loads in map(tuple, left_out):
+    for loads in map(tuple, held_out):
         seen = targets.without(*loads)
-        blind = calibrate(
+        without_loads = calibrate(
             machine, free.without_starts(), seen, plan, ledger, workers=workers, report=report
         )
         cases = targets.of(*loads)
         calibrated, predicted = (
             best.amplitude[cases] / targets.amplitude[cases] - 1.0
-            for best in (calibration.solutions[0], blind.solutions[0])
+            for best in (calibration.solutions[0], without_loads.solutions[0])
         )
-        found.append(
-            Prediction(loads, calibrated, predicted, blind.solutions[0].errors(seen)[~cases])
-        )
+        errors_seen = without_loads.solutions[0].errors(seen)[~cases]
+        found.append(Prediction(loads, calibrated, predicted, errors_seen))
     return found
 
 
-def check_left_out(targets: Targets, left_out: Sequence[Sequence[str]]) -> None:
-    """Refuses groups of loads that cannot be left out."""
+def check_held_out(targets: Targets, held_out: Sequence[Sequence[str]]) -> None:
+    """Check that each group of loads can be held out.
+
+    Raises:
+        InputError: a load was not measured, or a group contains all loads.
+    """
     known = {name for name, _ in targets.loads}
-    for loads in left_out:
+    for loads in held_out:
         for name in loads:
             if name not in known:
                 raise input_error(
-                    f"no measured load '{name}'{nearest_names(name, known)}", key="left out"
+                    f"no measured load '{name}'{nearest_names(name, known)}", key="leave-out"
                 )
         if known <= set(loads):
-            raise input_error("leaves no load to calibrate with", key="left out")
+            raise input_error("leaves no load to calibrate with; name fewer loads", key="leave-out")

@@ -1,4 +1,4 @@
-"""The search itself: residuals of a problem -> points where their squares are least. Knows nothing of machines."""
+"""Searches for the least squares of residuals; they are independent of machines."""
 
 import itertools
 from collections.abc import Callable
@@ -12,37 +12,48 @@ from scipy.optimize import OptimizeResult, least_squares
 from wm_drake.parameters.types import FloatArray
 
 Residuals: TypeAlias = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-"""(points, n) in units of the prior -> residuals (points, m), and smooth stand-ins for them (points, m), whose slopes are
-theirs but for kinks; NaN where there are none."""
+"""Function of points (points, n) in units of the prior.
+
+It returns the residuals (points, m) and smooth substitutes of them (points, m). Both have the same
+slopes except at kinks of the residuals. They are NaN where there are no residuals.
+"""
 
 DIFFERENCE_STEPS = (0.1, 0.3, 0.03)
-"""Of the Jacobian's differences, in standard deviations of the prior. The first is above the grain of amplitudes read off
-samples; where a kink of the landscape misleads it, the others are tried."""
+"""Step sizes of the finite differences of the Jacobian, in standard deviations of the prior.
+
+The first is larger than the noise of amplitudes that comes from sampling. The others are tried
+where the search stops at a kink of the residuals.
+"""
 
 LEAST_GAIN = 0.01
-"""A search ends when no difference step brings the cost down by this part of it."""
+"""A search ends when no difference step reduces the cost by this fraction."""
 
 START_SPREAD = 0.7
-"""Of random starts about the first one, in standard deviations of the prior."""
+"""Standard deviation of random starts around the first one, in prior deviations."""
 
 DRAWS = 24
-"""Points that are drawn for a random start or a hop, of which the best is taken: less than a Jacobian, and worth several."""
+"""Number of points that are drawn for a random start or a hop; the best one is used.
+
+This costs less than one Jacobian and saves several of them.
+"""
 
 HOP_SPREAD = 0.3
-"""Of the points a hop draws about the best one so far, in standard deviations of the prior."""
+"""Standard deviation of the points of a hop around the best one so far, in prior deviations."""
 
 
 @dataclass
 class SearchProblem:
-    """Least squares in units of the prior: a coordinate is (quantity - expected) / deviation.
+    """A least-squares problem in units of the prior.
+
+    A coordinate is (quantity - expected) / deviation.
 
     Attributes:
-        residuals: Of the data, for many points at once.
-        lower, upper: Bounds of the coordinates. (n)
-        first: Where the first search begins. (n)
-        report: Called with the number of points evaluated and the least cost so far.
-        evaluations: Points evaluated so far.
-        best: Least cost so far.
+        residuals: Function that returns the residuals of the data for many points at once.
+        lower, upper: (n) bounds of the coordinates.
+        first: (n) start of the first search.
+        report: Called with the number of points evaluated and the lowest cost so far.
+        evaluations: Number of points evaluated so far.
+        best: Lowest cost so far.
     """
 
     residuals: Residuals
@@ -54,7 +65,11 @@ class SearchProblem:
     best: float = field(default=np.inf, init=False)
 
     def evaluate(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Residuals (points, m) of the data, and costs (points): half the sum of all squares, infinite without residuals."""
+        """Return residuals of the data (points, m) and costs (points,) at points.
+
+        The cost is half the sum of the squares of residuals and coordinates. It is infinite if a
+        residual is NaN.
+        """
         values, _ = self._counted(points)
         return values, _costs(values, points)
 
@@ -66,13 +81,20 @@ class SearchProblem:
         return values, smooth
 
     def jacobian(self, point: FloatArray, step: float = DIFFERENCE_STEPS[0]) -> FloatArray:
-        """Slopes of the smooth residuals at a point, by one-sided differences away from the upper bound. (m, n)"""
+        """Return the Jacobian (m, n) of the smooth residuals at a point.
+
+        It is computed by forward differences, or by backward differences near the upper bound. It
+        is 0 where a residual is NaN.
+        """
         steps = np.where(point + step <= self.upper, step, -step)
         _, smooth = self._counted(np.vstack([point, point + np.diag(steps)]))
-        return np.nan_to_num((smooth[1:] - smooth[0]).T / steps)  # no machine there: no slope
+        return np.nan_to_num((smooth[1:] - smooth[0]).T / steps)
 
     def start(self, number: int, seed: int) -> FloatArray:
-        """The first start is `first`; each other is the best of some points drawn about it."""
+        """Return the start with a number.
+
+        Start 0 is `first`. Each other start is the best of some points that are drawn around it.
+        """
         begin = np.clip(self.first, self.lower, self.upper)
         if number == 0:
             return begin
@@ -81,7 +103,13 @@ class SearchProblem:
     def best_near(
         self, point: FloatArray, spread: float, generator: np.random.Generator
     ) -> FloatArray:
-        """The best of some points drawn about one, with this standard deviation in each coordinate."""
+        """Return the best of some points that are drawn around a point.
+
+        Args:
+            point: (n) centre of the normal distribution.
+            spread: Standard deviation of each coordinate.
+            generator: Source of random numbers.
+        """
         drawn = point + generator.normal(0.0, spread, (DRAWS, len(point)))
         points = np.clip(drawn, self.lower, self.upper)
         _, costs = self.evaluate(points)
@@ -95,7 +123,13 @@ def _costs(values: FloatArray, points: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Found:
-    """Where a search from one start ended: the point in units of the prior, half its sum of squares, points evaluated."""
+    """Result of a search from one start.
+
+    Attributes:
+        point: (n) end point, in units of the prior.
+        cost: Half the sum of squares there.
+        evaluations: Number of points that the search evaluated.
+    """
 
     point: FloatArray
     cost: float
@@ -103,21 +137,31 @@ class Found:
 
 
 def least_squares_search(
-    problem: SearchProblem, start: FloatArray, iterations: int, seed: int = 0
-) -> Found:  # noqa: ARG001
-    """Gauss-Newton in a trust region within the bounds (scipy's trf) from one start; takes no chances, so no seed.
+    problem: SearchProblem,
+    start: FloatArray,
+    iterations: int,
+    seed: int = 0,  # noqa: ARG001
+) -> Found:
+    """Search from one start by the Gauss-Newton method in a trust region (scipy's trf).
 
-    Where it gets stuck it begins anew from there with another difference step, until none of them helps.
+    When the method stops, it is started again from there with another difference step, until no
+    difference step reduces the cost.
+
+    Args:
+        problem: The least-squares problem.
+        start: (n) point where the search starts.
+        iterations: Limit of iterations.
+        seed: Not used, because the method has no random part.
     """
     before = problem.evaluations
     inside = 1e-6 * (problem.upper - problem.lower)
     point = np.clip(start, problem.lower + inside, problem.upper - inside)
-    cost, left, fruitless = np.inf, iterations, 0
+    cost, remaining, failed = np.inf, iterations, 0
     for step in itertools.cycle(DIFFERENCE_STEPS):
-        result = _gauss_newton(problem, point, step, left)
-        fruitless = fruitless + 1 if result.cost > (1.0 - LEAST_GAIN) * cost else 0
-        point, cost, left = result.x, float(result.cost), left - result.nfev
-        if left <= 0 or fruitless == len(DIFFERENCE_STEPS):
+        result = _gauss_newton(problem, point, step, remaining)
+        failed = failed + 1 if result.cost > (1.0 - LEAST_GAIN) * cost else 0
+        point, cost, remaining = result.x, float(result.cost), remaining - result.nfev
+        if remaining <= 0 or failed == len(DIFFERENCE_STEPS):
             break
         point = np.clip(point, problem.lower + inside, problem.upper - inside)
     return Found(point, cost, problem.evaluations - before)
@@ -128,9 +172,8 @@ def _gauss_newton(
 ) -> OptimizeResult:
     def residuals(point: FloatArray) -> FloatArray:
         values, _ = problem.evaluate(point[None])
-        data = np.where(
-            np.isfinite(values[0]), values[0], 1e3
-        )  # no machine there: the step is refused and shortened
+        # without residuals, a large value makes the trust region reject and shorten the step
+        data = np.where(np.isfinite(values[0]), values[0], 1e3)
         return np.concatenate([data, point])
 
     def slopes(point: FloatArray) -> FloatArray:
@@ -145,9 +188,16 @@ def _gauss_newton(
 def basin_hopping_search(
     problem: SearchProblem, start: FloatArray, iterations: int, seed: int = 0
 ) -> Found:
-    """Least squares, then so many hops: least squares again from the best of some points about the best so far.
+    """Search by basin hopping: least squares from the start, then from the end of each hop.
 
-    [Wales and Doye, J. Phys. Chem. A 101, 5111 (1997)], downhill only.
+    A hop goes to the best of some points that are drawn around the best point so far [Wales and
+    Doye, J. Phys. Chem. A 101, 5111 (1997)]. Only a lower cost is accepted.
+
+    Args:
+        problem: The least-squares problem.
+        start: (n) point where the search starts.
+        iterations: Number of hops.
+        seed: Seed of the random numbers.
     """
     before = problem.evaluations
     generator = np.random.default_rng(seed)
@@ -163,11 +213,20 @@ def basin_hopping_search(
 def evolution_search(
     problem: SearchProblem, start: FloatArray, iterations: int, seed: int = 0
 ) -> Found:
-    """CMA-ES [Hansen, The CMA Evolution Strategy: A Tutorial, 2016] from one start, then least squares from where it ends."""
+    """Search by CMA-ES from one start, then by least squares from its end point.
+
+    CMA-ES: [Hansen, The CMA Evolution Strategy: A Tutorial, 2016].
+
+    Args:
+        problem: The least-squares problem.
+        start: (n) point where the search starts.
+        iterations: Limit of generations.
+        seed: Seed of the random numbers.
+    """
     before = problem.evaluations
     options = {
         "bounds": [problem.lower.tolist(), problem.upper.tolist()],
-        "seed": seed + 1,  # 0 would mean the clock
+        "seed": seed + 1,  # 0 would mean a seed from the clock
         "maxiter": iterations,
         "verbose": -9,
         "tolfun": 1e-2,
@@ -184,11 +243,11 @@ def evolution_search(
 
 
 POLISH = 10
-"""Iterations of least squares after an evolution or a hop."""
+"""Limit of iterations of least squares after CMA-ES or a hop."""
 
 METHODS = {
     "least-squares": least_squares_search,
     "basin-hopping": basin_hopping_search,
     "evolution": evolution_search,
 }
-"""Ways to search, by name: (problem, start, iterations, seed) -> Found."""
+"""Search methods by name; arguments: problem, start, iterations, seed."""

@@ -1,4 +1,4 @@
-"""What a calibration found: solutions, how good and how sure they are, and which are really different."""
+"""Solutions of a calibration: errors, uncertainties, and the choice of distinct solutions."""
 
 from dataclasses import dataclass
 
@@ -8,31 +8,33 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibration.targets import Targets
 
 GOOD = 1.25
-"""A solution is good if its mean error is at most so many times the best one's."""
+"""Largest ratio of the mean error of a good solution to that of the best solution."""
 
 DISTINCT = 0.5
-"""Solutions are distinct if they differ by so many prior deviations, in the root mean square over the quantities."""
+"""Least distance between distinct solutions: RMS over the quantities, in prior deviations."""
 
 DETERMINED, UNDETERMINED = 0.5, 0.9
-"""A quantity is determined by the data if they cut its deviation to less than this part of the prior's; by the prior alone if
-they leave more than the second."""
+"""Limits of the ratio of a quantity's standard deviation given the data to that of its prior.
+
+Below the first, the data determine the quantity. Above the second, only the prior does.
+"""
 
 AT_BOUND = 1e-2
-"""So near to a bound, in parts of the range, a quantity counts as lying on it."""
+"""Distance from a bound, as a fraction of the range, within which a quantity is at the bound."""
 
 
 @dataclass(frozen=True)
 class Solution:
-    """A point where a search ended.
+    """The end point of a search.
 
     Attributes:
-        start: Number of the start it came from.
-        point: Of the free quantities. (n) [SI]
-        coordinates: The same in units of the prior: (quantity - expected) / deviation. (n)
-        amplitude: Computed. (case, sensor) [m]
-        data_cost, prior_cost: Halves of the sums of squares.
-        slopes: Of the data's residuals over the coordinates. (m, n)
-        evaluations: Points that were evaluated on the way.
+        start: Number of the start.
+        point: (n) values of the free quantities, in SI units.
+        coordinates: (n) point in units of the prior: (quantity - expected) / deviation.
+        amplitude: (case, sensor) computed amplitudes. [m]
+        data_cost, prior_cost: Half the sums of squares of data and prior.
+        slopes: (m, n) derivatives of the data's residuals with respect to the coordinates.
+        evaluations: Number of points that the search evaluated.
     """
 
     start: int
@@ -46,28 +48,33 @@ class Solution:
 
     @property
     def cost(self) -> float:
-        """What the search makes small."""
+        """Cost that the search minimizes: the sum of data cost and prior cost."""
         return self.data_cost + self.prior_cost
 
     def errors(self, targets: Targets) -> FloatArray:
-        """(computed - measured) / measured, (case, sensor); NaN where the target has no weight."""
+        """Return (computed - measured) / measured (case, sensor); NaN where the weight is 0."""
         return np.where(targets.weight > 0.0, self.amplitude / targets.amplitude - 1.0, np.nan)
 
     def spread(self) -> FloatArray:
-        """Standard deviation of each quantity given the data, in parts of the prior's: 1 where the data say nothing. (n)
+        """Return the standard deviation of each quantity given the data, in prior deviations. (n)
 
-        Of the normal distribution about the point in which the amplitudes' logarithms are linear.
+        It is 1 if the data contain no information about the quantity. The posterior is approximated
+        by a normal distribution around the point, with the logarithms of the amplitudes linearized.
         """
         information = self.slopes.T @ self.slopes + np.eye(len(self.coordinates))
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
 
     def directions(self) -> FloatArray:
-        """How many times better than the prior the data know each principal direction, falling; as many above 1 as count."""
+        """Return the singular values of the slopes, in falling order.
+
+        Each one is the ratio of prior deviation to deviation by the data along a principal
+        direction. The number of values above 1 is the number of directions that the data determine.
+        """
         return np.asarray(np.linalg.svd(self.slopes, compute_uv=False))
 
 
 def distinct(solutions: list[Solution], targets: Targets) -> list[Solution]:
-    """The good solutions, best first, without those that are near a better one."""
+    """Return the good solutions, best first, without those that are close to a better one."""
     ordered = sorted(solutions, key=lambda solution: solution.cost)
     limit = GOOD * float(np.nanmean(np.abs(ordered[0].errors(targets))))
     kept: list[Solution] = []

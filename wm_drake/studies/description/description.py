@@ -1,4 +1,4 @@
-"""A machine resolved in SI: everything needed to rebuild it in another program, as plain data and as text."""
+"""Description of a machine in SI units, complete enough to rebuild it in another program."""
 
 from typing import Any
 
@@ -7,7 +7,8 @@ import numpy as np
 from wm_drake.compiler.compilation import generic
 from wm_drake.compiler.vectors import rotation_from_rpy
 from wm_drake.model.bodies import tubes_of
-from wm_drake.model.machine import Machine, Setup
+from wm_drake.model.machine import Machine
+from wm_drake.model.setup import Setup
 from wm_drake.model.state_layout import CARRIER
 from wm_drake.parameters import ForceTable, TorqueTable
 from wm_drake.studies.description.modal import natural_modes
@@ -21,10 +22,11 @@ PRODUCTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
 def describe(machine: Machine) -> dict[str, Any]:
-    """The machine at rest in SI (m, kg, s, rad, N).
+    """Return the description of a machine at rest, in SI units (m, kg, s, rad, N).
 
-    Frames: W housing, T tub, D drum; T = D = W when drawn. Points are given in the frame their key names. Inertias are about
-    the centre of mass, products as elements of the matrix.
+    The frames are W (housing), T (tub) and D (drum); in the SDF all three coincide. The suffix of a
+    key is the frame in which a point or direction is given. Inertias are about the centre of mass;
+    products of inertia are elements of the matrix.
     """
     setup = machine.set_up()
     modes = natural_modes(machine)
@@ -61,7 +63,7 @@ def describe(machine: Machine) -> dict[str, Any]:
 
 
 def oscillating_mass(setup: Setup) -> float:
-    """Mass of all that moves with the tub, the drum and its load included. [kg]"""
+    """Return the mass of the tub, all bodies welded to it, the drum and its load. [kg]"""
     plant = setup.machine.plant
     moving = [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]
     return float(sum(body.get_mass(setup.plant_context) for body in moving))
@@ -73,9 +75,8 @@ def _bodies(setup: Setup) -> dict[str, Any]:
     described = {}
     moving = [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]
     groups = {part.name(): "drum" if part.name() == "drum" else "tub" for part in moving}
-    carriers = (
-        {"drum": plant.GetBodyByName(CARRIER).body_frame()} if setup.bearing else {}
-    )  # T, as drawn
+    # in a compliant bearing, describe the drum relative to its carrier, which is T in the SDF
+    carriers = {"drum": plant.GetBodyByName(CARRIER).body_frame()} if setup.bearing else {}
     tubes = [
         body
         for damper in setup.parameters.telescopic_dampers.values()
@@ -107,7 +108,10 @@ def _drum_axis(setup: Setup) -> dict[str, list[float]]:
 
 
 def _drum_bearing(setup: Setup) -> dict[str, Any] | None:
-    """Where it acts and its six components along x, y, z of a frame whose y axis is the drum's; None for a perfect joint."""
+    """Return the position and the six components of a compliant bearing; None for a rigid bearing.
+
+    The components are along x, y and z of a frame whose y axis is the drum axis.
+    """
     placed, bearing = setup.bearing, setup.parameters.imperfections.bearing
     if placed is None or bearing is None:
         return None
@@ -124,7 +128,10 @@ def _drum_bearing(setup: Setup) -> dict[str, Any] | None:
 
 
 def _line(setup: Setup, element: Any) -> dict[str, Any]:
-    """Ends, length and direction (housing end to tub end) of a strut at the rest pose."""
+    """Return ends, length and direction of a strut at the rest pose.
+
+    The direction points from the housing end to the tub end.
+    """
     rotation = np.reshape(generic(rotation_from_rpy)(*setup.rest_pose[:3]), (3, 3))
     line = setup.rest_pose[3:] + rotation @ element.p_ToA_T - element.p_WH
     length = float(np.linalg.norm(line))
@@ -192,7 +199,7 @@ def _stiffness(value: Any) -> Any:
 
 
 def as_text(description: dict[str, Any]) -> str:
-    """The description for a terminal: one aligned line per number or list."""
+    """Return a description as text for a terminal: one indented line for each number or list."""
     return "\n".join(_lines(description, ""))
 
 

@@ -1,4 +1,4 @@
-"""Rigid-body modes of the hanging tub."""
+"""Rigid-body modes of the suspended tub."""
 
 from dataclasses import dataclass
 
@@ -13,13 +13,14 @@ from wm_drake.parameters.types import FloatArray
 
 @dataclass(frozen=True)
 class Modes:
-    """Modes in rising order of frequency.
+    """Natural modes in rising order of frequency.
 
     Attributes:
-        frequency_hz: (n,) natural frequency |lambda| / (2 pi).
+        frequency_hz: (n,) natural frequencies |lambda| / (2 pi). [Hz]
         damping_ratio: (n,) -Re(lambda) / |lambda|.
-        shape: (n, 6) roll, pitch, yaw, x, y, z of T, real part at the phase of the largest component, which is 1 after
-            angles are weighted with 0.25 m. [rad, m]
+        shape: (n, 6) mode shapes: roll, pitch, yaw, x, y, z of T. Each is the real part at the
+            phase of its largest component, scaled so that this component is 1 after angles are
+            multiplied by 0.25 m. [rad, m]
     """
 
     frequency_hz: FloatArray
@@ -28,26 +29,36 @@ class Modes:
 
 
 _SLOWEST = 2.0 * np.pi * 0.01
-"""What is slower is held by nothing but rounding: the turn of a damper's tubes about its axis. [rad/s]"""
+"""Least angular frequency of a mode. [rad/s]
+
+Slower eigenvalues result from rounding only: nothing holds the rotation of a damper's tubes about
+its axis.
+"""
 
 _ANGLE_ARM = 0.25
-"""Weighs angles against translations in a mode shape: about the radius of the tub. [m]"""
+"""Length that converts angles to displacements in a mode shape: about the radius of the tub. [m]"""
 
 
 def natural_modes(
     machine: Machine, parameters: MachineParameters | None = None, *, gasket: bool = True
 ) -> Modes:
-    """The empty tub's modes about its rest pose with the dampers free, by Drake's `Linearize` of the whole diagram.
+    """Compute the natural modes of the empty machine about its rest pose without dampers.
 
-    Dampers are taken out because friction at rest is no spring and no dashpot: a smoothed law would linearize to a huge one.
-    The drum stands still. Overdamped motions are not among the modes, nor are those of damper tubes on their bushings and of
-    a drum in its bearing, which are faster than the tub's six.
+    The diagram is linearized with Drake's `Linearize`. The drum stands still. Dampers are removed,
+    because friction at rest is neither a spring nor a dashpot: a smoothed friction law would
+    linearize to a very stiff dashpot. Overdamped motions are not included. Of the others, only the
+    six slowest are included; damper tubes on their bushings and a drum in a compliant bearing have
+    faster ones.
 
     Args:
         machine: A built machine.
-        parameters, gasket: As for `Machine.set_up`.
+        parameters: Parameters to use; those of the built machine if None.
+        gasket: False removes the gasket.
     """
     setup = machine.set_up(parameters=parameters, gasket=gasket, dampers=False)
+    # the drum stands still, whatever speed the spin profile begins with
+    machine.set_drum_acceleration(setup.context, 0.0)
+    machine.plant.SetVelocities(setup.plant_context, np.zeros(machine.plant.num_velocities()))
     system = Linearize(
         machine.diagram, setup.context, InputPortSelection.kNoInput, OutputPortSelection.kNoOutput
     )

@@ -1,12 +1,13 @@
-"""Analysis of variance of factors at a few levels: how much of a response each term explains, and how it acts at each level.
+"""Analysis of variance of factors at a few levels: contribution and effects of each term.
 
-Sum-to-zero coding: the constant is the mean over all level combinations, and the effects of a term sum to zero over the levels
-of each of its factors. Fits and tests are statsmodels'.
+The coding is sum-to-zero: the constant is the mean over all level combinations, and the effects of
+a term sum to zero over the levels of each of its factors. Fits and tests are done by statsmodels.
 
-A contribution is the variance of a term's effects over the grid of all level combinations, as a part of the variance there. On
-an orthogonal design that is the sum of squares of an analysis of variance over the total one, of any type. On others, sums of
-squares of type III do not add up to the total and those of type I depend on the order of terms; contributions by variance add
-up to 100 with the residual on any design.
+A contribution is the variance of a term's effects over the grid of all level combinations, as a
+fraction of the total variance there. On an orthogonal design it equals the ratio of the term's sum
+of squares to the total one, for all types of sums of squares. On other designs, sums of squares of
+type III do not add up to the total, and those of type I depend on the order of the terms.
+Contributions by variance and the residual add up to 100 % on any design.
 """
 
 import itertools
@@ -21,20 +22,23 @@ from threadpoolctl import threadpool_limits
 from wm_drake.parameters.types import FloatArray
 
 Combination = tuple[int, ...]
-"""A level for each factor of a term."""
+"""One level for each factor of a term."""
 
 
 @dataclass(frozen=True)
 class Term:
-    """What one term of the model explains.
+    """Contribution, test and effects of one term of the model.
 
     Attributes:
-        factors: Names; one for a main effect, two for an interaction.
-        percent: Contribution: mean square of its effects over all level combinations, of the variance there.
-        sum_sq: Sum of squares over the trials that are lost without it (type III). [unit of the response, squared]
+        factors: Names of the factors; one for a main effect, two for an interaction.
+        percent: Contribution: mean square of the effects over all level combinations, in percent of
+            the total variance there.
+        sum_sq: Sum of squares of type III over the trials. [unit of the response, squared]
         df: Degrees of freedom.
-        f, p: F statistic and its p-value against the residual; they mean something only if the residual is noise.
-        effects: By the levels of its factors, deviation from what the terms below it predict. [unit of the response]
+        f, p: F statistic against the residual and its p-value. They are meaningful only if the
+            residual is noise.
+        effects: By level combination: deviation from the prediction by all terms of lower order.
+            [unit of the response]
     """
 
     factors: tuple[str, ...]
@@ -58,11 +62,12 @@ class AnovaTable:
     Attributes:
         constant: Mean over all level combinations. [unit of the response]
         terms: Main effects, then interactions, in the order of the factors.
-        main_percent, interaction_percent, residual_percent: Contributions of all main effects, all interactions, and what is
-            left; they sum to 100.
-        total_sum_sq, residual_sum_sq: Sums of squares over the trials, about the mean and about the fit.
+        main_percent, interaction_percent, residual_percent: Contributions of all main effects, all
+            interactions and the residual; they sum to 100. [%]
+        total_sum_sq, residual_sum_sq: Sums of squares over the trials, about the mean and about the
+            fit. [unit of the response, squared]
         residual_df: Degrees of freedom of the residual.
-        fitted, residual: Per trial. [unit of the response]
+        fitted, residual: (trials,) fitted value and residual. [unit of the response]
     """
 
     constant: float
@@ -77,18 +82,24 @@ class AnovaTable:
     residual: FloatArray
 
     def percents(self) -> pd.Series:
-        """Contribution by name of term. [%]"""
+        """Return the contribution of each term, by its name. [%]"""
         return pd.Series({term.name: term.percent for term in self.terms})
 
 
 class SumCoding:
-    """Sum-coded columns of a design for all main effects and, if wanted, two-factor interactions."""
+    """Sum-coded columns of a design: main effects and, optionally, two-factor interactions."""
 
     def __init__(self, levels: pd.DataFrame, interactions: bool) -> None:
-        """For a design: a trial a row, a factor a column, any hashable levels that can be sorted, at least two a factor."""
+        """Compute the columns for a design.
+
+        Args:
+            levels: One row per trial and one column per factor. Levels are hashable and sortable,
+                and each factor has at least two.
+            interactions: Whether the model has two-factor interactions.
+        """
         self.levels = {str(name): sorted(set(levels[name])) for name in levels.columns}
         self.codes = {name: _sum_code(len(found)) for name, found in self.levels.items()}
-        places = {
+        indices = {
             name: levels[name].map({v: i for i, v in enumerate(found)})
             for name, found in self.levels.items()
         }
@@ -97,8 +108,8 @@ class SumCoding:
             for term in itertools.combinations(names, size):
                 block = np.ones((len(levels), 1))
                 for name in term:
-                    own = self.codes[name][places[name].to_numpy()]
-                    block = (block[:, :, None] * own[:, None, :]).reshape(len(levels), -1)
+                    code = self.codes[name][indices[name].to_numpy()]
+                    block = (block[:, :, None] * code[:, None, :]).reshape(len(levels), -1)
                 self.terms.append(term)
                 blocks.append(block)
         ends = np.cumsum([block.shape[1] for block in blocks])
@@ -108,7 +119,7 @@ class SumCoding:
         self.matrix = np.hstack(blocks)
 
     def effects(self, term: tuple[str, ...], coefficients: FloatArray) -> dict[Combination, float]:
-        """Effects at all level combinations of a term, from its coefficients."""
+        """Return the effects of a term at all its level combinations, from its coefficients."""
         table = coefficients.reshape([self.codes[name].shape[1] for name in term])
         for axis, name in enumerate(term):
             table = np.moveaxis(np.tensordot(self.codes[name], table, axes=(1, axis)), 0, axis)
@@ -117,25 +128,28 @@ class SumCoding:
 
 
 def _sum_code(levels: int) -> FloatArray:
-    """Columns for all levels but the last, which is minus their sum: that of R and patsy. (levels, levels - 1)"""
+    """Return the sum-to-zero code (levels, levels - 1) of one factor, as in R and patsy.
+
+    There is one column for each level except the last. The row of the last level is -1.
+    """
     return np.vstack([np.eye(levels - 1), -np.ones(levels - 1)])
 
 
 def anova(
     levels: pd.DataFrame, responses: pd.DataFrame, interactions: bool = True
 ) -> dict[str, AnovaTable]:
-    """Analyses the variance of responses.
+    """Return the analysis of variance of each response.
 
     Args:
-        levels: A trial a row, a factor a column.
-        responses: A trial a row, a response a column.
-        interactions: Whether two-factor interactions are in the model.
+        levels: One row per trial, one column per factor.
+        responses: One row per trial, one column per response.
+        interactions: Whether the model has two-factor interactions.
 
     Returns:
-        By name of response. A response that does not vary has no contributions: all percents are NaN.
+        Tables by name of the response. If a response is constant, all its contributions are NaN.
     """
     coding = SumCoding(levels, interactions)
-    with threadpool_limits(1, "blas"):  # many small fits: threads would wait for each other
+    with threadpool_limits(1, "blas"):  # the fits are small: several threads would be slower
         return {
             str(name): _analysed(coding, responses[name].to_numpy(dtype=float))
             for name in responses.columns
@@ -149,15 +163,15 @@ def _analysed(coding: SumCoding, response: FloatArray) -> AnovaTable:
         term: coding.effects(term, fit.params[columns]) for term, columns in coding.columns.items()
     }
     variances = {
-        term: float(np.mean(np.square(list(own.values())))) for term, own in effects.items()
+        term: float(np.mean(np.square(list(values.values())))) for term, values in effects.items()
     }
     variance = sum(variances.values()) + float(fit.ssr) / len(response)
-    # rounding alone leaves some 1e-16 of the response itself: nothing to divide up
+    # the variance of a constant response is not 0 but about 1e-32 of its square, by rounding
     scale = 100.0 / variance if variance > 1e-20 * float(np.mean(response**2)) else np.nan
     identity = np.eye(coding.matrix.shape[1])
     terms = []
     for term, columns in coding.columns.items():
-        # with the covariance for unit variance, F times its degrees of freedom is the sum of squares, exact fit or not
+        # with the covariance for unit variance, F * df is the sum of squares, also for an exact fit
         test = fit.f_test(identity[columns], cov_p=fit.normalized_cov_params)
         df = columns.stop - columns.start
         sum_sq = float(test.fvalue) * df

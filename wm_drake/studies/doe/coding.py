@@ -1,4 +1,4 @@
-"""Levels -1, 0, 1 -> columns of a linear model, and how well a design determines its coefficients."""
+"""Coding of the levels -1, 0, 1 as columns of a linear model, and the D-efficiency of designs."""
 
 import itertools
 from typing import TypeAlias
@@ -8,21 +8,27 @@ import numpy as np
 from wm_drake.parameters.types import FloatArray
 
 Levels: TypeAlias = np.ndarray[tuple[int, int], np.dtype[np.int8]]
-"""A trial a row, a factor a column, each -1, 0 or 1."""
+"""One row per trial, one column per factor; each value is -1, 0 or 1."""
 
 LEVELS = (-1, 0, 1)
 
 MODELS = {"main": 1, "main+2fi": 2}
-"""Models by name: the most factors that a term may join. main+2fi has all two-factor interactions."""
+"""Largest number of factors in a term, by name of the model.
+
+main+2fi has all two-factor interactions.
+"""
 
 _MAIN = np.array(
     [[-np.sqrt(1.5), np.sqrt(0.5)], [0.0, -np.sqrt(2.0)], [np.sqrt(1.5), np.sqrt(0.5)]]
 )
-"""Linear and quadratic contrast of the three levels: mean 0, mean square 1, uncorrelated over equally frequent levels."""
+"""Linear and quadratic contrast of the three levels.
+
+Over equally frequent levels they have mean 0 and mean square 1 and are uncorrelated.
+"""
 
 
 def terms_of(factors: int, model: str) -> list[tuple[int, ...]]:
-    """The terms of a model without its constant, as factor numbers: main effects, then interactions."""
+    """Return the terms of a model as indices of factors: main effects, then interactions."""
     return [
         term
         for size in range(1, MODELS[model] + 1)
@@ -31,19 +37,21 @@ def terms_of(factors: int, model: str) -> list[tuple[int, ...]]:
 
 
 def columns(factors: int, model: str) -> int:
-    """Number of coefficients of a model, constant included."""
+    """Return the number of coefficients of a model, including the constant."""
     return 1 + sum(2 ** len(term) for term in terms_of(factors, model))
 
 
 def level_matrix(factors: int) -> Levels:
-    """All 3^factors trials, the last factor changing fastest."""
+    """Return all 3^factors trials; the last factor changes fastest."""
     return np.indices((3,) * factors, dtype=np.int8).reshape(factors, -1).T - np.int8(1)
 
 
 def model_matrix(levels: Levels, model: str) -> FloatArray:
-    """The columns (n, p) of a model: constant, two for each main effect, four for each interaction of two.
+    """Return the columns (n, p) of a model for n trials.
 
-    Orthonormal over the full factorial: there X'X = n I, and every trial has the same leverage.
+    There is one column for the constant, two for each main effect and four for each two-factor
+    interaction. Over the full factorial they are orthogonal: X'X = n I, and every trial has the
+    same leverage.
     """
     main = [_MAIN[levels[:, factor].astype(int) + 1] for factor in range(levels.shape[1])]
     blocks = [np.ones((len(levels), 1))]
@@ -56,15 +64,16 @@ def model_matrix(levels: Levels, model: str) -> FloatArray:
 
 
 def efficiency(levels: Levels, model: str) -> float:
-    """D-efficiency of a design against the best there can be: det(X'X / n)^(1/p). [%]
+    """Return the D-efficiency 100 det(X'X / n)^(1/p) of a design. [%]
 
-    100 is an exact bound, that of the full factorial: its leverages are all the same, so by the equivalence theorem of Kiefer
-    and Wolfowitz no distribution of trials over the grid has a larger determinant. Any other full-rank coding of the same
-    terms gives the same number. 0 for a design that leaves some coefficient undetermined.
+    The full factorial has 100 %, which is an exact upper bound: all its leverages are equal, so by
+    the equivalence theorem of Kiefer and Wolfowitz no distribution of trials over the grid has a
+    larger determinant. Any other full-rank coding of the same terms has the same D-efficiency. The
+    result is 0 if the design does not determine all coefficients.
     """
     if len(levels) < columns(levels.shape[1], model):
         return 0.0
     x = model_matrix(levels, model)
     sign, logarithm = np.linalg.slogdet(x.T @ x / len(x))
-    found = 100.0 * float(np.exp(logarithm / x.shape[1])) if sign > 0 else 0.0
-    return found if found > 1e-2 else 0.0  # a singular matrix has a determinant of rounding errors
+    percent = 100.0 * float(np.exp(logarithm / x.shape[1])) if sign > 0 else 0.0
+    return percent if percent > 1e-2 else 0.0  # by rounding, a singular matrix is not exactly 0

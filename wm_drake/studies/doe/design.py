@@ -1,4 +1,4 @@
-"""A design: its trials with names of factors; made by kind, written and read as CSV."""
+"""Designs of experiments: make one of a kind, write it and read it as CSV."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,22 +13,22 @@ from wm_drake.studies.doe.exchange import d_optimal_levels
 from wm_drake.studies.doe.orthogonal import orthogonal_levels
 
 DESIGNS = ("d-optimal", "orthogonal", "full")
-"""Kinds of design that can be made; any other comes from a file."""
+"""Kinds of designs that can be made; other designs are read from a file."""
 
 TRIAL = "trial"
-"""Column of a CSV file that numbers the trials, from 1."""
+"""Name of the CSV column with the numbers of the trials, which start at 1."""
 
 
 @dataclass(frozen=True)
 class Design:
-    """Trials to run.
+    """A design of experiments: the trials to run.
 
     Attributes:
-        kind: One of `DESIGNS`, or where it was read from.
-        factors: Names, one a column of `levels`.
-        levels: A trial a row, each -1, 0 or 1.
-        model: The model it is meant for, key of `MODELS`.
-        seed: Of a seeded kind; None for others.
+        kind: One of `DESIGNS`, or the name of the file it was read from.
+        factors: Names of the factors, one for each column of `levels`.
+        levels: One row per trial; each value is -1, 0 or 1.
+        model: Model that the design is made for, key of `MODELS`.
+        seed: Seed of a random design; None for others.
     """
 
     kind: str
@@ -43,11 +43,11 @@ class Design:
         return len(self.levels)
 
     def efficiency(self, model: str | None = None) -> float:
-        """D-efficiency against the exact bound, for its own model or another. [%]"""
+        """Return the D-efficiency for a model; for the design's own model if None. [%]"""
         return efficiency(self.levels, model or self.model)
 
     def frame(self) -> pd.DataFrame:
-        """As a table: trial, then a column per factor."""
+        """Return the design as a table: number of the trial, then one column per factor."""
         table = pd.DataFrame(self.levels, columns=list(self.factors))
         table.insert(0, TRIAL, np.arange(1, self.trials + 1))
         return table
@@ -61,17 +61,18 @@ def make_design(
     model: str = "main+2fi",
     seed: int = 0,
 ) -> Design:
-    """A design of a kind.
+    """Make a design of a kind.
 
     Args:
         kind: One of `DESIGNS`.
-        factors: Names.
-        trials: As many trials; by default 1000 (d-optimal), 729 (orthogonal), all (full).
-        model: What is to be estimated, key of `MODELS`.
-        seed: Of a D-optimal design.
+        factors: Names of the factors.
+        trials: Number of trials; the default is 1000 (d-optimal), 729 (orthogonal) or all (full).
+        model: Model to estimate, key of `MODELS`.
+        seed: Seed of a D-optimal design.
 
     Raises:
-        InputError: unknown kind or model, or a number of trials that it cannot have.
+        InputError: the kind or the model is unknown, or the kind does not have this number of
+            trials.
     """
     if kind not in DESIGNS:
         raise input_error(f"no design '{kind}'{nearest_names(kind, DESIGNS)}", key="design")
@@ -93,11 +94,17 @@ def make_design(
     wanted = min(1000, everything) if trials is None else trials
     least = columns(count, model)
     if wanted < least:
-        message = f"{wanted} trials cannot determine the {least} coefficients of {model} with {count} factors"
-        raise input_error(f"{message}; allowed are {least} to {everything}", key="trials")
+        raise input_error(
+            f"{wanted} trials cannot determine the {least} coefficients of {model} with {count} "
+            f"factors; allowed are {least} to {everything}",
+            key="trials",
+        )
     if wanted > everything:
-        message = f"{count} factors have {everything} different trials, and a repeated run would tell nothing new"
-        raise input_error(f"{message}; allowed are {least} to {everything}", key="trials")
+        raise input_error(
+            f"{count} factors have only {everything} different trials, and a repeated run has the "
+            f"same result; allowed are {least} to {everything}",
+            key="trials",
+        )
     _check_size(wanted)
     if wanted == everything:
         return Design(kind, factors, level_matrix(count), model, seed)
@@ -105,26 +112,35 @@ def make_design(
 
 
 LARGEST_DESIGN = 3**11
-"""Trials of a design at most: some hours of runs."""
+"""Largest number of trials of a design; running them takes some hours."""
 
 
 def _check_size(trials: int) -> None:
     if trials > LARGEST_DESIGN:
         raise input_error(
-            f"{trials} trials are too many; allowed are {LARGEST_DESIGN}", key="trials"
+            f"{trials} trials are too many; allowed are up to {LARGEST_DESIGN}", key="trials"
         )
 
 
 def write_design(design: Design, path: Path) -> None:
-    """Writes a design as CSV: trial, then a column of levels per factor."""
+    """Write a design as CSV: number of the trial, then one column of levels per factor."""
     design.frame().to_csv(path, index=False)
 
 
 def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -> Design:
-    """Reads a design of the user's own: CSV with a column per factor in any order, each value -1, 0 or 1; `trial` may be there.
+    """Read a design from a CSV file.
+
+    The file has one column per factor, in any order, with the levels -1, 0 and 1. A column `trial`
+    is optional.
+
+    Args:
+        path: The file.
+        factors: Names of the factors.
+        model: Model to estimate, key of `MODELS`.
 
     Raises:
-        InputError: other columns, other levels, a repeated trial, or too few trials to determine the model.
+        InputError: the file has other columns, other levels or a repeated trial, or the trials do
+            not determine the model.
     """
     named = list(_header(path))
     wanted = [name for name in named if name != TRIAL]
@@ -140,7 +156,7 @@ def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -
         row, column = bad[0]
         value = table.iloc[row, column]
         raise input_error(
-            f"row {row + 1}: '{value}' is no level; allowed are -1, 0 and 1",
+            f"row {row + 1}: '{value}' is not a level; allowed are -1, 0 and 1",
             where=str(path),
             key=factors[column],
         )
@@ -149,16 +165,18 @@ def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -
     if len(first) < len(levels):
         row = int(first[np.argmax(counts)]) + 1
         raise input_error(
-            f"row {row} is there more than once; a repeated run would tell nothing new",
+            f"row {row} occurs more than once; rows must differ, as a repeated run has the same "
+            "result",
             where=str(path),
         )
     design = Design(path.name, factors, levels, model)
     if design.efficiency() == 0.0:
-        need = columns(len(factors), model)
-        message = (
-            f"these {design.trials} trials do not determine the {need} coefficients of {model}"
+        needed = columns(len(factors), model)
+        raise input_error(
+            f"these {design.trials} trials do not determine the {needed} coefficients of {model}; "
+            "add other trials, or use the model main",
+            where=str(path),
         )
-        raise input_error(f"{message}; add others, or take the model main", where=str(path))
     return design
 
 

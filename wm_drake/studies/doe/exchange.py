@@ -1,4 +1,4 @@
-"""D-optimal designs by exchange of rows: modified Fedorov, with rank-two updates."""
+"""D-optimal designs by the modified Fedorov exchange of trials, with rank-two updates."""
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -7,37 +7,40 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.doe.coding import Levels, level_matrix, model_matrix
 
 LARGEST_GRID = 3**9
-"""Trials that the exchange chooses from at most; of a larger grid, so many taken at random."""
+"""Largest number of trials to choose from; for a larger grid, a random sample of this size."""
 
 MOST_PASSES = 10
+"""Limit of the number of passes over all trials."""
+
 SMALLEST_GAIN = 2e-4
-"""Over all trials, the exchange goes on while a pass gains more than this of the D-efficiency."""
+"""Relative gain of the D-efficiency in one pass below which the exchange ends."""
 
 
 def d_optimal_levels(factors: int, trials: int, model: str, seed: int) -> Levels:
-    """Trials, all different, that determine the coefficients of a model as well as so many can: largest det X'X.
+    """Search for distinct trials with the largest det X'X.
 
-    From a random start, each trial in turn is exchanged for the one of the grid that raises the determinant most, until a
-    pass over all trials gains nothing worth having [Cook and Nachtsheim 1980, modified Fedorov exchange]. det X'X changes by
-    the factor (1 + d_j)(1 - d_i) + d_ij^2 when j replaces i, with d_ij = x_i' (X'X)^-1 x_j.
+    From a random start, each trial in turn is exchanged for the trial of the grid that raises the
+    determinant most, until a pass over all trials raises it by too little [Cook and Nachtsheim
+    1980, modified Fedorov exchange]. If trial j replaces trial i, det X'X changes by the factor
+
+        (1 + d_j) (1 - d_i) + d_ij^2,   d_ij = x_i' (X'X)^-1 x_j,   d_i = d_ii.
 
     Args:
         factors: Number of factors.
-        trials: At least as many as the model has columns, fewer than the grid.
+        trials: Number of trials: at least the number of columns of the model, fewer than the grid
+            has.
         model: Key of `MODELS`.
-        seed: Of the start; the same seed gives the same design.
+        seed: Seed of the random start; the design depends on it.
 
     Returns:
-        Sorted, so that only the set of trials matters.
+        The trials, sorted.
     """
     rng = np.random.default_rng(seed)
     grid = _grid(factors, rng)
     candidates = model_matrix(grid, model)
     columns = np.ascontiguousarray(candidates.T)
     log_determinant = -np.inf
-    with threadpool_limits(
-        1, "blas"
-    ):  # the products are small: threads would wait for each other, on a busy machine for long
+    with threadpool_limits(1, "blas"):  # the products are small: several threads would be slower
         chosen = _independent_start(candidates, trials, rng)
         for _ in range(MOST_PASSES):
             _pass(columns, chosen)
@@ -59,7 +62,10 @@ def _grid(factors: int, rng: np.random.Generator) -> Levels:
 
 
 def _independent_start(candidates: FloatArray, trials: int, rng: np.random.Generator) -> np.ndarray:
-    """Random rows that determine all coefficients: first one for each column, by elimination, then any others."""
+    """Return indices of random trials that determine all coefficients.
+
+    First, elimination selects one trial for each column of the model; the others are random.
+    """
     order = rng.permutation(len(candidates))
     remaining = candidates[order[: 8 * candidates.shape[1]]].copy()
     basis = []
@@ -74,7 +80,12 @@ def _independent_start(candidates: FloatArray, trials: int, rng: np.random.Gener
 
 
 def _pass(columns: FloatArray, chosen: np.ndarray) -> None:
-    """One exchange for each chosen trial, if any gains; changes `chosen`. `columns` are those of the model, (p, candidates)."""
+    """Exchange each chosen trial in turn if this raises the determinant.
+
+    Args:
+        columns: (p, candidates) columns of the model for all candidates.
+        chosen: Indices of the chosen trials; changed in place.
+    """
     inverse = np.linalg.inv(columns[:, chosen] @ columns[:, chosen].T)
     variance = np.einsum("ji,ji->i", columns, inverse @ columns)
     free = np.ones(columns.shape[1], dtype=bool)
@@ -94,8 +105,7 @@ def _pass(columns: FloatArray, chosen: np.ndarray) -> None:
             free[old], free[new] = True, False
             chosen[place] = new
         following = columns[:, chosen[(place + 1) % len(chosen)]]
-        *changes, covariance = (
-            np.stack([*steps, inverse @ following]) @ columns
-        )  # all products with the grid in one go
+        # one matrix product with the grid is faster than several
+        *changes, covariance = np.stack([*steps, inverse @ following]) @ columns
         for scale, change in zip(scales, changes, strict=True):
             variance -= scale * change**2

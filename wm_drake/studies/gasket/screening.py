@@ -1,6 +1,6 @@
-"""Screening: a design is run, and the variance of each response is divided among factors and their interactions.
+"""Screening: run a design and divide the variance of each response among factors and interactions.
 
-Knows nothing of machines: `evaluate` gives the responses of trials.
+It is independent of machines: the function `evaluate` returns the responses of the trials.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,23 +15,23 @@ from wm_drake.studies.doe import Design, efficiency
 from wm_drake.studies.doe.anova import AnovaTable, Term, anova
 
 LEADING_MAIN_PERCENT = 10.0
-"""Main effects that contribute more are listed ([B] Table 5)."""
+"""Contribution above which a main effect is a leading term ([B] Table 5). [%]"""
 
 LEADING_INTERACTION_PERCENT = 5.0
-"""Interactions that contribute more are listed ([B] Table 5)."""
+"""Contribution above which an interaction is a leading term ([B] Table 5). [%]"""
 
 Label: TypeAlias = tuple[str, str]
-"""Load and response."""
+"""Name of a load and name of a response."""
 
 
 @dataclass(frozen=True)
 class Responses:
-    """What trials gave.
+    """Responses of the trials of a design.
 
     Attributes:
-        values: By load: a trial a row, a response a column; NaN where a run gave none.
+        values: By load: one row per trial, one column per response; NaN where a run failed.
         units: Unit of each response, by its name.
-        failed: By (trial from 0, load), why a run failed.
+        failed: Reason of each failed run, by index of the trial (from 0) and load.
     """
 
     values: dict[str, pd.DataFrame]
@@ -44,12 +44,12 @@ Evaluate: TypeAlias = Callable[[Design], Responses]
 
 @dataclass(frozen=True)
 class Screening:
-    """A design that was run, and what came of it.
+    """A design with its responses and their analysis of variance.
 
     Attributes:
-        design: What was run.
-        responses: What that gave.
-        tables: Analysis of variance by label, over the trials whose runs of that load did not fail.
+        design: The design.
+        responses: Responses of its trials.
+        tables: Analysis of variance by label, without the trials whose run with this load failed.
     """
 
     design: Design
@@ -58,61 +58,79 @@ class Screening:
 
     @property
     def loads(self) -> list[str]:
-        """Loads, in the order they were run."""
+        """Names of the loads, in the order of the runs."""
         return list(self.responses.values)
 
     @property
     def names(self) -> list[str]:
-        """Responses, in their order."""
+        """Names of the responses."""
         return list(self.responses.units)
 
 
 def run_screening(design: Design, evaluate: Evaluate) -> Screening:
-    """Runs a design and analyses its responses.
+    """Run a design and analyse its responses.
 
     Raises:
-        InputError: so many runs failed that the rest does not determine the effects.
+        InputError: so many runs failed that the others do not determine the effects.
     """
     return analyse(design, evaluate(design))
 
 
 def analyse(design: Design, responses: Responses) -> Screening:
-    """Analyses responses of a design."""
+    """Analyse the variance of the responses of a design.
+
+    Raises:
+        InputError: so many runs failed that the others do not determine the effects.
+    """
     levels = pd.DataFrame(design.levels, columns=list(design.factors))
     tables: dict[Label, AnovaTable] = {}
     for load, values in responses.values.items():
         good = np.isfinite(values.to_numpy()).all(axis=1)
         if not good.all() and efficiency(design.levels[good], design.model) == 0.0:
-            message = f"{np.sum(~good)} of {len(good)} runs failed; the others do not determine the effects of {design.model}"
-            raise input_error(message, where=f"load {load}")
+            raise input_error(
+                f"{np.sum(~good)} of {len(good)} runs failed; the others do not determine the "
+                f"effects of {design.model}",
+                where=f"load {load}",
+            )
         found = anova(levels[good], values[good], interactions=design.model != "main")
         tables |= {(load, name): table for name, table in found.items()}
     return Screening(design, responses, tables)
 
 
 def leading_terms(table: AnovaTable) -> list[Term]:
-    """The terms above the thresholds of [B] Table 5, largest first."""
+    """Return the terms above the thresholds of [B] Table 5, largest first."""
     least = {1: LEADING_MAIN_PERCENT, 2: LEADING_INTERACTION_PERCENT}
     found = [term for term in table.terms if term.percent > least[len(term.factors)]]
     return sorted(found, key=lambda term: -term.percent)
 
 
 def main_effects(table: AnovaTable) -> list[Term]:
-    """Main effects, largest first."""
+    """Return the main effects, largest first."""
     return sorted(
         (term for term in table.terms if len(term.factors) == 1), key=lambda term: -term.percent
     )
 
 
 def contributions(screening: Screening) -> pd.DataFrame:
-    """Contribution of each term: a term a row, a label a column. [%]"""
+    """Return the contributions of the terms: one row per term, one column per label. [%]"""
     return pd.DataFrame({label: table.percents() for label, table in screening.tables.items()})
 
 
 def mean_at(
     screening: Screening, label: Label, factors: Sequence[str]
 ) -> dict[tuple[int, ...], float]:
-    """Model's mean response at each level combination of one or two factors, over all levels of the others."""
+    """Return the mean response at each level combination of one or two factors.
+
+    The mean is that of the fitted model over all levels of the other factors.
+
+    Args:
+        screening: A design with its responses and their analysis.
+        label: Load and response.
+        factors: Names of one or two factors.
+
+    Returns:
+        Mean response by level combination, in the order of `factors`. [unit of the response]
+    """
     table = screening.tables[label]
     order = [name for name in screening.design.factors if name in factors]
     parts = {

@@ -1,4 +1,8 @@
-"""The gasket study of [B] section 4: how its stiffness and damping act on tub displacement, gasket forces and moments."""
+"""The gasket study of [B] section 4.
+
+It computes the effects of stiffness and damping of the gasket on the displacement of the tub and on
+the forces and moments of the gasket.
+"""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -10,19 +14,20 @@ import xarray as xr
 
 from wm_drake.parameters import FactorLevels, MachineParameters, at_levels
 from wm_drake.parameters.units import Unit
-from wm_drake.simulation.runs import AXES, Case
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.outputs import AXES
 from wm_drake.studies.doe import Design
 from wm_drake.studies.gasket.screening import Responses
 
 MEASURES = ("extremes",)
-"""What is measured of each run."""
+"""Measures of each run, as for `simulate_many`."""
 
 VARIABLES = {
     "D": ("detergent_displacement", Unit("m", "mm")),
     "F": ("gasket_force", Unit("N", "N")),
     "M": ("gasket_moment", Unit("N*m", "N*m")),
 }
-"""By letter of [B]: variable of a table of runs, and the unit it is reported in."""
+"""By the letter in [B]: variable of the table of runs, and the unit of the report."""
 
 RESPONSES = [f"{letter}{axis}" for letter in VARIABLES for axis in AXES]
 
@@ -30,7 +35,7 @@ LOADS = ("middle", "counter")
 """Loads of [B] section 4."""
 
 Run: TypeAlias = Callable[[Iterable[Case]], xr.Dataset]
-"""Runs cases and gives their table, in their order, as `simulate_many` does."""
+"""Function that runs cases and returns their table, as `simulate_many` does."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +43,9 @@ class GasketTrials:
     """The trials of a design, as runs of a machine.
 
     Attributes:
-        parameters: The machine at level 0 of all factors, apart from which only the factors change.
-        factors: What the levels are.
-        loads: A case for each load to run, without parameters.
+        parameters: The machine; only the factors change.
+        factors: Levels of the factors for this machine.
+        loads: One case for each load to run, without parameters.
     """
 
     parameters: MachineParameters
@@ -48,23 +53,27 @@ class GasketTrials:
     loads: Sequence[Case]
 
     def cases(self, design: Design) -> Iterator[Case]:
-        """All runs: for each trial, one for each load."""
+        """Yield all runs: for each trial, one for each load."""
         for number, levels in enumerate(design.levels, start=1):
             changed = at_levels(self.parameters, self.factors, levels.tolist())
             for case in self.loads:
-                own = (
-                    self.parameters.loads.get(case.name) == case.load
-                )  # a factor may be one of its masses
-                load = changed.loads[case.name] if own else case.load
+                # a factor may be a mass of one of the machine's own loads
+                is_own = self.parameters.loads.get(case.name) == case.load
+                load = changed.loads[case.name] if is_own else case.load
                 yield Case(f"{case.name}, trial {number}", load, case.profile, parameters=changed)
 
     def responses(self, design: Design, run: Run) -> Responses:
-        """Runs all trials."""
+        """Run all trials and return their responses."""
         return as_responses(run(self.cases(design)), [case.name for case in self.loads])
 
 
 def as_responses(table: xr.Dataset, loads: Sequence[str]) -> Responses:
-    """D, F and M per load from a table of runs, the loads of a trial one after the other."""
+    """Return the responses D, F and M for each load from a table of runs.
+
+    Args:
+        table: Table of runs; the loads of one trial follow each other.
+        loads: Names of the loads, in the order of the runs.
+    """
     blocks = [unit.from_si(1.0) * table[name].values for name, unit in VARIABLES.values()]
     numbers = np.hstack(blocks)
     values = {

@@ -1,4 +1,4 @@
-"""Results of a screening as plain tables and plain data, for files and other programs."""
+"""Results of a screening as tables and plain data, for files and other programs."""
 
 import json
 import math
@@ -13,11 +13,11 @@ from wm_drake.studies.doe.anova import Term
 from wm_drake.studies.gasket.screening import Screening, leading_terms
 
 DIGITS = "%.9g"
-"""Of numbers in CSV files: more than the runs are good for."""
+"""Format of numbers in CSV files; it has more digits than the results are accurate to."""
 
 
 def write_tables(screening: Screening, folder: Path) -> None:
-    """Writes all tables as CSV. The same screening always gives the same bytes."""
+    """Write all tables as CSV files. One screening always results in the same bytes."""
     write_design(screening.design, folder / "design.csv")
     tables = {
         "runs.csv": runs_table(screening),
@@ -31,7 +31,7 @@ def write_tables(screening: Screening, folder: Path) -> None:
 
 
 def runs_table(screening: Screening) -> pd.DataFrame:
-    """Every run: trial, levels, load, responses with their units, why it failed if it did."""
+    """Return the table of all runs: trial, load, levels, responses, reason if the run failed."""
     design, responses = screening.design, screening.responses
     parts = []
     for load in screening.loads:
@@ -46,7 +46,11 @@ def runs_table(screening: Screening) -> pd.DataFrame:
 
 
 def variance_table(screening: Screening) -> pd.DataFrame:
-    """[B] Table 4: percent explained by main effects, by interactions, and not at all; with mean and range of the runs."""
+    """Return the table of variance of each response, as [B] Table 4.
+
+    It has the percentages of main effects, interactions and residual, and mean and range of the
+    runs.
+    """
     rows = []
     for (load, name), table in screening.tables.items():
         values = screening.responses.values[load][name]
@@ -70,7 +74,7 @@ def variance_table(screening: Screening) -> pd.DataFrame:
 
 
 def contributions_table(screening: Screening) -> pd.DataFrame:
-    """Every term of every response: contribution, sum of squares (type III), degrees of freedom."""
+    """Return contribution, sum of squares (type III) and degrees of freedom of all terms."""
     return pd.DataFrame(
         {
             "load": load,
@@ -86,7 +90,11 @@ def contributions_table(screening: Screening) -> pd.DataFrame:
 
 
 def effects_table(screening: Screening) -> pd.DataFrame:
-    """Every effect: term, levels of its factors joined by a colon, deviation in the unit of the response."""
+    """Return the table of all effects.
+
+    Its columns include the term, the levels of its factors joined by a colon, and the effect in the
+    unit of the response.
+    """
     return pd.DataFrame(
         {"load": load, "response": name, "term": t.name, "levels": levels, "effect": effect}
         for (load, name), table in screening.tables.items()
@@ -96,7 +104,11 @@ def effects_table(screening: Screening) -> pd.DataFrame:
 
 
 def leading_table(screening: Screening) -> pd.DataFrame:
-    """[B] Table 5: constant, and the terms above its thresholds with contribution and effects at their levels."""
+    """Return the table of leading terms, as [B] Table 5.
+
+    It has the constant of each response, and contribution and effects of the terms above the
+    thresholds of [B].
+    """
     rows: list[dict[str, Any]] = []
     for (load, name), table in screening.tables.items():
         head = {"load": load, "response": name, "unit": screening.responses.units[name]}
@@ -113,12 +125,16 @@ def leading_table(screening: Screening) -> pd.DataFrame:
 
 
 def effects_of(term: Term) -> dict[str, float]:
-    """Effects by levels as text: "-1", or "-1:0" of an interaction."""
+    """Return the effects of a term by levels as text: "-1", or "-1:0" for an interaction."""
     return {":".join(map(str, levels)): effect for levels, effect in term.effects.items()}
 
 
 def as_plain_data(screening: Screening) -> dict[str, Any]:
-    """For JSON: design, efficiency, and per load and response the contributions with the effects at each level."""
+    """Return a screening as data for JSON.
+
+    It has the design with its efficiency, and for each load and response the contributions and the
+    effects at each level.
+    """
     responses: dict[str, dict[str, Any]] = {load: {} for load in screening.loads}
     for (load, name), table in screening.tables.items():
         responses[load][name] = {
@@ -148,10 +164,10 @@ def as_plain_data(screening: Screening) -> dict[str, Any]:
 
 
 def finite(value: float) -> float | None:
-    """JSON has no NaN."""
+    """Return a number, or None if it is not finite, because JSON has no NaN."""
     return value if math.isfinite(value) else None
 
 
 def to_json(data: Any) -> str:
-    """Strict JSON, one line."""
+    """Return data as one line of strict JSON."""
     return json.dumps(data, allow_nan=False)

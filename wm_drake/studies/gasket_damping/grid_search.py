@@ -1,4 +1,8 @@
-"""Grid search of [B] section 3.1.2: a grid over the region, then grids of half the size around the best point so far."""
+"""Grid search of [B] section 3.1.2, and a bounded Nelder-Mead search to compare with.
+
+The first grid covers the region. Each further grid has half the size and is centred at the best
+point so far.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,18 +14,18 @@ from scipy.optimize import minimize
 from wm_drake.parameters.types import FloatArray
 
 POINTS_PER_AXIS = 5
-"""Of each grid: 25 points for two unknowns, as in [B]."""
+"""Points of a grid along each axis: 25 points for two unknowns, as in [B]."""
 
 MOST_ROUNDS = 12
-"""By then the grid is 4000 times finer than at first."""
+"""Limit of the number of grids; the last one is about 2000 times finer than the first."""
 
 Objective: TypeAlias = Callable[[Sequence[FloatArray]], list[float]]
-"""Values at several points, which may be computed side by side."""
+"""Function that returns the values at several points, so that they can be computed in parallel."""
 
 
 @dataclass(frozen=True)
 class Round:
-    """One grid: the points that were new in it, their values, and the best point known after it."""
+    """One grid: its new points, their values, and the best point so far with its value."""
 
     points: FloatArray
     values: FloatArray
@@ -31,12 +35,13 @@ class Round:
 
 @dataclass(frozen=True)
 class Search:
-    """How an optimum was found.
+    """Result of a search.
 
     Attributes:
-        best, value: The optimum.
-        evaluations: Points at which the objective was computed.
-        rounds: The grids, of a grid search.
+        best: The optimum.
+        value: Objective at the optimum.
+        evaluations: Number of points at which the objective was computed.
+        rounds: The grids of a grid search; empty for other searches.
     """
 
     best: FloatArray
@@ -46,14 +51,15 @@ class Search:
 
 
 def grid_search(objective: Objective, lower: FloatArray, upper: FloatArray, stop: float) -> Search:
-    """Refines a grid around its best point until a round gains less than `stop`.
+    """Minimize an objective by grids that are refined around the best point.
 
-    Points of a finer grid outside the region are left out, those known already are not computed again.
+    Points of a finer grid that are outside the region are omitted. Points that are known already
+    are not computed again.
 
     Args:
-        objective: To be smallest.
-        lower, upper: The region.
-        stop: Smallest gain of the objective from round to round that is worth another one.
+        objective: Objective to minimize.
+        lower, upper: Bounds of the region.
+        stop: The search ends when a round reduces the objective by less than this.
     """
     known: dict[tuple[float, ...], float] = {}
     offsets = np.stack(
@@ -65,9 +71,8 @@ def grid_search(objective: Objective, lower: FloatArray, upper: FloatArray, stop
     steps = offsets.reshape(-1, len(lower)) / (POINTS_PER_AXIS - 1)
     centre, rounds = np.full(len(lower), 0.5), list[Round]()
     for number in range(MOST_ROUNDS):
-        grid = (
-            centre + steps / 2.0**number
-        )  # in units of the region; quarters of powers of two, so exact
+        # in units of the region; the coordinates are dyadic fractions, which floats hold exactly
+        grid = centre + steps / 2.0**number
         inside = grid[np.all((grid >= 0.0) & (grid <= 1.0), axis=1)]
         new = [point for point in inside if tuple(point) not in known]
         points = [lower + point * (upper - lower) for point in new]
@@ -75,8 +80,9 @@ def grid_search(objective: Objective, lower: FloatArray, upper: FloatArray, stop
         known |= dict(zip((tuple(map(float, point)) for point in new), values, strict=True))
         centre = np.array(min(known, key=lambda point: known[point]))
         best_value = known[tuple(centre)]
-        shown = np.array(points).reshape(-1, len(lower))
-        rounds.append(Round(shown, np.array(values), lower + centre * (upper - lower), best_value))
+        best = lower + centre * (upper - lower)
+        new_points = np.array(points).reshape(-1, len(lower))
+        rounds.append(Round(new_points, np.array(values), best, best_value))
         if number and rounds[-2].best_value - best_value < stop:
             break
     return Search(rounds[-1].best, rounds[-1].best_value, len(known), tuple(rounds))
@@ -85,11 +91,15 @@ def grid_search(objective: Objective, lower: FloatArray, upper: FloatArray, stop
 def bounded_search(
     objective: Objective, lower: FloatArray, upper: FloatArray, stop: float
 ) -> Search:
-    """scipy's Nelder-Mead within the region, from its middle; envelopes have kinks, so no method that needs slopes.
+    """Minimize an objective by scipy's Nelder-Mead method, from near the middle of the region.
+
+    This method needs no derivatives; envelopes have kinks.
 
     Args:
-        objective, lower, upper: As for `grid_search`.
-        stop: Ends when the values at all corners of the simplex are this near, and their places within a thousandth.
+        objective: Objective to minimize.
+        lower, upper: Bounds of the region.
+        stop: The search ends when the values at the corners of the simplex differ by less than
+            this, and the corners by less than 0.1 % of the region.
     """
     found = minimize(
         lambda point: objective([lower + point * (upper - lower)])[0],
@@ -102,5 +112,5 @@ def bounded_search(
 
 
 def _simplex(size: int) -> FloatArray:
-    """A quarter of the region wide, about its middle."""
+    """Return a start simplex near the middle of the region, with edges of a quarter of its size."""
     return np.vstack([np.full(size, 0.4), 0.4 + 0.25 * np.eye(size)])

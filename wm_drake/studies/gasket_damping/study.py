@@ -1,4 +1,4 @@
-"""Damping of the gasket from measured displacements, [B] section 3.1.2: which C_L and C_T bring the envelopes nearest."""
+"""Identification of the gasket damping C_L and C_T from measured envelopes, [B] section 3.1.2."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,45 +18,48 @@ from wm_drake.parameters import (
     with_values,
 )
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import envelopes
-from wm_drake.simulation.runs import Case, Record, simulate
+from wm_drake.simulation.records import Record
+from wm_drake.simulation.runs import simulate
 from wm_drake.studies.gasket_damping.grid_search import Search, bounded_search, grid_search
 
 UNKNOWNS = ("C_L", "C_T")
 
 LOWER = np.array([0.0, 0.0])
 UPPER = np.array([50.0, 0.2 * 180.0 / np.pi])
-"""Region of [B]: C_L to 0.05 N s/mm, C_T to 200 N mm s/deg. [N s/m, N m s/rad]"""
+"""Upper bounds of [B]: 0.05 N s/mm for C_L and 200 N mm s/deg for C_T. [N s/m, N m s/rad]"""
 
 STOP = 0.02
 """Gain of the objective below which the search ends ([B] section 3.1.2). [mm]"""
 
 WINDOW = (10.0, 50.0)
-"""Part of the run that is compared ([B] section 3.1.2). [s]"""
+"""Time interval that is compared ([B] section 3.1.2). [s]"""
 
 AFTER = 5.0
-"""Runs go on for so long after the window, where the filter settles. [s]"""
+"""Time that runs continue after the window, so that end effects of the filter stay outside. [s]"""
 
 LOADS = ("middle", "counter")
 
 NOISE = 1e-4
-"""Standard deviation of the noise of a virtual experiment, at each sample of each sensor. [m] An assumption."""
+"""Standard deviation of the noise at each sample of a virtual experiment; an assumption. [m]"""
 
 MM_PER_M = 1e3
 
 Measured: TypeAlias = Mapping[str, xr.DataArray]
-"""By load: displacement (time, sensor) every 5 ms. [m]"""
+"""Displacements (time, sensor), sampled every 5 ms, by load. [m]"""
 
 
 @dataclass(frozen=True)
 class Damping:
-    """What came of it.
+    """Result of an identification of C_L and C_T.
 
     Attributes:
-        grid, scipy: The optimum by grid search and by a bounded optimiser of scipy: C_L, C_T. [N s/m, N m s/rad]
-        truth: The same of a virtual experiment; None if the records were measured.
-        at_best: By load, the computed record at the optimum of the grid search.
-        measured: The records that were compared with.
+        grid: Optimum of the grid search. [N s/m, N m s/rad]
+        scipy: Optimum of the bounded search of scipy. [N s/m, N m s/rad]
+        truth: True values of a virtual experiment; None for a measurement. [N s/m, N m s/rad]
+        at_best: Computed record at the optimum of the grid search, by load.
+        measured: The measured displacements.
     """
 
     grid: Search
@@ -69,12 +72,15 @@ class Damping:
 def identify_damping(
     parameters: MachineParameters, measured: Measured, truth: FloatArray | None = None
 ) -> Damping:
-    """Finds C_L and C_T.
+    """Identify C_L and C_T from measured displacements.
 
     Args:
-        parameters: The machine; loads are those of `measured`.
-        measured: Displacements of its sensors.
-        truth: Where `measured` comes from `virtual_experiment`, the damping planted there.
+        parameters: The machine.
+        measured: Displacements of its sensors, by load.
+        truth: True values if `measured` is from `virtual_experiment`. [N s/m, N m s/rad]
+
+    Raises:
+        InputError: the machine has no gasket, or its profile ends before the window.
     """
     objective = EnvelopeDistance(parameters, measured)
     grid = grid_search(objective, LOWER, UPPER, STOP)
@@ -86,20 +92,28 @@ def identify_damping(
 def virtual_experiment(
     parameters: MachineParameters, truth: FloatArray, seed: int
 ) -> dict[str, xr.DataArray]:
-    """Records as an experiment would give them: run by the Drake engine with another damping, and noise added."""
+    """Simulate an experiment and return its displacements (time, sensor), by load. [m]
+
+    The Drake engine runs the machine with the true damping, and noise is added.
+
+    Args:
+        parameters: The machine.
+        truth: True values of C_L and C_T. [N s/m, N m s/rad]
+        seed: Seed of the noise.
+    """
     rng = np.random.default_rng(seed)
-    planted = with_damping(parameters, truth)
-    machine = build_machine(planted)
+    true_parameters = with_damping(parameters, truth)
+    machine = build_machine(true_parameters)
     records = {}
     for load in LOADS:
-        case = Case(load, planted.loads[load], _run_up(planted.profile))
+        case = Case(load, true_parameters.loads[load], _run_up(true_parameters.profile))
         displacement = simulate(machine, case, "drake").displacement
         records[load] = displacement + rng.normal(scale=NOISE, size=displacement.shape)
     return records
 
 
 def with_damping(parameters: MachineParameters, damping: FloatArray) -> MachineParameters:
-    """The machine with C_L and C_T on every axis of its gasket. [N s/m, N m s/rad]"""
+    """Return the machine with C_L and C_T on every axis of its gasket. [N s/m, N m s/rad]"""
     factors = load_factors(GASKET_FACTORS)
     numbers = zip(UNKNOWNS, damping, strict=True)
     return with_values(
@@ -108,22 +122,32 @@ def with_damping(parameters: MachineParameters, damping: FloatArray) -> MachineP
 
 
 class EnvelopeDistance:
-    """Eq. (2), (3) of [B]: sum over the loads of the 2-norm of the differences of the envelopes. [mm]
+    """Objective [B] Eq. (2), (3): sum over the loads of the 2-norm of envelope differences. [mm]
 
-    Upper and lower envelope of every sensor, every 5 ms within the window.
+    The norm includes the upper and lower envelopes of all sensors at all samples in the window.
     """
 
     def __init__(self, parameters: MachineParameters, measured: Measured) -> None:
-        """For a machine and the records that it shall meet."""
+        """Build the machine and compute the measured envelopes.
+
+        Args:
+            parameters: The machine.
+            measured: Displacements of its sensors, by load.
+
+        Raises:
+            InputError: the machine has no gasket, or its profile ends before the window.
+        """
         if parameters.gasket is None:
-            raise input_error(f"machine '{parameters.name}' has no gasket", key="gasket")
+            raise input_error(
+                f"machine '{parameters.name}' has no gasket; this study needs one", key="gasket"
+            )
         self.parameters, self.measured = parameters, measured
         self.machine: Machine = build_machine(parameters)
         self.profile = _run_up(parameters.profile)
         self._targets = {load: _envelopes(displacement) for load, displacement in measured.items()}
 
     def cases(self, damping: FloatArray) -> list[Case]:
-        """A run for each load."""
+        """Return one case for each load, with a damping C_L, C_T. [N s/m, N m s/rad]"""
         changed = with_damping(self.parameters, damping)
         return [
             Case(load, changed.loads[load], self.profile, parameters=changed)
@@ -131,7 +155,7 @@ class EnvelopeDistance:
         ]
 
     def __call__(self, points: Sequence[FloatArray]) -> list[float]:
-        """Values at several (C_L, C_T); infinite where a run diverges."""
+        """Return the values at several points (C_L, C_T); infinite where a run diverges. [mm]"""
         values = np.zeros(len(points))
         cases = [case for damping in points for case in self.cases(damping)]
 
@@ -145,25 +169,30 @@ class EnvelopeDistance:
         return [float(value) for value in values]
 
     def _distance(self, load: str, record: Record | None) -> float:
-        assert record is not None  # histories were asked for
+        assert record is not None  # because of histories=True
         return MM_PER_M * float(
             np.linalg.norm(_envelopes(record.displacement) - self._targets[load])
         )
 
 
 def _envelopes(displacement: xr.DataArray) -> FloatArray:
-    """Both envelopes within the window, one after the other. [m]"""
-    both = envelopes(xr.Dataset({"displacement": displacement}))
-    shown = both.sel(time=slice(WINDOW[0] - 1e-9, WINDOW[1] + 1e-9))
-    return np.stack([shown.upper.values, shown.lower.values])
+    """Return the upper and lower envelopes (2, time, sensor) in the window. [m]"""
+    whole = envelopes(xr.Dataset({"displacement": displacement}))
+    window = whole.sel(time=slice(WINDOW[0] - 1e-9, WINDOW[1] + 1e-9))
+    return np.stack([window.upper.values, window.lower.values])
 
 
 def _run_up(profile: SpinProfile) -> SpinProfile:
-    """The profile as far as it is needed."""
+    """Return the profile, cut after the window and the time that the filter needs.
+
+    Raises:
+        InputError: the profile ends before the window does.
+    """
     end = WINDOW[1] + AFTER
     if profile.duration < WINDOW[1]:
         raise input_error(
-            f"ends at {profile.duration:g} s; records are compared from {WINDOW[0]:g} to {WINDOW[1]:g} s",
+            f"ends at {profile.duration:g} s; it must last at least {WINDOW[1]:g} s, because "
+            f"records are compared from {WINDOW[0]:g} to {WINDOW[1]:g} s",
             key="profile",
         )
     if profile.duration <= end:
@@ -175,14 +204,22 @@ def _run_up(profile: SpinProfile) -> SpinProfile:
 
 
 def as_measured(table: xr.DataArray, sensors: list[str], where: str) -> xr.DataArray:
-    """A record put on the sampling of ours, its sensors in our order.
+    """Return a measured record with the sensors of the machine, interpolated to samples every 5 ms.
+
+    Args:
+        table: Measured displacements (time, sensor). [m]
+        sensors: Names of the sensors, in the order of the machine.
+        where: Name of the file, for messages.
 
     Raises:
-        InputError: a sensor is missing, a value is not finite, or the window is not covered.
+        InputError: a sensor is missing, a value is not finite, times do not rise, or the record
+            does not cover the window.
     """
     missing = [name for name in sensors if name not in table.sensor.values]
     if missing:
-        raise input_error(f"has no sensor {', '.join(missing)}", where=where)
+        raise input_error(
+            f"has no sensor {', '.join(missing)}; needs {', '.join(sensors)}", where=where
+        )
     time = table.time.values
     if len(time) < 2 or time[0] > WINDOW[0] or time[-1] < WINDOW[1]:
         raise input_error(f"must cover {WINDOW[0]:g} to {WINDOW[1]:g} s", where=where)

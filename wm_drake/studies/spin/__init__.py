@@ -1,1 +1,5 @@
-"""Run the loads of a machine through its spin profile and collect what a report shows."""
+"""Run cases of a machine over spin profiles and collect records and measures for the report.
+
+Enters: machine parameters and cases. Leaves: a `SpinResult`.
+May import: `simulation` and the rooms before it.
+"""

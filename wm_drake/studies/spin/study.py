@@ -1,4 +1,4 @@
-"""Spin runs: cases, each with its measures."""
+"""Spin runs: cases with their records and measures, in one or several processes."""
 
 import multiprocessing
 import os
@@ -14,23 +14,21 @@ from typing import Any
 from wm_drake.model.machine import Machine, build_machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import Measures, measure
-from wm_drake.simulation.runs import (
-    DEFAULT_ENGINE,
-    Case,
-    DivergenceWarning,
-    Record,
-    checked_step,
-    simulate,
-)
+from wm_drake.simulation.records import Record
+from wm_drake.simulation.runs import DEFAULT_ENGINE, DivergenceWarning, checked_step, simulate
 
 _IN_PROCESSES = {"drake"}
-"""Engines whose cases run in processes of their own: seconds each, and Drake's Python callbacks take turns in one."""
+"""Engines whose cases run in separate processes.
+
+One case takes seconds, and Python systems of Drake do not run in parallel threads.
+"""
 
 
 @dataclass(frozen=True)
 class CaseResult:
-    """A case that was run. `wall_s` is the time of simulation and measures together."""
+    """Result of one case; `wall_s` is the time for simulation and measures together. [s]"""
 
     case: Case
     record: Record
@@ -40,7 +38,7 @@ class CaseResult:
 
 @dataclass(frozen=True)
 class SpinResult:
-    """All cases of one spin command, in the order they were asked for."""
+    """Results of all cases, in the order in which the cases were given."""
 
     parameters: MachineParameters
     engine: str
@@ -49,8 +47,8 @@ class SpinResult:
 
 
 @dataclass(frozen=True)
-class _Job:
-    """All that a process needs to make one run."""
+class _WorkItem:
+    """All data that a process needs for one run."""
 
     parameters: MachineParameters
     case: Case
@@ -67,37 +65,46 @@ def run_spin(
     progress: Callable[[int, float], None] = lambda index, fraction: None,
     workers: int | None = None,
 ) -> SpinResult:
-    """Runs cases; results do not depend on the number of workers.
+    """Run cases and return their records and measures.
+
+    The results do not depend on the number of workers.
 
     Args:
         parameters: The machine.
-        cases: What to run.
-        engine, step: As for `simulate`.
-        progress: Called with the number of the case and the fraction of it done.
-        workers: Processes for an engine that needs them; as many as cores by default. One case runs in this process.
+        cases: Cases to run.
+        engine: Name of the engine, key of `wm_drake.simulation.runs.ENGINES`.
+        step: Step size; None for that of the machine. [s]
+        progress: Called with the index of a case and the fraction of it that is done.
+        workers: Number of processes for an engine that needs processes; None for the number of
+            cores. A single case always runs in this process.
+
+    Raises:
+        InputError: a case or an argument is wrong.
     """
     step = checked_step(parameters, step)
     count = min(workers or os.cpu_count() or 1, len(cases))
-    jobs = [_Job(parameters, case, engine, step) for case in cases]
+    work_items = [_WorkItem(parameters, case, engine, step) for case in cases]
     if engine in _IN_PROCESSES and count > 1:
-        results = _run_in_processes(jobs, count, progress)
+        results = _run_in_processes(work_items, count, progress)
     else:
         machine, scene = build_machine(parameters), Scene(parameters)
         results = [
-            _run(job, machine, scene, partial(progress, index)) for index, job in enumerate(jobs)
+            _run(item, machine, scene, partial(progress, index))
+            for index, item in enumerate(work_items)
         ]
     return SpinResult(parameters, engine, step, tuple(results))
 
 
 def _run_in_processes(
-    jobs: list[_Job], count: int, progress: Callable[[int, float], None]
+    work_items: list[_WorkItem], count: int, progress: Callable[[int, float], None]
 ) -> list[CaseResult]:
-    # Drake diagrams do not pickle and forked Drake processes are not safe: fresh interpreters, plain parameters
+    # Drake diagrams cannot be pickled and forks of Drake processes are not safe, so new
+    # interpreters are started and build the machine from its parameters
     method = multiprocessing.get_context("spawn")
     with method.Manager() as manager, ProcessPoolExecutor(count, mp_context=method) as pool:
         reports = manager.Queue()
         futures: list[Future[CaseResult]] = [
-            pool.submit(_run_and_report, job, i, reports) for i, job in enumerate(jobs)
+            pool.submit(_run_and_report, item, i, reports) for i, item in enumerate(work_items)
         ]
         try:
             unfinished = set(futures)
@@ -121,17 +128,17 @@ def _pass_on(reports: Any, progress: Callable[[int, float], None]) -> None:
         pass
 
 
-def _run_and_report(job: _Job, index: int, reports: Any) -> CaseResult:
-    machine, scene = build_machine(job.parameters), Scene(job.parameters)
-    return _run(job, machine, scene, lambda fraction: reports.put((index, fraction)))
+def _run_and_report(item: _WorkItem, index: int, reports: Any) -> CaseResult:
+    machine, scene = build_machine(item.parameters), Scene(item.parameters)
+    return _run(item, machine, scene, lambda fraction: reports.put((index, fraction)))
 
 
 def _run(
-    job: _Job, machine: Machine, scene: Scene, progress: Callable[[float], None]
+    item: _WorkItem, machine: Machine, scene: Scene, progress: Callable[[float], None]
 ) -> CaseResult:
     begin = time.perf_counter()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DivergenceWarning)  # the record carries it to the report
-        record = simulate(machine, job.case, job.engine, step=job.step, progress=progress)
+        warnings.simplefilter("ignore", DivergenceWarning)  # the report shows it from the record
+        record = simulate(machine, item.case, item.engine, step=item.step, progress=progress)
     measures = measure(record, scene)
-    return CaseResult(job.case, record, measures, time.perf_counter() - begin)
+    return CaseResult(item.case, record, measures, time.perf_counter() - begin)

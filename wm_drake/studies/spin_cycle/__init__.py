@@ -1,1 +1,7 @@
-"""Run the spin cycle with many unbalances: RMS displacement per region, sensor and axis."""
+"""Run a spin cycle with many unbalances ([A] section 4).
+
+Enters: a machine, a table of unbalance cases and a profile with regions; optionally measurements.
+Leaves: a `SpinCycleResult` with the RMS displacement per region, sensor and axis, and errors
+against a measurement. `damper_topology` makes machines with simpler dampers.
+May import: `studies.spin`, `batch` and the rooms before it.
+"""

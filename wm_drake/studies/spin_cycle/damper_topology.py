@@ -1,4 +1,4 @@
-"""The same machine with simpler dampers: massless struts in place of tubes on bushings."""
+"""Machines with simpler dampers: massless struts instead of tubes on bushings."""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -8,13 +8,15 @@ from wm_drake.parameters import MachineParameters
 
 
 def strut_machine(parameters: MachineParameters, folder: Path) -> MachineParameters:
-    """A machine whose telescopic dampers are massless struts with the same law and the same bending at their ends.
+    """Return a machine with massless struts in place of its telescopic dampers.
 
-    What is left out: masses of the tubes, radial and axial give of the bushings, friction about the damper's axis.
+    The struts have the same damper law and the same bending stiffness, damping and friction at
+    their ends. They do not model the masses of the tubes, the radial and axial compliance of the
+    bushings and the friction about the axis of the damper.
 
     Args:
         parameters: A machine with telescopic dampers.
-        folder: Where its SDF without the tubes is written.
+        folder: Folder to which its SDF without the tubes is written.
     """
     tree = parameters.model_dump(exclude_unset=True)
     types, dampers = dict(tree["damper_types"]), {}
@@ -58,12 +60,12 @@ def _without_tubes(parameters: MachineParameters, folder: Path) -> Path:
     joints = {damper.joint for damper in parameters.telescopic_dampers.values()}
     telescopes = [joint for joint in model.iter("joint") if joint.get("name") in joints]
     tubes = {joint.findtext(end, "").strip() for joint in telescopes for end in ("parent", "child")}
-    gone = [
+    removed = [
         part
         for part in model
         if part.get("name") in tubes | joints or part.get("attached_to") in tubes
     ]
-    for part in gone:
+    for part in removed:
         model.remove(part)
     written = folder / f"{path.stem}_without_tubes.sdf"
     tree.write(written, encoding="unicode", xml_declaration=True)

@@ -1,4 +1,4 @@
-"""Measurements of a spin cycle, as files: RMS displacements, or acceleration records to be integrated twice."""
+"""Files with measurements of a spin cycle: RMS displacements, or records of acceleration."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,27 +15,35 @@ from wm_drake.simulation.vibration import HIGH_PASS_HZ, high_passed, integrated_
 from wm_drake.studies.spin_cycle.study import DIMS
 
 RMS_COLUMNS = ["case", "region", "sensor", "axis", "rms_mm"]
-"""Of a table of RMS displacements; `rms_table` writes the same."""
+"""Columns of a table of RMS displacements, as read by `read_rms` and returned by `rms_table`."""
 
 UNEVEN = 1e-3
-"""How much the time between two samples may differ from the mean one."""
+"""Largest relative deviation of a sampling interval from the mean one."""
 
 
 def rms_table(displacement: xr.DataArray) -> pd.DataFrame:
-    """RMS displacements as a table with `RMS_COLUMNS`, one number a row. [mm]"""
+    """Return RMS displacements as a table with `RMS_COLUMNS`, one value per row. [mm]"""
     table = (1e3 * displacement).rename("rms_mm").to_dataframe().reset_index()
     return table.rename(columns={"accelerometer": "sensor"})[RMS_COLUMNS]
 
 
 def read_rms(path: Path, labels: Mapping[str, Sequence[str]]) -> xr.DataArray:
-    """Measured RMS displacements (case, region, accelerometer, axis) from a CSV with `RMS_COLUMNS`; NaN where it has none. [m]
+    """Read measured RMS displacements from a CSV file with the columns `RMS_COLUMNS`.
+
+    Args:
+        path: The file.
+        labels: Names of the study along each dimension, from `labels_of`.
+
+    Returns:
+        (case, region, accelerometer, axis); NaN where the file has no value. [m]
 
     Raises:
-        InputError: not such a table, a name the study does not have, a value that is not a number, a row twice.
+        InputError: the file has other columns or no row, the study does not have a name, a value is
+            not a number of at least 0, or a row occurs twice.
     """
     table = read_csv(path, RMS_COLUMNS)
     if table.empty:
-        raise input_error("has no row", where=str(path))
+        raise input_error("has no row; at least one is needed", where=str(path))
     names = table[RMS_COLUMNS[:4]].astype(str)
     for column, dim in zip(RMS_COLUMNS, DIMS, strict=False):
         for name in names[column]:
@@ -45,9 +53,8 @@ def read_rms(path: Path, labels: Mapping[str, Sequence[str]]) -> xr.DataArray:
                     where=str(path),
                 )
     if names.duplicated().any():
-        raise input_error(
-            f"{' '.join(names[names.duplicated()].iloc[0])} is there twice", where=str(path)
-        )
+        name = " ".join(names[names.duplicated()].iloc[0])
+        raise input_error(f"{name} occurs twice; each value may occur once", where=str(path))
     values = pd.to_numeric(table["rms_mm"], errors="coerce").to_numpy(dtype=float)
     if not (np.isfinite(values) & (values >= 0.0)).all():
         raise input_error("an RMS displacement is not a number of at least 0", where=str(path))
@@ -63,18 +70,29 @@ def read_rms(path: Path, labels: Mapping[str, Sequence[str]]) -> xr.DataArray:
 def read_accelerations(
     folder: Path, labels: Mapping[str, Sequence[str]], profile: SpinProfile
 ) -> xr.DataArray:
-    """RMS displacements (case, region, accelerometer, axis) from acceleration records, integrated twice. [m]
+    """Compute RMS displacements from records of acceleration, integrated twice.
 
-    One file CASE.csv a case, for some of the cases: time_s from the begin of the profile on, then SENSOR_AXIS (S1_x, ...) in
-    m/s^2. The mean of each, faded in and out, is taken for the sensor's bias.
+    The folder has one file CASE.csv for each measured case; cases without a file are NaN. The
+    columns are time_s, which starts with the profile, and SENSOR_AXIS (S1_x, ...) in m/s^2. The
+    bias of each sensor is estimated by a mean with a Hann window and subtracted.
+
+    Args:
+        folder: Folder with the files.
+        labels: Names of the study along each dimension, from `labels_of`.
+        profile: Spin profile with regions.
+
+    Returns:
+        (case, region, accelerometer, axis). [m]
 
     Raises:
-        InputError: no such folder or no file of a case, not such a table, samples that are not evenly spaced.
+        InputError: the folder has no file of a case, a file has other columns or values that are
+            not finite numbers, or the samples are not evenly spaced.
     """
     paths = {name: folder / f"{name}.csv" for name in labels["case"]}
     if not any(path.is_file() for path in paths.values()):
         raise input_error(
-            "has no file CASE.csv with accelerations of a case of this study", where=str(folder)
+            "has no file CASE.csv with accelerations of a case of this study; give at least one",
+            where=str(folder),
         )
     empty = np.full([len(labels[dim]) for dim in DIMS[1:]], np.nan)
     rows = [
@@ -95,7 +113,9 @@ def _from_acceleration(
     )
     if not np.isfinite(numbers).all() or len(numbers) < 2:
         raise input_error(
-            "has a value that is not a finite number, or fewer than two rows", where=str(path)
+            "has a value that is not a finite number, or fewer than two rows; at least two rows of "
+            "finite numbers are needed",
+            where=str(path),
         )
     time, acceleration = numbers[:, 0], numbers[:, 1:]
     period = float((time[-1] - time[0]) / (len(time) - 1))
@@ -108,7 +128,7 @@ def _from_acceleration(
             "samples must be evenly spaced in time and begin at time 0 of the profile",
             where=str(path),
         )
-    # a plain mean holds the speed at which the record ends; fading in and out leaves of it what does not swing
+    # a plain mean would include the velocity at the end of the record divided by its duration
     bias = np.average(acceleration, axis=0, weights=np.hanning(len(acceleration)))
     displacement = high_passed(integrated_twice(acceleration - bias, period), period, HIGH_PASS_HZ)
     return region_rms(displacement, period, profile).reshape([len(labels[dim]) for dim in DIMS[1:]])

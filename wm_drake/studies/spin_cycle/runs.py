@@ -1,4 +1,4 @@
-"""How a spin-cycle study runs its cases: side by side with the compiled engine, or one by one with Drake's."""
+"""Functions that run the cases of a spin-cycle study with the compiled or the Drake engine."""
 
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -10,7 +10,7 @@ from wm_drake.batch import simulate_many, simulate_remembered
 from wm_drake.batch.ledger import Ledger
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.vibration import record_region_displacements
 from wm_drake.studies.spin.study import CaseResult, run_spin
 from wm_drake.studies.spin_cycle.study import MEASURES, Evaluate
@@ -23,11 +23,13 @@ def compiled_runs(
     workers: int | None = None,
     progress: Callable[[int], None] = lambda done: None,
 ) -> Evaluate:
-    """Runs cases with the compiled engine; those that a ledger holds are not run again.
+    """Return a function that runs cases with the compiled engine.
 
     Args:
         machine: A built machine.
-        ledger, workers, progress: As for `simulate_remembered`.
+        ledger: An open ledger; cases whose results it has are not run. None for no ledger.
+        workers: Number of threads; None for the number of cores.
+        progress: Called with the number of finished cases.
     """
     if ledger is None:
         return partial(
@@ -46,23 +48,28 @@ def compiled_runs(
 def drake_runs(
     parameters: MachineParameters, *, progress: Callable[[int], None] = lambda done: None
 ) -> Evaluate:
-    """Runs cases by the Drake engine, in a process each; they take minutes."""
+    """Return a function that runs cases with the Drake engine in processes; a case takes minutes.
+
+    Args:
+        parameters: The machine.
+        progress: Called with the number of finished cases.
+    """
 
     def evaluate(cases: Iterable[Case]) -> xr.Dataset:
         runs = list(cases)
         done = np.zeros(len(runs))
 
-        def tell(index: int, fraction: float) -> None:
+        def report(index: int, fraction: float) -> None:
             done[index] = fraction
             progress(int(done.sum()))
 
-        return _table(run_spin(parameters, runs, "drake", progress=tell).results)
+        return _table(run_spin(parameters, runs, "drake", progress=report).results)
 
     return evaluate
 
 
 def _table(results: Iterable[CaseResult]) -> xr.Dataset:
-    """As `simulate_many` gives it."""
+    """Return results as a table in the form of `simulate_many`."""
     direct, integrated, gaps, diverged = [], [], [], []
     for result in results:
         points = result.record.accelerometer_point.values

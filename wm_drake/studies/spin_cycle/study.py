@@ -1,4 +1,4 @@
-"""The spin cycle: RMS displacement per region, sensor and axis for a table of unbalance cases ([A] section 4)."""
+"""Spin cycle: RMS displacement per region, sensor and axis for unbalance cases ([A] section 4)."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -10,31 +10,35 @@ import xarray as xr
 from wm_drake.errors import input_error
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
-from wm_drake.simulation.runs import AXES, Case
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.outputs import AXES
 from wm_drake.simulation.vibration import relative_error
 
 MEASURES = ("regions", "gap")
-"""Of `simulate_many`: what the study reads off each run."""
+"""Measures of each run, as for `simulate_many`."""
 
 DIMS = ("case", "region", "accelerometer", "axis")
 
 Evaluate: TypeAlias = Callable[[Iterable[Case]], xr.Dataset]
-"""Runs cases, gives the table that `simulate_many` gives of `MEASURES`."""
+"""Function that runs cases and returns their table with `MEASURES`, as `simulate_many` does."""
 
 
 @dataclass(frozen=True)
 class SpinCycleResult:
-    """All cases of one study.
+    """Results of a spin-cycle study.
 
     Attributes:
         parameters: The machine.
-        profile: The spin cycle, with regions.
-        cases: What was run, in order.
-        displacement, integrated: RMS displacement (case, region, accelerometer, axis), taken directly and from acceleration;
-            NaN where a run did not get there. [m]
-        smallest_gap: (case) between tub group and housing. [m]
-        diverged: (case) when and why a run stopped early, "" if it did not.
-        measured: As `displacement`, NaN where nothing was measured; None without a measurement. [m]
+        profile: Spin profile with regions.
+        cases: The cases, in the order of the runs.
+        displacement: (case, region, accelerometer, axis) RMS displacement from the displacement
+            itself; NaN where a run ended before the region did. [m]
+        integrated: (case, region, accelerometer, axis) RMS displacement from the acceleration,
+            integrated twice. [m]
+        smallest_gap: (case) smallest gap between tub group and housing. [m]
+        diverged: (case) time and reason if a run diverged, else "".
+        measured: (case, region, accelerometer, axis) measured RMS displacement; NaN where nothing
+            was measured. None without a measurement. [m]
     """
 
     parameters: MachineParameters
@@ -50,14 +54,15 @@ class SpinCycleResult:
 def runs_of(
     parameters: MachineParameters, cases: Sequence[UnbalanceCase], profile: SpinProfile
 ) -> list[Case]:
-    """The runs of a study.
+    """Return the runs of a study.
 
     Raises:
-        InputError: the profile has no regions, or the machine no places for unbalances.
+        InputError: the profile has no regions, or the machine does not define the planes of the
+            unbalance masses.
     """
     if not profile.regions:
         raise input_error(
-            "has no regions; a profile of this study names them: regions: [{name, begin, end}, ...]",
+            "has no regions; this study needs them: regions: [{name, begin, end}, ...]",
             key="profile",
         )
     return [Case(case.name, case.load(parameters), profile) for case in cases]
@@ -69,13 +74,17 @@ def run_spin_cycle(
     profile: SpinProfile,
     evaluate: Evaluate,
 ) -> SpinCycleResult:
-    """Runs the cases of a table and labels what is measured of them.
+    """Run unbalance cases and label their measures.
 
     Args:
-        parameters: The machine; its imperfections count.
-        cases: At least one.
-        profile: With regions.
-        evaluate: Runs them.
+        parameters: The machine with its imperfections.
+        cases: Unbalance cases, at least one.
+        profile: Spin profile with regions.
+        evaluate: Function that runs cases.
+
+    Raises:
+        InputError: the profile has no regions, or the machine does not define the planes of the
+            unbalance masses.
     """
     table = evaluate(runs_of(parameters, cases, profile))
     labels = labels_of(parameters, cases, profile)
@@ -91,7 +100,7 @@ def run_spin_cycle(
 def labels_of(
     parameters: MachineParameters, cases: Sequence[UnbalanceCase], profile: SpinProfile
 ) -> dict[str, list[str]]:
-    """Names along the dimensions of the results."""
+    """Return the names along each dimension of the results."""
     regions = [region.name for region in profile.regions]
     sensors = list(parameters.accelerometer_frames())
     return dict(
@@ -100,7 +109,11 @@ def labels_of(
 
 
 def disagreement(result: SpinCycleResult) -> xr.DataArray:
-    """(case, region) how far the two ways of taking displacements are apart: [A] Eq. (9) over all sensors and axes."""
+    """Return the relative error (case, region) of the displacements from integrated acceleration.
+
+    It is [A] Eq. (9) with norms over all sensors and axes; the reference is the displacement
+    itself.
+    """
     direct, integrated = (_flat(values) for values in (result.displacement, result.integrated))
     return xr.DataArray(
         relative_error(integrated, direct), {dim: result.displacement[dim] for dim in DIMS[:2]}
@@ -108,26 +121,35 @@ def disagreement(result: SpinCycleResult) -> xr.DataArray:
 
 
 def region_errors(computed: xr.DataArray, measured: xr.DataArray) -> xr.DataArray:
-    """(case, region) relative error [A] Eq. (9), norms over the sensors and axes that were measured."""
-    there = np.isfinite(measured)
-    shown = [_flat(values.where(there, 0.0)) for values in (computed, measured)]
-    return xr.DataArray(relative_error(*shown), {dim: computed[dim] for dim in DIMS[:2]})
+    """Return the relative error (case, region) of computed displacements, [A] Eq. (9).
+
+    The norms are over the sensors and axes that were measured.
+    """
+    is_measured = np.isfinite(measured)
+    vectors = [_flat(values.where(is_measured, 0.0)) for values in (computed, measured)]
+    return xr.DataArray(relative_error(*vectors), {dim: computed[dim] for dim in DIMS[:2]})
 
 
 def average_errors(computed: xr.DataArray, measured: xr.DataArray) -> xr.DataArray:
-    """(case) mean over regions, sensors and axes of the relative errors of single numbers, as in [A] Table 9."""
+    """Return the mean relative error (case) of single values, as in [A] Table 9.
+
+    The mean is over regions, sensors and axes.
+    """
     single = relative_error(computed.values[..., None], measured.values[..., None])
     return xr.DataArray(single, computed.coords, computed.dims).mean(DIMS[1:], skipna=True)
 
 
 def mean_and_deviation(errors: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
-    """Over the cases: mean and standard deviation, of these cases as [A] has it, not of what they are a sample of."""
+    """Return mean and standard deviation of errors over the cases.
+
+    As in [A], it is the standard deviation of these cases, not an estimate for a population.
+    """
     return errors.mean("case", skipna=True), errors.std("case", skipna=True)
 
 
 @dataclass(frozen=True)
 class Largest:
-    """The largest RMS displacement of a case, or of all. [m]"""
+    """The largest RMS displacement, with the names of its case, region, sensor and axis. [m]"""
 
     case: str
     region: str
@@ -137,7 +159,10 @@ class Largest:
 
 
 def largest(displacement: xr.DataArray) -> Largest | None:
-    """Where an array (case, region, accelerometer, axis) is largest; None if no run got through a region."""
+    """Return the largest value of an array (case, region, accelerometer, axis).
+
+    The result is None if no run completed a region.
+    """
     values = displacement.values
     if not np.isfinite(values).any():
         return None

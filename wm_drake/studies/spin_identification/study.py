@@ -1,4 +1,7 @@
-"""Numbers of a machine from vibrations of the whole of it in a spin cycle, as [A] section 4.2 found those of its Table 8."""
+"""Identification of parameters from vibrations of the whole machine in a spin cycle.
+
+[A] section 4.2 identifies the parameters of its Table 8 in this way.
+"""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -12,21 +15,21 @@ from wm_drake.parameters import MachineParameters, SpinProfile, quantities, with
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.parameters.units import Unit
-from wm_drake.simulation.runs import Case
+from wm_drake.simulation.cases import Case
 from wm_drake.studies.fitting import Fit, FitProblem, Measurement, Progress, Unknown, least_squares
 from wm_drake.studies.spin_cycle.study import DIMS, labels_of, runs_of
 
 SPAN = 1.5
-"""An unknown without a range of its own is sought between its number divided and multiplied by this."""
+"""Default bounds of an unknown: the number of the machine divided and multiplied by this."""
 
 PLANTED = (0.8, 1.25)
-"""Factors between which a virtual experiment draws the true number of each unknown, by its logarithm."""
+"""Range of the ratio of true number to machine's number in a virtual experiment."""
 
 KNOWN = 0.02
-"""Half a 95 % interval, as a part of the number, up to which an unknown counts as identified."""
+"""Largest relative half-width of the 95 % confidence interval of an identified unknown."""
 
 JOIN = "+"
-"""Between the keys of numbers that are equal, being one unknown."""
+"""Separator between keys whose numbers are equal and form one unknown."""
 
 TABLE_8 = (
     ("bushing_types.connecting.friction_torque_y",),
@@ -36,18 +39,21 @@ TABLE_8 = (
     ("gasket.friction_torque_x", "gasket.friction_torque_y", "gasket.friction_torque_z"),
     ("gasket.full_friction_rate_x", "gasket.full_friction_rate_y", "gasket.full_friction_rate_z"),
 )
-"""What [A] could only get from the whole machine: friction about the axis of its bushings, and all rotations of the gasket."""
+"""Keys of the numbers that [A] could identify from the whole machine only.
+
+They are the friction about the axis of its bushings and all rotational numbers of the gasket.
+"""
 
 DEFAULT_CASES = ("2", "5", "29")
-"""Of [A] Table 9: 400 g in front, at the rear, and both opposite, as in its Figs. 24 to 26."""
+"""Cases of [A] Table 9: 400 g in front, at the rear, and both opposite, as in Figs. 24 to 26."""
 
 Regions: TypeAlias = Callable[[Iterable[Case]], xr.Dataset]
-"""Runs cases, gives the table that `simulate_many` gives of "regions"."""
+"""Function that runs cases and returns their table with "regions", as `simulate_many` does."""
 
 
 @dataclass(frozen=True)
 class Sought:
-    """An unknown, and the keys of a machine that have its number."""
+    """An unknown, and the keys of the machine's numbers that are equal to it."""
 
     keys: tuple[str, ...]
     unknown: Unknown
@@ -58,13 +64,15 @@ class SpinIdentification:
     """Result of an identification.
 
     Attributes:
-        parameters: The machine, as it was before.
-        profile, cases: What was run.
+        parameters: The machine before the identification.
+        profile: Spin profile with regions.
+        cases: The unbalance cases.
         sought: The unknowns.
-        fit: What was found.
-        measured: RMS displacements (case, region, accelerometer, axis). [m]
-        before, after: The same of the machine as it was, and with what was found. [m]
-        planted: True numbers of a virtual experiment; None of a real one. [SI]
+        fit: The fit.
+        measured: (case, region, accelerometer, axis) measured RMS displacements. [m]
+        before, after: RMS displacements of the machine before the identification and with the
+            identified numbers. [m]
+        planted: True numbers of a virtual experiment, in SI units; None for a real experiment.
     """
 
     parameters: MachineParameters
@@ -79,7 +87,10 @@ class SpinIdentification:
 
     @property
     def uncertainty(self) -> FloatArray:
-        """Half of each unknown's 95 % interval, by its number; infinite where the data do not determine it."""
+        """Relative half-width of the 95 % confidence interval of each unknown.
+
+        It is infinite if the data do not determine the unknown.
+        """
         halves = [
             0.5 * (e.upper - e.lower) / abs(e.value) if e.value else np.nan
             for e in self.fit.estimates
@@ -88,12 +99,12 @@ class SpinIdentification:
 
     @property
     def identifiable(self) -> tuple[bool, ...]:
-        """Which unknowns the data determine to `KNOWN`."""
+        """Whether the relative half-width of each unknown is at most `KNOWN`."""
         return tuple(bool(half <= KNOWN) for half in self.uncertainty)
 
     @property
     def recovered(self) -> FloatArray | None:
-        """Relative error of each unknown of a virtual experiment."""
+        """Relative error of each unknown in a virtual experiment; None for a real experiment."""
         return None if self.planted is None else self.fit.values / self.planted - 1.0
 
 
@@ -103,16 +114,18 @@ def sought_of(
     bounds: tuple[float, float] | None = None,
     span: float = SPAN,
 ) -> Sought:
-    """An unknown of a machine, sought by its logarithm.
+    """Return an unknown of a machine; the search uses its logarithm if the bounds are positive.
 
     Args:
-        parameters: The machine; its number is the start.
-        keys: Key paths of numbers that are to be equal.
-        bounds: Of the search; around the machine's number if None. [SI]
-        span: How far around.
+        parameters: The machine; its number is the start value.
+        keys: Key paths of numbers that are equal.
+        bounds: Bounds of the search, in SI units. If None, they are the machine's number divided
+            and multiplied by `span`.
+        span: Factor of the default bounds.
 
     Raises:
-        InputError: no such key, no number there, or none that is positive.
+        InputError: a key is unknown or not a number, the numbers have different units, or bounds
+            are needed because the number is not positive.
     """
     known = {
         key: (value, unit)
@@ -127,9 +140,14 @@ def sought_of(
             )
     value, unit = known[keys[0]]
     if any(known[key][1] != unit for key in keys):
-        raise input_error(f"{', '.join(keys)} have not the same unit", key=keys[0])
+        raise input_error(
+            f"{', '.join(keys)} have different units; equal numbers need the same unit",
+            key=keys[0],
+        )
     if bounds is None and value <= 0.0:
-        raise input_error("is not positive, so its range must be given", key=keys[0])
+        raise input_error(
+            "is not positive, so its range must be given; write KEY=LOW..HIGH", key=keys[0]
+        )
     lower, upper = bounds or (value / span, value * span)
     start = value if lower <= value <= upper else None
     return Sought(
@@ -138,7 +156,10 @@ def sought_of(
 
 
 def unit_of_key(parameters: MachineParameters, key: str) -> Unit:
-    """The unit of a number of a machine; any unit where there is none, which `sought_of` refuses."""
+    """Return the unit of a number of a machine.
+
+    For an unknown key any unit is returned, because `sought_of` reports the error.
+    """
     return next(
         (unit for known, _, unit in quantities(parameters) if known == key), Unit("m", "mm")
     )
@@ -147,14 +168,14 @@ def unit_of_key(parameters: MachineParameters, key: str) -> Unit:
 def at_point(
     parameters: MachineParameters, sought: Sequence[Sought], values: FloatArray
 ) -> MachineParameters:
-    """The machine with the unknowns' numbers. [SI]"""
+    """Return the machine with values of the unknowns, in SI units."""
     return with_values(
         parameters, {key: float(v) for s, v in zip(sought, values, strict=True) for key in s.keys}
     )
 
 
 def planted_values(sought: Sequence[Sought], seed: int) -> FloatArray:
-    """True numbers of a virtual experiment, none of them the machine's. [SI]"""
+    """Draw true numbers of a virtual experiment; all differ from the machine's. In SI units."""
     low, high = np.log(PLANTED)
     drawn = np.random.default_rng(seed).uniform(0.3, 1.0, len(sought)) * np.where(
         np.arange(len(sought)) % 2, low, high
@@ -166,7 +187,15 @@ def planted_values(sought: Sequence[Sought], seed: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class SpinModel:
-    """RMS displacements of the cases as a function of the unknowns; `regions` runs them."""
+    """RMS displacements of unbalance cases as a function of the unknowns.
+
+    Attributes:
+        parameters: The machine.
+        profile: Spin profile with regions.
+        cases: The unbalance cases.
+        sought: The unknowns.
+        regions: Function that runs cases.
+    """
 
     parameters: MachineParameters
     profile: SpinProfile
@@ -175,7 +204,14 @@ class SpinModel:
     regions: Regions
 
     def displacements(self, points: FloatArray) -> FloatArray:
-        """At points (k, unknowns) in SI: (k, case, region, accelerometer, axis); NaN where a run diverged. [m]"""
+        """Compute the RMS displacements at points.
+
+        Args:
+            points: (k, unknowns) in SI units.
+
+        Returns:
+            (k, case, region, accelerometer, axis); NaN where a run diverged. [m]
+        """
         labels = labels_of(self.parameters, self.cases, self.profile)
         table = self.regions(self._runs(points))
         return table.region_displacement.values.reshape(
@@ -192,13 +228,16 @@ class SpinModel:
 def virtual_experiment(
     model: SpinModel, planted: FloatArray, noise: float, seed: int
 ) -> xr.DataArray:
-    """RMS displacements that a machine with the planted numbers would show, each with a relative error of its own.
+    """Simulate an experiment: RMS displacements with the true numbers and random errors.
 
     Args:
-        model: Computes them.
-        planted: True numbers of the unknowns. [SI]
-        noise: Standard deviation of the errors; a fraction.
-        seed: Of the errors.
+        model: Model of the machine.
+        planted: True numbers of the unknowns, in SI units.
+        noise: Relative standard deviation of the error of each value.
+        seed: Seed of the errors.
+
+    Returns:
+        (case, region, accelerometer, axis). [m]
     """
     exact = model.displacements(planted[None])[0]
     errors = np.random.default_rng(seed).standard_normal(exact.shape)
@@ -217,14 +256,21 @@ def identify_from_spin(
     seed: int = 0,
     progress: Progress = lambda fraction, least: None,
 ) -> SpinIdentification:
-    """Finds the unknowns with which the relative errors [A] Eq. (9) of all regions and cases are least, by root mean square.
+    """Identify the unknowns from measured RMS displacements.
+
+    The fit minimizes the root mean square of the relative errors [A] Eq. (9) of all regions and
+    cases.
 
     Args:
-        model: Of the machine.
-        measured: RMS displacements (case, region, accelerometer, axis), NaN where nothing was measured. [m]
-        planted: The truth, if this is a virtual experiment. [SI]
-        seed: Of the points where the search looks first.
-        progress: Called with the fraction done and the least error so far.
+        model: Model of the machine.
+        measured: (case, region, accelerometer, axis) RMS displacements; NaN where nothing was
+            measured. [m]
+        planted: True numbers of a virtual experiment, in SI units.
+        seed: Seed of the points that are evaluated before the search.
+        progress: Called with the fraction done and the lowest error so far.
+
+    Raises:
+        InputError: nothing was measured in the cases of the study.
     """
     problem = _problem(model, measured)
     fit = least_squares(problem, seed=seed, starts=1, screened=8, progress=progress)
@@ -248,21 +294,27 @@ def identify_from_spin(
 
 
 def _problem(model: SpinModel, measured: xr.DataArray) -> FitProblem:
-    """Residuals are parts of Eq. (9): each number over the norm of what was measured in its case and region."""
-    there = np.isfinite(measured.values)
-    sizes = np.sqrt(np.sum(np.where(there, measured.values, 0.0) ** 2, axis=(2, 3), keepdims=True))
-    there &= sizes > 0.0
-    weights = there / np.where(sizes > 0.0, sizes, 1.0)
-    with_data = [k for k in range(len(model.cases)) if there[k].any()]
+    """Return the fit problem, whose residuals are those of [A] Eq. (9).
+
+    Each value is divided by the norm of the measured values in its case and region.
+    """
+    is_measured = np.isfinite(measured.values)
+    data = np.where(is_measured, measured.values, 0.0)
+    norms = np.sqrt(np.sum(data**2, axis=(2, 3), keepdims=True))
+    is_measured &= norms > 0.0
+    weights = is_measured / np.where(norms > 0.0, norms, 1.0)
+    with_data = [k for k in range(len(model.cases)) if is_measured[k].any()]
     if not with_data:
-        raise input_error("nothing was measured in the cases of this study")
+        raise input_error(
+            "nothing was measured in the cases of this study; at least one needs values above 0"
+        )
 
     def scaled(values: FloatArray) -> list[FloatArray]:
-        return [(values[..., k, :, :, :] * weights[k])[..., there[k]] for k in with_data]
+        return [(values[..., k, :, :, :] * weights[k])[..., is_measured[k]] for k in with_data]
 
     tests = tuple(
         Measurement(f"case {model.cases[k].name}", numbers)
-        for k, numbers in zip(with_data, scaled(np.where(there, measured.values, 0.0)), strict=True)
+        for k, numbers in zip(with_data, scaled(data), strict=True)
     )
     unknowns = tuple(s.unknown for s in model.sought)
     return FitProblem(

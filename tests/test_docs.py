@@ -1,0 +1,149 @@
+"""The documents keep their form: decisions have their parts, links lead somewhere, numbers repeat."""
+
+import re
+
+import pytest
+from documents import CHECKOUT, DECISIONS, PAGES, README, anchors, name_of, prose, text_of
+from ruamel.yaml import YAML
+
+from wm_drake.parameters.components import load_component
+from wm_drake.rigs import Harmonic, damper_bench, force_loops, measures_of
+
+INDEX = CHECKOUT / "docs" / "decisions" / "README.md"
+LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
+STATUS = re.compile(
+    r"^- Status: (?:accepted|superseded by|accepted for [\w ]+; for [\w ]+ superseded by)"
+)
+
+
+def decision_faults(text, number):
+    """Return what is wrong with the text of a decision, one text each."""
+    lines = text.splitlines()
+    found = [] if len(lines) < 25 else [f"{len(lines)} lines"]
+    if not re.match(rf"# {number} \w", lines[0]):
+        found.append("title")
+    if not any(STATUS.match(line) for line in lines):
+        found.append("status")
+    if not re.search(r"^- Date: \d{4}-\d\d-\d\d$", text, re.MULTILINE):
+        found.append("date")
+    parts = re.split(r"^## (.*)$", text, flags=re.MULTILINE)[1:]
+    if parts[::2] != ["Context", "Decision", "Consequences"]:
+        found.append("parts")
+    return found + [
+        f"{name} is empty"
+        for name, body in zip(parts[::2], parts[1::2], strict=True)
+        if not body.strip()
+    ]
+
+
+@pytest.mark.parametrize("path", DECISIONS, ids=lambda path: path.stem)
+def test_a_decision_has_its_parts(path):
+    assert decision_faults(text_of(path), path.name[:4]) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("- Status: accepted", "- Status: perhaps", "status"),
+        ("- Date: 2026", "- Date: ", "date"),
+        ("## Context", "## Background", "parts"),
+        ("# 0001", "# 0002", "title"),
+        ("## Decision\n", "## Decision\n" + 25 * "line\n", "40 lines"),
+    ],
+)
+def test_a_planted_fault_in_a_decision_is_found(old, new, fault):
+    text = text_of(DECISIONS[0])
+    assert decision_faults(text.replace(old, new, 1), "0001") == [
+        fault if "lines" not in fault else f"{len(text.splitlines()) + 25} lines"
+    ]
+
+
+def test_decisions_are_numbered_without_gaps_and_listed():
+    assert [path.name[:4] for path in DECISIONS] == [
+        f"{number:04d}" for number in range(1, len(DECISIONS) + 1)
+    ]
+    rows = re.findall(r"^\| \[(\d{4})\]\((.*?)\) \| (.*?) \|", text_of(INDEX), re.MULTILINE)
+    titles = [text_of(path).splitlines()[0].removeprefix("# ") for path in DECISIONS]
+    assert [(name, f"{number} {title}") for number, name, title in rows] == [
+        (path.name, title) for path, title in zip(DECISIONS, titles, strict=True)
+    ]
+
+
+def test_a_superseded_decision_and_its_successor_name_each_other():
+    for path in DECISIONS:
+        for name in re.findall(r"superseded by\s+\[\d{4}\]\((.*?)\)", text_of(path)):
+            successor = path.with_name(name)
+            assert successor.is_file()
+            if "accepted" not in text_of(path).split("## ")[0]:
+                assert path.name in text_of(successor), (path.name, name)
+
+
+@pytest.mark.parametrize("path", PAGES, ids=name_of)
+def test_relative_links_lead_somewhere(path):
+    for target in LINK.findall(text_of(path)):
+        if re.match(r"[a-z]+:", target):
+            continue
+        name, _, anchor = target.partition("#")
+        other = (path.parent / name).resolve() if name else path
+        assert other.exists(), target
+        assert not anchor or anchor in anchors(other), target
+
+
+@pytest.mark.parametrize("path", PAGES, ids=name_of)
+def test_files_named_in_code_exist(path):
+    named = re.findall(r"`((?:wm_drake|sdf|tests|analyses|docs)/[\w/.-]*)`", "\n".join(prose(path)))
+    assert [name for name in named if not (CHECKOUT / name).exists()] == []
+
+
+@pytest.mark.parametrize("path", [path for path in PAGES if path.parent.name != "sdf"], ids=name_of)
+def test_lines_of_prose_are_short(path):
+    long = [line for line in prose(path) if len(line) > 100 and not line.startswith("|")]
+    assert long == []
+
+
+def test_the_readme_is_short_and_begins_with_a_picture():
+    lines = text_of(README).splitlines()
+    assert len(lines) < 150
+    assert lines[2].startswith("![")
+    picture = CHECKOUT / re.search(r"!\[[^\]]*\]\((.*?)\)", text_of(README))[1]
+    assert picture.stat().st_size < 150_000
+
+
+def test_the_citation_has_the_fields_of_its_format():
+    citation = YAML(typ="safe").load(CHECKOUT / "CITATION.cff")
+    assert str(citation["cff-version"]) == "1.2.0"
+    assert citation["type"] in ("software", "dataset")
+    for work in (citation, *citation["references"]):
+        assert {"title", "authors"} <= set(work)
+        for author in work["authors"]:
+            assert set(author) in ({"name"}, {"family-names", "given-names"})
+    assert all("type" in work for work in citation["references"])
+    assert len(citation["references"]) == 3
+
+
+def test_the_table_on_friction_over_frequency_repeats():
+    """docs/misprints.md, C11: energy per cycle and peak force of the damper of [C]."""
+    printed = load_component("mstv_damper").parameters
+    rows = re.findall(
+        r"^\| ([\d.]+) mm, (energy|peak force) \| ([\d.]+).*?\| (.*) \|$",
+        text_of(CHECKOUT / "docs" / "misprints.md"),
+        re.MULTILINE,
+    )
+    assert len(rows) == 7
+    for amplitude, what, air, cells in rows:
+        damper = printed.model_copy(update={"slider_damping": 1e3 * float(air)})
+        motions = [Harmonic(f, 1e-3 * float(amplitude)) for f in (1.0, 3.0, 6.67, 10.0)]
+        measures = [measures_of(loop) for loop in force_loops(damper_bench(damper), motions)]
+        found = [1e3 * m.energy_per_cycle if what == "energy" else m.peak_force for m in measures]
+        told = [float(cell.split()[0]) for cell in cells.split(" | ")]
+        assert found == pytest.approx(told, abs=0.06), (amplitude, what, air)
+
+
+def test_upper_bounds_of_the_compiler_allow_what_is_installed():
+    import importlib.metadata
+
+    text = (CHECKOUT / "pyproject.toml").read_text(encoding="utf-8")
+    for name in ("numba", "llvmlite"):
+        bound = re.search(rf'"{name}>=[\d.]+,<(\d+)\.(\d+)"', text)
+        installed = tuple(map(int, importlib.metadata.version(name).split(".")[:2]))
+        assert installed < (int(bound[1]), int(bound[2]))

@@ -1,0 +1,223 @@
+"""Elements of a machine placed at their frames, and the force that they apply to the plant."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+
+from wm_drake.elements.bearing import evaluate_drum_bearing
+from wm_drake.elements.bushing import (
+    SixComponentBushingParameters,
+    evaluate_six_component_bushing,
+    packed_bushing_law,
+)
+from wm_drake.elements.damper_law import packed_damper_law
+from wm_drake.elements.friction_damper import FrictionDamperParameters, evaluate_friction_damper
+from wm_drake.elements.layouts import packed_stiffness
+from wm_drake.elements.spring import SpringStrutParameters, evaluate_spring_strut
+from wm_drake.elements.telescopic_damper import (
+    TelescopicDamperParameters,
+    evaluate_telescopic_damper,
+)
+from wm_drake.errors import input_error
+from wm_drake.model.frame_poses import FramePoses
+from wm_drake.model.state_layout import StateLayout
+from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.types import FloatArray
+
+SHORTEST_STRUT = 1e-3
+"""A spring or damper that is shorter than this as drawn has no defined direction. [m]"""
+
+LARGEST_OWN_SIZE = 13
+"""Upper bound of the own numbers that an element writes beside its generalized force."""
+
+
+@dataclass(frozen=True)
+class PlacedElements:
+    """All elements of a machine at their frames, by name; `bearing` is None for a rigid bearing."""
+
+    springs: dict[str, SpringStrutParameters]
+    dampers: dict[str, FrictionDamperParameters]
+    bushings: dict[str, SixComponentBushingParameters]
+    telescopes: dict[str, TelescopicDamperParameters]
+    bearing: SixComponentBushingParameters | None
+
+    def without_gasket(self) -> "PlacedElements":
+        """Return the elements with the gasket disengaged; the same elements if there is none."""
+        if "gasket" not in self.bushings:
+            return self
+        gasket = replace(self.bushings["gasket"], engaged=0.0)
+        return replace(self, bushings=self.bushings | {"gasket": gasket})
+
+    def without_dampers(self) -> "PlacedElements":
+        """Return the elements with all damper laws and the friction of tube bushings disengaged."""
+        dampers = {name: replace(damper, engaged=0.0) for name, damper in self.dampers.items()}
+        telescopes = {name: tubes.without_friction() for name, tubes in self.telescopes.items()}
+        return replace(self, dampers=dampers, telescopes=telescopes)
+
+    def links(self) -> Iterator[tuple[Any, Callable[..., None], int]]:
+        """Yield each element, its law and the tree it acts on beside tub and drum; 0 for none."""
+        for spring in self.springs.values():
+            yield spring, evaluate_spring_strut, 0
+        for damper in self.dampers.values():
+            yield damper, evaluate_friction_damper, 0
+        for bushing in self.bushings.values():
+            yield bushing, evaluate_six_component_bushing, 0
+        for tree, telescope in enumerate(self.telescopes.values(), start=1):
+            yield telescope, evaluate_telescopic_damper, tree
+        if self.bearing:
+            yield self.bearing, evaluate_drum_bearing, 1 + len(self.telescopes)
+
+
+class AppliedForce:
+    """Generalized force of placed elements on the plant, without a diagram: at rest, sponges relaxed.
+
+    The diagram of the machine applies the same laws to the same packed numbers.
+    """
+
+    def __init__(self, elements: PlacedElements, state_layout: StateLayout) -> None:
+        """Pack the elements once; calls then differ in the state only."""
+        trees, states = state_layout.trees, state_layout.states()
+        self._size = state_layout.size
+        self._calls = []
+        for element, evaluate, tree in elements.links():
+            acted_on = [0, tree] if tree else [0]
+            self._calls.append(
+                (
+                    evaluate,
+                    np.concatenate([states[t] for t in acted_on]),
+                    np.concatenate([trees[t] for t in acted_on]),
+                    element.packed(),
+                )
+            )
+
+    def __call__(self, state: FloatArray) -> FloatArray:
+        """Return the generalized force (n,) at a state (2 n,) of the plant. [N m, N]"""
+        total, sponge = np.zeros(self._size), np.zeros(1)
+        own, rate = np.empty(LARGEST_OWN_SIZE), np.empty(1)
+        for evaluate, of_state, of_force, packed in self._calls:
+            force = np.empty(len(of_force))
+            evaluate(np.ascontiguousarray(state[of_state]), sponge, packed, force, own, rate)
+            np.add.at(total, of_force, force)
+        return total
+
+
+def placed_elements(
+    plant: MultibodyPlant, poses: FramePoses, parameters: MachineParameters
+) -> PlacedElements:
+    """Place all elements; springs without preload. The plant's positions must be zero, as drawn.
+
+    Raises:
+        InputError: a spring or damper whose ends coincide.
+    """
+    return PlacedElements(
+        _springs(poses, parameters),
+        _dampers(poses, parameters),
+        _bushings(poses, parameters),
+        _telescopes(plant, poses, parameters),
+        _bearing(plant, parameters),
+    )
+
+
+def _ends(poses: FramePoses, element: Any) -> tuple[FloatArray, FloatArray]:
+    """Return the tub end in T and the housing end in W of an element. [m]"""
+    return poses("tub", element.tub_frame)[0], poses("world", element.housing_frame)[0]
+
+
+def _strut_ends(poses: FramePoses, element: Any, key: str) -> tuple[FloatArray, FloatArray]:
+    """Return the ends of an element that acts along the line between them; see `_ends`."""
+    tub_end, housing_end = _ends(poses, element)
+    if not math.dist(tub_end, housing_end) > SHORTEST_STRUT:
+        raise input_error(
+            f"frames '{element.tub_frame}' and '{element.housing_frame}' are at the same place; "
+            f"they must be more than {1e3 * SHORTEST_STRUT:g} mm apart",
+            key=key,
+        )
+    return tub_end, housing_end
+
+
+def _springs(poses: FramePoses, parameters: MachineParameters) -> dict[str, SpringStrutParameters]:
+    """Place the springs, without preload."""
+    return {
+        name: SpringStrutParameters(
+            *_strut_ends(poses, spring, f"springs.{name}"),
+            0.0,
+            packed_stiffness(parameters.spring_types[spring.type].stiffness),
+        )
+        for name, spring in parameters.springs.items()
+    }
+
+
+def _dampers(
+    poses: FramePoses, parameters: MachineParameters
+) -> dict[str, FrictionDamperParameters]:
+    """Place the dampers that are massless struts."""
+    placed = {}
+    for name, damper in parameters.dampers.items():
+        kind = parameters.damper_types[damper.type]
+        ends = _strut_ends(poses, damper, f"dampers.{name}")
+        placed[name] = FrictionDamperParameters(*ends, kind.end_bushing, packed_damper_law(kind))
+    return placed
+
+
+def _bushings(
+    poses: FramePoses, parameters: MachineParameters
+) -> dict[str, SixComponentBushingParameters]:
+    """Place the bushings between tub and housing, the gasket among them."""
+    placed = {}
+    for name, bushing in parameters.all_bushings().items():
+        tub_point, housing_point = _ends(poses, bushing)
+        r_tub = poses("tub", bushing.tub_frame)[1]
+        r_housing = poses("world", bushing.housing_frame)[1]
+        placed[name] = SixComponentBushingParameters(
+            tub_point, r_tub, housing_point, r_housing, packed_bushing_law(bushing)
+        )
+    return placed
+
+
+def _telescopes(
+    plant: MultibodyPlant, poses: FramePoses, parameters: MachineParameters
+) -> dict[str, TelescopicDamperParameters]:
+    """Place the dampers whose tubes are bodies."""
+    placed = {}
+    for name, damper in parameters.telescopic_dampers.items():
+        joint = plant.GetJointByName(damper.joint)
+        outer = joint.parent_body().name()
+        X_OF = joint.frame_on_parent().GetFixedPoseInBodyFrame()
+        at_tub = SixComponentBushingParameters(
+            *poses("tub", damper.tub_frame),
+            *poses(outer, damper.outer_frame),
+            packed_bushing_law(parameters.bushing_types[damper.tub_bushing]),
+        )
+        at_housing = SixComponentBushingParameters(
+            *poses(outer, damper.inner_frame),
+            *poses("world", damper.housing_frame),
+            packed_bushing_law(parameters.bushing_types[damper.housing_bushing]),
+        )
+        axis = X_OF.rotation() @ joint.translation_axis()
+        law = packed_damper_law(parameters.damper_types[damper.type])
+        placed[name] = TelescopicDamperParameters(axis, at_tub, at_housing, law)
+    return placed
+
+
+def _bearing(
+    plant: MultibodyPlant, parameters: MachineParameters
+) -> SixComponentBushingParameters | None:
+    """Place the compliant bearing between tub (ground side) and drum carrier; None if it is rigid."""
+    bearing = parameters.imperfections.bearing
+    if bearing is None:
+        return None
+    joint = plant.GetJointByName(parameters.drive.joint)
+    X_TF = joint.frame_on_parent().GetFixedPoseInBodyFrame()
+    axis = X_TF.rotation() @ joint.revolute_axis()
+    point = X_TF.translation() + bearing.y * axis
+    across = np.eye(3)[int(abs(axis[0]) > 0.9)]  # x, if the axis is not near it
+    x = across - (across @ axis) * axis
+    x /= np.linalg.norm(x)
+    rotation = np.column_stack([x, axis, np.cross(x, axis)])
+    return SixComponentBushingParameters(
+        point, rotation, point, rotation, packed_bushing_law(bearing.as_bushing())
+    )

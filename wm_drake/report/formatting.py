@@ -1,0 +1,32 @@
+"""Text form of numbers and names on a page: rounded, in mm and rpm, with a true minus sign."""
+
+import math
+
+from wm_drake.parameters.units import Unit
+
+MM_PER_M = Unit("m", "mm").from_si(1.0)
+RPM_PER_RAD_S = Unit("rad/s", "rpm").from_si(1.0)
+
+MISSING = "–"
+"""Text of a value that does not exist."""
+
+
+def number(value: float, decimals: int = 1) -> str:
+    """Return a number rounded to some decimals as text; NaN and infinity become a dash."""
+    if not math.isfinite(value):
+        return MISSING
+    rounded = round(float(value), decimals) + 0.0  # -0.0 + 0.0 is 0.0
+    return f"{rounded:.{decimals}f}".replace("-", "−")
+
+
+def percent(value: float) -> str:
+    """Return a difference in whole percent, with its sign; NaN becomes a dash."""
+    if not math.isfinite(value):
+        return MISSING
+    text = number(value, 0)
+    return f"+{text} %" if round(value) > 0 else f"{text} %"
+
+
+def shape_name(name: str) -> str:
+    """Return the name of an SDF shape as words: `tub_shell` becomes `tub shell`."""
+    return name.replace("_", " ")

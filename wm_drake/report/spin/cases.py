@@ -1,0 +1,22 @@
+"""Labels and speeds of the cases of a spin run, for its tables, figures and text."""
+
+import numpy as np
+
+from wm_drake.report.formatting import RPM_PER_RAD_S
+from wm_drake.studies.spin.study import CaseResult
+
+
+def has_gasket(result: CaseResult) -> bool:
+    """Return whether a case was run with the gasket."""
+    return bool(result.record.attrs["gasket"] == "yes")
+
+
+def case_title(result: CaseResult) -> str:
+    """Return the title of a case: its load, with or without gasket."""
+    return f"{result.case.name} ({'with' if has_gasket(result) else 'without'} gasket)"
+
+
+def speed_rpm(result: CaseResult, time: float) -> float:
+    """Return the drum speed at a time of a case. [rpm]"""
+    record = result.record
+    return float(np.interp(time, record.time.values, record.drum_speed.values)) * RPM_PER_RAD_S

@@ -1,0 +1,296 @@
+"""Results of a spin run as tables: numbers for files, text for a page."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from wm_drake.parameters import Load, measured_amplitudes, quantities
+from wm_drake.report.formatting import (
+    MISSING,
+    MM_PER_M,
+    RPM_PER_RAD_S,
+    number,
+    percent,
+    shape_name,
+)
+from wm_drake.report.spin.cases import case_title, has_gasket, speed_rpm
+from wm_drake.report.tables import MOST_SHOWN, Group, Row, Table, line, readable
+from wm_drake.simulation.measures import percent_difference
+from wm_drake.studies.spin.study import CaseResult, SpinResult
+
+OURS = "wm_drake"
+"""Name of this program in the column `source` of an amplitude table."""
+
+EXPERIMENT = "experiment"
+"""Source of the rows that all other rows are compared with."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Percent difference between an amplitude and the measured one, [B] Eq. (1)."""
+
+    case: str
+    sensor: str
+    percent: float
+
+
+def amplitude_table(result: SpinResult) -> pd.DataFrame:
+    """Return the amplitudes: load, gasket (yes, no), source, and one column per sensor. [mm]
+
+    For each case, the table holds the measured rows of the machine file with the same load and
+    gasket, then the computed row with the source 'wm_drake'. A machine file can name this table,
+    saved as CSV, in `measured`.
+    """
+    sensors = list(result.parameters.sensors)
+    measured = measured_amplitudes(result.parameters)
+    parts = []
+    for case in result.results:
+        gasket = case.record.attrs["gasket"]
+        parts.append(
+            measured[(measured["load"] == case.case.name) & (measured["gasket"] == gasket)]
+        )
+        values = {
+            name: MM_PER_M * float(case.measures.amplitude.sel(sensor=name)) for name in sensors
+        }
+        parts.append(
+            pd.DataFrame([{"load": case.case.name, "gasket": gasket, "source": OURS, **values}])
+        )
+    return pd.concat([part for part in parts if len(part)], ignore_index=True)
+
+
+def rows_of(table: pd.DataFrame, case: CaseResult) -> pd.DataFrame:
+    """Return the rows of an amplitude table that belong to a case."""
+    return table[
+        (table["load"] == case.case.name) & (table["gasket"] == case.record.attrs["gasket"])
+    ]
+
+
+def experiment_mm(table: pd.DataFrame, case: CaseResult) -> dict[str, float] | None:
+    """Return the measured amplitudes of a case by sensor, or None if there are none. [mm]"""
+    rows = rows_of(table, case)
+    rows = rows[rows["source"] == EXPERIMENT]
+    return (
+        None if rows.empty else {str(name): float(rows.iloc[0][name]) for name in table.columns[3:]}
+    )
+
+
+def differences(table: pd.DataFrame, case: CaseResult, source: str = OURS) -> list[Difference]:
+    """Return the percent differences between a source and the experiment, one per sensor.
+
+    The list is empty if the table has no row of the source or of the experiment.
+    """
+    reference = experiment_mm(table, case)
+    rows = rows_of(table, case)
+    rows = rows[rows["source"] == source]
+    if reference is None or rows.empty:
+        return []
+    sensors = list(reference)
+    value = xr.DataArray(
+        rows.iloc[0][sensors].to_numpy(dtype=float), {"sensor": sensors}, ["sensor"]
+    )
+    change = percent_difference(
+        value, xr.DataArray(list(reference.values()), {"sensor": sensors}, ["sensor"])
+    )
+    return [Difference(case_title(case), name, float(change.sel(sensor=name))) for name in sensors]
+
+
+def comparison(result: SpinResult, table: pd.DataFrame) -> Table:
+    """Return the amplitudes with their percent differences from the experiment."""
+    sensors = list(result.parameters.sensors)
+    groups = []
+    for case in result.results:
+        rows = [_amplitude_row(row, sensors) for _, row in rows_of(table, case).iterrows()]
+        others = [
+            source for source in rows_of(table, case)["source"] if source not in (EXPERIMENT, OURS)
+        ]
+        for source in dict.fromkeys([*others, OURS]):
+            rows += _difference_rows(differences(table, case, source), source)
+        groups.append(Group(case_title(case), tuple(rows)))
+    caption = (
+        "Amplitude of the displacement at each sensor: the largest absolute value of its envelopes "
+        "in the band 0.5–20 Hz. The last rows of each load are differences: 100 % × (value − "
+        "experiment) / experiment, [B] Eq. (1)."
+    )
+    header = ("load", "source", *(f"{name}, mm" for name in sensors), "mean absolute difference, %")
+    return Table(caption, header, tuple(groups), text_columns=2)
+
+
+def _amplitude_row(row: pd.Series, sensors: list[str]) -> Row:
+    kind = "ours" if row["source"] == OURS else "measured"
+    return Row((str(row["source"]), *(number(float(row[name])) for name in sensors), ""), kind)
+
+
+def _difference_rows(changes: list[Difference], source: str) -> list[Row]:
+    if not changes:
+        return []
+    mean = float(np.mean([abs(change.percent) for change in changes]))
+    cells = (
+        f"{source} vs. {EXPERIMENT}",
+        *(percent(c.percent) for c in changes),
+        percent(mean).lstrip("+"),
+    )
+    return [Row(cells, "difference" if source == OURS else "difference other")]
+
+
+def critical_speeds(result: SpinResult) -> Table:
+    """Return the drum speed at which the displacement of each sensor is largest."""
+    groups = [
+        line(
+            case_title(case),
+            [number(RPM_PER_RAD_S * float(speed), 0) for speed in case.measures.critical_speed],
+        )
+        for case in result.results
+    ]
+    header = ("load", *(f"{name}, rpm" for name in result.parameters.sensors))
+    return Table(
+        "Critical speeds: the drum speed at which the displacement of each sensor is largest.",
+        header,
+        tuple(groups),
+    )
+
+
+def largest_values(result: SpinResult) -> Table:
+    """Return D, F and M of [B] for each case."""
+    caption = (
+        "D: largest displacement, from the rest position, of the tub point nearest to the "
+        "detergent box. F, M: largest force and moment of the gasket on the housing. All are the "
+        "largest absolute values over the whole run, for each axis."
+    )
+    header = (
+        "load",
+        *(
+            f"{name}{axis}, {unit}"
+            for name, unit in (("D", "mm"), ("F", "N"), ("M", "N m"))
+            for axis in "xyz"
+        ),
+    )
+    return Table(
+        caption,
+        header,
+        tuple(line(case_title(case), _largest_cells(case)) for case in result.results),
+    )
+
+
+def _largest_cells(case: CaseResult) -> list[str]:
+    measures = case.measures
+    shown = [number(MM_PER_M * float(value)) for value in measures.detergent_displacement]
+    gasket = [*measures.gasket_force, *measures.gasket_moment]
+    decimals = [1] * 3 + [2] * 3
+    if not has_gasket(case):
+        return [*shown, *[MISSING] * len(gasket)]
+    return [
+        *shown,
+        *(number(float(value), places) for value, places in zip(gasket, decimals, strict=True)),
+    ]
+
+
+def smallest_gaps(result: SpinResult) -> Table:
+    """Return the smallest gap of each case: its width, the two parts, the time and the place."""
+    caption = (
+        "Smallest gap between the housing and the parts that move with the tub, over all samples. "
+        "A negative gap means that the parts overlap. x (to the right), y (to the rear), z (up): "
+        "position of the nearest point of the moving part, from drum mid-depth at rest."
+    )
+    header = (
+        "load",
+        "moving part",
+        "part of the housing",
+        "gap, mm",
+        "drum speed, rpm",
+        "time, s",
+        "x, mm",
+        "y, mm",
+        "z, mm",
+    )
+    return Table(caption, header, tuple(_gap(case) for case in result.results), text_columns=3)
+
+
+def _gap(case: CaseResult) -> Group:
+    gap = case.measures.smallest_gap
+    if gap is None:
+        return line(case_title(case), ["not computed", *[MISSING] * 7])
+    place = [number(MM_PER_M * value, 0) for value in gap.point]
+    speed = number(speed_rpm(case, gap.time), 0)
+    cells = [
+        shape_name(gap.moving),
+        shape_name(gap.fixed),
+        number(MM_PER_M * gap.distance),
+        speed,
+        number(gap.time, 2),
+        *place,
+    ]
+    return line(case_title(case), cells, "alarm" if gap.distance <= 0.0 else "")
+
+
+def loads(result: SpinResult) -> Table:
+    """Return the point masses of each case."""
+    caption = (
+        "Loads: point masses in the drum. A mass with phase 0 is at the top when the drum angle is "
+        "0. y is measured from drum mid-depth to the rear."
+    )
+    groups = (Group(case_title(case), _masses(case.case.load)) for case in result.results)
+    return Table(caption, ("load", "mass, kg", "radius, mm", "y, mm", "phase, deg"), tuple(groups))
+
+
+def _masses(load: Load) -> tuple[Row, ...]:
+    rows = [
+        Row(
+            (
+                number(u.mass, 3),
+                number(MM_PER_M * u.radius),
+                number(MM_PER_M * u.y),
+                number(float(np.rad2deg(u.phase))),
+            )
+        )
+        for u in load.unbalances
+    ]
+    return tuple(rows) or (Row(("0 (empty drum)", *[MISSING] * 3)),)
+
+
+def profiles(result: SpinResult) -> Table:
+    """Return the corner points of the spin profile of each case."""
+    cases: dict[tuple[tuple[float, ...], tuple[float, ...]], list[str]] = {}
+    for case in result.results:
+        cases.setdefault((case.case.profile.time, case.case.profile.speed), []).append(
+            case_title(case)
+        )
+    groups = (
+        Group("all loads" if len(cases) == 1 else "; ".join(names), _points(*points))
+        for points, names in cases.items()
+    )
+    return Table(
+        "Spin profile. The drum speed is linear between these points.",
+        ("load", "time, s", "drum speed, rpm"),
+        tuple(groups),
+    )
+
+
+def _points(times: Sequence[float], speeds: Sequence[float]) -> tuple[Row, ...]:
+    rows = [
+        Row((number(t, 3), number(RPM_PER_RAD_S * w))) for t, w in zip(times, speeds, strict=True)
+    ]
+    if len(rows) > MOST_SHOWN:
+        half = MOST_SHOWN // 2
+        rows[half:-half] = [Row((f"{len(rows) - 2 * half} more", "…"))]
+    return tuple(rows)
+
+
+def changed_parameters(result: SpinResult, case: CaseResult) -> Table | None:
+    """Return the parameters of a case that differ from the machine's; None if it has no own set."""
+    if case.case.parameters is None:
+        return None
+    common = {key: value for key, value, _ in quantities(result.parameters)}
+    groups = tuple(
+        line(key, [readable(value, unit)])
+        for key, value, unit in quantities(case.case.parameters)
+        if common.get(key) != value
+    )
+    return Table(
+        "Parameters of this load that differ from those of the machine.",
+        ("key", "value"),
+        groups,
+        text_columns=2,
+    )

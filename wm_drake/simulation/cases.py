@@ -1,0 +1,45 @@
+"""The case: one run to make."""
+
+from dataclasses import dataclass
+
+from wm_drake.errors import input_error, nearest_names
+from wm_drake.parameters import Load, MachineParameters, SpinProfile
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run to make.
+
+    Attributes:
+        name: Label of the run in records, tables and messages.
+        load: Point masses in the drum.
+        profile: Drum speed over time.
+        gasket: False removes the gasket from the machine.
+        parameters: Parameters of the machine in this run; those of the built machine if None.
+    """
+
+    name: str
+    load: Load
+    profile: SpinProfile
+    gasket: bool = True
+    parameters: MachineParameters | None = None
+
+
+def case_of(parameters: MachineParameters, load: str, *, gasket: bool = True) -> Case:
+    """Return the case that runs one of a machine's loads over the machine's own profile.
+
+    Args:
+        parameters: Machine that defines the load and the profile.
+        load: Name of the load.
+        gasket: False removes the gasket from the machine.
+
+    Raises:
+        InputError: the machine has no load of this name.
+    """
+    if load not in parameters.loads:
+        raise input_error(
+            f"no load '{load}' in machine '{parameters.name}'"
+            f"{nearest_names(load, parameters.loads)}",
+            key="loads",
+        )
+    return Case(load, parameters.loads[load], parameters.profile, gasket)

@@ -1,0 +1,95 @@
+"""The record: a labelled dataset of one run, with units; how it is made, written and read."""
+
+import functools
+import importlib.metadata
+import json
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import xarray as xr
+
+from wm_drake.engines.trajectory import COORDINATES, Trajectory, divergence_text
+from wm_drake.model.setup import Setup
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.outputs import AXES, variables_of
+
+Record: TypeAlias = xr.Dataset
+"""Outputs of one run over time, in SI units.
+
+The dimensions are time, axis (x, y, z), angle (roll, pitch, yaw), sensor, accelerometer, spring,
+damper and bushing; machines with telescopic dampers also have tube. Each variable has its unit in
+attrs["units"]. `as_record` makes it.
+"""
+
+
+def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
+    """Return a trajectory as a record: labelled, with the outputs that follow from the motion.
+
+    All displacements are in W and count from the rest pose of the empty machine.
+
+    Args:
+        setup: Machine as it was set up for the run.
+        case: The case that was run.
+        trajectory: Motion that an engine computed.
+    """
+    variables: dict[str, Any] = {
+        name: (dims, values, {"units": unit, "long_name": text})
+        for name, (dims, values, unit, text) in variables_of(setup, trajectory).items()
+    }
+    labels = {
+        "axis": AXES,
+        "angle": COORDINATES[:3],
+        "sensor": setup.sensors,
+        "accelerometer": setup.accelerometer_points,
+        "spring": setup.springs,
+        "damper": (*setup.dampers, *setup.telescopes),
+        "bushing": (
+            *setup.bushings,
+            *(f"{name}_{end}" for name in setup.telescopes for end in ("tub", "housing")),
+        ),
+        **({"tube": setup.telescopes} if setup.telescopes else {}),
+    }
+    label_coordinates = _label_coordinates(**{name: tuple(of) for name, of in labels.items()})
+    variables["time"] = "time", trajectory.time, {"units": "s"}
+    attributes = {
+        "machine": setup.parameters.name,
+        "load": case.name,
+        "gasket": "yes" if case.gasket and "gasket" in setup.bushings else "no",
+        "rest_pose": setup.rest_pose,
+        "parameters": json.dumps(setup.parameters.model_dump(mode="json", exclude={"sources"})),
+        "load_parameters": case.load.model_dump_json(),
+        "profile": case.profile.model_dump_json(),
+        "diverged": divergence_text(trajectory.divergence, trajectory.time, trajectory.state),
+    }
+    attributes |= {f"version_{name}": version for name, version in versions().items()}
+    return xr.Dataset(variables, label_coordinates, attributes)
+
+
+@functools.lru_cache(maxsize=16)  # building them takes 2 % of the time of a run
+def _label_coordinates(**labels: tuple[str, ...]) -> xr.Coordinates:
+    """Return the coordinates of all dimensions except time."""
+    return xr.Coordinates({name: list(of) for name, of in labels.items()})
+
+
+def save_record(record: Record, path: Path) -> None:
+    """Write a record to a compressed netCDF file."""
+    compression = {
+        name: {"compression": "gzip", "compression_opts": 1}
+        for name in record.data_vars
+        if record[name].size
+    }
+    record.to_netcdf(path, engine="h5netcdf", encoding=compression)
+
+
+def load_record(path: Path) -> Record:
+    """Read a record that `save_record` wrote."""
+    return xr.load_dataset(path, engine="h5netcdf")
+
+
+@functools.cache  # reading them takes more than 10 % of the time of a run
+def versions() -> dict[str, str]:
+    """Return the versions of the packages that determine a result, by package name."""
+    return {
+        name: importlib.metadata.version(name)
+        for name in ("wm-drake", "drake", "numpy", "scipy", "numba")
+    }

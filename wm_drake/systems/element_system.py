@@ -1,0 +1,137 @@
+"""Ports, parameters and state that all element systems share, and the two ways to evaluate a law."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.systems.framework import BasicVector_, NumericParameterIndex
+
+from wm_drake.compiler.compilation import generic
+from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE
+from wm_drake.parameters.types import FloatArray
+
+SCALARS = (float, AutoDiffXd)
+"""Scalar types of all systems. `Expression` would make Drake trace Python callbacks symbolically."""
+
+
+def evaluator(compiled: Any, scalar: type) -> Callable[..., None]:
+    """Return the function to call for a scalar type.
+
+    Args:
+        compiled: A compiled law.
+        scalar: float gets the compiled law; AutoDiffXd gets the same source, interpreted.
+    """
+    return compiled if scalar is float else generic(compiled)
+
+
+def empty(size: int, scalar: type) -> Any:
+    """Return an uninitialized array of a scalar type. (size,)"""
+    return np.empty(size, float if scalar is float else object)
+
+
+class ElementSystem:
+    """Mixin of the LeafSystems that put a force on the plant.
+
+        plant_state ──▶ [ element ] ──▶ generalized_force   moment about To, force (W), drum torque
+                        [ (state) ] ──▶ own outputs         force, moment, ... of the element itself
+                                    ──▶ (state)             of an element that has one
+
+    A subclass passes `declare_element` a compiled function
+    ``evaluate(plant_state, state, parameters, generalized_force, own, rate)`` that writes the last
+    three. The packed parameters are a numeric parameter of the Context; derivatives by state and by
+    parameter follow from AutoDiffXd. A system holds no Context.
+    """
+
+    def declare_element(
+        self,
+        scalar: type,
+        evaluate: Any,
+        parameters: FloatArray,
+        own_outputs: Mapping[str, slice],
+        *,
+        state_size: int = 0,
+        trees: int = 1,
+    ) -> None:
+        """Declare ports, parameters and state. `self` is a LeafSystem of the given scalar type.
+
+        Args:
+            scalar: Scalar type of the system.
+            evaluate: Compiled function, see the class.
+            parameters: Packed parameters, the default of the numeric parameter.
+            own_outputs: Name of each own output port, and its part of what `evaluate` writes.
+            state_size: Number of continuous states.
+            trees: Number of trees of the plant that the element acts on. The plant state and the
+                generalized force have one part for each, one after the other.
+        """
+        system: Any = self
+        self.packed = parameters  # a scalar-converted copy is constructed from these
+        self.state_size = state_size
+        self._scalar, self._evaluate = scalar, evaluator(evaluate, scalar)
+        self._sizes = (
+            trees * GENERALIZED_FORCE_SIZE,
+            max(part.stop for part in own_outputs.values()),
+            state_size,
+        )
+        self._plant_state = system.DeclareVectorInputPort("plant_state", trees * PLANT_STATE_SIZE)
+        self._parameters = system.DeclareNumericParameter(BasicVector_[scalar](parameters))
+        needs = {
+            self._plant_state.ticket(),
+            system.numeric_parameter_ticket(NumericParameterIndex(self._parameters)),
+        }
+        if state_size:
+            state = system.DeclareContinuousState(state_size)
+            needs.add(system.xc_ticket())
+        outputs = {"generalized_force": (0, slice(None))}
+        outputs |= {name: (1, part) for name, part in own_outputs.items()}
+        for name, (vector, part) in outputs.items():
+            size = len(range(self._sizes[vector])[part])
+            calc = _output(self._calc, vector, part)
+            system.DeclareVectorOutputPort(name, size, calc, needs)
+        if state_size:
+            system.DeclareStateOutputPort("state", state)
+
+    def set_parameters(self, context: Any, parameters: FloatArray) -> None:
+        """Set the packed parameters in the element's own Context.
+
+        Raises:
+            ValueError: their number is not that of the built element (a table has more points).
+        """
+        if len(parameters) != len(self.packed):
+            name = self.get_name()  # type: ignore[attr-defined]
+            raise ValueError(
+                f"{name}: a table has another number of points than the built machine's; "
+                "build a new machine"
+            )
+        context.get_mutable_numeric_parameter(self._parameters).SetFromVector(parameters)
+
+    def packed_numbers(self, context: Any) -> Any:
+        """Return the packed parameters in the element's own Context."""
+        return context.get_numeric_parameter(self._parameters).CopyToVector()
+
+    def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
+        """Write the time derivative of the element's state."""
+        if self.state_size:
+            derivatives.get_mutable_vector().SetFromVector(self._calc(context)[2])
+
+    def _calc(self, context: Any) -> tuple[Any, ...]:
+        """Return generalized force, own numbers and rate of the state."""
+        written = tuple(empty(size, self._scalar) for size in self._sizes)
+        self._evaluate(
+            self._plant_state.Eval(context),
+            context.get_continuous_state_vector().CopyToVector(),
+            self.packed_numbers(context),
+            *written,
+        )
+        return written
+
+
+def _output(
+    calc: Callable[[Any], tuple[Any, ...]], vector: int, part: slice
+) -> Callable[[Any, Any], None]:
+    """Return the callback of an output port that is a part of one of the computed vectors."""
+
+    def write(context: Any, output: Any) -> None:
+        output.SetFromVector(calc(context)[vector][part])
+
+    return write

@@ -1,0 +1,76 @@
+"""Displacement sensors on the tub."""
+
+from typing import Any
+
+from pydrake.systems.framework import BasicVector_, LeafSystem_, NumericParameterIndex
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from wm_drake.elements.motion import PLANT_STATE_SIZE
+from wm_drake.elements.sensor import POINT_SIZE, evaluate_sensors
+from wm_drake.parameters.types import FloatArray
+from wm_drake.systems.element_system import SCALARS, empty, evaluator
+
+DETERGENT_SIZE = 3
+"""The last three measured points are the point nearest the detergent box, along x, y, z."""
+
+
+@TemplateSystem.define("Sensors_", T_list=SCALARS)
+def Sensors_(T: type) -> Any:
+    """Return the class Sensors for a scalar type."""
+
+    class Sensors(LeafSystem_[T]):
+        """Displacement sensors of the tub; law `displacement_at`.
+
+            plant_state (14) ──▶ [ Sensors ] ──▶ displacement (k) of each sensor along its axis [m]
+                                             ──▶ detergent_displacement (3) in W [m]
+                                             ──▶ drum_speed (1) against the tub [rad/s]
+
+        Displacements are from the rest pose of the empty machine.
+        """
+
+        def _construct(self, points: FloatArray, converter: Any = None) -> None:
+            LeafSystem_[T].__init__(self, converter=converter)
+            self.points = points  # a scalar-converted copy is constructed from these
+            self._evaluate = evaluator(evaluate_sensors, T)
+            self._plant_state = self.DeclareVectorInputPort("plant_state", PLANT_STATE_SIZE)
+            self._index = self.DeclareNumericParameter(BasicVector_[T](points.ravel()))
+            needs = {
+                self._plant_state.ticket(),
+                self.numeric_parameter_ticket(NumericParameterIndex(self._index)),
+            }
+            sensors = len(points) - DETERGENT_SIZE
+            self.DeclareVectorOutputPort("displacement", sensors, self._calc_sensors, needs)
+            self.DeclareVectorOutputPort(
+                "detergent_displacement", DETERGENT_SIZE, self._calc_detergent, needs
+            )
+            self.DeclareVectorOutputPort(
+                "drum_speed", 1, self._calc_drum_speed, {self._plant_state.ticket()}
+            )
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._construct(self, other.points, converter=converter)
+
+        def set_points(self, context: Any, points: FloatArray) -> None:
+            """Set the measured points (k, `POINT_SIZE`) in the system's own Context."""
+            context.get_mutable_numeric_parameter(self._index).SetFromVector(points.ravel())
+
+        def _displacements(self, context: Any) -> Any:
+            points = context.get_numeric_parameter(self._index).CopyToVector()
+            displacement = empty(len(points) // POINT_SIZE, T)
+            self._evaluate(self._plant_state.Eval(context), points, displacement)
+            return displacement
+
+        def _calc_sensors(self, context: Any, output: Any) -> None:
+            output.SetFromVector(self._displacements(context)[:-DETERGENT_SIZE])
+
+        def _calc_detergent(self, context: Any, output: Any) -> None:
+            output.SetFromVector(self._displacements(context)[-DETERGENT_SIZE:])
+
+        def _calc_drum_speed(self, context: Any, output: Any) -> None:
+            output.SetFromVector(self._plant_state.Eval(context)[-1:])
+
+    Impl = Sensors
+    return Sensors
+
+
+Sensors = Sensors_[None]

@@ -1,0 +1,74 @@
+"""Spin profile as a system: the prescribed acceleration and speed of the drum over time."""
+
+from typing import Any
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.systems.framework import AbstractParameterIndex, LeafSystem_
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from wm_drake.elements.spin_profile import drum_acceleration, drum_motion
+from wm_drake.parameters import SpinProfile
+from wm_drake.systems.element_system import SCALARS
+
+
+@TemplateSystem.define("SpinProfileSource_", T_list=SCALARS)
+def SpinProfileSource_(T: type) -> Any:
+    """Return the class SpinProfileSource for a scalar type."""
+
+    class SpinProfileSource(LeafSystem_[T]):
+        """Prescribed motion of the drum at the time of the Context.
+
+            [ SpinProfileSource ] ──▶ acceleration (1) [rad/s^2]
+                                  ──▶ speed (1) [rad/s]
+              parameter: SpinProfile (abstract)
+
+        The acceleration jumps at the corners of the profile. A step across a corner misses the speed
+        by up to the jump times the step size; `wm_drake.engines.drake.advance_to` ends a step at each
+        corner. Behind the end of the profile the speed stays constant.
+        """
+
+        def _construct(self, profile: SpinProfile, converter: Any = None) -> None:
+            LeafSystem_[T].__init__(self, converter=converter)
+            self.profile = profile  # a scalar-converted copy is constructed from it
+            self._index = self.DeclareAbstractParameter(Value[object](profile))
+            needs = {
+                self.time_ticket(),
+                self.abstract_parameter_ticket(AbstractParameterIndex(self._index)),
+            }
+            self.DeclareVectorOutputPort("acceleration", 1, self._calc_acceleration, needs)
+            self.DeclareVectorOutputPort("speed", 1, self._calc_speed, needs)
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._construct(self, other.profile, converter=converter)
+
+        def set_profile(self, context: Any, profile: SpinProfile) -> None:
+            """Set the profile in the source's own Context."""
+            context.get_mutable_abstract_parameter(self._index).set_value(profile)
+
+        def get_profile(self, context: Any) -> SpinProfile:
+            """Return the profile in the source's own Context."""
+            return context.get_abstract_parameter(self._index).get_value()
+
+        def _calc_acceleration(self, context: Any, output: Any) -> None:
+            time = context.get_time()
+            value = drum_acceleration(self.get_profile(context), np.array(_number(time)))
+            output.SetFromVector([0.0 * time + float(value)])
+
+        def _calc_speed(self, context: Any, output: Any) -> None:
+            time, profile = context.get_time(), self.get_profile(context)
+            at = np.array([min(_number(time), profile.duration)])
+            speed = drum_motion(profile, at)[0][0]
+            slope = drum_acceleration(profile, np.array(_number(time)))
+            output.SetFromVector([(time - _number(time)) * float(slope) + float(speed)])
+
+    Impl = SpinProfileSource
+    return SpinProfileSource
+
+
+def _number(time: Any) -> float:
+    """Return the value of a time, float or AutoDiffXd. [s]"""
+    return time if isinstance(time, float) else float(time.value())
+
+
+SpinProfileSource = SpinProfileSource_[None]

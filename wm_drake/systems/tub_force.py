@@ -1,0 +1,43 @@
+"""External force on the tub, for the systems of a user."""
+
+from typing import Any
+
+from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE
+from wm_drake.systems.element_system import SCALARS
+
+
+@TemplateSystem.define("TubForce_", T_list=SCALARS)
+def TubForce_(T: type) -> Any:
+    """Return the class TubForce for a scalar type."""
+
+    class TubForce(LeafSystem_[T]):
+        """Spatial force on the tub that a user connects or fixes; zero without one.
+
+        tub_force (6) ──▶ [ TubForce ] ──▶ generalized_force (7) [N m, N]
+          moment about To and force on the tub, in W [N m, N]
+        """
+
+        def _construct(self, converter: Any = None) -> None:
+            LeafSystem_[T].__init__(self, converter=converter)
+            self._force = self.DeclareVectorInputPort("tub_force", GENERALIZED_FORCE_SIZE - 1)
+            self.DeclareVectorOutputPort(
+                "generalized_force", GENERALIZED_FORCE_SIZE, self._calc, {self._force.ticket()}
+            )
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._construct(self, converter=converter)
+
+        def _calc(self, context: Any, output: Any) -> None:
+            force = [T(0.0)] * GENERALIZED_FORCE_SIZE
+            if self._force.HasValue(context):
+                force[:-1] = self._force.Eval(context)
+            output.SetFromVector(force)
+
+    Impl = TubForce
+    return TubForce
+
+
+TubForce = TubForce_[None]
