@@ -143,11 +143,12 @@ def existing_file(path: Path, option: str) -> Path:
 
 def check_buildable(file: str, parameters: "MachineParameters") -> None:
     """Raise an InputError for faults that only building the machine reveals."""
+    from wm_drake.engines.compiled.step_check import check_step
     from wm_drake.model.machine import build_machine
     from wm_drake.parameters import measured_amplitudes
-    from wm_drake.simulation.runs import check_bearing, checked_step
+    from wm_drake.simulation.runs import checked_step
 
     with located_in(file):
         measured_amplitudes(parameters)
         step = checked_step(parameters, None)
-        check_bearing(build_machine(parameters).set_up(), step)
+        check_step(build_machine(parameters).set_up(), step)

@@ -18,7 +18,6 @@ from wm_drake.model.same_elements import check_same_elements
 from wm_drake.model.setup import Setup, TubPoints, measured_points
 from wm_drake.model.state_layout import StateLayout, state_layout_of
 from wm_drake.model.visualization import add_visualizer
-from wm_drake.model.whirl import max_bearing_eigenvalue
 from wm_drake.model.wiring import Link, Wiring
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.types import FloatArray
@@ -111,9 +110,6 @@ class MachineSystems:
         elements = elements if gasket else elements.without_gasket()
         elements = elements if dampers else elements.without_dampers()
         residual = put_to_rest(self.plant, plant_context, layout, elements)
-        fastest = 0.0
-        if elements.bearing:
-            fastest = max_bearing_eigenvalue(self.plant, plant_context, layout, elements.bearing)
         self._add_load(plant_context, parameters, load)
         q = self.plant.GetPositions(plant_context)
         points = _tub_points(poses, parameters)
@@ -121,7 +117,7 @@ class MachineSystems:
         self._set_systems(context, elements, measured_points(parameters, points, q[layout.tub]))
         self.set_profile(context, profile)
         rest = q[layout.tub], residual, q[layout.tubes], q[layout.carrier]
-        return Setup(self, parameters, context, elements, points, *rest, fastest)
+        return Setup(self, parameters, context, elements, points, *rest)
 
     def set_up_bodies(
         self, load: Load | None, parameters: MachineParameters, context: Context

@@ -53,7 +53,6 @@ class Setup:
             (telescopic dampers, 7) [rad, m]
         carrier_rest: Angles and position of the drum carrier at rest with a compliant bearing, else
             empty. (6,) [rad, m]
-        bearing_rate: Largest eigenvalue of the empty drum on a compliant bearing, else 0. [rad/s]
     """
 
     machine: "MachineSystems"
@@ -65,7 +64,6 @@ class Setup:
     residual: FloatArray
     tube_rest: FloatArray
     carrier_rest: FloatArray
-    bearing_rate: float
 
     @property
     def plant_context(self) -> Context:

@@ -1,5 +1,7 @@
 """The time derivative of a machine's state, for integrators of other packages and for tests."""
 
+import numpy as np
+
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.integration import derivative_lanes
 from wm_drake.engines.compiled.packing import aligned, fill_lanes, pack
@@ -36,7 +38,19 @@ class StateDerivative:
         Returns:
             (size,) The derivative of each number of the state. All lanes compute the same one.
         """
-        state, rate = (aligned(len(x) * WIDTH) for _ in range(2))
-        fill_lanes(state, [x])
+        return self.at_states(np.tile(x, (WIDTH, 1)), acceleration)[0]
+
+    def at_states(self, states: FloatArray, acceleration: float = 0.0) -> FloatArray:
+        """Return the time derivatives at several states of one machine.
+
+        Args:
+            states: (WIDTH, size), one a lane.
+            acceleration: As for a call, the same at all states. [rad/s^2]
+
+        Returns:
+            (WIDTH, size)
+        """
+        state, rate = aligned(states.size), aligned(states.size)
+        state[:] = states.T.ravel()
         derivative_lanes(state, rate, acceleration, self._p, self._elements)
-        return rate[::WIDTH].copy()
+        return rate.reshape(-1, WIDTH).T.copy()

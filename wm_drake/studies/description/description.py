@@ -6,6 +6,7 @@ import numpy as np
 
 from wm_drake.compiler.compilation import generic
 from wm_drake.compiler.vectors import rotation_from_rpy
+from wm_drake.engines.compiled.step_check import BEARING, fastest_motions
 from wm_drake.model.bodies import tubes_of
 from wm_drake.model.machine import Machine
 from wm_drake.model.setup import Setup
@@ -117,7 +118,7 @@ def _drum_bearing(setup: Setup) -> dict[str, Any] | None:
         return None
     kind = bearing.as_bushing().model_dump(include=set(_BEARING_NUMBERS))
     sag = setup.carrier_rest[3:] - setup.rest_pose[3:]
-    rate = {"fastest_motion_hz": setup.bearing_rate / (2.0 * np.pi)}
+    rate = {"fastest_motion_hz": fastest_motions(setup)[BEARING].rate / (2.0 * np.pi)}
     return {
         "point_T": placed.ground_side_point.tolist(),
         "rotation_T": placed.ground_side_rotation.tolist(),
