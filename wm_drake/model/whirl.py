@@ -1,4 +1,4 @@
-"""How fast a drum moves in a bearing that gives: what the integration step has to follow."""
+"""Fastest motion of a drum in a compliant bearing, which limits the step size."""
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -15,15 +15,15 @@ def max_bearing_eigenvalue(
     state_layout: StateLayout,
     bearing: SixComponentBushingParameters,
 ) -> float:
-    """Largest modulus of the eigenvalues of tub and drum on the bearing alone. [rad/s]
+    """Return the largest modulus of the eigenvalues of tub and drum on the bearing alone. [rad/s]
 
-    The drum does not turn against its carrier here; gyroscopic moments raise the fastest frequency of a stiff bearing by no
-    more than about the drum's speed.
+    The drum does not turn against its carrier here. Gyroscopic moments raise the largest eigenvalue
+    of a stiff bearing by about the drum speed at most.
 
     Args:
         plant, context: The plant and its Context.
-        state_layout: Of the plant.
-        bearing: Of the drum; its stiffnesses are numbers.
+        state_layout: State layout of the plant.
+        bearing: Bearing of the drum; its stiffnesses are numbers, not tables.
     """
     moving = np.concatenate([state_layout.tub, state_layout.carrier])
     mass = plant.CalcMassMatrix(context)[np.ix_(moving, moving)]
@@ -36,7 +36,12 @@ def max_bearing_eigenvalue(
 
 
 def _relative_motion(bearing: SixComponentBushingParameters) -> FloatArray:
-    """From angular velocity and velocity of tub and carrier to velocity and angular velocity in the bearing, when drawn."""
+    """Return the matrix (6, 12) from velocities of tub and carrier to those in the bearing.
+
+    The columns are angular velocity and velocity of the tub, then of the carrier, in W. The rows
+    are velocity and angular velocity of the carrier against the tub, in the frame of the bearing
+    at the drawn pose.
+    """
     x, y, z = bearing.ground_side_point
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])  # p x .
     turn = bearing.ground_side_rotation.T
