@@ -1,4 +1,4 @@
-"""Identification: unknown numbers of any model from what was measured, by three methods with one kind of result."""
+"""Identify unknown numbers of any model from measurements, by three methods."""
 
 from wm_drake.studies.fitting.assessment import assess
 from wm_drake.studies.fitting.fit import Direction, Estimate, Fit, TestError
