@@ -1,4 +1,7 @@
-"""The direction of the rooms: imports point upwards only, read from the source, imports inside functions included."""
+"""Imports between rooms, read from the source: each room imports only rooms before it.
+
+Imports inside functions count too.
+"""
 
 import ast
 import sys
@@ -50,7 +53,7 @@ def imported(name, source, is_package=False):
 
 
 def faults(name, source, is_package=False):
-    """What is wrong with the imports of a module, one text each."""
+    """Return a text for each wrong import of a module."""
     room = name.split(".")[1]
     if room not in LEVEL:
         return [f"{name}: room '{room}' has no place in the order"]

@@ -48,6 +48,12 @@ def input_error(message: str, *, where: str = "", key: str = "") -> InputError:
     return InputError([Problem(where, key, message)])
 
 
+def first_line(error: Exception) -> str:
+    """Return the first line of the message of a foreign exception, at most 200 characters of it."""
+    line = next(iter(str(error).strip().splitlines()), type(error).__name__)
+    return line if len(line) <= 200 else f"{line[:197]}..."
+
+
 def nearest_names(name: str, known: Iterable[str]) -> str:
     """Return a hint for an unknown name, such as `` (did you mean 'x'? known: x, y, z)``.
 

@@ -66,7 +66,7 @@ FAULTY_MACHINES = {
     ),
     "unknown joint": (
         in_machine("drive: {joint: drum_axes}"),
-        "no moving joint 'drum_axes' (did you mean 'drum_axis'?",
+        "no moving joint 'drum_axes' in the SDF (did you mean 'drum_axis'?",
     ),
     "unknown model": (in_machine("model: nosuch.sdf"), "no SDF file 'nosuch.sdf'"),
     "model that is no SDF": (in_machine("model: machine.yaml"), "cannot be read"),

@@ -1,7 +1,8 @@
 """Command `wm-drake`, one module per command.
 
-A command reads options and files, calls a study, and writes the results. This room holds no physics
-and no statistics.
+Enters: options and files. Leaves: printed results and result files. A command reads its input,
+calls a study, and writes the results; this room contains no physics and no statistics.
+May import: all other rooms; neither pydrake nor a plotting library.
 """
 
 import sys

@@ -25,7 +25,7 @@ class FramePoses:
         self._known: dict[tuple[str, str], tuple[FloatArray, FloatArray]] = {}
 
     def __call__(self, body: str, frame: str) -> tuple[FloatArray, FloatArray]:
-        """Return position of the origin (3,) [m] and rotation (3, 3) of a frame in a body's frame."""
+        """Return position (3,) [m] and rotation (3, 3) of a frame in the frame of a body."""
         if (body, frame) not in self._known:
             body_frame = self._plant.GetBodyByName(body).body_frame()
             pose = self._plant.CalcRelativeTransform(

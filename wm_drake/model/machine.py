@@ -39,21 +39,22 @@ OUTPUT_PERIOD = 5e-3
 class MachineSystems:
     """The systems of a machine in a diagram, and the ports that other systems may connect to.
 
-    Numbers live in a Context of the diagram: see `set_up`.
+    The numbers in force are in a Context of the diagram, see `set_up`.
 
     Attributes:
         parameters: The numbers it was built from.
         plant: The bodies.
-        state_layout: Where the plant keeps what.
+        state_layout: Indices in the state of the plant.
         spin_profile, speed_source, sensors: Systems that drive the drum and measure the tub.
         springs, dampers, bushings, telescopes: Element systems by name.
         bearing: System of the compliant bearing; None for a rigid one.
-        inputs: By name: "drum_acceleration" (1) [rad/s^2], followed in place of the spin profile if a
-            value is connected or fixed; "tub_force" (6), moment about To and force on the tub in W
-            [N m, N], zero if nothing is connected.
-        outputs: By name: "state" of the plant; "displacement" of the sensors, "detergent_displacement",
-            "drum_speed"; "motor_torque"; and for each element its own outputs, such as
-            "spring_left_force", "damper_left_force", "gasket_force", "gasket_moment".
+        inputs: By name. "drum_acceleration" (1) [rad/s^2] replaces the acceleration of the spin
+            profile if a value is connected or fixed. "tub_force" (6) is moment about To and force
+            on the tub in W [N m, N], zero if nothing is connected.
+        outputs: By name: "state" of the plant; "displacement" of the sensors,
+            "detergent_displacement", "drum_speed"; "motor_torque"; and for each element its own
+            outputs, such as "spring_left_force", "damper_left_force", "gasket_force" and
+            "gasket_moment".
     """
 
     parameters: MachineParameters
@@ -81,10 +82,11 @@ class MachineSystems:
         gasket: bool = True,
         dampers: bool = True,
     ) -> Setup:
-        """Set numbers and load in a Context, at the rest pose of the empty machine and the first speed.
+        """Set numbers and load in a Context, at the rest pose and the first speed of the profile.
 
-        Setting numbers in a Context of one built machine gives, bit for bit, what a machine built from
-        them gives. A default Context holds the bodies of the SDF, not at rest: call this first.
+        A built machine with these numbers set in a Context computes bit for bit the same as a
+        machine built from them. A default Context has the bodies of the SDF and is not at rest:
+        call this first.
 
         Args:
             load: Point masses in the drum, or the name of one of the machine's loads; None for the
@@ -96,7 +98,8 @@ class MachineSystems:
             gasket, dampers: False disengages them.
 
         Raises:
-            InputError: other elements than were built, names unknown to the SDF, or no equilibrium.
+            InputError: the elements are not those that were built, a name is not in the SDF, or
+                there is no equilibrium.
         """
         parameters = parameters or self.parameters
         check_same_elements(self.parameters, parameters)
@@ -125,7 +128,7 @@ class MachineSystems:
         """Set bodies, frames and load in a Context and return it; all positions are zero, as drawn.
 
         Raises:
-            InputError: names unknown to the SDF.
+            InputError: a name is not in the SDF.
         """
         plant_context = self.plant.GetMyContextFromRoot(context)
         self.plant.SetDefaultContext(plant_context)
@@ -134,7 +137,7 @@ class MachineSystems:
         return context
 
     def set_profile(self, context: Context, profile: SpinProfile) -> None:
-        """Set the spin profile to follow in a root Context, and the drum to its first speed."""
+        """Set the spin profile in a root Context, and the drum speed to its first speed."""
         self.spin_profile.set_profile(self.spin_profile.GetMyContextFromRoot(context), profile)
         plant_context = self.plant.GetMyContextFromRoot(context)
         velocities = self.plant.GetVelocities(plant_context)
@@ -151,9 +154,13 @@ class MachineSystems:
         )
 
     def elastic_and_gravity_force(self, setup: Setup) -> FloatArray:
-        """Return moment about To and force on the tub in W at the pose of a setup's Context.
+        """Return the moment about To and the force of all elements and gravity on the tub, in W.
 
-        All elements and gravity. (6,) [N m, N]
+        Args:
+            setup: Machine at the pose of its Context.
+
+        Returns:
+            (6,) [N m, N]
         """
         context = setup.plant_context
         applied = AppliedForce(setup.elements, self.state_layout)
@@ -162,6 +169,7 @@ class MachineSystems:
         return np.asarray(force[self.state_layout.tub])
 
     def _load(self, load: Load | str | None, parameters: MachineParameters) -> Load | None:
+        """Return a load that may be given by its name."""
         if not isinstance(load, str):
             return load
         if load not in parameters.loads:
@@ -175,7 +183,7 @@ class MachineSystems:
     def _add_load(
         self, plant_context: Context, parameters: MachineParameters, load: Load | None
     ) -> None:
-        """Add a load to the drum, and with it the drum's residual imbalance; neither without a load."""
+        """Add a load and the drum's residual imbalance to the drum; add neither without a load."""
         if load is not None:
             add_load(self.plant, plant_context, load)
             imbalance = parameters.imperfections.residual_imbalance
@@ -266,16 +274,14 @@ def add_washing_machine(
         name: Prefix of the names of its systems, for several machines in one diagram.
 
     Raises:
-        InputError: the SDF or the machine file is at fault.
+        InputError: the SDF or the machine file has an error.
     """
     prefix = f"{name}_" if name else ""
     plant = builder.AddNamedSystem(f"{prefix}bodies", MultibodyPlant(time_step=0.0))
     add_bodies(plant, parameters)
     layout = state_layout_of(plant, parameters)
     context = plant.CreateDefaultContext()
-    set_bodies(
-        plant, context, parameters
-    )  # reports unknown names before anything is placed by them
+    set_bodies(plant, context, parameters)  # raises for unknown names, which placing would use
     poses = FramePoses(plant, parameters.frames, context)
     placed = placed_elements(plant, poses, parameters)
     points = measured_points(parameters, _tub_points(poses, parameters), np.zeros(6))
@@ -323,7 +329,7 @@ def build_machine(parameters: MachineParameters, *, meshcat: Meshcat | None = No
         meshcat: Shows the moving machine if given; the shapes cannot touch the dynamics.
 
     Raises:
-        InputError: the SDF or the machine file is at fault.
+        InputError: the SDF or the machine file has an error.
     """
     builder = DiagramBuilder()
     systems = add_washing_machine(builder, parameters)

@@ -12,17 +12,17 @@ from wm_drake.parameters.types import FloatArray
 class StateDerivative:
     """The time derivative of the state of a machine as it is set up.
 
-    A state has the layout of `wm_drake.engines.compiled.mechanics`; `initial_state` gives one.
+    A state has the layout of `wm_drake.engines.compiled.mechanics`; see `initial_state`.
 
     Attributes:
-        layout: Where the parts of the machine begin in packed numbers and states.
+        layout: Indices of the parts of the machine in packed numbers and states.
     """
 
     def __init__(self, setup: Setup) -> None:
         """Pack a machine.
 
         Raises:
-            InputError: it has something that the compiled engine does not represent.
+            InputError: the machine has something that the compiled engine does not represent.
         """
         packed, self.layout = pack(setup)
         self._elements = self.layout.elements
@@ -33,10 +33,11 @@ class StateDerivative:
 
         Args:
             x: State (size,).
-            acceleration: Acceleration of the drum against what carries it. [rad/s^2]
+            acceleration: Acceleration of the drum against the tub, or against the drum carrier
+                with a compliant bearing. [rad/s^2]
 
         Returns:
-            (size,) The derivative of each number of the state. All lanes compute the same one.
+            Derivative of each number of the state (size,). All lanes compute the same derivative.
         """
         return self.at_states(np.tile(x, (WIDTH, 1)), acceleration)[0]
 

@@ -62,7 +62,7 @@ RATES_SIZE = 6
 Elements = namedtuple(
     "Elements", ("springs", "dampers", "bushings", "telescopes", "bearing", "tubes")
 )
-"""Where the parts of a machine begin.
+"""Indices at which the parts of a machine begin.
 
 springs, dampers, bushings: arrays of indices of the elements in the packed numbers; telescopes: the
 same for telescopic dampers, None if there are none; bearing: index of the drum's bearing in the
@@ -156,7 +156,7 @@ def motor_torque(motion, w_rate, v_rate, masses, rate, acceleration, p):
     Args:
         motion: `TubMotion` of the tub, or of the drum's carrier in a compliant bearing.
         w_rate, v_rate: Its accelerations, as `accelerations` returns them.
-        masses, rate, acceleration, p: As for `accelerations`.
+        masses, rate, acceleration, p: See `accelerations`.
     """
     a, o = three(p, AXIS), three(p, ORIGIN)
     w, w_rate = (
@@ -176,7 +176,7 @@ def motor_torque(motion, w_rate, v_rate, masses, rate, acceleration, p):
 
 @law
 def drum_motion(w, rate, acceleration, a):
-    """Return w_D and b of the drum, in T."""
+    """Return the angular velocity w_D and the angular acceleration term b of the drum, in T."""
     return add(w, scale(rate, a)), add(scale(acceleration, a), scale(rate, cross(w, a)))
 
 
@@ -186,7 +186,7 @@ def state_derivative(x, dx, masses, rate, acceleration, p, elements):
 
     Args:
         x, dx: State and its derivative; the drum's angle and rate in x are not read.
-        masses, rate, acceleration, p: As for `accelerations`.
+        masses, rate, acceleration, p: See `accelerations`.
         elements: `Elements`.
     """
     roll, pitch, yaw = sine_cosine(x[0]), sine_cosine(x[1]), sine_cosine(x[2])
@@ -225,12 +225,12 @@ def tub_and_carrier_accelerations(
 ):
     """Return the accelerations of the tub; write the derivative of the carrier's state, if any.
 
-    With a rigid bearing the tub carries the drum. With a compliant one a massless carrier does, and
-    the packed bodies are those of carrier and drum.
+    With a rigid bearing the drum turns in the tub. With a compliant bearing it turns in a massless
+    carrier, and the packed bodies are carrier and drum.
 
     Args:
         x, dx: State and its derivative.
-        motion, masses, rate, acceleration: As for `accelerations`.
+        motion, masses, rate, acceleration: See `accelerations`.
         total: Moment about To and force on the tub, in W, of all elements but the bearing, without
             gravity. [N m, N]
         p: Packed numbers.
@@ -256,7 +256,7 @@ def state_size(elements):
 
 @law
 def rates_size(elements):
-    """Return how many accelerations a sample has."""
+    """Return the number of accelerations in a sample."""
     return RATES_SIZE if elements.bearing is None else 2 * RATES_SIZE
 
 

@@ -46,9 +46,10 @@ class Layout:
 
     @property
     def elements(self) -> Elements:
-        """The indices for compiled functions.
+        """The indices in the form that compiled functions use.
 
-        None for tubes or bearing compiles the functions without them.
+        Without telescopic dampers or without a compliant bearing their index is None, and the
+        functions are compiled without them.
         """
         springs, dampers, bushings, telescopes = (
             np.array(indices, dtype=np.int64)
@@ -67,7 +68,7 @@ class Layout:
 
     @property
     def rates_size(self) -> int:
-        """How many accelerations a sample has behind the state."""
+        """Number of accelerations in a sample, behind the state."""
         return RATES_SIZE if self.bearing < 0 else 2 * RATES_SIZE
 
     def parts(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -135,7 +136,7 @@ def pack_on_tub(setup: Setup, size: int = 0) -> tuple[FloatArray, dict[str, tupl
 
     Args:
         setup: The machine.
-        size: How many numbers come before.
+        size: Number of packed numbers before these.
     """
     packed: list[FloatArray] = []
     indices: dict[str, tuple[int, ...]] = {}
@@ -150,7 +151,7 @@ def pack_on_tub(setup: Setup, size: int = 0) -> tuple[FloatArray, dict[str, tupl
 
 
 def aligned(size: int) -> FloatArray:
-    """Return zeros at an address from which one load reads a whole vector."""
+    """Return zeros at an address that is aligned to the size of a vector of lanes. (size,)"""
     raw = np.zeros(size + WIDTH)
     begin = (-raw.ctypes.data // raw.itemsize) % WIDTH
     return raw[begin : begin + size]
@@ -191,7 +192,7 @@ def pack_tubes(setup: Setup, name: str) -> FloatArray:
     """Return the packed bodies of a telescopic damper (`wm_drake.engines.compiled.tubes`).
 
     Raises:
-        InputError: its joint has something that the compiled engine does not represent.
+        InputError: the joint has something that the compiled engine does not represent.
     """
     plant, context = setup.machine.plant, setup.plant_context
     joint = plant.GetJointByName(setup.parameters.telescopic_dampers[name].joint)
@@ -285,6 +286,7 @@ def drum_joint(plant: MultibodyPlant, name: str) -> RevoluteJoint:
 
 
 def _not_represented(what: str, key: str) -> InputError:
+    """Return the error for a property of the machine that only the drake engine represents."""
     return input_error(
         f"the compiled engine does not represent this: {what}; use the drake engine", key=key
     )
@@ -296,10 +298,12 @@ def _moment(inertia: SpatialInertia) -> FloatArray:
 
 
 def _matrix(inertia: SpatialInertia) -> FloatArray:
+    """Return the rotational inertia about the reference point. (3, 3) [kg m^2]"""
     return np.array(inertia.CalcRotationalInertia().CopyToFullMatrix3())
 
 
 def _six(matrix: FloatArray) -> FloatArray:
+    """Return the elements xx, yy, zz, xy, xz, yz of a symmetric matrix. (6,)"""
     return matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
 
 

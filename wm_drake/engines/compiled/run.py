@@ -24,10 +24,10 @@ def run_compiled(
     progress: Callable[[float], None],
     period: float = OUTPUT_PERIOD,
 ) -> Trajectory:
-    """Run a machine through a spin profile without Drake, with its numbers and its laws.
+    """Run a machine through a spin profile with the compiled engine.
 
-    Steps end at every output time and at every corner of the profile, so no step sees the
-    acceleration jump. The run is a batch of one: idle lanes repeat it.
+    Steps end at every output time and at every corner of the profile, so no step contains a jump of
+    the acceleration. The run is a batch of one: idle lanes repeat it.
 
     Args:
         setup: Machine at rest in its Context, which is not changed.
@@ -40,7 +40,7 @@ def run_compiled(
         The sampled motion; up to the last good sample if it diverged.
 
     Raises:
-        InputError: the machine has something that this engine does not represent.
+        InputError: the machine has something that the compiled engine does not represent.
     """
     p, layout = pack(setup)
     begin, schedule = initial_state(setup, profile), schedule_of(profile, step, period)

@@ -10,7 +10,7 @@ from wm_drake.elements.motion import PLANT_STATE_SIZE, tub_motion
 from wm_drake.engines.compiled.mechanics import mass_properties, motor_torque
 from wm_drake.engines.compiled.packing import Layout
 from wm_drake.engines.schedule import Schedule
-from wm_drake.engines.trajectory import Trajectory, ended_where_it_diverged
+from wm_drake.engines.trajectory import Trajectory, cut_at_divergence
 from wm_drake.parameters.types import FloatArray
 
 
@@ -32,15 +32,19 @@ def trajectory_of(
     torque_history(
         _motion_of_drum_and_carrier(motion, carrier), rates[:, -6:], drum_acceleration, p, torque
     )
-    return ended_where_it_diverged(
+    return cut_at_divergence(
         Trajectory(schedule.time, motion, deformation, torque[:, 0], rates[:, :6], tubes, carrier)
     )
 
 
 def _motion_of_drum_and_carrier(motion: FloatArray, carrier: FloatArray) -> FloatArray:
-    """Return the motion of the drum and of the body that carries it, in the layout of `motion`.
+    """Return the motion of the drum and of the body that it turns in, in the layout of `motion`.
 
-    The drum's carrier in a compliant bearing (n, 12) carries it; without one (n, 0) the tub does.
+    This body is the drum carrier with a compliant bearing, else the tub.
+
+    Args:
+        motion: State of tub and drum. (n, 14)
+        carrier: State of the drum carrier (n, 12); (n, 0) with a rigid bearing.
     """
     if not carrier.shape[1]:
         return motion
@@ -52,8 +56,8 @@ def torque_history(motions, rates, acceleration, p, torque):
     """Evaluate the torque of the motor on the drum at samples.
 
     Args:
-        motions: (n, 14) motion of the body that carries the drum, and of the drum; laid out as the
-            state of the plant.
+        motions: (n, 14) motion of the body that the drum turns in, and of the drum, in the layout
+            of the state of tub and drum.
         rates: (n, 6) angular acceleration and acceleration of the origin of that body, in W.
             [rad/s^2, m/s^2]
         acceleration: (n, 1) acceleration of the drum. [rad/s^2]
