@@ -10,7 +10,7 @@ import pytest
 from hypothesis import settings
 
 from wm_drake.cli import main
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
 
 settings.register_profile("same_every_time", derandomize=True, deadline=None, database=None)

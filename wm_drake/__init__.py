@@ -14,9 +14,9 @@ from typing import Any
 _HOMES = {
     "Case": "simulation.cases",
     "Scene": "model.scene",
-    "add_washing_machine": "model.machine",
+    "add_washing_machine": "model.build",
     "advance_to": "engines.drake",
-    "build_machine": "model.machine",
+    "build_machine": "model.build",
     "case_of": "simulation.cases",
     "describe": "studies.description.description",
     "envelopes": "simulation.measures",

@@ -15,7 +15,7 @@ import pytest
 from wm_drake import load_record
 from wm_drake.cli import main
 from wm_drake.cli.result_folder import result_folder
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
 
 SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]

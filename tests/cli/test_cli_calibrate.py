@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine, with_value
 from wm_drake.simulation.cases import case_of
 from wm_drake.simulation.measures import measure

@@ -13,7 +13,7 @@ from wm_drake.engines.compiled.step_check import (
     fastest_motions,
 )
 from wm_drake.errors import InputError
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import with_value, with_values
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
@@ -86,7 +86,7 @@ def test_a_stiff_friction_is_refused_with_the_step_that_will_do(
     )
     with pytest.raises(InputError, match=rf"step: 2.5 ms is too long for {part}, .* 1/s; allowed"):
         simulate(machine, case)
-    with pytest.raises(InputError, match="case 0 'middle': step: 2.5 ms is too long"):
+    with pytest.raises(InputError, match=r"case 0 'middle': step: 2.5 ms is too long"):
         simulate_many(machine, [case])
     setup = machine.set_up(case.load, parameters=parameters)
     pieces = int(np.ceil(5e-3 / fastest_motion(setup).longest_step))

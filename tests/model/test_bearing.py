@@ -12,7 +12,7 @@ from wm_drake.batch import simulate_many
 from wm_drake.engines.compiled.step_check import fastest_motion
 from wm_drake.errors import InputError
 from wm_drake.model.bodies import add_bodies, add_load, set_bodies
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import (
     Load,
     MachineParameters,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wm_drake.model.bodies import sdf_path, with_sdf_values
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.model.sdf_text import sdf_with
 from wm_drake.parameters import load_machine, with_value
 

@@ -18,7 +18,8 @@ from wm_drake.batch.many import as_table, simulate_many
 from wm_drake.batch.remembered import run_keys, sources_version
 from wm_drake.batch.runs import MEASURES
 from wm_drake.errors import WmDrakeError, input_error
-from wm_drake.model.machine import Machine, build_machine
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.machine import DEFAULT_STEP
 from wm_drake.simulation.cases import Case

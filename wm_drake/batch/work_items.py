@@ -11,8 +11,7 @@ from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.engines.compiled.packing import Layout, initial_state, pack_bodies, pack_elements
 from wm_drake.engines.compiled.step_check import check_step
 from wm_drake.errors import InputError, Problem, input_error
-from wm_drake.model.machine import Machine
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import Machine, Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case

@@ -158,7 +158,7 @@ def _run(
 ) -> "tuple[Calibration, list[Prediction]]":
     """Run the calibration and the predictions, with a ledger of evaluations in the folder `out`."""
     from wm_drake.batch.ledger import open_ledger
-    from wm_drake.model.machine import build_machine
+    from wm_drake.model.build import build_machine
     from wm_drake.parameters import located
     from wm_drake.parameters.free import load_free
     from wm_drake.studies.calibration.calibration import calibrate, identity_of
@@ -257,7 +257,7 @@ def _shown(
     parameters: "MachineParameters", calibration: "Calibration"
 ) -> "tuple[SpinResult, list[tuple[str, Modes]]]":
     """Return spin runs and natural modes of the best solution, for the report."""
-    from wm_drake.model.machine import build_machine
+    from wm_drake.model.build import build_machine
     from wm_drake.simulation.cases import case_of
     from wm_drake.studies.calibration.outcome import solved_machine
     from wm_drake.studies.description.modal import natural_modes

@@ -144,7 +144,7 @@ def existing_file(path: Path, option: str) -> Path:
 def check_buildable(file: str, parameters: "MachineParameters") -> None:
     """Raise an InputError for faults that only building the machine reveals."""
     from wm_drake.engines.compiled.step_check import check_step
-    from wm_drake.model.machine import build_machine
+    from wm_drake.model.build import build_machine
     from wm_drake.parameters import measured_amplitudes
     from wm_drake.simulation.runs import checked_step
 

@@ -8,8 +8,7 @@ from pydrake.systems.analysis import InitializeParams, ResetIntegratorFromFlags,
 from wm_drake.engines.schedule import output_times
 from wm_drake.engines.trajectory import Trajectory, cut_at_divergence, diverging_coordinate
 from wm_drake.errors import first_line
-from wm_drake.model.machine import OUTPUT_PERIOD, Machine, MachineSystems
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import OUTPUT_PERIOD, Machine, MachineSystems, Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import xarray as xr
 
 from wm_drake.engines.trajectory import COORDINATES, Trajectory, divergence_text
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import Setup
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.outputs import AXES, variables_of
 

@@ -9,8 +9,7 @@ from wm_drake.engines.compiled.step_check import check_step
 from wm_drake.engines.drake import run_drake
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.model.machine import OUTPUT_PERIOD, Machine
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import OUTPUT_PERIOD, Machine, Setup
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.simulation.cases import Case, case_of
 from wm_drake.simulation.records import Record, as_record

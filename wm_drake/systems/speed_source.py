@@ -34,7 +34,7 @@ def SpeedSource_(T: type) -> Any:
             needs = {self._profile.ticket(), self._wanted.ticket()}
             self.DeclareVectorOutputPort("actuation", 1, self._calc_actuation, needs)
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+        def _construct_copy(self, _: Any, converter: Any = None) -> None:
             Impl._construct(self, converter=converter)
 
         def _calc_actuation(self, context: Any, output: Any) -> None:

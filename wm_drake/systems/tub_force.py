@@ -28,7 +28,7 @@ def TubForce_(T: type) -> Any:
                 "generalized_force", GENERALIZED_FORCE_SIZE, self._calc, {self._force.ticket()}
             )
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+        def _construct_copy(self, _: Any, converter: Any = None) -> None:
             Impl._construct(self, converter=converter)
 
         def _calc(self, context: Any, output: Any) -> None:

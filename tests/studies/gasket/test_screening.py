@@ -6,7 +6,7 @@ import pytest
 
 from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import (
     GASKET_FACTORS,
     SpinProfile,

@@ -10,7 +10,7 @@ import xarray as xr
 
 from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate

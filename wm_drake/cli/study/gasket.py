@@ -220,7 +220,7 @@ def _runner(
     """Yield the function that runs cases: on the cores of this computer, or on a cluster."""
     from wm_drake.batch import simulate_remembered
     from wm_drake.batch.cluster import cluster_client, simulate_on_cluster
-    from wm_drake.model.machine import build_machine
+    from wm_drake.model.build import build_machine
 
     if cluster is None:
         yield partial(simulate_remembered, build_machine(parameters), workers=workers)

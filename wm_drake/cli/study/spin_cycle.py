@@ -181,7 +181,7 @@ def _run(
     ledger: "Ledger",
     workers: int | None,
 ) -> "SpinCycleResult":
-    from wm_drake.model.machine import build_machine
+    from wm_drake.model.build import build_machine
     from wm_drake.studies.spin_cycle.runs import compiled_runs, drake_runs
     from wm_drake.studies.spin_cycle.study import run_spin_cycle
 

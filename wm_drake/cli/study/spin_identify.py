@@ -175,7 +175,7 @@ def _identify(
     model: Any, given: Any, noise: float, seed: int, ledger: Any, workers: int | None
 ) -> "SpinIdentification":
     from wm_drake.batch import simulate_remembered
-    from wm_drake.model.machine import build_machine
+    from wm_drake.model.build import build_machine
     from wm_drake.studies.spin_identification.study import (
         identify_from_spin,
         planted_values,

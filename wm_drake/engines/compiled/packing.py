@@ -17,7 +17,7 @@ from wm_drake.engines.compiled.mechanics import (
 )
 from wm_drake.engines.compiled.tubes import TUBES_STATE_SIZE
 from wm_drake.errors import InputError, input_error
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import Setup
 from wm_drake.model.state_layout import CARRIER
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray

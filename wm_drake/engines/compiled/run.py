@@ -8,8 +8,7 @@ from wm_drake.engines.compiled.packing import Layout, aligned, fill_lanes, initi
 from wm_drake.engines.compiled.samples import trajectory_of
 from wm_drake.engines.schedule import Schedule, schedule_of
 from wm_drake.engines.trajectory import Trajectory, diverging_coordinate
-from wm_drake.model.machine import OUTPUT_PERIOD
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import OUTPUT_PERIOD, Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 

@@ -1,10 +1,10 @@
 """Check that fixed steps are short enough for the fastest motion of a machine.
 
-Own derivation. The explicit Runge-Kutta scheme of fourth order follows a linear motion exp(lambda t)
-while |lambda h| stays small. Friction, sponges, bushings and a compliant bearing make lambda large:
-friction over its transition velocity acts as a dashpot, and a stiff dashpot on a light body decays
-within a step. The eigenvalues of the machine's Jacobian at a few states with slow and fast motion
-show it, whatever the law.
+Own derivation. The explicit Runge-Kutta scheme of fourth order follows a linear motion
+exp(lambda t) while |lambda h| stays small. Friction, sponges, bushings and a compliant bearing
+make lambda large: friction over its transition velocity acts as a dashpot, and a stiff dashpot on a
+light body decays within a step. The eigenvalues of the machine's Jacobian at a few states with slow
+and fast motion show it, whatever the law.
 """
 
 import itertools
@@ -18,21 +18,23 @@ from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZ
 from wm_drake.engines.compiled.packing import initial_state
 from wm_drake.engines.compiled.tubes import TUBES_STATE_SIZE
 from wm_drake.errors import input_error
-from wm_drake.model.machine import OUTPUT_PERIOD
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import OUTPUT_PERIOD, Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 
 LARGEST_DECAY = 2.0
-"""Largest |lambda h| of a motion that decays without oscillation. The scheme is stable up to 2.78."""
+"""Largest |lambda h| of a motion that decays without oscillation.
+
+The scheme is stable up to 2.78."""
 
 LARGEST_PHASE = 1.0
 """Largest |lambda h| of a motion that oscillates, about a sixth of its period. [rad] The scheme is
 stable up to 2.83; at 1 rad a step damps the motion by 0.6 % of its amplitude."""
 
 SPEEDS = (1e-6, 1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0)
-"""Speeds of the states that are looked at, one a lane. [m/s, rad/s] The slowest has every friction on
-its steepest part; in the fast ones the sponges slip."""
+"""Speeds of the states that are looked at, one a lane. [m/s, rad/s]
+
+The slowest has every friction on its steepest part; in the fast ones the sponges slip."""
 
 TUB, BEARING = "the tub", "the drum in its bearing"
 """Names of parts that move."""
@@ -163,7 +165,7 @@ def _free_states(setup: Setup) -> tuple[list[int], list[str]]:
 
 
 def _states(setup: Setup, free: list[int]) -> FloatArray:
-    """Return the states to look at (WIDTH, size): the rest pose, with random speeds of each size."""
+    """Return the states to look at (WIDTH, size): the rest pose, with speeds of each size."""
     rest = initial_state(setup, _standstill())
     states = np.tile(rest, (WIDTH, 1))
     directions = np.random.default_rng(0).uniform(-1.0, 1.0, len(rest))

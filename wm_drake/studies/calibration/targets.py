@@ -8,8 +8,7 @@ import pandas as pd
 
 from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
-from wm_drake.model.machine import Machine
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import Machine, Setup
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit

@@ -8,8 +8,7 @@ from wm_drake.compiler.compilation import generic
 from wm_drake.compiler.vectors import rotation_from_rpy
 from wm_drake.engines.compiled.step_check import BEARING, fastest_motions
 from wm_drake.model.bodies import tubes_of
-from wm_drake.model.machine import Machine
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import Machine, Setup
 from wm_drake.model.state_layout import CARRIER
 from wm_drake.parameters import ForceTable, TorqueTable
 from wm_drake.studies.description.modal import natural_modes

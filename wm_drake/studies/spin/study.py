@@ -11,7 +11,8 @@ from functools import partial
 from queue import Empty
 from typing import Any
 
-from wm_drake.model.machine import Machine, build_machine
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case
