@@ -1,5 +1,6 @@
-"""Turn a law into machine code: compilation and its cache, SIMD lanes, elementary functions, small vectors.
+"""Turn a law into machine code: compilation and its cache, SIMD lanes, elementary functions.
 
-Enters: scalar Python functions. Leaves: the same functions compiled for floats and for SIMD lanes, and interpreted for
-other scalars such as AutoDiffXd. Imports no other room.
+Also small vectors and matrices, and named packed layouts of the numbers that laws read. Enters:
+scalar Python functions. Leaves: the same functions compiled for floats and SIMD lanes, and
+interpreted for other scalars such as AutoDiffXd. Imports no other room.
 """

@@ -1,4 +1,4 @@
-"""Motion that a spin profile prescribes for the drum, in closed form: straight pieces of speed over time."""
+"""Motion that a spin profile prescribes for the drum, in closed form: pieces of linear speed."""
 
 import numpy as np
 
