@@ -20,7 +20,7 @@ from wm_drake.parameters import load_machine
 
 SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
 PROFILE = "time: (0, 2) s\nspeed: (0, 100) rpm\n"
-BLOW_UP = "spring_types.suspension.stiffness=1e9 N/mm"  # far beyond what the fixed step can follow
+VIOLENT = "unbalances: [{mass: 800 kg, radius: 300 mm, y: 100 mm}]\n"  # the tub leaves its bounds
 
 
 def in_machine(text):
@@ -543,16 +543,25 @@ def test_tables_are_printed_without_json(wm_drake):
 
 @pytest.mark.parametrize("replay", [(), ("--replay",)], ids=["", "replay"])
 def test_diverging_run_exits_1_says_when_and_what_and_keeps_its_record(wm_drake, replay):
-    ended, printed = spin(wm_drake, "--set", BLOW_UP, *replay)
+    Path("violent.yaml").write_text(VIOLENT)
+    ended, printed = spin(wm_drake, *replay, load="violent.yaml")
     assert ended.code == 1
     (message,) = filter(None, ended.messages)
-    assert re.match(r"middle: the run diverged at \d+\.\d+ s: (roll|pitch|yaw|x|y|z) = ", message)
-    assert message == f"middle: {printed['cases'][0]['diverged']}"
-    record = load_record(Path("out/record_middle.nc"))
-    assert f"middle: {record.attrs['diverged']}" == message
+    assert re.match(r"violent: the run diverged at \d+\.\d+ s: (roll|pitch|yaw|x|y|z) = ", message)
+    assert message == f"violent: {printed['cases'][0]['diverged']}"
+    record = load_record(Path("out/record_violent.nc"))
+    assert f"violent: {record.attrs['diverged']}" == message
     assert record.time.size >= 1
     assert Path("out/amplitudes.csv").is_file()
     assert "diverged" in Path("out/report.html").read_text(encoding="utf-8")
+
+
+def test_a_machine_too_stiff_for_the_step_is_refused(wm_drake):
+    ended = wm_drake("spin", "--set", "spring_types.suspension.stiffness=1e9 N/mm", "--out", "out")
+    assert (ended.code, ended.out) == (2, "")
+    assert "step: 2.5 ms is too long for the tub" in ended.err
+    assert "allowed are up to" in ended.err
+    assert not Path("out").exists()
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -245,9 +246,16 @@ def test_damaged_ledger_is_refused_and_left(study_without_page):
 
 
 def test_diverging_trial_is_said_and_left_out(study):
-    ended = study("--factor", "spring_types.suspension.stiffness=8 N/mm..1e9 N/mm")
+    Path("violent.yaml").write_text("unbalances: [{mass: 800 kg, radius: 300 mm, y: 100 mm}]\n")
+    ended = study("--load", "violent.yaml")
     assert ended.code == 2
     assert "runs failed; the others do not determine the effects" in ended.err
+
+
+def test_trial_too_stiff_for_the_step_is_refused_by_name(study):
+    ended = study("--factor", "spring_types.suspension.stiffness=8 N/mm..1e9 N/mm")
+    assert ended.code == 2
+    assert re.search(r"case \d+ '.*': step: 2.5 ms is too long for the tub", ended.err)
 
 
 # a study in a process of its own: one load, runs of one second, 65 trials of a D-optimal design
