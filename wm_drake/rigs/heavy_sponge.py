@@ -37,8 +37,8 @@ def steady_tensions(packed: FloatArray, mass: float, amplitude: float, omega: fl
     Raises:
         NotSteadyError: The motion is not steady, or the loops do not agree.
     """
-    steps, begin = FEWEST_STEPS, np.zeros(2)
-    coarse, begin = _steady_loop(packed, mass, amplitude, omega, steps, begin)
+    steps = FEWEST_STEPS
+    coarse, begin = _steady_loop(packed, mass, amplitude, omega, steps, np.zeros(2))
     last: FloatArray | None = None
     while steps < MOST_STEPS:
         steps *= 2
