@@ -334,7 +334,7 @@ BAD_FILE = "time_s,displacement_mm,force_N\n" + "\n".join(
         ),
         (
             ("identify", "gasket", "good.csv", "--axis", "x", "--fix", "damping_x=-1 N s/mm"),
-            "--fix: damping_x: Input should be greater than or equal to 0",
+            "--fix: damping_x: '-1000.0' is out of range; allowed is >= 0",
         ),
         (
             (

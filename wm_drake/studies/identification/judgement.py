@@ -2,19 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
 import numpy as np
 from scipy.stats import f as fisher
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.measured import MeasuredMotion
-from wm_drake.studies.fitting import Fit, rmse
-
-Verdict: TypeAlias = Literal["good", "fair", "poor"]
-
-GOOD, FAIR = 0.05, 0.15
-"""Largest lack of fit of a good and of a fair fit, as a part of the measured force."""
+from wm_drake.studies.fitting import Fit, Verdict, rmse, verdict_of
+from wm_drake.studies.fitting.verdict import FAIR
 
 CHANCE = 0.01
 """Probability that noise alone shows as lack of fit."""
@@ -113,9 +109,7 @@ class Judgement:
     @property
     def verdict(self) -> Verdict:
         """Whether the law fits the loops."""
-        if self.missed <= GOOD:
-            return "good"
-        return "fair" if self.missed <= FAIR else "poor"
+        return verdict_of(self.missed)
 
     @property
     def sentences(self) -> tuple[str, ...]:

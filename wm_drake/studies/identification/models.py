@@ -16,6 +16,7 @@ from wm_drake.parameters import DAMPER_LAWS, DamperType, ForceTable, TorqueTable
 from wm_drake.parameters.damper_laws import DamperLaw, DamperNumbers, Kind
 from wm_drake.parameters.elements import BushingType
 from wm_drake.parameters.keys import unit_of
+from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.rigs import Bench, bushing_bench, damper_bench
@@ -186,10 +187,8 @@ def _check_fixed(base: BushingType, fixed: Mapping[str, float]) -> None:
     try:
         type(base).model_validate({**base.model_dump(), **fixed})
     except ValidationError as error:
-        detail = error.errors()[0]
-        raise input_error(
-            str(detail["msg"]), where="--fix", key=".".join(map(str, detail["loc"]))
-        ) from None
+        problem = problems_of(error, type(base))[0]
+        raise input_error(problem.message, where="--fix", key=problem.key) from None
 
 
 def _bushing_kinds(axis: str) -> dict[str, Kind]:
