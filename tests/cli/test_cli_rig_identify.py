@@ -217,6 +217,23 @@ def test_a_fixed_rise_of_a_table_stays(wm_drake, loops_of):
     assert "rise_plus_1 fixed" in Path("fit/identified.yaml").read_text()
 
 
+def test_other_changes_of_the_machine_are_kept(wm_drake, loops_of):
+    files = loops_of("gasket", "--axis", "x", "-f", "1,5 Hz", "-a", "5 mm")
+    sets = (
+        "--set", "gasket.damping_y=0.07 N s/mm",
+        "--set", "damper_types.friction.friction_force=33 N",
+        "--set", "loads.middle.unbalances.0.radius=230 mm",
+    )  # fmt: skip
+    ended = wm_drake("identify", "gasket", *files, "--axis", "x", *sets, "--out", "fit")
+    assert ended.code == 0
+    machine = load_machine("fit/identified.yaml")
+    assert machine.gasket.damping_y == 70.0
+    assert machine.gasket.damping_x == pytest.approx(19.0, rel=0.01)
+    assert machine.damper_types["friction"].friction_force == 33.0
+    text = Path("fit/identified.yaml").read_text()
+    assert "# Not in this file: --set loads.middle.unbalances.0.radius=230 mm." in text
+
+
 def test_a_bad_fit_is_called_bad_first(wm_drake, loops_of):
     files = loops_of("damper", "-f", "1,3 Hz", "-a", "1,5 mm")
     ended = wm_drake("identify", "damper", *files, "--law", "coulomb", "--out", "fit")

@@ -91,6 +91,7 @@ class _Asked:
     seed: int
     out: Path
     as_json: bool
+    sets: list[str] | None
 
 
 @app.command("damper", cls=DamperCommand)
@@ -118,7 +119,7 @@ def identify_damper(
 
     target = target_of("damper", machine, name, component, sets)
     own = str(target.component.parameters.law)  # type: ignore[union-attr]
-    asked = _Asked(files, units, method, seed, out, as_json)
+    asked = _Asked(files, units, method, seed, out, as_json, sets)
     motions = _motions(asked, rotates=False)
     ranges = _ranges(bounds)
     kept = _kept_fields(target, law or own, ranges)
@@ -153,7 +154,7 @@ def _axis_command(kind: str) -> Callable[..., None]:
         from wm_drake.studies.identification import bushing_model
 
         target = target_of(kind, machine, name, component, sets)
-        asked = _Asked(files, units, method, seed, out, as_json)
+        asked = _Asked(files, units, method, seed, out, as_json, sets)
         axes = axes_of(axis)
         radius = quantities_of(arm, Unit("m", "mm"), "--arm")[0] if arm else 0.0
         motions = _motions(asked, rotates=axes[0].startswith("about") and not radius)
@@ -309,6 +310,7 @@ def _run(
             copies,
             asked.out,
             judgement.sentences,
+            dict(pairs_of(asked.sets, "--set")),
         )
         (folder / "identified.yaml").write_text(text, encoding="utf-8")
         estimates_table(fit, model.fixed).to_csv(folder / "parameters.csv", index=False)

@@ -15,6 +15,7 @@ from wm_drake.report.tables import Group, Row, Table
 from wm_drake.rigs.measured import MeasuredMotion
 from wm_drake.studies.fitting import Estimate, Fit
 from wm_drake.studies.identification import Judgement
+from wm_drake.studies.identification.judgement import per_cent
 from wm_drake.studies.identification.models import unit_of_field
 
 
@@ -56,7 +57,7 @@ def identify_report(
         ],
         errors=_errors(fit, motions, judgement),
         history=picture(
-            history_figure(fit),
+            history_figure(fit, force_scale(motions[0].loop.rotates)[1]),
             "Smallest RMSE after each round of the search.",
             "Smallest RMSE that was found up to the end of each round of the search.",
         ),
@@ -224,7 +225,7 @@ def _errors(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) -
                         f"{test.rmse:.4g}",
                         number(test.normalised, 4),
                         f"{judged.noise:.2g}",
-                        f"{100.0 * judged.missed:.2g}",
+                        per_cent(judged.missed),
                     )
                 ),
             ),
@@ -247,7 +248,7 @@ def _errors(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) -
             f"RMSE, {unit}",
             f"RMSE / largest {name}",
             f"noise, {unit}",
-            "lack of fit, %",
+            "lack of fit",
         ),
         groups,
         text_columns=2,
@@ -299,16 +300,16 @@ def _summary(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) 
     name, unit = force_scale(motions[0].loop.rotates)
     normalised = [test.normalised for test in fit.tests]
     determined = sum(e.determined for e in fit.estimates)
-    least, most = (f"{100.0 * value:.2g}" for value in (min(normalised), max(normalised)))
+    least, most = (per_cent(value) for value in (min(normalised), max(normalised)))
     opening = judgement.sentences[0] + " " if judgement.verdict == "good" else ""
     ending = (
-        f"{determined} of {len(fit.estimates)} unknowns have a definite best value, but the law "
+        f"The data give a best value of {determined} of {len(fit.estimates)} unknowns, but the law "
         "does not describe the loops."
         if judgement.verdict == "poor"
         else f"The data determine {determined} of {len(fit.estimates)} unknowns."
     )
     return (
         f"{opening}The root mean square difference (RMSE) between fitted and measured loops is "
-        f"{fit.rmse:.3g} {unit} over all samples. For single tests it is {least} to {most} % of "
+        f"{fit.rmse:.3g} {unit} over all samples. For single tests it is {least} to {most} of "
         f"the largest {name}. {ending}"
     )

@@ -37,6 +37,7 @@ def fragment(
     copies: Mapping[str, str],
     out: Path,
     remarks: Sequence[str] = (),
+    changes: Mapping[str, str] | None = None,
 ) -> str:
     """Return the text of a YAML file with identified numbers; comments name the undetermined ones.
 
@@ -50,6 +51,8 @@ def fragment(
         copies: Fields that get the value of another, such as z of an axisymmetric bushing from x.
         out: Folder the file goes to, from which a machine file is named.
         remarks: Sentences on the fit for the head of the file.
+        changes: Other numbers of the machine that the user changed: text by key path. A number
+            inside a list cannot be in a fragment; a comment names it.
 
     Raises:
         InputError: The data do not determine a number that a new law needs.
@@ -60,6 +63,9 @@ def fragment(
             entries[field] = dict(entries[source])
     tests = ", ".join(test.name for test in fit.tests)
     unit = "N m" if any(unknown.unit == TORQUE for unknown in fit.problem.unknowns) else "N"
+    written, left_out = _of_fragment(changes or {})
+    if left_out and machine:
+        comments.append(f"Not in this file: --set {', '.join(left_out)}.")
     head = [
         f"# Identified by least RMSE, method {fit.method}, seed {fit.seed}, from {tests}.",
         f"# RMSE {fit.rmse:.4g} {unit} over all tests.",
@@ -69,15 +75,30 @@ def fragment(
         body: Any = _whole(entries, target)
     else:
         body = {"extends": _named_from(machine, out)}
-        node = body
-        for part in key.split("."):
-            node = node.setdefault(part, {})
-        node.update(_leaving(entries, target))
+        for path, text in written.items():
+            *parents, name = path.split(".")
+            _node(body, parents)[name] = YAML(typ="safe").load(text)
+        _node(body, key.split(".")).update(_leaving(entries, target))
     lines: list[str] = []
     yaml = YAML()
     yaml.width = 4096
     yaml.dump(body, _Lines(lines))
     return "\n".join(head) + "\n" + "".join(lines)
+
+
+def _of_fragment(changes: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
+    """Return the changes that a fragment can have, and those inside of a list as KEY=VALUE."""
+    inside = [path for path in changes if any(part.isdigit() for part in path.split("."))]
+    return (
+        {path: text for path, text in changes.items() if path not in inside},
+        [f"{path}={changes[path]}" for path in inside],
+    )
+
+
+def _node(tree: Any, path: Sequence[str]) -> Any:
+    for part in path:
+        tree = tree.setdefault(part, {})
+    return tree
 
 
 class _Lines:

@@ -114,11 +114,16 @@ class Judgement:
     @property
     def sentences(self) -> tuple[str, ...]:
         """The verdict in words, then hints on its cause and on single loops."""
-        missed, noise = _per_cent(self.missed), _per_cent(self.noise)
+        missed, noise = per_cent(self.missed), per_cent(self.noise)
         known = (
             f"the lack of fit is {missed} of the measured {self.quantity} (root mean square), "
             f"the noise {noise}"
         )
+        if not self.missed:
+            known = (
+                f"no lack of fit shows above the noise, {noise} of the measured {self.quantity} "
+                "(root mean square)"
+            )
         found = [
             {
                 "good": f"Good fit: {known}.",
@@ -192,7 +197,8 @@ MOST_NAMED = 3
 """Largest number of loops that a sentence names."""
 
 
-def _per_cent(part: float) -> str:
+def per_cent(part: float) -> str:
+    """Return a part as a percentage of two digits, or more above 100 %."""
     size = 100.0 * part
     return f"{size:.0f} %" if size >= 10.0 else f"{size:.2g} %"
 
