@@ -86,6 +86,7 @@ def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
         friction["value_1"], abs=0.01
     )
     assert written.sources["damper_types.friction.friction_force"].startswith("fit: friction")
+    assert written.name == "short_calibrated_1"
     table = pd.read_csv("out/amplitudes.csv")
     assert np.allclose(
         *(table[table.source == source][SENSORS] for source in ("experiment", "solution 1")),
@@ -95,6 +96,11 @@ def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
         *ARGUMENTS, "--deviation", "1", "--leave-out", "back", "--json", "--out", "out"
     )
     assert json.loads(again.out) == result  # a finished calibration is read back
+    shown = wm_drake(*ARGUMENTS, "--deviation", "1", "--leave-out", "back", "--out", "out").out
+    value = next(line for line in shown.splitlines() if "friction" in line)
+    assert f"{friction['value_1']:.4g}" in value
+    assert " N " in value
+    assert "data" in value
 
 
 FAULTS = {

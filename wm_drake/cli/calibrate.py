@@ -244,7 +244,7 @@ def _write(
     from wm_drake.studies.calibration.outcome import amplitude_rows, quantity_table, solved_machine
 
     for number, solution in enumerate(calibration.solutions, start=1):
-        text = machine_yaml(solved_machine(calibration.parameter_map, solution))
+        text = machine_yaml(solved_machine(calibration.parameter_map, solution, number))
         (folder / f"machine_{number}.yaml").write_text(text, encoding="utf-8")
     quantity_table(calibration).to_csv(folder / "quantities.csv", index=False, float_format="%.6g")
     amplitude_rows(calibration).to_csv(folder / "amplitudes.csv", index=False, float_format="%.4f")
@@ -277,6 +277,7 @@ def _shown(
 def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Path) -> None:
     from wm_drake.studies.calibration.outcome import mean_and_largest
 
+    _print_values(calibration)
     best = calibration.solutions[0]
     mean, largest = mean_and_largest(best.errors(calibration.targets))
     typer.echo(
@@ -298,6 +299,25 @@ def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Pat
         typer.echo(f"    held out and predicted: {predicted}")
         typer.echo(f"    other loads in that calibration: {others}")
     typer.echo(f"Results in {out}: report.html, machine_<n>.yaml, quantities.csv, amplitudes.csv")
+
+
+def _print_values(calibration: "Calibration") -> None:
+    """Print the quantities of the best solution; the deviation is that given data and prior."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from wm_drake.studies.calibration.outcome import quantity_table
+
+    table = Table(title="Best solution, machine_1.yaml")
+    table.add_column("quantity", no_wrap=True)
+    for head in ("value", "± deviation", "expected"):
+        table.add_column(head, justify="right")
+    for head in ("unit", "determined by"):
+        table.add_column(head)
+    for row in quantity_table(calibration).to_dict("records"):
+        numbers = (f"{row[key]:.4g}" for key in ("value_1", "deviation_1", "expected"))
+        table.add_row(str(row["quantity"]), *numbers, str(row["unit"]), str(row["held_by_1"]))
+    Console().print(table)
 
 
 def _as_json(calibration: "Calibration", predictions: "list[Prediction]") -> dict[str, Any]:

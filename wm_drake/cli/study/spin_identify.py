@@ -199,9 +199,14 @@ def _identify(
 
 
 def _write(result: "SpinIdentification", folder: Path) -> None:
-    from wm_drake.report.spin_identify.report import spin_identify_report
+    from wm_drake.parameters import machine_yaml
+    from wm_drake.report.spin_identify.report import spin_identify_report, values_table
     from wm_drake.studies.spin_cycle.measured import rms_table
+    from wm_drake.studies.spin_identification.study import identified_machine
 
+    text = machine_yaml(identified_machine(result))
+    (folder / "identified.yaml").write_text(text, encoding="utf-8")
+    values_table(result).to_csv(folder / "parameters.csv", index=False, float_format="%.7g")
     rms_table(result.measured).to_csv(folder / "measured.csv", index=False, float_format="%.6g")
     rms_table(result.after).to_csv(folder / "rms.csv", index=False, float_format="%.6g")
     command = command_line()
@@ -210,29 +215,27 @@ def _write(result: "SpinIdentification", folder: Path) -> None:
 
 def _print_table(result: "SpinIdentification", out: Path) -> None:
     from rich.console import Console
-    from rich.table import Table
 
-    from wm_drake.report.spin_identify.report import directions, summary, unknowns
+    from wm_drake.report.spin_identify.report import directions, summary, unknowns, warnings_of
 
     console = Console()
-    console.print(summary(result))
+    for text in (summary(result), *warnings_of(result)):
+        console.print(text, highlight=False, markup=False)
     shown = unknowns(result)
-    # a narrow first column: keys are broken at their dots, keys of the same value below each other
-    keys = [
-        "\n= ".join(sought.keys[:1] + tuple(key.rsplit(".", 1)[-1] for key in sought.keys[1:]))
-        for sought in result.sought
-    ]
-    keys = [text.replace(".", ".\n") for text in keys]
-    table = Table()
-    table.add_column("unknown", no_wrap=True)
-    for name in shown.header[2:]:
-        table.add_column(name, justify="right", overflow="fold")
-    for text, group in zip(keys, shown.groups, strict=True):
-        table.add_row(text, *group.rows[0].cells[1:])
-    console.print(table)
+    rows = [shown.header[2:], *(group.rows[0].cells[1:] for group in shown.groups)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ["  " + "  ".join(map(str.rjust, row, widths)) for row in rows]
+    # each key has a line of its own, so that no terminal breaks it
+    typer.echo(f"\n{lines[0]}")
+    for sought, line in zip(result.sought, lines[1:], strict=True):
+        typer.echo("\n= ".join(sought.keys))
+        typer.echo(line)
+    typer.echo()
     for text in directions(result):
-        console.print(text)
-    console.print(f"Results in {out}: report.html, measured.csv, rms.csv")
+        console.print(text, highlight=False, markup=False)
+    typer.echo(
+        f"Results in {out}: report.html, identified.yaml, parameters.csv, measured.csv, rms.csv"
+    )
 
 
 def _as_json(result: "SpinIdentification") -> dict[str, Any]:
@@ -254,6 +257,7 @@ def _as_json(result: "SpinIdentification") -> dict[str, Any]:
         "virtual_experiment": result.planted is not None,
         "cases": [case.name for case in result.cases],
         "average_error_before": float(average_errors(result.before, result.measured).mean()),
-        "average_error_after": float(average_errors(result.after, result.measured).mean()),
+        "average_error_after": result.error_after,
+        "verdict": result.verdict,
         **shown,
     }
