@@ -176,7 +176,7 @@ def test_a_step_too_long_for_the_bearing_is_refused(wm_drake, whirling_file):
         assert (ended.code, ended.out) == (2, "")
         assert f"{whirling_file}:3" in ended.err
         assert (
-            "step: 2.5 ms is too long for the drum in its bearing, whose fastest motion is at"
+            "step: 2.5 ms is too long for the drum in its bearing, whose fastest motion oscillates"
             in ended.err
         )
         assert not Path("out").exists()
