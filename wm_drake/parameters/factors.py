@@ -224,7 +224,9 @@ def _resolved(
                 tables == "scaled" or not _takes_numbers(parameters, key)
             )
             level[key] = _scaled(original, value / float(number or 1.0)) if scaled else value
-            with_value(parameters, key, level[key])  # raises if the value is not allowed
+            changed = with_value(parameters, key, level[key])  # raises if it is not allowed
+            # a number that only the SDF has is a number of the machine once it is set
+            unit = unit or next((u for k, _, u in quantities(changed) if k == key), None)
         nominal[key] = "" if number is None else _text(number, unit)
         levels = (low, middle, high)
         numbers[key] = levels if unit is None else tuple(map(unit.from_si, levels))

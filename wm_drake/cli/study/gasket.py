@@ -36,6 +36,9 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.studies.gasket.screening import Screening
     from wm_drake.studies.gasket.study import GasketTrials
 
+WIDE = 100
+"""Width of a terminal from which on its table has the leading terms. [characters]"""
+
 DEFAULT_OUT = Path("wm-drake-gasket")
 
 
@@ -311,9 +314,12 @@ def _print_table(screening: "Screening", words: "Words") -> None:
     table = Table(title=escape(f"Percent of the variance explained ({about})"))
     for name in ("load", "response"):
         table.add_column(name)
-    for name in ("mean", "main", "inter-\nactions", "residual", "predicted\nR2"):
+    for name in ("mean", "main", "inter-\nactions", "resid-\nual", "pre-\ndicted\nR2"):
         table.add_column(name, justify="right")
-    table.add_column("leading terms, percent")
+    console = Console()
+    is_wide = console.width >= WIDE
+    if is_wide:
+        table.add_column("leading terms, percent")
     for (load, name), found in screening.tables.items():
         leading = ", ".join(
             f"{term.name.replace(':', ' × ')} {term.percent:.0f}" for term in leading_terms(found)
@@ -321,5 +327,6 @@ def _print_table(screening: "Screening", words: "Words") -> None:
         percents = (found.main_percent, found.interaction_percent, found.residual_percent)
         mean = f"{found.constant:.3g} {screening.responses.units[name]}"
         texts = (load, words.response(name), mean, *(f"{value:.1f}" for value in percents))
-        table.add_row(*map(escape, (*texts, r2_text(found.predicted_r2), leading)))
-    Console().print(table)
+        texts = (*texts, r2_text(found.predicted_r2), *([leading] if is_wide else []))
+        table.add_row(*map(escape, texts))
+    console.print(table)

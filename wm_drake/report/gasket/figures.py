@@ -36,6 +36,9 @@ SMALLEST_PERCENT = 1.0
 MOST_POINTS = 1500
 """Largest number of points of a scatter plot; of more points, every n-th is drawn."""
 
+CHARACTER = 0.08
+"""Width of a character of a label. [in]"""
+
 COLUMNS = 3
 """Number of panels in a row."""
 
@@ -125,7 +128,8 @@ def spread_figure(screening: Screening, names: Sequence[str], what: str, words: 
             )
             _box(axes, place, every, 0.34)
         titles = [words.response(name) for name in names]
-        is_long = len(names) > 3 or max(map(len, titles)) > 20
+        width = WIDTH / len(screening.loads) / len(names) / CHARACTER
+        is_long = max(map(len, titles)) > width
         axes.set_xticks(
             range(len(names)), titles, fontsize=9, rotation=90 if is_long else 0, parse_math=False
         )

@@ -85,6 +85,11 @@ def _quality(screening: Screening, words: Words) -> str:
     if not known:
         return f"{model} cannot be checked with these trials."
     load, name = worst = min(known, key=lambda label: known[label])
+    if known[worst] < 0.0:
+        return (
+            f"{model} predicts {words.response(name)}, load {load}, worse than its mean does "
+            "(predicted R² below 0)."
+        )
     return (
         f"{model} predicts trials that were left out of its fit with R² of at least "
         f"{r2_text(known[worst])} ({words.response(name)}, load {load})."
