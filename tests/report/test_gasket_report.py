@@ -106,6 +106,21 @@ def test_advice_names_the_best_value_or_the_compromise(screening, words):
     )
 
 
+def test_advice_names_the_load_where_loads_differ(words):
+    def evaluate(design):
+        a = design.levels[:, 0].astype(float)
+        frames = {
+            name: pd.DataFrame({"Dx": 9.0 + sign * a}) for name, sign in (("p", 1), ("q", -1))
+        }
+        return Responses(frames, {"Dx": "mm"}, {}, MEANINGS)
+
+    damping = advice(run_screening(make_design("full", NAMES), evaluate), words)[0]
+    assert damping == (
+        "Linear damping C_L: needs a compromise. 0.0095 N s/mm is best for displacement x (Dx), "
+        "load p [2.00 mm]; 0.0285 N s/mm is best for displacement x (Dx), load q [2.00 mm]."
+    )
+
+
 def part_of_grid(kind, trials, cube):
     """Return a screening of a part of the grid; `cube` is the size of a term of three factors."""
 

@@ -102,11 +102,12 @@ class _Wish:
 
     Attributes:
         level: The level.
-        response: Name of the response.
+        load, response: Names of load and response.
         gain: Difference of the mean response between worst and best level. [unit of the response]
     """
 
     level: int
+    load: str
     response: str
     gain: float
 
@@ -139,27 +140,35 @@ def advice(screening: Screening, words: Words) -> list[str]:
 def _wishes(screening: Screening, words: Words, factor: str) -> list[_Wish]:
     """Return the levels of a factor that are best for the responses that it influences."""
     found = []
-    for (_, name), table in screening.tables.items():
+    for (load, name), table in screening.tables.items():
         goal = words.meaning(name).goal
         term = next(term for term in table.terms if term.factors == (factor,))
         if not goal or not term.percent >= ADVICE_PERCENT:
             continue
         effects = [term.effects[(level,)] for level in LEVELS]
         at = int(np.argmin(effects) if goal == "smaller" else np.argmax(effects))
-        found.append(_Wish(LEVELS[at], name, max(effects) - min(effects)))
+        found.append(_Wish(LEVELS[at], load, name, max(effects) - min(effects)))
     return found
 
 
 def _for_what(screening: Screening, words: Words, wishes: Sequence[_Wish], level: int) -> str:
-    """Return the responses for which a level is best, each with its largest gain."""
-    gains: dict[str, float] = {}
+    """Return the responses for which a level is best, each with its largest gain.
+
+    The load is named where another level is best for the same response with another load.
+    """
+    levels: dict[str, set[int]] = {}
+    for wish in wishes:
+        levels.setdefault(wish.response, set()).add(wish.level)
+    gains: dict[tuple[str, str], float] = {}
     for wish in wishes:
         if wish.level == level:
-            gains[wish.response] = max(gains.get(wish.response, 0.0), wish.gain)
+            load = f", load {wish.load}" if len(levels[wish.response]) > 1 else ""
+            key = wish.response, load
+            gains[key] = max(gains.get(key, 0.0), wish.gain)
     return _joined(
         [
-            f"{words.response(name)} [{digits(gain)} {screening.responses.units[name]}]"
-            for name, gain in gains.items()
+            f"{words.response(name)}{load} [{digits(gain)} {screening.responses.units[name]}]"
+            for (name, load), gain in gains.items()
         ]
     )
 

@@ -141,7 +141,7 @@ def _extremes() -> Iterator[Response]:
     }
     for letter, (kind, about, variable, unit) in words.items():
         for index, axis in enumerate(AXES):
-            meaning = Meaning(f"{kind} {axis}", about, kind, is_motion=letter == "D")
+            meaning = Meaning(f"{kind} {axis}", about, kind)
             yield Response(f"{letter}{axis}", letter, "extremes", variable, (index,), unit, meaning)
 
 

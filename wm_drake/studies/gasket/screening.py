@@ -47,14 +47,12 @@ class Meaning:
         about: What is measured of a run, as part of a sentence.
         kind: Quantity, such as displacement; responses of one kind share a unit and a figure.
         goal: Which change is an improvement.
-        is_motion: Whether it describes the motion of the tub, and not a load on the housing.
     """
 
     title: str
     about: str = ""
     kind: str = ""
     goal: Goal = "smaller"
-    is_motion: bool = True
 
 
 @dataclass(frozen=True)
