@@ -69,6 +69,9 @@ class FactorLevels:
             in the display unit.
         shown: For each of the levels -1, 0 and 1: the value of the first key, as text in the
             display unit.
+        numbers: By key path: the value at each of the levels -1, 0 and 1, in the display unit. Of a
+            table, it is the nominal stiffness.
+        units: By key path: the display unit, for reading; "" if the number has none.
     """
 
     name: str
@@ -76,6 +79,8 @@ class FactorLevels:
     settings: tuple[dict[str, Value], ...]
     nominal: dict[str, str]
     shown: tuple[str, ...]
+    numbers: dict[str, tuple[float, ...]]
+    units: dict[str, str]
 
 
 def load_factors(path: Path) -> dict[str, Factor]:
@@ -196,6 +201,8 @@ def _resolved(
     settings: tuple[dict[str, Value], ...] = ({}, {}, {})
     nominal: dict[str, str] = {}
     shown: tuple[str, ...] = ()
+    numbers: dict[str, tuple[float, ...]] = {}
+    units: dict[str, str] = {}
     for key in factor.keys:
         number, unit = _nominal(parameters, known, key)
         low, high = (_bound(parameters, key, text, number) for text in (factor.low, factor.high))
@@ -217,11 +224,15 @@ def _resolved(
                 tables == "scaled" or not _takes_numbers(parameters, key)
             )
             level[key] = _scaled(original, value / float(number or 1.0)) if scaled else value
-            with_value(parameters, key, level[key])  # raises if the value is not allowed
+            changed = with_value(parameters, key, level[key])  # raises if it is not allowed
+            # a number that only the SDF has is a number of the machine once it is set
+            unit = unit or next((u for k, _, u in quantities(changed) if k == key), None)
         nominal[key] = "" if number is None else _text(number, unit)
-        if not shown:
-            shown = tuple(_text(value, unit) for value in (low, middle, high))
-    return FactorLevels(name, factor.about, settings, nominal, shown)
+        levels = (low, middle, high)
+        numbers[key] = levels if unit is None else tuple(map(unit.from_si, levels))
+        units[key] = "" if unit is None else unit.shown.replace("*", " ")
+        shown = shown or tuple(_text(value, unit) for value in levels)
+    return FactorLevels(name, factor.about, settings, nominal, shown, numbers, units)
 
 
 def _nominal(

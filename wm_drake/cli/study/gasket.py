@@ -22,7 +22,7 @@ from wm_drake.cli.common import (
 from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import result_folder
 from wm_drake.cli.study.common import ProfileOption, ResumeOption, WorkersOption, study_ledger
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import InputError, Problem, input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from collections.abc import Callable
@@ -30,10 +30,14 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
 
     from wm_drake.parameters import FactorLevels, MachineParameters
+    from wm_drake.report.gasket.words import Words
     from wm_drake.simulation.cases import Case
     from wm_drake.studies.doe import Design
     from wm_drake.studies.gasket.screening import Screening
     from wm_drake.studies.gasket.study import GasketTrials
+
+WIDE = 100
+"""Width of a terminal from which on its table has the leading terms. [characters]"""
 
 DEFAULT_OUT = Path("wm-drake-gasket")
 
@@ -83,6 +87,15 @@ def gasket(
     factors: Annotated[
         Path | None, typer.Option(help="YAML file of factors.", metavar="FILE")
     ] = None,
+    response: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What is measured of each run: D, F, M, gap, amplitude, critical_speed, "
+            "power_mean, region_displacement, region_displacement_integrated, or one number such "
+            "as Dx or amplitude_Xr. Repeatable. Default: D, F, M and gap.",
+            metavar="NAME",
+        ),
+    ] = None,
     tables: Annotated[
         str,
         typer.Option(
@@ -108,15 +121,16 @@ def gasket(
 ) -> None:
     """Find how stiffness and damping of the gasket affect displacement, force and moment."""
     begin = time.perf_counter()
-    from wm_drake.studies.gasket.study import GasketTrials
+    from wm_drake.studies.gasket.screening import check_degrees_of_freedom
 
     parameters = load_parameters(machine, sets)
     levels = _factors(parameters, factor, factors, tables)
     plan = _design(design, levels, trials, model, seed)
+    check_degrees_of_freedom(plan)
     cases = _loads(parameters, load, profile)
     middle = _at_middle(parameters, levels)
     check_buildable(machine, parameters)
-    work = GasketTrials(middle, levels, cases)
+    work = _work(middle, levels, cases, response or [])
     with (
         _runner(middle, workers, cluster) as run,
         study_ledger(out, _identity(work, plan), resume) as ledger,
@@ -132,7 +146,7 @@ def gasket(
                 "to write the results without running them again"
             )
             raise input_error(message, where=str(out)) from None
-    _print_result(screening, out, as_json, time.perf_counter() - begin)
+    _print_result(screening, work, out, as_json, time.perf_counter() - begin)
 
 
 def _factors(
@@ -191,11 +205,24 @@ def _at_middle(
     return at_levels(parameters, levels, [0] * len(levels))
 
 
+def _work(
+    parameters: "MachineParameters",
+    levels: "tuple[FactorLevels, ...]",
+    cases: "list[Case]",
+    responses: list[str],
+) -> "GasketTrials":
+    from wm_drake.studies.gasket.study import GasketTrials
+
+    try:
+        return GasketTrials(parameters, levels, cases, responses)
+    except InputError as error:
+        raise InputError(Problem("--response", "", p.message) for p in error.problems) from None
+
+
 def _identity(work: "GasketTrials", plan: "Design") -> dict[str, str]:
     """Return the properties that distinguish this study from others, for its ledger."""
     from wm_drake.batch import sources_version
     from wm_drake.batch.ledger import key_of
-    from wm_drake.studies.gasket.study import MEASURES
 
     machine = work.parameters
     levels = key_of(levels=plan.levels, settings=[f.settings for f in work.factors])[:8]
@@ -208,7 +235,7 @@ def _identity(work: "GasketTrials", plan: "Design") -> dict[str, str]:
         "machine": f"{machine.name} {runs}",
         "design": f"{plan.kind}, {plan.trials} trials, {levels}",
         "loads": f"{', '.join(case.name for case in work.loads)}, {loads}",
-        "measures": ", ".join(MEASURES),
+        "measures": ", ".join(work.measures),
         "sources": sources_version(),
     }
 
@@ -231,13 +258,12 @@ def _runner(
 
 def _run(work: "GasketTrials", plan: "Design", run: "Callable[..., xr.Dataset]") -> "Screening":
     from wm_drake.studies.gasket.screening import run_screening
-    from wm_drake.studies.gasket.study import MEASURES
 
     with progress_bar(plan.trials * len(work.loads)) as progress:
         return run_screening(
             plan,
             lambda d: work.responses(
-                d, lambda cases: run(cases, measures=MEASURES, progress=progress)
+                d, lambda cases: run(cases, measures=work.measures, progress=progress)
             ),
         )
 
@@ -246,42 +272,61 @@ def _write(screening: "Screening", work: "GasketTrials", folder: Path, wall_s: f
     from wm_drake.report.gasket.report import gasket_report
     from wm_drake.studies.gasket.tables import write_tables
 
-    write_tables(screening, folder)
+    write_tables(screening, folder, work.factors)
     command = command_line()
     (folder / "report.html").write_text(
         gasket_report(screening, work, command, wall_s), encoding="utf-8"
     )
 
 
-def _print_result(screening: "Screening", out: Path, as_json: bool, wall_s: float) -> None:
+def _print_result(
+    screening: "Screening", work: "GasketTrials", out: Path, as_json: bool, wall_s: float
+) -> None:
+    from wm_drake.report.gasket.findings import summary, warnings
+    from wm_drake.report.gasket.words import Words
     from wm_drake.studies.gasket.tables import as_plain_data, to_json
 
+    words = Words(work.factors, screening.responses.meanings)
     if as_json:
         typer.echo(to_json(as_plain_data(screening) | {"wall_s": wall_s}))
     else:
-        _print_table(screening)
+        _print_table(screening, words)
+        typer.echo("\n".join(summary(screening, words)))
         typer.echo(f"Results in {out}: report.html and CSV tables")
+    for text in warnings(screening, words):
+        typer.echo(f"warning: {text}", err=True)
     for (trial, load), reason in screening.responses.failed.items():
         typer.echo(f"trial {trial + 1}, load {load}: {reason}", err=True)
     if screening.responses.failed:
         raise typer.Exit(1)
 
 
-def _print_table(screening: "Screening") -> None:
+def _print_table(screening: "Screening", words: "Words") -> None:
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
+    from wm_drake.report.gasket.tables import r2_text
     from wm_drake.studies.gasket.screening import leading_terms
 
     design = screening.design
     about = f"{design.kind}, {design.trials} trials, D-efficiency {design.efficiency():.2f} %"
-    table = Table(title=f"Percent of the variance explained ({about})")
-    for name in ("load", "response", "mean", "main", "inter-\nactions", "residual"):
-        table.add_column(name, justify="left" if name in ("load", "response") else "right")
-    table.add_column("leading terms")
+    table = Table(title=escape(f"Percent of the variance explained ({about})"))
+    for name in ("load", "response"):
+        table.add_column(name)
+    for name in ("mean", "main", "inter-\nactions", "resid-\nual", "pre-\ndicted\nR2"):
+        table.add_column(name, justify="right")
+    console = Console()
+    is_wide = console.width >= WIDE
+    if is_wide:
+        table.add_column("leading terms, percent")
     for (load, name), found in screening.tables.items():
-        leading = ", ".join(f"{term.name} {term.percent:.0f}" for term in leading_terms(found))
+        leading = ", ".join(
+            f"{term.name.replace(':', ' × ')} {term.percent:.0f}" for term in leading_terms(found)
+        )
         percents = (found.main_percent, found.interaction_percent, found.residual_percent)
         mean = f"{found.constant:.3g} {screening.responses.units[name]}"
-        table.add_row(load, name, mean, *(f"{value:.1f}" for value in percents), leading)
-    Console().print(table)
+        texts = (load, words.response(name), mean, *(f"{value:.1f}" for value in percents))
+        texts = (*texts, r2_text(found.predicted_r2), *([leading] if is_wide else []))
+        table.add_row(*map(escape, texts))
+    console.print(table)

@@ -170,12 +170,17 @@ def _as_json(result: "Damping") -> dict[str, Any]:
         if result.truth is None
         else dict(zip(("C_L", "C_T"), in_units_of_paper(result.truth), strict=True))
     )
+    interval = None
+    if result.interval is not None:
+        ends = (in_units_of_paper(end) for end in (result.interval.low, result.interval.high))
+        interval = dict(zip(("C_L", "C_T"), map(list, zip(*ends, strict=True)), strict=True))
     return {
         "units": {"C_L": "N s/mm", "C_T": "N mm s/deg"},
         "virtual_experiment": result.truth is not None,
         "planted": truth,
         "grid": found(result.grid) | {"rounds": len(result.grid.rounds)},
         "scipy": found(result.scipy),
+        "interval_95": interval,
     }
 
 
