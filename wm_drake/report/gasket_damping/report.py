@@ -90,8 +90,8 @@ def _interval_text(result: Damping) -> str:
         return "There is no confidence interval: fewer than three curves, or a run diverged."
     low, high = (in_units_of_paper(end) for end in (result.interval.low, result.interval.high))
     return (
-        f"95 % intervals of the better optimum: {number(low[0], 4)} to {number(high[0], 4)} N s/mm for C_L and "
-        f"{number(low[1], 1)} to {number(high[1], 1)} N mm s/deg for C_T."
+        f"95 % intervals of the better optimum: {number(low[0], 4)} to {number(high[0], 4)} N s/mm "
+        f"for C_L and {number(low[1], 1)} to {number(high[1], 1)} N mm s/deg for C_T."
     )
 
 
