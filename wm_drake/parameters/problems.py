@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from wm_drake.errors import Problem, nearest_names
+from wm_drake.errors import Problem, nearest_names, shortened
 from wm_drake.parameters.damper_laws import DAMPER_LAWS
 
 
@@ -32,6 +32,7 @@ _TAGS = ("[key]", "number", "table", *DAMPER_LAWS)
 
 def _message(detail: Any, root: type[BaseModel]) -> str:
     kind, context, given = detail["type"], detail.get("ctx", {}), detail.get("input")
+    shown = shortened(str(given), 60)
     if kind == "value_error":
         return str(context["error"])
     if kind == "missing":
@@ -42,19 +43,20 @@ def _message(detail: Any, root: type[BaseModel]) -> str:
         )
     if kind in ("greater_than", "greater_than_equal"):
         sign, limit = (">", context["gt"]) if kind == "greater_than" else (">=", context["ge"])
-        return f"'{given}' is out of range; allowed is {sign} {limit:g}"
+        return f"'{shown}' is out of range; allowed is {sign} {limit:g}"
     if kind == "string_pattern_mismatch":
         return (
-            f"'{given}' is not a name; allowed are letters, digits, _ and -, with a letter or _ "
+            f"'{shown}' is not a name; allowed are letters, digits, _ and -, with a letter or _ "
             "first"
         )
     if kind == "union_tag_invalid":
-        return f"'{context['tag']}' is not known; allowed are {context['expected_tags']}"
+        key = context["discriminator"].strip("'")
+        return f"{key} '{shortened(context['tag'], 60)}' is not known; allowed are {context['expected_tags']}"
     if kind == "union_tag_not_found":
         return f"needs the key {context['discriminator']}"
     if kind == "literal_error":
-        return f"'{given}' is not allowed; allowed are {context['expected']}"
-    return f"{detail['msg'][0].lower()}{detail['msg'][1:]}, is {given!r}"
+        return f"'{shown}' is not allowed; allowed are {context['expected']}"
+    return f"{detail['msg'][0].lower()}{detail['msg'][1:]}, is {shortened(repr(given), 60)}"
 
 
 def _fields_at(root: type[BaseModel], path: tuple[str | int, ...]) -> set[str]:

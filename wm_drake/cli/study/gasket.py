@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,7 +23,7 @@ from wm_drake.cli.common import (
 from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import result_folder
 from wm_drake.cli.study.common import ProfileOption, ResumeOption, WorkersOption, study_ledger
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import InputError, input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from collections.abc import Callable
@@ -145,10 +146,19 @@ def _factors(
             f"unknown treatment '{tables}'{nearest_names(tables, TABLES)}", where="--tables"
         )
     known = load_factors(GASKET_FACTORS if file is None else existing_file(file, "--factors"))
-    chosen = dict(factor_of_text(text, known) for text in named) if named else known
+    try:
+        chosen = dict(factor_of_text(text, known) for text in named) if named else known
+    except InputError as error:
+        raise InputError(replace(p, where="--factor") for p in error.problems) from None
     if named and len(chosen) < len(named):
         raise input_error("a factor is given twice", where="--factor")
-    return levels_of(parameters, chosen, tables)
+    try:
+        return levels_of(parameters, chosen, tables)
+    except InputError as error:
+        origin = "--factor" if named else str(file) if file else ""
+        raise InputError(
+            replace(p, where=": ".join(filter(None, [origin, p.where]))) for p in error.problems
+        ) from None
 
 
 def _design(
