@@ -147,6 +147,7 @@ def existing_file(path: Path, option: str) -> Path:
 def check_buildable(file: str, parameters: "MachineParameters") -> None:
     """Raise an InputError for faults that only building the machine reveals."""
     from wm_drake.model.machine import build_machine
+    from wm_drake.model.scene import Scene
     from wm_drake.parameters import measured_amplitudes
     from wm_drake.simulation.runs import check_bearing, checked_step
 
@@ -154,3 +155,4 @@ def check_buildable(file: str, parameters: "MachineParameters") -> None:
         measured_amplitudes(parameters)
         step = checked_step(parameters, None)
         check_bearing(build_machine(parameters).set_up(), step)
+        Scene(parameters)

@@ -77,7 +77,7 @@ UnitsOption = Annotated[
 KnotsOption = Annotated[
     int, typer.Option("--knots", help="Points of a table on each side of zero.", min=1, max=12)
 ]
-SeedOption = Annotated[int, typer.Option("--seed", help="Of the search.")]
+SeedOption = Annotated[int, typer.Option("--seed", help="Of the search.", min=0)]
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.", metavar="DIR")]
 
 
@@ -323,7 +323,7 @@ def _print(title: str, fit: "Fit", out: Path) -> None:
         table.add_column(head)
     for cells in estimate_cells(fit):
         table.add_row(*cells)
-    console = Console()
+    console = Console(markup=False, emoji=False)
     console.print(table)
     for sentence in (*undetermined_sentences(fit), *fit.notes):
         console.print(sentence, highlight=False)

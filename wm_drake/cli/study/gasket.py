@@ -294,4 +294,4 @@ def _print_table(screening: "Screening") -> None:
         percents = (found.main_percent, found.interaction_percent, found.residual_percent)
         mean = f"{found.constant:.3g} {screening.responses.units[name]}"
         table.add_row(load, name, mean, *(f"{value:.1f}" for value in percents), leading)
-    Console().print(table)
+    Console(markup=False, emoji=False).print(table)

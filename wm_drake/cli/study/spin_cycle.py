@@ -231,7 +231,7 @@ def _print_table(result: "SpinCycleResult", out: Path) -> None:
         table.add_row(
             *(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row)
         )
-    console = Console()
+    console = Console(markup=False, emoji=False)
     console.print(table)
     console.print(f"Results in {out}: report.html, cases.csv, rms.csv")
 

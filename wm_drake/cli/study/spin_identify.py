@@ -81,7 +81,9 @@ def spin_identify(
     ] = 0.005,
     seed: Annotated[
         int,
-        typer.Option(help="Seed of the planted values of a virtual experiment, and of the search."),
+        typer.Option(
+            help="Seed of the planted values of a virtual experiment, and of the search.", min=0
+        ),
     ] = 0,
     workers: WorkersOption = None,
     out: Annotated[
@@ -214,7 +216,7 @@ def _print_table(result: "SpinIdentification", out: Path) -> None:
 
     from wm_drake.report.spin_identify.report import directions, summary, unknowns
 
-    console = Console()
+    console = Console(markup=False, emoji=False)
     console.print(summary(result))
     shown = unknowns(result)
     # a narrow first column: keys are broken at their dots, keys of the same value below each other
