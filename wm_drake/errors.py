@@ -5,7 +5,6 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-
 LONGEST_LINE = 480
 """Largest number of characters of a problem; a longer one is shortened."""
 

@@ -40,7 +40,9 @@ class Worker:
         )
         self.lines = queue.Queue()
         process, lines = self.process, self.lines
-        threading.Thread(target=lambda: [lines.put(line) for line in process.stdout], daemon=True).start()
+        threading.Thread(
+            target=lambda: [lines.put(line) for line in process.stdout], daemon=True
+        ).start()
         assert self.lines.get(timeout=120) == "ready\n"
 
     def outcome(self, number):
@@ -80,13 +82,18 @@ def faults(outcome):
         found.append(f"{len(lines)} lines, the longest of {max(map(len, lines))} characters")
     if any(not c.isprintable() for line in lines for c in line):
         found.append("control characters in the message")
-    if code == 2:
-        if outcome["out"]:
-            found.append("standard output")
-        if not any(name in err for name in outcome["names"]):
-            found.append("names neither file nor option")
-        if outcome["keys"] and not any(key in err for key in outcome["keys"]):
-            found.append(f"names none of the keys {outcome['keys']}")
+    return [*found, *(faults_of_refusal(outcome) if code == 2 else [])]
+
+
+def faults_of_refusal(outcome):
+    """Return what is wrong with the way in which a case was refused."""
+    found, err = [], outcome["err"]
+    if outcome["out"]:
+        found.append("standard output")
+    if not any(name in err for name in outcome["names"]):
+        found.append("names neither file nor option")
+    if outcome["keys"] and not any(key in err for key in outcome["keys"]):
+        found.append(f"names none of the keys {outcome['keys']}")
     return found
 
 
@@ -98,7 +105,10 @@ def campaign(numbers):
             outcome = worker.outcome(number)
             found = ["took too long, or ended the process"] if outcome is None else faults(outcome)
             if found:
-                about = outcome and f"{outcome['door']}: {outcome['arguments']}: {outcome['err'][-600:]}"
+                about = (
+                    outcome
+                    and f"{outcome['door']}: {outcome['arguments']}: {outcome['err'][-600:]}"
+                )
                 bad[number] = "; ".join(found) + "\n" + str(about)[:1500]
     finally:
         worker.end()

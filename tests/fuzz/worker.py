@@ -89,7 +89,9 @@ def outcome(number: int, top: Path) -> dict:
     seconds = time.perf_counter() - begin
     os.chdir(top)
     after = files(around)
-    changed = sorted(p for p in before.keys() | after.keys() if before.get(p) != after.get(p) and p != "work")
+    changed = sorted(
+        p for p in before.keys() | after.keys() if before.get(p) != after.get(p) and p != "work"
+    )
     shutil.rmtree(around)
     return {
         "number": number,
@@ -107,7 +109,10 @@ def outcome(number: int, top: Path) -> dict:
 
 def limit_memory() -> None:
     """Limit the memory that a case may take, on top of what the package itself takes."""
-    size = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[0]) * resource.getpagesize()
+    size = (
+        int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[0])
+        * resource.getpagesize()
+    )
     resource.setrlimit(resource.RLIMIT_AS, (size + MEMORY_LIMIT, resource.RLIM_INFINITY))
 
 

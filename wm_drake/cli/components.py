@@ -192,7 +192,9 @@ def quantities_of(text: str, unit: "Unit", option: str) -> tuple[float, ...]:
 
 def _digits(text: str) -> str:
     """Return the leading numbers of a text, with the commas between them."""
-    match = re.match(r"[\s,]*(?:[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[\s,]*)*", text.strip())
+    match = re.match(
+        r"[\s,]*(?:[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[\s,]*)*", text.strip()
+    )
     return match[0] if match else ""
 
 

@@ -102,7 +102,9 @@ def _run(parameters: "MachineParameters", cases: "list[Case]", engine: str) -> "
         TextColumn("{task.percentage:3.0f} %"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True, markup=False, emoji=False), transient=True) as bar:
+    with Progress(
+        *columns, console=Console(stderr=True, markup=False, emoji=False), transient=True
+    ) as bar:
         tasks = [bar.add_task(case.name, total=1.0) for case in cases]
         return run_spin(
             parameters,

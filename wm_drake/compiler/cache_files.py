@@ -16,7 +16,7 @@ from numba.core.caching import IndexDataCacheFile
 _DIGEST = hashlib.sha256().digest_size
 
 
-class CheckedCacheFile(IndexDataCacheFile):  # type: ignore[misc]
+class CheckedCacheFile(IndexDataCacheFile):
     """The index and the data files of one compiled function, each behind the hash of its content.
 
     A file that is damaged counts as missing; one that cannot be written is left out. Both are said

@@ -48,7 +48,9 @@ def sdf_path(model: str) -> Path:
 
 def unusable(path: Path, error: BaseException) -> InputError:
     """Return the error of an SDF file that Drake refuses, with Drake's reason."""
-    reason = " ".join(str(error).replace(f"{path.parent}/", "").replace(f"/{path.name}", path.name).split())
+    reason = " ".join(
+        str(error).replace(f"{path.parent}/", "").replace(f"/{path.name}", path.name).split()
+    )
     return input_error(f"SDF '{path.name}' cannot be read: {reason}", key="model")
 
 

@@ -22,7 +22,8 @@ _NOT_FINITE = re.compile(r"[+-]?(?:nan|inf|infinity)", re.IGNORECASE)
 LONGEST_UNIT = 40
 """Largest number of characters of a unit."""
 
-_UNIT = re.compile(r"(?:1\s*/)?(?:[^\W\d]\w*|[°%]|[\s*/().·-]|(?:\^|\*\*)\s*-?[0-9]{1,2}(?![0-9.]|\s*(?:\^|\*\*)))*")
+_POWER = r"(?:\^|\*\*)\s*-?[0-9]{1,2}(?![0-9.]|\s*(?:\^|\*\*))"
+_UNIT = re.compile(rf"(?:1\s*/)?(?:[^\W\d]\w*|[°%]|[\s*/().·-]|{_POWER})*")
 """A unit: words, products and quotients; a power is one whole number of at most two digits."""
 
 
@@ -136,7 +137,8 @@ def convert(magnitude: float, unit_text: str | None, unit: Unit) -> float:
         value = float(quantity(magnitude, unit_text).to(unit.si).magnitude)
     except pint.DimensionalityError:
         raise ValueError(
-            f"unit '{shortened(unit_text, 40)}' does not fit; allowed is a unit such as {unit.shown}"
+            f"unit '{shortened(unit_text, 40)}' does not fit; "
+            f"allowed is a unit such as {unit.shown}"
         ) from None
     except Exception as error:  # pint raises several types of errors on text that is not a unit
         raise ValueError(
@@ -164,8 +166,8 @@ def split(text: str) -> tuple[list[float], str, bool]:
         parts = [match[1]] if match else []
     if match is None or not all(_BARE.fullmatch(part) for part in parts):
         raise ValueError(
-            f"'{shortened(text, 60)}' is not a number or a list of numbers with a unit; write for example "
-            "'12 kg' or '(9, 12) kg'"
+            f"'{shortened(text, 60)}' is not a number or a list of numbers with a unit; "
+            "write for example '12 kg' or '(9, 12) kg'"
         )
     unit = match[2] or ""
     dimension(unit)
@@ -181,7 +183,9 @@ def dimension(unit: str) -> Any:
     try:
         return quantity(1.0, unit).dimensionality
     except Exception as error:  # pint raises several types of errors on text that is not a unit
-        raise ValueError(f"unit '{shortened(unit, 40)}' is not known; write for example kg, mm or N/mm") from error
+        raise ValueError(
+            f"unit '{shortened(unit, 40)}' is not known; write for example kg, mm or N/mm"
+        ) from error
 
 
 def to_base(value: float, unit: str) -> float:
@@ -210,7 +214,8 @@ def to_si(value: Any, info: ValidationInfo, unit: Unit) -> float:
         match = _SCALAR.fullmatch(value)
         if match is None:
             raise ValueError(
-                f"'{shortened(value, 60)}' is not a number with a unit; write for example '{example}'"
+                f"'{shortened(value, 60)}' is not a number with a unit; "
+                f"write for example '{example}'"
             )
         return convert(float(match[1]), match[2], unit)
     return _plain_number(value, info, example)
@@ -233,12 +238,14 @@ def to_si_vector(value: Any, info: ValidationInfo, unit: Unit) -> tuple[float, .
         parts = [] if match is None else [part.strip() for part in match[1].split(",")]
         if match is None or not all(_BARE.fullmatch(part) for part in parts):
             raise ValueError(
-                f"'{shortened(value, 60)}' is not a list of numbers with a unit; write for example '{example}'"
+                f"'{shortened(value, 60)}' is not a list of numbers with a unit; "
+                f"write for example '{example}'"
             )
         return tuple(convert(float(part), match[2], unit) for part in parts)
     if not isinstance(value, list | tuple):
         raise ValueError(
-            f"{shortened(repr(value), 60)} is not a list of numbers with a unit; write for example '{example}'"
+            f"{shortened(repr(value), 60)} is not a list of numbers with a unit; "
+            f"write for example '{example}'"
         )
     return tuple(_plain_number(number, info, example) for number in value)
 
@@ -247,7 +254,9 @@ def _plain_number(value: Any, info: ValidationInfo, example: str) -> float:
     if isinstance(value, str) and _BARE.fullmatch(value):
         raise ValueError(f"'{value}' has no unit; write for example '{example}'")
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{shortened(repr(value), 60)} is not a number with a unit; write for example '{example}'")
+        raise ValueError(
+            f"{shortened(repr(value), 60)} is not a number with a unit; write for example '{example}'"
+        )
     try:
         number = float(value)
     except OverflowError:
