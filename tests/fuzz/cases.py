@@ -569,6 +569,7 @@ def _set_case(random_: random.Random) -> FuzzCase:
         [["spin"], ["machine", "show"], ["rig", "damper", "-f", "1 Hz", "-a", "1 mm"]]
     )
     parts = [part[:10] for part in key.split(".") if part and part.isprintable()] or ["--set"]
+    parts = parts if "=" in entry else ["--set"]
     return FuzzCase("set", [*command, "--set", entry], ["--set", "reference.yaml"], parts)
 
 

@@ -122,7 +122,8 @@ def serve() -> None:
     with tempfile.TemporaryDirectory() as name:
         top = Path(name)
         os.chdir(top)
-        run(["machine", "check", "reference"])  # imports and compiles
+        for name_of_machine in ("reference", "free_stroke"):  # imports and compiles
+            run(["machine", "check", name_of_machine])
         for place in COMPUTATIONS:
             module, _, function = place.rpartition(".")
             mock.patch.object(import_module(module), function, accepted).start()
