@@ -21,6 +21,7 @@ from wm_drake.cli.common import (
     pairs_of,
 )
 from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.study.common import RUNS_KEPT
 from wm_drake.errors import InputError, input_error
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -107,7 +108,7 @@ def calibrate(
         calibration, predictions = _run(
             parameters, free, wanted, plan, groups, out, workers, resume
         )
-    with result_folder(out) as folder:
+    with result_folder(out, RUNS_KEPT) as folder:
         _write(parameters, calibration, predictions, folder)
     if as_json:
         typer.echo(json.dumps(_as_json(calibration, predictions)))

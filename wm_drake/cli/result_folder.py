@@ -28,11 +28,15 @@ _NOT_WRITTEN = {
 
 
 @contextmanager
-def result_folder(out: Path) -> Iterator[Path]:
+def result_folder(out: Path, kept: str = "") -> Iterator[Path]:
     """Yield a temporary folder beside `out`, and move its files to `out` if the block succeeds.
 
     If the block fails, `out` keeps its earlier files. Temporary folders of earlier commands that
     were killed are removed first.
+
+    Args:
+        out: Folder of the results.
+        kept: What is kept if the results cannot be written, for the message.
 
     Raises:
         InputError: `out` is a file, or it cannot be written to: checked before the block, or found
@@ -45,7 +49,7 @@ def result_folder(out: Path) -> Iterator[Path]:
         _remove_leftovers(out, beside)
         partial, lock = _locked_folder(out, beside)
     except OSError as error:
-        raise _unwritable(out, error) from None
+        raise _unwritable(out, error, kept) from None
     try:
         yield partial
         out.mkdir(exist_ok=True)
@@ -54,14 +58,15 @@ def result_folder(out: Path) -> Iterator[Path]:
     except OSError as error:
         if error.errno not in _NOT_WRITTEN:
             raise
-        raise _unwritable(out, error) from None
+        raise _unwritable(out, error, kept) from None
     finally:
         shutil.rmtree(partial, ignore_errors=True)
         os.close(lock)
 
 
-def _unwritable(out: Path, error: OSError) -> Exception:
-    return input_error(f"cannot be written to: {reason_of(error)}", where=str(out))
+def _unwritable(out: Path, error: OSError, kept: str) -> Exception:
+    reason = "; ".join(filter(None, [f"cannot be written to: {reason_of(error)}", kept]))
+    return input_error(reason, where=str(out))
 
 
 def _locked_folder(out: Path, beside: Path) -> tuple[Path, int]:

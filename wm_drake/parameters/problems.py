@@ -27,6 +27,16 @@ def problems_of(error: ValidationError, root: type[BaseModel], key: str = "") ->
     return problems
 
 
+_WANTED = {
+    "model_type": "a group of keys and values",
+    "model_attributes_type": "a group of keys and values",
+    "dict_type": "a group of keys and values",
+    "tuple_type": "a list",
+    "list_type": "a list",
+    "string_type": "text",
+}
+"""What a value must be, by kind of error; pydantic would name its Python class."""
+
 _TAGS = ("[key]", "number", "table", *DAMPER_LAWS)
 
 
@@ -46,14 +56,17 @@ def _message(detail: Any, root: type[BaseModel]) -> str:
         return f"'{shown}' is out of range; allowed is {sign} {limit:g}"
     if kind == "string_pattern_mismatch":
         return (
-            f"'{shown}' is not a name; allowed are letters, digits, _ and -, with a letter or _ "
-            "first"
+            f"'{shown}' is not a name; allowed are up to 64 letters, digits, _ and -, with a "
+            "letter or _ first"
         )
     if kind == "union_tag_invalid":
         key = context["discriminator"].strip("'")
-        return f"{key} '{shortened(context['tag'], 60)}' is not known; allowed are {context['expected_tags']}"
+        given, known = shortened(context["tag"], 60), context["expected_tags"]
+        return f"{key} '{given}' is not known; allowed are {known}"
     if kind == "union_tag_not_found":
         return f"needs the key {context['discriminator']}"
+    if kind in _WANTED:
+        return f"needs {_WANTED[kind]}, is {shortened(repr(given), 60)}"
     if kind == "literal_error":
         return f"'{shown}' is not allowed; allowed are {context['expected']}"
     return f"{detail['msg'][0].lower()}{detail['msg'][1:]}, is {shortened(repr(given), 60)}"

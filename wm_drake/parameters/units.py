@@ -255,7 +255,8 @@ def _plain_number(value: Any, info: ValidationInfo, example: str) -> float:
         raise ValueError(f"'{value}' has no unit; write for example '{example}'")
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(
-            f"{shortened(repr(value), 60)} is not a number with a unit; write for example '{example}'"
+            f"{shortened(repr(value), 60)} is not a number with a unit; "
+            f"write for example '{example}'"
         )
     try:
         number = float(value)

@@ -22,7 +22,13 @@ from wm_drake.cli.common import (
 )
 from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import result_folder
-from wm_drake.cli.study.common import ProfileOption, ResumeOption, WorkersOption, study_ledger
+from wm_drake.cli.study.common import (
+    RUNS_KEPT,
+    ProfileOption,
+    ResumeOption,
+    WorkersOption,
+    study_ledger,
+)
 from wm_drake.errors import InputError, input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -124,15 +130,8 @@ def gasket(
     ):
         screening = _run(work, plan, partial(run, ledger=ledger))
         ledger.mark_finished()
-        try:
-            with result_folder(out) as folder:
-                _write(screening, work, folder, time.perf_counter() - begin)
-        except OSError as error:
-            message = (
-                f"cannot be written to: {error.strerror}; all runs are kept, so repeat the command "
-                "to write the results without running them again"
-            )
-            raise input_error(message, where=str(out)) from None
+        with result_folder(out, RUNS_KEPT) as folder:
+            _write(screening, work, folder, time.perf_counter() - begin)
     _print_result(screening, out, as_json, time.perf_counter() - begin)
 
 

@@ -111,7 +111,7 @@ def spin_identify(
     check_buildable(machine, parameters)
     model = partial(SpinModel, parameters, spin_profile, tuple(table), sought)
     kept = "finished runs are kept; repeat the command to continue"
-    with interruptible(kept), result_folder(out) as folder, open_runs(out) as ledger:
+    with interruptible(kept), result_folder(out, kept) as folder, open_runs(out) as ledger:
         result = _identify(model, given, noise, seed, ledger, workers)
         _write(result, folder)
         ledger.mark_finished()
