@@ -57,7 +57,7 @@ def calibrate(
         ),
     ] = "least-squares",
     starts: Annotated[
-        int, typer.Option(help="Number of searches, each with its own starting point.", min=1)
+        int, typer.Option(help="Number of searches, each with its own starting point.")
     ] = 8,
     iterations: Annotated[
         int,
