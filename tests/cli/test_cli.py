@@ -78,7 +78,7 @@ FAULTY_MACHINES = {
     ),
     "missing measured table": (
         in_machine("measured: [nosuch.csv]"),
-        "measured: cannot be read as CSV",
+        "measured: No such file or directory",
     ),
     "spring that would push": (
         in_machine("frames: {spring_left_housing: {position: '(-250, 0, -600) mm'}}"),

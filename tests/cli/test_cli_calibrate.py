@@ -118,7 +118,7 @@ FAULTS = {
     "weight of nothing": (["--weight", "Q=2"], "'Q' is no load, sensor"),
     "weight that is no number": (
         ["--weight", "Xr=much"],
-        "--weight: 'Xr=much' does not have the form NAME=NUMBER",
+        "--weight: Xr: 'much' is not a number",
     ),
 }
 

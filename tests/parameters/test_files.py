@@ -239,7 +239,7 @@ def test_strange_scalar_is_refused_with_its_line(write, value):
         ),
         (
             "damper_types: {friction: {law: glue}}\n",
-            ":2: damper_types.friction: 'glue' is not known; allowed are 'coulomb', ",
+            ":2: damper_types.friction: law 'glue' is not known; allowed are 'coulomb', ",
         ),
         (
             "springs:\n  left: {type: nosuch}\n",

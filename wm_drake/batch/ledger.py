@@ -45,6 +45,10 @@ _TABLES = (
 )
 
 
+_SQLITE_ERRORS = (sqlite3.Error, UnicodeDecodeError)
+"""Errors of SQLite; the second one if its message quotes damaged text."""
+
+
 class LedgerError(WmDrakeError):
     """A ledger cannot be read or written. Results that were stored before are kept."""
 
@@ -82,10 +86,13 @@ class Ledger:
             LedgerError: the row of the result is damaged.
         """
         rows = self._query("SELECT shapes, numbers, note, checksum FROM results WHERE key = ?", key)
+        if not rows and key in self._keys:
+            raise LedgerError(f"{self.path}: is damaged: result {key} is missing; {_UNCHANGED}")
         if not rows:
             raise KeyError(key)
         shapes, numbers, note, checksum = rows[0]
-        if _checksum(key, shapes, numbers, note) != checksum:
+        kinds = [type(part) for part in (shapes, numbers, note)]
+        if kinds != [str, bytes, str] or _checksum(key, shapes, numbers, note) != checksum:
             raise LedgerError(
                 f"{self.path}: is damaged: the checksum of result {key} is wrong; {_UNCHANGED}"
             )
@@ -215,14 +222,14 @@ def _connected(path: Path) -> sqlite3.Connection:
         connection = sqlite3.connect(
             path, timeout=0.0, isolation_level=None, check_same_thread=False
         )
-    except sqlite3.Error as error:
+    except _SQLITE_ERRORS as error:
         raise input_error(f"cannot be written to: {error}", where=str(path)) from None
     try:
         connection.execute("PRAGMA locking_mode = EXCLUSIVE")
         connection.execute("BEGIN IMMEDIATE")
         connection.execute("COMMIT")
-        (state,) = connection.execute("PRAGMA quick_check(1)").fetchone()
-    except sqlite3.Error as error:
+        (state,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
+    except _SQLITE_ERRORS as error:
         connection.close()
         raise input_error(_reason(error), where=str(path)) from None
     if state != "ok":
@@ -243,7 +250,7 @@ def _check_header(
             raise input_error(f"is a database but not a ledger; {_UNCHANGED}", where=str(path))
         header = dict(connection.execute("SELECT name, text FROM header"))
         (count,) = connection.execute("SELECT count(*) FROM results").fetchone()
-    except sqlite3.Error as error:
+    except _SQLITE_ERRORS as error:
         raise input_error(_reason(error), where=str(path)) from None
     finished = header.pop("finished", "") == "yes"
     if header != identity:
@@ -276,11 +283,11 @@ def _ledger_errors(path: Path) -> Iterator[None]:
     """Convert errors of SQLite into a `LedgerError` with a message for the user."""
     try:
         yield
-    except sqlite3.Error as error:
+    except _SQLITE_ERRORS as error:
         raise LedgerError(f"{path}: {_reason(error)}") from None
 
 
-def _reason(error: sqlite3.Error) -> str:
+def _reason(error: Exception) -> str:
     name = getattr(error, "sqlite_errorname", "")
     if name.startswith(("SQLITE_BUSY", "SQLITE_LOCKED")):
         return (

@@ -10,7 +10,7 @@ import sys
 import typer
 
 from wm_drake.cli import calibrate, identify, machine, rig, spin, study
-from wm_drake.errors import WmDrakeError
+from wm_drake.errors import Problem, WmDrakeError, reason_of
 
 app = typer.Typer(
     help="Dynamics of front-loading washing machines.",
@@ -27,9 +27,15 @@ app.command()(calibrate.calibrate)
 
 
 def main() -> None:
-    """Run the command; an error of the input ends it with a message and exit code 2."""
+    """Run the command; an error of the input or the disk ends it with a message and exit code 2."""
     try:
         app()
     except WmDrakeError as error:
         typer.echo(str(error), err=True)
-        sys.exit(2)
+    except OSError as error:  # a disk that is full, a folder that cannot be read
+        typer.echo(str(Problem(str(error.filename or "file"), "", reason_of(error))), err=True)
+    except MemoryError:
+        typer.echo("out of memory", err=True)
+    else:
+        return
+    sys.exit(2)

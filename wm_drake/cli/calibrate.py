@@ -1,6 +1,7 @@
 """Command `wm-drake calibrate`: fit unknown numbers of a machine to measured amplitudes."""
 
 import json
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,8 +18,10 @@ from wm_drake.cli.common import (
     existing_file,
     interruptible,
     load_parameters,
+    pairs_of,
 )
 from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.study.common import RUNS_KEPT
 from wm_drake.errors import InputError, input_error
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -58,9 +61,11 @@ def calibrate(
     ] = 8,
     iterations: Annotated[
         int,
-        typer.Option(help="Largest number of iterations per search; 0: default of the method."),
+        typer.Option(
+            help="Largest number of iterations per search; 0: default of the method.", min=0
+        ),
     ] = 0,
-    seed: Annotated[int, typer.Option(help="Seed of the random starting points.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the random starting points.", min=0)] = 0,
     deviation: Annotated[
         float, typer.Option(help="Standard deviation of a measured amplitude, in percent.")
     ] = 5.0,
@@ -82,7 +87,7 @@ def calibrate(
         ),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(help="Number of threads. Default: number of cores.")
+        int | None, typer.Option(help="Number of threads. Default: number of cores.", min=1)
     ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue an interrupted calibration.")
@@ -94,16 +99,16 @@ def calibrate(
     """Fit unknown numbers of a machine to measured amplitudes, within bounds and with priors."""
     from wm_drake.studies.calibration.calibration import Plan
 
+    groups = _groups(leave_out)
     parameters = _with_targets(load_parameters(machine, sets), targets)
     wanted = _targets(parameters).weighted(_weights(weight))
     check_buildable(machine, parameters)
     plan = Plan(method, starts, seed, iterations, deviation / 100.0, 1e-3 * resolution)
-    groups = [entry.split(",") for entry in leave_out or []]
     with interruptible(f"finished evaluations are kept in {out}; continue with --resume"):
         calibration, predictions = _run(
             parameters, free, wanted, plan, groups, out, workers, resume
         )
-    with result_folder(out) as folder:
+    with result_folder(out, RUNS_KEPT) as folder:
         _write(parameters, calibration, predictions, folder)
     if as_json:
         typer.echo(json.dumps(_as_json(calibration, predictions)))
@@ -134,16 +139,32 @@ def _targets(parameters: "MachineParameters") -> "Targets":
 
 
 def _weights(entries: list[str] | None) -> dict[str, float]:
-    weights = {}
-    for entry in entries or []:
-        name, _, number = entry.partition("=")
+    from wm_drake.parameters.units import plain_number
+
+    weights: dict[str, float] = {}
+    for name, number in pairs_of(entries, "--weight"):
         try:
-            weights[name] = float(number)
-        except ValueError:
+            weight = plain_number(number)
+        except ValueError as error:
+            raise input_error(str(error), where="--weight", key=name) from None
+        if not 0.0 <= weight < math.inf:
             raise input_error(
-                f"'{entry}' does not have the form NAME=NUMBER", where="--weight"
-            ) from None
+                f"'{number}' is not allowed; must be >= 0 and finite", where="--weight", key=name
+            )
+        if name in weights:
+            raise input_error("is given twice", where="--weight", key=name)
+        weights[name] = weight
     return weights
+
+
+def _groups(entries: list[str] | None) -> list[list[str]]:
+    """Return the groups of loads that `--leave-out` names."""
+    groups = [[name.strip() for name in entry.split(",")] for entry in entries or []]
+    for names in groups:
+        for name in names:
+            if names.count(name) > 1:
+                raise input_error(f"'{name}' is given twice", where="--leave-out")
+    return groups
 
 
 def _run(
@@ -208,14 +229,14 @@ def _progress(searches: int) -> Iterator[Callable[[int, int, float], None]]:
     columns = (
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         TimeElapsedColumn(),
     )
     with Progress(
         *columns,
         TextColumn("remaining"),
         TimeRemainingColumn(),
-        console=Console(stderr=True),
+        console=Console(stderr=True, markup=False, emoji=False),
         transient=True,
     ) as bar:
         task = bar.add_task("search", total=searches)

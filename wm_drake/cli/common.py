@@ -107,6 +107,7 @@ def cases_of(
 ) -> "list[Case]":
     """Return the cases that `--load`, `--no-gasket` and `--profile` select."""
     from wm_drake.parameters import load_load, load_profile
+    from wm_drake.parameters.text_files import is_file
     from wm_drake.simulation.cases import Case
 
     spin_profile = (
@@ -116,7 +117,7 @@ def cases_of(
     for name in loads or list(parameters.loads):
         if name in parameters.loads:
             cases.append(Case(name, parameters.loads[name], spin_profile, gasket))
-        elif Path(name).is_file():
+        elif is_file(Path(name)):
             cases.append(Case(Path(name).stem, load_load(Path(name)), spin_profile, gasket))
         else:
             hint = nearest_names(name, parameters.loads)
@@ -136,7 +137,9 @@ def cases_of(
 
 def existing_file(path: Path, option: str) -> Path:
     """Return the path if it is a file; otherwise raise an InputError for the option."""
-    if not path.is_file():
+    from wm_drake.parameters.text_files import is_file
+
+    if not is_file(path):
         raise input_error(f"no such file '{path}'", where=option)
     return path
 
@@ -145,6 +148,7 @@ def check_buildable(file: str, parameters: "MachineParameters") -> None:
     """Raise an InputError for faults that only building the machine reveals."""
     from wm_drake.engines.compiled.step_check import check_step
     from wm_drake.model.build import build_machine
+    from wm_drake.model.scene import Scene
     from wm_drake.parameters import measured_amplitudes
     from wm_drake.simulation.runs import checked_step
 
@@ -152,3 +156,4 @@ def check_buildable(file: str, parameters: "MachineParameters") -> None:
         measured_amplitudes(parameters)
         step = checked_step(parameters, None)
         check_step(build_machine(parameters).set_up(), step)
+        Scene(parameters)

@@ -77,7 +77,7 @@ UnitsOption = Annotated[
 KnotsOption = Annotated[
     int, typer.Option("--knots", help="Points of a table on each side of zero.", min=1, max=12)
 ]
-SeedOption = Annotated[int, typer.Option("--seed", help="Of the search.")]
+SeedOption = Annotated[int, typer.Option("--seed", help="Of the search.", min=0)]
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.", metavar="DIR")]
 
 
@@ -348,9 +348,9 @@ def _print(
 
     from wm_drake.report.identify.report import estimate_cells, undetermined_sentences
 
-    console = Console()
+    console = Console(markup=False, emoji=False)
     for sentence in judgement.sentences:
-        console.print(sentence, highlight=False, markup=False)
+        console.print(sentence, highlight=False)
     table = Table(title=f"{title}: RMSE {fit.rmse:.4g} {unit} by {fit.method}")
     table.add_column("unknown", no_wrap=True)
     for head in ("value", "95 % interval", "unit", "remark"):

@@ -29,9 +29,11 @@ def machine_show(
     The output has bodies, elements, preloads, the equilibrium and the natural frequencies.
     """
     from wm_drake.model.build import build_machine
+    from wm_drake.simulation.runs import checked_step
     from wm_drake.studies.description.description import as_text, describe
 
     parameters = load_parameters(file, sets)
     with located_in(file):
+        checked_step(parameters, None)
         description = describe(build_machine(parameters))
     typer.echo(json.dumps(description, indent=1) if as_json else as_text(description))

@@ -218,6 +218,6 @@ def _print(run: "RigRun", out: Path) -> None:
         table.add_column(name, justify="right")
     for cells in measures_cells(run):
         table.add_row(*cells)
-    console = Console()
+    console = Console(markup=False, emoji=False)
     console.print(table)
     console.print(f"Results in {out}: report.html, measures.csv, loop_<frequency>_<amplitude>.csv")

@@ -97,12 +97,14 @@ def _run(parameters: "MachineParameters", cases: "list[Case]", engine: str) -> "
     from wm_drake.studies.spin.study import run_spin
 
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         TextColumn("{task.percentage:3.0f} %"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Progress(
+        *columns, console=Console(stderr=True, markup=False, emoji=False), transient=True
+    ) as bar:
         tasks = [bar.add_task(case.name, total=1.0) for case in cases]
         return run_spin(
             parameters,
@@ -157,7 +159,7 @@ def _print_tables(result: "SpinResult", out: Path) -> None:
             *(f"{value:.1f}" if isinstance(value, float) else str(value) for value in row)
         )
     millimetre = Unit("m", "mm")
-    console = Console()
+    console = Console(markup=False, emoji=False)
     console.print(table)
     for case in result.results:
         gap = case.measures.smallest_gap

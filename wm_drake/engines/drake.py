@@ -7,7 +7,7 @@ from pydrake.systems.analysis import InitializeParams, ResetIntegratorFromFlags,
 
 from wm_drake.engines.schedule import output_times
 from wm_drake.engines.trajectory import Trajectory, cut_at_divergence, diverging_coordinate
-from wm_drake.errors import first_line
+from wm_drake.errors import shortened
 from wm_drake.model.machine import OUTPUT_PERIOD, Machine, MachineSystems, Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
@@ -85,7 +85,7 @@ def run_drake(
                 progress(time / profile.duration)
         progress(1.0)
     except RuntimeError as error:  # Drake raises if the state is not finite
-        failure = first_line(error)
+        failure = shortened(str(error).partition("\n")[0], 200)
     return samples.trajectory(failure)
 
 

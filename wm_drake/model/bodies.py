@@ -21,14 +21,19 @@ from pydrake.multibody.tree import (
     UnitInertia,
 )
 
-from wm_drake.errors import InputError, Problem, first_line, input_error, nearest_names
+from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.model.sdf_shapes import check_shapes
 from wm_drake.model.state_layout import CARRIER
 from wm_drake.parameters import BodyOverride, Load, MachineParameters, with_value
+from wm_drake.parameters.text_files import check_regular, is_file
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
 _PACKAGE = Path(__file__).parents[1]
 SDF_FOLDER = _PACKAGE / "sdf" if (_PACKAGE / "sdf").is_dir() else _PACKAGE.parent / "sdf"
 """Folder of the SDF models: in an installed package inside it, in a checkout beside it."""
+
+LARGEST_SDF = 16 << 20
+"""Largest size of an SDF file. [byte]"""
 
 
 def sdf_path(model: str) -> Path:
@@ -41,10 +46,19 @@ def sdf_path(model: str) -> Path:
         InputError: there is no such file.
     """
     path = Path(model) if Path(model).is_absolute() else SDF_FOLDER / model
-    if not path.is_file():
+    if not is_file(path):
         known = [shipped.name for shipped in SDF_FOLDER.glob("*.sdf")]
         raise input_error(f"no SDF file '{model}'{nearest_names(model, known)}", key="model")
+    check_regular(path, key="model", largest=LARGEST_SDF)
     return path
+
+
+def unusable(path: Path, error: BaseException) -> InputError:
+    """Return the error of an SDF file that Drake refuses, with Drake's reason."""
+    reason = " ".join(
+        str(error).replace(f"{path.parent}/", "").replace(f"/{path.name}", path.name).split()
+    )
+    return input_error(f"SDF '{path.name}' cannot be read: {reason}", key="model")
 
 
 def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
@@ -65,12 +79,12 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
     """
     parser = Parser(plant)
     parser.SetStrictParsing()
+    path = sdf_path(parameters.model)
+    check_shapes(path)
     try:
-        parser.AddModels(str(sdf_path(parameters.model)))
-    except RuntimeError as error:
-        raise input_error(
-            f"SDF '{parameters.model}' cannot be read: {first_line(error)}", key="model"
-        ) from None
+        parser.AddModels(str(path))
+    except (RuntimeError, SystemExit) as error:  # Drake turns failed assertions into exits
+        raise unusable(path, error) from None
     missing = [
         f"link '{name}'" for name in ("housing", "tub", "drum") if not plant.HasBodyNamed(name)
     ]

@@ -7,11 +7,11 @@ read again with its shapes and set to the poses of a finished run.
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import Cylinder, GeometryId, Meshcat, MeshcatVisualizer
+from pydrake.geometry import Cylinder, GeometryId, Meshcat, MeshcatParams, MeshcatVisualizer
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
-from wm_drake.model.bodies import add_bodies, set_bodies
+from wm_drake.model.bodies import add_bodies, sdf_path, set_bodies, unusable
 from wm_drake.model.outline import support_history
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
@@ -106,6 +106,14 @@ class Scene:
         self._plant_context = self.plant.GetMyContextFromRoot(self._context)
         set_bodies(self.plant, self._plant_context, parameters)
         self._pairs = [(a, b) for a in self._shapes("tub") for b in self._shapes("housing")]
+        try:
+            query = self._scene_graph.get_query_output_port().Eval(
+                self._scene_graph.GetMyContextFromRoot(self._context)
+            )
+            for pair in self._pairs:
+                query.ComputeSignedDistancePairClosestPoints(*pair)
+        except (RuntimeError, SystemExit) as error:  # Drake turns failed assertions into exits
+            raise unusable(sdf_path(parameters.model), error) from None
         self._outlines = {shape: self._outline(shape) for pair in self._pairs for shape in pair}
         self._rest_cache: dict[
             tuple[float, ...], list[tuple[float, FloatArray, tuple[GeometryId, GeometryId]]]
@@ -317,7 +325,7 @@ def replay_page(parameters: MachineParameters, time: FloatArray, positions: Floa
         time: (n,) [s]
         positions: Positions of the plant: roll, pitch, yaw, x, y, z, drum angle. (n, 7) [rad, m]
     """
-    meshcat = Meshcat()
+    meshcat = Meshcat(MeshcatParams(host="localhost"))  # reachable from this computer only
     meshcat.SetProperty("/Grid", "visible", False)
     meshcat.SetCameraPose(camera_in_world=[0.7, -1.5, 0.6], target_in_world=[0.0, 0.0, 0.0])
     scene = Scene(parameters, meshcat)

@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.parameters.elements import ForceTable, Frozen, TorqueTable
 from wm_drake.parameters.files import read_yaml
-from wm_drake.parameters.keys import quantities, unit_of, with_value, with_values
+from wm_drake.parameters.keys import is_index, quantities, unit_of, with_value, with_values
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.units import Unit
@@ -34,7 +34,7 @@ TABLES = ("linear", "scaled")
 "scaled": the forces of the table are scaled, so that the curve keeps its shape.
 """
 
-_PERCENT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*%\s*")
+_PERCENT = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))\s*%\s*")
 
 Value: TypeAlias = float | ForceTable | TorqueTable
 
@@ -250,7 +250,7 @@ def _nominal(
     parent, _, last = key.rpartition(".")
     if (
         parent in known
-        and last.isdigit()
+        and is_index(last)
         and isinstance(known[parent][0], tuple)
         and int(last) < len(known[parent][0])
     ):
@@ -273,7 +273,7 @@ def _value_at(parameters: MachineParameters, key: str) -> Any:
             node = getattr(node, part)
         elif isinstance(node, dict) and part in node:
             node = node[part]
-        elif isinstance(node, tuple) and part.isdigit() and int(part) < len(node):
+        elif isinstance(node, tuple) and is_index(part) and int(part) < len(node):
             node = node[int(part)]
         elif place == 1 and parts[0] in ("bodies", "frames"):
             return None
@@ -303,7 +303,7 @@ def _bound(parameters: MachineParameters, key: str, text: str, nominal: float | 
         )
     if percent:
         return 0.01 * float(percent[1]) * float(nominal or 0.0)
-    if key.rpartition(".")[2].isdigit():
+    if is_index(key.rpartition(".")[2]):
         raise input_error(
             f"'{text}' is not in percent; the bounds of one number of a list must be", key=key
         )

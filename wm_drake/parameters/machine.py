@@ -20,7 +20,7 @@ from wm_drake.parameters.elements import (
 )
 from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
 
-Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
+Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$")]
 """Name of an entry. It becomes part of key paths and of file names."""
 
 

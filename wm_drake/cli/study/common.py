@@ -16,6 +16,11 @@ if TYPE_CHECKING:
 LEDGER = "ledger.sqlite"
 """Name of the ledger file in the folder of a study."""
 
+RUNS_KEPT = (
+    "all runs are kept, so repeat the command to write the results without running them again"
+)
+"""What is kept if the results of a study cannot be written."""
+
 WorkersOption = Annotated[
     int | None, typer.Option(help="Number of cores. Default: all.", min=1, metavar="N")
 ]

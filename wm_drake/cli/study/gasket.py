@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -21,7 +22,13 @@ from wm_drake.cli.common import (
 )
 from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import result_folder
-from wm_drake.cli.study.common import ProfileOption, ResumeOption, WorkersOption, study_ledger
+from wm_drake.cli.study.common import (
+    RUNS_KEPT,
+    ProfileOption,
+    ResumeOption,
+    WorkersOption,
+    study_ledger,
+)
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -137,15 +144,8 @@ def gasket(
     ):
         screening = _run(work, plan, partial(run, ledger=ledger))
         ledger.mark_finished()
-        try:
-            with result_folder(out) as folder:
-                _write(screening, work, folder, time.perf_counter() - begin)
-        except OSError as error:
-            message = (
-                f"cannot be written to: {error.strerror}; all runs are kept, so repeat the command "
-                "to write the results without running them again"
-            )
-            raise input_error(message, where=str(out)) from None
+        with result_folder(out, RUNS_KEPT) as folder:
+            _write(screening, work, folder, time.perf_counter() - begin)
     _print_result(screening, work, out, as_json, time.perf_counter() - begin)
 
 
@@ -159,10 +159,19 @@ def _factors(
             f"unknown treatment '{tables}'{nearest_names(tables, TABLES)}", where="--tables"
         )
     known = load_factors(GASKET_FACTORS if file is None else existing_file(file, "--factors"))
-    chosen = dict(factor_of_text(text, known) for text in named) if named else known
+    try:
+        chosen = dict(factor_of_text(text, known) for text in named) if named else known
+    except InputError as error:
+        raise InputError(replace(p, where="--factor") for p in error.problems) from None
     if named and len(chosen) < len(named):
         raise input_error("a factor is given twice", where="--factor")
-    return levels_of(parameters, chosen, tables)
+    try:
+        return levels_of(parameters, chosen, tables)
+    except InputError as error:
+        origin = "--factor" if named else str(file) if file else ""
+        raise InputError(
+            replace(p, where=": ".join(filter(None, [origin, p.where]))) for p in error.problems
+        ) from None
 
 
 def _design(
@@ -303,7 +312,6 @@ def _print_result(
 
 def _print_table(screening: "Screening", words: "Words") -> None:
     from rich.console import Console
-    from rich.markup import escape
     from rich.table import Table
 
     from wm_drake.report.gasket.tables import r2_text
@@ -311,12 +319,12 @@ def _print_table(screening: "Screening", words: "Words") -> None:
 
     design = screening.design
     about = f"{design.kind}, {design.trials} trials, D-efficiency {design.efficiency():.2f} %"
-    table = Table(title=escape(f"Percent of the variance explained ({about})"))
+    table = Table(title=f"Percent of the variance explained ({about})")
     for name in ("load", "response"):
         table.add_column(name)
     for name in ("mean", "main", "inter-\nactions", "resid-\nual", "pre-\ndicted\nR2"):
         table.add_column(name, justify="right")
-    console = Console()
+    console = Console(markup=False, emoji=False)
     is_wide = console.width >= WIDE
     if is_wide:
         table.add_column("leading terms, percent")
@@ -328,5 +336,5 @@ def _print_table(screening: "Screening", words: "Words") -> None:
         mean = f"{found.constant:.3g} {screening.responses.units[name]}"
         texts = (load, words.response(name), mean, *(f"{value:.1f}" for value in percents))
         texts = (*texts, r2_text(found.predicted_r2), *([leading] if is_wide else []))
-        table.add_row(*map(escape, texts))
+        table.add_row(*texts)
     console.print(table)

@@ -114,7 +114,7 @@ def spin_cycle(
     comparison = measurement(parameters, table, spin_profile, measured, accelerations)
     check_buildable(machine, parameters)
     kept = "finished cases are kept; repeat the command to continue"
-    with interruptible(kept), result_folder(out) as folder, open_runs(out) as ledger:
+    with interruptible(kept), result_folder(out, kept) as folder, open_runs(out) as ledger:
         result = _run(parameters, table, spin_profile, engine, ledger, workers)
         result = result if comparison is None else _with(result, comparison)
         _write(result, folder, engine)
@@ -231,7 +231,7 @@ def _print_table(result: "SpinCycleResult", out: Path) -> None:
         table.add_row(
             *(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row)
         )
-    console = Console()
+    console = Console(markup=False, emoji=False)
     console.print(table)
     console.print(f"Results in {out}: report.html, cases.csv, rms.csv")
 

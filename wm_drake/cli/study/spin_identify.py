@@ -81,7 +81,9 @@ def spin_identify(
     ] = 0.005,
     seed: Annotated[
         int,
-        typer.Option(help="Seed of the planted values of a virtual experiment, and of the search."),
+        typer.Option(
+            help="Seed of the planted values of a virtual experiment, and of the search.", min=0
+        ),
     ] = 0,
     workers: WorkersOption = None,
     out: Annotated[
@@ -109,7 +111,7 @@ def spin_identify(
     check_buildable(machine, parameters)
     model = partial(SpinModel, parameters, spin_profile, tuple(table), sought)
     kept = "finished runs are kept; repeat the command to continue"
-    with interruptible(kept), result_folder(out) as folder, open_runs(out) as ledger:
+    with interruptible(kept), result_folder(out, kept) as folder, open_runs(out) as ledger:
         result = _identify(model, given, noise, seed, ledger, workers)
         _write(result, folder)
         ledger.mark_finished()
@@ -218,9 +220,9 @@ def _print_table(result: "SpinIdentification", out: Path) -> None:
 
     from wm_drake.report.spin_identify.report import directions, summary, unknowns, warnings_of
 
-    console = Console()
+    console = Console(markup=False, emoji=False)
     for text in (summary(result), *warnings_of(result)):
-        console.print(text, highlight=False, markup=False)
+        console.print(text, highlight=False)
     shown = unknowns(result)
     rows = [shown.header[2:], *(group.rows[0].cells[1:] for group in shown.groups)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]

@@ -69,9 +69,9 @@ class Targets:
                     f"'{key}' is no load, sensor, or LOAD:SENSOR{nearest_names(key, known)}",
                     key="weight",
                 )
-            if not factor >= 0.0:
+            if not 0.0 <= factor < np.inf:
                 raise input_error(
-                    f"{factor:g} is not allowed; must be >= 0", key=f"weight of '{key}'"
+                    f"{factor:g} is not allowed; must be >= 0 and finite", key=f"weight of '{key}'"
                 )
             weight[np.ix_(loads, sensors)] *= factor
         return replace(self, weight=weight)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.parameters.csv_files import read_csv
+from wm_drake.parameters.csv_files import read_csv, read_header
 from wm_drake.studies.doe.coding import LEVELS, MODELS, Levels, columns, efficiency, level_matrix
 from wm_drake.studies.doe.exchange import d_optimal_levels
 from wm_drake.studies.doe.orthogonal import orthogonal_levels
@@ -165,7 +165,7 @@ def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -
         InputError: the file has other columns, other levels or a repeated trial, or the trials do
             not determine the model.
     """
-    named = list(_header(path))
+    named = list(read_header(path))
     wanted = [name for name in named if name != TRIAL and not _VALUES.fullmatch(name)]
     if sorted(wanted) != sorted(factors):
         raise input_error(
@@ -201,12 +201,3 @@ def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -
             where=str(path),
         )
     return design
-
-
-def _header(path: Path) -> pd.Index:
-    try:
-        return pd.read_csv(path, comment="#", skipinitialspace=True, nrows=0).columns
-    except (OSError, ValueError) as error:
-        raise input_error(
-            f"cannot be read as CSV ({' '.join(str(error).split())})", where=str(path)
-        ) from None
