@@ -45,6 +45,7 @@ def wm_drake(monkeypatch, capsys, tmp_path):
     """Runs `wm-drake` in this process, in a folder of its own: wm_drake("machine", "check", "reference").code == 0."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setattr("wm_drake.cli.progress.LINE_PERIOD", float("inf"))
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["wm-drake", *map(str, arguments)])

@@ -14,7 +14,7 @@ import pytest
 
 from wm_drake import load_record
 from wm_drake.cli import main
-from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.model.machine import build_machine
 from wm_drake.parameters import load_machine
 
@@ -246,13 +246,14 @@ def test_failed_run_leaves_nothing(monkeypatch, tmp_path, mishap):
 
 def test_failed_run_keeps_older_results(monkeypatch, tmp_path):
     def fail_after_writing():
-        with result_folder(Path("out")) as folder:
+        with result_folder(Path("out"), Run("spin", overwrite=True)) as folder:
             (folder / "report.html").write_text("new")
             raise RuntimeError
 
     monkeypatch.chdir(tmp_path)
-    Path("out").mkdir()
-    before = write_all({"out/report.html": "old"})
+    with result_folder(Path("out"), Run("spin")) as folder:
+        (folder / "report.html").write_text("old")
+    before = listing()
     with pytest.raises(RuntimeError):
         fail_after_writing()
     assert (listing(), Path("out/report.html").read_text()) == (before, "old")
@@ -430,6 +431,7 @@ def test_result_files_are_there_and_nothing_beside_them(plain):
             "out/record_middle.nc",
             "out/replay_middle.html",
             "out/report.html",
+            "out/run.json",
             "profile.yaml",
         )
     ]
@@ -573,7 +575,7 @@ def test_loads_side_by_side(tmp_path):
     assert (ended.returncode, ended.stderr.strip()) == (0, "")
     assert [case["load"] for case in strict_json(ended.stdout)["cases"]] == ["middle", "counter"]
     assert {path.name for path in (tmp_path / "wm-drake-spin").iterdir()} == {
-        *("record_middle.nc", "record_counter.nc", "amplitudes.csv", "report.html")
+        *("record_middle.nc", "record_counter.nc", "amplitudes.csv", "report.html", "run.json")
     }
 
 

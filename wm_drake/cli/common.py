@@ -30,6 +30,25 @@ SetOption = Annotated[
         metavar="KEY=VALUE",
     ),
 ]
+
+
+def _out_folder(text: str) -> Path:
+    """Return the path of a result folder; refuse an empty text, which is the current folder."""
+    if not str(text).strip():
+        raise input_error("is empty; name a folder", where="--out")
+    return Path(text)
+
+
+OutOption = Annotated[
+    Path,
+    typer.Option("--out", help="Folder for the results.", metavar="DIR", parser=_out_folder),
+]
+OverwriteOption = Annotated[
+    bool,
+    typer.Option(
+        "--overwrite", help="Replace the results of an earlier run of this command in the folder."
+    ),
+]
 JsonOption = Annotated[
     bool,
     typer.Option("--json", help="Print one JSON object on standard output instead of tables."),

@@ -10,6 +10,8 @@ import typer
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
+    OutOption,
+    OverwriteOption,
     SetOption,
     cases_of,
     check_buildable,
@@ -17,7 +19,9 @@ from wm_drake.cli.common import (
     interruptible,
     load_parameters,
 )
-from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.progress import progress_bars
+from wm_drake.cli.result_folder import Run, result_folder
+from wm_drake.cli.terminal import Console
 from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -53,7 +57,8 @@ def spin(
             metavar="NAME",
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for the results.", metavar="DIR")] = DEFAULT_OUT,
+    out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
     replay: Annotated[
         bool,
         typer.Option("--replay", help="Also write a 3D replay of the largest motion of each load."),
@@ -72,7 +77,7 @@ def spin(
     parameters = load_parameters(machine, sets)
     cases = cases_of(parameters, load, not no_gasket, profile)
     check_buildable(machine, parameters)
-    with interruptible(), result_folder(out) as folder:
+    with interruptible(), result_folder(out, Run("spin", overwrite)) as folder:
         result = _run(parameters, cases, engine)
         _write(result, folder, replay)
     diverged = [
@@ -91,25 +96,10 @@ def spin(
 
 
 def _run(parameters: "MachineParameters", cases: "list[Case]", engine: str) -> "SpinResult":
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
     from wm_drake.studies.spin.study import run_spin
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        tasks = [bar.add_task(case.name, total=1.0) for case in cases]
-        return run_spin(
-            parameters,
-            cases,
-            engine,
-            progress=lambda i, fraction: bar.update(tasks[i], completed=fraction),
-        )
+    with progress_bars([case.name for case in cases]) as progress:
+        return run_spin(parameters, cases, engine, progress=progress)
 
 
 def _write(result: "SpinResult", folder: Path, replay: bool) -> None:
@@ -138,7 +128,6 @@ def _replay(result: "SpinResult", case: "CaseResult") -> str:
 
 
 def _print_tables(result: "SpinResult", out: Path) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from wm_drake.parameters.units import Unit

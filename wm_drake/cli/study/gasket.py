@@ -12,6 +12,8 @@ import typer
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
+    OutOption,
+    OverwriteOption,
     SetOption,
     cases_of,
     check_buildable,
@@ -20,8 +22,9 @@ from wm_drake.cli.common import (
     load_parameters,
 )
 from wm_drake.cli.progress import progress_bar
-from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.study.common import ProfileOption, ResumeOption, WorkersOption, study_ledger
+from wm_drake.cli.terminal import Console, say
 from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -100,9 +103,8 @@ def gasket(
         ),
     ] = None,
     resume: ResumeOption = False,
-    out: Annotated[
-        Path, typer.Option(help="Folder for the results and the ledger of runs.", metavar="DIR")
-    ] = DEFAULT_OUT,
+    out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
@@ -117,14 +119,16 @@ def gasket(
     middle = _at_middle(parameters, levels)
     check_buildable(machine, parameters)
     work = GasketTrials(middle, levels, cases)
+    identity = _identity(work, plan)
+    writer = Run("study gasket", overwrite, identity)
     with (
         _runner(middle, workers, cluster) as run,
-        study_ledger(out, _identity(work, plan), resume) as ledger,
+        study_ledger(out, writer, identity, resume) as ledger,
     ):
         screening = _run(work, plan, partial(run, ledger=ledger))
         ledger.mark_finished()
         try:
-            with result_folder(out) as folder:
+            with result_folder(out, writer) as folder:
                 _write(screening, work, folder, time.perf_counter() - begin)
         except OSError as error:
             message = (
@@ -260,7 +264,7 @@ def _print_result(screening: "Screening", out: Path, as_json: bool, wall_s: floa
         typer.echo(to_json(as_plain_data(screening) | {"wall_s": wall_s}))
     else:
         _print_table(screening)
-        typer.echo(f"Results in {out}: report.html and CSV tables")
+        say(f"Results in {out}: report.html and CSV tables")
     for (trial, load), reason in screening.responses.failed.items():
         typer.echo(f"trial {trial + 1}, load {load}: {reason}", err=True)
     if screening.responses.failed:
@@ -268,7 +272,6 @@ def _print_result(screening: "Screening", out: Path, as_json: bool, wall_s: floa
 
 
 def _print_table(screening: "Screening") -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from wm_drake.studies.gasket.screening import leading_terms
