@@ -518,6 +518,36 @@ def test_set_changes_the_result_and_is_recorded(wm_drake, plain):
     assert "set on the command line" in report
 
 
+COMPARED = {
+    "as it was measured": ((), True),
+    "another load": (("--load", "heavy.yaml"), False),
+    "another profile": (("--profile", "profile.yaml"), False),
+    "a number changed": (("--set", "gasket.damping_x=0.03 N s/mm"), False),
+    "a file that extends": (("--machine", "mine.yaml"), False),
+    "measurements named": (("--machine", "mine.yaml", "--measured", "measured.csv"), True),
+}
+
+
+@pytest.mark.parametrize("kind", COMPARED)
+def test_only_what_was_measured_is_judged_against_the_experiment(wm_drake, monkeypatch, kind):
+    arguments, compared = COMPARED[kind]
+    short = "profile: {time: '(0, 2) s', speed: '(0, 100) rpm'}\n"
+    Path("own.yaml").write_text(f"extends: reference\nmeasured: [measured.csv]\n{short}")
+    Path("mine.yaml").write_text("extends: own.yaml\n")
+    Path("profile.yaml").write_text("time: (0, 2) s\nspeed: (0, 90) rpm\n")
+    Path("heavy.yaml").write_text("unbalances: [{mass: 2 kg, radius: 200 mm, y: 0 mm}]\n")
+    Path("measured.csv").write_text(
+        f"load,gasket,source,{','.join(SENSORS)}\nmiddle,yes,experiment,1,1,1,1,1,1\n"
+        "heavy,yes,experiment,1,1,1,1,1,1\n"
+    )
+    machine = () if "--machine" in arguments else ("--machine", "own.yaml")
+    load = () if "--load" in arguments else ("--load", "middle")
+    monkeypatch.setattr("wm_drake.report.spin.report._envelopes_picture", lambda *_: None)
+    assert wm_drake("spin", *machine, *load, *arguments, "--out", "out").code == 0
+    sources = pd.read_csv("out/amplitudes.csv")["source"].tolist()
+    assert sources == (["experiment", "wm_drake"] if compared else ["wm_drake"])
+
+
 def test_load_file_equals_the_same_load_of_the_machine(wm_drake, plain):
     one = load_machine("reference").loads["middle"].unbalances[0]
     place = f"radius: {1e3 * one.radius:g} mm, y: {1e3 * one.y:g} mm"

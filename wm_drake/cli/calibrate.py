@@ -19,6 +19,7 @@ from wm_drake.cli.common import (
     existing_file,
     interruptible,
     load_parameters,
+    with_measured,
 )
 from wm_drake.cli.progress import ProgressLines, has_bars
 from wm_drake.cli.result_folder import LEDGER, Run, prepare_folder, result_folder
@@ -99,7 +100,7 @@ def calibrate(
     """Fit unknown numbers of a machine to measured amplitudes, within bounds and with priors."""
     from wm_drake.studies.calibration.calibration import Plan
 
-    parameters = _with_targets(load_parameters(machine, sets), targets)
+    parameters = with_measured(load_parameters(machine, sets), targets, "--targets")
     wanted = _targets(parameters).weighted(_weights(weight))
     check_buildable(machine, parameters)
     plan = Plan(method, starts, seed, iterations, deviation / 100.0, 1e-3 * resolution)
@@ -116,21 +117,15 @@ def calibrate(
         _print(calibration, predictions, out)
 
 
-def _with_targets(parameters: "MachineParameters", files: list[Path] | None) -> "MachineParameters":
-    """Return the machine with other files of measured amplitudes, if any are given."""
-    if not files:
-        return parameters
-    return parameters.model_copy(
-        update={
-            "measured": tuple(str(existing_file(path, "--targets").resolve()) for path in files)
-        }
-    )
-
-
 def _targets(parameters: "MachineParameters") -> "Targets":
     from wm_drake.parameters import measured_amplitudes
     from wm_drake.studies.calibration.targets import targets_of
 
+    if not parameters.measured:
+        raise input_error(
+            f"machine '{parameters.name}' names no measured amplitudes of its own; name a CSV file",
+            where="--targets",
+        )
     return targets_of(
         parameters,
         measured_amplitudes(parameters),

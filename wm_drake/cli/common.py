@@ -153,6 +153,16 @@ def cases_of(
     return cases
 
 
+def with_measured(
+    parameters: "MachineParameters", files: list[Path] | None, option: str
+) -> "MachineParameters":
+    """Return the machine with other files of measured amplitudes, if any are given."""
+    if not files:
+        return parameters
+    paths = tuple(str(existing_file(path, option).resolve()) for path in files)
+    return parameters.model_copy(update={"measured": paths})
+
+
 def existing_file(path: Path, option: str) -> Path:
     """Return the path if it is a file; otherwise raise an InputError for the option."""
     if not path.is_file():

@@ -18,6 +18,7 @@ from wm_drake.cli.common import (
     command_line,
     interruptible,
     load_parameters,
+    with_measured,
 )
 from wm_drake.cli.progress import progress_bars
 from wm_drake.cli.result_folder import Run, result_folder
@@ -63,6 +64,15 @@ def spin(
         bool,
         typer.Option("--replay", help="Also write a 3D replay of the largest motion of each load."),
     ] = False,
+    measured: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Measured amplitudes to compare with: load, gasket, source, and a column per "
+            "sensor in mm. Repeatable. Default: those of the machine file, for its own numbers, "
+            "loads and profile.",
+            metavar="CSV",
+        ),
+    ] = None,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
@@ -74,11 +84,12 @@ def spin(
         raise input_error(
             f"unknown engine '{engine}'{nearest_names(engine, ENGINES)}", where="--engine"
         )
-    parameters = load_parameters(machine, sets)
+    parameters = with_measured(load_parameters(machine, sets), measured, "--measured")
     cases = cases_of(parameters, load, not no_gasket, profile)
     check_buildable(machine, parameters)
     with interruptible(), result_folder(out, Run("spin", overwrite)) as folder:
-        result = _run(parameters, cases, engine)
+        comparison = "all" if measured else "none" if sets else "as measured"
+        result = _run(parameters, cases, engine, comparison)
         _write(result, folder, replay)
     diverged = [
         f"{r.case.name}: {r.record.attrs['diverged']}"
@@ -95,11 +106,15 @@ def spin(
         raise typer.Exit(1)
 
 
-def _run(parameters: "MachineParameters", cases: "list[Case]", engine: str) -> "SpinResult":
-    from wm_drake.studies.spin.study import run_spin
+def _run(
+    parameters: "MachineParameters", cases: "list[Case]", engine: str, comparison: str
+) -> "SpinResult":
+    from wm_drake.studies.spin.study import Comparison, run_spin
 
     with progress_bars([case.name for case in cases]) as progress:
-        return run_spin(parameters, cases, engine, progress=progress)
+        return run_spin(
+            parameters, cases, engine, progress=progress, comparison=Comparison(comparison)
+        )
 
 
 def _write(result: "SpinResult", folder: Path, replay: bool) -> None:

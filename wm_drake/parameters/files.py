@@ -36,7 +36,8 @@ def shipped_machines() -> dict[str, Path]:
 def load_machine(name_or_path: str | Path = "reference") -> MachineParameters:
     """Read a machine file.
 
-    A file with ``extends: NAME_OR_PATH`` contains only the changes to another machine.
+    A file with ``extends: NAME_OR_PATH`` contains only the changes to another machine. The measured
+    amplitudes of that machine are not inherited, because they belong to its numbers.
 
     Args:
         name_or_path: Name of a shipped machine or path of a YAML file.
@@ -279,9 +280,9 @@ def _extended(path: Path, seen: tuple[Path, ...]) -> CommentedMap:
     if base_path.resolve() in (*seen, path.resolve()):
         raise input_error("extends itself", where=str(path), key="extends")
     base_tree = _extended(base_path, (*seen, path.resolve()))
-    for key in ("model", "measured"):  # paths are relative to the file that contains them
-        if key in base_tree:
-            base_tree[key] = _with_absolute_paths({key: base_tree[key]}, base_path)[key]
+    base_tree.pop("measured", None)  # another machine was measured
+    if "model" in base_tree:  # paths are relative to the file that contains them
+        base_tree["model"] = _with_absolute_paths({"model": base_tree["model"]}, base_path)["model"]
     _merge(base_tree, tree)
     return base_tree
 

@@ -20,7 +20,7 @@ from wm_drake.report.spin.cases import case_title, has_gasket, speed_rpm
 from wm_drake.report.spin.figures import envelopes_figure, gaps_figure, gasket_figure, orbits_figure
 from wm_drake.report.spin.tables import amplitude_table
 from wm_drake.report.tables import Table, parameter_table
-from wm_drake.studies.spin.study import CaseResult, SpinResult
+from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
 
 __all__ = ["amplitude_table", "spin_report"]
 
@@ -93,7 +93,7 @@ def summary(result: SpinResult, table: pd.DataFrame) -> str:
                 opening,
                 _largest_amplitude_sentence(ended),
                 _smallest_gap_sentence(ended),
-                _agreement_sentence(ended, table),
+                _agreement_sentence(result, ended, table),
             ],
         )
     )
@@ -151,7 +151,7 @@ def _case_facts(case: CaseResult) -> str:
     return f"{facts} Smallest gap to the housing: {_gap_text(case, gap)}." if gap else facts
 
 
-def _agreement_sentence(cases: list[CaseResult], table: pd.DataFrame) -> str:
+def _agreement_sentence(result: SpinResult, cases: list[CaseResult], table: pd.DataFrame) -> str:
     changes = [
         change
         for case in cases
@@ -159,7 +159,7 @@ def _agreement_sentence(cases: list[CaseResult], table: pd.DataFrame) -> str:
         if np.isfinite(change.percent)
     ]
     if not changes:
-        return "The machine file has no measured amplitudes for these cases."
+        return _why_not_compared(result)
     mean = float(np.mean([abs(change.percent) for change in changes]))
     worst = max(changes, key=lambda change: abs(change.percent))
     return (
@@ -169,8 +169,24 @@ def _agreement_sentence(cases: list[CaseResult], table: pd.DataFrame) -> str:
     )
 
 
+def _why_not_compared(result: SpinResult) -> str:
+    if not result.parameters.measured:
+        return "The machine file has no measured amplitudes."
+    if result.comparison is Comparison.NONE:
+        return (
+            "There is no comparison with the measured amplitudes of the machine file, because its "
+            "numbers were changed."
+        )
+    if not any(result.is_compared(case) for case in result.results):
+        return (
+            "There is no comparison with the measured amplitudes of the machine file, because they "
+            "belong to other loads or to another spin profile."
+        )
+    return "The machine file has no measured amplitudes for these cases."
+
+
 def warnings_of(result: SpinResult) -> list[str]:
-    """Return warnings about runs that diverged, parts that overlap, and another spin profile."""
+    """Return warnings about runs that diverged and about parts that overlap."""
     found = []
     for case in result.results:
         gap, title = case.measures.smallest_gap, case_title(case)
@@ -185,11 +201,6 @@ def warnings_of(result: SpinResult) -> list[str]:
                 f"Load {title}: {parts} overlap by {number(-MM_PER_M * gap.distance)} mm. The "
                 "model has no contact forces. In the real machine these parts would collide, and "
                 "the motion after that is not valid."
-            )
-        if case.case.profile != result.parameters.profile:
-            found.append(
-                f"Load {title}: the spin profile differs from the one in the machine file. "
-                "Measured amplitudes belong to the profile of the machine file."
             )
     return found
 
