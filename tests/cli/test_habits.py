@@ -148,3 +148,69 @@ def test_new_machine_that_cannot_be_written(wm_drake, name, message):
     assert (ended.code, ended.out) == (2, "")
     assert message in ended.err
     assert [(path.name, path.read_text()) for path in Path().iterdir()] == [("taken.yaml", "mine")]
+
+
+UNUSUAL = (
+    "extends: reference\nname: bad\nloads: {middle: {unbalances: [{mass: 800 kg, radius: 240 mm, "
+    "y: 0 mm}]}}\nspring_types: {suspension: {stiffness: 6.5 N/m}}\n"
+)
+
+
+def test_unusual_values_are_warned_of_and_strict_refuses_them(wm_drake):
+    Path("bad.yaml").write_text(UNUSUAL)
+    ended = wm_drake("machine", "check", "bad.yaml")
+    assert (ended.code, ended.out) == (0, "bad.yaml: machine 'bad' is valid\n")
+    assert ended.messages[:2] == [
+        "warning: bad.yaml:4: spring_types.suspension.stiffness: 0.0065 N/mm is unusual; usual is "
+        "1 to 60 N/mm",
+        "warning: bad.yaml:3: loads.middle.unbalances.0.mass: 800 kg is unusual; usual is 0 to 5 "
+        "kg",
+    ]
+    assert "springs.left: is too soft" in ended.messages[2]
+    strict = wm_drake("machine", "check", "bad.yaml", "--strict")
+    assert (strict.code, strict.out) == (2, "")
+    assert [f"warning: {line}" for line in strict.messages] == ended.messages
+    assert wm_drake("machine", "check", "reference", "--strict").code == 0
+
+
+@pytest.mark.parametrize(
+    ("files", "arguments"),
+    [
+        ({"m.yaml": "extends: reference\ngravity: 9,81 m/s^2\n"}, ("machine", "check", "m.yaml")),
+        ({}, ("spin", "--set", "gasket.damping_x=0,03 N s/mm")),
+        ({"p.csv": "time_s,speed_rpm\n0,0\n1,5,30\n"}, ("spin", "--profile", "p.csv")),
+        ({"p.csv": "time_s;speed_rpm\n0;0\n1,5;30\n"}, ("spin", "--profile", "p.csv")),
+        ({"p.csv": 'time_s,speed_rpm\n0,0\n"1,5",30\n'}, ("spin", "--profile", "p.csv")),
+        (
+            {"l.csv": "time [s];displacement [mm];force [N]\n0;0;0\n0,1;1,5;30\n"},
+            ("identify", "damper", "l.csv"),
+        ),
+        (
+            {"l.csv": "time [s],displacement [mm],force [N]\n0,0,0\n0,1,1,5,30\n"},
+            ("identify", "damper", "l.csv"),
+        ),
+        (
+            {"m.csv": 'load,gasket,source,Xr,Yr,Zr,Xf,Yf,Zf\nmiddle,yes,exp,"1,5",1,1,1,1,1\n'},
+            ("spin", "--measured", "m.csv"),
+        ),
+    ],
+)
+def test_decimal_comma_is_named(wm_drake, files, arguments):
+    for name, text in files.items():
+        Path(name).write_text(text)
+    ended = wm_drake(*arguments)
+    assert (ended.code, ended.out) == (2, "")
+    (message,) = ended.messages
+    assert "the decimal sign is a point" in message
+    assert len(message) < 300
+
+
+def test_phase_error_without_effect_is_said(wm_drake):
+    Path("profile.yaml").write_text("time: (0, 2) s\nspeed: (0, 100) rpm\n")
+    ended = wm_drake(
+        *("spin", "--load", "middle", "--profile", "profile.yaml", "--out", "out"),
+        *("--set", "imperfections.phase_error=5 deg"),
+    )
+    (message,) = ended.messages
+    assert message.startswith("warning: imperfections.phase_error has no effect on the loads")
+    assert "imperfections.phase_error has no effect" in Path("out/report.html").read_text()

@@ -143,7 +143,7 @@ def test_null_removes_an_entry(write, reference):
     assert machine.measured == ()
 
 
-def test_measured_paths_are_relative_to_the_file(write, tmp_path, reference):
+def test_measured_paths_are_relative_to_the_file(write, tmp_path):
     machine = load_machine(write("extends: reference\nmeasured: [mine.csv, sub/../yours.csv]\n"))
     assert machine.measured == (str(tmp_path / "mine.csv"), str(tmp_path / "yours.csv"))
     inherited = load_machine(write("extends: reference\nname: x\n"))

@@ -19,6 +19,7 @@ from wm_drake.cli.common import (
     existing_file,
     interruptible,
     load_parameters,
+    warn_of_phase_error,
     with_measured,
 )
 from wm_drake.cli.progress import ProgressLines, has_bars
@@ -103,6 +104,7 @@ def calibrate(
     parameters = with_measured(load_parameters(machine, sets), targets, "--targets")
     wanted = _targets(parameters).weighted(_weights(weight))
     check_buildable(machine, parameters)
+    warn_of_phase_error(parameters)
     plan = Plan(method, starts, seed, iterations, deviation / 100.0, 1e-3 * resolution)
     groups = [entry.split(",") for entry in leave_out or []]
     with interruptible(f"finished evaluations are kept in {out}; continue with --resume"):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from wm_drake.cli.terminal import say
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -121,6 +122,14 @@ def pairs_of(entries: list[str] | None, option: str) -> list[tuple[str, str]]:
     return found
 
 
+def warn_of_phase_error(parameters: "MachineParameters") -> None:
+    """Print a warning if a machine has a phase error, which runs of its loads do not use."""
+    from wm_drake.simulation.cases import UNUSED_PHASE_ERROR
+
+    if parameters.imperfections.phase_error:
+        say(f"warning: {UNUSED_PHASE_ERROR}", err=True)
+
+
 def cases_of(
     parameters: "MachineParameters", loads: list[str] | None, gasket: bool, profile: Path | None
 ) -> "list[Case]":
@@ -128,6 +137,7 @@ def cases_of(
     from wm_drake.parameters import load_load, load_profile
     from wm_drake.simulation.cases import Case
 
+    warn_of_phase_error(parameters)
     spin_profile = (
         parameters.profile if profile is None else load_profile(existing_file(profile, "--profile"))
     )
@@ -170,13 +180,21 @@ def existing_file(path: Path, option: str) -> Path:
     return path
 
 
-def check_buildable(file: str, parameters: "MachineParameters") -> None:
-    """Raise an InputError for faults that only building the machine reveals."""
+def check_buildable(file: str, parameters: "MachineParameters") -> "tuple[Problem, ...]":
+    """Raise an InputError for faults that only building the machine reveals.
+
+    Returns:
+        Values of the machine that are legal but unusual, with file and line.
+    """
     from wm_drake.model.machine import build_machine
-    from wm_drake.parameters import measured_amplitudes
+    from wm_drake.model.plausibility import unusual_values
+    from wm_drake.parameters import located, machine_path, measured_amplitudes
     from wm_drake.simulation.runs import check_bearing, checked_step
 
     with located_in(file):
         measured_amplitudes(parameters)
         step = checked_step(parameters, None)
-        check_bearing(build_machine(parameters).set_up(), step)
+        setup = build_machine(parameters).set_up()
+        check_bearing(setup, step)
+    unusual = unusual_values(setup)
+    return located(InputError(unusual), machine_path(file)).problems if unusual else ()

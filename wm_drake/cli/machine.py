@@ -10,16 +10,28 @@ import typer
 
 from wm_drake.cli.common import JsonOption, SetOption, check_buildable, load_parameters, located_in
 from wm_drake.cli.terminal import say
-from wm_drake.errors import input_error
+from wm_drake.errors import InputError, input_error
 
 app = typer.Typer(help="List, start, check and show machine files.", no_args_is_help=True)
 
 
 @app.command("check")
-def machine_check(file: Annotated[str, typer.Argument(metavar="NAME|FILE")]) -> None:
-    """Check a machine file. The exit code is 0, or 2 with one line per problem."""
+def machine_check(
+    file: Annotated[str, typer.Argument(metavar="NAME|FILE")],
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Treat unusual values as errors.")
+    ] = False,
+) -> None:
+    """Check a machine file. The exit code is 0, or 2 with one line per problem.
+
+    Values outside the usual range are warned of.
+    """
     parameters = load_parameters(file, None)
-    check_buildable(file, parameters)
+    unusual = check_buildable(file, parameters)
+    if unusual and strict:
+        raise InputError(unusual)
+    for problem in unusual:
+        typer.echo(f"warning: {problem}", err=True)
     say(f"{file}: machine '{parameters.name}' is valid")
 
 

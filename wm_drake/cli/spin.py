@@ -62,7 +62,9 @@ def spin(
     overwrite: OverwriteOption = False,
     replay: Annotated[
         bool,
-        typer.Option("--replay", help="Also write a 3D replay of the largest motion of each load."),
+        typer.Option(
+            "--replay", help="Also write a 3D replay around the largest amplitude of each load."
+        ),
     ] = False,
     measured: Annotated[
         list[Path] | None,

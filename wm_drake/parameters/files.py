@@ -22,6 +22,7 @@ from wm_drake.parameters.keys import quantities, source_of
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.spin import Load, SpinProfile
+from wm_drake.parameters.units import comma_hint
 
 MACHINES_FOLDER = Path(__file__).parents[1] / "data" / "machines"
 CYCLES_FOLDER = Path(__file__).parents[1] / "data" / "cycles"
@@ -135,8 +136,9 @@ def load_profile(name_or_path: str | Path) -> SpinProfile:
     finite = np.isfinite(numbers.to_numpy(dtype=float)).all(axis=1)
     if not finite.all():
         row = int(np.flatnonzero(~finite)[0])
+        cells = ", ".join(f"'{cell}'" for cell in table.iloc[row].tolist())
         raise input_error(
-            f"row {row + 1} of the data is not two finite numbers: {table.iloc[row].tolist()}",
+            f"row {row + 1} of the data is not two finite numbers: {cells}{comma_hint(cells)}",
             where=str(path),
         )
     text = {"time": ("time_s", "s"), "speed": ("speed_rpm", "rpm")}

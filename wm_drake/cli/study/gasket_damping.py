@@ -17,6 +17,7 @@ from wm_drake.cli.common import (
     existing_file,
     interruptible,
     load_parameters,
+    warn_of_phase_error,
 )
 from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.terminal import say
@@ -59,6 +60,7 @@ def gasket_damping(
 
     parameters = load_parameters(machine, sets)
     check_buildable(machine, parameters)
+    warn_of_phase_error(parameters)
     run = Run("study gasket-damping", overwrite)
     with interruptible(), result_folder(out, run) as folder:
         truth = None

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.model.scene import Gap
+from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.report.formatting import (
     MM_PER_M,
     RPM_PER_RAD_S,
@@ -20,6 +21,7 @@ from wm_drake.report.spin.cases import case_title, has_gasket, speed_rpm
 from wm_drake.report.spin.figures import envelopes_figure, gaps_figure, gasket_figure, orbits_figure
 from wm_drake.report.spin.tables import amplitude_table
 from wm_drake.report.tables import Table, parameter_table
+from wm_drake.simulation.cases import UNUSED_PHASE_ERROR
 from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
 
 __all__ = ["amplitude_table", "spin_report"]
@@ -186,8 +188,10 @@ def _why_not_compared(result: SpinResult) -> str:
 
 
 def warnings_of(result: SpinResult) -> list[str]:
-    """Return warnings about runs that diverged and about parts that overlap."""
-    found = []
+    """Return warnings about unusual numbers, runs that diverged, and parts that overlap."""
+    found = [f"{problem.key}: {problem.message}." for problem in unusual_numbers(result.parameters)]
+    if result.parameters.imperfections.phase_error:
+        found.append(UNUSED_PHASE_ERROR)
     for case in result.results:
         gap, title = case.measures.smallest_gap, case_title(case)
         if case.record.attrs["diverged"]:
@@ -266,11 +270,11 @@ def _orbits_picture(case: CaseResult) -> Picture | None:
     depths = case.record.sensor_point.sel(axis="y")
     caption = (
         "Path of the drum axis in the planes of the foremost and the rearmost sensor, seen from "
-        "the front of the machine. Dark line: the drum revolution in which the axis is farthest "
-        "from its rest position. Pale line: the revolutions before and after it."
+        "the front of the machine. Dot and dark line: the moment of the largest amplitude of all "
+        "sensors, and the drum revolution around it. Pale line: the revolutions before and after."
     )
     alternative = (
-        "Orbits of the drum axis, front and rear, around the largest motion, "
+        "Orbits of the drum axis, front and rear, around the largest amplitude, "
         f"load {case_title(case)}."
     )
     return picture(
