@@ -287,6 +287,7 @@ def test_shown_machine_is_complete(wm_drake, reference):
         *("telescopic_dampers", "drum_bearing"),
         *("sensors", "detergent_point_T", "loads", "profile", "rest_pose", "equilibrium_residual"),
         *("natural_frequencies_hz", "mode_damping_ratios"),
+        *("format", "conventions", "laws", "imperfections", "accelerometers", "numerics"),
     }
     assert sum(body["mass"] for body in shown["bodies"].values()) == pytest.approx(
         shown["oscillating_mass_kg"]
@@ -465,6 +466,7 @@ def test_table_of_amplitudes_agrees(plain):
 def test_report_is_one_self_contained_page_with_its_command(plain):
     report = (plain.folder / "out" / "report.html").read_text(encoding="utf-8")
     assert "--profile profile.yaml" in report
+    assert '<a href="replay_middle.html">' in report
     assert is_self_contained(report)
 
 

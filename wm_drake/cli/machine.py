@@ -54,6 +54,14 @@ def machine_show(
     typer.echo(json.dumps(description, indent=1) if as_json else as_text(description))
 
 
+@app.command("schema")
+def machine_schema() -> None:
+    """Print the JSON schema of the output of `machine show --json`."""
+    from wm_drake.studies.description.schema import description_schema
+
+    typer.echo(json.dumps(description_schema(), indent=1))
+
+
 @app.command("list")
 def machine_list(as_json: JsonOption = False) -> None:
     """List the machines that wm_drake contains."""

@@ -101,7 +101,7 @@ def spin(
     if as_json:
         typer.echo(json.dumps(_as_json(result)))
     else:
-        _print_tables(result, out)
+        _print_tables(result, out, replay)
     for message in diverged:
         typer.echo(message, err=True)
     if diverged:
@@ -123,15 +123,15 @@ def _write(result: "SpinResult", folder: Path, replay: bool) -> None:
     from wm_drake.report.spin.report import amplitude_table, spin_report
     from wm_drake.simulation.records import save_record
 
+    replays = {}
     for case in result.results:
         save_record(case.record, folder / f"record_{case.case.name}.nc")
         if replay:
-            (folder / f"replay_{case.case.name}.html").write_text(
-                _replay(result, case), encoding="utf-8"
-            )
+            replays[case.case.name] = name = f"replay_{case.case.name}.html"
+            (folder / name).write_text(_replay(result, case), encoding="utf-8")
     amplitude_table(result).to_csv(folder / "amplitudes.csv", index=False, float_format="%.4f")
     command = command_line()
-    (folder / "report.html").write_text(spin_report(result, command), encoding="utf-8")
+    (folder / "report.html").write_text(spin_report(result, command, replays), encoding="utf-8")
 
 
 def _replay(result: "SpinResult", case: "CaseResult") -> str:
@@ -144,7 +144,7 @@ def _replay(result: "SpinResult", case: "CaseResult") -> str:
     return replay_page(result.parameters, time, positions)
 
 
-def _print_tables(result: "SpinResult", out: Path) -> None:
+def _print_tables(result: "SpinResult", out: Path, replay: bool) -> None:
     from rich.table import Table
 
     from wm_drake.parameters.units import Unit
@@ -172,7 +172,8 @@ def _print_tables(result: "SpinResult", out: Path) -> None:
                 f"{case.case.name}: smallest gap {millimetre.from_si(gap.distance):.1f} mm between "
                 f"{gap.moving} and {gap.fixed}, at {gap.time:.2f} s"
             )
-    console.print(f"Results in {out}: report.html, amplitudes.csv, record_<load>.nc")
+    replays = ", replay_<load>.html" if replay else ""
+    console.print(f"Results in {out}: report.html, amplitudes.csv, record_<load>.nc{replays}")
 
 
 def _as_json(result: "SpinResult") -> dict[str, Any]:

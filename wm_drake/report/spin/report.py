@@ -1,6 +1,7 @@
 """Report of a spin run: one self-contained HTML file."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,7 @@ class CaseView:
         facts: Short sentences above the figures.
         pictures: Figures.
         changed: Parameters of the case that differ from the machine's, if any.
+        replay: Name of the file with the 3D replay, beside the page; empty if there is none.
     """
 
     anchor: str
@@ -44,14 +46,18 @@ class CaseView:
     facts: str
     pictures: tuple[Picture, ...]
     changed: Table | None
+    replay: str = ""
 
 
-def spin_report(result: SpinResult, command: str = "") -> str:
+def spin_report(
+    result: SpinResult, command: str = "", replays: Mapping[str, str] | None = None
+) -> str:
     """Return the report as text of one self-contained HTML file.
 
     Args:
         result: Result with at least one case.
         command: Command line of the run, shown on the page.
+        replays: Names of the files with a 3D replay, by name of the case.
 
     Raises:
         InputError: A file of measured amplitudes cannot be used.
@@ -68,7 +74,12 @@ def spin_report(result: SpinResult, command: str = "") -> str:
         critical_speeds=tables.critical_speeds(result),
         smallest_gaps=tables.smallest_gaps(result),
         gaps_picture=_gaps_picture(result),
-        cases=[_case_view(result, index, table) for index in range(len(result.results))],
+        cases=[
+            replace(
+                _case_view(result, index, table), replay=(replays or {}).get(case.case.name, "")
+            )
+            for index, case in enumerate(result.results)
+        ],
         facts=facts_of_run(result, command),
         loads=tables.loads(result),
         profiles=tables.profiles(result),
