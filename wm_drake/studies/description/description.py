@@ -61,9 +61,9 @@ def describe(machine: Machine) -> dict[str, Any]:
     modes = natural_modes(machine)
     parameters = setup.parameters
     return {
-        "format": VERSION,
         "machine": parameters.name,
         "units": "SI: m, kg, s, rad, N; x right, y to the rear, z up",
+        "format": VERSION,
         "conventions": CONVENTIONS,
         "laws": _laws(parameters),
         "gravity_W": [0.0, 0.0, -parameters.gravity],

@@ -268,9 +268,9 @@ class Description(_Part):
     The suffix of a key is the frame of a point or direction: W housing, T tub, D drum.
     """
 
-    format: str = Field(description=f"'{VERSION}'")
     machine: str
     units: str
+    format: str = Field(description=f"'{VERSION}'")
     conventions: dict[str, str] = Field(description="Conventions by subject, as sentences.")
     laws: dict[str, str] = Field(description="Equation numbers of the laws in use, by name.")
     gravity_W: Vector = Field(description="[m/s^2]")
