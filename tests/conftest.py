@@ -51,6 +51,7 @@ def wm_drake(monkeypatch, capsys, tmp_path):
     """
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setattr("wm_drake.cli.progress.LINE_PERIOD", float("inf"))
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["wm-drake", *map(str, arguments)])

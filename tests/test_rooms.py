@@ -27,6 +27,7 @@ ORDER = (
     {"studies"},
     {"report"},
     {"cli"},
+    {"__main__"},
 )
 LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}
 WITHOUT_DRAKE = {

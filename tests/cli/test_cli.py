@@ -14,7 +14,7 @@ import pytest
 
 from wm_drake import load_record
 from wm_drake.cli import main
-from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
 
@@ -246,13 +246,14 @@ def test_failed_run_leaves_nothing(monkeypatch, tmp_path, mishap):
 
 def test_failed_run_keeps_older_results(monkeypatch, tmp_path):
     def fail_after_writing():
-        with result_folder(Path("out")) as folder:
+        with result_folder(Path("out"), Run("spin", overwrite=True)) as folder:
             (folder / "report.html").write_text("new")
             raise RuntimeError
 
     monkeypatch.chdir(tmp_path)
-    Path("out").mkdir()
-    before = write_all({"out/report.html": "old"})
+    with result_folder(Path("out"), Run("spin")) as folder:
+        (folder / "report.html").write_text("old")
+    before = listing()
     with pytest.raises(RuntimeError):
         fail_after_writing()
     assert (listing(), Path("out/report.html").read_text()) == (before, "old")
@@ -286,6 +287,7 @@ def test_shown_machine_is_complete(wm_drake, reference):
         *("telescopic_dampers", "drum_bearing"),
         *("sensors", "detergent_point_T", "loads", "profile", "rest_pose", "equilibrium_residual"),
         *("natural_frequencies_hz", "mode_damping_ratios"),
+        *("format", "conventions", "laws", "imperfections", "accelerometers", "numerics"),
     }
     assert sum(body["mass"] for body in shown["bodies"].values()) == pytest.approx(
         shown["oscillating_mass_kg"]
@@ -430,6 +432,7 @@ def test_result_files_are_there_and_nothing_beside_them(plain):
             "out/record_middle.nc",
             "out/replay_middle.html",
             "out/report.html",
+            "out/run.json",
             "profile.yaml",
         )
     ]
@@ -463,6 +466,7 @@ def test_table_of_amplitudes_agrees(plain):
 def test_report_is_one_self_contained_page_with_its_command(plain):
     report = (plain.folder / "out" / "report.html").read_text(encoding="utf-8")
     assert "--profile profile.yaml" in report
+    assert '<a href="replay_middle.html">' in report
     assert is_self_contained(report)
 
 
@@ -514,6 +518,36 @@ def test_set_changes_the_result_and_is_recorded(wm_drake, plain):
     report = Path("out/report.html").read_text(encoding="utf-8")
     assert "gasket.damping_x" in report
     assert "set on the command line" in report
+
+
+COMPARED = {
+    "as it was measured": ((), True),
+    "another load": (("--load", "heavy.yaml"), False),
+    "another profile": (("--profile", "profile.yaml"), False),
+    "a number changed": (("--set", "gasket.damping_x=0.03 N s/mm"), False),
+    "a file that extends": (("--machine", "mine.yaml"), False),
+    "measurements named": (("--machine", "mine.yaml", "--measured", "measured.csv"), True),
+}
+
+
+@pytest.mark.parametrize("kind", COMPARED)
+def test_only_what_was_measured_is_judged_against_the_experiment(wm_drake, monkeypatch, kind):
+    arguments, compared = COMPARED[kind]
+    short = "profile: {time: '(0, 2) s', speed: '(0, 100) rpm'}\n"
+    Path("own.yaml").write_text(f"extends: reference\nmeasured: [measured.csv]\n{short}")
+    Path("mine.yaml").write_text("extends: own.yaml\n")
+    Path("profile.yaml").write_text("time: (0, 2) s\nspeed: (0, 90) rpm\n")
+    Path("heavy.yaml").write_text("unbalances: [{mass: 2 kg, radius: 200 mm, y: 0 mm}]\n")
+    Path("measured.csv").write_text(
+        f"load,gasket,source,{','.join(SENSORS)}\nmiddle,yes,experiment,1,1,1,1,1,1\n"
+        "heavy,yes,experiment,1,1,1,1,1,1\n"
+    )
+    machine = () if "--machine" in arguments else ("--machine", "own.yaml")
+    load = () if "--load" in arguments else ("--load", "middle")
+    monkeypatch.setattr("wm_drake.report.spin.report._envelopes_picture", lambda *_: None)
+    assert wm_drake("spin", *machine, *load, *arguments, "--out", "out").code == 0
+    sources = pd.read_csv("out/amplitudes.csv")["source"].tolist()
+    assert sources == (["experiment", "wm_drake"] if compared else ["wm_drake"])
 
 
 def test_load_file_equals_the_same_load_of_the_machine(wm_drake, plain):
@@ -582,7 +616,7 @@ def test_loads_side_by_side(tmp_path):
     assert (ended.returncode, ended.stderr.strip()) == (0, "")
     assert [case["load"] for case in strict_json(ended.stdout)["cases"]] == ["middle", "counter"]
     assert {path.name for path in (tmp_path / "wm-drake-spin").iterdir()} == {
-        *("record_middle.nc", "record_counter.nc", "amplitudes.csv", "report.html")
+        *("record_middle.nc", "record_counter.nc", "amplitudes.csv", "report.html", "run.json")
     }
 
 

@@ -80,6 +80,7 @@ def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
         "quantities.csv",
         "amplitudes.csv",
         "ledger.sqlite",
+        "run.json",
     }
     written = load_machine(Path("out/machine_1.yaml"))
     assert written.damper_types["friction"].friction_force == pytest.approx(

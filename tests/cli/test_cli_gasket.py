@@ -248,7 +248,7 @@ def test_other_study_in_the_folder_is_refused_and_kept(study_without_page):
     ):
         ended = study_without_page(*arguments, "--resume")
         assert ended.code == 2
-        assert "out/ledger.sqlite: belongs to another study or version" in ended.err
+        assert "out: holds another study or version: " in ended.err
         assert word in ended.err
     assert tables() == before
 

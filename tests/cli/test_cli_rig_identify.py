@@ -55,7 +55,7 @@ def test_the_machine_may_be_changed_on_the_command_line(wm_drake):
     change = ("--set", "damper_types.friction.friction_force=200 N", "--sponge-mass", "10 g")
     plain, changed = (
         json.loads(wm_drake("rig", "damper", "-f", "1 Hz", "-a", "10 mm", "--json", *more).out)
-        for more in ((), change)
+        for more in ((), (*change, "--overwrite"))
     )
     assert changed["peak_force_N"] > 3.0 * plain["peak_force_N"]
     assert "sponge of 10 g" in changed["component"]
@@ -68,7 +68,7 @@ def test_a_whole_matrix_writes_loops_and_one_page(wm_drake):
     assert len(pd.read_csv("out/measures.csv")) == 18
     page = Path("out/report.html").read_text()
     assert page.count("<img ") == 5
-    assert re.findall(r'(?:src|href)="(?!data:|#)', page) == []
+    assert re.findall(r'(?:src|href)="(?!data:|#|https://doi.org/)', page) == []
 
 
 @pytest.mark.parametrize(
@@ -104,6 +104,7 @@ def test_a_damper_goes_from_the_bench_into_a_machine(wm_drake, loops_of):
         assert found["unknowns"][name]["value"] == pytest.approx(getattr(truth, name), rel=0.01)
     assert {path.name for path in Path("fit").iterdir()} == {
         "report.html", "identified.yaml", "parameters.csv", "errors.csv", "loops.csv", "fit.json",
+        "run.json",
     }  # fmt: skip
     Path("mine.yaml").write_text("name: mine\nextends: fit/identified.yaml\n")
     assert wm_drake("machine", "check", "mine.yaml").code == 0

@@ -164,7 +164,7 @@ class Ledger:
 
 @contextmanager
 def open_ledger(
-    path: Path, identity: Mapping[str, str], *, resume: bool = False
+    path: Path, identity: Mapping[str, str], *, resume: bool = False, replace: bool = False
 ) -> Iterator[Ledger]:
     """Open the ledger of a study, or create it, with exclusive access for this process.
 
@@ -173,6 +173,8 @@ def open_ledger(
         identity: Texts that identify the study (kind, machine, design, versions), by short names.
             Messages print the texts that differ, so give the hash of a long text instead.
         resume: Whether an unfinished study may be continued.
+        replace: Whether the results of another study of the same kind are deleted. Results of this
+            study are kept, and are used as with `resume`.
 
     Raises:
         InputError: the ledger belongs to another study or version, is in use, is damaged, cannot be
@@ -180,7 +182,7 @@ def open_ledger(
     """
     connection = _connected(path)
     try:
-        _check_header(path, connection, {"format": FORMAT} | dict(identity), resume)
+        _check_header(path, connection, {"format": FORMAT} | dict(identity), resume, replace)
         with _ledger_errors(path):
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA synchronous = NORMAL")
@@ -239,7 +241,11 @@ def _connected(path: Path) -> sqlite3.Connection:
 
 
 def _check_header(
-    path: Path, connection: sqlite3.Connection, identity: dict[str, str], resume: bool
+    path: Path,
+    connection: sqlite3.Connection,
+    identity: dict[str, str],
+    resume: bool,
+    replace: bool,
 ) -> None:
     try:
         tables = {name for (name,) in connection.execute("SELECT name FROM sqlite_master")}
@@ -254,15 +260,21 @@ def _check_header(
         raise input_error(_reason(error), where=str(path)) from None
     finished = header.pop("finished", "") == "yes"
     if header != identity:
+        same_kind = all(header.get(name) == identity.get(name) for name in ("format", "study"))
+        if same_kind and replace:
+            _empty(path, connection, identity)
+            return
         names = [name for name in identity | header if identity.get(name) != header.get(name)]
         changes = ", ".join(
             f"{n} is '{header.get(n, '')}' in the ledger and '{identity.get(n, '')}' now"
             for n in names
         )
         raise input_error(
-            f"belongs to another study or version: {changes}; {_UNCHANGED}", where=str(path)
+            f"belongs to another study or version: {changes}; {_UNCHANGED}"
+            f"{', or add --overwrite to replace it' if same_kind else ''}",
+            where=str(path),
         )
-    if count and not finished and not resume:
+    if count and not finished and not (resume or replace):
         raise input_error(
             f"holds {count} finished results of this study; go on from there with --resume, "
             "or choose another folder",
@@ -275,6 +287,15 @@ def _begin(connection: sqlite3.Connection, identity: dict[str, str]) -> None:
         connection.execute("BEGIN")
         for table in _TABLES:
             connection.execute(table)
+        connection.executemany("INSERT INTO header VALUES (?, ?)", list(identity.items()))
+
+
+def _empty(path: Path, connection: sqlite3.Connection, identity: dict[str, str]) -> None:
+    """Delete all results of a ledger, and give it another identity."""
+    with _ledger_errors(path), connection:
+        connection.execute("BEGIN")
+        connection.execute("DELETE FROM results")
+        connection.execute("DELETE FROM header")
         connection.executemany("INSERT INTO header VALUES (?, ?)", list(identity.items()))
 
 

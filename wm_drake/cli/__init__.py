@@ -6,17 +6,19 @@ May import: all other rooms; neither pydrake nor a plotting library.
 """
 
 import sys
+from typing import Annotated
 
 import typer
 
 from wm_drake.cli import calibrate, identify, machine, rig, spin, study
+from wm_drake.cli.terminal import give_quiet
 from wm_drake.errors import Problem, WmDrakeError, reason_of
 
 app = typer.Typer(
     help="Dynamics of front-loading washing machines.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.add_typer(identify.app, name="identify")
 app.add_typer(machine.app, name="machine")
@@ -24,6 +26,30 @@ app.add_typer(rig.app, name="rig")
 app.add_typer(study.app, name="study")
 app.command()(spin.spin)
 app.command()(calibrate.calibrate)
+give_quiet(app)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from wm_drake.report.provenance import program
+
+        typer.echo(program())
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            help="Print version and source revision, and exit.",
+            callback=_print_version,
+            is_eager=True,
+        ),
+    ] = False,
+) -> None:
+    """Dynamics of front-loading washing machines."""
 
 
 def main() -> None:

@@ -12,6 +12,8 @@ import typer
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
+    OutOption,
+    OverwriteOption,
     SetOption,
     check_buildable,
     command_line,
@@ -19,9 +21,13 @@ from wm_drake.cli.common import (
     interruptible,
     load_parameters,
     pairs_of,
+    warn_of_phase_error,
+    with_measured,
 )
-from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.progress import ProgressLines, has_bars
+from wm_drake.cli.result_folder import LEDGER, Run, prepare_folder, result_folder
 from wm_drake.cli.study.common import RUNS_KEPT
+from wm_drake.cli.terminal import Console, say
 from wm_drake.errors import InputError, input_error
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -92,7 +98,8 @@ def calibrate(
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue an interrupted calibration.")
     ] = False,
-    out: Annotated[Path, typer.Option(help="Folder for the results.", metavar="DIR")] = DEFAULT_OUT,
+    out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
@@ -100,15 +107,16 @@ def calibrate(
     from wm_drake.studies.calibration.calibration import Plan
 
     groups = _groups(leave_out)
-    parameters = _with_targets(load_parameters(machine, sets), targets)
+    parameters = with_measured(load_parameters(machine, sets), targets, "--targets")
     wanted = _targets(parameters).weighted(_weights(weight))
     check_buildable(machine, parameters)
+    warn_of_phase_error(parameters)
     plan = Plan(method, starts, seed, iterations, deviation / 100.0, 1e-3 * resolution)
     with interruptible(f"finished evaluations are kept in {out}; continue with --resume"):
-        calibration, predictions = _run(
-            parameters, free, wanted, plan, groups, out, workers, resume
+        calibration, predictions, writer = _run(
+            parameters, free, wanted, plan, groups, out, workers, resume, overwrite
         )
-    with result_folder(out, RUNS_KEPT) as folder:
+    with result_folder(out, writer, RUNS_KEPT) as folder:
         _write(parameters, calibration, predictions, folder)
     if as_json:
         typer.echo(json.dumps(_as_json(calibration, predictions)))
@@ -116,21 +124,15 @@ def calibrate(
         _print(calibration, predictions, out)
 
 
-def _with_targets(parameters: "MachineParameters", files: list[Path] | None) -> "MachineParameters":
-    """Return the machine with other files of measured amplitudes, if any are given."""
-    if not files:
-        return parameters
-    return parameters.model_copy(
-        update={
-            "measured": tuple(str(existing_file(path, "--targets").resolve()) for path in files)
-        }
-    )
-
-
 def _targets(parameters: "MachineParameters") -> "Targets":
     from wm_drake.parameters import measured_amplitudes
     from wm_drake.studies.calibration.targets import targets_of
 
+    if not parameters.measured:
+        raise input_error(
+            f"machine '{parameters.name}' names no measured amplitudes of its own; name a CSV file",
+            where="--targets",
+        )
     return targets_of(
         parameters,
         measured_amplitudes(parameters),
@@ -176,7 +178,8 @@ def _run(
     out: Path,
     workers: int | None,
     resume: bool,
-) -> "tuple[Calibration, list[Prediction]]":
+    overwrite: bool,
+) -> "tuple[Calibration, list[Prediction], Run]":
     """Run the calibration and the predictions, with a ledger of evaluations in the folder `out`."""
     from wm_drake.batch.ledger import open_ledger
     from wm_drake.model.build import build_machine
@@ -193,11 +196,12 @@ def _run(
         parameter_map_of(built, free_file)
     except InputError as error:
         raise located(error, free) from None
-    with result_folder(out):  # checks before the search that the folder can be written to
-        pass
-    with open_ledger(
-        out / "ledger.sqlite", identity_of(built, free_file, targets, plan), resume=resume
-    ) as ledger:
+    identity = identity_of(built, free_file, targets, plan)
+    writer = Run(
+        "calibrate", overwrite, {**identity, "leave_out": "; ".join(map(",".join, held_out))}
+    )
+    prepare_folder(out, writer)
+    with open_ledger(out / LEDGER, identity, resume=resume, replace=overwrite) as ledger:
         with _progress(plan.starts) as report:
             calibration = calibrate(
                 built, free_file, targets, plan, ledger, workers=workers, report=report
@@ -207,7 +211,7 @@ def _run(
                 built, free_file, calibration, held_out, ledger, workers=workers, report=report
             )
         ledger.mark_finished()
-    return calibration, predictions
+    return calibration, predictions, writer
 
 
 @contextmanager
@@ -216,7 +220,6 @@ def _progress(searches: int) -> Iterator[Callable[[int, int, float], None]]:
 
     The bar shows the number of machines and the least cost of the current search.
     """
-    from rich.console import Console
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -232,12 +235,14 @@ def _progress(searches: int) -> Iterator[Callable[[int, int, float], None]]:
         TextColumn("{task.description}", markup=False),
         TimeElapsedColumn(),
     )
+    console, lines = Console(stderr=True), ProgressLines()
     with Progress(
         *columns,
         TextColumn("remaining"),
         TimeRemainingColumn(),
-        console=Console(stderr=True, markup=False, emoji=False),
+        console=console,
         transient=True,
+        disable=not has_bars(console),
     ) as bar:
         task = bar.add_task("search", total=searches)
         ended, last = 0, (0, 0)
@@ -247,9 +252,9 @@ def _progress(searches: int) -> Iterator[Callable[[int, int, float], None]]:
             if last[1] > evaluations or last[0] != start:  # another search has begun
                 ended += 1
             last = start, evaluations
-            bar.update(
-                task, completed=ended, description=f"{evaluations} machines, least cost {best:.1f}"
-            )
+            text = f"{evaluations} machines, least cost {best:.1f}"
+            bar.update(task, completed=ended, description=text)
+            lines.show(f"search {ended + 1} of {searches}: {text}")
 
         yield report
 
@@ -301,12 +306,12 @@ def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Pat
     _print_values(calibration)
     best = calibration.solutions[0]
     mean, largest = mean_and_largest(best.errors(calibration.targets))
-    typer.echo(
+    say(
         f"Searches: {len(calibration.ended)}. Distinct good solutions: "
         f"{len(calibration.solutions)}."
     )
-    typer.echo("Absolute differences of the amplitudes from the experiment:")
-    typer.echo(f"  best solution: mean {100 * mean:.1f} %, largest {100 * largest:.1f} %")
+    say("Absolute differences of the amplitudes from the experiment:")
+    say(f"  best solution: mean {100 * mean:.1f} %, largest {100 * largest:.1f} %")
     for prediction in predictions:
         pairs = [
             mean_and_largest(errors)
@@ -315,16 +320,15 @@ def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Pat
         calibrated, predicted, others = (
             f"mean {100 * mean:.1f} %, largest {100 * largest:.1f} %" for mean, largest in pairs
         )
-        typer.echo(f"  load {', '.join(prediction.loads)}:")
-        typer.echo(f"    used for the calibration: {calibrated}")
-        typer.echo(f"    held out and predicted: {predicted}")
-        typer.echo(f"    other loads in that calibration: {others}")
-    typer.echo(f"Results in {out}: report.html, machine_<n>.yaml, quantities.csv, amplitudes.csv")
+        say(f"  load {', '.join(prediction.loads)}:")
+        say(f"    used for the calibration: {calibrated}")
+        say(f"    held out and predicted: {predicted}")
+        say(f"    other loads in that calibration: {others}")
+    say(f"Results in {out}: report.html, machine_<n>.yaml, quantities.csv, amplitudes.csv")
 
 
 def _print_values(calibration: "Calibration") -> None:
     """Print the quantities of the best solution; the deviation is that given data and prior."""
-    from rich.console import Console
     from rich.table import Table
 
     from wm_drake.studies.calibration.outcome import quantity_table

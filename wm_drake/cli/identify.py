@@ -11,6 +11,8 @@ import typer
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
+    OutOption,
+    OverwriteOption,
     SetOption,
     command_line,
     interruptible,
@@ -29,7 +31,8 @@ from wm_drake.cli.components import (
     target_of,
 )
 from wm_drake.cli.progress import progress_bar
-from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.result_folder import Run, result_folder
+from wm_drake.cli.terminal import Console
 from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:
@@ -78,7 +81,6 @@ KnotsOption = Annotated[
     int, typer.Option("--knots", help="Points of a table on each side of zero.", min=1, max=12)
 ]
 SeedOption = Annotated[int, typer.Option("--seed", help="Of the search.", min=0)]
-OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.", metavar="DIR")]
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,7 @@ class _Asked:
     method: str
     seed: int
     out: Path
+    overwrite: bool
     as_json: bool
     sets: list[str] | None
 
@@ -111,6 +114,7 @@ def identify_damper(
     name: NameOption = None,
     component: ComponentOption = None,
     out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
@@ -119,7 +123,7 @@ def identify_damper(
 
     target = target_of("damper", machine, name, component, sets)
     own = str(target.component.parameters.law)  # type: ignore[union-attr]
-    asked = _Asked(files, units, method, seed, out, as_json, sets)
+    asked = _Asked(files, units, method, seed, out, overwrite, as_json, sets)
     motions = _motions(asked, rotates=False)
     ranges = _ranges(bounds)
     kept = _kept_fields(target, law or own, ranges)
@@ -147,6 +151,7 @@ def _axis_command(kind: str) -> Callable[..., None]:
         name: NameOption = None,
         component: ComponentOption = None,
         out: OutOption = DEFAULT_OUT,
+        overwrite: OverwriteOption = False,
         as_json: JsonOption = False,
         sets: SetOption = None,
     ) -> None:
@@ -154,7 +159,7 @@ def _axis_command(kind: str) -> Callable[..., None]:
         from wm_drake.studies.identification import bushing_model
 
         target = target_of(kind, machine, name, component, sets)
-        asked = _Asked(files, units, method, seed, out, as_json, sets)
+        asked = _Asked(files, units, method, seed, out, overwrite, as_json, sets)
         axes = axes_of(axis)
         radius = quantities_of(arm, Unit("m", "mm"), "--arm")[0] if arm else 0.0
         motions = _motions(asked, rotates=axes[0].startswith("about") and not radius)
@@ -292,7 +297,8 @@ def _run(
     from wm_drake.studies.fitting import identify
     from wm_drake.studies.identification import fit_problem, fragment, judge
 
-    with interruptible(), result_folder(asked.out) as folder:
+    writer = Run("identify", asked.overwrite)
+    with interruptible(), result_folder(asked.out, writer) as folder:
         with progress_bar(PER_CENT, "identify") as bar:
             fit = identify(
                 fit_problem(model, motions),
@@ -343,12 +349,11 @@ def _print(
     fixed: Mapping[str, float],
     out: Path,
 ) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from wm_drake.report.identify.report import estimate_cells, undetermined_sentences
 
-    console = Console(markup=False, emoji=False)
+    console = Console()
     for sentence in judgement.sentences:
         console.print(sentence, highlight=False)
     table = Table(title=f"{title}: RMSE {fit.rmse:.4g} {unit} by {fit.method}")

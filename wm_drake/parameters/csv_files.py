@@ -10,6 +10,8 @@ import pandas as pd
 from wm_drake.errors import input_error
 from wm_drake.parameters.text_files import read_text
 
+_SIGNS = "; columns are separated by commas, and the decimal sign is a point"
+
 
 def read_csv(
     path: str | Path, columns: list[str], key: str = "", optional: str = ""
@@ -30,16 +32,23 @@ def read_csv(
     try:
         named = list(_table(text, nrows=0).columns)
         if named not in (columns, [*columns, optional]):
-            message = f"needs the columns {','.join(columns)}, has {','.join(map(str, named))}"
+            has = ",".join(map(str, named))
+            signs = _SIGNS if ";" in has or "\t" in has else ""
+            message = f"needs the columns {','.join(columns)}, has {has}{signs}"
             raise input_error(message, where=str(path), key=key)
         with warnings.catch_warnings():
             # pandas cuts a row that is too long and only warns
             warnings.simplefilter("error", pd.errors.ParserWarning)
             return _table(text, index_col=False)
     except pd.errors.ParserWarning:
-        raise input_error("a row has more values than columns", where=str(path), key=key) from None
+        message = f"a row has more values than columns{_SIGNS}"
+        raise input_error(message, where=str(path), key=key) from None
+    except pd.errors.ParserError as error:
+        reason = " ".join(str(error).split()).removeprefix("Error tokenizing data. C error: ")
+        message = f"cannot be read as CSV ({reason}){_SIGNS}"
+        raise input_error(message, where=str(path), key=key) from None
     except ValueError as error:
-        reason = " ".join(str(error).removeprefix("Error tokenizing data. C error: ").split())
+        reason = " ".join(str(error).split())
         raise input_error(f"cannot be read as CSV ({reason})", where=str(path), key=key) from None
 
 

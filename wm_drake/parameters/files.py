@@ -26,6 +26,7 @@ from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.spin import Load, SpinProfile
 from wm_drake.parameters.text_files import is_file, read_text
+from wm_drake.parameters.units import comma_hint
 
 MACHINES_FOLDER = Path(__file__).parents[1] / "data" / "machines"
 CYCLES_FOLDER = Path(__file__).parents[1] / "data" / "cycles"
@@ -49,7 +50,8 @@ def shipped_machines() -> dict[str, Path]:
 def load_machine(name_or_path: str | Path = "reference") -> MachineParameters:
     """Read a machine file.
 
-    A file with ``extends: NAME_OR_PATH`` contains only the changes to another machine.
+    A file with ``extends: NAME_OR_PATH`` contains only the changes to another machine. The measured
+    amplitudes of that machine are not inherited, because they belong to its numbers.
 
     Args:
         name_or_path: Name of a shipped machine or path of a YAML file.
@@ -150,9 +152,9 @@ def load_profile(name_or_path: str | Path) -> SpinProfile:
     finite = np.isfinite(numbers.to_numpy(dtype=float)).all(axis=1)
     if not finite.all():
         row = int(np.flatnonzero(~finite)[0])
+        cells = ", ".join(f"'{cell}'" for cell in table.iloc[row].tolist())
         raise input_error(
-            f"row {row + 1} of the data is not two finite numbers: "
-            f"{', '.join(map(str, table.iloc[row]))}",
+            f"row {row + 1} of the data is not two finite numbers: {cells}{comma_hint(cells)}",
             where=str(path),
         )
     text = {"time": ("time_s", "s"), "speed": ("speed_rpm", "rpm")}
@@ -344,9 +346,9 @@ def _extended(path: Path, seen: tuple[Path, ...]) -> CommentedMap:
         message = f"more than {LONGEST_CHAIN} files extend each other; extend an earlier one"
         raise input_error(message, where=str(path), key="extends")
     base_tree = _extended(base_path, seen)
-    for key in ("model", "measured"):  # paths are relative to the file that contains them
-        if key in base_tree:
-            base_tree[key] = _with_absolute_paths({key: base_tree[key]}, base_path)[key]
+    base_tree.pop("measured", None)  # another machine was measured
+    if "model" in base_tree:  # paths are relative to the file that contains them
+        base_tree["model"] = _with_absolute_paths({"model": base_tree["model"]}, base_path)["model"]
     _merge(base_tree, tree)
     return base_tree
 

@@ -11,7 +11,7 @@ import numpy as np
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.parameters.text_files import read_text
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit, convert, plain_number
+from wm_drake.parameters.units import Unit, comma_hint, convert, plain_number
 
 FEWEST = 20
 """Smallest number of samples of a loop."""
@@ -230,7 +230,9 @@ def _numbers(
 ) -> list[float]:
     if len(cells) != len(head):
         raise input_error(
-            f"has {len(cells)} values but the header has {len(head)} columns", where=place
+            f"has {len(cells)} values but the header has {len(head)} columns"
+            f"{'; the decimal sign is a point' if len(cells) > len(head) else ''}",
+            where=place,
         )
     values = []
     for index in columns:
@@ -238,7 +240,9 @@ def _numbers(
             value = plain_number(cells[index])
         except ValueError:
             raise input_error(
-                f"'{cells[index]}' is not a number", where=place, key=head[index]
+                f"'{cells[index]}' is not a number{comma_hint(cells[index])}",
+                where=place,
+                key=head[index],
             ) from None
         if not np.isfinite(value):
             raise input_error(

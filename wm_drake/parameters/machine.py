@@ -131,7 +131,7 @@ class Imperfections(Frozen):
     Attributes:
         residual_imbalance: Unbalance of the empty drum. It is added to the load in every run.
         phase_error: Angle by which the rear mass of a spin-cycle case leads more than its phase.
-            [rad]
+            Loads of the machine are not changed by it. [rad]
         bearing: Compliant bearing, in which the drum can whirl; None for a rigid bearing (a
             revolute joint).
     """

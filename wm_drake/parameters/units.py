@@ -16,6 +16,7 @@ from wm_drake.errors import shortened
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _BARE = re.compile(_NUMBER)
 _SCALAR = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*$")
+_DECIMAL_COMMA = re.compile(r"(?<![0-9])[+-]?[0-9]+,[0-9]+")
 _VECTOR = re.compile(r"\s*\(([^()]*)\)\s*(\S.*?)?\s*$")
 _NOT_FINITE = re.compile(r"[+-]?(?:nan|inf|infinity)", re.IGNORECASE)
 
@@ -164,10 +165,11 @@ def split(text: str) -> tuple[list[float], str, bool]:
     if match is None:
         match = _SCALAR.fullmatch(text)
         parts = [match[1]] if match else []
-    if match is None or not all(_BARE.fullmatch(part) for part in parts):
+    comma = match is not None and (match[2] or "").startswith(",")
+    if match is None or comma or not all(_BARE.fullmatch(part) for part in parts):
+        hint = comma_hint(text) or "; write for example '12 kg' or '(9, 12) kg'"
         raise ValueError(
-            f"'{shortened(text, 60)}' is not a number or a list of numbers with a unit; "
-            "write for example '12 kg' or '(9, 12) kg'"
+            f"'{shortened(text, 60)}' is not a number or a list of numbers with a unit{hint}"
         )
     unit = match[2] or ""
     dimension(unit)
@@ -212,11 +214,9 @@ def to_si(value: Any, info: ValidationInfo, unit: Unit) -> float:
     example = f"1 {unit.shown}"
     if isinstance(value, str):
         match = _SCALAR.fullmatch(value)
-        if match is None:
-            raise ValueError(
-                f"'{shortened(value, 60)}' is not a number with a unit; "
-                f"write for example '{example}'"
-            )
+        if match is None or (match[2] or "").startswith(","):
+            hint = comma_hint(value) or f"; write for example '{example}'"
+            raise ValueError(f"'{shortened(value, 60)}' is not a number with a unit{hint}")
         return convert(float(match[1]), match[2], unit)
     return _plain_number(value, info, example)
 
@@ -248,6 +248,18 @@ def to_si_vector(value: Any, info: ValidationInfo, unit: Unit) -> tuple[float, .
             f"write for example '{example}'"
         )
     return tuple(_plain_number(number, info, example) for number in value)
+
+
+def comma_hint(text: str) -> str:
+    """Return a hint for a number with a decimal comma in a text, or "" if there is none.
+
+    Args:
+        text: Text that is not a number as it stands, such as ``'6,5 N/mm'``.
+    """
+    match = _DECIMAL_COMMA.search(text)
+    if match is None:
+        return ""
+    return f"; the decimal sign is a point, not a comma: write {match[0].replace(',', '.')}"
 
 
 def _plain_number(value: Any, info: ValidationInfo, example: str) -> float:

@@ -13,6 +13,8 @@ import typer
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
+    OutOption,
+    OverwriteOption,
     SetOption,
     cases_of,
     check_buildable,
@@ -21,7 +23,7 @@ from wm_drake.cli.common import (
     load_parameters,
 )
 from wm_drake.cli.progress import progress_bar
-from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.study.common import (
     RUNS_KEPT,
     ProfileOption,
@@ -29,6 +31,7 @@ from wm_drake.cli.study.common import (
     WorkersOption,
     study_ledger,
 )
+from wm_drake.cli.terminal import Console, say
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -120,9 +123,8 @@ def gasket(
         ),
     ] = None,
     resume: ResumeOption = False,
-    out: Annotated[
-        Path, typer.Option(help="Folder for the results and the ledger of runs.", metavar="DIR")
-    ] = DEFAULT_OUT,
+    out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
@@ -138,13 +140,15 @@ def gasket(
     middle = _at_middle(parameters, levels)
     check_buildable(machine, parameters)
     work = _work(middle, levels, cases, response or [])
+    identity = _identity(work, plan)
+    writer = Run("study gasket", overwrite, identity)
     with (
         _runner(middle, workers, cluster) as run,
-        study_ledger(out, _identity(work, plan), resume) as ledger,
+        study_ledger(out, writer, identity, resume) as ledger,
     ):
         screening = _run(work, plan, partial(run, ledger=ledger))
         ledger.mark_finished()
-        with result_folder(out, RUNS_KEPT) as folder:
+        with result_folder(out, writer, RUNS_KEPT) as folder:
             _write(screening, work, folder, time.perf_counter() - begin)
     _print_result(screening, work, out, as_json, time.perf_counter() - begin)
 
@@ -300,10 +304,10 @@ def _print_result(
         typer.echo(to_json(as_plain_data(screening) | {"wall_s": wall_s}))
     else:
         _print_table(screening, words)
-        typer.echo("\n".join(summary(screening, words)))
-        typer.echo(f"Results in {out}: report.html and CSV tables")
+        say("\n".join(summary(screening, words)))
+        say(f"Results in {out}: report.html and CSV tables")
     for text in warnings(screening, words):
-        typer.echo(f"warning: {text}", err=True)
+        say(f"warning: {text}", err=True)
     for (trial, load), reason in screening.responses.failed.items():
         typer.echo(f"trial {trial + 1}, load {load}: {reason}", err=True)
     if screening.responses.failed:
@@ -311,7 +315,6 @@ def _print_result(
 
 
 def _print_table(screening: "Screening", words: "Words") -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from wm_drake.report.gasket.tables import r2_text
@@ -324,7 +327,7 @@ def _print_table(screening: "Screening", words: "Words") -> None:
         table.add_column(name)
     for name in ("mean", "main", "inter-\nactions", "resid-\nual", "pre-\ndicted\nR2"):
         table.add_column(name, justify="right")
-    console = Console(markup=False, emoji=False)
+    console = Console()
     is_wide = console.width >= WIDE
     if is_wide:
         table.add_column("leading terms, percent")

@@ -9,14 +9,18 @@ import typer
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
+    OutOption,
+    OverwriteOption,
     SetOption,
     check_buildable,
     command_line,
     existing_file,
     interruptible,
     load_parameters,
+    warn_of_phase_error,
 )
-from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.result_folder import Run, result_folder
+from wm_drake.cli.terminal import say
 from wm_drake.errors import input_error
 
 if TYPE_CHECKING:
@@ -46,7 +50,8 @@ def gasket_damping(
     seed: Annotated[
         int, typer.Option(help="Seed of the noise of the virtual experiment.", min=0)
     ] = 0,
-    out: Annotated[Path, typer.Option(help="Folder for the results.", metavar="DIR")] = DEFAULT_OUT,
+    out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
@@ -55,7 +60,9 @@ def gasket_damping(
 
     parameters = load_parameters(machine, sets)
     check_buildable(machine, parameters)
-    with interruptible(), result_folder(out) as folder:
+    warn_of_phase_error(parameters)
+    run = Run("study gasket-damping", overwrite)
+    with interruptible(), result_folder(out, run) as folder:
         truth = None
         if record:
             measured: Measured = _read(parameters, record)
@@ -135,7 +142,7 @@ def _virtual(parameters: "MachineParameters", truth: "FloatArray", seed: int) ->
                 "needs",
                 key="loads",
             )
-    typer.echo(
+    say(
         "No measured records were given. The Drake engine runs a virtual experiment with other "
         "damping values and noise.",
         err=True,
@@ -187,5 +194,5 @@ def _as_json(result: "Damping") -> dict[str, Any]:
 def _print_result(result: "Damping", out: Path) -> None:
     from wm_drake.report.gasket_damping.report import summary
 
-    typer.echo(summary(result))
-    typer.echo(f"Results in {out}: report.html, objective.csv")
+    say(summary(result))
+    say(f"Results in {out}: report.html, objective.csv")

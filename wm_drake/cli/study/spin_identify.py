@@ -10,6 +10,8 @@ import typer
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
+    OutOption,
+    OverwriteOption,
     SetOption,
     check_buildable,
     command_line,
@@ -17,9 +19,10 @@ from wm_drake.cli.common import (
     load_parameters,
 )
 from wm_drake.cli.progress import progress_bar
-from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.study.common import WorkersOption
-from wm_drake.cli.study.spin_cycle import cases_of_table, measurement, open_runs
+from wm_drake.cli.study.spin_cycle import cases_of_table, measurement, open_runs, study_identity
+from wm_drake.cli.terminal import Console, say
 from wm_drake.errors import input_error
 
 if TYPE_CHECKING:
@@ -86,13 +89,8 @@ def spin_identify(
         ),
     ] = 0,
     workers: WorkersOption = None,
-    out: Annotated[
-        Path,
-        typer.Option(
-            help="Folder for the results. Runs that it already holds are not repeated.",
-            metavar="DIR",
-        ),
-    ] = DEFAULT_OUT,
+    out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
@@ -100,6 +98,7 @@ def spin_identify(
 
     Without measurements, the displacements come from a virtual experiment.
     """
+    from wm_drake.batch.ledger import key_of
     from wm_drake.parameters import load_profile
     from wm_drake.studies.spin_identification.study import DEFAULT_CASES, SpinModel
 
@@ -111,7 +110,16 @@ def spin_identify(
     check_buildable(machine, parameters)
     model = partial(SpinModel, parameters, spin_profile, tuple(table), sought)
     kept = "finished runs are kept; repeat the command to continue"
-    with interruptible(kept), result_folder(out, kept) as folder, open_runs(out) as ledger:
+    identity = study_identity(
+        parameters,
+        table,
+        spin_profile,
+        given,
+        unknowns=key_of(sought=sought)[:8],
+        noise=f"{noise:g}, seed {seed}",
+    )
+    writer = Run("study spin-identify", overwrite, identity)
+    with interruptible(kept), result_folder(out, writer, kept) as folder, open_runs(out) as ledger:
         result = _identify(model, given, noise, seed, ledger, workers)
         _write(result, folder)
         ledger.mark_finished()
@@ -216,11 +224,10 @@ def _write(result: "SpinIdentification", folder: Path) -> None:
 
 
 def _print_table(result: "SpinIdentification", out: Path) -> None:
-    from rich.console import Console
 
     from wm_drake.report.spin_identify.report import directions, summary, unknowns, warnings_of
 
-    console = Console(markup=False, emoji=False)
+    console = Console()
     for text in (summary(result), *warnings_of(result)):
         console.print(text, highlight=False)
     shown = unknowns(result)
@@ -228,16 +235,14 @@ def _print_table(result: "SpinIdentification", out: Path) -> None:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ["  " + "  ".join(map(str.rjust, row, widths)) for row in rows]
     # each key has a line of its own, so that no terminal breaks it
-    typer.echo(f"\n{lines[0]}")
+    say(f"\n{lines[0]}")
     for sought, line in zip(result.sought, lines[1:], strict=True):
-        typer.echo("\n= ".join(sought.keys))
-        typer.echo(line)
-    typer.echo()
+        say("\n= ".join(sought.keys))
+        say(line)
+    say("")
     for text in directions(result):
         console.print(text, highlight=False, markup=False)
-    typer.echo(
-        f"Results in {out}: report.html, identified.yaml, parameters.csv, measured.csv, rms.csv"
-    )
+    say(f"Results in {out}: report.html, identified.yaml, parameters.csv, measured.csv, rms.csv")
 
 
 def _as_json(result: "SpinIdentification") -> dict[str, Any]:
