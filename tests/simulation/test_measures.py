@@ -10,7 +10,6 @@ from wm_drake.simulation.measures import (
     largest_motion,
     measure,
     moment_of_largest_amplitude,
-    measure,
     peak_line,
     percent_difference,
 )
