@@ -213,6 +213,7 @@ def test_command_names_its_experiment_virtual_and_recovers_the_true_numbers(iden
         "parameters.csv",
         "report.html",
         "rms.csv",
+        "run.json",
     ]
     page = Path("out/report.html").read_text(encoding="utf-8")
     assert "This is a virtual experiment: nothing was measured." in page
@@ -225,7 +226,7 @@ def test_command_names_its_experiment_virtual_and_recovers_the_true_numbers(iden
         assert table.lower_95[key] <= table.value[key] <= table.upper_95[key]
         assert table.unit[key] == "N/mm"
     assert written.name == "reference_identified"
-    real = identify("--json", "--measured", "out/measured.csv", *unknowns)
+    real = identify("--json", "--measured", "out/measured.csv", "--overwrite", *unknowns)
     told = json.loads(real.out)
     assert told["virtual_experiment"] is False
     for name, entry in told["unknowns"].items():
