@@ -598,7 +598,9 @@ def _options_case(random_: random.Random) -> FuzzCase:
         words += [f"{name}={text}" for name, text in given.items()]
     else:
         words.append(f"{option}={value}")
-    return FuzzCase("options", words, [option, option.removeprefix("--"), "reference.yaml", "-h"])
+    return FuzzCase(
+        "options", words, [option, option.removeprefix("--"), "reference.yaml", "-f and -a"]
+    )
 
 
 def _links_case(  # noqa: C901 - one branch a kind of link
