@@ -142,6 +142,7 @@ DOCUMENTS = [
     "? [a, b]\n: c\n",
     "? {a: b}\n: c\n",
     "a: &a [*a]\n",
+    'name: "\\ud83d"\n',
     "a: &a {b: *a}\n",
     "a: &a\n  <<: *a\n",
     "<<: 1\n",
@@ -311,8 +312,10 @@ def mutated_tree(random_: random.Random, tree: Any) -> tuple[str, list[str]]:
             node[name] = node.pop(last)
             keys.append(name[:10])
             if len(name) > 1000:
-                return json.dumps(tree), []  # YAML refuses a key of this length by itself
-    return json.dumps(tree), keys
+                return json.dumps(
+                    tree, ensure_ascii=False
+                ), []  # YAML refuses a key of this length by itself
+    return json.dumps(tree, ensure_ascii=False), keys
 
 
 def broken_text(random_: random.Random, text: str) -> bytes:
@@ -373,6 +376,9 @@ CSV = {
     "targets": (MACHINES_FOLDER / "sanchez_tabuenca_2020_table3.csv").read_text(encoding="utf-8"),
     "loop": loop_text(),
     "design": "C_L\n-1\n0\n1\n",
+    "record": "time_s,Xr,Yr,Zr,Xf,Yf,Zf\n" + "".join(
+        f"{0.01 * n:g},{n % 7},0,1,2,3,{n % 5}\n" for n in range(60)
+    ),
 }  # fmt: skip
 
 
@@ -396,6 +402,7 @@ def commands(file: str) -> dict[str, list[str]]:
         "rms": ["study", "spin-cycle", "--case", "1", "--measured", file],
         "acceleration": ["study", "spin-cycle", "--case", "1", "--accelerations", "."],
         "loop": ["identify", "damper", file],
+        "record": ["study", "gasket-damping", "--record", f"middle={file}"],
     }
 
 
@@ -459,7 +466,9 @@ def case_of(number: int, folder: Path) -> FuzzCase:
         content = broken_text(random_, yaml_text(door))
     (folder / name).write_bytes(content)
     others = ["/dev/zero", ": measured: "] if "machine" in door else ["/dev/zero"]
-    return FuzzCase(door, commands(name)[door], [name, *others], keys)
+    command = commands(name)[door]
+    options = [word for word in command if word.startswith("--")]
+    return FuzzCase(door, command, [name, *others, *options], keys)
 
 
 def _mutated_table(random_: random.Random, text: str) -> str:
@@ -589,7 +598,9 @@ def _options_case(random_: random.Random) -> FuzzCase:
         words += [f"{name}={text}" for name, text in given.items()]
     else:
         words.append(f"{option}={value}")
-    return FuzzCase("options", words, [option, option.removeprefix("--"), "reference.yaml", "-h"])
+    return FuzzCase(
+        "options", words, [option, option.removeprefix("--"), "reference.yaml", "-f and -a"]
+    )
 
 
 def _links_case(  # noqa: C901 - one branch a kind of link

@@ -7,7 +7,7 @@ import pytest
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import load_machine, load_profile, read_loops, units, with_value
-from wm_drake.parameters.csv_files import read_csv
+from wm_drake.parameters.csv_files import finite_numbers, read_csv
 from wm_drake.parameters.files import LARGEST_YAML, LONGEST_CHAIN, MOST_VALUES, read_yaml
 from wm_drake.parameters.text_files import read_text
 
@@ -167,3 +167,20 @@ def test_digits_other_than_0_to_9_are_refused(reference, text):
 )
 def test_deeply_nested_key_is_refused(reference, key):
     assert len(refused(with_value, reference, key, "1 kg")) == 1
+
+
+def test_text_in_a_number_column_names_row_and_column(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text("time_s,Xr\n0,1\n1,text\n", encoding="utf-8")
+    with pytest.raises(
+        InputError, match=r"record\.csv: Xr: row 2 of the data: 'text' is not a finite number"
+    ):
+        finite_numbers(read_csv(path, ["time_s", "Xr"]), path)
+
+
+def test_half_a_character_is_refused(tmp_path):
+    path = tmp_path / "machine.yaml"
+    path.write_text('gravity: 1 m/s^2\nname: "\\ud83d\\udca5"\n', encoding="utf-8")
+    assert refused(read_yaml, path) == [
+        f"{path}:2: is not YAML: has half a character; write the character itself"
+    ]

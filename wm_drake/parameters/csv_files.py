@@ -5,10 +5,12 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from wm_drake.errors import input_error
 from wm_drake.parameters.text_files import read_text
+from wm_drake.parameters.types import FloatArray
 
 _SIGNS = "; columns are separated by commas, and the decimal sign is a point"
 
@@ -50,6 +52,28 @@ def read_csv(
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise input_error(f"cannot be read as CSV ({reason})", where=str(path), key=key) from None
+
+
+def finite_numbers(table: pd.DataFrame, path: str | Path) -> FloatArray:
+    """Return a table as numbers. (row, column)
+
+    Args:
+        table: Table from `read_csv`.
+        path: The file, for messages.
+
+    Raises:
+        InputError: a value is not a finite number.
+    """
+    numbers = table.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
+    bad = np.argwhere(~np.isfinite(numbers))
+    if len(bad):
+        row, column = bad[0]
+        raise input_error(
+            f"row {row + 1} of the data: '{table.iloc[row, column]}' is not a finite number",
+            where=str(path),
+            key=str(table.columns[column]),
+        )
+    return numbers
 
 
 def read_header(path: Path) -> list[str]:

@@ -3,6 +3,7 @@
 Every message names the file, the line and the key path.
 """
 
+import re
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -16,7 +17,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.composer import Composer, ComposerError
 from ruamel.yaml.error import ReusedAnchorWarning, YAMLError
-from ruamel.yaml.events import AliasEvent
+from ruamel.yaml.events import AliasEvent, ScalarEvent
 from ruamel.yaml.resolver import VersionedResolver
 
 from wm_drake.errors import InputError, input_error, nearest_names, reason_of
@@ -253,6 +254,10 @@ class _TextResolver(VersionedResolver):
         return {first: pairs for first, pairs in kept.items() if pairs}
 
 
+_SURROGATE = re.compile("[\ud800-\udfff]")
+"""Half of a pair such as ``\\ud83d\\udca5``, which JSON writes for one character."""
+
+
 class _BoundedComposer(Composer):
     """A composer of YAML nodes that bounds their depth and number.
 
@@ -277,6 +282,9 @@ class _BoundedComposer(Composer):
             self._count(values, event)
             return super().compose_node(parent, index)
         self._count(1, event)
+        if self.parser.check_event(ScalarEvent) and _SURROGATE.search(event.value):
+            problem = "has half a character; write the character itself"
+            raise ComposerError(None, None, problem, event.start_mark)
         self._depth += 1
         if self._depth > DEEPEST:
             problem = f"is nested too deeply; allowed are {DEEPEST} levels"

@@ -80,7 +80,7 @@ def gasket_damping(
 def _read(parameters: "MachineParameters", entries: list[str]) -> "Measured":
     import xarray as xr
 
-    from wm_drake.parameters.csv_files import read_csv
+    from wm_drake.parameters.csv_files import finite_numbers, read_csv
     from wm_drake.simulation.records import load_record
     from wm_drake.studies.gasket_damping.study import MM_PER_M, as_measured
 
@@ -97,10 +97,10 @@ def _read(parameters: "MachineParameters", entries: list[str]) -> "Measured":
         path = existing_file(Path(name), "--record")
         if path.suffix.lower() == ".csv":
             table = read_csv(path, ["time_s", *sensors])
-            values = table[sensors].to_numpy(dtype=float) / MM_PER_M
+            numbers = finite_numbers(table, path)
             record = xr.DataArray(
-                values,
-                {"time": table["time_s"].to_numpy(dtype=float), "sensor": sensors},
+                numbers[:, 1:] / MM_PER_M,
+                {"time": numbers[:, 0], "sensor": sensors},
                 ["time", "sensor"],
             )
         else:

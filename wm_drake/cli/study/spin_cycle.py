@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,7 +25,7 @@ from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import LEDGER, Run, result_folder
 from wm_drake.cli.study.common import WorkersOption
 from wm_drake.cli.terminal import Console
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import InputError, input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
@@ -159,7 +160,13 @@ def measurement(
 
     if measured and accelerations:
         raise input_error("not allowed together with --measured", where="--accelerations")
-    runs_of(parameters, cases, profile)  # raises an error for cases that cannot be run
+    try:
+        runs_of(parameters, cases, profile)  # raises an error for cases that cannot be run
+    except InputError as error:
+        raise InputError(
+            replace(p, where="--profile", key="") if p.key == "profile" else p
+            for p in error.problems
+        ) from None
     labels = labels_of(parameters, cases, profile)
     if measured:
         return read_rms(existing_file(measured, "--measured"), labels)
@@ -224,8 +231,6 @@ def _run(
 
 
 def _with(result: "SpinCycleResult", measured: "xr.DataArray") -> "SpinCycleResult":
-    from dataclasses import replace
-
     return replace(result, measured=measured)
 
 
