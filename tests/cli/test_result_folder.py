@@ -259,3 +259,20 @@ def test_empty_out_is_refused(wm_drake, command, text):
     ended = wm_drake(*command, "--out", text)
     assert (ended.code, ended.err) == (2, "--out: is empty; name a folder\n")
     assert list(Path().iterdir()) == []
+
+
+def test_file_system_without_locks_is_refused_and_left_clean(monkeypatch):
+    def no_locks(*_):
+        raise OSError("no locks")
+
+    monkeypatch.setattr("wm_drake.cli.result_folder.fcntl.flock", no_locks)
+    with pytest.raises(InputError, match="out: cannot be written to: No locks available"):
+        written(Run("spin"), "report.html")
+    assert list(Path().iterdir()) == []
+
+
+def test_deeply_nested_run_file_is_refused():
+    OUT.mkdir()
+    (OUT / RUN_FILE).write_text("[" * 100_000)
+    with pytest.raises(InputError, match="does not describe a run"):
+        written(Run("spin", overwrite=True), "report.html")

@@ -31,6 +31,9 @@ LEDGER = "ledger.sqlite"
 SUFFIX = ".partial"
 """End of the name of a temporary folder."""
 
+TRIES = 5
+"""Number of temporary folders that are tried."""
+
 _NOT_WRITTEN = {
     errno.ENOSPC,
     errno.EDQUOT,
@@ -214,7 +217,7 @@ def _earlier_run(out: Path) -> dict[str, Any] | None:
         plain = all(Path(name).name == name for name in files)
     except OSError as error:
         raise _unwritable(out, error) from None
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         content = None
     if content is None or not plain or not all(isinstance(text, str) for text in texts):
         raise input_error(
@@ -254,13 +257,19 @@ def _unwritable(out: Path, error: OSError, kept: str = "") -> InputError:
 def _locked_folder(out: Path, beside: Path) -> tuple[Path, int]:
     """Return a new temporary folder and the lock that says that this process uses it.
 
-    The system releases the lock when the process ends, however it ends.
+    The system releases the lock when the process ends, however it ends. Another process may remove
+    the folder before it is locked, so a few are tried.
+
+    Raises:
+        OSError: the file system has no locks.
     """
-    while True:
+    for _ in range(TRIES):
         partial = Path(tempfile.mkdtemp(prefix=f".{out.name}-", suffix=SUFFIX, dir=beside))
         lock = _locked(partial)
         if lock is not None:
             return partial, lock
+        shutil.rmtree(partial, ignore_errors=True)
+    raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
 
 def _remove_leftovers(out: Path, beside: Path) -> None:
