@@ -186,8 +186,8 @@ def test_an_sdf_error_is_one_short_line(tmp_path):
     (problem,) = caught.value.problems
     quoted = problem.message.split("cannot be read: ")[1]
     assert "\n" not in quoted
-    assert quoted.endswith("...")
-    assert len(quoted) == 200
+    assert quoted.startswith("own.sdf:1: error")
+    assert len(quoted) <= 200
 
 
 def test_a_compliant_bearing_needs_a_joint_between_tub_and_drum(tmp_path):

@@ -21,7 +21,7 @@ from pydrake.multibody.tree import (
     UnitInertia,
 )
 
-from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.errors import InputError, Problem, input_error, nearest_names, shortened
 from wm_drake.model.sdf_shapes import check_shapes
 from wm_drake.model.state_layout import CARRIER
 from wm_drake.parameters import BodyOverride, Load, MachineParameters, with_value
@@ -31,6 +31,9 @@ from wm_drake.systems.speed_source import REFLECTED_INERTIA
 _PACKAGE = Path(__file__).parents[1]
 SDF_FOLDER = _PACKAGE / "sdf" if (_PACKAGE / "sdf").is_dir() else _PACKAGE.parent / "sdf"
 """Folder of the SDF models: in an installed package inside it, in a checkout beside it."""
+
+LONGEST_REASON = 200
+"""Largest number of characters of Drake's reason in a message."""
 
 LARGEST_SDF = 16 << 20
 """Largest size of an SDF file. [byte]"""
@@ -58,7 +61,9 @@ def unusable(path: Path, error: BaseException) -> InputError:
     reason = " ".join(
         str(error).replace(f"{path.parent}/", "").replace(f"/{path.name}", path.name).split()
     )
-    return input_error(f"SDF '{path.name}' cannot be read: {reason}", key="model")
+    return input_error(
+        f"SDF '{path.name}' cannot be read: {shortened(reason, LONGEST_REASON)}", key="model"
+    )
 
 
 def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
