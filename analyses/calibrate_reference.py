@@ -14,7 +14,7 @@ from pathlib import Path
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.cli.progress import progress_bar
 from wm_drake.model.bodies import sdf_path
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.model.sdf_text import sdf_with
 from wm_drake.parameters import load_machine, machine_file_with, machine_path, measured_amplitudes
 from wm_drake.parameters.free import FreeFile, load_free

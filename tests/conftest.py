@@ -1,4 +1,7 @@
-"""Fixtures for all rooms: the reference machine, the command `wm-drake`; property tests run the same examples every time."""
+"""Fixtures for all tests: the reference machine and the command `wm-drake`.
+
+Property tests run the same examples every time.
+"""
 
 import sys
 from dataclasses import dataclass
@@ -7,7 +10,7 @@ import pytest
 from hypothesis import settings
 
 from wm_drake.cli import main
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
 
 settings.register_profile("same_every_time", derandomize=True, deadline=None, database=None)
@@ -16,19 +19,19 @@ settings.load_profile("same_every_time")
 
 @pytest.fixture(scope="session")
 def reference():
-    """The shipped reference machine; frozen, so that tests may share it."""
+    """Return the shipped reference machine; it is frozen, so tests may share it."""
     return load_machine("reference")
 
 
 @pytest.fixture(scope="session")
 def machine(reference):
-    """The reference machine, built; every test sets up a Context of its own."""
+    """Build the reference machine once; every test sets up its own Context."""
     return build_machine(reference)
 
 
 @dataclass(frozen=True)
-class Ended:
-    """How a command ended."""
+class CommandResult:
+    """Exit code and printed text of a command."""
 
     code: int
     out: str
@@ -36,20 +39,24 @@ class Ended:
 
     @property
     def messages(self):
-        """Lines on standard error."""
+        """Return the lines on standard error."""
         return self.err.splitlines()
 
 
 @pytest.fixture
 def wm_drake(monkeypatch, capsys, tmp_path):
-    """Runs `wm-drake` in this process, in a folder of its own: wm_drake("machine", "check", "reference").code == 0."""
+    """Return a function that runs `wm-drake` in this process, in a temporary folder.
+
+    For example, ``wm_drake("machine", "check", "reference").code == 0``.
+    """
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setattr("wm_drake.cli.progress.LINE_PERIOD", float("inf"))
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["wm-drake", *map(str, arguments)])
         with pytest.raises(SystemExit) as ended:
             main()
-        return Ended(ended.value.code or 0, *capsys.readouterr())
+        return CommandResult(ended.value.code or 0, *capsys.readouterr())
 
     return run

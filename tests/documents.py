@@ -1,4 +1,4 @@
-"""The documents of the checkout, and what is read from them: blocks of code, links, headings."""
+"""Documents of the checkout, and functions that read code blocks, links and headings from them."""
 
 import re
 from pathlib import Path
@@ -13,10 +13,12 @@ PAGES = sorted(
 
 
 def name_of(path):
+    """Return the path of a document in the checkout."""
     return path.relative_to(CHECKOUT).as_posix()
 
 
 def text_of(path):
+    """Return the text of a document."""
     return path.read_text(encoding="utf-8")
 
 
@@ -31,7 +33,7 @@ def prose(path):
 
 
 def anchors(path):
-    """Return the anchors that a Markdown page offers: its headings in small letters, with hyphens."""
+    """Return the anchors of a Markdown page: its headings in small letters, with hyphens."""
     headings = (line.lstrip("# ") for line in prose(path) if line.startswith("#"))
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 

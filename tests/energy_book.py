@@ -1,4 +1,4 @@
-"""A plain second account of the machine's energy, from a record and the numbers alone: numpy, no law of the package."""
+"""Independent energy balance of a machine, from a record and the parameters, without its laws."""
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -13,7 +13,10 @@ from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
 
 def elastic_energy(stiffness, x):
-    """Energy of a stiffness, a number or a table, stretched from 0 to x: for a table the integral of the monotone cubic. [J]"""
+    """Return the elastic energy of a stiffness, a number or a table, at displacement x. [J]
+
+    For a table it is the integral of the monotone cubic through its points.
+    """
     if isinstance(stiffness, float):
         return 0.5 * stiffness * x**2
     at, force = stiffness.model_dump().values()
@@ -21,12 +24,15 @@ def elastic_energy(stiffness, x):
     slope = curve.derivative()
     energy = curve.antiderivative()
     inside = np.clip(x, at[0], at[-1])
-    beyond = x - inside  # a straight line there
+    beyond = x - inside  # the force is linear there
     return energy(inside) - energy(0.0) + beyond * curve(inside) + 0.5 * slope(inside) * beyond**2
 
 
 class EnergyBook:
-    """Stored energy and dissipated power of a machine with linear springs, MSTV dampers and one gasket. [J, W]"""
+    """Stored energy [J] and dissipated power [W] of a machine, at all samples of a record.
+
+    The machine has linear springs, MSTV dampers and a gasket, and a rigid bearing.
+    """
 
     def __init__(self, setup, load, record):
         self.setup, self.parameters, self.time = setup, setup.parameters, record.time.values
@@ -39,12 +45,12 @@ class EnergyBook:
         self.context = self.plant.CreateDefaultContext()
         set_bodies(self.plant, self.context, self.parameters)
         add_load(self.plant, self.context, load)
-        # without the drive's reflected inertia, which is a device and no energy of the machine
+        # the reflected inertia of the drive is numerical and stores no energy of the machine
         actuator = self.plant.get_joint_actuator(self.plant.GetJointActuatorIndices()[0])
         actuator.SetRotorInertia(self.context, 0.0)
 
     def bodies(self, index):
-        """Kinetic and gravitational energy at a sample."""
+        """Return the kinetic and gravitational energy at a sample. [J]"""
         state = np.concatenate(
             [self.rpy[index], self.position[index], [self.record.drum_angle.values[index]],
              self.w[index], self.v[index], [self.record.drum_speed.values[index]]]
@@ -63,7 +69,7 @@ class EnergyBook:
         return length, direction, velocity
 
     def springs(self):
-        """Elastic energy of the springs above the rest pose."""
+        """Return the elastic energy of the springs relative to the rest pose. [J]"""
         total = 0.0
         for name, spring in self.setup.springs.items():
             stretch = self._strut(spring)[0] - np.linalg.norm(spring.p_ToA_T - spring.p_WH)
@@ -72,7 +78,10 @@ class EnergyBook:
         return total
 
     def gasket(self):
-        """Elastic energy and dissipated power of the gasket; its frames coincide with the axes of W at rest."""
+        """Return elastic energy [J] and dissipated power [W] of the gasket.
+
+        The axes of both of its frames are those of W at rest.
+        """
         g, placed = self.parameters.gasket, self.setup.bushings["gasket"]
         arm = self.rotation.apply(placed.tub_side_point)
         d = self.position + arm - placed.ground_side_point
@@ -102,7 +111,7 @@ class EnergyBook:
         return np.linalg.solve(left_jacobian, w)
 
     def dampers(self):
-        """Stored energy and dissipated power of sponges and end bushings."""
+        """Return stored energy [J] and dissipated power [W] of sponges and end bushings."""
         stored, power = 0.0, 0.0
         for index, (name, placed) in enumerate(self.setup.dampers.items()):
             kind = self.parameters.damper_types[self.parameters.dampers[name].type]
@@ -146,7 +155,7 @@ class EnergyBook:
         return stored, power
 
     def balance(self):
-        """Work of the drive, change of stored energy, dissipated energy over the record. [J]"""
+        """Return work of the drive, change of stored energy and dissipated energy. [J]"""
         gasket_stored, gasket_power = self.gasket()
         damper_stored, damper_power = self.dampers()
         elastic = self.springs() + gasket_stored + damper_stored
@@ -155,12 +164,15 @@ class EnergyBook:
         return self.integral(drive), change, self.integral(gasket_power + damper_power)
 
     def integral(self, power):
-        """Over the record; corners of the profile are sampled on both sides."""
+        """Integrate a power over the record, which has two samples at each corner. [J]"""
         return np.trapezoid(power, self.time)
 
 
 def dense_record(machine, case, step):
-    """A run sampled at every step: the 5 ms of a record are too coarse to integrate the power of friction to 1e-5."""
+    """Return set-up and record of a run with a sample at every step.
+
+    A sample every 5 ms is too coarse to integrate the power of friction to 1e-5.
+    """
     setup = machine.set_up(case.load, gasket=case.gasket)
     profile, context = case.profile, setup.context
     simulator = Simulator(machine.diagram, context)

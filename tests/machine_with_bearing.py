@@ -1,4 +1,4 @@
-"""Machines whose drum can whirl in its bearing, and what their tests share."""
+"""Machines with a compliant bearing of the drum, for tests."""
 
 from wm_drake.parameters import MachineParameters
 
@@ -17,13 +17,17 @@ UNITS = dict(
 
 
 def with_bearing(parameters, step=2.5e-4, **numbers):
-    """A machine with a bearing that gives."""
+    """Return a machine with a compliant bearing."""
     tree = parameters.model_dump(exclude_unset=True)
     imperfections = {**tree.get("imperfections", {}), "bearing": BEARING | numbers}
     return MachineParameters.model_validate(tree | {"imperfections": imperfections, "step": step})
 
 
 def stiffer(share):
-    """A bearing so many times as stiff, with as much of critical damping."""
+    """Return the numbers of a stiffer bearing with the same damping ratio.
+
+    Args:
+        share: Factor of all stiffnesses.
+    """
     powers = {"stiffness": share, "damping": share**0.5}
     return {key: value * powers[key.split("_")[1]] for key, value in BEARING.items() if key != "y"}

@@ -1,4 +1,4 @@
-"""The reference machine with each kind of element in it, by name: what both engines must agree on."""
+"""Variants of the reference machine with each kind of element, for comparisons of both engines."""
 
 from wm_drake.parameters import MachineParameters, load_machine
 
@@ -52,12 +52,12 @@ TABLES = {f"stiffness_{axis}": LINEAR_TABLE for axis in "xyz"} | {
 
 
 def changed(**parts):
-    """The reference machine with some parts of its tree replaced."""
+    """Return the reference machine with some of its top-level parts replaced."""
     return MachineParameters.model_validate(load_machine("reference").model_dump() | parts)
 
 
 def machines_of_each_kind():
-    """By name."""
+    """Return all variants by name."""
     reference = load_machine("reference").model_dump()
     end_bushing = {"end_bushing": END_BUSHING}
     machines = {"reference": load_machine("reference")}

@@ -1,4 +1,4 @@
-"""Machines simple enough to have a closed form: one isotropic bushing at the centre of mass, no gravity, no friction."""
+"""Machines with a closed-form solution: one isotropic bushing, no gravity and no friction."""
 
 from wm_drake.parameters import Load, SpinProfile, Unbalance, load_machine
 from wm_drake.parameters.machine import BodyOverride, InertiaMatrix
@@ -9,7 +9,10 @@ MASS = 6 * 7.0  # kg, six bodies
 
 
 def isotropic_machine(stiffness=STIFFNESS, damping=DAMPING, rotational_stiffness=4000.0):
-    """All bodies' centres at To, one linear bushing there: translation is three equal oscillators."""
+    """Return a machine with all centres of mass at To and one linear bushing there.
+
+    Its translation is three equal oscillators along x, y and z.
+    """
     reference = load_machine("reference")
     ball = BodyOverride(
         mass=7.0, centre_of_mass=(0.0, 0.0, 0.0), inertia=InertiaMatrix(xx=0.3, yy=0.3, zz=0.3)
@@ -41,8 +44,10 @@ def isotropic_machine(stiffness=STIFFNESS, damping=DAMPING, rotational_stiffness
 
 
 def unbalance(mass, radius=0.25, y=0.0, phase=0.0):
+    """Return a load with one unbalance. [kg, m, m, rad]"""
     return Load(unbalances=(Unbalance(mass=mass, radius=radius, y=y, phase=phase),))
 
 
 def constant_speed(speed, duration):
+    """Return a spin profile of constant speed. [rad/s, s]"""
     return SpinProfile(time=(0.0, duration), speed=(speed, speed))

@@ -1,4 +1,4 @@
-"""The machine with tubes as bodies, and what its tests share."""
+"""The shipped machine with telescopic dampers, and variants of it for tests."""
 
 import numpy as np
 
@@ -14,20 +14,29 @@ OUTER_TUBES = ("damper_left_outer", "damper_right_rear_outer", "damper_right_fro
 
 
 def telescopic():
+    """Return the shipped machine with telescopic dampers."""
     return load_machine("free_stroke")
 
 
 def changed(parameters, **parts):
+    """Return a machine with some of its top-level parts replaced."""
     return MachineParameters.model_validate(parameters.model_dump(exclude_unset=True) | parts)
 
 
 def with_bushing(parameters, **numbers):
+    """Return a machine with some numbers of the bushings of its tubes replaced."""
     kind = parameters.bushing_types["connecting"].model_dump() | numbers
     return changed(parameters, bushing_types={"connecting": kind})
 
 
 def with_tubes(parameters, built, outer_mass, about_axis, inner_mass=None):
-    """Tubes of other masses; `about_axis` is the outer tube's inertia about the damper's axis. [kg, kg m^2]"""
+    """Return a machine whose tubes have other masses; their inertias scale with the mass.
+
+    Args:
+        parameters, built: The machine.
+        outer_mass, inner_mass: Masses; the inner one is 0.75 times the outer one if None. [kg]
+        about_axis: Inertia of the outer tube about the damper's axis, if given. [kg m^2]
+    """
     bodies = {}
     for name in parameters.telescopic_dampers:
         for part, mass in (

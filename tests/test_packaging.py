@@ -140,4 +140,5 @@ def test_command_runs_and_reports(python, tmp_path):
         "record_middle.nc",
         "amplitudes.csv",
         "report.html",
+        "run.json",
     }

@@ -7,7 +7,7 @@ import typer
 from documents import CHECKOUT, HOW_TO, README, blocks, commands, name_of
 
 from wm_drake.cli import app
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile, load_machine
 from wm_drake.parameters.free import load_free
 from wm_drake.report.diagram import mermaid

@@ -1,4 +1,7 @@
-"""The direction of the rooms: imports point upwards only, read from the source, imports inside functions included."""
+"""Imports between rooms, read from the source: each room imports only rooms before it.
+
+Imports inside functions count too.
+"""
 
 import ast
 import sys
@@ -24,6 +27,7 @@ ORDER = (
     {"studies"},
     {"report"},
     {"cli"},
+    {"__main__"},
 )
 LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}
 WITHOUT_DRAKE = {
@@ -50,7 +54,7 @@ def imported(name, source, is_package=False):
 
 
 def faults(name, source, is_package=False):
-    """What is wrong with the imports of a module, one text each."""
+    """Return a text for each wrong import of a module."""
     room = name.split(".")[1]
     if room not in LEVEL:
         return [f"{name}: room '{room}' has no place in the order"]

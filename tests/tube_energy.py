@@ -1,4 +1,4 @@
-"""A plain second account of the energy of the machine with tubes, from its states alone: numpy, no law of the package."""
+"""Independent energy balance of the machine with telescopic dampers, without the package's laws."""
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -15,25 +15,26 @@ def dense_run(setup, profile, step):
 
 
 class Motion:
-    """Of a body: rotation, position, velocities, at all samples."""
+    """Rotation, position and velocities of a body at all samples."""
 
     def __init__(self, states):
         self.rotation = Rotation.from_euler("xyz", states[:, :3])
         self.position, self.w, self.v = states[:, 3:6], states[:, 7:10], states[:, 10:13]
 
     def point(self, p):
-        """Place and velocity of a point fixed to the body."""
+        """Return position and velocity of a point fixed to the body."""
         arm = self.rotation.apply(p)
         return self.position + arm, self.v + np.cross(self.w, arm)
 
 
 def still(count):
+    """Return the motion of a body at rest at the origin, for a number of samples."""
     states = np.zeros((count, 14))
     return Motion(states)
 
 
 def rotation_vector_rate(r, w):
-    """Inverse of the series for the angular velocity of a rotation vector."""
+    """Return the time derivative of a rotation vector at an angular velocity, from a series."""
     rates = np.empty_like(r)
     for k, (a, b) in enumerate(zip(r, w, strict=True)):
         x = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
@@ -43,11 +44,12 @@ def rotation_vector_rate(r, w):
 
 
 def havsin(v, v_t, p):
+    """Return the HAVSIN friction at a velocity."""
     return p * np.where(np.abs(v) < v_t, np.sin(np.pi * v / (2 * v_t)), np.sign(v))
 
 
 def potential(curve, x):
-    """Elastic energy of a number or a table."""
+    """Return the elastic energy of a stiffness, a number or a table, at displacement x. [J]"""
     if isinstance(curve, float):
         return 0.5 * curve * x**2
     pchip = PchipInterpolator(curve.displacement, curve.force)
@@ -57,13 +59,18 @@ def potential(curve, x):
 
 
 def bushing(kind, a, p_a, r_a, b, p_b, r_b):
-    """Stored energy and dissipated power of a six-component bushing between two bodies; its ground side is on the second."""
+    """Return stored energy [J] and dissipated power [W] of a bushing between two bodies.
+
+    Args:
+        kind: Numbers of the bushing.
+        a, p_a, r_a: Motion of the first body; point and rotation of the bushing's frame on it.
+        b, p_b, r_b: The same for the second body, which is the ground side.
+    """
     ground = b.rotation * Rotation.from_matrix(r_b)
     place, velocity = a.point(p_a)
     ground_place = b.point(p_b)[0]
-    of_ground = b.v + np.cross(
-        b.w, place - b.position
-    )  # velocity there of what is fixed to the second
+    # velocity of the point of the second body that is at the same place
+    of_ground = b.v + np.cross(b.w, place - b.position)
     d, d_rate = ground.inv().apply(place - ground_place), ground.inv().apply(velocity - of_ground)
     r = (ground.inv() * a.rotation * Rotation.from_matrix(r_a)).as_rotvec()
     r_rate = rotation_vector_rate(r, ground.inv().apply(a.w - b.w))
@@ -83,7 +90,7 @@ def bushing(kind, a, p_a, r_a, b, p_b, r_b):
 
 
 def balance(machine, setup, load, profile, step):
-    """Work of the drive, change of stored energy, dissipated energy. [J]"""
+    """Return work of the drive, change of stored energy and dissipated energy of a run. [J]"""
     parameters = setup.parameters
     run = dense_run(setup, profile, step)
     time, motion, deformation, tubes = run.time, run.state, run.deformation, run.tubes
@@ -134,7 +141,7 @@ def balance(machine, setup, load, profile, step):
     context = plant.CreateDefaultContext()
     set_bodies(plant, context, parameters)
     add_load(plant, context, load)
-    # without the drive's reflected inertia, which is a device and no energy of the machine
+    # the reflected inertia of the drive is numerical and stores no energy of the machine
     plant.get_joint_actuator(plant.GetJointActuatorIndices()[0]).SetRotorInertia(context, 0.0)
     bodies = []
     for sample in (0, -1):

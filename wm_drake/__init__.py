@@ -9,14 +9,15 @@ The rooms, in the order of the data flow: `parameters`, `laws`, `elements`, `sys
 """
 
 import importlib
+import importlib.metadata
 from typing import Any
 
 _HOMES = {
     "Case": "simulation.cases",
     "Scene": "model.scene",
-    "add_washing_machine": "model.machine",
+    "add_washing_machine": "model.build",
     "advance_to": "engines.drake",
-    "build_machine": "model.machine",
+    "build_machine": "model.build",
     "case_of": "simulation.cases",
     "describe": "studies.description.description",
     "envelopes": "simulation.measures",
@@ -41,10 +42,13 @@ __all__ = sorted(_HOMES)
 
 def __getattr__(name: str) -> Any:
     """Load a public name from its room when it is first used, because importing Drake takes 1 s."""
+    if name == "__version__":
+        return importlib.metadata.version("wm-drake")
     if name not in _HOMES:
         raise AttributeError(f"module 'wm_drake' has no attribute '{name}'")
     return getattr(importlib.import_module(f"wm_drake.{_HOMES[name]}"), name)
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOMES])
+    special = {name for name in globals() if name.startswith("__")}
+    return sorted({*special, "__version__", *_HOMES})

@@ -1,8 +1,17 @@
 """Errors that a user can correct, with one line of message for each problem."""
 
 import difflib
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+
+LONGEST_LINE = 480
+"""Largest number of characters of a problem; a longer one is shortened."""
+
+MOST_LINES = 20
+"""Largest number of problems that the text of an `InputError` lists."""
+
+_LONGEST_WHERE, _LONGEST_KEY, _LONGEST_WORD, _LONGEST_LIST = 220, 80, 60, 300
 
 
 class WmDrakeError(Exception):
@@ -24,8 +33,13 @@ class Problem:
     message: str
 
     def __str__(self) -> str:
-        """Return one line: ``file:line: key.path: message``."""
-        return ": ".join(part for part in (self.where, self.key, self.message) if part)
+        """Return one line: ``file:line: key.path: message``.
+
+        Long parts are shortened, and characters that a terminal would act on are escaped.
+        """
+        where, key = shortened(self.where, _LONGEST_WHERE), shortened(self.key, _LONGEST_KEY)
+        message = shortened(self.message, LONGEST_LINE - len(where) - len(key) - 4)
+        return ": ".join(part for part in (where, key, message) if part)
 
 
 class InputError(WmDrakeError):
@@ -34,7 +48,10 @@ class InputError(WmDrakeError):
     def __init__(self, problems: Iterable[Problem]) -> None:
         """Store the problems, of which there must be at least one."""
         self.problems = tuple(problems)
-        super().__init__("\n".join(str(problem) for problem in self.problems))
+        lines = [str(problem) for problem in self.problems[:MOST_LINES]]
+        if len(self.problems) > MOST_LINES:
+            lines.append(f"and {len(self.problems) - MOST_LINES} more problems")
+        super().__init__("\n".join(lines))
 
 
 def input_error(message: str, *, where: str = "", key: str = "") -> InputError:
@@ -48,11 +65,43 @@ def input_error(message: str, *, where: str = "", key: str = "") -> InputError:
     return InputError([Problem(where, key, message)])
 
 
+def shortened(text: str, longest: int) -> str:
+    """Return a text in one printable line of limited length.
+
+    Characters that are not printable are escaped. In a text that is too long, long words lose their
+    middle first, then the text loses its middle.
+
+    Args:
+        text: Any text.
+        longest: Largest number of characters.
+    """
+    line = text if text.isprintable() else "".join(map(_printable, text))
+    if len(line) > longest:
+        line = re.sub(rf"\S{{{_LONGEST_WORD + 1},}}", _without_middle, line)
+    if len(line) > longest:
+        tail = longest // 3
+        line = f"{line[: longest - tail - 1]}…{line[-tail:]}"
+    return line
+
+
+def _printable(character: str) -> str:
+    return character if character.isprintable() else character.encode("unicode_escape").decode()
+
+
+def _without_middle(word: re.Match[str]) -> str:
+    return f"{word[0][: _LONGEST_WORD - 21]}…{word[0][-20:]}"
+
+
+def reason_of(error: OSError | ValueError) -> str:
+    """Return why a file cannot be read or written, in words without the number of the error."""
+    return getattr(error, "strerror", None) or shortened(str(error), 100) or type(error).__name__
+
+
 def nearest_names(name: str, known: Iterable[str]) -> str:
     """Return a hint for an unknown name, such as `` (did you mean 'x'? known: x, y, z)``.
 
-    The hint contains the most similar name if there is one. It lists all known names if they are
-    at most 24, or if none is similar.
+    The hint contains the most similar name if there is one. It lists the known names if they are
+    at most 24, or if none is similar; a long list ends with the number of names left out.
 
     Args:
         name: The unknown name.
@@ -61,8 +110,15 @@ def nearest_names(name: str, known: Iterable[str]) -> str:
     names = sorted(known)
     if not names:
         return " (there are none)"
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    close = difflib.get_close_matches(name[:_LONGEST_KEY], names, n=1, cutoff=0.5)
     hint = f"did you mean '{close[0]}'? " if close else ""
     if len(names) <= 24 or not close:
-        hint += "known: " + ", ".join(names)
+        shown, length = [], 0
+        for known_name in names:
+            length += len(known_name) + 2
+            if length > _LONGEST_LIST:
+                break
+            shown.append(known_name)
+        left_out = len(names) - len(shown)
+        hint += "known: " + ", ".join([*shown, *([f"{left_out} more"] if left_out else [])])
     return f" ({hint.strip()})"

@@ -12,7 +12,7 @@ from wm_drake.batch import SimulationInterrupted, simulate_many
 from wm_drake.batch.work_items import KEPT_NUMBERS
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import InputError
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, with_value
 from wm_drake.simulation.cases import Case

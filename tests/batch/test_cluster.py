@@ -2,12 +2,13 @@
 
 import os
 import signal
+from concurrent.futures import CancelledError
 from pathlib import Path
 
 import pytest
 import xarray as xr
 
-from wm_drake.batch import simulate_many
+from wm_drake.batch import cluster, simulate_many
 from wm_drake.batch.cluster import (
     CASES_PER_WORK_ITEM,
     check_workers,
@@ -16,7 +17,7 @@ from wm_drake.batch.cluster import (
     simulate_on_cluster,
 )
 from wm_drake.batch.ledger import Ledger, open_ledger
-from wm_drake.errors import InputError
+from wm_drake.errors import InputError, WmDrakeError
 from wm_drake.parameters import SpinProfile, with_value
 from wm_drake.simulation.cases import Case
 
@@ -51,6 +52,63 @@ def test_work_item_returns_results_by_key(reference, machine):
     table = simulate_many(machine, cases, measures=("extremes",))
     assert list(results) == ["a", "b", "c"]
     assert results["b"].values["gasket_force"].tolist() == table.gasket_force.values[1].tolist()
+
+
+class Running:
+    """Work items of which none ends."""
+
+    def __init__(self, ready=()):
+        self.ready = list(ready)
+
+    def is_empty(self):
+        return False
+
+    def has_ready(self):
+        return bool(self.ready)
+
+    def __next__(self):
+        return self.ready.pop()
+
+
+class Lost:
+    """Client of a cluster in a given state."""
+
+    def __init__(self, status, workers):
+        self.status, self.workers = status, workers
+
+    def scheduler_info(self):
+        return {"workers": self.workers}
+
+
+def test_study_without_workers_says_so_and_ends(monkeypatch, caplog):
+    monkeypatch.setattr(cluster, "WAIT_FOR_WORKERS", 0.2)
+    ended = cluster._as_they_end(Running(["first"]), Lost("running", {}))
+    assert next(ended) == "first"
+    with pytest.raises(WmDrakeError, match=r"no workers for 0\.2 s; finished runs are kept"):
+        next(ended)
+    assert caplog.messages == ["--cluster: the cluster has no workers; waiting 0.2 s for one"]
+
+
+def test_worker_that_comes_back_ends_the_wait(monkeypatch, caplog):
+    monkeypatch.setattr(cluster, "WAIT_FOR_WORKERS", 0.2)
+    running, client = Running(), Lost("running", {})
+
+    def sleep(_):
+        client.workers = {"tcp://one": {}}
+        running.ready = ["first"]
+
+    monkeypatch.setattr(cluster.time, "sleep", sleep)
+    assert next(cluster._as_they_end(running, client)) == "first"
+    assert len(caplog.messages) == 1
+
+
+def test_lost_scheduler_ends_the_study():
+    with pytest.raises(
+        WmDrakeError, match="connection to the scheduler is lost; finished runs are kept"
+    ):
+        next(cluster._as_they_end(Running(), Lost("connecting", {"tcp://one": {}})))
+    with pytest.raises(WmDrakeError, match="scheduler is lost"), cluster._cluster_errors():
+        raise CancelledError
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """The ledger keeps results through kills and refuses other files with a message."""
 
 import os
+import random
 import resource
 import shutil
 import signal
@@ -283,3 +284,43 @@ def test_key_sees_the_last_digit(reference):
     assert key_of(a=np.array([1.0, 2.0])) == key_of(a=[1.0, 2.0])
     with pytest.raises(TypeError, match="Path"):
         key_of(a=Path())
+
+
+def test_flipped_bit_is_found_or_harmless(path):
+    count = 40
+    filled(path, count)
+    with open_ledger(path, IDENTITY, resume=True) as ledger:
+        ledger.mark_finished()
+    content, results = path.read_bytes(), read_all(path, count)
+    refused = 0
+    for number in range(600):
+        random_ = random.Random(number)
+        damaged = bytearray(content)
+        damaged[random_.randrange(len(damaged))] ^= 1 << random_.randrange(8)
+        for end in ("-wal", "-shm"):
+            path.with_name(path.name + end).unlink(missing_ok=True)
+        path.write_bytes(damaged)
+        try:
+            found = read_all(path, count)
+        except WmDrakeError:
+            refused += 1
+            continue
+        for one, other in zip(found, results, strict=True):
+            assert one.note == other.note
+            assert all(
+                np.array_equal(one.values[n], v, equal_nan=True) for n, v in other.values.items()
+            )
+    assert refused > 100
+
+
+@pytest.mark.parametrize("numbers", ["'abc'", "x'00'", "7"])
+def test_cell_of_another_type_is_found(path, numbers):
+    filled(path)
+    with sqlite3.connect(path) as connection:
+        connection.execute(f"UPDATE results SET numbers = {numbers} WHERE note = 'run 1'")
+    connection.close()
+    with (
+        open_ledger(path, IDENTITY, resume=True) as ledger,
+        pytest.raises(LedgerError, match="is damaged"),
+    ):
+        ledger.get(key_of(index=1))

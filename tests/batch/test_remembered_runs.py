@@ -8,7 +8,7 @@ import xarray as xr
 
 from wm_drake.batch import SimulationInterrupted, run_keys, simulate_many, simulate_remembered
 from wm_drake.batch.ledger import open_ledger
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile, with_value
 from wm_drake.simulation.cases import Case
 

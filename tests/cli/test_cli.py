@@ -14,13 +14,13 @@ import pytest
 
 from wm_drake import load_record
 from wm_drake.cli import main
-from wm_drake.cli.result_folder import result_folder
-from wm_drake.model.machine import build_machine
+from wm_drake.cli.result_folder import Run, result_folder
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
 
 SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
 PROFILE = "time: (0, 2) s\nspeed: (0, 100) rpm\n"
-BLOW_UP = "spring_types.suspension.stiffness=1e9 N/mm"  # far beyond what the fixed step can follow
+VIOLENT = "unbalances: [{mass: 800 kg, radius: 300 mm, y: 100 mm}]\n"  # the tub leaves its bounds
 
 
 def in_machine(text):
@@ -66,7 +66,7 @@ FAULTY_MACHINES = {
     ),
     "unknown joint": (
         in_machine("drive: {joint: drum_axes}"),
-        "no moving joint 'drum_axes' (did you mean 'drum_axis'?",
+        "no moving joint 'drum_axes' in the SDF (did you mean 'drum_axis'?",
     ),
     "unknown model": (in_machine("model: nosuch.sdf"), "no SDF file 'nosuch.sdf'"),
     "model that is no SDF": (in_machine("model: machine.yaml"), "cannot be read"),
@@ -78,7 +78,7 @@ FAULTY_MACHINES = {
     ),
     "missing measured table": (
         in_machine("measured: [nosuch.csv]"),
-        "measured: cannot be read as CSV",
+        "measured: No such file or directory",
     ),
     "spring that would push": (
         in_machine("frames: {spring_left_housing: {position: '(-250, 0, -600) mm'}}"),
@@ -246,13 +246,14 @@ def test_failed_run_leaves_nothing(monkeypatch, tmp_path, mishap):
 
 def test_failed_run_keeps_older_results(monkeypatch, tmp_path):
     def fail_after_writing():
-        with result_folder(Path("out")) as folder:
+        with result_folder(Path("out"), Run("spin", overwrite=True)) as folder:
             (folder / "report.html").write_text("new")
             raise RuntimeError
 
     monkeypatch.chdir(tmp_path)
-    Path("out").mkdir()
-    before = write_all({"out/report.html": "old"})
+    with result_folder(Path("out"), Run("spin")) as folder:
+        (folder / "report.html").write_text("old")
+    before = listing()
     with pytest.raises(RuntimeError):
         fail_after_writing()
     assert (listing(), Path("out/report.html").read_text()) == (before, "old")
@@ -286,6 +287,7 @@ def test_shown_machine_is_complete(wm_drake, reference):
         *("telescopic_dampers", "drum_bearing"),
         *("sensors", "detergent_point_T", "loads", "profile", "rest_pose", "equilibrium_residual"),
         *("natural_frequencies_hz", "mode_damping_ratios"),
+        *("format", "conventions", "laws", "imperfections", "accelerometers", "numerics"),
     }
     assert sum(body["mass"] for body in shown["bodies"].values()) == pytest.approx(
         shown["oscillating_mass_kg"]
@@ -430,6 +432,7 @@ def test_result_files_are_there_and_nothing_beside_them(plain):
             "out/record_middle.nc",
             "out/replay_middle.html",
             "out/report.html",
+            "out/run.json",
             "profile.yaml",
         )
     ]
@@ -463,6 +466,7 @@ def test_table_of_amplitudes_agrees(plain):
 def test_report_is_one_self_contained_page_with_its_command(plain):
     report = (plain.folder / "out" / "report.html").read_text(encoding="utf-8")
     assert "--profile profile.yaml" in report
+    assert '<a href="replay_middle.html">' in report
     assert is_self_contained(report)
 
 
@@ -516,6 +520,36 @@ def test_set_changes_the_result_and_is_recorded(wm_drake, plain):
     assert "set on the command line" in report
 
 
+COMPARED = {
+    "as it was measured": ((), True),
+    "another load": (("--load", "heavy.yaml"), False),
+    "another profile": (("--profile", "profile.yaml"), False),
+    "a number changed": (("--set", "gasket.damping_x=0.03 N s/mm"), False),
+    "a file that extends": (("--machine", "mine.yaml"), False),
+    "measurements named": (("--machine", "mine.yaml", "--measured", "measured.csv"), True),
+}
+
+
+@pytest.mark.parametrize("kind", COMPARED)
+def test_only_what_was_measured_is_judged_against_the_experiment(wm_drake, monkeypatch, kind):
+    arguments, compared = COMPARED[kind]
+    short = "profile: {time: '(0, 2) s', speed: '(0, 100) rpm'}\n"
+    Path("own.yaml").write_text(f"extends: reference\nmeasured: [measured.csv]\n{short}")
+    Path("mine.yaml").write_text("extends: own.yaml\n")
+    Path("profile.yaml").write_text("time: (0, 2) s\nspeed: (0, 90) rpm\n")
+    Path("heavy.yaml").write_text("unbalances: [{mass: 2 kg, radius: 200 mm, y: 0 mm}]\n")
+    Path("measured.csv").write_text(
+        f"load,gasket,source,{','.join(SENSORS)}\nmiddle,yes,experiment,1,1,1,1,1,1\n"
+        "heavy,yes,experiment,1,1,1,1,1,1\n"
+    )
+    machine = () if "--machine" in arguments else ("--machine", "own.yaml")
+    load = () if "--load" in arguments else ("--load", "middle")
+    monkeypatch.setattr("wm_drake.report.spin.report._envelopes_picture", lambda *_: None)
+    assert wm_drake("spin", *machine, *load, *arguments, "--out", "out").code == 0
+    sources = pd.read_csv("out/amplitudes.csv")["source"].tolist()
+    assert sources == (["experiment", "wm_drake"] if compared else ["wm_drake"])
+
+
 def test_load_file_equals_the_same_load_of_the_machine(wm_drake, plain):
     one = load_machine("reference").loads["middle"].unbalances[0]
     place = f"radius: {1e3 * one.radius:g} mm, y: {1e3 * one.y:g} mm"
@@ -543,16 +577,25 @@ def test_tables_are_printed_without_json(wm_drake):
 
 @pytest.mark.parametrize("replay", [(), ("--replay",)], ids=["", "replay"])
 def test_diverging_run_exits_1_says_when_and_what_and_keeps_its_record(wm_drake, replay):
-    ended, printed = spin(wm_drake, "--set", BLOW_UP, *replay)
+    Path("violent.yaml").write_text(VIOLENT)
+    ended, printed = spin(wm_drake, *replay, load="violent.yaml")
     assert ended.code == 1
     (message,) = filter(None, ended.messages)
-    assert re.match(r"middle: the run diverged at \d+\.\d+ s: (roll|pitch|yaw|x|y|z) = ", message)
-    assert message == f"middle: {printed['cases'][0]['diverged']}"
-    record = load_record(Path("out/record_middle.nc"))
-    assert f"middle: {record.attrs['diverged']}" == message
+    assert re.match(r"violent: the run diverged at \d+\.\d+ s: (roll|pitch|yaw|x|y|z) = ", message)
+    assert message == f"violent: {printed['cases'][0]['diverged']}"
+    record = load_record(Path("out/record_violent.nc"))
+    assert f"violent: {record.attrs['diverged']}" == message
     assert record.time.size >= 1
     assert Path("out/amplitudes.csv").is_file()
     assert "diverged" in Path("out/report.html").read_text(encoding="utf-8")
+
+
+def test_a_machine_too_stiff_for_the_step_is_refused(wm_drake):
+    ended = wm_drake("spin", "--set", "spring_types.suspension.stiffness=1e9 N/mm", "--out", "out")
+    assert (ended.code, ended.out) == (2, "")
+    assert "step: 2.5 ms is too long for the tub" in ended.err
+    assert "allowed are up to" in ended.err
+    assert not Path("out").exists()
 
 
 @pytest.mark.slow
@@ -573,7 +616,7 @@ def test_loads_side_by_side(tmp_path):
     assert (ended.returncode, ended.stderr.strip()) == (0, "")
     assert [case["load"] for case in strict_json(ended.stdout)["cases"]] == ["middle", "counter"]
     assert {path.name for path in (tmp_path / "wm-drake-spin").iterdir()} == {
-        *("record_middle.nc", "record_counter.nc", "amplitudes.csv", "report.html")
+        *("record_middle.nc", "record_counter.nc", "amplitudes.csv", "report.html", "run.json")
     }
 
 

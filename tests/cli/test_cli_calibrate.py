@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine, with_value
 from wm_drake.simulation.cases import case_of
 from wm_drake.simulation.measures import measure
@@ -80,12 +80,14 @@ def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
         "quantities.csv",
         "amplitudes.csv",
         "ledger.sqlite",
+        "run.json",
     }
     written = load_machine(Path("out/machine_1.yaml"))
     assert written.damper_types["friction"].friction_force == pytest.approx(
         friction["value_1"], abs=0.01
     )
     assert written.sources["damper_types.friction.friction_force"].startswith("fit: friction")
+    assert written.name == "short_calibrated_1"
     table = pd.read_csv("out/amplitudes.csv")
     assert np.allclose(
         *(table[table.source == source][SENSORS] for source in ("experiment", "solution 1")),
@@ -95,6 +97,11 @@ def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
         *ARGUMENTS, "--deviation", "1", "--leave-out", "back", "--json", "--out", "out"
     )
     assert json.loads(again.out) == result  # a finished calibration is read back
+    shown = wm_drake(*ARGUMENTS, "--deviation", "1", "--leave-out", "back", "--out", "out").out
+    value = next(line for line in shown.splitlines() if "friction" in line)
+    assert f"{friction['value_1']:.4g}" in value
+    assert " N " in value
+    assert "data" in value
 
 
 FAULTS = {
@@ -112,7 +119,7 @@ FAULTS = {
     "weight of nothing": (["--weight", "Q=2"], "'Q' is no load, sensor"),
     "weight that is no number": (
         ["--weight", "Xr=much"],
-        "--weight: 'Xr=much' does not have the form NAME=NUMBER",
+        "--weight: Xr: 'much' is not a number",
     ),
 }
 

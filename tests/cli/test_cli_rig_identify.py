@@ -55,7 +55,7 @@ def test_the_machine_may_be_changed_on_the_command_line(wm_drake):
     change = ("--set", "damper_types.friction.friction_force=200 N", "--sponge-mass", "10 g")
     plain, changed = (
         json.loads(wm_drake("rig", "damper", "-f", "1 Hz", "-a", "10 mm", "--json", *more).out)
-        for more in ((), change)
+        for more in ((), (*change, "--overwrite"))
     )
     assert changed["peak_force_N"] > 3.0 * plain["peak_force_N"]
     assert "sponge of 10 g" in changed["component"]
@@ -68,7 +68,7 @@ def test_a_whole_matrix_writes_loops_and_one_page(wm_drake):
     assert len(pd.read_csv("out/measures.csv")) == 18
     page = Path("out/report.html").read_text()
     assert page.count("<img ") == 5
-    assert re.findall(r'(?:src|href)="(?!data:|#)', page) == []
+    assert re.findall(r'(?:src|href)="(?!data:|#|https://doi.org/)', page) == []
 
 
 @pytest.mark.parametrize(
@@ -104,6 +104,7 @@ def test_a_damper_goes_from_the_bench_into_a_machine(wm_drake, loops_of):
         assert found["unknowns"][name]["value"] == pytest.approx(getattr(truth, name), rel=0.01)
     assert {path.name for path in Path("fit").iterdir()} == {
         "report.html", "identified.yaml", "parameters.csv", "errors.csv", "loops.csv", "fit.json",
+        "run.json",
     }  # fmt: skip
     Path("mine.yaml").write_text("name: mine\nextends: fit/identified.yaml\n")
     assert wm_drake("machine", "check", "mine.yaml").code == 0
@@ -169,6 +170,89 @@ def test_a_radial_axis_serves_x_and_z_and_a_component_file_serves_the_bench(wm_d
         "--json",
     )
     assert json.loads(again.out)["peak_force_N"] == pytest.approx(8.0, rel=1e-3)
+
+
+def test_fixed_numbers_are_written_with_the_identified_ones(wm_drake, loops_of):
+    """On one axis, on the axes that are copied from it, and with a law that is new to the machine."""
+    files = loops_of("gasket", "--axis", "x", "-f", "1,5 Hz", "-a", "5 mm")
+    fix = ("--fix", "damping_x=0.06 N s/mm")
+    for axis in ("x", "radial"):
+        ended = wm_drake("identify", "gasket", *files, "--axis", axis, *fix, "--out", axis)
+        assert ended.code == 0
+        assert "fixed" in ended.out
+    energy = json.loads(
+        wm_drake(
+            "rig", "gasket", "--machine", "x/identified.yaml",
+            "--axis", "x", "-f", "5 Hz", "-a", "5 mm", "--json",
+        ).out
+    )["energy_per_cycle_J"]  # fmt: skip
+    assert energy == pytest.approx(np.pi * 60.0 * 2.0 * np.pi * 5.0 * 5e-3**2, rel=1e-6)
+    reference, one, two = (
+        load_machine(m).gasket for m in ("reference", "x/identified.yaml", "radial/identified.yaml")
+    )
+    assert (one.damping_x, one.damping_z) == (60.0, reference.damping_z)
+    assert (two.damping_x, two.damping_z) == (60.0, 60.0)
+    assert "fixed by the user" in Path("x/identified.yaml").read_text()
+    assert json.loads(Path("x/fit.json").read_text())["fixed"] == {
+        "damping_x": {"value": 60.0, "unit": "N*s/m"}
+    }
+    assert pd.read_csv("x/parameters.csv").set_index("unknown").value["damping_x"] == 0.06
+
+
+def test_a_number_of_a_new_law_may_be_fixed(wm_drake, loops_of):
+    files = loops_of("damper", "-f", "1,3 Hz", "-a", "1,5 mm")
+    options = ("--law", "coulomb", "--fix", "damping=0.1 N s/mm", "--out", "fit")
+    ended = wm_drake("identify", "damper", *files, *options)
+    assert ended.code == 0
+    damper = load_machine("fit/identified.yaml").damper_types["friction"]
+    assert (damper.law, damper.damping) == ("coulomb", 100.0)
+
+
+def test_a_fixed_rise_of_a_table_stays(wm_drake, loops_of):
+    files = loops_of("gasket", "--axis", "x", "-f", "1,5 Hz", "-a", "5 mm")
+    options = ("--axis", "x", "--law", "table", "--knots", "2", "--out", "fit")
+    rise = ("--fix", "stiffness_x.rise_plus_1=2 N")
+    assert wm_drake("identify", "gasket", *files, *options, *rise).code == 0
+    table = load_machine("fit/identified.yaml").gasket.stiffness_x
+    assert table.force[3] == 2.0
+    assert "rise_plus_1 fixed" in Path("fit/identified.yaml").read_text()
+
+
+def test_other_changes_of_the_machine_are_kept(wm_drake, loops_of):
+    files = loops_of("gasket", "--axis", "x", "-f", "1,5 Hz", "-a", "5 mm")
+    sets = (
+        "--set", "gasket.damping_y=0.07 N s/mm",
+        "--set", "damper_types.friction.friction_force=33 N",
+        "--set", "loads.middle.unbalances.0.radius=230 mm",
+    )  # fmt: skip
+    ended = wm_drake("identify", "gasket", *files, "--axis", "x", *sets, "--out", "fit")
+    assert ended.code == 0
+    machine = load_machine("fit/identified.yaml")
+    assert machine.gasket.damping_y == 70.0
+    assert machine.gasket.damping_x == pytest.approx(19.0, rel=0.01)
+    assert machine.damper_types["friction"].friction_force == 33.0
+    text = Path("fit/identified.yaml").read_text()
+    assert "# Not in this file: --set loads.middle.unbalances.0.radius=230 mm." in text
+
+
+def test_a_bad_fit_is_called_bad_first(wm_drake, loops_of):
+    files = loops_of("damper", "-f", "1,3 Hz", "-a", "1,5 mm")
+    ended = wm_drake("identify", "damper", *files, "--law", "coulomb", "--out", "fit")
+    assert ended.code == 0
+    assert ended.out.startswith("Poor fit: the lack of fit is ")
+    assert re.search(r"RMSE [\d.]+ N\b", ended.out)
+    for name in ("identified.yaml", "report.html"):
+        assert "Poor fit" in Path("fit", name).read_text()
+    found = json.loads(Path("fit/fit.json").read_text())["judgement"]
+    assert found["verdict"] == "poor"
+    assert found["hints"] == []
+    for path in files:
+        table = pd.read_csv(path)
+        table["force_N"] *= -1.0
+        table.to_csv(path, index=False)
+    ended = wm_drake("identify", "damper", *files, "--out", "flipped", "--json")
+    (hint,) = json.loads(ended.out)["judgement"]["hints"]
+    assert "wrong sign in all 4 loops" in hint
 
 
 def test_axial_curve_of_a_bushing_is_found_as_a_monotone_table(wm_drake, loops_of):
@@ -265,6 +349,24 @@ BAD_FILE = "time_s,displacement_mm,force_N\n" + "\n".join(
         (
             ("identify", "damper", "good.csv", "--fix", "friction_force"),
             "--fix: 'friction_force' does not have the form KEY=VALUE",
+        ),
+        (
+            ("identify", "gasket", "good.csv", "--axis", "x", "--fix", "damping_x=-1 N s/mm"),
+            "--fix: damping_x: '-1000.0' is out of range; allowed is >= 0",
+        ),
+        (
+            (
+                "identify",
+                "gasket",
+                "good.csv",
+                "--axis",
+                "x",
+                "--fix",
+                "damping_x=1 N s/mm",
+                "--fix",
+                "stiffness_x=1 N/mm",
+            ),
+            "--fix: all numbers of the law are fixed; leave one out",
         ),
         (
             ("identify", "gasket", "good.csv", "--axis", "tilt"),

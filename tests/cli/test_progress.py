@@ -1,8 +1,7 @@
 """Test of the progress bar."""
 
-from rich.console import Console
-
 from wm_drake.cli import progress as progress_module
+from wm_drake.cli.terminal import Console
 
 
 def test_progress_bar_counts_up_to_the_total_on_standard_error(monkeypatch, capsys):

@@ -112,6 +112,33 @@ def test_fields_of_fixed_place_have_an_offset_and_can_be_replaced():
         OUTER.replaced(PACKED, pair=(0.0, 0.0))
 
 
+STATE = PackedLayout("StateNumbers", place=VECTOR, angle=SCALAR)
+write_state = STATE.write
+
+
+@law
+def written(p, place):
+    write_state(p, 1, place, angle=4.0)
+    return p
+
+
+def test_the_writer_is_the_inverse_of_the_reader():
+    for function in (written, generic(written)):
+        p = function(np.zeros(6), (1.0, 2.0, 3.0))
+        assert p.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 0.0]
+        assert STATE.unpack(p, 1) == ((1.0, 2.0, 3.0), 4.0)
+    assert OUTER.write is None
+
+
+def test_a_part_of_fixed_size_moves_no_offset():
+    layout = PackedLayout("Nested", first=LAYOUT(STATE), gain=SCALAR, last=LIST)
+    assert layout.offsets == {"first": 0, "gain": 4, "last": 5}
+    packed = layout.pack(first=range(4), gain=7.0, last=packed_list(8.0))
+    assert STATE.unpack(*layout.unpack(packed).first) == ((0.0, 1.0, 2.0), 3.0)
+    assert layout.unpack(packed).gain == 7.0
+    assert PackedLayout("Twice", a=LAYOUT(STATE), b=LAYOUT(STATE)).fixed_size == 8
+
+
 def test_only_a_layout_without_variable_parts_has_a_fixed_size():
     assert PackedLayout("Fixed", place=VECTOR, pair=ARRAY(2)).fixed_size == 5
     with pytest.raises(ValueError, match="OuterNumbers has no fixed size"):

@@ -62,7 +62,7 @@ import numpy as np
 sys.path[:0] = [TESTS, TESTS + "/engines"]
 import wm_drake
 from wm_drake.errors import InputError
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine, with_value
 from wm_drake.rigs import Harmonic, damper_bench, force_loops, measures_of
 from wm_drake.parameters.loop_files import MeasuredLoop

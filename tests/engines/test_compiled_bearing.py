@@ -11,7 +11,7 @@ from wm_drake.engines.compiled.derivative import StateDerivative
 from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.errors import InputError
 from wm_drake.model.bodies import sdf_path
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, load_machine
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate

@@ -10,7 +10,7 @@ from machines_of_each_kind import machines_of_each_kind
 from wm_drake.engines.compiled import run
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.engines.drake import run_drake
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance, with_value
 from wm_drake.simulation.cases import Case, case_of
 from wm_drake.simulation.measures import measure

@@ -11,7 +11,7 @@ from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.errors import InputError
 from wm_drake.model.bodies import sdf_path
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance
 
 MACHINES = machines_of_each_kind()

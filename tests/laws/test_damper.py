@@ -13,6 +13,7 @@ from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.laws.damper import (
     free_stroke_damper,
     mstv_damper,
+    mstv_sponge_with_mass,
     slider_rate,
     stv_sponge_damper,
 )
@@ -289,3 +290,40 @@ def test_derivatives_of_a_free_stroke_damper_without_main_friction_are_finite():
         rate, deformation, 0.0, 60.0, 1e-6, 10.5, 0.09, (sponge, 0)
     )
     assert np.all(np.isfinite(ExtractGradient(np.array([[deformation_rate]]))))
+
+
+@given(
+    deformation=st.floats(-5e-3, 5e-3),
+    v=velocities,
+    w_before=st.floats(-2.0, 2.0),
+    step=st.floats(1e-7, 1e-2),
+    mass=st.floats(1e-6, 1.0),
+    f_max=full_forces,
+)
+def test_step_of_heavy_sponge_keeps_momentum(deformation, v, w_before, step, mass, f_max):
+    """m (w - w0) / h is tension, air resistance and friction at the end of the step, [C] (2), (3)."""
+    tension, w = mstv_sponge_with_mass(
+        deformation, v, w_before, step, mass, f_max, 0.0, EPSILON, K1, C1, C2
+    )
+    assert tension == pytest.approx(
+        K1 * (deformation - step * w) + C1 * (v - w), rel=1e-9, abs=1e-9
+    )
+    inertia = mass * (w - w_before) / step
+    # friction jumps where |w| = |v - w|: the balance holds between its two values there
+    frictions = [
+        mstv_friction(w, (v - w) * (1.0 + turn), f_max, 0.0, EPSILON) for turn in (-1e-9, 1e-9)
+    ]
+    size = abs(K1 * deformation) + abs(C1 * v) + abs(mass * w_before / step) + f_max
+    room = 1e-6 * size + 1e-9
+    friction = inertia - tension + C2 * w
+    if w == 0.0 and v == 0.0:
+        assert abs(friction) <= f_max + room
+    else:
+        assert min(frictions) - room <= friction <= max(frictions) + room
+
+
+def test_step_of_heavy_sponge_without_mass_is_that_of_massless_damper():
+    tension, w = mstv_sponge_with_mass(2e-4, 0.03, 0.5, 1e-12, 0.0, 60.0, 0.0, EPSILON, K1, C1, C2)
+    expected, rate = mstv_damper(0.03, 2e-4, 60.0, 0.0, EPSILON, K1, C1, C2)
+    assert tension == pytest.approx(expected, rel=1e-9)
+    assert 0.03 - w == pytest.approx(rate, rel=1e-9)

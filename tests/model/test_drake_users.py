@@ -31,8 +31,8 @@ def speed_error_rpm(machine, simulator, end, profile):
 
 @pytest.mark.parametrize(("scheme", "step"), [("runge_kutta3", 0.1), ("runge_kutta5", 0.05)])
 def test_a_plain_simulator_follows_the_profile(machine, scheme, step):
-    context = machine.set_up("middle").context
-    simulator = Simulator(machine.diagram, context)
+    simulator = Simulator(machine.diagram)
+    machine.set_up("middle", context=simulator.get_mutable_context())
     ResetIntegratorFromFlags(simulator, scheme, step)
     assert speed_error_rpm(machine, simulator, 4.0, machine.parameters.profile) < 0.01
 

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from machine_with_bearing import with_bearing
 from scipy.linalg import eigh
 
 from wm_drake.errors import InputError
 from wm_drake.model.bodies import sdf_path
+from wm_drake.model.build import build_machine
 from wm_drake.model.equilibrium import EQUILIBRIUM_TOLERANCE
-from wm_drake.model.machine import build_machine
 from wm_drake.parameters import Load, Unbalance, load_machine, with_value
 from wm_drake.studies.description.modal import natural_modes
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
@@ -168,8 +169,38 @@ def test_a_model_of_ones_own_must_not_clamp_the_motor(tmp_path, effort):
     (tmp_path / "free.sdf").write_text(text)
     for model in ("own", "free"):
         (tmp_path / f"{model}.yaml").write_text(f"extends: reference\nmodel: {model}.sdf\n")
-    with pytest.raises(InputError, match="without <effort>"):
+    with pytest.raises(InputError, match="must have no effort limit"):
         build_machine(load_machine(tmp_path / "own.yaml"))
     assert (
         np.max(np.abs(build_machine(load_machine(tmp_path / "free.yaml")).set_up().residual)) < 1e-9
     )
+
+
+def test_an_sdf_error_is_one_short_line(tmp_path):
+    (tmp_path / "own.sdf").write_text(
+        f"<sdf version='1.9'><model name='m'><{'x' * 500}/></model></sdf>"
+    )
+    (tmp_path / "own.yaml").write_text("extends: reference\nmodel: own.sdf\n")
+    with pytest.raises(InputError, match="cannot be read") as caught:
+        build_machine(load_machine(tmp_path / "own.yaml"))
+    (problem,) = caught.value.problems
+    quoted = problem.message.split("cannot be read: ")[1]
+    assert "\n" not in quoted
+    assert quoted.startswith("own.sdf:1: error")
+    assert len(quoted) <= 200
+
+
+def test_a_compliant_bearing_needs_a_joint_between_tub_and_drum(tmp_path):
+    text = sdf_path("oscillating_group.sdf").read_text()
+    begin = text.index('<joint name="drum_axis"')
+    end = text.index("</joint>", begin)
+    joint = text[begin:end].replace("<parent>tub<", "<parent>motor<")
+    assert joint != text[begin:end]
+    (tmp_path / "own.sdf").write_text(text[:begin] + joint + text[end:])
+    (tmp_path / "own.yaml").write_text("extends: reference\nmodel: own.sdf\n")
+    parameters = with_bearing(load_machine(tmp_path / "own.yaml"))
+    with pytest.raises(
+        InputError,
+        match="needs a revolute joint from 'tub' to 'drum'; joint 'drum_axis' is revolute, from 'motor'",
+    ):
+        build_machine(parameters)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from wm_drake.model import scene as scene_module
 from wm_drake.model.scene import Scene, replay_page
 from wm_drake.parameters import load_machine
 
@@ -89,3 +90,16 @@ def test_replay_is_one_page_that_needs_nothing_else():
     assert len(page) > 1_000_000  # the viewer and the scene are inside
     assert 'src="http' not in page
     assert page != still
+
+
+def test_replay_is_served_to_this_computer_only(monkeypatch, reference):
+    hosts = []
+
+    def meshcat(params):
+        hosts.append(params.host)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(scene_module, "Meshcat", meshcat)
+    with pytest.raises(KeyboardInterrupt):
+        replay_page(reference, np.zeros(1), np.zeros((1, 7)))
+    assert hosts == ["localhost"]

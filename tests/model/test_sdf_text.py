@@ -5,8 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from wm_drake.model.bodies import sdf_path, spelled_out
-from wm_drake.model.machine import build_machine
+from wm_drake.model.bodies import sdf_path, with_sdf_values
+from wm_drake.model.build import build_machine
 from wm_drake.model.sdf_text import sdf_with
 from wm_drake.parameters import load_machine, with_value
 
@@ -19,7 +19,7 @@ def changed(machine):
         "bodies.tub.inertia",
         "bodies.tub.mass",
     )
-    parameters = spelled_out(machine.plant, machine.parameters, keys)
+    parameters = with_sdf_values(machine.plant, machine.parameters, keys)
     parameters = with_value(parameters, "frames.sensor_Xr.position", (0.01, 0.02, -0.03))
     parameters = with_value(parameters, "bodies.motor.centre_of_mass", (0.04, 0.05, -0.26))
     parameters = with_value(parameters, "bodies.tub.mass", 10.5)

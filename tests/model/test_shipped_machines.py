@@ -6,8 +6,8 @@ import pytest
 from pydantic import BaseModel
 
 from wm_drake.model.bodies import SDF_FOLDER, sdf_path
+from wm_drake.model.build import build_machine
 from wm_drake.model.equilibrium import EQUILIBRIUM_TOLERANCE
-from wm_drake.model.machine import build_machine
 from wm_drake.parameters import (
     load_machine,
     measured_amplitudes,

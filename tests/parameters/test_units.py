@@ -95,12 +95,18 @@ def test_missing_unit_is_refused_in_a_file(value, read):
         read(value, IN_FILE, LENGTH)
 
 
-@pytest.mark.parametrize(
-    "text", ["1 foo", "1 2 mm", "1 mm)", "1,5 mm", "1_000 mm", "1 __import__('os')"]
-)
+@pytest.mark.parametrize("text", ["1 foo", "1 2 mm", "1 mm)", "1_000 mm", "1 __import__('os')"])
 def test_unknown_unit_is_refused(text):
     with pytest.raises(ValueError, match="is not known; write for example '1 mm'"):
         to_si(text, IN_FILE, LENGTH)
+
+
+@pytest.mark.parametrize("text", ["1,5 mm", " -1,5mm", "1,5"])
+def test_decimal_comma_is_named(text):
+    with pytest.raises(ValueError, match=r"decimal sign is a point, not a comma: write -?1\.5"):
+        to_si(text, IN_FILE, LENGTH)
+    with pytest.raises(ValueError, match="decimal sign is a point"):
+        units.split(text)
 
 
 @pytest.mark.parametrize(

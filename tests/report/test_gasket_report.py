@@ -6,17 +6,34 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wm_drake.errors import InputError
 from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors
-from wm_drake.report.gasket.findings import about_residual, conflicts, load_findings, summary
+from wm_drake.report.gasket import figures
+from wm_drake.report.gasket.findings import (
+    about_residual,
+    advice,
+    load_findings,
+    summary,
+    warnings,
+)
 from wm_drake.report.gasket.report import gasket_report
-from wm_drake.report.gasket.tables import digits
+from wm_drake.report.gasket.tables import digits, factors
+from wm_drake.report.gasket.words import Words
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe import make_design
-from wm_drake.studies.gasket.screening import Responses, run_screening
-from wm_drake.studies.gasket.study import RESPONSES, GasketTrials
+from wm_drake.studies.gasket.screening import Meaning, Responses, run_screening
+from wm_drake.studies.gasket.study import GasketTrials
 
 NAMES = ("C_L", "C_T", "K_Lx", "K_Ly")
+RESPONSES = [letter + axis for letter in "DFM" for axis in "xyz"]
 UNITS = {name: {"D": "mm", "F": "N", "M": "N m"}[name[0]] for name in RESPONSES}
+KINDS = {"D": "displacement", "F": "force", "M": "moment"}
+MEANINGS = {name: Meaning(f"{KINDS[name[0]]} {name[1]}", kind=KINDS[name[0]]) for name in RESPONSES}
+
+
+@pytest.fixture(scope="module")
+def words(trials):
+    return Words(trials.factors, MEANINGS)
 
 
 def planted(design):
@@ -35,7 +52,7 @@ def planted(design):
         "Fz": 30.0 + x["K_Lx"] * x["K_Ly"],
     }
     frame = pd.DataFrame(values)[RESPONSES]
-    return Responses({"middle": frame, "towel & co": frame * 1.5}, UNITS, {})
+    return Responses({"middle": frame, "towel & co": frame * 1.5}, UNITS, {}, MEANINGS)
 
 
 @pytest.fixture(scope="module")
@@ -54,18 +71,127 @@ def trials(reference):
     )
 
 
-def test_words_come_from_the_numbers(screening):
-    found = load_findings(screening, "middle")
-    assert found[0] == "Dx (mean 20.0 mm) falls by 4.00 mm from level −1 to +1 of C_L (100 %)."
-    assert found[1] == "Dy (mean 8.67 mm) is lowest at level 0 of C_T, by up to 1.00 mm (100 %)."
-    assert found[5] == "Fz (mean 30.0 N) depends on the interaction K_Lx × K_Ly (100 %)."
-    assert conflicts(screening, "middle") == ["Load middle: raising C_L lowers Dx but raises Mx."]
-    text = summary(screening)
+def test_words_come_from_the_numbers(screening, words):
+    found = load_findings(screening, "middle", words)
+    assert found[0] == (
+        "Displacement x (Dx), mean 20.0 mm, falls by 4.00 mm as linear damping C_L rises from "
+        "0.0095 to 0.0285 N s/mm (100 %)."
+    )
+    assert found[1] == (
+        "Displacement y (Dy), mean 8.67 mm, is lowest at 60 N mm s/deg of torsional damping C_T, "
+        "by up to 1.00 mm (100 %)."
+    )
+    assert found[5] == (
+        "Force z (Fz), mean 30.0 N, depends on the interaction linear stiffness along x K_Lx × "
+        "linear stiffness along y K_Ly (100 %)."
+    )
+    text = " ".join(summary(screening, words))
     assert (
         "162 runs: 81 trials of 4 factors (full, D-efficiency 100.00 %) with load middle and load towel & co."
         in text
     )
-    assert "It consists of the interactions of three and more factors." in about_residual(screening)
+    assert "The residual consists of the interactions of three and more" in about_residual(
+        screening
+    )
+
+
+def test_advice_names_the_best_value_or_the_compromise(screening, words):
+    damping, torsional, *_ = advice(screening, words)
+    assert damping == (
+        "Linear damping C_L: needs a compromise. 0.0095 N s/mm is best for moment x (Mx) "
+        "[3.00 N m]; 0.0285 N s/mm is best for displacement x (Dx) [6.00 mm]."
+    )
+    assert torsional == (
+        "Torsional damping C_T: choose 60 N mm s/deg. It is best for displacement y (Dy) [1.50 mm]."
+    )
+
+
+def test_advice_names_the_load_where_loads_differ(words):
+    def evaluate(design):
+        a = design.levels[:, 0].astype(float)
+        frames = {
+            name: pd.DataFrame({"Dx": 9.0 + sign * a}) for name, sign in (("p", 1), ("q", -1))
+        }
+        return Responses(frames, {"Dx": "mm"}, {}, MEANINGS)
+
+    damping = advice(run_screening(make_design("full", NAMES), evaluate), words)[0]
+    assert damping == (
+        "Linear damping C_L: needs a compromise. 0.0095 N s/mm is best for displacement x (Dx), "
+        "load p [2.00 mm]; 0.0285 N s/mm is best for displacement x (Dx), load q [2.00 mm]."
+    )
+
+
+def part_of_grid(kind, trials, cube):
+    """Return a screening of a part of the grid; `cube` is the size of a term of three factors."""
+
+    def evaluate(design):
+        a, b, c, d = design.levels.T.astype(float)
+        y = 10.0 + a + 0.2 * b * c + cube * a * b * d
+        return Responses({"middle": pd.DataFrame({"y": y})}, {"y": "mm"}, {})
+
+    return run_screening(make_design(kind, NAMES, trials=trials), evaluate)
+
+
+def test_partial_design_is_judged_by_trials_that_are_left_out(words):
+    good, poor = part_of_grid("d-optimal", 60, 0.1), part_of_grid("d-optimal", 60, 1.5)
+    text = about_residual(good)
+    assert "consists of" not in text
+    assert "Judge the model by predicted R²" in text
+    assert "predicts trials that were left out of its fit with R² of at least" in " ".join(
+        summary(good, words)
+    )
+    assert warnings(good, words) == []
+    assert "The model predicts these responses poorly" in warnings(poor, words)[0]
+
+
+def test_few_trials_are_warned_of_and_none_left_is_refused(words):
+    found = warnings(part_of_grid("d-optimal", 40, 0.1), words)
+    assert "40 trials for 33 coefficients are few (7 degrees of freedom)" in found[0]
+    with pytest.raises(InputError, match=r"33 trials for 33 coefficients .* no degree of freedom"):
+        part_of_grid("d-optimal", 33, 0.1)
+
+
+def test_full_saturated_design_says_that_nothing_shows_its_fit(trials, words):
+    frame = pd.DataFrame({"y": np.arange(9.0) ** 2})
+    responses = Responses({"middle": frame}, {"y": "mm"}, {})
+    screening = run_screening(make_design("full", NAMES[:2]), lambda _: responses)
+    assert "nothing shows how well the model fits between them" in warnings(screening, words)[0]
+    page = gasket_report(screening, trials)
+    assert not re.search(r"[>( ](nan|NaN)[<) ]", page)
+
+
+def test_contact_is_said_first_and_listed(trials, words):
+    def evaluate(design):
+        gap = 5.0 + 3.0 * design.levels[:, 0]
+        gap[4] = -1.0
+        frame = pd.DataFrame({"gap": gap})
+        return Responses({"middle": frame}, {"gap": "mm"}, {}, {}, {(4, "middle"): -1.0})
+
+    screening = run_screening(make_design("full", NAMES), evaluate)
+    first = warnings(screening, words)[0]
+    assert "The tub touches the housing in 1 of 81 runs" in first
+    assert "trial 5, load middle" in first
+    assert "Runs in which the tub touches the housing" in gasket_report(screening, trials)
+
+
+def test_spread_shows_all_points_of_all_loads(screening, words):
+    """Shared limits once ended with the first panel and cut the points of the others."""
+    figure = figures.spread_figure(screening, ["Dx", "Dy", "Dz"], "displacement", words)
+    for axes, load in zip(figure.axes, screening.loads, strict=True):
+        values = screening.responses.values[load][["Dx", "Dy", "Dz"]].to_numpy()
+        low, high = axes.get_ylim()
+        assert low <= values.min() < values.max() <= high
+
+
+def test_factor_table_has_every_level_and_its_unit(trials, words):
+    table = factors(trials.factors, words)
+    for group, factor in zip(table.groups, trials.factors, strict=True):
+        for row in group.rows:
+            key, _, *levels, unit = row.cells
+            assert unit == factor.units[key]
+            assert [float(text) for text in levels] == pytest.approx(
+                [factor.numbers[key][at] for at in range(3)], rel=1e-3
+            )
 
 
 def test_page_is_whole(screening, trials):
@@ -78,9 +204,10 @@ def test_page_is_whole(screening, trials):
     for text in (
         "0.0095 N s/mm",
         "gasket.damping_z",
+        "What to do",
         "D-efficiency for main+2fi",
         "wm-drake study gasket",
-        "K_Lx × K_Ly",
+        "linear stiffness along x K_Lx × linear stiffness along y K_Ly",
     ):
         assert text in page
     assert not re.search(r"[>( ](nan|NaN)[<) ]", page)

@@ -26,6 +26,7 @@ from wm_drake.parameters import (
 )
 from wm_drake.rigs import (
     AXES,
+    MATRICES,
     Harmonic,
     bushing_bench,
     damper_bench,
@@ -203,6 +204,42 @@ def test_a_sponge_with_mass_differs_in_proportion_to_it(mass):
 
 def test_ten_grams_of_sponge_change_the_loop_by_less_than_three_parts_in_ten_thousand():
     assert largest_difference(0.01) < 3e-4 * np.max(mstv_force(0.0))
+
+
+@pytest.mark.parametrize("motion", MATRICES["damper"]["C"], ids=str)
+def test_a_sponge_of_a_milligram_is_massless_in_all_tests_of_c(motion):
+    """At the two reversals the friction of a massless slider jumps; a mass smooths the jump."""
+    heavy, massless = (force_loop(damper_bench(MSTV, m), motion).force for m in (1e-6, 0.0))
+    inside = np.delete(np.arange(len(massless)), [len(massless) // 4, 3 * len(massless) // 4])
+    assert heavy[inside] == pytest.approx(massless[inside], abs=2e-5 * np.max(massless))
+    assert heavy == pytest.approx(massless, abs=2e-3 * np.max(massless))
+
+
+def test_all_tests_of_c_run_with_a_sponge_of_ten_grams():
+    motions = MATRICES["damper"]["C"]
+    damper = load_machine("reference").damper_types["friction"]
+    loops = {m: force_loops(damper_bench(damper, m), motions) for m in (0.0, 0.01)}
+    assert len(loops[0.01]) == 18
+    for heavy, massless in zip(loops[0.01], loops[0.0], strict=True):
+        # the inertia of 10 g is below 10 g times the largest acceleration of the driven end
+        inertia = 0.01 * heavy.motion.angular_frequency**2 * heavy.motion.amplitude
+        largest = np.max(np.abs(massless.force))
+        mean = np.sqrt(np.mean(np.square(heavy.force - massless.force)))
+        assert mean < inertia + 2e-4 * largest
+
+
+@pytest.mark.parametrize("mass", [0.01, 0.5])  # kg
+@pytest.mark.parametrize("frequency", [1.0, 10.0, 50.0])  # Hz
+def test_heavy_sponge_without_friction_has_its_complex_stiffness(mass, frequency):
+    """m X'' + c2 X' = k1 (Y - X) + c1 (Y' - X'): a complex stiffness in closed form."""
+    bench = damper_bench(MSTV.model_copy(update={"friction_force": 0.0}), mass)
+    motion = Harmonic(frequency, 1e-3)
+    s = 1j * motion.angular_frequency
+    sponge, slider = 176e3 + 90.0 * s, 400.0 * s + mass * s * s
+    expected = sponge * slider / (sponge + slider)
+    measures = measures_of(force_loop(bench, motion))
+    assert measures.dynamic_stiffness == pytest.approx(abs(expected), rel=1e-5)
+    assert measures.loss_angle == pytest.approx(np.angle(expected), abs=1e-5)
 
 
 def test_sponge_without_friction_is_a_linear_solid():

@@ -5,7 +5,7 @@ import pytest
 from simple_machines import DAMPING, MASS, STIFFNESS, constant_speed, isotropic_machine, unbalance
 
 from wm_drake.engines.drake import run_drake
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.description.modal import natural_modes

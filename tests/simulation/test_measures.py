@@ -9,6 +9,7 @@ from wm_drake.simulation.measures import (
     filtered_displacement,
     largest_motion,
     measure,
+    moment_of_largest_amplitude,
     peak_line,
     percent_difference,
 )
@@ -116,6 +117,18 @@ def test_measures_read_amplitude_speed_and_forces():
 def test_percent_difference_is_equation_1_of_B():
     with_gasket, without = xr.DataArray([29.1, 8.0]), xr.DataArray([23.6, 1.1])
     assert percent_difference(with_gasket, without).values == pytest.approx([23.3, 627.3], abs=0.05)
+
+
+def test_moment_of_largest_amplitude_is_that_of_the_amplitudes():
+    """A slow drift far outside of the band is larger, but it is no amplitude."""
+    time = np.arange(8000) / RATE
+    burst = 0.01 * np.exp(-(((time - 25.0) / 2.0) ** 2)) * np.sin(2.0 * np.pi * 3.0 * time)
+    record = record_of(burst + 0.1 * np.sin(2.0 * np.pi * 0.01 * time))
+    at = moment_of_largest_amplitude(record)
+    assert time[at] == pytest.approx(25.0, abs=0.2)
+    speed = measure(record).critical_speed.values
+    assert record.drum_speed.values[at] == speed[0]
+    assert moment_of_largest_amplitude(record_of([0.0, -2.0, 1.0])) == 1  # too short to filter
 
 
 def test_replay_shows_the_stretch_around_the_largest_motion():

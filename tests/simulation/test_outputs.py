@@ -5,7 +5,7 @@ import pytest
 from element_ports import own_outputs
 from machines_of_each_kind import machines_of_each_kind
 
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate

@@ -7,7 +7,7 @@ from pydrake.systems.analysis import Simulator
 
 from wm_drake.engines.drake import advance_to
 from wm_drake.errors import InputError
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, with_value
 from wm_drake.simulation.cases import Case, case_of
 from wm_drake.simulation.measures import measure

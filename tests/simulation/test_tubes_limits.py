@@ -5,7 +5,7 @@ from telescopic_machine import OUTER_TUBES, RUN_UP, changed, telescopic, with_bu
 from tube_energy import balance
 
 from wm_drake.batch import simulate_many
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.vibration import relative_error

@@ -5,7 +5,7 @@ import pytest
 from simple_machines import constant_speed, isotropic_machine
 
 from wm_drake.batch import simulate_many
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance, with_value
 from wm_drake.parameters.spin import Region
 from wm_drake.simulation.cases import Case

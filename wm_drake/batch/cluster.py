@@ -7,8 +7,11 @@ This module needs the extra `cluster`.
 
 import functools
 import itertools
+import logging
+import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import xarray as xr
@@ -17,8 +20,9 @@ from wm_drake.batch.ledger import Ledger, Result
 from wm_drake.batch.many import as_table, simulate_many
 from wm_drake.batch.remembered import run_keys, sources_version
 from wm_drake.batch.runs import MEASURES
-from wm_drake.errors import WmDrakeError, input_error
-from wm_drake.model.machine import Machine, build_machine
+from wm_drake.errors import WmDrakeError, input_error, shortened
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.machine import DEFAULT_STEP
 from wm_drake.simulation.cases import Case
@@ -31,6 +35,22 @@ They take about 0.2 s to run and a few milliseconds to send.
 
 WORK_ITEMS_PER_THREAD = 4
 """Number of work items in flight for each thread of the cluster."""
+
+WAIT_FOR_WORKERS = 60.0
+"""Time for which a study waits for a worker when all are gone. [s]"""
+
+POLL = 0.05
+"""Time between two looks for finished work items. [s]"""
+
+CLOSING_TIME = 5.0
+"""Longest time for which the end of a command waits for the scheduler. [s]"""
+
+_CONNECTION_LOST = (
+    "--cluster: the connection to the scheduler is lost; finished runs are kept: start it again "
+    "and go on with --resume"
+)
+
+_log = logging.getLogger(__name__)
 
 RETRY_LIMIT = 10
 """Number of times that a work item is sent again after it failed, for example with its worker."""
@@ -53,6 +73,9 @@ def cluster_client(address: str) -> Iterator[Any]:
         raise input_error(
             "needs the extra 'cluster': pip install 'wm-drake[cluster]'", where="--cluster"
         ) from None
+    for name in list(logging.root.manager.loggerDict):
+        if name.startswith("distributed"):  # its tracebacks would bury our message
+            logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client = Client(address, timeout=10, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -65,7 +88,8 @@ def cluster_client(address: str) -> Iterator[Any]:
         check_workers(client)
         yield client
     finally:
-        client.close()
+        with suppress(Exception):  # the scheduler is gone: there is nothing left to close
+            client.close(timeout=CLOSING_TIME)
 
 
 def check_workers(client: Any) -> None:
@@ -74,7 +98,11 @@ def check_workers(client: Any) -> None:
     Raises:
         InputError: there are no workers, or one has other sources or library versions.
     """
-    found = client.run(sources_version)
+    try:
+        found = client.run(sources_version)
+    except OSError:
+        message = "the scheduler or a worker has gone; start it again, then repeat the command"
+        raise input_error(message, where="--cluster") from None
     if not found:
         raise input_error("the cluster has no workers; start at least one", where="--cluster")
     for worker, version in found.items():
@@ -84,6 +112,22 @@ def check_workers(client: Any) -> None:
                 f"({sources_version()}); install the same wm-drake and libraries on both",
                 where="--cluster",
             )
+
+
+@contextmanager
+def _cluster_errors() -> Iterator[None]:
+    """Convert the errors of workers and of the connection into one with a message for the user."""
+    try:
+        yield
+    except WmDrakeError:
+        raise
+    except CancelledError:  # what is left of a work item when the connection is lost
+        raise WmDrakeError(_CONNECTION_LOST) from None
+    except Exception as error:  # workers and the connection raise many types of errors
+        reason = shortened(f"{type(error).__name__}: {error}", 300)
+        raise WmDrakeError(
+            f"--cluster: {reason}; finished runs are kept: go on with --resume"
+        ) from None
 
 
 def simulate_on_cluster(
@@ -144,24 +188,17 @@ def simulate_on_cluster(
         )
 
     in_flight = WORK_ITEMS_PER_THREAD * max(1, sum(client.nthreads().values()))
-    running = as_completed(
-        [send(work_item) for work_item in itertools.islice(work_items, in_flight)],
-        loop=client.loop,
-    )
     progress(len(ledger))
-    try:
-        for future in running:
+    with _cluster_errors():
+        running = as_completed(
+            [send(work_item) for work_item in itertools.islice(work_items, in_flight)],
+            loop=client.loop,
+        )
+        for future in _as_they_end(running, client):
             ledger.put_all(future.result())
             progress(len(ledger))
             for work_item in itertools.islice(work_items, 1):
                 running.add(send(work_item))
-    except WmDrakeError:
-        raise
-    except Exception as error:  # workers and the connection raise many types of errors
-        raise WmDrakeError(
-            f"--cluster: {type(error).__name__}: {error}; finished runs are kept: go on with "
-            "--resume"
-        ) from None
     rows = {}
     for number, (name, key) in enumerate(zip(names, keys, strict=True)):
         result = ledger.get(key)
@@ -171,6 +208,40 @@ def simulate_on_cluster(
             [result.values[n] for measure in wanted for n in MEASURES[measure]],
         )
     return as_table(machine.parameters, wanted, rows)
+
+
+def _as_they_end(running: Any, client: Any) -> Iterator[Any]:
+    """Yield the work items of a cluster as they end, as long as the cluster has workers.
+
+    Args:
+        running: Work items, as `distributed.as_completed`; others may be added.
+        client: Client of the cluster.
+
+    Raises:
+        WmDrakeError: the connection to the scheduler is lost, or there has been no worker for
+            `WAIT_FOR_WORKERS`.
+    """
+    since: float | None = None
+    while not running.is_empty():
+        if running.has_ready():
+            since = None
+            yield next(running)
+            continue
+        if client.status != "running":
+            raise WmDrakeError(_CONNECTION_LOST)
+        if client.scheduler_info()["workers"]:
+            since = None
+        elif since is None:
+            since = time.monotonic()
+            _log.warning(
+                "--cluster: the cluster has no workers; waiting %g s for one", WAIT_FOR_WORKERS
+            )
+        elif time.monotonic() - since > WAIT_FOR_WORKERS:
+            raise WmDrakeError(
+                f"--cluster: the cluster has had no workers for {WAIT_FOR_WORKERS:g} s; finished "
+                "runs are kept: start a worker and go on with --resume"
+            )
+        time.sleep(POLL)
 
 
 def run_work_item(

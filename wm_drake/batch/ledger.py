@@ -45,6 +45,10 @@ _TABLES = (
 )
 
 
+_SQLITE_ERRORS = (sqlite3.Error, UnicodeDecodeError)
+"""Errors of SQLite; the second one if its message quotes damaged text."""
+
+
 class LedgerError(WmDrakeError):
     """A ledger cannot be read or written. Results that were stored before are kept."""
 
@@ -82,10 +86,13 @@ class Ledger:
             LedgerError: the row of the result is damaged.
         """
         rows = self._query("SELECT shapes, numbers, note, checksum FROM results WHERE key = ?", key)
+        if not rows and key in self._keys:
+            raise LedgerError(f"{self.path}: is damaged: result {key} is missing; {_UNCHANGED}")
         if not rows:
             raise KeyError(key)
         shapes, numbers, note, checksum = rows[0]
-        if _checksum(key, shapes, numbers, note) != checksum:
+        kinds = [type(part) for part in (shapes, numbers, note)]
+        if kinds != [str, bytes, str] or _checksum(key, shapes, numbers, note) != checksum:
             raise LedgerError(
                 f"{self.path}: is damaged: the checksum of result {key} is wrong; {_UNCHANGED}"
             )
@@ -157,7 +164,7 @@ class Ledger:
 
 @contextmanager
 def open_ledger(
-    path: Path, identity: Mapping[str, str], *, resume: bool = False
+    path: Path, identity: Mapping[str, str], *, resume: bool = False, replace: bool = False
 ) -> Iterator[Ledger]:
     """Open the ledger of a study, or create it, with exclusive access for this process.
 
@@ -166,6 +173,8 @@ def open_ledger(
         identity: Texts that identify the study (kind, machine, design, versions), by short names.
             Messages print the texts that differ, so give the hash of a long text instead.
         resume: Whether an unfinished study may be continued.
+        replace: Whether the results of another study of the same kind are deleted. Results of this
+            study are kept, and are used as with `resume`.
 
     Raises:
         InputError: the ledger belongs to another study or version, is in use, is damaged, cannot be
@@ -173,7 +182,7 @@ def open_ledger(
     """
     connection = _connected(path)
     try:
-        _check_header(path, connection, {"format": FORMAT} | dict(identity), resume)
+        _check_header(path, connection, {"format": FORMAT} | dict(identity), resume, replace)
         with _ledger_errors(path):
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA synchronous = NORMAL")
@@ -215,14 +224,14 @@ def _connected(path: Path) -> sqlite3.Connection:
         connection = sqlite3.connect(
             path, timeout=0.0, isolation_level=None, check_same_thread=False
         )
-    except sqlite3.Error as error:
+    except _SQLITE_ERRORS as error:
         raise input_error(f"cannot be written to: {error}", where=str(path)) from None
     try:
         connection.execute("PRAGMA locking_mode = EXCLUSIVE")
         connection.execute("BEGIN IMMEDIATE")
         connection.execute("COMMIT")
-        (state,) = connection.execute("PRAGMA quick_check(1)").fetchone()
-    except sqlite3.Error as error:
+        (state,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
+    except _SQLITE_ERRORS as error:
         connection.close()
         raise input_error(_reason(error), where=str(path)) from None
     if state != "ok":
@@ -232,7 +241,11 @@ def _connected(path: Path) -> sqlite3.Connection:
 
 
 def _check_header(
-    path: Path, connection: sqlite3.Connection, identity: dict[str, str], resume: bool
+    path: Path,
+    connection: sqlite3.Connection,
+    identity: dict[str, str],
+    resume: bool,
+    replace: bool,
 ) -> None:
     try:
         tables = {name for (name,) in connection.execute("SELECT name FROM sqlite_master")}
@@ -243,19 +256,25 @@ def _check_header(
             raise input_error(f"is a database but not a ledger; {_UNCHANGED}", where=str(path))
         header = dict(connection.execute("SELECT name, text FROM header"))
         (count,) = connection.execute("SELECT count(*) FROM results").fetchone()
-    except sqlite3.Error as error:
+    except _SQLITE_ERRORS as error:
         raise input_error(_reason(error), where=str(path)) from None
     finished = header.pop("finished", "") == "yes"
     if header != identity:
+        same_kind = all(header.get(name) == identity.get(name) for name in ("format", "study"))
+        if same_kind and replace:
+            _empty(path, connection, identity)
+            return
         names = [name for name in identity | header if identity.get(name) != header.get(name)]
         changes = ", ".join(
             f"{n} is '{header.get(n, '')}' in the ledger and '{identity.get(n, '')}' now"
             for n in names
         )
         raise input_error(
-            f"belongs to another study or version: {changes}; {_UNCHANGED}", where=str(path)
+            f"belongs to another study or version: {changes}; {_UNCHANGED}"
+            f"{', or add --overwrite to replace it' if same_kind else ''}",
+            where=str(path),
         )
-    if count and not finished and not resume:
+    if count and not finished and not (resume or replace):
         raise input_error(
             f"holds {count} finished results of this study; go on from there with --resume, "
             "or choose another folder",
@@ -271,16 +290,25 @@ def _begin(connection: sqlite3.Connection, identity: dict[str, str]) -> None:
         connection.executemany("INSERT INTO header VALUES (?, ?)", list(identity.items()))
 
 
+def _empty(path: Path, connection: sqlite3.Connection, identity: dict[str, str]) -> None:
+    """Delete all results of a ledger, and give it another identity."""
+    with _ledger_errors(path), connection:
+        connection.execute("BEGIN")
+        connection.execute("DELETE FROM results")
+        connection.execute("DELETE FROM header")
+        connection.executemany("INSERT INTO header VALUES (?, ?)", list(identity.items()))
+
+
 @contextmanager
 def _ledger_errors(path: Path) -> Iterator[None]:
     """Convert errors of SQLite into a `LedgerError` with a message for the user."""
     try:
         yield
-    except sqlite3.Error as error:
+    except _SQLITE_ERRORS as error:
         raise LedgerError(f"{path}: {_reason(error)}") from None
 
 
-def _reason(error: sqlite3.Error) -> str:
+def _reason(error: Exception) -> str:
     name = getattr(error, "sqlite_errorname", "")
     if name.startswith(("SQLITE_BUSY", "SQLITE_LOCKED")):
         return (

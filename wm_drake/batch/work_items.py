@@ -9,13 +9,12 @@ from pydrake.systems.framework import Context
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.engines.compiled.packing import Layout, initial_state, pack_bodies, pack_elements
+from wm_drake.engines.compiled.step_check import check_step
 from wm_drake.errors import InputError, Problem, input_error
-from wm_drake.model.machine import Machine
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import Machine, Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.runs import check_bearing
 
 KEPT_BODIES, KEPT_NUMBERS = 64, 2048
 """How many sets of bodies with a load, and of other numbers, are cached."""
@@ -151,5 +150,5 @@ class Preparation:
                 f"has sensors {', '.join(setup.sensors)}; the machine has {', '.join(self.sensors)}"
             )
         self._context = setup.context
-        check_bearing(setup, self.step)
+        check_step(setup, self.step)
         return setup

@@ -1,21 +1,24 @@
 """Command `wm-drake`, one module per command.
 
-A command reads options and files, calls a study, and writes the results. This room holds no physics
-and no statistics.
+Enters: options and files. Leaves: printed results and result files. A command reads its input,
+calls a study, and writes the results; this room contains no physics and no statistics.
+May import: all other rooms; neither pydrake nor a plotting library.
 """
 
 import sys
+from typing import Annotated
 
 import typer
 
 from wm_drake.cli import calibrate, identify, machine, rig, spin, study
-from wm_drake.errors import WmDrakeError
+from wm_drake.cli.terminal import give_quiet
+from wm_drake.errors import Problem, WmDrakeError, reason_of
 
 app = typer.Typer(
     help="Dynamics of front-loading washing machines.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.add_typer(identify.app, name="identify")
 app.add_typer(machine.app, name="machine")
@@ -23,12 +26,42 @@ app.add_typer(rig.app, name="rig")
 app.add_typer(study.app, name="study")
 app.command()(spin.spin)
 app.command()(calibrate.calibrate)
+give_quiet(app)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from wm_drake.report.provenance import program
+
+        typer.echo(program())
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            help="Print version and source revision, and exit.",
+            callback=_print_version,
+            is_eager=True,
+        ),
+    ] = False,
+) -> None:
+    """Dynamics of front-loading washing machines."""
 
 
 def main() -> None:
-    """Run the command; an error of the input ends it with a message and exit code 2."""
+    """Run the command; an error of the input or the disk ends it with a message and exit code 2."""
     try:
         app()
     except WmDrakeError as error:
         typer.echo(str(error), err=True)
-        sys.exit(2)
+    except OSError as error:  # a disk that is full, a folder that cannot be read
+        typer.echo(str(Problem(str(error.filename or "file"), "", reason_of(error))), err=True)
+    except MemoryError:
+        typer.echo("out of memory", err=True)
+    else:
+        return
+    sys.exit(2)

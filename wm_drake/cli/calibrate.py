@@ -1,6 +1,7 @@
 """Command `wm-drake calibrate`: fit unknown numbers of a machine to measured amplitudes."""
 
 import json
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,14 +12,22 @@ import typer
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
+    OutOption,
+    OverwriteOption,
     SetOption,
     check_buildable,
     command_line,
     existing_file,
     interruptible,
     load_parameters,
+    pairs_of,
+    warn_of_phase_error,
+    with_measured,
 )
-from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.progress import ProgressLines, has_bars
+from wm_drake.cli.result_folder import LEDGER, Run, prepare_folder, result_folder
+from wm_drake.cli.study.common import RUNS_KEPT
+from wm_drake.cli.terminal import Console, say
 from wm_drake.errors import InputError, input_error
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -58,9 +67,11 @@ def calibrate(
     ] = 8,
     iterations: Annotated[
         int,
-        typer.Option(help="Largest number of iterations per search; 0: default of the method."),
+        typer.Option(
+            help="Largest number of iterations per search; 0: default of the method.", min=0
+        ),
     ] = 0,
-    seed: Annotated[int, typer.Option(help="Seed of the random starting points.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the random starting points.", min=0)] = 0,
     deviation: Annotated[
         float, typer.Option(help="Standard deviation of a measured amplitude, in percent.")
     ] = 5.0,
@@ -82,28 +93,30 @@ def calibrate(
         ),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(help="Number of threads. Default: number of cores.")
+        int | None, typer.Option(help="Number of threads. Default: number of cores.", min=1)
     ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue an interrupted calibration.")
     ] = False,
-    out: Annotated[Path, typer.Option(help="Folder for the results.", metavar="DIR")] = DEFAULT_OUT,
+    out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
     """Fit unknown numbers of a machine to measured amplitudes, within bounds and with priors."""
     from wm_drake.studies.calibration.calibration import Plan
 
-    parameters = _with_targets(load_parameters(machine, sets), targets)
+    groups = _groups(leave_out)
+    parameters = with_measured(load_parameters(machine, sets), targets, "--targets")
     wanted = _targets(parameters).weighted(_weights(weight))
     check_buildable(machine, parameters)
+    warn_of_phase_error(parameters)
     plan = Plan(method, starts, seed, iterations, deviation / 100.0, 1e-3 * resolution)
-    groups = [entry.split(",") for entry in leave_out or []]
     with interruptible(f"finished evaluations are kept in {out}; continue with --resume"):
-        calibration, predictions = _run(
-            parameters, free, wanted, plan, groups, out, workers, resume
+        calibration, predictions, writer = _run(
+            parameters, free, wanted, plan, groups, out, workers, resume, overwrite
         )
-    with result_folder(out) as folder:
+    with result_folder(out, writer, RUNS_KEPT) as folder:
         _write(parameters, calibration, predictions, folder)
     if as_json:
         typer.echo(json.dumps(_as_json(calibration, predictions)))
@@ -111,21 +124,15 @@ def calibrate(
         _print(calibration, predictions, out)
 
 
-def _with_targets(parameters: "MachineParameters", files: list[Path] | None) -> "MachineParameters":
-    """Return the machine with other files of measured amplitudes, if any are given."""
-    if not files:
-        return parameters
-    return parameters.model_copy(
-        update={
-            "measured": tuple(str(existing_file(path, "--targets").resolve()) for path in files)
-        }
-    )
-
-
 def _targets(parameters: "MachineParameters") -> "Targets":
     from wm_drake.parameters import measured_amplitudes
     from wm_drake.studies.calibration.targets import targets_of
 
+    if not parameters.measured:
+        raise input_error(
+            f"machine '{parameters.name}' names no measured amplitudes of its own; name a CSV file",
+            where="--targets",
+        )
     return targets_of(
         parameters,
         measured_amplitudes(parameters),
@@ -134,16 +141,32 @@ def _targets(parameters: "MachineParameters") -> "Targets":
 
 
 def _weights(entries: list[str] | None) -> dict[str, float]:
-    weights = {}
-    for entry in entries or []:
-        name, _, number = entry.partition("=")
+    from wm_drake.parameters.units import plain_number
+
+    weights: dict[str, float] = {}
+    for name, number in pairs_of(entries, "--weight"):
         try:
-            weights[name] = float(number)
-        except ValueError:
+            weight = plain_number(number)
+        except ValueError as error:
+            raise input_error(str(error), where="--weight", key=name) from None
+        if not 0.0 <= weight < math.inf:
             raise input_error(
-                f"'{entry}' does not have the form NAME=NUMBER", where="--weight"
-            ) from None
+                f"'{number}' is not allowed; must be >= 0 and finite", where="--weight", key=name
+            )
+        if name in weights:
+            raise input_error("is given twice", where="--weight", key=name)
+        weights[name] = weight
     return weights
+
+
+def _groups(entries: list[str] | None) -> list[list[str]]:
+    """Return the groups of loads that `--leave-out` names."""
+    groups = [[name.strip() for name in entry.split(",")] for entry in entries or []]
+    for names in groups:
+        for name in names:
+            if names.count(name) > 1:
+                raise input_error(f"'{name}' is given twice", where="--leave-out")
+    return groups
 
 
 def _run(
@@ -155,10 +178,11 @@ def _run(
     out: Path,
     workers: int | None,
     resume: bool,
-) -> "tuple[Calibration, list[Prediction]]":
+    overwrite: bool,
+) -> "tuple[Calibration, list[Prediction], Run]":
     """Run the calibration and the predictions, with a ledger of evaluations in the folder `out`."""
     from wm_drake.batch.ledger import open_ledger
-    from wm_drake.model.machine import build_machine
+    from wm_drake.model.build import build_machine
     from wm_drake.parameters import located
     from wm_drake.parameters.free import load_free
     from wm_drake.studies.calibration.calibration import calibrate, identity_of
@@ -172,11 +196,12 @@ def _run(
         parameter_map_of(built, free_file)
     except InputError as error:
         raise located(error, free) from None
-    with result_folder(out):  # checks before the search that the folder can be written to
-        pass
-    with open_ledger(
-        out / "ledger.sqlite", identity_of(built, free_file, targets, plan), resume=resume
-    ) as ledger:
+    identity = identity_of(built, free_file, targets, plan)
+    writer = Run(
+        "calibrate", overwrite, {**identity, "leave_out": "; ".join(map(",".join, held_out))}
+    )
+    prepare_folder(out, writer)
+    with open_ledger(out / LEDGER, identity, resume=resume, replace=overwrite) as ledger:
         with _progress(plan.starts) as report:
             calibration = calibrate(
                 built, free_file, targets, plan, ledger, workers=workers, report=report
@@ -186,7 +211,7 @@ def _run(
                 built, free_file, calibration, held_out, ledger, workers=workers, report=report
             )
         ledger.mark_finished()
-    return calibration, predictions
+    return calibration, predictions, writer
 
 
 @contextmanager
@@ -195,7 +220,6 @@ def _progress(searches: int) -> Iterator[Callable[[int, int, float], None]]:
 
     The bar shows the number of machines and the least cost of the current search.
     """
-    from rich.console import Console
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -208,15 +232,17 @@ def _progress(searches: int) -> Iterator[Callable[[int, int, float], None]]:
     columns = (
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         TimeElapsedColumn(),
     )
+    console, lines = Console(stderr=True), ProgressLines()
     with Progress(
         *columns,
         TextColumn("remaining"),
         TimeRemainingColumn(),
-        console=Console(stderr=True),
+        console=console,
         transient=True,
+        disable=not has_bars(console),
     ) as bar:
         task = bar.add_task("search", total=searches)
         ended, last = 0, (0, 0)
@@ -226,9 +252,9 @@ def _progress(searches: int) -> Iterator[Callable[[int, int, float], None]]:
             if last[1] > evaluations or last[0] != start:  # another search has begun
                 ended += 1
             last = start, evaluations
-            bar.update(
-                task, completed=ended, description=f"{evaluations} machines, least cost {best:.1f}"
-            )
+            text = f"{evaluations} machines, least cost {best:.1f}"
+            bar.update(task, completed=ended, description=text)
+            lines.show(f"search {ended + 1} of {searches}: {text}")
 
         yield report
 
@@ -244,7 +270,7 @@ def _write(
     from wm_drake.studies.calibration.outcome import amplitude_rows, quantity_table, solved_machine
 
     for number, solution in enumerate(calibration.solutions, start=1):
-        text = machine_yaml(solved_machine(calibration.parameter_map, solution))
+        text = machine_yaml(solved_machine(calibration.parameter_map, solution, number))
         (folder / f"machine_{number}.yaml").write_text(text, encoding="utf-8")
     quantity_table(calibration).to_csv(folder / "quantities.csv", index=False, float_format="%.6g")
     amplitude_rows(calibration).to_csv(folder / "amplitudes.csv", index=False, float_format="%.4f")
@@ -257,7 +283,7 @@ def _shown(
     parameters: "MachineParameters", calibration: "Calibration"
 ) -> "tuple[SpinResult, list[tuple[str, Modes]]]":
     """Return spin runs and natural modes of the best solution, for the report."""
-    from wm_drake.model.machine import build_machine
+    from wm_drake.model.build import build_machine
     from wm_drake.simulation.cases import case_of
     from wm_drake.studies.calibration.outcome import solved_machine
     from wm_drake.studies.description.modal import natural_modes
@@ -277,14 +303,15 @@ def _shown(
 def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Path) -> None:
     from wm_drake.studies.calibration.outcome import mean_and_largest
 
+    _print_values(calibration)
     best = calibration.solutions[0]
     mean, largest = mean_and_largest(best.errors(calibration.targets))
-    typer.echo(
+    say(
         f"Searches: {len(calibration.ended)}. Distinct good solutions: "
         f"{len(calibration.solutions)}."
     )
-    typer.echo("Absolute differences of the amplitudes from the experiment:")
-    typer.echo(f"  best solution: mean {100 * mean:.1f} %, largest {100 * largest:.1f} %")
+    say("Absolute differences of the amplitudes from the experiment:")
+    say(f"  best solution: mean {100 * mean:.1f} %, largest {100 * largest:.1f} %")
     for prediction in predictions:
         pairs = [
             mean_and_largest(errors)
@@ -293,11 +320,29 @@ def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Pat
         calibrated, predicted, others = (
             f"mean {100 * mean:.1f} %, largest {100 * largest:.1f} %" for mean, largest in pairs
         )
-        typer.echo(f"  load {', '.join(prediction.loads)}:")
-        typer.echo(f"    used for the calibration: {calibrated}")
-        typer.echo(f"    held out and predicted: {predicted}")
-        typer.echo(f"    other loads in that calibration: {others}")
-    typer.echo(f"Results in {out}: report.html, machine_<n>.yaml, quantities.csv, amplitudes.csv")
+        say(f"  load {', '.join(prediction.loads)}:")
+        say(f"    used for the calibration: {calibrated}")
+        say(f"    held out and predicted: {predicted}")
+        say(f"    other loads in that calibration: {others}")
+    say(f"Results in {out}: report.html, machine_<n>.yaml, quantities.csv, amplitudes.csv")
+
+
+def _print_values(calibration: "Calibration") -> None:
+    """Print the quantities of the best solution; the deviation is that given data and prior."""
+    from rich.table import Table
+
+    from wm_drake.studies.calibration.outcome import quantity_table
+
+    table = Table(title="Best solution, machine_1.yaml")
+    table.add_column("quantity", no_wrap=True)
+    for head in ("value", "± deviation", "expected"):
+        table.add_column(head, justify="right")
+    for head in ("unit", "determined by"):
+        table.add_column(head)
+    for row in quantity_table(calibration).to_dict("records"):
+        numbers = (f"{row[key]:.4g}" for key in ("value_1", "deviation_1", "expected"))
+        table.add_row(str(row["quantity"]), *numbers, str(row["unit"]), str(row["held_by_1"]))
+    Console().print(table)
 
 
 def _as_json(calibration: "Calibration", predictions: "list[Prediction]") -> dict[str, Any]:

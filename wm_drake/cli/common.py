@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from wm_drake.cli.terminal import say
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -28,6 +29,25 @@ SetOption = Annotated[
         "--set",
         help="Change a number of the machine file: gasket.stiffness_x='5 N/mm'. Repeatable.",
         metavar="KEY=VALUE",
+    ),
+]
+
+
+def _out_folder(text: str) -> Path:
+    """Return the path of a result folder; refuse an empty text, which is the current folder."""
+    if not str(text).strip():
+        raise input_error("is empty; name a folder", where="--out")
+    return Path(text)
+
+
+OutOption = Annotated[
+    Path,
+    typer.Option("--out", help="Folder for the results.", metavar="DIR", parser=_out_folder),
+]
+OverwriteOption = Annotated[
+    bool,
+    typer.Option(
+        "--overwrite", help="Replace the results of an earlier run of this command in the folder."
     ),
 ]
 JsonOption = Annotated[
@@ -102,13 +122,23 @@ def pairs_of(entries: list[str] | None, option: str) -> list[tuple[str, str]]:
     return found
 
 
+def warn_of_phase_error(parameters: "MachineParameters") -> None:
+    """Print a warning if a machine has a phase error, which runs of its loads do not use."""
+    from wm_drake.simulation.cases import UNUSED_PHASE_ERROR
+
+    if parameters.imperfections.phase_error:
+        say(f"warning: {UNUSED_PHASE_ERROR}", err=True)
+
+
 def cases_of(
     parameters: "MachineParameters", loads: list[str] | None, gasket: bool, profile: Path | None
 ) -> "list[Case]":
     """Return the cases that `--load`, `--no-gasket` and `--profile` select."""
     from wm_drake.parameters import load_load, load_profile
+    from wm_drake.parameters.text_files import is_file
     from wm_drake.simulation.cases import Case
 
+    warn_of_phase_error(parameters)
     spin_profile = (
         parameters.profile if profile is None else load_profile(existing_file(profile, "--profile"))
     )
@@ -116,7 +146,7 @@ def cases_of(
     for name in loads or list(parameters.loads):
         if name in parameters.loads:
             cases.append(Case(name, parameters.loads[name], spin_profile, gasket))
-        elif Path(name).is_file():
+        elif is_file(Path(name)):
             cases.append(Case(Path(name).stem, load_load(Path(name)), spin_profile, gasket))
         else:
             hint = nearest_names(name, parameters.loads)
@@ -134,20 +164,43 @@ def cases_of(
     return cases
 
 
+def with_measured(
+    parameters: "MachineParameters", files: list[Path] | None, option: str
+) -> "MachineParameters":
+    """Return the machine with other files of measured amplitudes, if any are given."""
+    if not files:
+        return parameters
+    paths = tuple(str(existing_file(path, option).resolve()) for path in files)
+    return parameters.model_copy(update={"measured": paths})
+
+
 def existing_file(path: Path, option: str) -> Path:
     """Return the path if it is a file; otherwise raise an InputError for the option."""
-    if not path.is_file():
+    from wm_drake.parameters.text_files import is_file
+
+    if not is_file(path):
         raise input_error(f"no such file '{path}'", where=option)
     return path
 
 
-def check_buildable(file: str, parameters: "MachineParameters") -> None:
-    """Raise an InputError for faults that only building the machine reveals."""
-    from wm_drake.model.machine import build_machine
-    from wm_drake.parameters import measured_amplitudes
-    from wm_drake.simulation.runs import check_bearing, checked_step
+def check_buildable(file: str, parameters: "MachineParameters") -> "tuple[Problem, ...]":
+    """Raise an InputError for faults that only building the machine reveals.
+
+    Returns:
+        Values of the machine that are legal but unusual, with file and line.
+    """
+    from wm_drake.engines.compiled.step_check import check_step
+    from wm_drake.model.build import build_machine
+    from wm_drake.model.plausibility import unusual_values
+    from wm_drake.model.scene import Scene
+    from wm_drake.parameters import located, machine_path, measured_amplitudes
+    from wm_drake.simulation.runs import checked_step
 
     with located_in(file):
         measured_amplitudes(parameters)
         step = checked_step(parameters, None)
-        check_bearing(build_machine(parameters).set_up(), step)
+        setup = build_machine(parameters).set_up()
+        check_step(setup, step)
+        Scene(parameters)
+    unusual = unusual_values(setup)
+    return located(InputError(unusual), machine_path(file)).problems if unusual else ()

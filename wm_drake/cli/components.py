@@ -170,7 +170,7 @@ def axes_of(word: str) -> tuple[str, ...]:
 
 def quantities_of(text: str, unit: "Unit", option: str) -> tuple[float, ...]:
     """Return numbers with one unit, ``(1, 3, 5) mm`` or ``1,3,5 mm``, in SI."""
-    from wm_drake.parameters.units import convert
+    from wm_drake.parameters.units import convert, plain_number
 
     body = text.strip()
     if not body.startswith("("):
@@ -178,7 +178,7 @@ def quantities_of(text: str, unit: "Unit", option: str) -> tuple[float, ...]:
         body = f"({body[:size]}) {body[size:]}"
     numbers, _, written = body[1:].partition(")")
     try:
-        values = [float(part) for part in numbers.split(",")]
+        values = [plain_number(part) for part in numbers.split(",")]
     except ValueError:
         raise input_error(
             f"'{text}' is not a number with a unit; write for example '1 {unit.shown}'",
@@ -192,7 +192,9 @@ def quantities_of(text: str, unit: "Unit", option: str) -> tuple[float, ...]:
 
 def _digits(text: str) -> str:
     """Return the leading numbers of a text, with the commas between them."""
-    match = re.match(r"[\s,]*(?:[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[\s,]*)*", text.strip())
+    match = re.match(
+        r"[\s,]*(?:[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[\s,]*)*", text.strip()
+    )
     return match[0] if match else ""
 
 
@@ -202,7 +204,9 @@ def existing_files(paths: list[Path]) -> list[Path]:
     Raises:
         InputError: A path is no file.
     """
-    problems = [Problem(str(path), "", "no such file") for path in paths if not path.is_file()]
+    from wm_drake.parameters.text_files import is_file
+
+    problems = [Problem(str(path), "", "no such file") for path in paths if not is_file(path)]
     if problems:
         raise InputError(problems)
     return paths

@@ -1,7 +1,7 @@
 """`wm-drake identify`: the numbers of a component from measured loops."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,6 +11,8 @@ import typer
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
+    OutOption,
+    OverwriteOption,
     SetOption,
     command_line,
     interruptible,
@@ -29,14 +31,15 @@ from wm_drake.cli.components import (
     target_of,
 )
 from wm_drake.cli.progress import progress_bar
-from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.result_folder import Run, result_folder
+from wm_drake.cli.terminal import Console
 from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:
     from wm_drake.parameters.units import Unit
     from wm_drake.rigs.measured import MeasuredMotion
     from wm_drake.studies.fitting import Fit
-    from wm_drake.studies.identification import ComponentModel
+    from wm_drake.studies.identification import ComponentModel, Judgement
 
 app = typer.Typer(help="Find the numbers of a component from measured loops.", no_args_is_help=True)
 
@@ -77,8 +80,7 @@ UnitsOption = Annotated[
 KnotsOption = Annotated[
     int, typer.Option("--knots", help="Points of a table on each side of zero.", min=1, max=12)
 ]
-SeedOption = Annotated[int, typer.Option("--seed", help="Of the search.")]
-OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.", metavar="DIR")]
+SeedOption = Annotated[int, typer.Option("--seed", help="Of the search.", min=0)]
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,9 @@ class _Asked:
     method: str
     seed: int
     out: Path
+    overwrite: bool
     as_json: bool
+    sets: list[str] | None
 
 
 @app.command("damper", cls=DamperCommand)
@@ -110,6 +114,7 @@ def identify_damper(
     name: NameOption = None,
     component: ComponentOption = None,
     out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
@@ -118,11 +123,11 @@ def identify_damper(
 
     target = target_of("damper", machine, name, component, sets)
     own = str(target.component.parameters.law)  # type: ignore[union-attr]
-    asked = _Asked(files, units, method, seed, out, as_json)
+    asked = _Asked(files, units, method, seed, out, overwrite, as_json, sets)
     motions = _motions(asked, rotates=False)
     ranges = _ranges(bounds)
-    fixed = _kept_fields(target, law or own, ranges) | _single(fix, "--fix")
-    model = damper_model(law or own, motions, ranges, fixed, knots)
+    kept = _kept_fields(target, law or own, ranges)
+    model = damper_model(law or own, motions, ranges, _single(fix, "--fix"), knots, kept)
     _run(asked, f"damper {target.component.name}, law {model.law}", target, model, motions, {})
 
 
@@ -146,6 +151,7 @@ def _axis_command(kind: str) -> Callable[..., None]:
         name: NameOption = None,
         component: ComponentOption = None,
         out: OutOption = DEFAULT_OUT,
+        overwrite: OverwriteOption = False,
         as_json: JsonOption = False,
         sets: SetOption = None,
     ) -> None:
@@ -153,7 +159,7 @@ def _axis_command(kind: str) -> Callable[..., None]:
         from wm_drake.studies.identification import bushing_model
 
         target = target_of(kind, machine, name, component, sets)
-        asked = _Asked(files, units, method, seed, out, as_json)
+        asked = _Asked(files, units, method, seed, out, overwrite, as_json, sets)
         axes = axes_of(axis)
         radius = quantities_of(arm, Unit("m", "mm"), "--arm")[0] if arm else 0.0
         motions = _motions(asked, rotates=axes[0].startswith("about") and not radius)
@@ -180,7 +186,8 @@ app.command("gasket", help="One axis of the gasket.")(_axis_command("gasket"))
 def _copies(model: "ComponentModel", axes: tuple[str, ...]) -> dict[str, str]:
     """Return the fields of a bushing's other axes, and the field that each is copied from."""
     ours, others = axes[0][-1], [other[-1] for other in axes[1:]]
-    fields = [unknown.name.split(".")[0] for unknown in model.unknowns]
+    names = [*(unknown.name for unknown in model.unknowns), *model.fixed]
+    fields = list(dict.fromkeys(name.split(".")[0] for name in names))
     return {f"{field[: -len(ours)]}{other}": field for field in fields for other in others}
 
 
@@ -283,12 +290,15 @@ def _run(
         errors_table,
         estimates_table,
         fitted_loops,
+        fixed_numbers,
         identify_report,
     )
+    from wm_drake.report.rig.figures import force_scale
     from wm_drake.studies.fitting import identify
-    from wm_drake.studies.identification import fit_problem, fragment
+    from wm_drake.studies.identification import fit_problem, fragment, judge
 
-    with interruptible(), result_folder(asked.out) as folder:
+    writer = Run("identify", asked.overwrite)
+    with interruptible(), result_folder(asked.out, writer) as folder:
         with progress_bar(PER_CENT, "identify") as bar:
             fit = identify(
                 fit_problem(model, motions),
@@ -296,34 +306,62 @@ def _run(
                 seed=asked.seed,
                 progress=lambda fraction, least: bar(int(PER_CENT * fraction)),
             )
-        text = fragment(fit, model, target.component, target.machine, target.key, copies, asked.out)
+        judgement = judge(fit, motions)
+        text = fragment(
+            fit,
+            model,
+            target.component,
+            target.machine,
+            target.key,
+            copies,
+            asked.out,
+            judgement.sentences,
+            dict(pairs_of(asked.sets, "--set")),
+        )
         (folder / "identified.yaml").write_text(text, encoding="utf-8")
-        estimates_table(fit).to_csv(folder / "parameters.csv", index=False)
-        errors_table(fit, motions).to_csv(folder / "errors.csv", index=False)
+        estimates_table(fit, model.fixed).to_csv(folder / "parameters.csv", index=False)
+        errors_table(fit, motions, judgement).to_csv(folder / "errors.csv", index=False)
         fitted_loops(fit, motions).to_csv(folder / "loops.csv", index=False, float_format="%.7g")
-        (folder / "fit.json").write_text(json.dumps(fit.as_dict(), indent=1), encoding="utf-8")
+        found = {
+            **fit.as_dict(),
+            "fixed": fixed_numbers(model.fixed),
+            "judgement": judgement.as_dict(),
+        }
+        (folder / "fit.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
         command = command_line()
         (folder / "report.html").write_text(
-            identify_report(title, fit, motions, command), encoding="utf-8"
+            identify_report(title, fit, motions, judgement, model.fixed, command),
+            encoding="utf-8",
         )
     if asked.as_json:
-        typer.echo(json.dumps({"component": title, **fit.as_dict()}))
+        typer.echo(json.dumps({"component": title, **found}))
     else:
-        _print(title, fit, asked.out)
+        _print(
+            title, fit, judgement, force_scale(motions[0].loop.rotates)[1], model.fixed, asked.out
+        )
 
 
-def _print(title: str, fit: "Fit", out: Path) -> None:
-    from rich.console import Console
+def _print(
+    title: str,
+    fit: "Fit",
+    judgement: "Judgement",
+    unit: str,
+    fixed: Mapping[str, float],
+    out: Path,
+) -> None:
     from rich.table import Table
 
     from wm_drake.report.identify.report import estimate_cells, undetermined_sentences
 
-    table = Table(title=f"{title}: RMSE {fit.rmse:.4g} by {fit.method}")
-    for head in ("unknown", "value", "95 % interval", "unit", "remark"):
-        table.add_column(head)
-    for cells in estimate_cells(fit):
-        table.add_row(*cells)
     console = Console()
+    for sentence in judgement.sentences:
+        console.print(sentence, highlight=False)
+    table = Table(title=f"{title}: RMSE {fit.rmse:.4g} {unit} by {fit.method}")
+    table.add_column("unknown", no_wrap=True)
+    for head in ("value", "95 % interval", "unit", "remark"):
+        table.add_column(head)
+    for cells in estimate_cells(fit, fixed):
+        table.add_row(*cells)
     console.print(table)
     for sentence in (*undetermined_sentences(fit), *fit.notes):
         console.print(sentence, highlight=False)

@@ -1,21 +1,38 @@
-"""Command `wm-drake machine`: check and show machine files."""
+"""Command `wm-drake machine`: list, start, check and show machine files."""
 
 import json
+import os
+import re
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from wm_drake.cli.common import JsonOption, SetOption, check_buildable, load_parameters, located_in
+from wm_drake.cli.terminal import say
+from wm_drake.errors import InputError, input_error
 
-app = typer.Typer(help="Check and show machine files.", no_args_is_help=True)
+app = typer.Typer(help="List, start, check and show machine files.", no_args_is_help=True)
 
 
 @app.command("check")
-def machine_check(file: Annotated[str, typer.Argument(metavar="NAME|FILE")]) -> None:
-    """Check a machine file. The exit code is 0, or 2 with one line per problem."""
+def machine_check(
+    file: Annotated[str, typer.Argument(metavar="NAME|FILE")],
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Treat unusual values as errors.")
+    ] = False,
+) -> None:
+    """Check a machine file. The exit code is 0, or 2 with one line per problem.
+
+    Values outside the usual range are warned of.
+    """
     parameters = load_parameters(file, None)
-    check_buildable(file, parameters)
-    typer.echo(f"{file}: machine '{parameters.name}' is valid")
+    unusual = check_buildable(file, parameters)
+    if unusual and strict:
+        raise InputError(unusual)
+    for problem in unusual:
+        typer.echo(f"warning: {problem}", err=True)
+    say(f"{file}: machine '{parameters.name}' is valid")
 
 
 @app.command("show")
@@ -28,10 +45,100 @@ def machine_show(
 
     The output has bodies, elements, preloads, the equilibrium and the natural frequencies.
     """
-    from wm_drake.model.machine import build_machine
+    from wm_drake.model.build import build_machine
+    from wm_drake.simulation.runs import checked_step
     from wm_drake.studies.description.description import as_text, describe
 
     parameters = load_parameters(file, sets)
     with located_in(file):
+        checked_step(parameters, None)
         description = describe(build_machine(parameters))
     typer.echo(json.dumps(description, indent=1) if as_json else as_text(description))
+
+
+@app.command("schema")
+def machine_schema() -> None:
+    """Print the JSON schema of the output of `machine show --json`."""
+    from wm_drake.studies.description.schema import description_schema
+
+    typer.echo(json.dumps(description_schema(), indent=1))
+
+
+@app.command("list")
+def machine_list(as_json: JsonOption = False) -> None:
+    """List the machines that wm_drake contains."""
+    from wm_drake.parameters import load_machine
+    from wm_drake.parameters.files import shipped_machines
+
+    about = {name: load_machine(name).about for name in shipped_machines()}
+    if as_json:
+        typer.echo(json.dumps(about))
+        return
+    width = max(map(len, about))
+    for name, text in about.items():
+        typer.echo(f"{name:{width}}  {text}")
+
+
+@app.command("new")
+def machine_new(
+    name: Annotated[
+        str, typer.Argument(help="Name of the new machine, or path of its file.", metavar="NAME")
+    ],
+    base: Annotated[
+        str,
+        typer.Option("--extends", help="Machine that the new one changes.", metavar="NAME|FILE"),
+    ] = "reference",
+) -> None:
+    """Write a machine file that extends another machine, with all its numbers as comments."""
+    path = Path(name) if name.endswith((".yaml", ".yml")) else Path(f"{name}.yaml")
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_-]*", path.stem):
+        raise input_error(
+            f"'{path.stem}' is no name of a machine; letters, digits, '_' and '-' are allowed, and "
+            "a letter first",
+            where="machine new",
+        )
+    text = _template(path, base)
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise input_error("exists already; choose another name", where=str(path)) from None
+    except OSError as error:
+        raise input_error(f"cannot be written to: {error.strerror}", where=str(path)) from None
+    say(f"{path} extends '{base}'. Edit it, then: wm-drake machine check {path}")
+
+
+def _template(path: Path, base: str) -> str:
+    """Return the text of a machine file that extends a machine and changes nothing yet."""
+    from wm_drake.parameters import load_machine
+    from wm_drake.parameters.files import machine_path, machine_yaml, shipped_machines
+
+    parameters = load_machine(base)
+    extends = base
+    if base not in shipped_machines():
+        extends = os.path.relpath(machine_path(base).resolve(), path.parent.resolve())
+    own = {"name", "about", "model", "measured"}
+    lines = machine_yaml(parameters.model_copy(update={"sources": {}})).splitlines()
+    comments, skipped = [], False
+    for line in lines:
+        if not line.startswith((" ", "-")):  # a key at the top
+            skipped = line.split(":")[0] in own
+        if not skipped:
+            comments.append(f"# {line}")
+    return "\n".join(
+        [
+            f"# A machine of your own. It has every number of '{base}' that this file does not "
+            "change.",
+            "# To change a number, remove '# ' from its line and from the lines of the keys above",
+            "# it that are less indented; write the new value with its unit. A list, a table and a",
+            "# profile are replaced as a whole. 'null' in place of an element removes it.",
+            f"# Check it: wm-drake machine check {path}",
+            f"# Run it:   wm-drake spin --machine {path}",
+            f"extends: {json.dumps(extends)}",
+            f"name: {path.stem}",
+            f"about: {json.dumps(f'changes to {base}')}",
+            "",
+            *comments,
+            "",
+        ]
+    )

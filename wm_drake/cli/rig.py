@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wm_drake.cli.common import JsonOption, MachineOption, SetOption, command_line, interruptible
+from wm_drake.cli.common import (
+    JsonOption,
+    MachineOption,
+    OutOption,
+    OverwriteOption,
+    SetOption,
+    command_line,
+    interruptible,
+)
 from wm_drake.cli.components import (
     ArmOption,
     AxisOption,
@@ -19,7 +27,8 @@ from wm_drake.cli.components import (
     target_of,
 )
 from wm_drake.cli.progress import progress_bar
-from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.result_folder import Run, result_folder
+from wm_drake.cli.terminal import Console
 from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:
@@ -52,7 +61,6 @@ MatrixOption = Annotated[
         "--matrix", help="Run the test matrix of a paper: A, or for dampers C.", metavar="PAPER"
     ),
 ]
-OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.", metavar="DIR")]
 
 
 @app.command("damper", cls=DamperCommand)
@@ -71,6 +79,7 @@ def rig_damper(
         ),
     ] = None,
     out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
@@ -84,7 +93,7 @@ def rig_damper(
     motions = _motions("damper", bench, frequency, amplitude, matrix)
     law = chosen.parameters.law  # type: ignore[union-attr]
     title = f"damper {chosen.name}, law {law}{f', sponge of {1e3 * mass:g} g' if mass else ''}"
-    _run(title, bench, motions, chosen, out, as_json)
+    _run(title, bench, motions, chosen, out, Run("rig", overwrite), as_json)
 
 
 def _axis_command(kind: str) -> Callable[..., None]:
@@ -100,6 +109,7 @@ def _axis_command(kind: str) -> Callable[..., None]:
         name: NameOption = None,
         component: ComponentOption = None,
         out: OutOption = DEFAULT_OUT,
+        overwrite: OverwriteOption = False,
         as_json: JsonOption = False,
         sets: SetOption = None,
     ) -> None:
@@ -116,7 +126,7 @@ def _axis_command(kind: str) -> Callable[..., None]:
         what = kind if chosen.name == kind else f"{kind} {chosen.name}"
         through = f", through an arm of {1e3 * radius:g} mm" if radius else ""
         title = f"{what}, axis {turned.replace('_', ' ')}{through}"
-        _run(title, bench, motions, chosen, out, as_json)
+        _run(title, bench, motions, chosen, out, Run("rig", overwrite), as_json)
 
     return rig_axis
 
@@ -161,12 +171,13 @@ def _run(
     motions: "list[Harmonic]",
     chosen: "Component",
     out: Path,
+    writer: Run,
     as_json: bool,
 ) -> None:
     from wm_drake.report.rig.report import loop_file, loop_table, measures_table, rig_report
     from wm_drake.rigs import run_rig
 
-    with interruptible(), result_folder(out) as folder:
+    with interruptible(), result_folder(out, writer) as folder:
         with progress_bar(len(motions), "loops") as progress:
             run = run_rig(title, bench, motions, _numbers(chosen), progress)
         for loop in run.loops:
@@ -208,7 +219,6 @@ def _as_json(run: "RigRun") -> dict[str, Any]:
 
 
 def _print(run: "RigRun", out: Path) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from wm_drake.report.rig.report import measures_cells, measures_header

@@ -10,14 +10,19 @@ import typer
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
+    OutOption,
+    OverwriteOption,
     SetOption,
     cases_of,
     check_buildable,
     command_line,
     interruptible,
     load_parameters,
+    with_measured,
 )
-from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.progress import progress_bars
+from wm_drake.cli.result_folder import Run, result_folder
+from wm_drake.cli.terminal import Console
 from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -53,11 +58,23 @@ def spin(
             metavar="NAME",
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for the results.", metavar="DIR")] = DEFAULT_OUT,
+    out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
     replay: Annotated[
         bool,
-        typer.Option("--replay", help="Also write a 3D replay of the largest motion of each load."),
+        typer.Option(
+            "--replay", help="Also write a 3D replay around the largest amplitude of each load."
+        ),
     ] = False,
+    measured: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Measured amplitudes to compare with: load, gasket, source, and a column per "
+            "sensor in mm. Repeatable. Default: those of the machine file, for its own numbers, "
+            "loads and profile.",
+            metavar="CSV",
+        ),
+    ] = None,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
@@ -69,11 +86,12 @@ def spin(
         raise input_error(
             f"unknown engine '{engine}'{nearest_names(engine, ENGINES)}", where="--engine"
         )
-    parameters = load_parameters(machine, sets)
+    parameters = with_measured(load_parameters(machine, sets), measured, "--measured")
     cases = cases_of(parameters, load, not no_gasket, profile)
     check_buildable(machine, parameters)
-    with interruptible(), result_folder(out) as folder:
-        result = _run(parameters, cases, engine)
+    with interruptible(), result_folder(out, Run("spin", overwrite)) as folder:
+        comparison = "all" if measured else "none" if sets else "as measured"
+        result = _run(parameters, cases, engine, comparison)
         _write(result, folder, replay)
     diverged = [
         f"{r.case.name}: {r.record.attrs['diverged']}"
@@ -83,32 +101,21 @@ def spin(
     if as_json:
         typer.echo(json.dumps(_as_json(result)))
     else:
-        _print_tables(result, out)
+        _print_tables(result, out, replay)
     for message in diverged:
         typer.echo(message, err=True)
     if diverged:
         raise typer.Exit(1)
 
 
-def _run(parameters: "MachineParameters", cases: "list[Case]", engine: str) -> "SpinResult":
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+def _run(
+    parameters: "MachineParameters", cases: "list[Case]", engine: str, comparison: str
+) -> "SpinResult":
+    from wm_drake.studies.spin.study import Comparison, run_spin
 
-    from wm_drake.studies.spin.study import run_spin
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        tasks = [bar.add_task(case.name, total=1.0) for case in cases]
+    with progress_bars([case.name for case in cases]) as progress:
         return run_spin(
-            parameters,
-            cases,
-            engine,
-            progress=lambda i, fraction: bar.update(tasks[i], completed=fraction),
+            parameters, cases, engine, progress=progress, comparison=Comparison(comparison)
         )
 
 
@@ -116,15 +123,15 @@ def _write(result: "SpinResult", folder: Path, replay: bool) -> None:
     from wm_drake.report.spin.report import amplitude_table, spin_report
     from wm_drake.simulation.records import save_record
 
+    replays = {}
     for case in result.results:
         save_record(case.record, folder / f"record_{case.case.name}.nc")
         if replay:
-            (folder / f"replay_{case.case.name}.html").write_text(
-                _replay(result, case), encoding="utf-8"
-            )
+            replays[case.case.name] = name = f"replay_{case.case.name}.html"
+            (folder / name).write_text(_replay(result, case), encoding="utf-8")
     amplitude_table(result).to_csv(folder / "amplitudes.csv", index=False, float_format="%.4f")
     command = command_line()
-    (folder / "report.html").write_text(spin_report(result, command), encoding="utf-8")
+    (folder / "report.html").write_text(spin_report(result, command, replays), encoding="utf-8")
 
 
 def _replay(result: "SpinResult", case: "CaseResult") -> str:
@@ -137,8 +144,7 @@ def _replay(result: "SpinResult", case: "CaseResult") -> str:
     return replay_page(result.parameters, time, positions)
 
 
-def _print_tables(result: "SpinResult", out: Path) -> None:
-    from rich.console import Console
+def _print_tables(result: "SpinResult", out: Path, replay: bool) -> None:
     from rich.table import Table
 
     from wm_drake.parameters.units import Unit
@@ -166,7 +172,8 @@ def _print_tables(result: "SpinResult", out: Path) -> None:
                 f"{case.case.name}: smallest gap {millimetre.from_si(gap.distance):.1f} mm between "
                 f"{gap.moving} and {gap.fixed}, at {gap.time:.2f} s"
             )
-    console.print(f"Results in {out}: report.html, amplitudes.csv, record_<load>.nc")
+    replays = ", replay_<load>.html" if replay else ""
+    console.print(f"Results in {out}: report.html, amplitudes.csv, record_<load>.nc{replays}")
 
 
 def _as_json(result: "SpinResult") -> dict[str, Any]:

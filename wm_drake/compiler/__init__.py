@@ -1,5 +1,6 @@
-"""Turn a law into machine code: compilation and its cache, SIMD lanes, elementary functions, small vectors.
+"""Compile laws to machine code: cache, SIMD lanes, elementary functions, small vectors.
 
-Enters: scalar Python functions. Leaves: the same functions compiled for floats and for SIMD lanes, and interpreted for
-other scalars such as AutoDiffXd. Imports no other room.
+Enters: scalar Python functions. Leaves: the same functions compiled for floats and for SIMD lanes,
+and interpreted for other scalars such as AutoDiffXd. `packed` declares the layout of arrays of
+named numbers. May import: no other room; no pydrake.
 """

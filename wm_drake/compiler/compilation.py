@@ -14,6 +14,7 @@ modules become constants of the compiled code: they must be in files that `_cach
 import functools
 import hashlib
 import os
+import tempfile
 import types
 from collections.abc import Callable
 from pathlib import Path
@@ -23,6 +24,7 @@ import numba
 from numba.core import config
 from numba.core.dispatcher import Dispatcher
 
+from wm_drake.compiler.cache_files import CheckedCacheFile, say_once
 from wm_drake.compiler.lanes import LawCompiler
 
 _PACKAGE = Path(__file__).parents[1]
@@ -34,7 +36,7 @@ for example, are the packed order of its numbers."""
 
 
 def _cache_folder() -> str:
-    """Return the folder of compiled code that belongs to exactly these sources.
+    """Return the folder of compiled code that belongs to exactly these sources; "" for none.
 
     numba checks only the file of the function that it compiles: after an edit of a called law, its
     cached callers would keep the old one. The folder is named by the hash of all sources that
@@ -46,8 +48,16 @@ def _cache_folder() -> str:
         room = source.relative_to(_PACKAGE).parts[0]
         if room in _COMPILED_ROOMS or "wm_drake.compiler" in text or "numba" in text:
             digest.update(text.encode())
-    home = os.environ.get("NUMBA_CACHE_DIR") or Path.home() / ".cache" / "wm_drake"
-    return str(Path(home) / digest.hexdigest()[:16])
+    try:
+        home = Path(os.environ.get("NUMBA_CACHE_DIR") or Path.home() / ".cache" / "wm_drake")
+        folder = home / digest.hexdigest()[:16]
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except (OSError, RuntimeError) as error:  # RuntimeError: the user has no home
+        reason = getattr(error, "strerror", None) or "the user has no home folder"
+        say_once(f"compiled code is not kept ({reason}); set NUMBA_CACHE_DIR to a folder for it")
+        return ""
+    return str(folder)
 
 
 def law(function: Callable[..., Any]) -> Any:
@@ -71,14 +81,22 @@ def long_running(function: Callable[..., Any]) -> Any:
 
 def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     options |= {"no_cfunc_wrapper": True}  # no C code calls these; a tenth of the time to compile
+    if not _CACHE_FOLDER:
+        # numba would choose a folder beside the sources, where an edit of a called law goes unseen
+        return numba.njit(**options)(function)
     chosen_by_user = config.CACHE_DIR
     config.CACHE_DIR = _CACHE_FOLDER
     try:
-        return numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # no folder to write to: compile anew in each process
+        compiled = numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # the folder cannot be written to any more
         return numba.njit(**options)(function)
     finally:
         config.CACHE_DIR = chosen_by_user
+    files = compiled._cache._cache_file
+    compiled._cache._cache_file = CheckedCacheFile(
+        files._cache_path, compiled._cache._impl.filename_base, files._source_stamp
+    )
+    return compiled
 
 
 @functools.cache

@@ -47,10 +47,12 @@ class Part:
             last.
         structure: Function (p, at) that returns the whole numbers which must be equal in all
             machines of a batch, such as the number of points of a table.
+        fixed_size: How many numbers the part has, if all machines have as many; else None.
     """
 
     size: Any
     structure: Callable[[_FloatArray, int], list[int]]
+    fixed_size: int | None = None
 
 
 SCALAR = Fixed(1, is_tuple=False)
@@ -69,7 +71,7 @@ def ARRAY(size: int) -> Fixed:  # a kind, like the constants above
 
 def LAYOUT(layout: "PackedLayout") -> Part:
     """Return the kind of a field that holds the numbers of another layout."""
-    return Part(layout.size, layout.structure)
+    return Part(layout.size, layout.structure, layout._fixed_size)
 
 
 class PackedLayout:
@@ -78,13 +80,15 @@ class PackedLayout:
     Attributes:
         name: Name of the named tuple that `read` returns.
         fields: Kind of each field, in packed order.
-        read: Law (p, at) that returns the numbers which begin at index `at` as a named tuple.
-        size: Law (p, at) that returns how many numbers there are.
         offsets: Offset of each field whose offset is the same in all machines.
+        read: Law (p, at) that returns the numbers which begin at index `at` as a named tuple.
+        write: Law (p, at, fields) that writes them; None if a field is a part.
+        size: Law (p, at) that returns how many numbers there are; None if the last part has no
+            size.
     """
 
     def __init__(self, name: str, **fields: Fixed | Part) -> None:
-        """Generate the reader.
+        """Generate the laws.
 
         Raises:
             ValueError: A part without a size is not the last field.
@@ -92,40 +96,60 @@ class PackedLayout:
         self.name = name
         self.fields: Mapping[str, Fixed | Part] = fields
         self.offsets: dict[str, int] = {}
-        self._tuple = namedtuple(f"{name}", tuple(fields))  # type: ignore[misc]
-        self._write_laws()
+        self._fixed_size: int | None = None
+        self.read: Any
+        self.write: Any = None
+        self.size: Any = None
+        self._generate_reader()
+        self._generate_writer()
 
-    def _write_laws(self) -> None:
-        names: dict[str, Any] = {"Numbers": self._tuple}
+    def _generate_reader(self) -> None:
+        """Set `read`, `size` and offsets.
+
+        In the source, each part of variable size moves the variable from which offsets count.
+        """
+        names: dict[str, Any] = {"Numbers": namedtuple(self.name, tuple(self.fields))}
         steps, entries = list[str](), list[str]()
-        begin, offset = "at", 0  # of the next field; `begin` is a variable of the generated source
-        open_ended = False
+        begin, offset, open_ended = "at", 0, False
         for field, kind in self.fields.items():
             if open_ended:
                 raise ValueError(f"{self.name}: the part before '{field}' has no size")
             if begin == "at":
                 self.offsets[field] = offset
+            place = _sum(begin, offset)
             if isinstance(kind, Fixed):
                 entries.append(kind.expression(begin, offset))
                 offset += kind.size
                 continue
-            entries.append(f"(p, {_sum(begin, offset)})")
-            open_ended = kind.size is None
-            if not open_ended:
+            entries.append(f"(p, {place})")
+            if kind.fixed_size is not None:
+                offset += kind.fixed_size
+            elif kind.size is None:
+                open_ended = True
+            else:
                 names[f"size_of_{field}"] = kind.size
-                after = f"after_{field}"
-                place = _sum(begin, offset)
-                steps.append(f"    {after} = {place} + size_of_{field}(p, {place})\n")
-                begin, offset = after, 0
-        self._fixed_size = offset if begin == "at" and not open_ended else None
-        chain = "".join(steps)
-        self.read = generated(
-            f"read_{self.name}",
-            f"def read_{self.name}(p, at):\n{chain}    return Numbers({', '.join(entries)})\n",
-            names,
-        )
-        size = f"def size_of_{self.name}(p, at):\n{chain}    return {_sum(begin, offset)} - at\n"
-        self.size = None if open_ended else generated(f"size_of_{self.name}", size, names)
+                steps.append(f"    after_{field} = {place} + size_of_{field}(p, {place})\n")
+                begin, offset = f"after_{field}", 0
+        read, size, chain = f"read_{self.name}", f"size_of_{self.name}", "".join(steps)
+        source = f"def {read}(p, at):\n{chain}    return Numbers({', '.join(entries)})\n"
+        self.read = generated(read, source, names)
+        if begin == "at" and not open_ended:
+            self._fixed_size = offset
+        source = f"def {size}(p, at):\n{chain}    return {_sum(begin, offset)} - at\n"
+        if not open_ended:
+            self.size = generated(size, source, names)
+
+    def _generate_writer(self) -> None:
+        """Set `write` of a layout without parts."""
+        write = f"write_{self.name}"
+        lines = [f"def {write}(p, at, {', '.join(self.fields)}):"]
+        for field, kind in self.fields.items():
+            if isinstance(kind, Part):
+                return
+            for k in range(kind.size):
+                value = f"{field}[{k}]" if kind.is_tuple else field
+                lines.append(f"    p[{_sum('at', self.offsets[field] + k)}] = {value}")
+        self.write = generated(write, "\n".join(lines) + "\n", {})
 
     @property
     def fixed_size(self) -> int:

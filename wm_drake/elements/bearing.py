@@ -7,7 +7,13 @@ from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, numbers, r
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.compiler.vectors import rotate_back, rotation_vector
 from wm_drake.elements.bushing import motion_between, six_component_bushing_between
-from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE, motion_at, tub_motion
+from wm_drake.elements.motion import (
+    GENERALIZED_FORCE_SIZE,
+    PLANT_STATE_SIZE,
+    motion_at,
+    tub_motion,
+    write_generalized_force,
+)
 
 FORCE_SIZE = 12
 """Own numbers: displacement and rotation vector of the drum's carrier against the tub, force and
@@ -43,13 +49,11 @@ def evaluate_drum_bearing(x, state, p, generalized_force, force, rate):
     on_tub, on_carrier, own = drum_bearing_forces(
         tub_motion(y), motion_at(y, PLANT_STATE_SIZE), q, 0
     )
-    for i in range(6):
-        generalized_force[i] = on_tub[i]
-        generalized_force[GENERALIZED_FORCE_SIZE + i] = on_carrier[i]
+    zero = 0.0 * on_tub[0]
+    write_generalized_force(generalized_force, 0, on_tub, zero)
+    write_generalized_force(generalized_force, GENERALIZED_FORCE_SIZE, on_carrier, zero)
     for i in range(FORCE_SIZE):
         force[i] = own[i]
-    generalized_force[6] = 0.0 * on_tub[0]
-    generalized_force[GENERALIZED_FORCE_SIZE + 6] = 0.0 * on_tub[0]
 
 
 @law

@@ -20,7 +20,7 @@ from wm_drake.compiler.vectors import (
 )
 from wm_drake.compiler.vectors import transpose as transposed
 from wm_drake.elements.layouts import layout_of, packed_fields
-from wm_drake.elements.motion import tub_motion
+from wm_drake.elements.motion import tub_motion, write_generalized_force
 from wm_drake.elements.strut import wrench_at_origin
 from wm_drake.laws.bushing import bushing_force
 from wm_drake.laws.table import stiffness_force
@@ -205,7 +205,6 @@ def motion_between(motion, ground, p, at):
 def evaluate_six_component_bushing(x, state, p, generalized_force, force, rate):
     """Write the force of a bushing; arguments as in `ElementSystem`, numbers of `BUSHING`."""
     wrench, on_housing = six_component_bushing_wrench(tub_motion(numbers(x)), numbers(p), 0)
+    write_generalized_force(generalized_force, 0, wrench, 0.0 * wrench[0])
     for i in range(6):
-        generalized_force[i] = wrench[i]
         force[i] = on_housing[i]
-    generalized_force[6] = 0.0 * wrench[0]

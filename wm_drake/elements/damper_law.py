@@ -84,12 +84,13 @@ ends together [N], and deformation rate, 0 without a sponge [m/s]."""
 
 sponge_with_mass = _choice(
     "sponge_with_mass",
-    ("deformation", "deformation_rate", "slider_rate"),
+    ("deformation", "rate", "slider_velocity", "step", "mass"),
     {law.number: law.sponge_with_mass for law in DAMPER_LAWS.values() if law.sponge_with_mass},
     result="{}",
 )
-"""Law (deformation, deformation_rate, slider_rate, p, at) that returns tension and force on a
-sponge with mass, of a law that has one on the bench. [m, m/s, m/s -> N, N]"""
+"""Law (deformation, rate, slider_velocity, step, mass, p, at) that takes a step of a sponge with
+mass, of a law that has one on the bench; returns tension and velocity of the slider at the end of
+the step. [m, m/s, m/s, s, kg -> N, m/s]"""
 
 LAW = Part(None, law_structure)
 """Kind of a field that holds a packed damper law; the last of a layout."""

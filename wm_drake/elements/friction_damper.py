@@ -15,7 +15,7 @@ from wm_drake.elements.damper_law import (
     packed_damper_law,
 )
 from wm_drake.elements.layouts import layout_of, packed_fields
-from wm_drake.elements.motion import tub_motion
+from wm_drake.elements.motion import tub_motion, write_generalized_force
 from wm_drake.elements.strut import strut_line, transverse, wrench_at_origin
 from wm_drake.laws.strut import bending_moment, transverse_couple
 from wm_drake.parameters.elements import EndBushing
@@ -158,9 +158,7 @@ def evaluate_friction_damper(x, state, p, generalized_force, force, rate):
     arm, line = friction_damper_line(motion, q, 0)
     tension, deformation_rate = friction_damper_tension(line[1], deformation, q, 0)
     wrench = friction_damper_wrench(motion, arm, line, tension, q, 0)
-    for i in range(6):
-        generalized_force[i] = wrench[i]
-    generalized_force[6] = 0.0 * tension
+    write_generalized_force(generalized_force, 0, wrench, 0.0 * tension)
     force[0] = read_friction_damper(q, 0).engaged * tension
     if len(rate) > 0:
         rate[0] = deformation_rate

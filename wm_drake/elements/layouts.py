@@ -8,7 +8,7 @@ from pydantic import BaseModel
 from scipy.interpolate import PchipInterpolator
 
 from wm_drake.compiler.packed import SCALAR, PackedLayout
-from wm_drake.laws.table import CURVE, pack_table
+from wm_drake.laws.table import CURVE, pack_number, pack_table
 from wm_drake.parameters.elements import ForceTable, TorqueTable
 from wm_drake.parameters.types import FloatArray
 
@@ -44,9 +44,7 @@ def packed_stiffnesses(stiffnesses: Sequence[float | ForceTable | TorqueTable]) 
 
     A study makes thousands of such calls.
     """
-    packed = [
-        np.array([0.0, s]) if isinstance(s, float | int) else np.empty(0) for s in stiffnesses
-    ]
+    packed = [pack_number(s) if isinstance(s, float | int) else np.empty(0) for s in stiffnesses]
     curves = {
         index: s.curve
         for index, s in enumerate(stiffnesses)

@@ -7,6 +7,8 @@ from wm_drake.compiler.elementary import sine_cosine
 from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import rotation_from_sines
 
+POSE = PackedLayout("Pose", angles=VECTOR, position=VECTOR)
+"""Roll, pitch, yaw of a body and its position p_WTo. [rad, m]"""
 TREE_STATE = PackedLayout(
     "TreeState",
     angles=VECTOR,
@@ -20,12 +22,15 @@ TREE_STATE = PackedLayout(
 
 Roll, pitch, yaw of the body, its position p_WTo, angle or extension of the joint; w_WT, v_WTo, rate
 of the joint. The body is the tub or another one. [rad, m, rad or m; rad/s, m/s, rad/s or m/s]"""
-read_tree_state = TREE_STATE.read
+read_pose = POSE.read
+read_tree_state, write_tree_state = TREE_STATE.read, TREE_STATE.write
 
 PLANT_STATE_SIZE = TREE_STATE.fixed_size
 """State of the plant of a rigid machine, a `TREE_STATE`: the tub floats, the drum turns in it."""
-GENERALIZED_FORCE_SIZE = 7
-"""Moment about To and force on the tub in W, then the torque on the drum joint."""
+GENERALIZED_FORCE = PackedLayout("GeneralizedForce", moment=VECTOR, force=VECTOR, on_joint=SCALAR)
+"""Moment about To and force on the body of a tree, in W, then torque or force on its joint."""
+GENERALIZED_FORCE_SIZE = GENERALIZED_FORCE.fixed_size
+_put_generalized_force = GENERALIZED_FORCE.write
 
 TubMotion = namedtuple("TubMotion", ("rotation", "position", "angular_velocity", "velocity"))
 """R_WT by rows, p_WTo [m], w_WT [rad/s], v_WTo [m/s] of the tub or of another body: tuples of
@@ -55,6 +60,19 @@ def motion_from_sines(x, at, roll, pitch, yaw):
         state.angular_velocity,
         state.velocity,
     )
+
+
+@law
+def write_generalized_force(generalized_force, at, wrench, on_joint):
+    """Write the numbers of `GENERALIZED_FORCE`.
+
+    Args:
+        generalized_force, at: Array that is written, and index where the numbers begin.
+        wrench: Moment about To and force, in W (six numbers). [N m, N]
+        on_joint: Torque or force on the joint. [N m or N]
+    """
+    moment, force = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
+    _put_generalized_force(generalized_force, at, moment, force, on_joint)
 
 
 @law

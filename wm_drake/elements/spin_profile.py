@@ -1,4 +1,4 @@
-"""Motion that a spin profile prescribes for the drum, in closed form: straight pieces of speed over time."""
+"""Prescribed motion of the drum in closed form: the speed of a spin profile is piecewise linear."""
 
 import numpy as np
 
@@ -7,11 +7,13 @@ from wm_drake.parameters.types import FloatArray
 
 
 def drum_acceleration(profile: SpinProfile, time: FloatArray) -> FloatArray:
-    """Return the prescribed angular acceleration of the drum; after a corner that of the new piece.
+    """Return the prescribed angular acceleration of the drum.
+
+    At a corner it is that of the piece that begins there.
 
     Args:
         profile: Drum speed over time.
-        time: Any shape. [s] Behind the end of the profile the speed is constant.
+        time: Any shape. [s] After the end of the profile the speed is constant.
 
     Returns:
         Same shape. [rad/s^2]
@@ -45,5 +47,5 @@ def drum_motion(profile: SpinProfile, time: FloatArray) -> tuple[FloatArray, Flo
 
 
 def _piece(corners: FloatArray, time: FloatArray) -> np.ndarray:
-    """Return the number of the straight piece that holds just after each time."""
+    """Return the number of the linear piece that is in force just after each time."""
     return np.clip(np.searchsorted(corners, time, side="right") - 1, 0, len(corners) - 2)

@@ -7,7 +7,7 @@ from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import numbers
 from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import rotate, scale
-from wm_drake.elements.motion import tub_motion
+from wm_drake.elements.motion import tub_motion, write_generalized_force
 from wm_drake.elements.strut import strut_line, wrench_at_origin
 from wm_drake.laws.spring import spring_tension
 from wm_drake.laws.table import CURVE
@@ -75,7 +75,5 @@ def spring_strut_wrench(motion, p, at):
 def evaluate_spring_strut(x, state, p, generalized_force, force, rate):
     """Write the force of a spring strut; arguments as in `ElementSystem`, numbers of `SPRING`."""
     wrench, tension = spring_strut_wrench(tub_motion(numbers(x)), numbers(p), 0)
-    for i in range(6):
-        generalized_force[i] = wrench[i]
-    generalized_force[6] = 0.0 * tension
+    write_generalized_force(generalized_force, 0, wrench, 0.0 * tension)
     force[0] = tension

@@ -7,7 +7,7 @@ import numpy as np
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, numbers, rows_to_lanes
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
-from wm_drake.compiler.packed import LAYOUT, SCALAR, VECTOR, PackedLayout
+from wm_drake.compiler.packed import ARRAY, LAYOUT, SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import add, cross, dot, rotate, scale
 from wm_drake.elements.bushing import (
     BUSHING,
@@ -23,12 +23,17 @@ from wm_drake.elements.motion import (
     motion_at,
     read_tree_state,
     tub_motion,
+    write_generalized_force,
 )
 from wm_drake.parameters.types import FloatArray
 
-FORCE_SIZE = 13
-"""Own forces: tension; force and moment of the bushing at the tub on the outer tube; force and
-moment of the other bushing on the housing."""
+OWN_FORCES = PackedLayout(
+    "TelescopicDamperForces", tension=SCALAR, on_outer_tube=ARRAY(6), on_housing=ARRAY(6)
+)
+"""Own forces: tension [N]; force and moment of the bushing at the tub on the outer tube; force and
+moment of the other bushing on the housing [N, N m]."""
+FORCE_SIZE = OWN_FORCES.fixed_size
+write_own_forces = OWN_FORCES.write
 
 TELESCOPIC_DAMPER = PackedLayout(
     "TelescopicDamperNumbers",
@@ -167,14 +172,9 @@ def evaluate_telescopic_damper(x, state, p, generalized_force, force, rate):
     on_tub, on_tubes, along, deformation_rate, tension, first, second = _forces_at(
         y, deformation, q
     )
-    for i in range(6):
-        generalized_force[i] = on_tub[i]
-        generalized_force[GENERALIZED_FORCE_SIZE + i] = on_tubes[i]
-        force[1 + i] = first[i]
-        force[7 + i] = second[i]
-    generalized_force[6] = 0.0 * tension
-    generalized_force[GENERALIZED_FORCE_SIZE + 6] = along
-    force[0] = tension
+    write_generalized_force(generalized_force, 0, on_tub, 0.0 * tension)
+    write_generalized_force(generalized_force, GENERALIZED_FORCE_SIZE, on_tubes, along)
+    write_own_forces(force, 0, tension, first, second)
     if len(rate) > 0:
         rate[0] = deformation_rate
 
@@ -195,8 +195,5 @@ def telescopic_damper_history(states, own_states, p, forces):
         rows_to_lanes(states, begin, x_numbers)
         rows_to_lanes(own_states, begin, own_numbers)
         _, _, _, _, tension, first, second = _forces_at(x, own[0], q)
-        own_force[0] = tension
-        for k in range(6):
-            own_force[1 + k] = first[k]
-            own_force[7 + k] = second[k]
+        write_own_forces(own_force, 0, tension, first, second)
         lanes_to_rows(force_numbers, begin, forces)

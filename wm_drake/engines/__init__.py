@@ -3,5 +3,5 @@
 Enters: a `Setup` from `wm_drake.model`, a `SpinProfile`, a step size. Leaves: a `Trajectory`, the
 sampled states. `drake` steps the Drake diagram with an integrator of pydrake's `Simulator`; it is
 the reference. `compiled` runs the same machine as compiled code, several runs at a time.
-May import: `model`, `elements`, `systems` and the rooms above them.
+May import: `model`, `elements`, `systems` and the rooms before them.
 """

@@ -6,9 +6,9 @@ import numpy as np
 from pydrake.systems.analysis import InitializeParams, ResetIntegratorFromFlags, Simulator
 
 from wm_drake.engines.schedule import output_times
-from wm_drake.engines.trajectory import Trajectory, diverging_coordinate, ended_where_it_diverged
-from wm_drake.model.machine import OUTPUT_PERIOD, Machine, MachineSystems
-from wm_drake.model.setup import Setup
+from wm_drake.engines.trajectory import Trajectory, cut_at_divergence, diverging_coordinate
+from wm_drake.errors import shortened
+from wm_drake.model.machine import OUTPUT_PERIOD, Machine, MachineSystems, Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 
@@ -21,10 +21,10 @@ ACCURACY = 1e-5
 less than 0.1 % (tested)."""
 
 SMALLEST_STEP = 5e-5
-"""Smallest step of the error control, accepted with whatever error it has. [s] Coulomb friction jumps
-where the velocity changes its sign: across such a jump no step is short enough."""
+"""Smallest step of the error control, which is accepted with any error. [s] Coulomb friction jumps
+where the velocity changes its sign. No step across such a jump is short enough."""
 
-SAMPLES_BETWEEN_LOOKS = 100
+SAMPLES_BETWEEN_CHECKS = 100
 """Samples between checks for divergence and reports of progress: half a second of motion."""
 
 
@@ -32,8 +32,8 @@ def advance_to(simulator: Simulator, time: float, profile: SpinProfile) -> None:
     """Advance a simulation so that no step contains a corner of the spin profile.
 
     The drum's acceleration jumps at a corner. Drake evaluates the last stage of a step at its end,
-    where the next piece holds already: so the step ends just before the corner, and the clock is set
-    onto it. A plain `AdvanceTo` is right within the accuracy of the integrator.
+    where the next piece is already in force. So the step ends just before the corner, and then the
+    time is set to the corner. A plain `AdvanceTo` is right within the accuracy of the integrator.
 
     Args:
         simulator: Simulation of a diagram that contains the machine.
@@ -79,13 +79,13 @@ def run_drake(
         for row, time in enumerate(samples.time):
             advance_to(simulator, time, profile)
             samples.take(row)
-            if row % SAMPLES_BETWEEN_LOOKS == 0:
+            if row % SAMPLES_BETWEEN_CHECKS == 0:
                 if diverging_coordinate(samples.tub_pose()) is not None:
                     break
                 progress(time / profile.duration)
         progress(1.0)
-    except RuntimeError as error:  # Drake refuses a state that is not a number
-        failure = str(error).splitlines()[0]
+    except RuntimeError as error:  # Drake raises if the state is not finite
+        failure = shortened(str(error).partition("\n")[0], 200)
     return samples.trajectory(failure)
 
 
@@ -142,7 +142,11 @@ class _Samples:
         self._motor_torque[row] = self._torque.Eval(self._torque_context)[0]
 
     def trajectory(self, failure: str) -> Trajectory:
-        """Return the motion up to the last good sample; `failure` is what stopped the run, if any."""
+        """Return the motion up to the last good sample.
+
+        Args:
+            failure: Message of the error that stopped the run, if any.
+        """
         layout, telescopes = self._machine.state_layout, len(self._setup.telescopes)
         trees = [self._state[:, indices] for indices in layout.states()]
         tubes = np.empty((len(self.time), 0, trees[0].shape[1]))
@@ -158,4 +162,4 @@ class _Samples:
             tubes,
             self._state[:, carrier],
         )
-        return ended_where_it_diverged(trajectory, failure)
+        return cut_at_divergence(trajectory, failure)

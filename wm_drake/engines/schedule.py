@@ -14,14 +14,14 @@ from wm_drake.parameters.types import FloatArray
 class Schedule:
     """Steps that end at every output time and at every corner of the profile.
 
-    So no step contains a jump of the drum's acceleration.
+    No step contains a jump of the drum's acceleration.
 
     Attributes:
         step: (n,) length of each step; the last has length zero, for the sample at the end. [s]
         acceleration: (n,) of the drum in each step. [rad/s^2]
-        drum: (2 n + 1, 4) speed, cosine and sine of the angle, and the angle, at the begin and the
+        drum: (2 n + 1, 4) speed, cosine and sine of the angle, and the angle, at the start and the
             middle of each step and at the end of the last. [rad/s, 1, 1, rad]
-        row: (n,) number of the sample at the begin of each step, or -1.
+        row: (n,) number of the sample at the start of each step, or -1.
         time: (rows,) times of the samples, from 0. [s]
     """
 
@@ -44,7 +44,7 @@ def schedule_of(profile: SpinProfile, step: float, period: float) -> Schedule:
     Args:
         profile: Drum speed over time.
         step: Largest step. [s]
-        period: Between samples. [s]
+        period: Time between samples. [s]
     """
     time, corners = output_times(profile, period), np.array(profile.time)
     marks = np.union1d(time, corners)

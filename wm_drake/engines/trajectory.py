@@ -1,4 +1,4 @@
-"""What an engine hands over: the motion, sampled, and why it ended early if it did."""
+"""Result of an engine: the sampled motion, and the reason if the run diverged."""
 
 from dataclasses import dataclass
 
@@ -7,10 +7,10 @@ import numpy as np
 from wm_drake.parameters.types import FloatArray
 
 LARGEST_DISPLACEMENT = 0.5
-"""Beyond this the motion is called divergent: no housing is that wide. [m]"""
+"""Bound of each displacement of the tub, wider than any housing; a run beyond it diverged. [m]"""
 
 LARGEST_ANGLE = 1.0
-"""Beyond this tilt of the tub the motion is called divergent. [rad]"""
+"""Bound of each angle of the tub; a run beyond it diverged. [rad]"""
 
 COORDINATES = ("roll", "pitch", "yaw", "x", "y", "z")
 _BOUNDS = np.repeat([LARGEST_ANGLE, LARGEST_DISPLACEMENT], 3)
@@ -18,12 +18,13 @@ _BOUNDS = np.repeat([LARGEST_ANGLE, LARGEST_DISPLACEMENT], 3)
 
 @dataclass(frozen=True)
 class Divergence:
-    """When and why a run stopped.
+    """Time and reason of the divergence of a run.
 
     Attributes:
         time: Simulated time of the first sample out of bounds. [s]
-        coordinate: Coordinate of the tub that left its bounds.
-        reason: Its value and the bound.
+        coordinate: Coordinate of the tub that is out of bounds, one of `COORDINATES`, or "state" if
+            the engine failed.
+        reason: Value and bound of the coordinate, or the message of the engine.
     """
 
     time: float
@@ -37,18 +38,20 @@ class Trajectory:
 
     Attributes:
         time: (n,) [s]
-        state: (n, 14) positions and velocities of the plant: roll, pitch, yaw, x, y, z of T in W, drum angle; angular
-            velocity and velocity of To in W, drum rate. The drum's are against the tub; if its bearing gives, against what
-            carries it there. [rad, m, rad/s, m/s]
-        deformation: (n, number of dampers) deformation of each damper's sponge, those of telescopic ones last; 0 where it
-            has none. [m]
-        motor_torque: (n,) torque of the motor on the drum, its reaction on the tub. [N m]
-        acceleration: (n, 6) angular acceleration of the tub and acceleration of To, in W. [rad/s^2, m/s^2]
-        tubes: (n, number of telescopic dampers, 14) position of the outer tube and extension, their velocities; as `state`
-            for tub and drum.
-        carrier: (n, 12) position of what carries the drum in its bearing, and its velocity, as of the tub; (n, 0) if that
-            does not give.
-        divergence: None if the run came to its end.
+        state: (n, 14) Positions and velocities of the plant: roll, pitch, yaw, x, y, z of T in W,
+            drum angle; angular velocity and velocity of To in W, drum speed. Drum angle and speed
+            are against the tub, with a compliant bearing against the drum carrier.
+            [rad, m, rad/s, m/s]
+        deformation: (n, dampers) Deformation of the sponge of each damper, telescopic dampers last;
+            0 for a damper without a sponge. [m]
+        motor_torque: (n,) Torque of the motor on the drum; its reaction acts on the tub. [N m]
+        acceleration: (n, 6) Angular acceleration of the tub and acceleration of To, in W.
+            [rad/s^2, m/s^2]
+        tubes: (n, telescopic dampers, 14) Positions and velocities of the tubes of each telescopic
+            damper, in the order of `state`: outer tube for the tub, extension for the drum angle.
+        carrier: (n, 12) Positions and velocities of the drum carrier, in the order of those of the
+            tub in `state`; (n, 0) with a rigid bearing.
+        divergence: None if the run reached the end of its profile.
     """
 
     time: FloatArray
@@ -61,27 +64,28 @@ class Trajectory:
     divergence: Divergence | None = None
 
 
-def ended_where_it_diverged(trajectory: Trajectory, failure: str = "") -> Trajectory:
-    """Cuts a trajectory before its first sample out of bounds, and says why.
+def cut_at_divergence(trajectory: Trajectory, failure: str = "") -> Trajectory:
+    """Return a trajectory cut before its first sample out of bounds, with the `Divergence`.
+
+    A trajectory without such a sample is returned unchanged.
 
     Args:
-        trajectory: As an engine sampled it; NaN where it did not come to.
-        failure: What stopped the engine, if something did.
+        trajectory: Samples of an engine; NaN behind the last sample that it reached.
+        failure: Message of the engine if it failed, else "".
     """
-    inside = np.abs(trajectory.state[:, :6]) <= _BOUNDS  # a NaN is not
+    inside = np.abs(trajectory.state[:, :6]) <= _BOUNDS  # false for NaN
     if inside.all():
         return trajectory
     index = int(np.argmin(inside.all(axis=1)))
     reason = diverging_coordinate(trajectory.state[index])
-    assert reason is not None  # the same question, of this sample
-    if (
-        failure and np.isnan(trajectory.state[index]).all()
-    ):  # from a good sample to no number within one output period
+    assert reason is not None  # this sample is out of bounds
+    if failure and np.isnan(trajectory.state[index]).all():  # the engine took no such sample
         reason = "state", failure
     return _cut(trajectory, index, Divergence(float(trajectory.time[index]), *reason))
 
 
 def _cut(trajectory: Trajectory, length: int, divergence: Divergence) -> Trajectory:
+    """Return the first samples of a trajectory, with a divergence."""
     return Trajectory(
         trajectory.time[:length],
         trajectory.state[:length],
@@ -95,10 +99,10 @@ def _cut(trajectory: Trajectory, length: int, divergence: Divergence) -> Traject
 
 
 def diverging_coordinate(positions: FloatArray) -> tuple[str, str] | None:
-    """Name of the first coordinate out of bounds and what is wrong with it; None while all is well.
+    """Return name of the first coordinate out of bounds and the reason; None if all are in bounds.
 
     Args:
-        positions: roll, pitch, yaw, x, y, z, (drum angle). [rad, m]
+        positions: At least roll, pitch, yaw, x, y, z of the tub. [rad, m]
     """
     size = np.abs(positions[:6])
     bad = np.flatnonzero(~(size <= _BOUNDS))
@@ -106,17 +110,18 @@ def diverging_coordinate(positions: FloatArray) -> tuple[str, str] | None:
         return None
     index = int(bad[0])
     unit = "rad" if index < 3 else "m"
-    return COORDINATES[
-        index
-    ], f"{COORDINATES[index]} = {positions[index]:.4g} {unit}, bound {_BOUNDS[index]:g} {unit}"
+    name = COORDINATES[index]
+    return name, f"{name} = {positions[index]:.4g} {unit}, bound {_BOUNDS[index]:g} {unit}"
 
 
 def divergence_text(divergence: Divergence | None, time: FloatArray, state: FloatArray) -> str:
-    """When and why a run stopped, and its last good sample; "" for one that did not.
+    """Return a message with time and reason of a divergence and the last good sample.
+
+    The message is "" for a run without divergence.
 
     Args:
-        divergence: Of the run.
-        time, state: Its good samples, (n,) [s] and (n, >= 6).
+        divergence: Divergence of the run, if any.
+        time, state: Good samples of the run, (n,) [s] and (n, >= 6) [rad, m].
     """
     if divergence is None:
         return ""

@@ -13,7 +13,6 @@ from wm_drake.compiler.elementary import sqrt, where
 from wm_drake.laws.friction import (
     coulomb_friction,
     havsin_friction,
-    mstv_friction,
     stv_friction,
 )
 from wm_drake.laws.table import stiffness_force
@@ -166,8 +165,10 @@ def mstv_damper(
 @law
 def mstv_sponge_with_mass(
     deformation,
-    deformation_rate,
-    slider_rate,
+    rate,
+    slider_velocity,
+    step,
+    mass,
     friction_force,
     friction_damping,
     regularisation_velocity,
@@ -175,26 +176,40 @@ def mstv_sponge_with_mass(
     sponge_damping,
     slider_damping,
 ):
-    """Return tension and force on the sponge of a friction damper whose sponge has a mass.
+    """Take a step of implicit Euler of a friction damper whose sponge has a mass.
 
         s = k1 (Y - X) + c1 (Y' - X')                             [C] Eq. (2)
         m X'' = s - c2 X' + f_mstv(X', Y' - X')                   [C] Eq. (3), (7)
 
+    Own derivation of the step: with X = X0 + h w and X'' = (w - w0) / h, the balance at the end of
+    the step is that of a massless slider, `slider_rate`, with more force and more damping:
+
+        (k1 h + c1 + c2 + m/h) w - f_mstv(w, Y' - w) = k1 (Y - X0) + c1 Y' + m/h w0
+
     Args:
-        deformation, deformation_rate: Y - X and its rate. [m, m/s]
-        slider_rate: X'. [m/s]
+        deformation: Y - X0: displacement of the driven end at the end of the step less that of the
+            slider at its beginning. [m]
+        rate: Rate of elongation Y' at the end of the step. [m/s]
+        slider_velocity: Velocity w0 of the slider at the beginning of the step. [m/s]
+        step: Time step h, > 0. [s]
+        mass: Mass of the sponge m, >= 0. [kg]
         friction_force, friction_damping, regularisation_velocity: As for `mstv_damper`. [N, N s/m,
             m/s]
         sponge_stiffness, sponge_damping, slider_damping: As for `mstv_damper`. [N/m, N s/m, N s/m]
 
     Returns:
-        Tension s and force m X'' on the sponge. [N]
+        Tension s [N] and velocity w of the slider [m/s], both at the end of the step.
     """
-    tension = sponge_stiffness * deformation + sponge_damping * deformation_rate
-    friction = mstv_friction(
-        slider_rate, deformation_rate, friction_force, friction_damping, regularisation_velocity
+    w = slider_rate(
+        sponge_stiffness * deformation + sponge_damping * rate + mass / step * slider_velocity,
+        rate,
+        sponge_stiffness * step + sponge_damping + slider_damping + mass / step,
+        friction_force,
+        friction_damping,
+        regularisation_velocity,
     )
-    return tension, tension - slider_damping * slider_rate + friction
+    tension = sponge_stiffness * (deformation - step * w) + sponge_damping * (rate - w)
+    return tension, w
 
 
 @law

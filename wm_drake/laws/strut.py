@@ -18,7 +18,8 @@ def bending_moment(direction, rate, axis, stiffness, damping, friction_torque, f
     Args:
         direction: Unit vector e along the strut, in W.
         rate: Angular velocity of the strut against the body, transverse to e. [rad/s]
-        axis: Unit vector fixed in the body, equal to e at the rest pose, in W.
+        axis: Unit vector fixed in the body, in W. It equals e as drawn (T = W), which is the
+            neutral pose of the bushing; the rest pose may differ slightly.
         stiffness: Rotational stiffness [k]. [N m/rad]
         damping: Rotational damping [c]. [N m s/rad]
         friction_torque: Full friction torque [p]. [N m]

@@ -77,6 +77,11 @@ def packed_table_size(n):
     return 1 + PIECE_SIZE * (n - 1) + END_SIZE
 
 
+def pack_number(stiffness):
+    """Return a packed stiffness that is a number. [N/m or N m/rad]"""
+    return np.array([0.0, stiffness])
+
+
 def pack_table(x, cubics, end_slope):
     """Return a packed table.
 

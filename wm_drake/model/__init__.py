@@ -1,5 +1,7 @@
 """Build the Drake model of a machine from its SDF and its parameters.
 
-Enters: `MachineParameters`. Leaves: a `Machine` (diagram, plant and a handle to each system) and, from `set_up`, a
-`Setup`: a Context at rest with preloads solved. May import: `systems`, `elements` and the rooms above them.
+Enters: `MachineParameters`. Leaves: a `Machine` (diagram, plant and a handle to each system). Its
+method `set_up` returns a `Setup`: a Context at the rest pose, with numbers and load set and spring
+preloads solved. `add_washing_machine` adds the systems to a diagram of the caller.
+May import: `systems`, `elements` and the rooms before them.
 """

@@ -1,4 +1,4 @@
-"""The bodies: SDF model -> MultibodyPlant, and what the machine file changes in it, set in a Context."""
+"""Bodies of a machine: the plant built from its SDF, with overrides and load set in a Context."""
 
 import functools
 from collections.abc import Iterable
@@ -21,43 +21,75 @@ from pydrake.multibody.tree import (
     UnitInertia,
 )
 
-from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.errors import InputError, Problem, input_error, nearest_names, shortened
+from wm_drake.model.sdf_shapes import check_shapes
 from wm_drake.model.state_layout import CARRIER
 from wm_drake.parameters import BodyOverride, Load, MachineParameters, with_value
+from wm_drake.parameters.text_files import check_regular, is_file
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
 _PACKAGE = Path(__file__).parents[1]
 SDF_FOLDER = _PACKAGE / "sdf" if (_PACKAGE / "sdf").is_dir() else _PACKAGE.parent / "sdf"
-"""The SDF models: inside an installed package, beside it in a checkout."""
+"""Folder of the SDF models: in an installed package inside it, in a checkout beside it."""
+
+LONGEST_REASON = 200
+"""Largest number of characters of Drake's reason in a message."""
+
+LARGEST_SDF = 16 << 20
+"""Largest size of an SDF file. [byte]"""
 
 
 def sdf_path(model: str) -> Path:
-    """The file of a shipped model's name or of a path."""
+    """Return the path of an SDF file.
+
+    Args:
+        model: Name of a shipped SDF file, or an absolute path.
+
+    Raises:
+        InputError: there is no such file.
+    """
     path = Path(model) if Path(model).is_absolute() else SDF_FOLDER / model
-    if not path.is_file():
+    if not is_file(path):
         known = [shipped.name for shipped in SDF_FOLDER.glob("*.sdf")]
         raise input_error(f"no SDF file '{model}'{nearest_names(model, known)}", key="model")
+    check_regular(path, key="model", largest=LARGEST_SDF)
     return path
 
 
-def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
-    """Parses the SDF strictly into `plant`, lets the tub float, couples the drive to the drum, finalizes.
+def unusable(path: Path, error: BaseException) -> InputError:
+    """Return the error of an SDF file that Drake refuses, with Drake's reason."""
+    reason = " ".join(
+        str(error).replace(f"{path.parent}/", "").replace(f"/{path.name}", path.name).split()
+    )
+    return input_error(
+        f"SDF '{path.name}' cannot be read: {shortened(reason, LONGEST_REASON)}", key="model"
+    )
 
-    The tub gets an RpyFloatingJoint (7 positions and 7 velocities with the drum), which SDF cannot say. The drive's reflected
-    inertia makes the drum follow its speed source (`wm_drake.systems.speed_source`). If its bearing gives, the drum turns in
-    a massless body that floats as well (`wm_drake.model.state_layout.CARRIER`), whose frame is T when drawn.
+
+def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
+    """Add the bodies of a machine to a plant and finalize it. The SDF is parsed strictly.
+
+    The tub gets an RpyFloatingJoint, which an SDF file cannot contain; tub and drum then have 7
+    positions and 7 velocities. The outer tubes of telescopic dampers get one too. The reflected
+    inertia of the drive makes the drum follow its speed source (`wm_drake.systems.speed_source`).
+    With a compliant bearing the drum turns in a massless floating body, the drum carrier
+    (`wm_drake.model.state_layout.CARRIER`). Its frame coincides with T in the drawn pose.
+
+    Args:
+        plant: Empty plant.
+        parameters: The machine.
 
     Raises:
-        InputError: no such file, not valid SDF, or not the bodies this machine needs.
+        InputError: there is no such file, it is not valid SDF, or it lacks a body or a joint.
     """
     parser = Parser(plant)
     parser.SetStrictParsing()
+    path = sdf_path(parameters.model)
+    check_shapes(path)
     try:
-        parser.AddModels(str(sdf_path(parameters.model)))
-    except RuntimeError as error:
-        raise input_error(
-            f"SDF '{parameters.model}' cannot be read: {error}", key="model"
-        ) from None
+        parser.AddModels(str(path))
+    except (RuntimeError, SystemExit) as error:  # Drake turns failed assertions into exits
+        raise unusable(path, error) from None
     missing = [
         f"link '{name}'" for name in ("housing", "tub", "drum") if not plant.HasBodyNamed(name)
     ]
@@ -70,8 +102,9 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
             for joint in map(plant.get_joint, plant.GetJointIndices())
             if joint.num_velocities()
         ]
+        hint = nearest_names(parameters.drive.joint, joints)
         raise input_error(
-            f"no moving joint '{parameters.drive.joint}'{nearest_names(parameters.drive.joint, joints)}",
+            f"no moving joint '{parameters.drive.joint}' in the SDF{hint}",
             key="drive.joint",
         )
     if missing:
@@ -88,24 +121,26 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
         )
     actuator = _drive_actuator(plant, parameters.drive.joint)
     if parameters.imperfections.bearing:
-        actuator = _hung_in_a_carrier(plant, actuator)
+        actuator = _attach_drum_to_carrier(plant, actuator)
     actuator.set_default_rotor_inertia(REFLECTED_INERTIA)
     actuator.set_default_gear_ratio(1.0)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -parameters.gravity])
     plant.Finalize()
-    _check_freedoms(plant, parameters)
+    _check_degrees_of_freedom(plant, parameters)
 
 
 def outer_tube(plant: MultibodyPlant, parameters: MachineParameters, name: str) -> RigidBody:
-    """The outer tube of a telescopic damper: the parent of its joint.
+    """Return the outer tube of a telescopic damper, the parent of its joint.
 
     Raises:
-        InputError: no such joint, or not a prismatic one.
+        InputError: there is no such joint, or it is not prismatic.
     """
     key, joint_name = f"telescopic_dampers.{name}.joint", parameters.telescopic_dampers[name].joint
     joints = [joint.name() for joint in map(plant.get_joint, plant.GetJointIndices())]
     if joint_name not in joints:
-        raise input_error(f"no joint '{joint_name}'{nearest_names(joint_name, joints)}", key=key)
+        raise input_error(
+            f"no joint '{joint_name}' in the SDF{nearest_names(joint_name, joints)}", key=key
+        )
     joint = plant.GetJointByName(joint_name)
     if not isinstance(joint, PrismaticJoint):
         raise input_error(f"joint '{joint_name}' is {joint.type_name()}, not prismatic", key=key)
@@ -113,32 +148,44 @@ def outer_tube(plant: MultibodyPlant, parameters: MachineParameters, name: str) 
 
 
 def _drive_actuator(plant: MultibodyPlant, joint_name: str) -> JointActuator:
-    """The actuator that the parser gave the drive's joint; it gives one to every moving joint without an effort limit of 0."""
+    """Return the actuator of the drive's joint.
+
+    Drake's parser adds an actuator to every moving joint whose effort limit is not 0.
+
+    Raises:
+        InputError: another joint has an actuator, or the drive's joint has an effort limit.
+    """
     actuators = [plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices()]
     if [actuator.joint().name() for actuator in actuators] != [joint_name] or np.isfinite(
         actuators[0].effort_limit()
     ):
         raise input_error(
-            f"joint '{joint_name}' must be the only driven one, and without <effort>, which would clamp the motor",
+            f"joint '{joint_name}' must be the only one with an actuator and must have no effort "
+            "limit; give every other moving joint <effort>0</effort>",
             key="drive.joint",
         )
     return actuators[0]
 
 
-def _hung_in_a_carrier(plant: MultibodyPlant, actuator: JointActuator) -> JointActuator:
-    """Puts a massless body that floats in the tub's place as the parent of the drum's joint.
+def _attach_drum_to_carrier(plant: MultibodyPlant, actuator: JointActuator) -> JointActuator:
+    """Replace the tub by a massless floating body, the carrier, as the parent of the drum's joint.
+
+    Args:
+        plant: Plant before `Finalize`.
+        actuator: Actuator of the drum's joint; it is removed together with the joint.
 
     Returns:
-        The new joint's actuator.
+        The actuator of the new joint.
 
     Raises:
-        InputError: the joint is not a revolute one from tub to drum.
+        InputError: the joint is not a revolute joint from tub to drum.
     """
     joint, key = actuator.joint(), "imperfections.bearing"
     if not isinstance(joint, RevoluteJoint) or joint.parent_body().name() != "tub":
-        what = f"joint '{joint.name()}' is {joint.type_name()}, from '{joint.parent_body().name()}'"
         raise input_error(
-            f"a bearing that gives asks for a revolute joint from 'tub' to 'drum'; {what}", key=key
+            "a compliant bearing needs a revolute joint from 'tub' to 'drum'; joint "
+            f"'{joint.name()}' is {joint.type_name()}, from '{joint.parent_body().name()}'",
+            key=key,
         )
     name, axis, damping = joint.name(), joint.revolute_axis(), joint.default_damping_vector()[0]
     X_TF, on_drum = joint.frame_on_parent().GetFixedPoseInBodyFrame(), joint.frame_on_child()
@@ -154,7 +201,8 @@ def _hung_in_a_carrier(plant: MultibodyPlant, actuator: JointActuator) -> JointA
     )
 
 
-def _check_freedoms(plant: MultibodyPlant, parameters: MachineParameters) -> None:
+def _check_degrees_of_freedom(plant: MultibodyPlant, parameters: MachineParameters) -> None:
+    """Raise InputError if the plant has other degrees of freedom than its floating trees."""
     dampers, carriers = (
         len(parameters.telescopic_dampers),
         1 if parameters.imperfections.bearing else 0,
@@ -163,30 +211,32 @@ def _check_freedoms(plant: MultibodyPlant, parameters: MachineParameters) -> Non
         plant.num_velocities() != 7 + 7 * dampers + 6 * carriers
         or plant.num_positions() != plant.num_velocities()
     ):
-        tubes = ", seven for each damper with tubes" if dampers else ""
+        more = ", 7 for each telescopic damper" if dampers else ""
+        more += ", 6 for the drum carrier" if carriers else ""
+        size = plant.num_velocities()
         raise input_error(
-            f"SDF '{parameters.model}' has {plant.num_velocities()} freedoms; a machine has the tub's six and the drum's one"
-            f"{tubes}, all else on fixed joints",
+            f"SDF '{parameters.model}' has {size} degrees of freedom; allowed are 6 for the tub, "
+            f"1 for the drum{more}; attach all other links by fixed joints",
             key="model",
         )
 
 
 def tubes_of(plant: MultibodyPlant, joint: str) -> tuple[RigidBody, RigidBody]:
-    """Outer and inner tube of a telescoping joint."""
+    """Return outer and inner tube of the joint of a telescopic damper."""
     telescope = plant.GetJointByName(joint)
     return telescope.parent_body(), telescope.child_body()
 
 
 def frame_names(plant: MultibodyPlant) -> list[str]:
-    """Names of the frames and links of the model, by which elements attach."""
+    """Return the names of the frames and links of the model, to which elements attach."""
     frames = map(
         plant.get_frame, plant.GetFrameIndices(plant.GetBodyByName("tub").model_instance())
     )
     return sorted({frame.name() for frame in frames} - {"__model__"})
 
 
-def fixed_to(plant: MultibodyPlant, body_name: str, frame_name: str) -> bool:
-    """Whether a frame moves with a body (on it, or on one welded to it)."""
+def is_welded_to(plant: MultibodyPlant, body_name: str, frame_name: str) -> bool:
+    """Return whether a frame is on a body, or on one that is welded to it."""
     body = plant.GetFrameByName(frame_name).body()
     return any(
         body.index() == other.index()
@@ -195,7 +245,7 @@ def fixed_to(plant: MultibodyPlant, body_name: str, frame_name: str) -> bool:
 
 
 def frame_problems(plant: MultibodyPlant, parameters: MachineParameters) -> list[Problem]:
-    """What is wrong with the names of frames and bodies in a machine."""
+    """Return one problem for each wrong name of a frame or body in a machine."""
     wanted = [
         (
             f"{table}.{name}.{end}_frame" if name else f"{table}.{end}_frame",
@@ -226,16 +276,21 @@ def frame_problems(plant: MultibodyPlant, parameters: MachineParameters) -> list
     )
 
 
-@functools.lru_cache(
-    maxsize=64
-)  # a study asks a thousand times with other numbers and the same names
+@functools.lru_cache(maxsize=64)  # thousands of machines of a study have the same names
 def _name_problems(
     plant: MultibodyPlant,
     wanted: tuple[tuple[str, str, str], ...],
     bodies: tuple[str, ...],
     frames: tuple[str, ...],
 ) -> tuple[Problem, ...]:
-    """Of frames (key, body they must be fixed to, name), overridden bodies, and overridden frames."""
+    """Return one problem for each wrong name.
+
+    Args:
+        plant: The plant.
+        wanted: Frames of elements and sensors: key, body that the frame must be fixed to, name.
+        bodies: Names of overridden bodies.
+        frames: Names of overridden frames.
+    """
     known = frame_names(plant)
     problems = []
     for key, body, frame in wanted:
@@ -243,7 +298,7 @@ def _name_problems(
             problems.append(
                 Problem("", key, f"no frame '{frame}' in the SDF{nearest_names(frame, known)}")
             )
-        elif not fixed_to(plant, body, frame):
+        elif not is_welded_to(plant, body, frame):
             problems.append(Problem("", key, f"frame '{frame}' is not fixed to the {body}"))
     fixed = [body.index() for body in plant.GetBodiesWeldedTo(plant.world_body())]
     links = [
@@ -278,6 +333,7 @@ def _name_problems(
 
 
 def _placed_elements(parameters: MachineParameters) -> Iterable[tuple[str, str, Any]]:
+    """Yield table, name and parameters of each element with a frame on tub and on housing."""
     for table in ("springs", "dampers", "bushings"):
         for name, element in getattr(parameters, table).items():
             yield table, name, element
@@ -286,10 +342,10 @@ def _placed_elements(parameters: MachineParameters) -> Iterable[tuple[str, str, 
 
 
 def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameters) -> None:
-    """Puts the overrides of the machine file into a plant Context.
+    """Set the overrides of the machine file in a plant Context.
 
     Raises:
-        InputError: names the SDF does not have.
+        InputError: the SDF does not have a body or frame of that name.
     """
     problems = frame_problems(plant, parameters)
     if problems:
@@ -306,7 +362,7 @@ def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameter
 
 
 def add_load(plant: MultibodyPlant, context: Any, load: Load) -> None:
-    """Adds the point masses of a load to the drum in a plant Context."""
+    """Add the point masses of a load to the drum in a plant Context."""
     drum = plant.GetBodyByName("drum")
     loaded = drum.CalcSpatialInertiaInBodyFrame(context)
     for unbalance in load.unbalances:
@@ -316,6 +372,7 @@ def add_load(plant: MultibodyPlant, context: Any, load: Load) -> None:
 
 
 def _overridden(inertia: SpatialInertia, override: BodyOverride) -> SpatialInertia:
+    """Return a spatial inertia with the parts of an override; a new mass scales the inertia."""
     mass = inertia.get_mass() if override.mass is None else override.mass
     centre = (
         inertia.get_com() if override.centre_of_mass is None else np.array(override.centre_of_mass)
@@ -331,13 +388,20 @@ def _overridden(inertia: SpatialInertia, override: BodyOverride) -> SpatialInert
     return SpatialInertia.MakeFromCentralInertia(mass, centre, about_centre)
 
 
-def spelled_out(
+def with_sdf_values(
     plant: MultibodyPlant, parameters: MachineParameters, keys: Iterable[str]
 ) -> MachineParameters:
-    """A copy in which the values of the SDF that key paths reach into stand as overrides, so that parts of them can be changed.
+    """Return the parameters with overrides that contain the values of the SDF.
+
+    `with_value` can then change a part of such a value, for example one coordinate of a frame.
+
+    Args:
+        plant: The plant.
+        parameters: The machine.
+        keys: Key paths; each path below `frames` or `bodies` adds an override.
 
     Raises:
-        InputError: bodies or frames the SDF does not have.
+        InputError: the SDF does not have a body or frame of that name.
     """
     changed = parameters
     for table, name, part in dict.fromkeys(tuple([*key.split("."), "", ""][:3]) for key in keys):
@@ -357,7 +421,13 @@ def spelled_out(
 
 
 def _mass_properties(plant: MultibodyPlant, name: str, override: BodyOverride) -> dict[str, Any]:
-    """Mass, centre of mass and central inertia of a body under an override, as an override says them."""
+    """Return mass, centre of mass and central inertia of a body, by the keys of an override.
+
+    Parts that `override` has replace those of the SDF.
+
+    Raises:
+        InputError: the SDF does not have a body of that name.
+    """
     if not plant.HasBodyNamed(name):
         links = [
             plant.get_body(index).name()
@@ -368,9 +438,9 @@ def _mass_properties(plant: MultibodyPlant, name: str, override: BodyOverride) -
         )
     inertia = _overridden(plant.GetBodyByName(name).default_spatial_inertia(), override)
     matrix = inertia.Shift(inertia.get_com()).CalcRotationalInertia().CopyToFullMatrix3()
-    places = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+    indices = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
     return {
         "mass": float(inertia.get_mass()),
         "centre_of_mass": tuple(map(float, inertia.get_com())),
-        "inertia": {axis: float(matrix[place]) for axis, place in places.items()},
+        "inertia": {axis: float(matrix[index]) for axis, index in indices.items()},
     }

@@ -1,4 +1,4 @@
-"""Static equilibrium of the empty machine: spring preloads, and the pose at which no force remains."""
+"""Static equilibrium of the empty machine: spring preloads and rest pose."""
 
 from dataclasses import replace
 
@@ -38,7 +38,11 @@ class Statics:
         self._applied = AppliedForce(elements, state_layout)
 
     def generalized_force(self) -> FloatArray:
-        """Return the generalized force (n,) of elements and gravity at the Context's state. [N m, N]"""
+        """Return the generalized force of elements and gravity at the Context's state.
+
+        Returns:
+            (n,) [N m, N]
+        """
         state = self.plant.GetPositionsAndVelocities(self.context)
         gravity = self.plant.CalcGravityGeneralizedForces(self.context)
         return np.asarray(self._applied(state) + gravity)
@@ -54,7 +58,7 @@ def preloaded(
     """Return the elements with the spring preloads that balance the empty machine as drawn (T = W).
 
     The balance is a least-squares one: fewer than six springs cannot balance every moment. Bodies
-    that hang on the tub (damper tubes, a drum in a compliant bearing) are moved to their equilibrium.
+    attached to the tub (damper tubes, drum in a compliant bearing) are moved to their equilibrium.
 
     Args:
         plant, context: The plant and its Context, at the drawn pose.
@@ -62,11 +66,11 @@ def preloaded(
         elements: All elements, springs without preload.
 
     Raises:
-        InputError: a spring would have to push, or the hanging bodies have no equilibrium.
+        InputError: a spring would have to push, or the attached bodies have no equilibrium.
     """
     statics = Statics(plant, context, state_layout, elements)
-    if state_layout.hanging.size:
-        _balance(statics, state_layout.hanging)  # the tub carries their weight
+    if state_layout.attached.size:
+        _balance(statics, state_layout.attached)  # so that their weight is on the tub
     springs = elements.springs
     hooks = np.stack([spring.p_ToA_T for spring in springs.values()])
     lines = np.stack([spring.p_WH for spring in springs.values()]) - hooks
@@ -108,13 +112,13 @@ def put_to_rest(
     """
     statics = Statics(plant, context, state_layout, elements)
     tolerance = EQUILIBRIUM_TOLERANCE
-    if state_layout.hanging.size:
+    if state_layout.attached.size:
         every = np.setdiff1d(np.arange(state_layout.size), state_layout.drum)
         tolerance = max(tolerance, _balance(statics, every))
     q = plant.GetPositions(context)
 
     def residual(pose: FloatArray) -> FloatArray:
-        if not np.all(np.abs(pose) < 10.0):  # Drake would abort on a step of the solver this far
+        if not np.all(np.abs(pose) < 10.0):  # Drake aborts at poses this far
             return np.full(6, 1e9)
         q[state_layout.tub] = pose
         plant.SetPositions(context, q)
@@ -124,9 +128,10 @@ def put_to_rest(
     remaining = residual(pose)
     if not np.all(np.isfinite(remaining)):
         raise input_error(
-            "forces at rest are not finite numbers; a mass, a stiffness or a distance is out of range"
+            "forces at rest are not finite numbers: a mass, a stiffness or a distance is out of "
+            "range"
         )
-    if np.max(np.abs(remaining)) > EQUILIBRIUM_TOLERANCE and not state_layout.hanging.size:
+    if np.max(np.abs(remaining)) > EQUILIBRIUM_TOLERANCE and not state_layout.attached.size:
         pose = np.asarray(root(residual, pose, tol=1e-12).x)
         remaining = residual(pose)
     far = (
@@ -137,9 +142,9 @@ def put_to_rest(
         plant.SetPositions(context, np.zeros(state_layout.size))
         m_x, m_y, m_z, f_x, f_y, f_z = statics.force_on_tub()
         raise input_error(
-            "the springs cannot hold the empty machine near its drawn pose: there remain force "
-            f"({f_x:.3g}, {f_y:.3g}, {f_z:.3g}) N and moment ({m_x:.3g}, {m_y:.3g}, {m_z:.3g}) N m; "
-            "move hooks or masses so that they balance"
+            "the springs cannot hold the empty machine near its drawn pose; force "
+            f"({f_x:.3g}, {f_y:.3g}, {f_z:.3g}) N and moment ({m_x:.3g}, {m_y:.3g}, {m_z:.3g}) N m "
+            "remain; move spring frames or masses"
         )
     return remaining
 
@@ -147,8 +152,9 @@ def put_to_rest(
 def _balance(statics: Statics, chosen: Indices) -> float:
     """Move the chosen positions to where the force on them vanishes, by Newton's method.
 
-    Least squares leave a tube that may spin freely where it is. The drum carrier moves with the tub,
-    so that the stiffness of a bearing does not hide the small stiffness of the springs.
+    A step is a least-squares solution, so that a tube that can spin freely stays where it is. The
+    drum carrier moves with the tub, so that the stiffness of a bearing does not hide the small
+    stiffness of the springs.
 
     Args:
         statics: Forces of the machine; its Context is moved.
@@ -186,15 +192,15 @@ def _balance(statics: Statics, chosen: Indices) -> float:
             rounding = np.finfo(float).eps * float(np.max(np.abs(slopes)))
         q += directions.T @ -(inverse_stiffness @ remaining)
         remaining = forces(q)
-    on_hanging = remaining[np.isin(chosen, layout.hanging)]
-    _check_held(q, on_hanging, max(TUBES_TOLERANCE, rounding), layout)
+    on_attached = remaining[np.isin(chosen, layout.attached)]
+    _check_held(q, on_attached, max(TUBES_TOLERANCE, rounding), layout)
     return rounding
 
 
 def _check_held(
     q: FloatArray, remaining: FloatArray, tolerance: float, state_layout: StateLayout
 ) -> None:
-    """Raise InputError if a hanging body has no equilibrium near where it is drawn."""
+    """Raise InputError if an attached body has no equilibrium near its drawn pose."""
     held = np.max(np.abs(remaining)) <= tolerance
     if state_layout.carrier.size:
         sag = np.abs(q[state_layout.carrier] - q[state_layout.tub])
@@ -208,7 +214,7 @@ def _check_held(
             )
     if not held:
         raise input_error(
-            "their bushings cannot hold the tubes near where they are drawn: nothing resists a turn "
-            "about the damper's axis, say, of a tube whose centre of mass is beside it",
+            "the bushings cannot hold the tubes near their drawn pose; a tube whose centre of mass "
+            "is not on the damper's axis needs a rotational stiffness about this axis",
             key="telescopic_dampers",
         )

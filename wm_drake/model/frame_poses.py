@@ -1,35 +1,37 @@
-"""Poses of the frames of the SDF, under the overrides of a machine file."""
+"""Poses of the frames of the SDF as drawn, under the overrides of a machine file."""
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context
 
-from wm_drake.parameters import FrameOverride
+from wm_drake.model.bodies import set_bodies
+from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 
 
 class FramePoses:
-    """Poses of frames in the frame of a body, under one set of overrides; each is computed once."""
+    """Poses of frames in the frame of a body, as drawn; each is computed once.
 
-    def __init__(
-        self, plant: MultibodyPlant, frames: dict[str, FrameOverride], context: Context
-    ) -> None:
-        """Start without any pose.
+    Attributes:
+        frames: The overrides of the machine file.
+    """
 
-        Args:
-            plant: The plant.
-            frames: The overrides.
-            context: A plant Context in which the overrides are set.
+    def __init__(self, plant: MultibodyPlant, parameters: MachineParameters) -> None:
+        """Set the overrides in a Context of its own.
+
+        Raises:
+            InputError: names unknown to the SDF.
         """
-        self.frames, self.context, self._plant = frames, context, plant
+        self.frames, self._plant = parameters.frames, plant
+        self._context = plant.CreateDefaultContext()
+        set_bodies(plant, self._context, parameters)
         self._known: dict[tuple[str, str], tuple[FloatArray, FloatArray]] = {}
 
     def __call__(self, body: str, frame: str) -> tuple[FloatArray, FloatArray]:
-        """Return position of the origin (3,) [m] and rotation (3, 3) of a frame in a body's frame."""
+        """Return position (3,) [m] and rotation (3, 3) of a frame in the frame of a body."""
         if (body, frame) not in self._known:
             body_frame = self._plant.GetBodyByName(body).body_frame()
             pose = self._plant.CalcRelativeTransform(
-                self.context, body_frame, self._plant.GetFrameByName(frame)
+                self._context, body_frame, self._plant.GetFrameByName(frame)
             )
             self._known[body, frame] = (
                 np.array(pose.translation()),

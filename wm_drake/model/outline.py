@@ -1,4 +1,4 @@
-"""Outlines of convex shapes that ride on a body: how far they extend along a direction."""
+"""Support functions of cylinders and boxes that are fixed to a moving body."""
 
 import numpy as np
 
@@ -10,13 +10,16 @@ from wm_drake.compiler.vectors import dot, rotate, rotate_back, rotation_from_rp
 
 @long_running
 def support_history(poses, direction, centre, axes, half, is_round, nearest):
-    """How far along a direction a shape begins, in each pose of its body: its support function against that direction.
+    """Compute the smallest coordinate of a shape along a direction, in each pose of its body.
+
+    It is minus the support function of the shape for the opposite direction.
 
     Args:
-        poses: (n, 6) roll, pitch, yaw, x, y, z. [rad, m]
+        poses: Poses of the body: roll, pitch, yaw, x, y, z. (n, 6) [rad, m]
         direction: Unit vector in W. (3,)
-        centre, axes, half, is_round: Of a cylinder or a box (`wm_drake.model.scene.Outline`); axes by rows. (3,), (9,), (3,) [m]
-        nearest: (n, 1) written: smallest value along the direction of any point of the shape. [m]
+        centre, axes, half, is_round: Attributes of a `wm_drake.model.scene.Outline`; the axes by
+            rows. (3,), (9,), (3,) [m]
+        nearest: Smallest coordinate of any point of the shape, written. (n, 1) [m]
     """
     align_stack()
     x_numbers, numbers = np.empty(6 * WIDTH), np.empty(WIDTH)

@@ -73,13 +73,14 @@ class PlacedElements:
 
 
 class AppliedForce:
-    """Generalized force of placed elements on the plant, without a diagram: at rest, sponges relaxed.
+    """Generalized force of placed elements on the plant, computed without a diagram.
 
-    The diagram of the machine applies the same laws to the same packed numbers.
+    The sponges of dampers are relaxed. The diagram of the machine applies the same laws to the same
+    packed numbers.
     """
 
     def __init__(self, elements: PlacedElements, state_layout: StateLayout) -> None:
-        """Pack the elements once; calls then differ in the state only."""
+        """Pack the elements."""
         trees, states = state_layout.trees, state_layout.states()
         self._size = state_layout.size
         self._calls = []
@@ -206,7 +207,10 @@ def _telescopes(
 def _bearing(
     plant: MultibodyPlant, parameters: MachineParameters
 ) -> SixComponentBushingParameters | None:
-    """Place the compliant bearing between tub (ground side) and drum carrier; None if it is rigid."""
+    """Place the compliant bearing between tub and drum carrier; return None if it is rigid.
+
+    The tub is its ground side.
+    """
     bearing = parameters.imperfections.bearing
     if bearing is None:
         return None

@@ -5,12 +5,12 @@ from wm_drake.parameters import MachineParameters
 
 
 def check_same_elements(built: MachineParameters, wanted: MachineParameters) -> None:
-    """Raise InputError if the wanted machine has other elements, laws or joints than the built one."""
+    """Raise InputError if a machine has other elements, laws or joints than the built one."""
     for key in ("model", "gravity"):
         if getattr(wanted, key) != getattr(built, key):
             raise input_error(
                 f"{getattr(wanted, key)} is not the built machine's {getattr(built, key)}; "
-                "build a new machine",
+                "rebuild the machine",
                 key=key,
             )
     _check_names(built, wanted)
@@ -18,25 +18,28 @@ def check_same_elements(built: MachineParameters, wanted: MachineParameters) -> 
         kinds = ("compliant", "rigid")
         now, before = kinds if wanted.imperfections.bearing else kinds[::-1]
         raise input_error(
-            f"is {now}; the built machine has a {before} bearing: rebuild the machine to make it {now}",
+            f"is {now}; the built machine has a {before} bearing: rebuild the machine to make it "
+            f"{now}",
             key="imperfections.bearing",
         )
     _check_laws(built, wanted)
 
 
 def _check_names(built: MachineParameters, wanted: MachineParameters) -> None:
+    """Raise InputError if an element is in one of the machines only."""
     for table in ("springs", "dampers", "all_bushings", "telescopic_dampers"):
         names = [set(t() if callable(t := getattr(p, table)) else t) for p in (built, wanted)]
         if names[0] != names[1]:
             other = sorted(names[0] ^ names[1])[0]
             raise input_error(
                 f"'{other}' is not in both machines{nearest_names(other, names[0])}; "
-                "build a new machine",
+                "rebuild the machine",
                 key=table.removeprefix("all_"),
             )
 
 
 def _check_laws(built: MachineParameters, wanted: MachineParameters) -> None:
+    """Raise InputError if a damper has another law or another joint."""
     for table in ("dampers", "telescopic_dampers"):
         for name, damper in getattr(wanted, table).items():
             built_damper = getattr(built, table)[name]
@@ -44,11 +47,11 @@ def _check_laws(built: MachineParameters, wanted: MachineParameters) -> None:
             built_law = built.damper_types[built_damper.type].law
             if law != built_law:
                 raise input_error(
-                    f"law '{law}' is not the built machine's '{built_law}'; build a new machine",
+                    f"law '{law}' is not the built machine's '{built_law}'; rebuild the machine",
                     key=f"{table}.{name}",
                 )
             if getattr(damper, "joint", "") != getattr(built_damper, "joint", ""):
                 raise input_error(
-                    "is not the built machine's joint; build a new machine",
+                    "is not the built machine's joint; rebuild the machine",
                     key=f"{table}.{name}.joint",
                 )

@@ -1,22 +1,23 @@
-"""The machine's shapes: distances between tub and housing, and a replay for the eye.
+"""Shapes of a machine: distances between tub and housing, and a 3D replay of a motion.
 
-The simulated plant carries no shapes, so that nothing in a run depends on them; here the same SDF is posed after the run.
+The simulated plant has no shapes, so that no result of a run depends on them. Here the same SDF is
+read again with its shapes and set to the poses of a finished run.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import Cylinder, GeometryId, Meshcat, MeshcatVisualizer
+from pydrake.geometry import Cylinder, GeometryId, Meshcat, MeshcatParams, MeshcatVisualizer
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
-from wm_drake.model.bodies import add_bodies, set_bodies
+from wm_drake.model.bodies import add_bodies, sdf_path, set_bodies, unusable
 from wm_drake.model.outline import support_history
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 
-_FIRST_LOOK = 16
-"""Every so many poses are looked at first for the smallest gap."""
+_COARSE_STRIDE = 16
+"""Stride of the poses that the first pass of the search for the smallest gap uses."""
 
 _AT_ORIGIN = np.zeros((1, 6))
 """Pose of the housing."""
@@ -30,8 +31,8 @@ class Gap:
     """Distance between a part that moves with the tub and a part of the housing.
 
     Attributes:
-        distance: < 0 when they overlap. [m]
-        time: When. [s]
+        distance: Signed distance, < 0 if the parts overlap. [m]
+        time: Time of the pose. [s]
         moving, fixed: Names of the two shapes in the SDF.
         point: Point of the moving shape nearest the fixed one, in W. [m]
     """
@@ -45,13 +46,13 @@ class Gap:
 
 @dataclass(frozen=True)
 class Outline:
-    """What a shape fills at most: a cylinder, or a box; in the frame of the body it rides on.
+    """Cylinder or box that contains a shape, in the frame of the body that the shape is fixed to.
 
     Attributes:
         centre: (3,) [m]
-        axes: (3, 3) its axes as rows; a cylinder's own axis is the last.
-        half: (3,) half widths along them; of a cylinder: its radius twice, half its length. [m]
-        is_round: A cylinder.
+        axes: (3, 3) The axes as rows; the last one is the axis of a cylinder.
+        half: (3,) Half widths along the axes; for a cylinder radius, radius, half length. [m]
+        is_round: Whether it is a cylinder.
     """
 
     centre: FloatArray
@@ -59,8 +60,16 @@ class Outline:
     half: FloatArray
     is_round: bool
 
-    def begins(self, direction: FloatArray, poses: FloatArray) -> FloatArray:
-        """How far along a direction in W (3,) it begins, in poses (n, 6) of its body: roll, pitch, yaw, x, y, z. (n,) [m]"""
+    def lower_extent(self, direction: FloatArray, poses: FloatArray) -> FloatArray:
+        """Return the smallest coordinate of any of its points along a direction.
+
+        Args:
+            direction: Unit vector in W. (3,)
+            poses: Poses of its body: roll, pitch, yaw, x, y, z. (n, 6) [rad, m]
+
+        Returns:
+            (n,) [m]
+        """
         nearest = np.empty((len(poses), 1))
         support_history(
             poses, direction, self.centre, self.axes.ravel(), self.half, self.is_round, nearest
@@ -69,12 +78,21 @@ class Outline:
 
 
 class Scene:
-    """The shapes of a machine, to be put into any pose."""
+    """Shapes of a machine, which can be set to any pose.
+
+    Attributes:
+        plant: Plant with the shapes; its bearing is rigid.
+    """
 
     def __init__(self, parameters: MachineParameters, meshcat: Meshcat | None = None) -> None:
-        """Builds plant and geometry of a machine; with a Meshcat to show them in, if given.
+        """Build plant and geometry of a machine.
 
-        The drum is shown on its axis even if its bearing gives: by hundredths of a millimetre.
+        A compliant bearing is replaced by a rigid one: the drum moves in it by hundredths of a
+        millimetre only.
+
+        Args:
+            parameters: The machine.
+            meshcat: Shows the shapes if given.
         """
         perfect = parameters.imperfections.model_copy(update={"bearing": None})
         parameters = parameters.model_copy(update={"imperfections": perfect})
@@ -88,23 +106,34 @@ class Scene:
         self._plant_context = self.plant.GetMyContextFromRoot(self._context)
         set_bodies(self.plant, self._plant_context, parameters)
         self._pairs = [(a, b) for a in self._shapes("tub") for b in self._shapes("housing")]
+        try:
+            query = self._scene_graph.get_query_output_port().Eval(
+                self._scene_graph.GetMyContextFromRoot(self._context)
+            )
+            for pair in self._pairs:
+                query.ComputeSignedDistancePairClosestPoints(*pair)
+        except (RuntimeError, SystemExit) as error:  # Drake turns failed assertions into exits
+            raise unusable(sdf_path(parameters.model), error) from None
         self._outlines = {shape: self._outline(shape) for pair in self._pairs for shape in pair}
-        self._kept_at_rest: dict[
+        self._rest_cache: dict[
             tuple[float, ...], list[tuple[float, FloatArray, tuple[GeometryId, GeometryId]]]
         ] = {}
         outlines = [self._outlines[shape] for shape, _ in self._pairs]
+        # largest distance of a point of the tub group from To
         self._reach = max(
             (float(np.linalg.norm(o.centre) + np.linalg.norm(o.half)) for o in outlines),
             default=0.0,
         )
 
     def _shapes(self, body: str) -> list[GeometryId]:
+        """Return the collision shapes of a body and of all bodies that are welded to it."""
         welded = self.plant.GetBodiesWeldedTo(self.plant.GetBodyByName(body))
         return [
             shape for part in welded for shape in self.plant.GetCollisionGeometriesForBody(part)
         ]
 
     def _outline(self, shape: GeometryId) -> Outline:
+        """Return the outline of a shape, in W if it is fixed to the housing, else in T."""
         inspector = self._scene_graph.model_inspector()
         body = self.plant.GetBodyFromFrameId(inspector.GetFrameId(shape))
         grounded = self.plant.GetBodiesWeldedTo(self.plant.world_body())
@@ -119,7 +148,7 @@ class Scene:
             half = np.array([kind.radius(), kind.radius(), 0.5 * kind.length()])
             return Outline(X_CS.translation(), X_CS.rotation().matrix().T, half, is_round=True)
         box = inspector.GetObbInGeometryFrame(shape)
-        assert box is not None  # only unbounded shapes have none, and those cannot ride on a tub
+        assert box is not None  # only an unbounded shape, such as a plane, has no box
         X_CO = X_CS.multiply(box.pose())
         return Outline(
             X_CO.translation(),
@@ -129,20 +158,33 @@ class Scene:
         )
 
     def _name(self, shape: GeometryId) -> str:
+        """Return the name of a shape in the SDF."""
         return str(self._scene_graph.model_inspector().GetName(shape)).split("::")[-1]
 
     def distance(
         self, pose: FloatArray, pair: tuple[GeometryId, GeometryId]
     ) -> tuple[float, FloatArray]:
-        """Signed distance of a pair at a pose (roll, pitch, yaw, x, y, z), and the nearest point of the first in W. [m]"""
+        """Return the distance of a pair of shapes at a pose.
+
+        Args:
+            pose: Pose of the tub: roll, pitch, yaw, x, y, z. (6,) [rad, m]
+            pair: A shape of the tub group and a shape of the housing.
+
+        Returns:
+            Signed distance, and the point of the first shape nearest the second, in W. [m]
+        """
         return self._nearest(pose, pair)[:2]
 
     def _nearest(
         self, pose: FloatArray, pair: tuple[GeometryId, GeometryId]
     ) -> tuple[float, FloatArray, FloatArray]:
-        """`distance`, and the unit vector in W along which the first is to move away from the second."""
-        # Drake stops when near enough, a micrometre or so: poses that differ in rounding only should get the same answer
-        self._put(np.append(np.round(pose, 9), 0.0))
+        """Return what `distance` returns, and the direction (3,) that separates the pair.
+
+        It is the unit vector in W along which the first shape moves away from the second.
+        """
+        # Drake's solver is accurate to about 1e-6 m; rounding gives poses that differ by rounding
+        # errors only the same result
+        self._set_positions(np.append(np.round(pose, 9), 0.0))
         query = self._scene_graph.get_query_output_port().Eval(
             self._scene_graph.GetMyContextFromRoot(self._context)
         )
@@ -153,55 +195,55 @@ class Scene:
         )
         return nearest.distance, query.GetPoseInWorld(pair[0]) @ witness, away
 
-    def _put(self, positions: FloatArray) -> None:
-        """Into a pose; tubes of which no position is given stay as they are drawn."""
+    def _set_positions(self, positions: FloatArray) -> None:
+        """Set the first positions of the plant; the others, of damper tubes, are 0 as drawn."""
         drawn = np.zeros(self.plant.num_positions() - len(positions))
         self.plant.SetPositions(self._plant_context, np.concatenate([positions, drawn]))
 
     def smallest_gap(
         self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray
     ) -> Gap | None:
-        """Smallest distance between tub group and housing over sampled poses; None if the SDF has no shapes to measure.
+        """Return the smallest distance between tub group and housing over sampled poses.
 
-        Along any direction, what two convex shapes leave free between their support functions is a lower bound of their
-        distance, and the largest over all directions is the distance itself. So for each pair the bound is known at all poses
-        from the direction at rest; the pose where it is lowest is measured, its direction tightens the bound everywhere, and
-        so on until no pose can beat the smallest gap found: exact over the samples after a few dozen measurements.
+        The gap between the support functions of two convex shapes along any direction is a lower
+        bound of their distance. The largest bound over all directions is the distance itself. For
+        each pair of shapes, the direction at the rest pose gives a bound at all poses. The distance
+        is computed at the pose with the lowest bound, and its direction raises the bounds of all
+        poses. This repeats until no bound is below the smallest distance found. The result is
+        exact over the samples, after a few dozen distances.
 
         Args:
             time: (n,) [s]
-            poses: (n, 6) roll, pitch, yaw, x, y, z. [rad, m]
-            rest_pose: (6,)
+            poses: Poses of the tub: roll, pitch, yaw, x, y, z. (n, 6) [rad, m]
+            rest_pose: Pose of the tub at rest. (6,) [rad, m]
+
+        Returns:
+            The smallest gap; None if there is no sample or the SDF has no shapes to measure.
         """
         if not self._pairs or not len(time):
             return None
-        away = np.ascontiguousarray((poses - rest_pose).T)
-        roll, pitch, yaw, x, y, z = away
+        moved = np.ascontiguousarray((poses - rest_pose).T)
+        roll, pitch, yaw, x, y, z = moved
         turned = (np.abs(roll) + np.abs(pitch) + np.abs(yaw)) * self._reach
         shift = np.sqrt(x * x + y * y + z * z) + turned
         at_rest = self._at_rest(tuple(map(float, rest_pose)))
         farthest = int(np.argmax(shift))
-        best = self._measured(at_rest[0][2], time[farthest], poses[farthest])[0]
-        for stride in (
-            _FIRST_LOOK,
-            1,
-        ):  # a first look at some poses, so that most of the others need none
+        best = self._gap(at_rest[0][2], time[farthest], poses[farthest])[0]
+        # the coarse pass finds a small gap, which excludes most poses of the fine pass
+        for stride in (_COARSE_STRIDE, 1):
             for distance, direction, pair in at_rest:
-                if (
-                    distance - shift[farthest] >= best.distance
-                ):  # nor can any pair that is farther apart at rest
-                    break
-                least = (
-                    distance + direction @ away[3:, ::stride] - turned[::stride]
-                )  # a gap shrinks by no more
+                if distance - shift[farthest] >= best.distance:
+                    break  # this pair and all that follow are farther apart at every pose
+                # lower bound of the distance
+                least = distance + direction @ moved[3:, ::stride] - turned[::stride]
                 near = stride * np.flatnonzero(least < best.distance)
                 best = self._smallest_of_pair(pair, direction, best, time[near], poses[near])
         return best
 
-    def _measured(
+    def _gap(
         self, pair: tuple[GeometryId, GeometryId], time: float, pose: FloatArray
     ) -> tuple[Gap, FloatArray]:
-        """The gap of a pair at a pose, and its direction."""
+        """Return the gap of a pair at a pose, and the direction that separates the pair (3,)."""
         distance, point, direction = self._nearest(pose, pair)
         x, y, z = map(float, point)
         return Gap(
@@ -211,14 +253,17 @@ class Scene:
     def _at_rest(
         self, rest_pose: tuple[float, ...]
     ) -> list[tuple[float, FloatArray, tuple[GeometryId, GeometryId]]]:
-        """Distance, direction and pair, nearest first; kept, since runs of a machine begin at the same pose."""
-        if rest_pose not in self._kept_at_rest:
+        """Return distance, direction and pair of all pairs at a rest pose, nearest first.
+
+        The last rest pose is cached, because runs of a machine begin at the same pose.
+        """
+        if rest_pose not in self._rest_cache:
             found = [(*self._nearest(np.array(rest_pose), pair), pair) for pair in self._pairs]
             nearest_first = sorted(found, key=lambda entry: entry[0])
-            self._kept_at_rest = {
+            self._rest_cache = {
                 rest_pose: [(distance, away, pair) for distance, _, away, pair in nearest_first]
             }
-        return self._kept_at_rest[rest_pose]
+        return self._rest_cache[rest_pose]
 
     def _smallest_of_pair(
         self,
@@ -228,45 +273,59 @@ class Scene:
         time: FloatArray,
         poses: FloatArray,
     ) -> Gap:
-        """The smallest gap after this pair was looked at; `direction` is a first guess of where it is narrowest."""
+        """Return the smaller of a known gap and the smallest gap of one pair of shapes.
+
+        Args:
+            pair: The pair.
+            direction: Direction of the first bound, see `_nearest`. (3,)
+            best: The smallest gap known.
+            time: (n,) [s]
+            poses: Poses of the tub. (n, 6) [rad, m]
+        """
         if not len(time):
             return best
         moving, fixed = (self._outlines[shape] for shape in pair)
         bound = np.full(len(time), -np.inf)
         while True:
-            free = moving.begins(direction, poses) + fixed.begins(
-                -direction, _AT_ORIGIN
-            )  # < 0 if they overlap there
-            bound = np.maximum(bound, free)
+            gap_along = moving.lower_extent(direction, poses)
+            gap_along += fixed.lower_extent(-direction, _AT_ORIGIN)  # sum < 0 if they overlap
+            bound = np.maximum(bound, gap_along)
             index = int(np.argmin(bound))
             if not bound[index] < best.distance:
                 return best
-            gap, direction = self._measured(pair, time[index], poses[index])
+            gap, direction = self._gap(pair, time[index], poses[index])
             best = min(best, gap, key=lambda found: found.distance)
-            bound[index] = np.inf  # measured
+            bound[index] = np.inf  # this distance is known
 
     def animate(self, meshcat: Meshcat, time: FloatArray, positions: FloatArray) -> None:
-        """Records the poses (n, 7) at their times, counted from the first, into a Meshcat animation."""
+        """Record a motion into a Meshcat animation that begins at time 0.
+
+        Args:
+            meshcat: The Meshcat that the scene was built with.
+            time: (n,) [s]
+            positions: Positions of the plant: roll, pitch, yaw, x, y, z, drum angle. (n, 7)
+                [rad, m]
+        """
         meshcat.StartRecording(
             frames_per_second=REPLAY_RATE, set_visualizations_while_recording=False
         )
         for moment, position in zip(time, positions, strict=True):
             self._context.SetTime(float(moment - time[0]))
-            self._put(position)
+            self._set_positions(position)
             self._diagram.ForcedPublish(self._context)
         meshcat.StopRecording()
         meshcat.PublishRecording()
 
 
 def replay_page(parameters: MachineParameters, time: FloatArray, positions: FloatArray) -> str:
-    """A self-contained HTML page that replays a motion in 3D.
+    """Return a self-contained HTML page that replays a motion in 3D.
 
     Args:
         parameters: The machine.
         time: (n,) [s]
-        positions: (n, 7) positions of the plant: roll, pitch, yaw, x, y, z, drum angle. [rad, m]
+        positions: Positions of the plant: roll, pitch, yaw, x, y, z, drum angle. (n, 7) [rad, m]
     """
-    meshcat = Meshcat()
+    meshcat = Meshcat(MeshcatParams(host="localhost"))  # reachable from this computer only
     meshcat.SetProperty("/Grid", "visible", False)
     meshcat.SetCameraPose(camera_in_world=[0.7, -1.5, 0.6], target_in_world=[0.0, 0.0, 0.0])
     scene = Scene(parameters, meshcat)

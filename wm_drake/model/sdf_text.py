@@ -1,4 +1,4 @@
-"""Numbers of a machine into the text of its SDF model."""
+"""Write the overrides of a machine into the text of its SDF model."""
 
 from typing import Any
 from xml.dom.minidom import Document, parseString
@@ -6,17 +6,18 @@ from xml.dom.minidom import Document, parseString
 from wm_drake.parameters import BodyOverride, MachineParameters, source_of
 
 _DIGITS = 6
-"""Of metres and kilograms: a thousandth of a millimetre or a gram is beyond any drawing."""
+"""Decimals of metres and kilograms: drawings are not more accurate than 1e-6 m and 1e-6 kg."""
 
 
 def sdf_with(text: str, parameters: MachineParameters) -> str:
-    """The SDF with the overrides of a machine in it, each followed by a comment with its source; all else stays as it is.
+    """Return the text of an SDF with the overrides of a machine written into it.
 
-    A body with a single shape called ``NAME_block`` carries it along with its centre of mass.
+    A comment with the source follows each override that comes from a fit. All else is unchanged.
+    The shape ``NAME_block`` of a body moves with the body's centre of mass.
 
     Args:
-        text: Of an SDF model that has the bodies and frames.
-        parameters: Its `bodies` and `frames` are written.
+        text: Text of an SDF model that has the bodies and frames.
+        parameters: The machine; its `bodies` and `frames` are written.
     """
     document = parseString(text)
     for name, frame in parameters.frames.items():
@@ -37,21 +38,24 @@ def sdf_with(text: str, parameters: MachineParameters) -> str:
 
 
 def _sources(parameters: MachineParameters, key: str) -> list[str]:
-    """Where a group of numbers comes from: the sources of its own, or the nearest one above."""
+    """Return the sources of the numbers below a key, else the source of the nearest key above."""
     return [text for known, text in parameters.sources.items() if known.startswith(f"{key}.")] or [
         source_of(parameters, key)
     ]
 
 
 def _named(document: Document, tag: str, name: str) -> Any:
+    """Return the first element with a tag and a name."""
     return next(e for e in document.getElementsByTagName(tag) if e.getAttribute("name") == name)
 
 
 def _only(element: Any, tag: str) -> Any:
+    """Return the first child of an element with a tag."""
     return next(child for child in element.childNodes if child.nodeName == tag)
 
 
 def _shapes(link: Any, name: str) -> list[Any]:
+    """Return the visual and collision elements of a link that have a name."""
     tags = ("visual", "collision")
     return [
         e for tag in tags for e in link.getElementsByTagName(tag) if e.getAttribute("name") == name
@@ -59,15 +63,18 @@ def _shapes(link: Any, name: str) -> list[Any]:
 
 
 def _set_text(element: Any, text: str) -> None:
+    """Replace the text of an element."""
     element.firstChild.data = text
 
 
 def _set_position(pose: Any, position: tuple[float, ...]) -> None:
+    """Replace the position in a pose element and keep its angles."""
     angles = pose.firstChild.data.split()[3:]
     _set_text(pose, " ".join([*map(_digits, position), *angles]))
 
 
 def _set_body(inertial: Any, body: BodyOverride) -> None:
+    """Write the mass properties of an override into an inertial element."""
     if body.mass is not None:
         _set_text(_only(inertial, "mass"), _digits(body.mass))
     if body.centre_of_mass is not None:
@@ -80,7 +87,7 @@ def _set_body(inertial: Any, body: BodyOverride) -> None:
 
 
 def _comment(document: Document, element: Any, text: str) -> None:
-    """Puts a comment after an element, in place of one that was put there before."""
+    """Write a comment with the source of a fit after an element; it replaces an earlier one."""
     following = element.nextSibling
     if (
         following is not None
@@ -93,4 +100,5 @@ def _comment(document: Document, element: Any, text: str) -> None:
 
 
 def _digits(value: float) -> str:
-    return f"{round(value, _DIGITS) + 0.0:.10g}"  # -0.0 + 0.0 is 0.0
+    """Return a rounded number as text; `+ 0.0` removes the sign of -0.0."""
+    return f"{round(value, _DIGITS) + 0.0:.10g}"

@@ -1,4 +1,7 @@
-"""Where the plant of a machine keeps what: the one description of its state that all others go by."""
+"""State layout of a machine's plant: the index of each position and velocity.
+
+This is the only description of the state; all other modules use it.
+"""
 
 import functools
 from dataclasses import dataclass
@@ -11,23 +14,25 @@ from wm_drake.parameters import MachineParameters
 Indices = np.ndarray
 
 CARRIER = "drum_carrier"
-"""Name of the massless body that the drum turns in where its bearing gives."""
+"""Name of the massless body that the drum turns in if its bearing is compliant."""
 
 
 @dataclass(frozen=True)
 class StateLayout:
-    """Indices of positions; velocities have the same ones, behind all positions.
+    """Indices of the positions; a velocity has the index of its position, plus `size`.
 
-    A tree is a body that floats and one on a joint of its: tub and drum, outer and inner tube of a damper. Each has seven
-    positions: roll, pitch, yaw, x, y, z, and that of the joint. Where the drum's bearing gives, the drum turns in a carrier
-    that floats too. Elements on the tub go on to see tub and drum; what holds the carrier sees carrier and drum besides.
+    A tree is a floating body and a second body on one of its joints: tub and drum, or outer and
+    inner tube of a damper. It has seven positions: roll, pitch, yaw, x, y, z and that of the joint.
+    With a compliant bearing the drum turns in a floating carrier. The drum then belongs to two
+    trees: tub and drum for all elements on the tub, carrier and drum for the bearing.
 
     Attributes:
-        size: How many positions there are.
-        tub: Six: roll, pitch, yaw, x, y, z.
-        drum: Of the drum angle.
-        tubes: (telescopic dampers, 7)
-        carrier: Six as of the tub, or none.
+        size: Number of positions.
+        tub: Indices of roll, pitch, yaw, x, y, z of the tub. (6,)
+        drum: Index of the drum angle.
+        tubes: Indices of the outer tube and of the extension. (telescopic dampers, 7)
+        carrier: Indices of roll, pitch, yaw, x, y, z of the drum carrier with a compliant bearing,
+            else empty. (6,)
     """
 
     size: int
@@ -38,22 +43,31 @@ class StateLayout:
 
     @property
     def trees(self) -> list[Indices]:
-        """Seven indices each: tub and drum, then each telescopic damper's tubes, then carrier and drum, if there is one."""
+        """Return the seven indices of each tree.
+
+        The order is tub and drum, tubes of each telescopic damper, carrier and drum if there is a
+        carrier.
+        """
         carriers = [np.append(self.carrier, self.drum)] if self.carrier.size else []
         return [np.append(self.tub, self.drum), *self.tubes, *carriers]
 
     @functools.cached_property
-    def hanging(self) -> Indices:
-        """What hangs on the tub and finds its own place there: all but tub and drum angle."""
+    def attached(self) -> Indices:
+        """Return the indices of the bodies attached to the tub: all but tub and drum angle."""
         return np.setdiff1d(np.arange(self.size), [*self.tub, self.drum])
 
     def states(self) -> list[Indices]:
-        """Fourteen indices in the state of the plant for each tree: its positions, its velocities."""
+        """Return the indices in the state of each tree: 7 positions, then 7 velocities."""
         return [np.concatenate([tree, self.size + tree]) for tree in self.trees]
 
 
 def state_layout_of(plant: MultibodyPlant, parameters: MachineParameters) -> StateLayout:
-    """Of a finalized plant with the joints that `wm_drake.model.bodies.add_bodies` gives it."""
+    """Return the state layout of a finalized plant.
+
+    Args:
+        plant: Plant with the joints that `wm_drake.model.bodies.add_bodies` adds.
+        parameters: The machine.
+    """
 
     def floating(body: str) -> Indices:
         return np.asarray(plant.GetJointByName(f"{body}_floating").position_start() + np.arange(6))

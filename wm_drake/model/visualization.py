@@ -1,4 +1,4 @@
-"""Show the moving machine in Meshcat, from a copy of its bodies that only carries the shapes."""
+"""Show the moving machine in Meshcat, with shapes on a second plant that is not simulated."""
 
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph

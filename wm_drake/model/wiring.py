@@ -1,4 +1,4 @@
-"""Connect elements to the plant: the part of the state that each reads, and where its force goes."""
+"""Connect elements to the plant: their part of its state, and their forces on its trees."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -28,7 +28,13 @@ class Link:
 
 
 class Wiring:
-    """Adds systems to a diagram, with one prefix before their names, and connects them."""
+    """Adds systems to a diagram, with a prefix before their names, and connects them.
+
+    Attributes:
+        builder: The diagram.
+        plant: The plant.
+        layout: State layout of the plant.
+    """
 
     def __init__(
         self, builder: DiagramBuilder, plant: MultibodyPlant, layout: StateLayout, prefix: str

@@ -11,6 +11,7 @@ from wm_drake.parameters.damper_laws import DamperType
 from wm_drake.parameters.elements import BushingType, Frozen
 from wm_drake.parameters.files import read_mapping
 from wm_drake.parameters.problems import problems_of
+from wm_drake.parameters.text_files import is_file
 
 COMPONENTS_FOLDER = Path(__file__).parents[1] / "data" / "components"
 
@@ -59,7 +60,7 @@ def load_component(name_or_path: str) -> Component:
     """
     shipped = shipped_components()
     path = shipped.get(name_or_path, Path(name_or_path))
-    if not path.is_file():
+    if not is_file(path):
         hint = nearest_names(name_or_path, shipped)
         raise input_error(
             f"no such file, and no shipped component of that name{hint}", where=str(path)

@@ -1,11 +1,18 @@
 """CSV files: a # starts a comment, and the first line names the columns."""
 
+import io
 import warnings
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from wm_drake.errors import input_error
+from wm_drake.parameters.text_files import read_text
+from wm_drake.parameters.types import FloatArray
+
+_SIGNS = "; columns are separated by commas, and the decimal sign is a point"
 
 
 def read_csv(
@@ -23,18 +30,71 @@ def read_csv(
         InputError: the file cannot be read as CSV, has other columns, or has a row with more values
             than columns.
     """
+    text = read_text(Path(path), key=key)
     try:
-        named = list(pd.read_csv(path, comment="#", skipinitialspace=True, nrows=0).columns)
+        named = list(_table(text, nrows=0).columns)
         if named not in (columns, [*columns, optional]):
-            message = f"needs the columns {','.join(columns)}, has {','.join(map(str, named))}"
+            has = ",".join(map(str, named))
+            signs = _SIGNS if ";" in has or "\t" in has else ""
+            message = f"needs the columns {','.join(columns)}, has {has}{signs}"
             raise input_error(message, where=str(path), key=key)
         with warnings.catch_warnings():
             # pandas cuts a row that is too long and only warns
             warnings.simplefilter("error", pd.errors.ParserWarning)
-            return pd.read_csv(path, comment="#", skipinitialspace=True, index_col=False)
+            return _table(text, index_col=False)
     except pd.errors.ParserWarning:
-        raise input_error("a row has more values than columns", where=str(path), key=key) from None
-    except (OSError, ValueError) as error:
+        message = f"a row has more values than columns{_SIGNS}"
+        raise input_error(message, where=str(path), key=key) from None
+    except pd.errors.ParserError as error:
+        reason = " ".join(str(error).split()).removeprefix("Error tokenizing data. C error: ")
+        message = f"cannot be read as CSV ({reason}){_SIGNS}"
+        raise input_error(message, where=str(path), key=key) from None
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        raise input_error(f"cannot be read as CSV ({reason})", where=str(path), key=key) from None
+
+
+def finite_numbers(table: pd.DataFrame, path: str | Path) -> FloatArray:
+    """Return a table as numbers. (row, column)
+
+    Args:
+        table: Table from `read_csv`.
+        path: The file, for messages.
+
+    Raises:
+        InputError: a value is not a finite number.
+    """
+    numbers = table.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
+    bad = np.argwhere(~np.isfinite(numbers))
+    if len(bad):
+        row, column = bad[0]
         raise input_error(
-            f"cannot be read as CSV ({' '.join(str(error).split())})", where=str(path), key=key
-        ) from None
+            f"row {row + 1} of the data: '{table.iloc[row, column]}' is not a finite number",
+            where=str(path),
+            key=str(table.columns[column]),
+        )
+    return numbers
+
+
+def read_header(path: Path) -> list[str]:
+    """Return the names of the columns of a CSV file.
+
+    Raises:
+        InputError: the file cannot be read as CSV.
+    """
+    try:
+        return list(map(str, _table(read_text(path), nrows=0).columns))
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        raise input_error(f"cannot be read as CSV ({reason})", where=str(path)) from None
+
+
+MOST_COLUMNS = 1000
+"""Largest number of columns of a table."""
+
+
+def _table(text: str, **options: Any) -> pd.DataFrame:
+    head = next((line for line in text.splitlines() if line.partition("#")[0].strip()), "")
+    if head.count(",") >= MOST_COLUMNS:
+        raise ValueError(f"{head.count(',') + 1} columns; allowed are up to {MOST_COLUMNS}")
+    return pd.read_csv(io.StringIO(text), comment="#", skipinitialspace=True, **options)

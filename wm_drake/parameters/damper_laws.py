@@ -130,9 +130,9 @@ class DamperLaw:
         equations: Where the papers have it.
         unknowns: Numbers that an identification searches, and where. It also searches each curve of
             the law; another number keeps its value unless the user gives it bounds.
-        sponge_with_mass: Law (deformation, deformation_rate, slider_rate, fields) that returns
-            tension and force on a sponge with mass, for the bench; None if its sponge is always
-            massless.
+        sponge_with_mass: Law (deformation, rate, slider_velocity, step, mass, fields) that takes a
+            time step of a sponge with mass on the bench and returns tension and velocity of the
+            slider at its end; None if the sponge is always massless.
         slider_friction: Law (slider_rate, deformation_rate, some fields) that returns the friction
             on the slider, for a figure; None for no figure.
     """

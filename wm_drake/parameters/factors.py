@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.parameters.elements import ForceTable, Frozen, TorqueTable
 from wm_drake.parameters.files import read_yaml
-from wm_drake.parameters.keys import quantities, unit_of, with_value, with_values
+from wm_drake.parameters.keys import is_index, quantities, unit_of, with_value, with_values
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.units import Unit
@@ -34,7 +34,7 @@ TABLES = ("linear", "scaled")
 "scaled": the forces of the table are scaled, so that the curve keeps its shape.
 """
 
-_PERCENT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*%\s*")
+_PERCENT = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))\s*%\s*")
 
 Value: TypeAlias = float | ForceTable | TorqueTable
 
@@ -69,6 +69,9 @@ class FactorLevels:
             in the display unit.
         shown: For each of the levels -1, 0 and 1: the value of the first key, as text in the
             display unit.
+        numbers: By key path: the value at each of the levels -1, 0 and 1, in the display unit. Of a
+            table, it is the nominal stiffness.
+        units: By key path: the display unit, for reading; "" if the number has none.
     """
 
     name: str
@@ -76,6 +79,8 @@ class FactorLevels:
     settings: tuple[dict[str, Value], ...]
     nominal: dict[str, str]
     shown: tuple[str, ...]
+    numbers: dict[str, tuple[float, ...]]
+    units: dict[str, str]
 
 
 def load_factors(path: Path) -> dict[str, Factor]:
@@ -196,6 +201,8 @@ def _resolved(
     settings: tuple[dict[str, Value], ...] = ({}, {}, {})
     nominal: dict[str, str] = {}
     shown: tuple[str, ...] = ()
+    numbers: dict[str, tuple[float, ...]] = {}
+    units: dict[str, str] = {}
     for key in factor.keys:
         number, unit = _nominal(parameters, known, key)
         low, high = (_bound(parameters, key, text, number) for text in (factor.low, factor.high))
@@ -217,11 +224,15 @@ def _resolved(
                 tables == "scaled" or not _takes_numbers(parameters, key)
             )
             level[key] = _scaled(original, value / float(number or 1.0)) if scaled else value
-            with_value(parameters, key, level[key])  # raises if the value is not allowed
+            changed = with_value(parameters, key, level[key])  # raises if it is not allowed
+            # a number that only the SDF has is a number of the machine once it is set
+            unit = unit or next((u for k, _, u in quantities(changed) if k == key), None)
         nominal[key] = "" if number is None else _text(number, unit)
-        if not shown:
-            shown = tuple(_text(value, unit) for value in (low, middle, high))
-    return FactorLevels(name, factor.about, settings, nominal, shown)
+        levels = (low, middle, high)
+        numbers[key] = levels if unit is None else tuple(map(unit.from_si, levels))
+        units[key] = "" if unit is None else unit.shown.replace("*", " ")
+        shown = shown or tuple(_text(value, unit) for value in levels)
+    return FactorLevels(name, factor.about, settings, nominal, shown, numbers, units)
 
 
 def _nominal(
@@ -239,7 +250,7 @@ def _nominal(
     parent, _, last = key.rpartition(".")
     if (
         parent in known
-        and last.isdigit()
+        and is_index(last)
         and isinstance(known[parent][0], tuple)
         and int(last) < len(known[parent][0])
     ):
@@ -262,7 +273,7 @@ def _value_at(parameters: MachineParameters, key: str) -> Any:
             node = getattr(node, part)
         elif isinstance(node, dict) and part in node:
             node = node[part]
-        elif isinstance(node, tuple) and part.isdigit() and int(part) < len(node):
+        elif isinstance(node, tuple) and is_index(part) and int(part) < len(node):
             node = node[int(part)]
         elif place == 1 and parts[0] in ("bodies", "frames"):
             return None
@@ -292,7 +303,7 @@ def _bound(parameters: MachineParameters, key: str, text: str, nominal: float | 
         )
     if percent:
         return 0.01 * float(percent[1]) * float(nominal or 0.0)
-    if key.rpartition(".")[2].isdigit():
+    if is_index(key.rpartition(".")[2]):
         raise input_error(
             f"'{text}' is not in percent; the bounds of one number of a list must be", key=key
         )

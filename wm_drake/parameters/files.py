@@ -3,6 +3,8 @@
 Every message names the file, the line and the key path.
 """
 
+import re
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,19 +15,32 @@ import pandas as pd
 from pydantic import BaseModel, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import YAMLError
+from ruamel.yaml.composer import Composer, ComposerError
+from ruamel.yaml.error import ReusedAnchorWarning, YAMLError
+from ruamel.yaml.events import AliasEvent, ScalarEvent
 from ruamel.yaml.resolver import VersionedResolver
 
-from wm_drake.errors import InputError, input_error, nearest_names
+from wm_drake.errors import InputError, input_error, nearest_names, reason_of
 from wm_drake.parameters.csv_files import read_csv
-from wm_drake.parameters.keys import quantities, source_of
+from wm_drake.parameters.keys import is_index, quantities, source_of
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.spin import Load, SpinProfile
+from wm_drake.parameters.text_files import is_file, read_text
+from wm_drake.parameters.units import comma_hint
 
 MACHINES_FOLDER = Path(__file__).parents[1] / "data" / "machines"
 CYCLES_FOLDER = Path(__file__).parents[1] / "data" / "cycles"
 Model = TypeVar("Model", bound=BaseModel)
+
+LARGEST_YAML = 1 << 20
+"""Largest size of a YAML file. [byte]"""
+
+DEEPEST, MOST_VALUES = 40, 20_000
+"""Largest depth of a YAML file, and its largest number of keys and values with aliases resolved."""
+
+LONGEST_CHAIN = 20
+"""Largest number of machine files that extend each other."""
 
 
 def shipped_machines() -> dict[str, Path]:
@@ -36,7 +51,8 @@ def shipped_machines() -> dict[str, Path]:
 def load_machine(name_or_path: str | Path = "reference") -> MachineParameters:
     """Read a machine file.
 
-    A file with ``extends: NAME_OR_PATH`` contains only the changes to another machine.
+    A file with ``extends: NAME_OR_PATH`` contains only the changes to another machine. The measured
+    amplitudes of that machine are not inherited, because they belong to its numbers.
 
     Args:
         name_or_path: Name of a shipped machine or path of a YAML file.
@@ -60,8 +76,11 @@ def machine_path(name_or_path: str | Path) -> Path:
     if str(name_or_path) in shipped:
         return shipped[str(name_or_path)]
     path = Path(name_or_path)
-    if not path.is_file():
-        reason = "is a folder" if path.is_dir() else "no such file"
+    if not is_file(path):
+        try:
+            reason = "is a folder" if path.is_dir() else "no such file"
+        except (OSError, ValueError) as error:
+            reason = reason_of(error)
         hint = nearest_names(str(name_or_path), shipped)
         raise input_error(f"{reason}, and no shipped machine of that name{hint}", where=str(path))
     return path
@@ -118,7 +137,7 @@ def load_profile(name_or_path: str | Path) -> SpinProfile:
     """
     shipped = shipped_profiles()
     path = shipped.get(f"profile_{name_or_path}", Path(name_or_path))
-    if not path.is_file():
+    if not is_file(path):
         known = [name.removeprefix("profile_") for name in shipped]
         raise input_error(
             f"no such file, and no shipped profile of that name{nearest_names(str(path), known)}",
@@ -134,8 +153,9 @@ def load_profile(name_or_path: str | Path) -> SpinProfile:
     finite = np.isfinite(numbers.to_numpy(dtype=float)).all(axis=1)
     if not finite.all():
         row = int(np.flatnonzero(~finite)[0])
+        cells = ", ".join(f"'{cell}'" for cell in table.iloc[row].tolist())
         raise input_error(
-            f"row {row + 1} of the data is not two finite numbers: {table.iloc[row].tolist()}",
+            f"row {row + 1} of the data is not two finite numbers: {cells}{comma_hint(cells)}",
             where=str(path),
         )
     text = {"time": ("time_s", "s"), "speed": ("speed_rpm", "rpm")}
@@ -234,9 +254,61 @@ class _TextResolver(VersionedResolver):
         return {first: pairs for first, pairs in kept.items() if pairs}
 
 
+_SURROGATE = re.compile("[\ud800-\udfff]")
+"""Half of a pair such as ``\\ud83d\\udca5``, which JSON writes for one character."""
+
+
+class _BoundedComposer(Composer):
+    """A composer of YAML nodes that bounds their depth and number.
+
+    An alias counts as many values as it stands for. Thus a short text whose aliases stand for
+    billions of values is refused before the values are made.
+    """
+
+    def __init__(self, loader: Any = None) -> None:
+        super().__init__(loader)
+        self._depth, self._values = 0, 0
+        self._values_of: dict[str, int | None] = {}  # by anchor; None within the node itself
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """Return the next node, after checking the bounds."""
+        event = self.parser.peek_event()
+        anchor = event.anchor
+        if self.parser.check_event(AliasEvent):
+            values = self._values_of.get(anchor, 0)
+            if values is None:
+                problem = f"alias '{anchor}' is inside the value that it stands for"
+                raise ComposerError(None, None, problem, event.start_mark)
+            self._count(values, event)
+            return super().compose_node(parent, index)
+        self._count(1, event)
+        if self.parser.check_event(ScalarEvent) and _SURROGATE.search(event.value):
+            problem = "has half a character; write the character itself"
+            raise ComposerError(None, None, problem, event.start_mark)
+        self._depth += 1
+        if self._depth > DEEPEST:
+            problem = f"is nested too deeply; allowed are {DEEPEST} levels"
+            raise ComposerError(None, None, problem, event.start_mark)
+        before = self._values
+        if anchor is not None:
+            self._values_of[anchor] = None
+        node = super().compose_node(parent, index)
+        if anchor is not None:
+            self._values_of[anchor] = self._values - before + 1
+        self._depth -= 1
+        return node
+
+    def _count(self, values: int, event: Any) -> None:
+        self._values += values
+        if self._values > MOST_VALUES:
+            problem = f"has too many values with its aliases; allowed are {MOST_VALUES}"
+            raise ComposerError(None, None, problem, event.start_mark)
+
+
 def _yaml() -> YAML:
     yaml = YAML(typ="rt")
     yaml.Resolver = _TextResolver
+    yaml.Composer = _BoundedComposer
     yaml.width = 4096
     return yaml
 
@@ -247,12 +319,11 @@ def read_yaml(path: Path) -> CommentedMap:
     Raises:
         InputError: the file is missing, is not YAML, or is not a mapping.
     """
+    text = read_text(path, largest=LARGEST_YAML)
     try:
-        tree = _yaml().load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise input_error(error.strerror or "cannot be read", where=str(path)) from None
-    except UnicodeDecodeError:
-        raise input_error("is not text in UTF-8", where=str(path)) from None
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ReusedAnchorWarning)
+            tree = _yaml().load(text)
     except YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f"{path}:{mark.line + 1}" if mark else str(path)
@@ -276,12 +347,16 @@ def _extended(path: Path, seen: tuple[Path, ...]) -> CommentedMap:
         return tree
     base_path = _base_path(tree, path)
     del tree["extends"]
-    if base_path.resolve() in (*seen, path.resolve()):
+    seen = (*seen, path.resolve())
+    if base_path.resolve() in seen:
         raise input_error("extends itself", where=str(path), key="extends")
-    base_tree = _extended(base_path, (*seen, path.resolve()))
-    for key in ("model", "measured"):  # paths are relative to the file that contains them
-        if key in base_tree:
-            base_tree[key] = _with_absolute_paths({key: base_tree[key]}, base_path)[key]
+    if len(seen) > LONGEST_CHAIN:
+        message = f"more than {LONGEST_CHAIN} files extend each other; extend an earlier one"
+        raise input_error(message, where=str(path), key="extends")
+    base_tree = _extended(base_path, seen)
+    base_tree.pop("measured", None)  # another machine was measured
+    if "model" in base_tree:  # paths are relative to the file that contains them
+        base_tree["model"] = _with_absolute_paths({"model": base_tree["model"]}, base_path)["model"]
     _merge(base_tree, tree)
     return base_tree
 
@@ -341,13 +416,19 @@ def _with_absolute_paths(tree: dict[str, Any], path: Path) -> dict[str, Any]:
     """
     changed = dict(tree)
     model = tree.get("model")
-    if isinstance(model, str) and (path.parent / model).is_file():
-        changed["model"] = str((path.parent / model).resolve())
+    if isinstance(model, str) and is_file(path.parent / model):
+        changed["model"] = _absolute(path.parent / model)
     if isinstance(tree.get("measured"), list):
-        changed["measured"] = [
-            str((path.parent / str(name)).resolve()) for name in tree["measured"]
-        ]
+        changed["measured"] = [_absolute(path.parent / str(name)) for name in tree["measured"]]
     return changed
+
+
+def _absolute(path: Path) -> str:
+    """Return the absolute path; a path that cannot exist stays as it is."""
+    try:
+        return str(path.resolve())
+    except (OSError, ValueError, RuntimeError):  # too long, a null byte, a cycle of links
+        return str(path)
 
 
 def _validated(model: type[Model], plain: Any, path: Path) -> Model:
@@ -401,7 +482,7 @@ def _line_of(tree: CommentedMap, key: str) -> tuple[int, int]:
         if isinstance(node, CommentedMap) and part in node:
             line = node.lc.key(part)[0] + 1 if part in (node.lc.data or {}) else line
             node = node[part]
-        elif isinstance(node, CommentedSeq) and part.isdigit() and int(part) < len(node):
+        elif isinstance(node, CommentedSeq) and is_index(part) and int(part) < len(node):
             line = node.lc.item(int(part))[0] + 1
             node = node[int(part)]
         else:
@@ -411,5 +492,14 @@ def _line_of(tree: CommentedMap, key: str) -> tuple[int, int]:
 
 
 def _base_path(tree: CommentedMap, path: Path) -> Path:
-    named = str(tree["extends"])
-    return machine_path(named if named in shipped_machines() else path.parent / named)
+    named = tree["extends"]
+    if not isinstance(named, str):
+        message = "is not the name of a shipped machine or a file"
+        raise input_error(message, where=str(path), key="extends")
+    try:
+        return machine_path(named if named in shipped_machines() else path.parent / named)
+    except InputError as error:
+        raise InputError(
+            replace(p, where=str(path), key="extends", message=f"'{p.where}': {p.message}")
+            for p in error.problems
+        ) from None

@@ -29,7 +29,7 @@ def _measured(text: Any) -> Any:
     if isinstance(text, int | float) and not isinstance(text, bool):
         text = repr(text)
     if not isinstance(text, str):
-        return text
+        raise ValueError("is not a number or a list of numbers with a unit, such as '12 kg'")
     magnitudes, unit, is_list = u.split(text)
     return {
         "values": tuple(u.to_base(number, unit) for number in magnitudes),
@@ -40,7 +40,7 @@ def _measured(text: Any) -> Any:
 
 def _pair(text: Any) -> Any:
     numbers = _measured(text)
-    if isinstance(numbers, dict) and len(numbers["values"]) != 2:
+    if len(numbers["values"]) != 2:
         raise ValueError(f"'{text}' is not two numbers with a unit; write for example '(9, 12) kg'")
     return numbers
 

@@ -32,6 +32,10 @@ def with_value(parameters: Tree, key: str, value: Any) -> Tree:
     return with_values(parameters, {key: value})
 
 
+DEEPEST_KEY = 20
+"""Largest number of parts of a key path; no number of a machine needs half of them."""
+
+
 def with_values(parameters: Tree, values: Mapping[str, Any]) -> Tree:
     """Return a copy of a machine with several values changed.
 
@@ -46,12 +50,20 @@ def with_values(parameters: Tree, values: Mapping[str, Any]) -> Tree:
     Raises:
         InputError: a key is unknown (the message names similar ones), or a value is not allowed.
     """
+    for key in values:
+        if key.count(".") >= DEEPEST_KEY:
+            raise input_error(f"has more than {DEEPEST_KEY} parts; no number has", key=key)
     return typing.cast(
         Tree,
         _replaced(
             parameters, [_Change(key, key.split("."), value) for key, value in values.items()]
         ),
     )
+
+
+def is_index(part: str) -> bool:
+    """Return whether a part of a key path is the index of an entry of a list."""
+    return part.isascii() and part.isdecimal() and len(part) < 9
 
 
 @dataclass(frozen=True)
@@ -96,7 +108,7 @@ def _replaced(node: Any, changes: list[_Change]) -> Any:
                 f"the machine has no '{whole}'; to add it, write all of it in a machine file",
                 key=inner[0].key,
             )
-        if not (isinstance(node, tuple) and name.isdigit() and int(name) < len(node)):
+        if not (isinstance(node, tuple) and is_index(name) and int(name) < len(node)):
             allowed = (
                 f"allowed are 0 to {len(node) - 1}"
                 if isinstance(node, tuple)

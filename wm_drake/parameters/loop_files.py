@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from wm_drake.errors import InputError, Problem, input_error
+from wm_drake.parameters.text_files import read_text
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit, convert
+from wm_drake.parameters.units import Unit, comma_hint, convert, plain_number
 
 FEWEST = 20
 """Smallest number of samples of a loop."""
@@ -130,12 +131,7 @@ def read_loops(paths: list[Path], units: tuple[str, str, str] | None = None) -> 
 
 def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Yield number and cells of each line that is neither empty nor a comment."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise input_error(error.strerror or "cannot be read", where=str(path)) from None
-    except UnicodeDecodeError:
-        raise input_error("is not text in UTF-8", where=str(path)) from None
+    text = read_text(path)
     kept = [
         (at, line)
         for at, line in enumerate(text.splitlines(), 1)
@@ -143,10 +139,13 @@ def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     ]
     if kept:
         delimiter = max(",;\t", key=kept[0][1].count)
-        for (at, _), cells in zip(
-            kept, csv.reader((line for _, line in kept), delimiter=delimiter), strict=False
-        ):
-            yield at, [cell.strip() for cell in cells]
+        reader = csv.reader((line for _, line in kept), delimiter=delimiter)
+        try:
+            for (at, _), cells in zip(kept, reader, strict=False):
+                yield at, [cell.strip() for cell in cells]
+        except csv.Error as error:  # such as a field of more than 128 kB
+            where = f"{path}:{kept[min(reader.line_num, len(kept)) - 1][0]}"
+            raise input_error(f"cannot be read as CSV ({error})", where=where) from None
 
 
 def _columns(
@@ -231,15 +230,19 @@ def _numbers(
 ) -> list[float]:
     if len(cells) != len(head):
         raise input_error(
-            f"has {len(cells)} values but the header has {len(head)} columns", where=place
+            f"has {len(cells)} values but the header has {len(head)} columns"
+            f"{'; the decimal sign is a point' if len(cells) > len(head) else ''}",
+            where=place,
         )
     values = []
     for index in columns:
         try:
-            value = float(cells[index])
+            value = plain_number(cells[index])
         except ValueError:
             raise input_error(
-                f"'{cells[index]}' is not a number", where=place, key=head[index]
+                f"'{cells[index]}' is not a number{comma_hint(cells[index])}",
+                where=place,
+                key=head[index],
             ) from None
         if not np.isfinite(value):
             raise input_error(

@@ -20,7 +20,7 @@ from wm_drake.parameters.elements import (
 )
 from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
 
-Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
+Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$")]
 """Name of an entry. It becomes part of key paths and of file names."""
 
 
@@ -131,7 +131,7 @@ class Imperfections(Frozen):
     Attributes:
         residual_imbalance: Unbalance of the empty drum. It is added to the load in every run.
         phase_error: Angle by which the rear mass of a spin-cycle case leads more than its phase.
-            [rad]
+            Loads of the machine are not changed by it. [rad]
         bearing: Compliant bearing, in which the drum can whirl; None for a rigid bearing (a
             revolute joint).
     """

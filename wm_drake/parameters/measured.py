@@ -6,6 +6,7 @@ import pandas as pd
 from wm_drake.errors import input_error
 from wm_drake.parameters.csv_files import read_csv
 from wm_drake.parameters.machine import MachineParameters
+from wm_drake.parameters.units import comma_hint
 
 _KEYS = ["load", "gasket", "source"]
 
@@ -33,5 +34,10 @@ def _read(path: str, sensors: list[str]) -> pd.DataFrame:
         )
     values = table[sensors].apply(pd.to_numeric, errors="coerce")
     if not np.isfinite(values.to_numpy(dtype=float)).all():
-        raise input_error("an amplitude is not a finite number", where=path, key="measured")
+        cells = table[sensors].to_numpy()[~np.isfinite(values.to_numpy(dtype=float))]
+        raise input_error(
+            f"an amplitude is not a finite number: '{cells[0]}'{comma_hint(str(cells[0]))}",
+            where=path,
+            key="measured",
+        )
     return table.assign(**{name: values[name] for name in sensors})

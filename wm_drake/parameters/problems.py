@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from wm_drake.errors import Problem, nearest_names
+from wm_drake.errors import Problem, nearest_names, shortened
 from wm_drake.parameters.damper_laws import DAMPER_LAWS
 
 
@@ -27,11 +27,22 @@ def problems_of(error: ValidationError, root: type[BaseModel], key: str = "") ->
     return problems
 
 
+_WANTED = {
+    "model_type": "a group of keys and values",
+    "model_attributes_type": "a group of keys and values",
+    "dict_type": "a group of keys and values",
+    "tuple_type": "a list",
+    "list_type": "a list",
+    "string_type": "text",
+}
+"""What a value must be, by kind of error; pydantic would name its Python class."""
+
 _TAGS = ("[key]", "number", "table", *DAMPER_LAWS)
 
 
 def _message(detail: Any, root: type[BaseModel]) -> str:
     kind, context, given = detail["type"], detail.get("ctx", {}), detail.get("input")
+    shown = shortened(str(given), 60)
     if kind == "value_error":
         return str(context["error"])
     if kind == "missing":
@@ -42,19 +53,23 @@ def _message(detail: Any, root: type[BaseModel]) -> str:
         )
     if kind in ("greater_than", "greater_than_equal"):
         sign, limit = (">", context["gt"]) if kind == "greater_than" else (">=", context["ge"])
-        return f"'{given}' is out of range; allowed is {sign} {limit:g}"
+        return f"'{shown}' is out of range; allowed is {sign} {limit:g}"
     if kind == "string_pattern_mismatch":
         return (
-            f"'{given}' is not a name; allowed are letters, digits, _ and -, with a letter or _ "
-            "first"
+            f"'{shown}' is not a name; allowed are up to 64 letters, digits, _ and -, with a "
+            "letter or _ first"
         )
     if kind == "union_tag_invalid":
-        return f"'{context['tag']}' is not known; allowed are {context['expected_tags']}"
+        key = context["discriminator"].strip("'")
+        given, known = shortened(context["tag"], 60), context["expected_tags"]
+        return f"{key} '{given}' is not known; allowed are {known}"
     if kind == "union_tag_not_found":
         return f"needs the key {context['discriminator']}"
+    if kind in _WANTED:
+        return f"needs {_WANTED[kind]}, is {shortened(repr(given), 60)}"
     if kind == "literal_error":
-        return f"'{given}' is not allowed; allowed are {context['expected']}"
-    return f"{detail['msg'][0].lower()}{detail['msg'][1:]}, is {given!r}"
+        return f"'{shown}' is not allowed; allowed are {context['expected']}"
+    return f"{detail['msg'][0].lower()}{detail['msg'][1:]}, is {shortened(repr(given), 60)}"
 
 
 def _fields_at(root: type[BaseModel], path: tuple[str | int, ...]) -> set[str]:

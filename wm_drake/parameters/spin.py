@@ -82,15 +82,16 @@ class SpinProfile(Frozen):
     @model_validator(mode="before")
     @classmethod
     def _from_steps(cls, data: Any, info: ValidationInfo) -> Any:
-        if not isinstance(data, dict) or "steps" not in data:
+        if not isinstance(data, dict) or ("steps" not in data and {"time", "speed"} & set(data)):
             return data
-        if not set(data) <= {"steps", "regions"} or not isinstance(data["steps"], list):
+        steps, others = data.get("steps"), set(data) - {"steps", "regions"}
+        if others or not isinstance(steps, list):
             raise ValueError(
                 "a profile is either {steps: [...]} or {time: (...) s, speed: (...) rpm}; regions "
                 "are optional"
             )
         points = [(0.0, 0.0)]
-        for index, entry in enumerate(data["steps"]):
+        for index, entry in enumerate(steps):
             try:
                 step = _Step.model_validate(entry, context=info.context)
             except ValidationError as error:

@@ -11,10 +11,21 @@ from pydantic import GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema
 from pydantic_core.core_schema import with_info_before_validator_function
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+from wm_drake.errors import shortened
+
+_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _BARE = re.compile(_NUMBER)
 _SCALAR = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*$")
+_DECIMAL_COMMA = re.compile(r"(?<![0-9])[+-]?[0-9]+,[0-9]+")
 _VECTOR = re.compile(r"\s*\(([^()]*)\)\s*(\S.*?)?\s*$")
+_NOT_FINITE = re.compile(r"[+-]?(?:nan|inf|infinity)", re.IGNORECASE)
+
+LONGEST_UNIT = 40
+"""Largest number of characters of a unit."""
+
+_POWER = r"(?:\^|\*\*)\s*-?[0-9]{1,2}(?![0-9.]|\s*(?:\^|\*\*))"
+_UNIT = re.compile(rf"(?:1\s*/)?(?:[^\W\d]\w*|[°%]|[\s*/().·-]|{_POWER})*")
+"""A unit: words, products and quotients; a power is one whole number of at most two digits."""
 
 
 @functools.cache
@@ -28,6 +39,32 @@ def registry() -> pint.UnitRegistry[float]:
     # pint has cached rpm and deg as dimensionless; there is no public way to clear its cache
     units._build_cache()
     return units
+
+
+def quantity(magnitude: float, unit: str) -> Any:
+    """Return a number with a unit as a quantity of pint.
+
+    The text is checked before pint parses it: a tower of powers or a very long word would take pint
+    minutes and gigabytes.
+
+    Raises:
+        ValueError: the text has not the form of a unit.
+        Exception: one of several errors of pint: the unit is unknown.
+    """
+    if len(unit) > LONGEST_UNIT or not _UNIT.fullmatch(unit):
+        raise ValueError("not a unit")
+    return registry().Quantity(magnitude, unit)
+
+
+def plain_number(text: str) -> float:
+    """Return a number without a unit, written with the digits 0 to 9; nan and inf are numbers too.
+
+    Raises:
+        ValueError: the text is not such a number.
+    """
+    if not (_BARE.fullmatch(text.strip()) or _NOT_FINITE.fullmatch(text.strip())):
+        raise ValueError(f"'{shortened(text, 40)}' is not a number")
+    return float(text)
 
 
 @dataclass(frozen=True)
@@ -98,14 +135,15 @@ def convert(magnitude: float, unit_text: str | None, unit: Unit) -> float:
     if unit_text is None:
         raise ValueError(f"'{magnitude:g}' has no unit; write for example '1 {unit.shown}'")
     try:
-        value = float(registry().Quantity(magnitude, unit_text).to(unit.si).magnitude)
+        value = float(quantity(magnitude, unit_text).to(unit.si).magnitude)
     except pint.DimensionalityError:
         raise ValueError(
-            f"unit '{unit_text}' does not fit; allowed is a unit such as {unit.shown}"
+            f"unit '{shortened(unit_text, 40)}' does not fit; "
+            f"allowed is a unit such as {unit.shown}"
         ) from None
     except Exception as error:  # pint raises several types of errors on text that is not a unit
         raise ValueError(
-            f"unit '{unit_text}' is not known; write for example '1 {unit.shown}'"
+            f"unit '{shortened(unit_text, 40)}' is not known; write for example '1 {unit.shown}'"
         ) from error
     if not math.isfinite(value):
         raise ValueError(f"'{magnitude:g} {unit_text}' is not a finite number")
@@ -127,10 +165,11 @@ def split(text: str) -> tuple[list[float], str, bool]:
     if match is None:
         match = _SCALAR.fullmatch(text)
         parts = [match[1]] if match else []
-    if match is None or not all(_BARE.fullmatch(part) for part in parts):
+    comma = match is not None and (match[2] or "").startswith(",")
+    if match is None or comma or not all(_BARE.fullmatch(part) for part in parts):
+        hint = comma_hint(text) or "; write for example '12 kg' or '(9, 12) kg'"
         raise ValueError(
-            f"'{text}' is not a number or a list of numbers with a unit; write for example "
-            "'12 kg' or '(9, 12) kg'"
+            f"'{shortened(text, 60)}' is not a number or a list of numbers with a unit{hint}"
         )
     unit = match[2] or ""
     dimension(unit)
@@ -144,9 +183,11 @@ def dimension(unit: str) -> Any:
         ValueError: the unit is unknown.
     """
     try:
-        return registry().Quantity(1.0, unit).dimensionality
+        return quantity(1.0, unit).dimensionality
     except Exception as error:  # pint raises several types of errors on text that is not a unit
-        raise ValueError(f"unit '{unit}' is not known; write for example kg, mm or N/mm") from error
+        raise ValueError(
+            f"unit '{shortened(unit, 40)}' is not known; write for example kg, mm or N/mm"
+        ) from error
 
 
 def to_base(value: float, unit: str) -> float:
@@ -173,10 +214,9 @@ def to_si(value: Any, info: ValidationInfo, unit: Unit) -> float:
     example = f"1 {unit.shown}"
     if isinstance(value, str):
         match = _SCALAR.fullmatch(value)
-        if match is None:
-            raise ValueError(
-                f"'{value}' is not a number with a unit; write for example '{example}'"
-            )
+        if match is None or (match[2] or "").startswith(","):
+            hint = comma_hint(value) or f"; write for example '{example}'"
+            raise ValueError(f"'{shortened(value, 60)}' is not a number with a unit{hint}")
         return convert(float(match[1]), match[2], unit)
     return _plain_number(value, info, example)
 
@@ -198,21 +238,38 @@ def to_si_vector(value: Any, info: ValidationInfo, unit: Unit) -> tuple[float, .
         parts = [] if match is None else [part.strip() for part in match[1].split(",")]
         if match is None or not all(_BARE.fullmatch(part) for part in parts):
             raise ValueError(
-                f"'{value}' is not a list of numbers with a unit; write for example '{example}'"
+                f"'{shortened(value, 60)}' is not a list of numbers with a unit; "
+                f"write for example '{example}'"
             )
         return tuple(convert(float(part), match[2], unit) for part in parts)
     if not isinstance(value, list | tuple):
         raise ValueError(
-            f"{value!r} is not a list of numbers with a unit; write for example '{example}'"
+            f"{shortened(repr(value), 60)} is not a list of numbers with a unit; "
+            f"write for example '{example}'"
         )
     return tuple(_plain_number(number, info, example) for number in value)
+
+
+def comma_hint(text: str) -> str:
+    """Return a hint for a number with a decimal comma in a text, or "" if there is none.
+
+    Args:
+        text: Text that is not a number as it stands, such as ``'6,5 N/mm'``.
+    """
+    match = _DECIMAL_COMMA.search(text)
+    if match is None:
+        return ""
+    return f"; the decimal sign is a point, not a comma: write {match[0].replace(',', '.')}"
 
 
 def _plain_number(value: Any, info: ValidationInfo, example: str) -> float:
     if isinstance(value, str) and _BARE.fullmatch(value):
         raise ValueError(f"'{value}' has no unit; write for example '{example}'")
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{value!r} is not a number with a unit; write for example '{example}'")
+        raise ValueError(
+            f"{shortened(repr(value), 60)} is not a number with a unit; "
+            f"write for example '{example}'"
+        )
     try:
         number = float(value)
     except OverflowError:

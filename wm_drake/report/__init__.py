@@ -1,4 +1,6 @@
-"""Reports as HTML pages, tables and figures, one folder per page.
+"""Write reports as HTML pages, tables and figures, one folder per page.
 
-This is the only room that imports a plotting library. It turns results of studies into files.
+Enters: results of studies and records. Leaves: files. This is the only room that imports a plotting
+library or a template library.
+May import: `studies` and the rooms before it.
 """

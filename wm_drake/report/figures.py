@@ -5,6 +5,7 @@ Figures are made without pyplot, so that they need no display and no global stat
 
 import base64
 import io
+import re
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -33,7 +34,9 @@ def inline_svg_or_png(figure: Figure) -> str:
     with mpl.rc_context({"svg.hashsalt": "wm-drake", "svg.fonttype": "path"}):
         figure.savefig(svg, format="svg", metadata={"Date": None})
     if len(svg.getvalue()) <= LARGEST_SVG:
-        return f"data:image/svg+xml;base64,{base64.b64encode(svg.getvalue()).decode()}"
+        # matplotlib repeats each text as a comment, names from files among them
+        drawn = re.sub(rb"<!--.*?-->\n?", b"", svg.getvalue(), flags=re.DOTALL)
+        return f"data:image/svg+xml;base64,{base64.b64encode(drawn).decode()}"
     figure.savefig(png, format="png", dpi=PNG_DPI, metadata={"Software": None})
     return f"data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}"
 

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from wm_drake.parameters.units import Unit
 
 MM_PER_M = Unit("m", "mm").from_si(1.0)
@@ -17,6 +19,12 @@ def number(value: float, decimals: int = 1) -> str:
         return MISSING
     rounded = round(float(value), decimals) + 0.0  # -0.0 + 0.0 is 0.0
     return f"{rounded:.{decimals}f}".replace("-", "−")
+
+
+def significant(value: float, digits: int = 4) -> str:
+    """Return a number with some significant digits as text, without an exponent."""
+    text = np.format_float_positional(value, precision=digits, fractional=False, trim="-")
+    return text.replace("-", "−")
 
 
 def percent(value: float) -> str:

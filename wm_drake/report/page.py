@@ -11,6 +11,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from wm_drake.report.figures import inline_svg_or_png
+from wm_drake.report.provenance import now, program
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,9 @@ def render(template: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(template).render(**values, sections=sections)
+    return environment.get_template(template).render(
+        **values, sections=sections, date=now(), program=program()
+    )
 
 
 def sections(body: str) -> list[tuple[str, Markup]]:

@@ -6,10 +6,14 @@ from typing import Any
 
 from wm_drake.parameters import MachineParameters, quantities, source_of
 from wm_drake.parameters.units import Unit
-from wm_drake.report.formatting import MISSING
+from wm_drake.report.formatting import MISSING, significant
 
 MOST_SHOWN = 24
 """Largest length of a list that is shown in full; of a longer list, only the ends are shown."""
+
+
+READABLE_DIGITS = 6
+"""Significant digits of a parameter on a page; `machine show` has all."""
 
 
 @dataclass(frozen=True)
@@ -64,14 +68,16 @@ def parameter_table(parameters: MachineParameters) -> Table:
 
 
 def readable(value: Any, unit: Unit) -> str:
-    """Return a value with its unit in a form for reading.
+    """Return a value in its display unit in a form for reading: `4600 N mm/rad`.
 
-    The text of `Unit.text` is changed for the eye: `4600 N*mm/rad` becomes `4600 N mm/rad`. A long
-    list is shown by its ends.
+    A value has at most `READABLE_DIGITS` significant digits. A long list is shown by its ends.
     """
     if isinstance(value, tuple) and len(value) > MOST_SHOWN:
         return f"{len(value)} values, {readable(value[0], unit)} to {readable(value[-1], unit)}"
-    return unit.text(value).replace("*", " ").replace("^2", "²").replace("-", "−")
+    values = value if isinstance(value, tuple) else (value,)
+    texts = [significant(unit.from_si(number), READABLE_DIGITS) for number in values]
+    shown = f"({', '.join(texts)})" if isinstance(value, tuple) else texts[0]
+    return f"{shown} {unit.shown.replace('*', ' ').replace('^2', '²')}"
 
 
 def line(heading: str, cells: Iterable[str], kind: str = "") -> Group:

@@ -1,11 +1,11 @@
 """Test one component on a bench: harmonic motion, steady force loops.
 
 Enters: parameters of a component and motions, or recorded loops. Leaves: force loops, measures.
-No pydrake. May import: `elements`, `laws`, `parameters`, `compiler`.
+May import: `elements`, `laws`, `parameters`, `compiler` and `errors`; no pydrake.
 
-from wm_drake.rigs import Harmonic, damper_bench, force_loop, measures_of loop =
-force_loop(damper_bench(machine.damper_types["friction"]), Harmonic(frequency=3.0, amplitude=0.005))
-measures_of(loop).energy_per_cycle
+    bench = damper_bench(parameters.damper_types["friction"])
+    loop = force_loop(bench, Harmonic(frequency=3.0, amplitude=0.005))
+    measures_of(loop).energy_per_cycle
 """
 
 from wm_drake.rigs.bench import (

@@ -4,7 +4,7 @@ import numpy as np
 
 from wm_drake.compiler.compilation import long_running
 from wm_drake.elements.bushing import read_bushing_law
-from wm_drake.elements.damper_law import damper_response, sponge_with_mass
+from wm_drake.elements.damper_law import damper_response
 from wm_drake.laws.bushing import bushing_force
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import AXES, BushingBench
@@ -22,24 +22,6 @@ def damper_tensions(rate, deformation, packed):  # type: ignore[no-untyped-def]
     force = np.empty(len(rate))
     for i in range(len(rate)):
         tension, _ = damper_response(rate[i], deformation[i], packed, 0)
-        force[i] = tension
-    return force
-
-
-@long_running
-def tensions_with_mass(deformation, deformation_rate, slider_rate, packed):  # type: ignore[no-untyped-def]
-    """Return the tension of a damper whose sponge has a mass (n,). [N]
-
-    Args:
-        deformation, deformation_rate: Deformation of the sponge and its rate (n,). [m, m/s]
-        slider_rate: Velocity of the sponge (n,). [m/s]
-        packed: Packed law.
-    """
-    force = np.empty(len(slider_rate))
-    for i in range(len(slider_rate)):
-        tension, _ = sponge_with_mass(
-            deformation[i], deformation_rate[i], slider_rate[i], packed, 0
-        )
         force[i] = tension
     return force
 

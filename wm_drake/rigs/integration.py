@@ -1,8 +1,8 @@
-"""Steady motion of sponges on the bench: adaptive, stiff integration of many benches at once.
+"""Steady motion of massless sponges on the bench: adaptive, stiff integration of many benches.
 
 All benches of a call are one system of equations over the phase of their motion, states in units of
 their amplitudes: one pass of LSODA in C instead of one per bench, which makes a fit to many loops
-short. The Jacobian is a band.
+short. The Jacobian is diagonal. A sponge with mass is integrated by `wm_drake.rigs.heavy_sponge`.
 """
 
 import warnings
@@ -12,7 +12,7 @@ import numpy as np
 from scipy.integrate import ODEintWarning, odeint
 
 from wm_drake.compiler.compilation import long_running
-from wm_drake.elements.damper_law import damper_response, sponge_with_mass
+from wm_drake.elements.damper_law import damper_response
 from wm_drake.errors import WmDrakeError
 from wm_drake.parameters.types import FloatArray
 
@@ -32,43 +32,31 @@ MOST_PERIODS = 200
 STEADY = 1e-7
 """A period repeats the one before if no state differs by more, in amplitudes."""
 
-TOLERANCES = {1: {"rtol": 2e-8, "atol": 2e-9}, 2: {"rtol": 1e-6, "atol": 1e-6}}
-"""Tolerances by the number of states of a bench, in amplitudes. With a mass, MSTV friction jumps by
-f_max epsilon / |u| as the sponge begins to slip: integrators chatter or break down at tighter
-ones."""
+TOLERANCES = {"rtol": 2e-8, "atol": 2e-9}
+"""Tolerances of the integrator, in amplitudes."""
 
 
 class NotSteadyError(WmDrakeError):
     """Error of a bench whose motion does not become steady, or cannot be integrated."""
 
 
-def steady_states(
-    packed: FloatArray, mass: FloatArray, amplitude: FloatArray, omega: FloatArray, size: int
-) -> FloatArray:
-    """Return the states of benches over one steady period.
+def steady_states(packed: FloatArray, amplitude: FloatArray, omega: FloatArray) -> FloatArray:
+    """Return the deformations of massless sponges over one steady period.
 
     Args:
         packed: Law number and parameters of a damper with sponge (r, s).
-        mass: Mass of each sponge (r,). [kg]
         amplitude, omega: Amplitude and angular frequency of each motion (r,). [m, rad/s]
-        size: States of each bench: 1, the deformation, or with mass 2, position and velocity of the
-            sponge.
 
     Returns:
-        (POINTS + 1, r, size); deformation and position in amplitudes, velocity in amplitude times
-        omega.
+        (POINTS + 1, r), in amplitudes.
 
     Raises:
         NotSteadyError: The motion is not steady within `MOST_PERIODS`, or cannot be integrated.
     """
-    rows = len(packed)
-    rates = np.empty(rows * size)
+    rates = np.empty(len(packed))
 
     def derivative(phase: float, state: FloatArray) -> FloatArray:
-        if size == 1:
-            deformation_rates(phase, state, packed, amplitude, omega, rates)
-        else:
-            sponge_rates(phase, state, packed, mass, amplitude, omega, rates)
+        deformation_rates(phase, state, packed, amplitude, omega, rates)
         return rates
 
     def integrate(state: FloatArray, phases: FloatArray) -> FloatArray:
@@ -79,12 +67,12 @@ def steady_states(
                     derivative,
                     state,
                     phases,
-                    ml=size - 1,
-                    mu=size - 1,
+                    ml=0,
+                    mu=0,
                     tfirst=True,
                     mxstep=200_000,
                     hmax=0.05,  # no stretch of slip is stepped over
-                    **TOLERANCES[size],
+                    **TOLERANCES,
                 )
             except ODEintWarning as told:
                 raise NotSteadyError(
@@ -100,32 +88,44 @@ def steady_states(
             parts.append(integrate(parts[-1][-1], PHASE[piece])[1:])
         return np.concatenate(parts)
 
-    closed = _closed_loop(
-        period, np.zeros(rows * size), max(STEADY, 10.0 * TOLERANCES[size]["atol"]), leap=size == 1
-    )
-    return closed.reshape(POINTS + 1, rows, size)
+    return closed_loop(period, np.zeros(len(packed)), STEADY, leaps=True)
 
 
-def _closed_loop(
-    period: Callable[[FloatArray], FloatArray], state: FloatArray, tolerance: float, *, leap: bool
+def closed_loop(
+    period: Callable[[FloatArray], FloatArray],
+    state: FloatArray,
+    tolerance: float,
+    *,
+    leaps: bool | np.ndarray,
 ) -> FloatArray:
-    """Repeat periods until one ends where it began.
+    """Repeat periods until one ends where it began, and return its states (points, n).
 
-    With `leap`, for states that do not act on each other, each leaps to where the secant through
-    its last two periods closes (Aitken's delta-squared): a sponge that creeps towards its steady
-    place over hundreds of periods is there in a few. The ends of a scalar equation keep the order
-    of its beginnings, so the secant has a slope of 0 to 1.
+    States that creep leap to where the secant through their last two periods closes (Aitken's
+    delta-squared): a sponge that creeps towards its steady place over hundreds of periods is there
+    in a few. The ends of a scalar equation keep the order of its beginnings, so the secant has a
+    slope of 0 to 1.
+
+    Args:
+        period: Function of the state at the beginning of a period that returns all of its states.
+        state: First state (n,).
+        tolerance: Largest change of a state in a steady period.
+        leaps: Which states leap: those that no other state acts on.
+
+    Raises:
+        NotSteadyError: The motion is not steady within `MOST_PERIODS`.
     """
     before: tuple[FloatArray, FloatArray] | None = None
     for _ in range(MOST_PERIODS):
         states = period(state)
         end = states[-1]
         slope = np.zeros(len(state))
-        if leap and before is not None:
+        if before is not None:
             moved = state - before[0]
             safe = np.where(np.abs(moved) > 0.0, moved, 1.0)
             slope = np.where(
-                np.abs(moved) > tolerance, np.clip((end - before[1]) / safe, 0.0, 1.0 - 1e-3), 0.0
+                leaps & (np.abs(moved) > tolerance),
+                np.clip((end - before[1]) / safe, 0.0, 1.0 - 1e-3),
+                0.0,
             )
         change = end - state
         step = np.where(
@@ -146,15 +146,3 @@ def deformation_rates(phase, deformation, packed, amplitude, omega, rates):  # t
             speed * np.cos(phase), amplitude[i] * deformation[i], packed[i], 0
         )
         rates[i] = rate / speed
-
-
-@long_running
-def sponge_rates(phase, state, packed, mass, amplitude, omega, rates):  # type: ignore[no-untyped-def]
-    """Write the rates by phase of position and velocity of sponges with mass."""
-    for i in range(len(amplitude)):
-        speed = amplitude[i] * omega[i]
-        y, v = amplitude[i] * np.sin(phase), speed * np.cos(phase)
-        x, w = amplitude[i] * state[2 * i], speed * state[2 * i + 1]
-        _, force = sponge_with_mass(y - x, v - w, w, packed[i], 0)
-        rates[2 * i] = state[2 * i + 1]
-        rates[2 * i + 1] = force / (mass[i] * speed * omega[i])

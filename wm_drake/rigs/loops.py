@@ -8,7 +8,8 @@ import numpy as np
 from wm_drake.errors import input_error
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import Bench, BushingBench, DamperBench, Harmonic
-from wm_drake.rigs.forces import bushing_loads, damper_tensions, tensions_with_mass
+from wm_drake.rigs.forces import bushing_loads, damper_tensions
+from wm_drake.rigs.heavy_sponge import steady_tensions
 from wm_drake.rigs.integration import PHASE, steady_states
 
 
@@ -72,12 +73,21 @@ def force_loops(bench: Bench, motions: Sequence[Harmonic]) -> list[ForceLoop]:
             _loop(bench, motion, bushing_loads(bench, *_driven(bench, motion, phase)))
             for motion in motions
         ]
+    if bench.sponge_mass > 0.0:
+        return [
+            _loop(
+                bench,
+                motion,
+                steady_tensions(
+                    bench.packed, bench.sponge_mass, motion.amplitude, motion.angular_frequency
+                ),
+            )
+            for motion in motions
+        ]
     amplitude = np.array([motion.amplitude for motion in motions])
     omega = np.array([motion.angular_frequency for motion in motions])
     packed = np.tile(bench.packed, (len(motions), 1))
     deformation = steady_deformations(bench, packed, amplitude, omega)[:, :-1]
-    if bench.sponge_mass > 0.0:
-        return [_loop(bench, motion, _tension_of_heavy_sponge(bench, motion)) for motion in motions]
     return [
         _loop(bench, motion, damper_tensions(_driven(bench, motion, phase)[1], own, bench.packed))
         for motion, own in zip(motions, deformation, strict=True)
@@ -96,8 +106,7 @@ def steady_deformations(
     """
     if bench.state_size != 1:
         return np.zeros((len(packed), len(PHASE)))
-    states = steady_states(packed, np.zeros(len(packed)), amplitude, omega, 1)
-    return np.asarray(states[:, :, 0].T * amplitude[:, None])
+    return np.asarray(steady_states(packed, amplitude, omega).T * amplitude[:, None])
 
 
 def measures_of(loop: ForceLoop) -> LoopMeasures:
@@ -127,22 +136,6 @@ def _driven(bench: Bench, motion: Harmonic, phase: FloatArray) -> tuple[FloatArr
     # at its reversals it stands still, where dry friction is zero
     velocity[np.abs(velocity) < 1e-12 * speed] = 0.0
     return motion.amplitude * np.sin(phase), velocity
-
-
-def _tension_of_heavy_sponge(bench: DamperBench, motion: Harmonic) -> FloatArray:
-    phase = PHASE[:-1]
-    amplitude, omega = motion.amplitude, motion.angular_frequency
-    states = steady_states(
-        bench.packed[None],
-        np.array([bench.sponge_mass]),
-        np.array([amplitude]),
-        np.array([omega]),
-        2,
-    )[:-1, 0]
-    displacement, velocity = _driven(bench, motion, phase)
-    rate = amplitude * omega * states[:, 1]
-    deformation = displacement - amplitude * states[:, 0]
-    return np.asarray(tensions_with_mass(deformation, velocity - rate, rate, bench.packed))
 
 
 def _loop(bench: Bench, motion: Harmonic, force: FloatArray) -> ForceLoop:

@@ -5,6 +5,12 @@ from dataclasses import dataclass
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 
+UNUSED_PHASE_ERROR = (
+    "imperfections.phase_error has no effect on the loads of a machine, only on the front and rear "
+    "masses of spin-cycle cases. To shift a mass of a load, change its phase."
+)
+"""Warning about a machine whose phase error a study of its loads does not use."""
+
 
 @dataclass(frozen=True)
 class Case:

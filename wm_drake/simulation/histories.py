@@ -8,7 +8,7 @@ from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.compiler.vectors import add, rotate, rotation_from_rpy
 from wm_drake.elements.bushing import six_component_bushing_wrench
 from wm_drake.elements.friction_damper import friction_damper_force
-from wm_drake.elements.motion import PLANT_STATE_SIZE, tub_motion
+from wm_drake.elements.motion import PLANT_STATE_SIZE, read_pose, tub_motion
 from wm_drake.elements.sensor import POINT_SIZE, displacement_at
 from wm_drake.elements.spring import spring_strut_wrench
 
@@ -27,10 +27,12 @@ def position_history(samples, points, positions):
     x, place = lane_array(x_numbers), lane_array(numbers)
     for begin in range(0, len(samples), WIDTH):
         rows_to_lanes(samples, begin, x_numbers)
-        rotation = rotation_from_rpy(x[0], x[1], x[2])
+        pose = read_pose(x, 0)
+        roll, pitch, yaw = pose.angles
+        rotation = rotation_from_rpy(roll, pitch, yaw)
         for k in range(len(points)):
             turned = rotate(rotation, (points[k, 0], points[k, 1], points[k, 2]))
-            place[3 * k], place[3 * k + 1], place[3 * k + 2] = add((x[3], x[4], x[5]), turned)
+            place[3 * k], place[3 * k + 1], place[3 * k + 2] = add(pose.position, turned)
         lanes_to_rows(numbers, begin, positions)
 
 
@@ -85,9 +87,15 @@ def output_history(state, deformation, points, p, springs, dampers, bushings, ou
 @law
 def in_bounds(x, angle, displacement):
     """Return 1 if the tub is within the bounds of angle and displacement, else 0."""
-    level = (abs(x[0]) <= angle) & (abs(x[1]) <= angle) & (abs(x[2]) <= angle)
-    near = (abs(x[3]) <= displacement) & (abs(x[4]) <= displacement) & (abs(x[5]) <= displacement)
-    return where(level & near, 1.0, 0.0)
+    pose = read_pose(x, 0)
+    level = all_within(pose.angles, angle)
+    return where(level & all_within(pose.position, displacement), 1.0, 0.0)
+
+
+@law
+def all_within(a, limit):
+    """Return whether the absolute values of all components of a vector are up to a limit."""
+    return (abs(a[0]) <= limit) & (abs(a[1]) <= limit) & (abs(a[2]) <= limit)
 
 
 @law

@@ -136,6 +136,18 @@ def amplitudes(displacement: FloatArray) -> tuple[FloatArray, np.ndarray]:
     return sizes, samples
 
 
+def moment_of_largest_amplitude(record: Record) -> int:
+    """Return the sample at which the largest amplitude of all sensors occurs.
+
+    Report, orbit and replay show this moment. In a record that is too short for the filter, it is
+    the sample of the largest displacement.
+    """
+    size, samples = amplitudes(filtered_displacement(record).values)
+    if np.isnan(size).all():
+        return int(abs(record.displacement).max("sensor").argmax("time"))
+    return int(samples[np.nanargmax(size)])
+
+
 def envelopes(record: Record) -> xr.Dataset:
     """Return the upper and lower envelope (time, sensor) of the filtered displacements. [m]
 
@@ -172,15 +184,14 @@ def axis_motion(record: Record, y: float) -> FloatArray:
 
 
 def largest_motion(record: Record) -> tuple[FloatArray, FloatArray]:
-    """Return the motion around the largest displacement of a record, sampled for a replay.
+    """Return the motion around the largest amplitude of a record, sampled for a replay.
 
     Returns:
         Times (n,) and positions of the plant (n, >= 7): roll, pitch, yaw, x, y, z of the tub and
         the drum angle; then, for each damper tube that is a body, roll, pitch, yaw, x, y, z of the
         outer tube and the extension of the damper. [s; rad, m]
     """
-    size = abs(record.displacement).max("sensor")
-    middle = float(record.time[int(size.argmax("time"))])
+    middle = float(record.time[moment_of_largest_amplitude(record)])
     stretch = record.sel(time=slice(middle - REPLAY_SPAN / 2, middle + REPLAY_SPAN / 2))
     period = (
         float(record.time[1] - record.time[0]) if record.sizes["time"] > 1 else 1.0 / REPLAY_RATE

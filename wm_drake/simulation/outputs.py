@@ -9,7 +9,7 @@ from wm_drake.elements.bearing import drum_bearing_history
 from wm_drake.elements.telescopic_damper import FORCE_SIZE, telescopic_damper_history
 from wm_drake.engines.compiled.packing import pack_on_tub
 from wm_drake.engines.trajectory import Trajectory
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.histories import output_history, position_history
 

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import xarray as xr
 
 from wm_drake.engines.trajectory import COORDINATES, Trajectory, divergence_text
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import Setup
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.outputs import AXES, variables_of
 
@@ -72,13 +72,19 @@ def _label_coordinates(**labels: tuple[str, ...]) -> xr.Coordinates:
 
 
 def save_record(record: Record, path: Path) -> None:
-    """Write a record to a compressed netCDF file."""
+    """Write a record to a compressed netCDF file.
+
+    The file is made in memory first: if HDF5 itself meets a full disk, the process crashes.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
     compression = {
         name: {"compression": "gzip", "compression_opts": 1}
         for name in record.data_vars
         if record[name].size
     }
-    record.to_netcdf(path, engine="h5netcdf", encoding=compression)
+    path.write_bytes(record.to_netcdf(engine="h5netcdf", encoding=compression))
 
 
 def load_record(path: Path) -> Record:

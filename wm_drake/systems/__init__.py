@@ -1,6 +1,7 @@
-"""Wrap each element as a Drake LeafSystem: ports, parameters, state; each calls one law.
+"""Wrap each element as a Drake LeafSystem with ports, parameters and state.
 
 Enters: packed parameters of an element. Leaves: a LeafSystem with named ports, for float and
-AutoDiffXd. Also the spin profile, the speed source of the drum, the sensors and an external force.
-May import: `elements` and the rooms above it, and pydrake.
+AutoDiffXd, that calls one function of `elements`. Also systems for the spin profile, the speed
+source of the drum, the sensors and an external force.
+May import: `elements` and the rooms before it; pydrake.
 """

@@ -23,16 +23,17 @@ def DrumBearing_(T: type) -> Any:
     """Return the class DrumBearing for a scalar type."""
 
     class DrumBearing(ElementSystem, LeafSystem_[T]):
-        """Compliant bearing of the drum; law `bushing_force`. The stiffness lives in a frame of the tub.
+        """Compliant bearing of the drum; law `bushing_force`.
 
-        plant_state (28) ──▶ [ DrumBearing ] ──▶ generalized_force (14) on tub and drum, then on carrier
-                                                   and drum [N m, N]
-                                             ──▶ displacement (3), rotation (3) of the carrier [m, rad]
-                                             ──▶ force (3), moment (3) on the tub [N, N m]
+            plant_state (28) ──▶ [ DrumBearing ] ──▶ generalized_force (14) [N m, N]
+                                                 ──▶ displacement (3) of the carrier [m]
+                                                 ──▶ rotation (3) of the carrier [rad]
+                                                 ──▶ force (3) on the tub [N]
+                                                 ──▶ moment (3) on the tub [N m]
 
-        The own outputs are in the frame of the tub whose y axis is the drum axis. Force and moment on
-        the tub act at the point of the carrier.
-
+        The generalized force acts on tub and drum (7), then on carrier and drum (7). The stiffness
+        and the own outputs are in the frame of the tub whose y axis is the drum axis. Force and
+        moment on the tub act at the point of the carrier.
         """
 
         def _construct(self, parameters: FloatArray, converter: Any = None) -> None:

@@ -1,4 +1,4 @@
-"""Ports, parameters and state that all element systems share, and the two ways to evaluate a law."""
+"""Ports, parameters and state that all element systems share."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -12,7 +12,7 @@ from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE
 from wm_drake.parameters.types import FloatArray
 
 SCALARS = (float, AutoDiffXd)
-"""Scalar types of all systems. `Expression` would make Drake trace Python callbacks symbolically."""
+"""Scalar types of all systems. With `Expression`, Drake would trace the callbacks symbolically."""
 
 
 def evaluator(compiled: Any, scalar: type) -> Callable[..., None]:
@@ -34,13 +34,13 @@ class ElementSystem:
     """Mixin of the LeafSystems that put a force on the plant.
 
         plant_state ──▶ [ element ] ──▶ generalized_force   moment about To, force (W), drum torque
-                        [ (state) ] ──▶ own outputs         force, moment, ... of the element itself
-                                    ──▶ (state)             of an element that has one
+                        [ (state) ] ──▶ own outputs         force, moment, ... of the element
+                                    ──▶ (state)             if the element has a state
 
-    A subclass passes `declare_element` a compiled function
-    ``evaluate(plant_state, state, parameters, generalized_force, own, rate)`` that writes the last
-    three. The packed parameters are a numeric parameter of the Context; derivatives by state and by
-    parameter follow from AutoDiffXd. A system holds no Context.
+    A subclass passes a compiled function to `declare_element`:
+    ``evaluate(plant_state, state, parameters, generalized_force, own, rate)`` writes its last three
+    arguments. The packed parameters are a numeric parameter of the Context. AutoDiffXd computes
+    derivatives with respect to state and parameters. A system holds no Context.
     """
 
     def declare_element(
@@ -59,7 +59,7 @@ class ElementSystem:
             scalar: Scalar type of the system.
             evaluate: Compiled function, see the class.
             parameters: Packed parameters, the default of the numeric parameter.
-            own_outputs: Name of each own output port, and its part of what `evaluate` writes.
+            own_outputs: Name of each own output port, and its part of the array `own`.
             state_size: Number of continuous states.
             trees: Number of trees of the plant that the element acts on. The plant state and the
                 generalized force have one part for each, one after the other.
@@ -95,13 +95,13 @@ class ElementSystem:
         """Set the packed parameters in the element's own Context.
 
         Raises:
-            ValueError: their number is not that of the built element (a table has more points).
+            ValueError: a table has another number of points than in the built element.
         """
         if len(parameters) != len(self.packed):
             name = self.get_name()  # type: ignore[attr-defined]
             raise ValueError(
                 f"{name}: a table has another number of points than the built machine's; "
-                "build a new machine"
+                "rebuild the machine"
             )
         context.get_mutable_numeric_parameter(self._parameters).SetFromVector(parameters)
 
@@ -115,7 +115,7 @@ class ElementSystem:
             derivatives.get_mutable_vector().SetFromVector(self._calc(context)[2])
 
     def _calc(self, context: Any) -> tuple[Any, ...]:
-        """Return generalized force, own numbers and rate of the state."""
+        """Return generalized force, own numbers and time derivative of the state."""
         written = tuple(empty(size, self._scalar) for size in self._sizes)
         self._evaluate(
             self._plant_state.Eval(context),

@@ -15,15 +15,14 @@ def FrictionDamper_(T: type) -> Any:
     """Return the class FrictionDamper for a scalar type."""
 
     class FrictionDamper(ElementSystem, LeafSystem_[T]):
-        """Friction damper of any law, with bushings at its ends; laws `damper_response`, `bending_moment`.
+        """Friction damper with end bushings; laws `damper_response` and `bending_moment`.
 
-        plant_state (14) ──▶ [ FrictionDamper   ] ──▶ generalized_force (7) [N m, N]
-                             [ (state: sponge)  ] ──▶ force (1) tension, > 0 pulls its ends together [N]
-                                                  ──▶ state (1) deformation of the sponge [m]
+            plant_state (14) ──▶ [ FrictionDamper  ] ──▶ generalized_force (7) [N m, N]
+                                 [ (state: sponge) ] ──▶ force (1), tension > 0 [N]
+                                                     ──▶ state (1) deformation of the sponge [m]
 
-        A law with a sponge has one continuous state: the deformation of the sponge. Construct it with
-        `state_size` 1; a law without a sponge has `state_size` 0 and no port "state".
-
+        A law with a sponge has one continuous state, the deformation of the sponge: construct it
+        with `state_size` 1. A law without a sponge has `state_size` 0 and no port "state".
         """
 
         def _construct(

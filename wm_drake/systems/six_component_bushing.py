@@ -1,4 +1,4 @@
-"""Six-component bushing between a frame of the tub and a frame of the housing; the gasket is one."""
+"""Six-component bushing, such as the gasket, between a frame of the tub and one of the housing."""
 
 from typing import Any
 
@@ -15,14 +15,14 @@ def SixComponentBushing_(T: type) -> Any:
     """Return the class SixComponentBushing for a scalar type."""
 
     class SixComponentBushing(ElementSystem, LeafSystem_[T]):
-        """Six-component bushing; law `bushing_force`. The stiffness lives in the housing-side frame G.
+        """Six-component bushing; law `bushing_force`.
 
-        plant_state (14) ──▶ [ SixComponentBushing ] ──▶ generalized_force (7) [N m, N]
-                                                     ──▶ force (3) on the housing, in G [N]
-                                                     ──▶ moment (3) on the housing, in G [N m]
+            plant_state (14) ──▶ [ SixComponentBushing ] ──▶ generalized_force (7) [N m, N]
+                                                         ──▶ force (3) on the housing, in G [N]
+                                                         ──▶ moment (3) on the housing, in G [N m]
 
-        Force and moment on the housing act at the tub-side point, where those on the tub act.
-
+        The stiffness is in the housing-side frame G. Force and moment on the housing act at the
+        tub-side point, as those on the tub do.
         """
 
         def _construct(self, parameters: FloatArray, converter: Any = None) -> None:

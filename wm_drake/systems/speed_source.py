@@ -9,8 +9,8 @@ from wm_drake.systems.element_system import SCALARS
 
 REFLECTED_INERTIA = 1e8
 """Inertia of the drive at the drum joint. [kg m^2] Not physical: it enters only the diagonal of the
-mass matrix at the joint, so that the actuation J alpha turns the drum with alpha, whatever the tub
-does, to one part in 1e8. The motor torque is what remains: J (alpha - rate of drum speed)."""
+mass matrix at the joint. The actuation J alpha therefore accelerates the drum by alpha for any
+motion of the tub, to one part in 1e8. The motor torque is J (alpha - drum acceleration)."""
 
 
 @TemplateSystem.define("SpeedSource_", T_list=SCALARS)
@@ -23,8 +23,8 @@ def SpeedSource_(T: type) -> Any:
             profile_acceleration (1) ──▶ [ SpeedSource ] ──▶ actuation (1) J alpha [N m]
             drum_acceleration (1)    ──▶ [             ]
 
-        alpha is that of the port `drum_acceleration` if a value is connected or fixed there, else that
-        of `profile_acceleration`. [rad/s^2]
+        alpha is the value of the port `drum_acceleration` if one is connected or fixed there, else
+        that of `profile_acceleration`. [rad/s^2]
         """
 
         def _construct(self, converter: Any = None) -> None:
@@ -34,7 +34,7 @@ def SpeedSource_(T: type) -> Any:
             needs = {self._profile.ticket(), self._wanted.ticket()}
             self.DeclareVectorOutputPort("actuation", 1, self._calc_actuation, needs)
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+        def _construct_copy(self, _: Any, converter: Any = None) -> None:
             Impl._construct(self, converter=converter)
 
         def _calc_actuation(self, context: Any, output: Any) -> None:
@@ -58,7 +58,7 @@ def MotorTorque_(T: type) -> Any:
             actuation (1)                ──▶ [ MotorTorque ] ──▶ torque (1) [N m]
             generalized_acceleration (n) ──▶ [             ]
 
-        torque = actuation - J vdot: what the reflected inertia J of the drive does not take up.
+        torque = actuation - J vdot, with the reflected inertia J of the drive.
         """
 
         def _construct(self, size: int, drum: int, converter: Any = None) -> None:

@@ -23,9 +23,10 @@ def SpinProfileSource_(T: type) -> Any:
                                   ──▶ speed (1) [rad/s]
               parameter: SpinProfile (abstract)
 
-        The acceleration jumps at the corners of the profile. A step across a corner misses the speed
-        by up to the jump times the step size; `wm_drake.engines.drake.advance_to` ends a step at each
-        corner. Behind the end of the profile the speed stays constant.
+        The acceleration jumps at the corners of the profile. The error of the speed after a step
+        across a corner is at most the jump times the step size;
+        `wm_drake.engines.drake.advance_to` ends a step at each corner. After the end of the profile
+        the speed is constant.
         """
 
         def _construct(self, profile: SpinProfile, converter: Any = None) -> None:

@@ -18,8 +18,7 @@ def SpringStrut_(T: type) -> Any:
         """Suspension spring; law `spring_tension`.
 
         plant_state (14) ──▶ [ SpringStrut ] ──▶ generalized_force (7) [N m, N]
-                                             ──▶ force (1) tension, > 0 pulls its ends together [N]
-
+                                             ──▶ force (1), tension > 0 [N]
         """
 
         def _construct(self, parameters: FloatArray, converter: Any = None) -> None:

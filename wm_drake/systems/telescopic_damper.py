@@ -1,4 +1,4 @@
-"""Telescopic damper: its tubes are bodies, held by two bushings, with friction along the joint."""
+"""Telescopic damper: two tubes as bodies, two bushings, and friction along the joint."""
 
 from typing import Any
 
@@ -26,17 +26,18 @@ def TelescopicDamper_(T: type) -> Any:
     class TelescopicDamper(ElementSystem, LeafSystem_[T]):
         """Telescopic damper; laws `bushing_force` twice, and `damper_response` along the joint.
 
-        plant_state (28) ──▶ [ TelescopicDamper ] ──▶ generalized_force (14) on tub and drum, then on
-                             [ (state: sponge)  ]       tubes and joint [N m, N]
-                                                  ──▶ force (1) tension of the law [N]
-                                                  ──▶ tub_bushing_force, tub_bushing_moment (3, 3) on the
-                                                        outer tube, in its frame [N, N m]
-                                                  ──▶ housing_bushing_force, housing_bushing_moment (3, 3)
-                                                        on the housing [N, N m]
-                                                  ──▶ state (1) deformation of the sponge [m]
+            plant_state (28) ──▶ [ TelescopicDamper ] ──▶ generalized_force (14) [N m, N]
+                                 [ (state: sponge)  ] ──▶ force (1), tension > 0 [N]
+                                                      ──▶ tub_bushing_force (3) [N]
+                                                      ──▶ tub_bushing_moment (3) [N m]
+                                                      ──▶ housing_bushing_force (3) [N]
+                                                      ──▶ housing_bushing_moment (3) [N m]
+                                                      ──▶ state (1) deformation of the sponge [m]
 
-        `state_size` as for `FrictionDamper`.
-
+        The generalized force acts on tub and drum (7), then on tubes and joint (7). `force` is that
+        of the law along the joint. Force and moment of the tub bushing act on the outer tube, in
+        its frame; those of the housing bushing act on the housing. Construct it with `state_size` 1
+        for a law with a sponge, else 0; without a sponge there is no port "state".
         """
 
         def _construct(

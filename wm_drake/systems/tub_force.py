@@ -14,10 +14,11 @@ def TubForce_(T: type) -> Any:
     """Return the class TubForce for a scalar type."""
 
     class TubForce(LeafSystem_[T]):
-        """Spatial force on the tub that a user connects or fixes; zero without one.
+        """External spatial force on the tub; zero if no value is connected or fixed.
 
-        tub_force (6) ──▶ [ TubForce ] ──▶ generalized_force (7) [N m, N]
-          moment about To and force on the tub, in W [N m, N]
+            tub_force (6) ──▶ [ TubForce ] ──▶ generalized_force (7) [N m, N]
+
+        `tub_force` is moment about To and force on the tub, in W. [N m, N]
         """
 
         def _construct(self, converter: Any = None) -> None:
@@ -27,7 +28,7 @@ def TubForce_(T: type) -> Any:
                 "generalized_force", GENERALIZED_FORCE_SIZE, self._calc, {self._force.ticket()}
             )
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+        def _construct_copy(self, _: Any, converter: Any = None) -> None:
             Impl._construct(self, converter=converter)
 
         def _calc(self, context: Any, output: Any) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.errors import InputError
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile, load_machine
 from wm_drake.parameters.free import Measured, load_free
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of

@@ -11,7 +11,7 @@ from statsmodels.formula.api import ols
 from statsmodels.stats.anova import anova_lm
 
 from wm_drake.studies.doe import d_optimal_levels, level_matrix, orthogonal_levels
-from wm_drake.studies.doe.anova import anova
+from wm_drake.studies.doe.anova import SumCoding, anova
 
 # Montgomery, Design and Analysis of Experiments, battery life data: hours by plate material (1-3)
 # and temperature (15, 70, 125 deg F), four batteries each; analysis of variance as printed there
@@ -41,6 +41,8 @@ def battery():
 def test_battery_table_of_the_textbook():
     data = battery()
     table = anova(data[["material", "temperature"]], data[["hours"]])["hours"]
+    # the printed sums of squares as variances: 36 batteries; the mean square of the error is 675.21
+    total = (10683.72 + 39118.72 + 9613.78) / 36.0 + 18230.75 / 27.0
     for term in table.terms:
         sum_sq, df, f = BATTERY_TABLE[term.name]
         assert (term.sum_sq, term.df, term.f) == (
@@ -48,7 +50,8 @@ def test_battery_table_of_the_textbook():
             df,
             pytest.approx(f, abs=0.006),
         )
-        assert term.percent == pytest.approx(100.0 * sum_sq / 77646.97, abs=1e-3)
+        assert term.percent == pytest.approx(100.0 * sum_sq / 36.0 / total, abs=1e-3)
+    assert table.residual_percent == pytest.approx(100.0 * 18230.75 / 27.0 / total, abs=1e-3)
     assert table.residual_sum_sq == pytest.approx(18230.75, abs=0.006)
     assert table.total_sum_sq == pytest.approx(77646.97, abs=0.006)
     assert table.residual_df == 27
@@ -168,7 +171,13 @@ def test_contributions_of_an_orthogonal_design_are_those_of_statsmodels(levels):
     table = anova(data.drop(columns="y"), data[["y"]])["y"]
     formula = f"y ~ ({' + '.join(f'C({name}, Sum)' for name in data.columns[:-1])})**2"
     expected = anova_lm(ols(formula, data).fit(), typ=3).drop(index="Intercept")
-    percents = 100.0 * expected["sum_sq"] / np.sum((response - response.mean()) ** 2)
+    # sums of squares as variances over the grid: the residual with its degrees of freedom, and with
+    # the part of the grid that the trials are
+    trials, grid = len(levels), 3 ** levels.shape[1]
+    coefficients = trials - table.residual_df
+    variances = expected["sum_sq"] / trials
+    variances["Residual"] *= trials / table.residual_df * (1.0 - coefficients / grid)
+    percents = 100.0 * variances / variances.sum()
     found = [*(term.percent for term in table.terms), table.residual_percent]
     assert found == pytest.approx(list(percents))
     assert sum(found) == pytest.approx(100.0)
@@ -221,3 +230,47 @@ def test_saturated_fit_has_no_tests():
     assert table.residual_df == 0
     assert all(np.isnan(term.p) for term in table.terms)
     assert sum(term.percent for term in table.terms) == pytest.approx(100.0)
+
+
+def test_predicted_r2_is_that_of_fits_without_each_trial():
+    rng = np.random.default_rng(3)
+    levels = d_optimal_levels(4, 60, "main+2fi", 0)
+    response = 4.0 * levels[:, 0] + np.prod(levels[:, :3], axis=1) + rng.normal(size=60)
+    table = anova(design_of(levels), pd.DataFrame({"y": response}))["y"]
+    matrix = SumCoding(design_of(levels), interactions=True).matrix
+    press = 0.0
+    for out in range(60):
+        kept = np.arange(60) != out
+        fit = np.linalg.lstsq(matrix[kept], response[kept], rcond=None)[0]
+        press += (response[out] - matrix[out] @ fit) ** 2
+    total = np.sum((response - response.mean()) ** 2)
+    assert table.predicted_r2 == pytest.approx(1.0 - press / total)
+    freedom = 60 - matrix.shape[1]
+    assert table.adjusted_r2 == pytest.approx(1.0 - table.residual_sum_sq / freedom * 59 / total)
+
+
+def test_residual_share_is_that_of_the_grid_for_any_number_of_trials():
+    """The fit to a part of the grid gives, on average, the share that the whole grid has."""
+    rng = np.random.default_rng(8)
+    full = level_matrix(5)
+    response = 2.0 * full[:, 0] + full[:, 1] * full[:, 2] + rng.normal(size=len(full))
+    frame = pd.DataFrame({"y": response})
+    truth = anova(design_of(full), frame)["y"].residual_percent
+    plain, corrected = [], []
+    for _ in range(150):
+        rows = rng.choice(len(full), 75, replace=False)
+        table = anova(design_of(full[rows]), frame.iloc[rows])["y"]
+        plain.append(table.residual_sum_sq / 75.0)
+        corrected.append(SumCoding(design_of(full[rows]), True).residual_variance(75.0 * plain[-1]))
+    over_grid = anova(design_of(full), frame)["y"].residual_sum_sq / len(full)
+    assert truth == pytest.approx(100.0 * over_grid / np.var(response))
+    assert np.mean(corrected) == pytest.approx(over_grid, rel=0.05)
+    assert np.mean(plain) < 0.5 * over_grid
+
+
+def test_saturated_design_has_no_residual_and_no_predicted_r2():
+    levels = level_matrix(2)
+    table = anova(design_of(levels), pd.DataFrame({"y": np.arange(9.0) ** 2}))["y"]
+    assert table.residual_df == 0
+    assert all(np.isnan([table.residual_percent, table.adjusted_r2, table.predicted_r2]))
+    assert table.main_percent + table.interaction_percent == pytest.approx(100.0)

@@ -3,10 +3,12 @@
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
 from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
+from wm_drake.model.scene import Scene
 from wm_drake.parameters import (
     GASKET_FACTORS,
     SpinProfile,
@@ -15,12 +17,14 @@ from wm_drake.parameters import (
     levels_of,
     load_factors,
 )
+from wm_drake.parameters.spin import Region
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.doe import Design, level_matrix, make_design
+from wm_drake.studies.doe import Design, level_matrix, make_design, read_design
+from wm_drake.studies.gasket.responses import chosen_responses, measures_of
 from wm_drake.studies.gasket.screening import Responses, leading_terms, mean_at, run_screening
-from wm_drake.studies.gasket.study import RESPONSES, GasketTrials
+from wm_drake.studies.gasket.study import GasketTrials, as_responses
 from wm_drake.studies.gasket.tables import as_plain_data, to_json, write_tables
 
 NAMES = ("a", "b", "c")
@@ -132,21 +136,92 @@ def test_cases_of_trials_have_their_levels(reference):
     machine = build_machine(middle)
     loads = [Case(name, reference.loads[name], SHORT) for name in ("middle", "counter")]
     trials = GasketTrials(middle, factors, loads)
+    assert trials.measures == ("extremes", "gap")
     design = Design("own", texts, level_matrix(2), "main")
     responses = trials.responses(
-        design, lambda cases: simulate_many(machine, cases, measures=("extremes",))
+        design, lambda cases: simulate_many(machine, cases, measures=trials.measures)
     )
     assert list(responses.values) == ["middle", "counter"]
-    assert list(responses.values["middle"].columns) == RESPONSES == list(responses.units)
+    names = [letter + axis for letter in "DFM" for axis in "xyz"]
+    assert list(responses.values["middle"].columns) == [*names, "gap"] == list(responses.units)
     heavy = list(trials.cases(design))[2 * 5]  # levels 0, 1: heavier, middle load
     assert heavy.load.unbalances[0].mass == pytest.approx(1.2)
-    measures = measure(simulate(machine, heavy))
+    measures = measure(simulate(machine, heavy), Scene(heavy.parameters))
     expected = [
         *(1e3 * measures.detergent_displacement.values),
         *measures.gasket_force.values,
         *measures.gasket_moment.values,
+        1e3 * measures.smallest_gap.distance,
     ]
     assert list(responses.values["middle"].loc[5]) == pytest.approx(expected, rel=1e-9)
     assert (
         responses.values["counter"].loc[3, "Dx"] == responses.values["counter"].loc[5, "Dx"]
     )  # its own masses stay
+
+
+def test_any_measure_can_be_a_response(reference):
+    profile = SpinProfile(
+        time=(0.0, 2.0), speed=(5.0, 12.0), regions=(Region(name="R1", begin=0.5, end=1.5),)
+    )
+    names = ("gap", "amplitude_Xr", "critical_speed", "power means", "region_displacement_R1_S1_z")
+    chosen = chosen_responses(reference, profile, names)
+    case = Case("middle", reference.loads["middle"], profile)
+    table = simulate_many(build_machine(reference), [case], measures=measures_of(reference, chosen))
+    found = as_responses(table, ["middle"], chosen).values["middle"].loc[0]
+    assert found["gap"] == pytest.approx(1e3 * table.smallest_gap.item())
+    assert found["amplitude_Xr"] == pytest.approx(1e3 * table.amplitude.sel(sensor="Xr").item())
+    rpm = 30.0 / np.pi * table.critical_speed.sel(sensor="Yf").item()
+    assert found["critical_speed_Yf"] == pytest.approx(rpm)
+    assert found["power_mean_Zr"] == pytest.approx(1e3 * table.power_mean.sel(sensor="Zr").item())
+    rms = table.region_displacement.sel(accelerometer="S1", axis="z").item()
+    assert found["region_displacement_R1_S1_z"] == pytest.approx(1e3 * rms)
+    assert len(found) == 1 + 1 + 2 * len(reference.sensors) + 1
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("gpa", "no response 'gpa' .did you mean 'gap'"), ("regions", "a spin profile with regions")],
+)
+def test_unknown_responses_are_refused(reference, name, message):
+    with pytest.raises(InputError, match=message):
+        chosen_responses(reference, SHORT, [name])
+
+
+def test_runs_that_touch_are_marked(reference):
+    chosen = chosen_responses(reference, SHORT, ["Dx"])
+    assert measures_of(reference, chosen) == ("extremes", "gap")  # also where it is no response
+    table = xr.Dataset(
+        {
+            "detergent_displacement": (("run", "axis"), np.ones((4, 3))),
+            "smallest_gap": ("run", [0.002, -0.001, 0.0, -0.003]),
+            "diverged": ("run", np.array(["", "", "", "at 1 s"], dtype=object)),
+        },
+        {"run": range(4)},
+    )
+    responses = as_responses(table, ["one", "two"], chosen)
+    assert responses.touching == pytest.approx({(0, "two"): -1.0, (1, "one"): 0.0})
+    assert np.isnan(responses.values["two"].loc[1, "Dx"])
+
+
+def test_physical_values_are_in_design_and_runs(reference, tmp_path):
+    texts = ("C_L", "K_Lx=2 N/mm..4 N/mm")
+    known = load_factors(GASKET_FACTORS)
+    factors = levels_of(reference, dict(factor_of_text(text, known) for text in texts))
+    design = Design("own", ("C_L", "K_Lx"), level_matrix(2), "main")
+    y = pd.DataFrame({"y": np.arange(9.0)})
+    write_tables(
+        run_screening(design, lambda _: Responses({"one": y}, {"y": "mm"}, {})), tmp_path, factors
+    )
+    for name in ("design.csv", "runs.csv"):
+        table = pd.read_csv(tmp_path / name)
+        assert list(table["K_Lx [N/mm]"]) == pytest.approx([2.0, 3.0, 4.0] * 3)
+        damping = 1e-3 * at_levels(reference, factors, [-1, 0]).gasket.damping_x
+        assert table["C_L [N s/mm]"][0] == pytest.approx(damping)
+    again = read_design(tmp_path / "design.csv", ("C_L", "K_Lx"), "main")
+    np.testing.assert_array_equal(again.levels, design.levels)
+
+
+def test_saturated_design_is_refused_before_any_run():
+    design = make_design("d-optimal", ("a", "b", "c"), trials=19)
+    with pytest.raises(InputError, match="19 trials for 19 coefficients"):
+        run_screening(design, lambda _: pytest.fail("no run is needed"))

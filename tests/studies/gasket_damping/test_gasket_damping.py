@@ -10,7 +10,7 @@ import xarray as xr
 
 from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
-from wm_drake.model.machine import build_machine
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
@@ -128,6 +128,9 @@ def test_command_recovers_its_virtual_experiment_and_names_it_so(wm_drake):
     for name, size in (("C_L", 0.05), ("C_T", 200.0)):
         spacing = size / 4.0 / 2.0 ** (printed["grid"]["rounds"] - 1)
         assert abs(printed["grid"][name] - printed["planted"][name]) <= spacing
+        low, high = printed["interval_95"][name]
+        assert low < printed["planted"][name] < high
+        assert low < printed["scipy"][name] < high
     page = Path("out/report.html").read_text()
     assert "virtual experiment" in page
     assert len(pd.read_csv("out/objective.csv")) == printed["grid"]["evaluations"]

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from wm_drake.elements.damper_law import law_numbers
 from wm_drake.errors import InputError
 from wm_drake.parameters import (
+    Component,
     ForceTable,
     MeasuredLoop,
     StvSpongeDamper,
@@ -14,7 +16,7 @@ from wm_drake.parameters import (
 from wm_drake.rigs import Harmonic, bushing_bench, damper_bench, force_loops
 from wm_drake.rigs.measured import measured_motion
 from wm_drake.studies.fitting import METHODS, identify, least_squares
-from wm_drake.studies.identification import bushing_model, damper_model, fit_problem
+from wm_drake.studies.identification import bushing_model, damper_model, fit_problem, fragment
 
 MSTV = load_component("mstv_damper").parameters
 FREE_STROKE = (
@@ -283,6 +285,32 @@ def test_friction_of_a_bushing_turned_too_slowly_is_not_told_from_its_damping():
     )
     assert fit["rotational_stiffness_x"].value == pytest.approx(0.75, rel=0.02)
     assert not fit["rotational_damping_x"].determined
+
+
+def test_a_component_file_keeps_the_tables_of_its_other_axes(tmp_path):
+    motions = motions_mm((1.0, 1.0), (5.0, 2.0))
+    loops = measured(bushing_bench(AXIAL, "x"), motions)
+    model = bushing_model("voigt", loops, AXIAL, "x")
+    fit = least_squares(fit_problem(model, loops), starts=1)
+    text = fragment(fit, model, Component("axial", AXIAL, {}), "", "", {}, tmp_path)
+    (tmp_path / "axial.yaml").write_text(text)
+    found = load_component(str(tmp_path / "axial.yaml")).parameters
+    assert found.stiffness_y.displacement == pytest.approx(AXIAL.stiffness_y.displacement)
+    assert found.stiffness_y.force == pytest.approx(AXIAL.stiffness_y.force)
+    assert found.stiffness_x == pytest.approx(AXIAL.stiffness_x, rel=1e-3)
+
+
+def test_a_number_that_is_kept_by_default_is_searched_between_the_users_bounds():
+    _, loops = mstv()
+    bounds = {"friction_damping": (1.0, 200.0), "regularisation_velocity": (1e-7, 1e-5)}
+    model = damper_model("mstv", loops, bounds=bounds)
+    found = {unknown.name: unknown for unknown in model.unknowns}
+    assert set(found) == {*MSTV_TRUTH, *bounds}
+    for name, (lower, upper) in bounds.items():
+        assert (found[name].lower, found[name].upper) == (lower, upper)
+        assert found[name].logarithmic
+    bench = model.bench(np.array([unknown.upper for unknown in model.unknowns]))
+    assert law_numbers(bench.packed).friction_damping == 200.0
 
 
 @pytest.mark.slow

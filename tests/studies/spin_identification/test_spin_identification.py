@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -11,10 +12,12 @@ from wm_drake.errors import InputError
 from wm_drake.parameters import SpinProfile, load_machine, with_value
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
+from wm_drake.report.spin_identify.report import summary, warnings_of
 from wm_drake.studies.spin_cycle.study import labels_of
 from wm_drake.studies.spin_identification.study import (
     SpinModel,
     at_point,
+    identified_machine,
     identify_from_spin,
     planted_values,
     sought_of,
@@ -104,6 +107,28 @@ def test_numbers_that_the_data_do_not_determine_are_named(reference):
     assert np.abs(result.recovered[:2]).max() < 0.02
     assert result.uncertainty[2] == np.inf
     assert any("gasket.damping_x" in direction.names for direction in result.fit.undetermined)
+    machine = identified_machine(result)
+    assert machine.name == "reference_identified"
+    assert machine.gasket.stiffness_x == result.fit["gasket.stiffness_x"].value
+    assert machine.gasket.damping_x == reference.gasket.damping_x
+    assert "virtual experiment: identified" in machine.sources["gasket.stiffness_z"]
+    assert machine.sources.get("gasket.damping_x") == reference.sources.get("gasket.damping_x")
+
+
+def test_verdict_is_that_of_the_displacements_not_of_the_intervals(reference):
+    """A model that cannot reproduce the measurement still determines its numbers."""
+    model = made_up(reference, seen=True)
+    planted = planted_values(model.sought, seed=3)
+    measured = virtual_experiment(model, planted, noise=0.0, seed=3)
+    good = identify_from_spin(model, measured)
+    assert good.verdict == "good"
+    other = measured * (1.0 + 0.6 * np.sin(7.0 * np.arange(measured.size)).reshape(measured.shape))
+    poor = identify_from_spin(model, other)
+    assert poor.verdict == "poor"
+    assert poor.error_after > 0.15
+    assert summary(poor).startswith("Poor fit: ")
+    assert "do not use the values" in warnings_of(poor)[0]
+    assert summary(good).startswith("Good fit: ")
 
 
 def test_noise_widens_intervals_until_a_number_is_not_identified(reference):
@@ -182,14 +207,26 @@ def test_command_names_its_experiment_virtual_and_recovers_the_true_numbers(iden
     )
     assert shown["average_error_after"] < 1e-3 < shown["average_error_before"]
     assert sorted(path.name for path in Path("out").iterdir()) == [
+        "identified.yaml",
         "ledger.sqlite",
         "measured.csv",
+        "parameters.csv",
         "report.html",
         "rms.csv",
+        "run.json",
     ]
     page = Path("out/report.html").read_text(encoding="utf-8")
     assert "This is a virtual experiment: nothing was measured." in page
-    real = identify("--json", "--measured", "out/measured.csv", *unknowns)
+    written = load_machine("out/identified.yaml")
+    table = pd.read_csv("out/parameters.csv").set_index("unknown")
+    assert list(table.index) == ["gasket.stiffness_x", "gasket.stiffness_z", "gasket.stiffness_y"]
+    for key in table.index:
+        value = getattr(written.gasket, key.removeprefix("gasket."))
+        assert table.value[key] == pytest.approx(1e-3 * value, rel=1e-5)
+        assert table.lower_95[key] <= table.value[key] <= table.upper_95[key]
+        assert table.unit[key] == "N/mm"
+    assert written.name == "reference_identified"
+    real = identify("--json", "--measured", "out/measured.csv", "--overwrite", *unknowns)
     told = json.loads(real.out)
     assert told["virtual_experiment"] is False
     for name, entry in told["unknowns"].items():
@@ -198,6 +235,18 @@ def test_command_names_its_experiment_virtual_and_recovers_the_true_numbers(iden
     assert (
         "virtual" not in Path("out/report.html").read_text(encoding="utf-8").split("references")[0]
     )
+
+
+def test_a_key_is_one_line_of_the_terminal(identify):
+    unknowns = (
+        "--unknown",
+        "gasket.stiffness_x+gasket.stiffness_z",
+        "--unknown",
+        "gasket.damping_x",
+    )
+    lines = [line.strip() for line in identify(*unknowns).out.splitlines()]
+    assert {"gasket.stiffness_x", "= gasket.stiffness_z", "gasket.damping_x"} <= set(lines)
+    assert "identified.yaml, parameters.csv" in lines[-1]
 
 
 @pytest.mark.parametrize(

@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wm_drake.cli.result_folder import check_is_folder
-from wm_drake.errors import input_error
+from wm_drake.cli.result_folder import LEDGER, Run, check_is_folder, prepare_folder
 
 if TYPE_CHECKING:
     from wm_drake.batch.ledger import Ledger
 
-LEDGER = "ledger.sqlite"
-"""Name of the ledger file in the folder of a study."""
+RUNS_KEPT = (
+    "all runs are kept, so repeat the command to write the results without running them again"
+)
+"""What is kept if the results of a study cannot be written."""
 
 WorkersOption = Annotated[
     int | None, typer.Option(help="Number of cores. Default: all.", min=1, metavar="N")
@@ -32,7 +33,9 @@ ProfileOption = Annotated[
 
 
 @contextmanager
-def study_ledger(out: Path, identity: Mapping[str, str], resume: bool) -> "Iterator[Ledger]":
+def study_ledger(
+    out: Path, run: Run, identity: Mapping[str, str], resume: bool
+) -> "Iterator[Ledger]":
     """Open the ledger of a study in its folder, and create the folder if it does not exist.
 
     Ctrl-C ends the command with exit code 130 and a message about the runs that are kept. If this
@@ -42,13 +45,10 @@ def study_ledger(out: Path, identity: Mapping[str, str], resume: bool) -> "Itera
 
     check_is_folder(out)
     created = not out.exists()
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise input_error(f"cannot be written to: {error.strerror}", where=str(out)) from None
+    prepare_folder(out, run)
     kept = 0
     try:
-        with open_ledger(out / LEDGER, identity, resume=resume) as ledger:
+        with open_ledger(out / LEDGER, identity, resume=resume, replace=run.overwrite) as ledger:
             try:
                 yield ledger
             finally:

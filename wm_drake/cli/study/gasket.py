@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,6 +13,8 @@ import typer
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
+    OutOption,
+    OverwriteOption,
     SetOption,
     cases_of,
     check_buildable,
@@ -20,9 +23,16 @@ from wm_drake.cli.common import (
     load_parameters,
 )
 from wm_drake.cli.progress import progress_bar
-from wm_drake.cli.result_folder import result_folder
-from wm_drake.cli.study.common import ProfileOption, ResumeOption, WorkersOption, study_ledger
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.cli.result_folder import Run, result_folder
+from wm_drake.cli.study.common import (
+    RUNS_KEPT,
+    ProfileOption,
+    ResumeOption,
+    WorkersOption,
+    study_ledger,
+)
+from wm_drake.cli.terminal import Console, say
+from wm_drake.errors import InputError, Problem, input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from collections.abc import Callable
@@ -30,10 +40,14 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
 
     from wm_drake.parameters import FactorLevels, MachineParameters
+    from wm_drake.report.gasket.words import Words
     from wm_drake.simulation.cases import Case
     from wm_drake.studies.doe import Design
     from wm_drake.studies.gasket.screening import Screening
     from wm_drake.studies.gasket.study import GasketTrials
+
+WIDE = 100
+"""Width of a terminal from which on its table has the leading terms. [characters]"""
 
 DEFAULT_OUT = Path("wm-drake-gasket")
 
@@ -83,6 +97,15 @@ def gasket(
     factors: Annotated[
         Path | None, typer.Option(help="YAML file of factors.", metavar="FILE")
     ] = None,
+    response: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What is measured of each run: D, F, M, gap, amplitude, critical_speed, "
+            "power_mean, region_displacement, region_displacement_integrated, or one number such "
+            "as Dx or amplitude_Xr. Repeatable. Default: D, F, M and gap.",
+            metavar="NAME",
+        ),
+    ] = None,
     tables: Annotated[
         str,
         typer.Option(
@@ -100,39 +123,34 @@ def gasket(
         ),
     ] = None,
     resume: ResumeOption = False,
-    out: Annotated[
-        Path, typer.Option(help="Folder for the results and the ledger of runs.", metavar="DIR")
-    ] = DEFAULT_OUT,
+    out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
     """Find how stiffness and damping of the gasket affect displacement, force and moment."""
     begin = time.perf_counter()
-    from wm_drake.studies.gasket.study import GasketTrials
+    from wm_drake.studies.gasket.screening import check_degrees_of_freedom
 
     parameters = load_parameters(machine, sets)
     levels = _factors(parameters, factor, factors, tables)
     plan = _design(design, levels, trials, model, seed)
+    check_degrees_of_freedom(plan)
     cases = _loads(parameters, load, profile)
     middle = _at_middle(parameters, levels)
     check_buildable(machine, parameters)
-    work = GasketTrials(middle, levels, cases)
+    work = _work(middle, levels, cases, response or [])
+    identity = _identity(work, plan)
+    writer = Run("study gasket", overwrite, identity)
     with (
         _runner(middle, workers, cluster) as run,
-        study_ledger(out, _identity(work, plan), resume) as ledger,
+        study_ledger(out, writer, identity, resume) as ledger,
     ):
         screening = _run(work, plan, partial(run, ledger=ledger))
         ledger.mark_finished()
-        try:
-            with result_folder(out) as folder:
-                _write(screening, work, folder, time.perf_counter() - begin)
-        except OSError as error:
-            message = (
-                f"cannot be written to: {error.strerror}; all runs are kept, so repeat the command "
-                "to write the results without running them again"
-            )
-            raise input_error(message, where=str(out)) from None
-    _print_result(screening, out, as_json, time.perf_counter() - begin)
+        with result_folder(out, writer, RUNS_KEPT) as folder:
+            _write(screening, work, folder, time.perf_counter() - begin)
+    _print_result(screening, work, out, as_json, time.perf_counter() - begin)
 
 
 def _factors(
@@ -145,10 +163,19 @@ def _factors(
             f"unknown treatment '{tables}'{nearest_names(tables, TABLES)}", where="--tables"
         )
     known = load_factors(GASKET_FACTORS if file is None else existing_file(file, "--factors"))
-    chosen = dict(factor_of_text(text, known) for text in named) if named else known
+    try:
+        chosen = dict(factor_of_text(text, known) for text in named) if named else known
+    except InputError as error:
+        raise InputError(replace(p, where="--factor") for p in error.problems) from None
     if named and len(chosen) < len(named):
         raise input_error("a factor is given twice", where="--factor")
-    return levels_of(parameters, chosen, tables)
+    try:
+        return levels_of(parameters, chosen, tables)
+    except InputError as error:
+        origin = "--factor" if named else str(file) if file else ""
+        raise InputError(
+            replace(p, where=": ".join(filter(None, [origin, p.where]))) for p in error.problems
+        ) from None
 
 
 def _design(
@@ -191,11 +218,24 @@ def _at_middle(
     return at_levels(parameters, levels, [0] * len(levels))
 
 
+def _work(
+    parameters: "MachineParameters",
+    levels: "tuple[FactorLevels, ...]",
+    cases: "list[Case]",
+    responses: list[str],
+) -> "GasketTrials":
+    from wm_drake.studies.gasket.study import GasketTrials
+
+    try:
+        return GasketTrials(parameters, levels, cases, responses)
+    except InputError as error:
+        raise InputError(Problem("--response", "", p.message) for p in error.problems) from None
+
+
 def _identity(work: "GasketTrials", plan: "Design") -> dict[str, str]:
     """Return the properties that distinguish this study from others, for its ledger."""
     from wm_drake.batch import sources_version
     from wm_drake.batch.ledger import key_of
-    from wm_drake.studies.gasket.study import MEASURES
 
     machine = work.parameters
     levels = key_of(levels=plan.levels, settings=[f.settings for f in work.factors])[:8]
@@ -208,7 +248,7 @@ def _identity(work: "GasketTrials", plan: "Design") -> dict[str, str]:
         "machine": f"{machine.name} {runs}",
         "design": f"{plan.kind}, {plan.trials} trials, {levels}",
         "loads": f"{', '.join(case.name for case in work.loads)}, {loads}",
-        "measures": ", ".join(MEASURES),
+        "measures": ", ".join(work.measures),
         "sources": sources_version(),
     }
 
@@ -220,7 +260,7 @@ def _runner(
     """Yield the function that runs cases: on the cores of this computer, or on a cluster."""
     from wm_drake.batch import simulate_remembered
     from wm_drake.batch.cluster import cluster_client, simulate_on_cluster
-    from wm_drake.model.machine import build_machine
+    from wm_drake.model.build import build_machine
 
     if cluster is None:
         yield partial(simulate_remembered, build_machine(parameters), workers=workers)
@@ -231,13 +271,12 @@ def _runner(
 
 def _run(work: "GasketTrials", plan: "Design", run: "Callable[..., xr.Dataset]") -> "Screening":
     from wm_drake.studies.gasket.screening import run_screening
-    from wm_drake.studies.gasket.study import MEASURES
 
     with progress_bar(plan.trials * len(work.loads)) as progress:
         return run_screening(
             plan,
             lambda d: work.responses(
-                d, lambda cases: run(cases, measures=MEASURES, progress=progress)
+                d, lambda cases: run(cases, measures=work.measures, progress=progress)
             ),
         )
 
@@ -246,42 +285,59 @@ def _write(screening: "Screening", work: "GasketTrials", folder: Path, wall_s: f
     from wm_drake.report.gasket.report import gasket_report
     from wm_drake.studies.gasket.tables import write_tables
 
-    write_tables(screening, folder)
+    write_tables(screening, folder, work.factors)
     command = command_line()
     (folder / "report.html").write_text(
         gasket_report(screening, work, command, wall_s), encoding="utf-8"
     )
 
 
-def _print_result(screening: "Screening", out: Path, as_json: bool, wall_s: float) -> None:
+def _print_result(
+    screening: "Screening", work: "GasketTrials", out: Path, as_json: bool, wall_s: float
+) -> None:
+    from wm_drake.report.gasket.findings import summary, warnings
+    from wm_drake.report.gasket.words import Words
     from wm_drake.studies.gasket.tables import as_plain_data, to_json
 
+    words = Words(work.factors, screening.responses.meanings)
     if as_json:
         typer.echo(to_json(as_plain_data(screening) | {"wall_s": wall_s}))
     else:
-        _print_table(screening)
-        typer.echo(f"Results in {out}: report.html and CSV tables")
+        _print_table(screening, words)
+        say("\n".join(summary(screening, words)))
+        say(f"Results in {out}: report.html and CSV tables")
+    for text in warnings(screening, words):
+        say(f"warning: {text}", err=True)
     for (trial, load), reason in screening.responses.failed.items():
         typer.echo(f"trial {trial + 1}, load {load}: {reason}", err=True)
     if screening.responses.failed:
         raise typer.Exit(1)
 
 
-def _print_table(screening: "Screening") -> None:
-    from rich.console import Console
+def _print_table(screening: "Screening", words: "Words") -> None:
     from rich.table import Table
 
+    from wm_drake.report.gasket.tables import r2_text
     from wm_drake.studies.gasket.screening import leading_terms
 
     design = screening.design
     about = f"{design.kind}, {design.trials} trials, D-efficiency {design.efficiency():.2f} %"
     table = Table(title=f"Percent of the variance explained ({about})")
-    for name in ("load", "response", "mean", "main", "inter-\nactions", "residual"):
-        table.add_column(name, justify="left" if name in ("load", "response") else "right")
-    table.add_column("leading terms")
+    for name in ("load", "response"):
+        table.add_column(name)
+    for name in ("mean", "main", "inter-\nactions", "resid-\nual", "pre-\ndicted\nR2"):
+        table.add_column(name, justify="right")
+    console = Console()
+    is_wide = console.width >= WIDE
+    if is_wide:
+        table.add_column("leading terms, percent")
     for (load, name), found in screening.tables.items():
-        leading = ", ".join(f"{term.name} {term.percent:.0f}" for term in leading_terms(found))
+        leading = ", ".join(
+            f"{term.name.replace(':', ' × ')} {term.percent:.0f}" for term in leading_terms(found)
+        )
         percents = (found.main_percent, found.interaction_percent, found.residual_percent)
         mean = f"{found.constant:.3g} {screening.responses.units[name]}"
-        table.add_row(load, name, mean, *(f"{value:.1f}" for value in percents), leading)
-    Console().print(table)
+        texts = (load, words.response(name), mean, *(f"{value:.1f}" for value in percents))
+        texts = (*texts, r2_text(found.predicted_r2), *([leading] if is_wide else []))
+        table.add_row(*texts)
+    console.print(table)

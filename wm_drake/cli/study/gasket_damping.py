@@ -9,14 +9,18 @@ import typer
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
+    OutOption,
+    OverwriteOption,
     SetOption,
     check_buildable,
     command_line,
     existing_file,
     interruptible,
     load_parameters,
+    warn_of_phase_error,
 )
-from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.result_folder import Run, result_folder
+from wm_drake.cli.terminal import say
 from wm_drake.errors import input_error
 
 if TYPE_CHECKING:
@@ -46,7 +50,8 @@ def gasket_damping(
     seed: Annotated[
         int, typer.Option(help="Seed of the noise of the virtual experiment.", min=0)
     ] = 0,
-    out: Annotated[Path, typer.Option(help="Folder for the results.", metavar="DIR")] = DEFAULT_OUT,
+    out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
@@ -55,7 +60,9 @@ def gasket_damping(
 
     parameters = load_parameters(machine, sets)
     check_buildable(machine, parameters)
-    with interruptible(), result_folder(out) as folder:
+    warn_of_phase_error(parameters)
+    run = Run("study gasket-damping", overwrite)
+    with interruptible(), result_folder(out, run) as folder:
         truth = None
         if record:
             measured: Measured = _read(parameters, record)
@@ -73,7 +80,7 @@ def gasket_damping(
 def _read(parameters: "MachineParameters", entries: list[str]) -> "Measured":
     import xarray as xr
 
-    from wm_drake.parameters.csv_files import read_csv
+    from wm_drake.parameters.csv_files import finite_numbers, read_csv
     from wm_drake.simulation.records import load_record
     from wm_drake.studies.gasket_damping.study import MM_PER_M, as_measured
 
@@ -90,10 +97,10 @@ def _read(parameters: "MachineParameters", entries: list[str]) -> "Measured":
         path = existing_file(Path(name), "--record")
         if path.suffix.lower() == ".csv":
             table = read_csv(path, ["time_s", *sensors])
-            values = table[sensors].to_numpy(dtype=float) / MM_PER_M
+            numbers = finite_numbers(table, path)
             record = xr.DataArray(
-                values,
-                {"time": table["time_s"].to_numpy(dtype=float), "sensor": sensors},
+                numbers[:, 1:] / MM_PER_M,
+                {"time": numbers[:, 0], "sensor": sensors},
                 ["time", "sensor"],
             )
         else:
@@ -135,7 +142,7 @@ def _virtual(parameters: "MachineParameters", truth: "FloatArray", seed: int) ->
                 "needs",
                 key="loads",
             )
-    typer.echo(
+    say(
         "No measured records were given. The Drake engine runs a virtual experiment with other "
         "damping values and noise.",
         err=True,
@@ -170,17 +177,22 @@ def _as_json(result: "Damping") -> dict[str, Any]:
         if result.truth is None
         else dict(zip(("C_L", "C_T"), in_units_of_paper(result.truth), strict=True))
     )
+    interval = None
+    if result.interval is not None:
+        ends = (in_units_of_paper(end) for end in (result.interval.low, result.interval.high))
+        interval = dict(zip(("C_L", "C_T"), map(list, zip(*ends, strict=True)), strict=True))
     return {
         "units": {"C_L": "N s/mm", "C_T": "N mm s/deg"},
         "virtual_experiment": result.truth is not None,
         "planted": truth,
         "grid": found(result.grid) | {"rounds": len(result.grid.rounds)},
         "scipy": found(result.scipy),
+        "interval_95": interval,
     }
 
 
 def _print_result(result: "Damping", out: Path) -> None:
     from wm_drake.report.gasket_damping.report import summary
 
-    typer.echo(summary(result))
-    typer.echo(f"Results in {out}: report.html, objective.csv")
+    say(summary(result))
+    say(f"Results in {out}: report.html, objective.csv")

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,6 +12,8 @@ import typer
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
+    OutOption,
+    OverwriteOption,
     SetOption,
     check_buildable,
     command_line,
@@ -19,9 +22,10 @@ from wm_drake.cli.common import (
     load_parameters,
 )
 from wm_drake.cli.progress import progress_bar
-from wm_drake.cli.result_folder import result_folder
-from wm_drake.cli.study.common import LEDGER, WorkersOption
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.cli.result_folder import LEDGER, Run, result_folder
+from wm_drake.cli.study.common import WorkersOption
+from wm_drake.cli.terminal import Console
+from wm_drake.errors import InputError, input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
@@ -90,13 +94,8 @@ def spin_cycle(
         ),
     ] = "compiled",
     workers: WorkersOption = None,
-    out: Annotated[
-        Path,
-        typer.Option(
-            help="Folder for the results. Runs that it already holds are not repeated.",
-            metavar="DIR",
-        ),
-    ] = DEFAULT_OUT,
+    out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
@@ -114,7 +113,12 @@ def spin_cycle(
     comparison = measurement(parameters, table, spin_profile, measured, accelerations)
     check_buildable(machine, parameters)
     kept = "finished cases are kept; repeat the command to continue"
-    with interruptible(kept), result_folder(out) as folder, open_runs(out) as ledger:
+    writer = Run(
+        "study spin-cycle",
+        overwrite,
+        study_identity(parameters, table, spin_profile, comparison, engine=engine),
+    )
+    with interruptible(kept), result_folder(out, writer, kept) as folder, open_runs(out) as ledger:
         result = _run(parameters, table, spin_profile, engine, ledger, workers)
         result = result if comparison is None else _with(result, comparison)
         _write(result, folder, engine)
@@ -156,11 +160,42 @@ def measurement(
 
     if measured and accelerations:
         raise input_error("not allowed together with --measured", where="--accelerations")
-    runs_of(parameters, cases, profile)  # raises an error for cases that cannot be run
+    try:
+        runs_of(parameters, cases, profile)  # raises an error for cases that cannot be run
+    except InputError as error:
+        raise InputError(
+            replace(p, where="--profile", key="") if p.key == "profile" else p
+            for p in error.problems
+        ) from None
     labels = labels_of(parameters, cases, profile)
     if measured:
         return read_rms(existing_file(measured, "--measured"), labels)
     return read_accelerations(accelerations, labels, profile) if accelerations else None
+
+
+def study_identity(
+    parameters: "MachineParameters",
+    cases: "list[UnbalanceCase]",
+    profile: "SpinProfile",
+    measured: "xr.DataArray | None",
+    **others: str,
+) -> dict[str, str]:
+    """Return the texts that identify a study of a spin cycle: its inputs and the program."""
+    from wm_drake.batch import sources_version
+    from wm_drake.batch.ledger import key_of
+    from wm_drake.batch.remembered import model_version
+
+    numbers = key_of(
+        machine=parameters.model_dump(exclude={"sources"}), model=model_version(parameters)
+    )
+    return {
+        "machine": f"{parameters.name} {numbers[:8]}",
+        "cases": f"{len(cases)} cases, {key_of(cases=cases)[:8]}",
+        "profile": key_of(profile=profile)[:8],
+        "measurements": "none" if measured is None else key_of(values=measured.values)[:8],
+        "sources": sources_version(),
+        **others,
+    }
 
 
 @contextmanager
@@ -181,7 +216,7 @@ def _run(
     ledger: "Ledger",
     workers: int | None,
 ) -> "SpinCycleResult":
-    from wm_drake.model.machine import build_machine
+    from wm_drake.model.build import build_machine
     from wm_drake.studies.spin_cycle.runs import compiled_runs, drake_runs
     from wm_drake.studies.spin_cycle.study import run_spin_cycle
 
@@ -196,8 +231,6 @@ def _run(
 
 
 def _with(result: "SpinCycleResult", measured: "xr.DataArray") -> "SpinCycleResult":
-    from dataclasses import replace
-
     return replace(result, measured=measured)
 
 
@@ -215,7 +248,6 @@ def _write(result: "SpinCycleResult", folder: Path, engine: str) -> None:
 
 
 def _print_table(result: "SpinCycleResult", out: Path) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from wm_drake.report.spin_cycle.tables import case_table

@@ -10,6 +10,8 @@ import typer
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
+    OutOption,
+    OverwriteOption,
     SetOption,
     check_buildable,
     command_line,
@@ -17,9 +19,10 @@ from wm_drake.cli.common import (
     load_parameters,
 )
 from wm_drake.cli.progress import progress_bar
-from wm_drake.cli.result_folder import result_folder
+from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.study.common import WorkersOption
-from wm_drake.cli.study.spin_cycle import cases_of_table, measurement, open_runs
+from wm_drake.cli.study.spin_cycle import cases_of_table, measurement, open_runs, study_identity
+from wm_drake.cli.terminal import Console, say
 from wm_drake.errors import input_error
 
 if TYPE_CHECKING:
@@ -81,16 +84,13 @@ def spin_identify(
     ] = 0.005,
     seed: Annotated[
         int,
-        typer.Option(help="Seed of the planted values of a virtual experiment, and of the search."),
+        typer.Option(
+            help="Seed of the planted values of a virtual experiment, and of the search.", min=0
+        ),
     ] = 0,
     workers: WorkersOption = None,
-    out: Annotated[
-        Path,
-        typer.Option(
-            help="Folder for the results. Runs that it already holds are not repeated.",
-            metavar="DIR",
-        ),
-    ] = DEFAULT_OUT,
+    out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
@@ -98,6 +98,7 @@ def spin_identify(
 
     Without measurements, the displacements come from a virtual experiment.
     """
+    from wm_drake.batch.ledger import key_of
     from wm_drake.parameters import load_profile
     from wm_drake.studies.spin_identification.study import DEFAULT_CASES, SpinModel
 
@@ -109,7 +110,16 @@ def spin_identify(
     check_buildable(machine, parameters)
     model = partial(SpinModel, parameters, spin_profile, tuple(table), sought)
     kept = "finished runs are kept; repeat the command to continue"
-    with interruptible(kept), result_folder(out) as folder, open_runs(out) as ledger:
+    identity = study_identity(
+        parameters,
+        table,
+        spin_profile,
+        given,
+        unknowns=key_of(sought=sought)[:8],
+        noise=f"{noise:g}, seed {seed}",
+    )
+    writer = Run("study spin-identify", overwrite, identity)
+    with interruptible(kept), result_folder(out, writer, kept) as folder, open_runs(out) as ledger:
         result = _identify(model, given, noise, seed, ledger, workers)
         _write(result, folder)
         ledger.mark_finished()
@@ -175,7 +185,7 @@ def _identify(
     model: Any, given: Any, noise: float, seed: int, ledger: Any, workers: int | None
 ) -> "SpinIdentification":
     from wm_drake.batch import simulate_remembered
-    from wm_drake.model.machine import build_machine
+    from wm_drake.model.build import build_machine
     from wm_drake.studies.spin_identification.study import (
         identify_from_spin,
         planted_values,
@@ -199,9 +209,14 @@ def _identify(
 
 
 def _write(result: "SpinIdentification", folder: Path) -> None:
-    from wm_drake.report.spin_identify.report import spin_identify_report
+    from wm_drake.parameters import machine_yaml
+    from wm_drake.report.spin_identify.report import spin_identify_report, values_table
     from wm_drake.studies.spin_cycle.measured import rms_table
+    from wm_drake.studies.spin_identification.study import identified_machine
 
+    text = machine_yaml(identified_machine(result))
+    (folder / "identified.yaml").write_text(text, encoding="utf-8")
+    values_table(result).to_csv(folder / "parameters.csv", index=False, float_format="%.7g")
     rms_table(result.measured).to_csv(folder / "measured.csv", index=False, float_format="%.6g")
     rms_table(result.after).to_csv(folder / "rms.csv", index=False, float_format="%.6g")
     command = command_line()
@@ -209,30 +224,25 @@ def _write(result: "SpinIdentification", folder: Path) -> None:
 
 
 def _print_table(result: "SpinIdentification", out: Path) -> None:
-    from rich.console import Console
-    from rich.table import Table
 
-    from wm_drake.report.spin_identify.report import directions, summary, unknowns
+    from wm_drake.report.spin_identify.report import directions, summary, unknowns, warnings_of
 
     console = Console()
-    console.print(summary(result))
+    for text in (summary(result), *warnings_of(result)):
+        console.print(text, highlight=False)
     shown = unknowns(result)
-    # a narrow first column: keys are broken at their dots, keys of the same value below each other
-    keys = [
-        "\n= ".join(sought.keys[:1] + tuple(key.rsplit(".", 1)[-1] for key in sought.keys[1:]))
-        for sought in result.sought
-    ]
-    keys = [text.replace(".", ".\n") for text in keys]
-    table = Table()
-    table.add_column("unknown", no_wrap=True)
-    for name in shown.header[2:]:
-        table.add_column(name, justify="right", overflow="fold")
-    for text, group in zip(keys, shown.groups, strict=True):
-        table.add_row(text, *group.rows[0].cells[1:])
-    console.print(table)
+    rows = [shown.header[2:], *(group.rows[0].cells[1:] for group in shown.groups)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ["  " + "  ".join(map(str.rjust, row, widths)) for row in rows]
+    # each key has a line of its own, so that no terminal breaks it
+    say(f"\n{lines[0]}")
+    for sought, line in zip(result.sought, lines[1:], strict=True):
+        say("\n= ".join(sought.keys))
+        say(line)
+    say("")
     for text in directions(result):
-        console.print(text)
-    console.print(f"Results in {out}: report.html, measured.csv, rms.csv")
+        console.print(text, highlight=False, markup=False)
+    say(f"Results in {out}: report.html, identified.yaml, parameters.csv, measured.csv, rms.csv")
 
 
 def _as_json(result: "SpinIdentification") -> dict[str, Any]:
@@ -254,6 +264,7 @@ def _as_json(result: "SpinIdentification") -> dict[str, Any]:
         "virtual_experiment": result.planted is not None,
         "cases": [case.name for case in result.cases],
         "average_error_before": float(average_errors(result.before, result.measured).mean()),
-        "average_error_after": float(average_errors(result.after, result.measured).mean()),
+        "average_error_after": result.error_after,
+        "verdict": result.verdict,
         **shown,
     }

@@ -7,16 +7,13 @@ and its inertia I about To:
 
     M a_O + w' x S + w x (w x S) = F,    S x a_O + I w' + w x (I w) = tau
 
-Packed numbers, from the index of the bearing: 1/M [1/kg]; S [kg m]; I as xx, yy, zz, xy, xz, yz
-[kg m^2]; then those of `SixComponentBushingParameters`.
-
-State, behind all others: roll, pitch, yaw, position of the carrier; its angular velocity and
-velocity.
+The packed numbers are those of `TUB_AND_BEARING`; the state of the carrier is a `CARRIER_STATE`.
 """
 
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import sine_cosine
-from wm_drake.compiler.matrices import about_centre, inverse, six, three, times
+from wm_drake.compiler.matrices import about_centre, inverse, times
+from wm_drake.compiler.packed import LAYOUT, SCALAR, SYMMETRIC, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import (
     add,
     cross,
@@ -26,12 +23,21 @@ from wm_drake.compiler.vectors import (
     scale,
     subtract,
 )
+from wm_drake.elements.bushing import BUSHING
 from wm_drake.elements.motion import TubMotion, rpy_rates
 
-TUB_SIZE = 10
-"""Numbers of the tub's body."""
-CARRIER_STATE_SIZE = 12
-"""Numbers of the carrier in the state."""
+TUB = PackedLayout("TubNumbers", inverse_mass=SCALAR, moment=VECTOR, inertia=SYMMETRIC)
+"""The tub without drum: 1/M [1/kg], S [kg m], I [kg m^2]."""
+TUB_AND_BEARING = PackedLayout("TubAndBearingNumbers", tub=LAYOUT(TUB), bearing=LAYOUT(BUSHING))
+"""Packed numbers of a compliant bearing: the tub, then the bushing."""
+CARRIER_STATE = PackedLayout(
+    "CarrierState", angles=VECTOR, position=VECTOR, angular_velocity=VECTOR, velocity=VECTOR
+)
+"""Roll, pitch, yaw and position of the carrier, its angular velocity and velocity, in W."""
+CARRIER_STATE_SIZE = CARRIER_STATE.fixed_size
+
+read_tub, read_tub_and_bearing = TUB.read, TUB_AND_BEARING.read
+read_carrier_state, write_carrier_state = CARRIER_STATE.read, CARRIER_STATE.write
 
 
 @law
@@ -43,12 +49,13 @@ def tub_accelerations(motion, wrench, gravity, p, at):
         wrench: Moment about To and force of all elements on the tub, in W, without gravity.
             [N m, N]
         gravity: Acceleration in W. [m/s^2]
-        p, at: Packed numbers and index of the bearing in them.
+        p, at: Array that holds the numbers of `TUB`, and index where they begin.
 
     Returns:
         Angular acceleration of the tub and acceleration of To, in W. [rad/s^2, m/s^2]
     """
-    q, first, i = p[at], three(p, at + 1), six(p, at + 4)
+    tub = read_tub(p, at)
+    q, first, i = tub.inverse_mass, tub.moment, tub.inertia
     w = rotate_back(motion.rotation, motion.angular_velocity)
     force = rotate_back(motion.rotation, (wrench[3], wrench[4], wrench[5]))
     force = subtract(force, cross(w, cross(w, first)))
@@ -60,16 +67,13 @@ def tub_accelerations(motion, wrench, gravity, p, at):
 
 
 @law
-def carrier_motion(x, dx, k):
-    """Return the motion of the carrier, whose state begins at index k.
-
-    The rates of its angles and of its position are written into `dx`.
-    """
-    roll, pitch, yaw = sine_cosine(x[k]), sine_cosine(x[k + 1]), sine_cosine(x[k + 2])
-    w, v = (x[k + 6], x[k + 7], x[k + 8]), (x[k + 9], x[k + 10], x[k + 11])
-    dx[k], dx[k + 1], dx[k + 2] = rpy_rates(w, pitch, yaw)
-    dx[k + 3], dx[k + 4], dx[k + 5] = v
-    return TubMotion(rotation_from_sines(roll, pitch, yaw), (x[k + 3], x[k + 4], x[k + 5]), w, v)
+def carrier_motion(x, k):
+    """Return the motion of the carrier, whose state begins at index k, and its angle rates."""
+    state = read_carrier_state(x, k)
+    angles, w = state.angles, state.angular_velocity
+    roll, pitch, yaw = sine_cosine(angles[0]), sine_cosine(angles[1]), sine_cosine(angles[2])
+    rotation = rotation_from_sines(roll, pitch, yaw)
+    return TubMotion(rotation, state.position, w, state.velocity), rpy_rates(w, pitch, yaw)
 
 
 @law

@@ -1,26 +1,28 @@
 """The time derivative of a machine's state, for integrators of other packages and for tests."""
 
+import numpy as np
+
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.integration import derivative_lanes
 from wm_drake.engines.compiled.packing import aligned, fill_lanes, pack
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 
 
 class StateDerivative:
     """The time derivative of the state of a machine as it is set up.
 
-    A state has the layout of `wm_drake.engines.compiled.mechanics`; `initial_state` gives one.
+    A state has the layout of `wm_drake.engines.compiled.mechanics`; see `initial_state`.
 
     Attributes:
-        layout: Where the parts of the machine begin in packed numbers and states.
+        layout: Indices of the parts of the machine in packed numbers and states.
     """
 
     def __init__(self, setup: Setup) -> None:
         """Pack a machine.
 
         Raises:
-            InputError: it has something that the compiled engine does not represent.
+            InputError: the machine has something that the compiled engine does not represent.
         """
         packed, self.layout = pack(setup)
         self._elements = self.layout.elements
@@ -31,12 +33,25 @@ class StateDerivative:
 
         Args:
             x: State (size,).
-            acceleration: Acceleration of the drum against what carries it. [rad/s^2]
+            acceleration: Acceleration of the drum against the tub, or against the drum carrier
+                with a compliant bearing. [rad/s^2]
 
         Returns:
-            (size,) The derivative of each number of the state. All lanes compute the same one.
+            Derivative of each number of the state (size,). All lanes compute the same derivative.
         """
-        state, rate = (aligned(len(x) * WIDTH) for _ in range(2))
-        fill_lanes(state, [x])
+        return self.at_states(np.tile(x, (WIDTH, 1)), acceleration)[0]
+
+    def at_states(self, states: FloatArray, acceleration: float = 0.0) -> FloatArray:
+        """Return the time derivatives at several states of one machine.
+
+        Args:
+            states: (WIDTH, size), one a lane.
+            acceleration: As for a call, the same at all states. [rad/s^2]
+
+        Returns:
+            (WIDTH, size)
+        """
+        state, rate = aligned(states.size), aligned(states.size)
+        state[:] = states.T.ravel()
         derivative_lanes(state, rate, acceleration, self._p, self._elements)
-        return rate[::WIDTH].copy()
+        return rate.reshape(-1, WIDTH).T.copy()

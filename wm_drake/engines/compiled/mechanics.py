@@ -12,21 +12,18 @@ O; a: unit vector of the axis, along the drum's rotation against the tub. The dr
 the drum angle exactly: for a body that turns about a fixed axis they contain the first and second
 harmonic of the angle and no other.
 
-Packed numbers of the bodies, from index 0 (`wm_drake.engines.compiled.packing`): gravity vector in
-W [m/s^2]; 1/M [1/kg]; a; position of O from To [m]; S_t [kg m]; I_t as xx, yy, zz, xy, xz, yz
-[kg m^2]; s_d, three times its mean, cosine and sine part; J_d, six times its mean, cosine, sine,
-double cosine and double sine part; damping of the drum joint [N m s/rad].
+The packed numbers of the bodies are those of `BODIES`, from index 0.
 
-State: that of the plant (tub and drum); the deformation of each strut damper; the states of
-telescopic dampers (`wm_drake.engines.compiled.tubes`); the state of the drum's carrier
-(`wm_drake.engines.compiled.bearing`).
+State: tub and drum (`TREE_STATE`); the deformation of each strut damper; the `TUBES_STATE` of each
+telescopic damper; the `CARRIER_STATE` of the drum's carrier in a compliant bearing.
 """
 
 from collections import namedtuple
 
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import anywhere, sine_cosine
-from wm_drake.compiler.matrices import about_centre, inverse, plus, six, three, times
+from wm_drake.compiler.matrices import about_centre, inverse, plus, times
+from wm_drake.compiler.packed import LAYOUT, SCALAR, SYMMETRIC, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import add, cross, dot, rotate, rotate_back, scale, subtract
 from wm_drake.elements.bearing import drum_bearing_forces
 from wm_drake.elements.bushing import six_component_bushing_wrench
@@ -35,13 +32,21 @@ from wm_drake.elements.friction_damper import (
     friction_damper_tension,
     friction_damper_wrench,
 )
-from wm_drake.elements.motion import PLANT_STATE_SIZE, motion_from_sines, rpy_rates
+from wm_drake.elements.motion import (
+    TREE_STATE,
+    motion_from_sines,
+    read_tree_state,
+    rpy_rates,
+    write_tree_state,
+)
 from wm_drake.elements.spring import spring_strut_wrench
 from wm_drake.engines.compiled.bearing import (
-    TUB_SIZE,
     carrier_motion,
     carrier_size,
+    read_carrier_state,
+    read_tub_and_bearing,
     tub_accelerations,
+    write_carrier_state,
 )
 from wm_drake.engines.compiled.tubes import (
     TUBES_STATE_SIZE,
@@ -49,20 +54,54 @@ from wm_drake.engines.compiled.tubes import (
     telescopic_damper_count,
 )
 
-GRAVITY, INVERSE_MASS, AXIS, ORIGIN = 0, 3, 4, 7
-TUB_MOMENT, TUB_INERTIA, DRUM_MOMENT, DRUM_INERTIA = 10, 13, 19, 28
-JOINT_DAMPING, BODIES_SIZE = 58, 59
-STATE_SIZE = PLANT_STATE_SIZE
+FIRST_HARMONIC = PackedLayout("FirstHarmonic", mean=SCALAR, cosine=SCALAR, sine=SCALAR)
+"""Parts of a function of the drum angle."""
+SECOND_HARMONIC = PackedLayout(
+    "SecondHarmonic",
+    mean=SCALAR,
+    cosine=SCALAR,
+    sine=SCALAR,
+    double_cosine=SCALAR,
+    double_sine=SCALAR,
+)
+"""Parts of a function of the drum angle and of the double drum angle."""
+BODIES = PackedLayout(
+    "BodiesNumbers",
+    gravity=VECTOR,
+    inverse_mass=SCALAR,
+    axis=VECTOR,
+    origin=VECTOR,
+    tub_moment=VECTOR,
+    tub_inertia=SYMMETRIC,
+    drum_moment_x=LAYOUT(FIRST_HARMONIC),
+    drum_moment_y=LAYOUT(FIRST_HARMONIC),
+    drum_moment_z=LAYOUT(FIRST_HARMONIC),
+    drum_inertia_xx=LAYOUT(SECOND_HARMONIC),
+    drum_inertia_yy=LAYOUT(SECOND_HARMONIC),
+    drum_inertia_zz=LAYOUT(SECOND_HARMONIC),
+    drum_inertia_xy=LAYOUT(SECOND_HARMONIC),
+    drum_inertia_xz=LAYOUT(SECOND_HARMONIC),
+    drum_inertia_yz=LAYOUT(SECOND_HARMONIC),
+    joint_damping=SCALAR,
+)
+"""Packed bodies: gravity in W [m/s^2]; 1/M [1/kg]; a; position of O from To [m]; S_t [kg m]; I_t
+[kg m^2]; s_d [kg m]; J_d [kg m^2]; damping of the drum joint [N m s/rad]."""
+BODIES_SIZE = BODIES.fixed_size
+STATE_SIZE = TREE_STATE.fixed_size
 """Size of the part of the state that belongs to tub and drum."""
-DRUM_ANGLE, DRUM_RATE = 6, 13
+DRUM_ANGLE, DRUM_RATE = TREE_STATE.offsets["joint_position"], TREE_STATE.offsets["joint_rate"]
 """Indices of the drum's angle and rate in the state."""
-RATES_SIZE = 6
-"""Accelerations of a body in a sample."""
+RATES = PackedLayout("Rates", angular_acceleration=VECTOR, acceleration=VECTOR)
+"""Accelerations of a body in a sample: angular, and of its origin, in W. [rad/s^2, m/s^2]"""
+RATES_SIZE = RATES.fixed_size
+
+read_first_harmonic, read_second_harmonic = FIRST_HARMONIC.read, SECOND_HARMONIC.read
+read_bodies, read_rates, write_rates_of = BODIES.read, RATES.read, RATES.write
 
 Elements = namedtuple(
     "Elements", ("springs", "dampers", "bushings", "telescopes", "bearing", "tubes")
 )
-"""Where the parts of a machine begin.
+"""Indices at which the parts of a machine begin.
 
 springs, dampers, bushings: arrays of indices of the elements in the packed numbers; telescopes: the
 same for telescopic dampers, None if there are none; bearing: index of the drum's bearing in the
@@ -76,38 +115,39 @@ MassProperties = namedtuple(
 
 
 @law
-def first_harmonic(p, at, c, s):
-    """Return the mean + cosine part c + sine part s."""
-    return p[at] + p[at + 1] * c + p[at + 2] * s
+def first_harmonic(c, s, p, at):
+    """Return a function of the drum angle, whose parts begin at `at`; c, s: cosine and sine."""
+    part = read_first_harmonic(p, at)
+    return part.mean + part.cosine * c + part.sine * s
 
 
 @law
-def second_harmonic(p, at, c, s):
-    """Return the first harmonic plus the cosine and sine part of the double angle."""
-    return first_harmonic(p, at, c, s) + p[at + 3] * (c * c - s * s) + p[at + 4] * (2.0 * c * s)
+def second_harmonic(c, s, p, at):
+    """Return a function of drum angle and double drum angle; arguments as `first_harmonic`."""
+    part = read_second_harmonic(p, at)
+    first = part.mean + part.cosine * c + part.sine * s
+    return first + part.double_cosine * (c * c - s * s) + part.double_sine * (2.0 * c * s)
 
 
 @law
 def mass_properties(p, c, s):
     """Return the `MassProperties` at a drum angle of cosine c and sine s."""
-    at = DRUM_MOMENT
+    bodies = read_bodies(p, 0)
     drum = (
-        first_harmonic(p, at, c, s),
-        first_harmonic(p, at + 3, c, s),
-        first_harmonic(p, at + 6, c, s),
+        first_harmonic(c, s, *bodies.drum_moment_x),
+        first_harmonic(c, s, *bodies.drum_moment_y),
+        first_harmonic(c, s, *bodies.drum_moment_z),
     )
-    at = DRUM_INERTIA
     j = (
-        second_harmonic(p, at, c, s),
-        second_harmonic(p, at + 5, c, s),
-        second_harmonic(p, at + 10, c, s),
-        second_harmonic(p, at + 15, c, s),
-        second_harmonic(p, at + 20, c, s),
-        second_harmonic(p, at + 25, c, s),
+        second_harmonic(c, s, *bodies.drum_inertia_xx),
+        second_harmonic(c, s, *bodies.drum_inertia_yy),
+        second_harmonic(c, s, *bodies.drum_inertia_zz),
+        second_harmonic(c, s, *bodies.drum_inertia_xy),
+        second_harmonic(c, s, *bodies.drum_inertia_xz),
+        second_harmonic(c, s, *bodies.drum_inertia_yz),
     )
-    t = six(p, TUB_INERTIA)
-    m = add(three(p, TUB_MOMENT), drum)
-    q = p[INVERSE_MASS]
+    t, q = bodies.tub_inertia, bodies.inverse_mass
+    m = add(bodies.tub_moment, drum)
     both = (t[0] + j[0], t[1] + j[1], t[2] + j[2], t[3] + j[3], t[4] + j[4], t[5] + j[5])
     return MassProperties(drum, j, m, inverse(about_centre(both, m, q)))
 
@@ -127,8 +167,8 @@ def accelerations(motion, masses, rate, acceleration, wrench, p):
     Returns:
         Angular acceleration of the tub and acceleration of To, in W. [rad/s^2, m/s^2]
     """
-    a, o, tub_moment = three(p, AXIS), three(p, ORIGIN), three(p, TUB_MOMENT)
-    q = p[INVERSE_MASS]
+    bodies = read_bodies(p, 0)
+    a, o, q = bodies.axis, bodies.origin, bodies.inverse_mass
     applied = rotate_back(motion.rotation, (wrench[3], wrench[4], wrench[5]))
     moment = rotate_back(motion.rotation, (wrench[0], wrench[1], wrench[2]))
     apart = anywhere((abs(o[0]) > 0.0) | (abs(o[1]) > 0.0) | (abs(o[2]) > 0.0))
@@ -137,16 +177,16 @@ def accelerations(motion, masses, rate, acceleration, wrench, p):
     w = rotate_back(motion.rotation, motion.angular_velocity)
     w_drum, b = drum_motion(w, rate, acceleration, a)
     drum_flow = add(cross(b, masses.drum_moment), cross(w_drum, cross(w_drum, masses.drum_moment)))
-    force = subtract(applied, add(cross(w, cross(w, tub_moment)), drum_flow))
+    force = subtract(applied, add(cross(w, cross(w, bodies.tub_moment)), drum_flow))
     gyration = add(times(masses.drum_inertia, b), cross(w_drum, times(masses.drum_inertia, w_drum)))
-    moment = subtract(moment, add(cross(w, times(six(p, TUB_INERTIA), w)), gyration))
+    moment = subtract(moment, add(cross(w, times(bodies.tub_inertia, w)), gyration))
     # gravity accelerates all bodies equally: it has no moment and is added at the end
     w_rate = times(masses.inverse_inertia, subtract(moment, scale(q, cross(masses.moment, force))))
     a_O = scale(q, subtract(force, cross(w_rate, masses.moment)))
     a_To = a_O
     if apart:
         a_To = subtract(a_O, add(cross(w_rate, o), cross(w, cross(w, o))))
-    return rotate(motion.rotation, w_rate), add(rotate(motion.rotation, a_To), three(p, GRAVITY))
+    return rotate(motion.rotation, w_rate), add(rotate(motion.rotation, a_To), bodies.gravity)
 
 
 @law
@@ -156,27 +196,28 @@ def motor_torque(motion, w_rate, v_rate, masses, rate, acceleration, p):
     Args:
         motion: `TubMotion` of the tub, or of the drum's carrier in a compliant bearing.
         w_rate, v_rate: Its accelerations, as `accelerations` returns them.
-        masses, rate, acceleration, p: As for `accelerations`.
+        masses, rate, acceleration, p: See `accelerations`.
     """
-    a, o = three(p, AXIS), three(p, ORIGIN)
+    bodies = read_bodies(p, 0)
+    a, o = bodies.axis, bodies.origin
     w, w_rate = (
         rotate_back(motion.rotation, motion.angular_velocity),
         rotate_back(motion.rotation, w_rate),
     )
     w_drum, b = drum_motion(w, rate, acceleration, a)
-    a_To = rotate_back(motion.rotation, subtract(v_rate, three(p, GRAVITY)))
+    a_To = rotate_back(motion.rotation, subtract(v_rate, bodies.gravity))
     a_O = add(a_To, add(cross(w_rate, o), cross(w, cross(w, o))))
     turning = times(masses.drum_inertia, add(b, w_rate))
     on_drum = add(
         add(turning, cross(w_drum, times(masses.drum_inertia, w_drum))),
         cross(masses.drum_moment, a_O),
     )
-    return dot(a, on_drum) + p[JOINT_DAMPING] * rate
+    return dot(a, on_drum) + bodies.joint_damping * rate
 
 
 @law
 def drum_motion(w, rate, acceleration, a):
-    """Return w_D and b of the drum, in T."""
+    """Return the angular velocity w_D and the angular acceleration term b of the drum, in T."""
     return add(w, scale(rate, a)), add(scale(acceleration, a), scale(rate, cross(w, a)))
 
 
@@ -186,12 +227,13 @@ def state_derivative(x, dx, masses, rate, acceleration, p, elements):
 
     Args:
         x, dx: State and its derivative; the drum's angle and rate in x are not read.
-        masses, rate, acceleration, p: As for `accelerations`.
+        masses, rate, acceleration, p: See `accelerations`.
         elements: `Elements`.
     """
-    roll, pitch, yaw = sine_cosine(x[0]), sine_cosine(x[1]), sine_cosine(x[2])
+    angles = read_tree_state(x, 0).angles
+    roll, pitch, yaw = sine_cosine(angles[0]), sine_cosine(angles[1]), sine_cosine(angles[2])
     motion = motion_from_sines(x, 0, roll, pitch, yaw)
-    zero = 0.0 * x[0]
+    zero = 0.0 * angles[0]
     total = (zero, zero, zero, zero, zero, zero)
     for at in elements.springs:
         wrench, _ = spring_strut_wrench(motion, p, at)
@@ -205,18 +247,22 @@ def state_derivative(x, dx, masses, rate, acceleration, p, elements):
         tension, dx[k] = friction_damper_tension(line[1], x[k], p, at)
         total = plus(total, friction_damper_wrench(motion, arm, line, tension, p, at))
     total = add_telescopic_dampers(
-        x, dx, motion, three(p, GRAVITY), p, elements.telescopes, elements.tubes, total
+        x, dx, motion, read_bodies(p, 0).gravity, p, elements.telescopes, elements.tubes, total
     )
     bodies = motion, masses, rate, acceleration, total, p
     w_rate, v_rate = tub_and_carrier_accelerations(
         x, dx, *bodies, elements.bearing, carrier_begin(elements)
     )
-    dx[0], dx[1], dx[2] = rpy_rates(motion.angular_velocity, pitch, yaw)
-    dx[3], dx[4], dx[5] = motion.velocity
-    dx[6] = zero + rate
-    dx[7], dx[8], dx[9] = w_rate
-    dx[10], dx[11], dx[12] = v_rate
-    dx[13] = zero + acceleration
+    write_tree_state(
+        dx,
+        0,
+        angles=rpy_rates(motion.angular_velocity, pitch, yaw),
+        position=motion.velocity,
+        joint_position=zero + rate,
+        angular_velocity=w_rate,
+        velocity=v_rate,
+        joint_rate=zero + acceleration,
+    )
 
 
 @law
@@ -225,12 +271,12 @@ def tub_and_carrier_accelerations(
 ):
     """Return the accelerations of the tub; write the derivative of the carrier's state, if any.
 
-    With a rigid bearing the tub carries the drum. With a compliant one a massless carrier does, and
-    the packed bodies are those of carrier and drum.
+    With a rigid bearing the drum turns in the tub. With a compliant bearing it turns in a massless
+    carrier, and the packed bodies are carrier and drum.
 
     Args:
         x, dx: State and its derivative.
-        motion, masses, rate, acceleration: As for `accelerations`.
+        motion, masses, rate, acceleration: See `accelerations`.
         total: Moment about To and force on the tub, in W, of all elements but the bearing, without
             gravity. [N m, N]
         p: Packed numbers.
@@ -240,12 +286,12 @@ def tub_and_carrier_accelerations(
     """
     if bearing is None:
         return accelerations(motion, masses, rate, acceleration, total, p)
-    carrier = carrier_motion(x, dx, first)
-    on_tub, on_carrier, _ = drum_bearing_forces(motion, carrier, p, bearing + TUB_SIZE)
+    numbers, gravity = read_tub_and_bearing(p, bearing), read_bodies(p, 0).gravity
+    carrier, angle_rates = carrier_motion(x, first)
+    on_tub, on_carrier, _ = drum_bearing_forces(motion, carrier, *numbers.bearing)
     w_rate, v_rate = accelerations(carrier, masses, rate, acceleration, on_carrier, p)
-    dx[first + 6], dx[first + 7], dx[first + 8] = w_rate
-    dx[first + 9], dx[first + 10], dx[first + 11] = v_rate
-    return tub_accelerations(motion, plus(total, on_tub), three(p, GRAVITY), p, bearing)
+    write_carrier_state(dx, first, angle_rates, carrier.velocity, w_rate, v_rate)
+    return tub_accelerations(motion, plus(total, on_tub), gravity, *numbers.tub)
 
 
 @law
@@ -256,22 +302,18 @@ def state_size(elements):
 
 @law
 def rates_size(elements):
-    """Return how many accelerations a sample has."""
+    """Return the number of accelerations in a sample."""
     return RATES_SIZE if elements.bearing is None else 2 * RATES_SIZE
 
 
 @law
 def write_rates(history, at, dx, elements):
-    """Write the accelerations of the tub into a sample, and those of the carrier behind them.
-
-    Each is the angular acceleration and the acceleration of the origin, in W. [rad/s^2, m/s^2]
-    """
-    for k in range(RATES_SIZE):
-        history[at + k] = dx[7 + k]
+    """Write the `RATES` of the tub into a sample, and those of the carrier behind them."""
+    tub = read_tree_state(dx, 0)
+    write_rates_of(history, at, tub.angular_velocity, tub.velocity)
     if elements.bearing is not None:
-        first = carrier_begin(elements) + 6
-        for k in range(RATES_SIZE):
-            history[at + RATES_SIZE + k] = dx[first + k]
+        carrier = read_carrier_state(dx, carrier_begin(elements))
+        write_rates_of(history, at + RATES_SIZE, carrier.angular_velocity, carrier.velocity)
 
 
 @law

@@ -8,16 +8,26 @@ from pydrake.multibody.tree import ForceElementIndex, RevoluteJoint, SpatialIner
 from pydrake.systems.framework import Context
 
 from wm_drake.compiler.lanes import WIDTH
+from wm_drake.elements.motion import POSE
+from wm_drake.engines.compiled.bearing import TUB, TUB_AND_BEARING
 from wm_drake.engines.compiled.mechanics import (
+    BODIES,
     BODIES_SIZE,
     DRUM_RATE,
+    FIRST_HARMONIC,
     RATES_SIZE,
+    SECOND_HARMONIC,
     STATE_SIZE,
     Elements,
 )
-from wm_drake.engines.compiled.tubes import TUBES_STATE_SIZE
+from wm_drake.engines.compiled.tubes import (
+    DEFORMATION,
+    TUBES,
+    TUBES_AND_DAMPER,
+    TUBES_STATE_SIZE,
+)
 from wm_drake.errors import InputError, input_error
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import Setup
 from wm_drake.model.state_layout import CARRIER
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
@@ -46,9 +56,10 @@ class Layout:
 
     @property
     def elements(self) -> Elements:
-        """The indices for compiled functions.
+        """The indices in the form that compiled functions use.
 
-        None for tubes or bearing compiles the functions without them.
+        Without telescopic dampers or without a compliant bearing their index is None, and the
+        functions are compiled without them.
         """
         springs, dampers, bushings, telescopes = (
             np.array(indices, dtype=np.int64)
@@ -67,7 +78,7 @@ class Layout:
 
     @property
     def rates_size(self) -> int:
-        """How many accelerations a sample has behind the state."""
+        """Number of accelerations in a sample, behind the state."""
         return RATES_SIZE if self.bearing < 0 else 2 * RATES_SIZE
 
     def parts(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -83,14 +94,15 @@ class Layout:
         tubes = states[:, tubes_begin:tubes_end].reshape(
             len(states), len(self.telescopes), TUBES_STATE_SIZE
         )
-        deformation = np.hstack([states[:, STATE_SIZE:tubes_begin], tubes[:, :, -1]])
-        return states[:, :STATE_SIZE], deformation, tubes[:, :, :-1], states[:, tubes_end:]
+        own, deformation_of_tubes = tubes[:, :, :STATE_SIZE], tubes[:, :, DEFORMATION]
+        deformation = np.hstack([states[:, STATE_SIZE:tubes_begin], deformation_of_tubes])
+        return states[:, :STATE_SIZE], deformation, own, states[:, tubes_end:]
 
 
 def pack(setup: Setup) -> tuple[FloatArray, Layout]:
     """Return the packed numbers of a machine as it is set up, and their layout.
 
-    The bodies come first, laid out as in `wm_drake.engines.compiled.mechanics`, then the elements.
+    The bodies come first (`BODIES`), then the elements.
 
     Raises:
         InputError: the machine has something that the compiled engine does not represent.
@@ -113,14 +125,16 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
     begins = []
     for name, telescope in setup.telescopes.items():
         begins.append(size)
-        parts += [pack_tubes(setup, name), telescope.packed()]
-        size += sum(map(len, parts[-2:]))
+        parts.append(
+            TUBES_AND_DAMPER.pack(tubes=pack_tubes(setup, name), damper=telescope.packed())
+        )
+        size += len(parts[-1])
         structure += telescope.structure
     indices["telescopes"] = tuple(begins)
     names = list(setup.bushings)
     gasket = indices["bushings"][names.index("gasket")] if "gasket" in names else -1
     if setup.bearing:
-        parts += [pack_tub(setup), setup.bearing.packed()]
+        parts.append(TUB_AND_BEARING.pack(tub=pack_tub(setup), bearing=setup.bearing.packed()))
         structure += setup.bearing.structure
     bearing = size if setup.bearing else -1
     return np.concatenate(parts), Layout(
@@ -135,7 +149,7 @@ def pack_on_tub(setup: Setup, size: int = 0) -> tuple[FloatArray, dict[str, tupl
 
     Args:
         setup: The machine.
-        size: How many numbers come before.
+        size: Number of packed numbers before these.
     """
     packed: list[FloatArray] = []
     indices: dict[str, tuple[int, ...]] = {}
@@ -150,7 +164,7 @@ def pack_on_tub(setup: Setup, size: int = 0) -> tuple[FloatArray, dict[str, tupl
 
 
 def aligned(size: int) -> FloatArray:
-    """Return zeros at an address from which one load reads a whole vector."""
+    """Return zeros at an address that is aligned to the size of a vector of lanes. (size,)"""
     raw = np.zeros(size + WIDTH)
     begin = (-raw.ctypes.data // raw.itemsize) % WIDTH
     return raw[begin : begin + size]
@@ -179,19 +193,19 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     The machine is at rest at the rest pose, the drum at its first speed, sponges undeformed.
     """
     x = np.zeros(STATE_SIZE + len(setup.dampers))
-    x[:6] = setup.rest_pose
+    x[: POSE.fixed_size] = setup.rest_pose
     x[DRUM_RATE] = profile.speed[0]
     tubes = np.zeros((len(setup.telescopes), TUBES_STATE_SIZE))
-    tubes[:, :7] = setup.tube_rest
+    tubes[:, : setup.tube_rest.shape[1]] = setup.tube_rest
     carrier = np.append(setup.carrier_rest, np.zeros_like(setup.carrier_rest))
     return np.concatenate([x, tubes.ravel(), carrier])
 
 
 def pack_tubes(setup: Setup, name: str) -> FloatArray:
-    """Return the packed bodies of a telescopic damper (`wm_drake.engines.compiled.tubes`).
+    """Return the packed bodies of a telescopic damper (`TUBES`).
 
     Raises:
-        InputError: its joint has something that the compiled engine does not represent.
+        InputError: the joint has something that the compiled engine does not represent.
     """
     plant, context = setup.machine.plant, setup.plant_context
     joint = plant.GetJointByName(setup.parameters.telescopic_dampers[name].joint)
@@ -216,21 +230,33 @@ def pack_tubes(setup: Setup, name: str) -> FloatArray:
     second_order = m * (np.eye(3) - np.outer(a, a))
     both = _matrix(outer_inertia) + _matrix(inner_inertia)
     mass = outer_inertia.get_mass() + m
-    inertias = [_six(matrix) for matrix in (both, first_order, second_order)]
-    return np.concatenate([[1.0 / mass, m], a, _moment(outer_inertia) + s, s, *inertias])
+    return TUBES.pack(
+        inverse_mass=1.0 / mass,
+        inner_mass=m,
+        axis=a,
+        moment=_moment(outer_inertia) + s,
+        inner_moment=s,
+        inertia=_six(both),
+        inertia_slope=_six(first_order),
+        inertia_curvature=_six(second_order),
+    )
 
 
 def pack_tub(setup: Setup) -> FloatArray:
-    """Return the packed tub without the drum (`wm_drake.engines.compiled.bearing`)."""
+    """Return the packed tub without the drum (`TUB`)."""
     plant, context = setup.machine.plant, setup.plant_context
     tub = plant.GetBodyByName("tub")
     group = [body.index() for body in plant.GetBodiesWeldedTo(tub)]
     inertia = plant.CalcSpatialInertia(context, tub.body_frame(), group)
-    return np.concatenate([[1.0 / inertia.get_mass()], _moment(inertia), _six(_matrix(inertia))])
+    return TUB.pack(
+        inverse_mass=1.0 / inertia.get_mass(),
+        moment=_moment(inertia),
+        inertia=_six(_matrix(inertia)),
+    )
 
 
 def pack_bodies(plant: MultibodyPlant, context: Context, drive: str) -> FloatArray:
-    """Return the packed bodies with the load of a plant Context; no element changes them.
+    """Return the packed bodies (`BODIES`) of a plant Context with its load.
 
     With a compliant bearing these are the carrier and the drum, without the tub.
 
@@ -252,12 +278,16 @@ def pack_bodies(plant: MultibodyPlant, context: Context, drive: str) -> FloatArr
     )
     tub_inertia = plant.CalcSpatialInertia(context, tub.body_frame(), tub_group).Shift(origin)
     drum_inertia = plant.CalcSpatialInertia(context, tub.body_frame(), drum_group).Shift(origin)
-    gravity = plant.gravity_field().gravity_vector()
-    mass = tub_inertia.get_mass() + drum_inertia.get_mass()
-    damping = joint.GetDampingVector(context)
-    parts = [gravity, [1.0 / mass], axis, origin, _moment(tub_inertia), _six(_matrix(tub_inertia))]
-    angle = joint.get_angle(context)
-    return np.concatenate([*parts, *_drum_harmonics(drum_inertia, axis, angle), damping])
+    return BODIES.pack(
+        gravity=plant.gravity_field().gravity_vector(),
+        inverse_mass=1.0 / (tub_inertia.get_mass() + drum_inertia.get_mass()),
+        axis=axis,
+        origin=origin,
+        tub_moment=_moment(tub_inertia),
+        tub_inertia=_six(_matrix(tub_inertia)),
+        **_drum_harmonics(drum_inertia, axis, joint.get_angle(context)),
+        joint_damping=joint.GetDampingVector(context),
+    )
 
 
 def drum_joint(plant: MultibodyPlant, name: str) -> RevoluteJoint:
@@ -285,6 +315,7 @@ def drum_joint(plant: MultibodyPlant, name: str) -> RevoluteJoint:
 
 
 def _not_represented(what: str, key: str) -> InputError:
+    """Return the error for a property of the machine that only the drake engine represents."""
     return input_error(
         f"the compiled engine does not represent this: {what}; use the drake engine", key=key
     )
@@ -296,17 +327,19 @@ def _moment(inertia: SpatialInertia) -> FloatArray:
 
 
 def _matrix(inertia: SpatialInertia) -> FloatArray:
+    """Return the rotational inertia about the reference point. (3, 3) [kg m^2]"""
     return np.array(inertia.CalcRotationalInertia().CopyToFullMatrix3())
 
 
 def _six(matrix: FloatArray) -> FloatArray:
+    """Return the elements xx, yy, zz, xy, xz, yz of a symmetric matrix. (6,)"""
     return matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
 
 
 def _drum_harmonics(
     inertia: SpatialInertia, axis: FloatArray, angle: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return first moment and inertia of the drum as harmonics of the drum angle.
+) -> dict[str, FloatArray]:
+    """Return first moment and inertia of the drum as packed harmonics of the drum angle, by name.
 
     With R = A + B cos + C sin for a rotation about the axis they are R s and R J R^T; products of
     cosine and sine are written in the double angle.
@@ -321,17 +354,27 @@ def _drum_harmonics(
     turned = np.cross(axis, np.eye(3)).T  # axis x .
     back = along + across * np.cos(angle) - turned * np.sin(angle)
     s, j = back @ _moment(inertia), back @ _matrix(inertia) @ back.T
-    moment = np.column_stack([along @ s, across @ s, turned @ s])
 
     def product(left: FloatArray, right: FloatArray) -> FloatArray:
         return left @ j @ right.T
 
     cosine_squared, sine_squared = product(across, across), product(turned, turned)
-    parts = (
-        product(along, along) + 0.5 * (cosine_squared + sine_squared),
-        product(along, across) + product(across, along),
-        product(along, turned) + product(turned, along),
-        0.5 * (cosine_squared - sine_squared),
-        0.5 * (product(across, turned) + product(turned, across)),
-    )
-    return moment.ravel(), np.column_stack([_six(part) for part in parts]).ravel()
+    moment = {"mean": along @ s, "cosine": across @ s, "sine": turned @ s}
+    matrices = {
+        "mean": product(along, along) + 0.5 * (cosine_squared + sine_squared),
+        "cosine": product(along, across) + product(across, along),
+        "sine": product(along, turned) + product(turned, along),
+        "double_cosine": 0.5 * (cosine_squared - sine_squared),
+        "double_sine": 0.5 * (product(across, turned) + product(turned, across)),
+    }
+    moments = {
+        f"drum_moment_{letter}": FIRST_HARMONIC.pack(**{part: v[k] for part, v in moment.items()})
+        for k, letter in enumerate("xyz")
+    }
+    inertias = {
+        f"drum_inertia_{entry}": SECOND_HARMONIC.pack(
+            **{part: _six(matrix)[k] for part, matrix in matrices.items()}
+        )
+        for k, entry in enumerate(("xx", "yy", "zz", "xy", "xz", "yz"))
+    }
+    return moments | inertias

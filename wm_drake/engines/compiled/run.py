@@ -8,8 +8,7 @@ from wm_drake.engines.compiled.packing import Layout, aligned, fill_lanes, initi
 from wm_drake.engines.compiled.samples import trajectory_of
 from wm_drake.engines.schedule import Schedule, schedule_of
 from wm_drake.engines.trajectory import Trajectory, diverging_coordinate
-from wm_drake.model.machine import OUTPUT_PERIOD
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import OUTPUT_PERIOD, Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 
@@ -24,10 +23,10 @@ def run_compiled(
     progress: Callable[[float], None],
     period: float = OUTPUT_PERIOD,
 ) -> Trajectory:
-    """Run a machine through a spin profile without Drake, with its numbers and its laws.
+    """Run a machine through a spin profile with the compiled engine.
 
-    Steps end at every output time and at every corner of the profile, so no step sees the
-    acceleration jump. The run is a batch of one: idle lanes repeat it.
+    Steps end at every output time and at every corner of the profile, so no step contains a jump of
+    the acceleration. The run is a batch of one: idle lanes repeat it.
 
     Args:
         setup: Machine at rest in its Context, which is not changed.
@@ -40,7 +39,7 @@ def run_compiled(
         The sampled motion; up to the last good sample if it diverged.
 
     Raises:
-        InputError: the machine has something that this engine does not represent.
+        InputError: the machine has something that the compiled engine does not represent.
     """
     p, layout = pack(setup)
     begin, schedule = initial_state(setup, profile), schedule_of(profile, step, period)

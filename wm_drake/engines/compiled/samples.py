@@ -5,12 +5,19 @@ import numpy as np
 from wm_drake.compiler.compilation import long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
-from wm_drake.compiler.matrices import three
-from wm_drake.elements.motion import PLANT_STATE_SIZE, tub_motion
-from wm_drake.engines.compiled.mechanics import mass_properties, motor_torque
+from wm_drake.elements.motion import POSE, tub_motion
+from wm_drake.engines.compiled.mechanics import (
+    DRUM_ANGLE,
+    DRUM_RATE,
+    RATES_SIZE,
+    STATE_SIZE,
+    mass_properties,
+    motor_torque,
+    read_rates,
+)
 from wm_drake.engines.compiled.packing import Layout
 from wm_drake.engines.schedule import Schedule
-from wm_drake.engines.trajectory import Trajectory, ended_where_it_diverged
+from wm_drake.engines.trajectory import Trajectory, cut_at_divergence
 from wm_drake.parameters.types import FloatArray
 
 
@@ -30,21 +37,31 @@ def trajectory_of(
     torque = np.empty((len(samples), 1))
     drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
     torque_history(
-        _motion_of_drum_and_carrier(motion, carrier), rates[:, -6:], drum_acceleration, p, torque
+        _motion_of_drum_and_carrier(motion, carrier),
+        rates[:, -RATES_SIZE:],
+        drum_acceleration,
+        p,
+        torque,
     )
-    return ended_where_it_diverged(
-        Trajectory(schedule.time, motion, deformation, torque[:, 0], rates[:, :6], tubes, carrier)
+    of_tub = rates[:, :RATES_SIZE]
+    return cut_at_divergence(
+        Trajectory(schedule.time, motion, deformation, torque[:, 0], of_tub, tubes, carrier)
     )
 
 
 def _motion_of_drum_and_carrier(motion: FloatArray, carrier: FloatArray) -> FloatArray:
-    """Return the motion of the drum and of the body that carries it, in the layout of `motion`.
+    """Return the motion of the drum and of the body that it turns in, in the layout of `motion`.
 
-    The drum's carrier in a compliant bearing (n, 12) carries it; without one (n, 0) the tub does.
+    This body is the drum carrier with a compliant bearing, else the tub.
+
+    Args:
+        motion: State of tub and drum. (n, 14)
+        carrier: State of the drum carrier (n, 12); (n, 0) with a rigid bearing.
     """
     if not carrier.shape[1]:
         return motion
-    return np.column_stack([carrier[:, :6], motion[:, 6], carrier[:, 6:], motion[:, 13]])
+    pose, velocity = np.split(carrier, [POSE.fixed_size], axis=1)
+    return np.column_stack([pose, motion[:, DRUM_ANGLE], velocity, motion[:, DRUM_RATE]])
 
 
 @long_running
@@ -52,8 +69,8 @@ def torque_history(motions, rates, acceleration, p, torque):
     """Evaluate the torque of the motor on the drum at samples.
 
     Args:
-        motions: (n, 14) motion of the body that carries the drum, and of the drum; laid out as the
-            state of the plant.
+        motions: (n, 14) motion of the body that the drum turns in, and of the drum, in the layout
+            of the state of tub and drum.
         rates: (n, 6) angular acceleration and acceleration of the origin of that body, in W.
             [rad/s^2, m/s^2]
         acceleration: (n, 1) acceleration of the drum. [rad/s^2]
@@ -61,7 +78,7 @@ def torque_history(motions, rates, acceleration, p, torque):
         torque: (n, 1), written. [N m]
     """
     align_stack()
-    x_numbers, rates_numbers = np.empty(PLANT_STATE_SIZE * WIDTH), np.empty(6 * WIDTH)
+    x_numbers, rates_numbers = np.empty(STATE_SIZE * WIDTH), np.empty(RATES_SIZE * WIDTH)
     drum_numbers, numbers, p_numbers = np.empty(WIDTH), np.empty(WIDTH), in_each_lane(p)
     x, dx, drum = lane_array(x_numbers), lane_array(rates_numbers), lane_array(drum_numbers)
     answer, q = lane_array(numbers), lane_array(p_numbers)
@@ -69,9 +86,15 @@ def torque_history(motions, rates, acceleration, p, torque):
         rows_to_lanes(motions, begin, x_numbers)
         rows_to_lanes(rates, begin, rates_numbers)
         rows_to_lanes(acceleration, begin, drum_numbers)
-        sine, cosine = sine_cosine(x[6])
-        masses = mass_properties(q, cosine, sine)
+        sine, cosine = sine_cosine(x[DRUM_ANGLE])
+        masses, rate = mass_properties(q, cosine, sine), read_rates(dx, 0)
         answer[0] = motor_torque(
-            tub_motion(x), three(dx, 0), three(dx, 3), masses, x[13], drum[0], q
+            tub_motion(x),
+            rate.angular_acceleration,
+            rate.acceleration,
+            masses,
+            x[DRUM_RATE],
+            drum[0],
+            q,
         )
         lanes_to_rows(numbers, begin, torque)

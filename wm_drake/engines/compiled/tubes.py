@@ -13,25 +13,46 @@ M: mass of both tubes, m: of the inner one; S, S_i: first moments of both and of
 inertia of both. The first equation gives a_O and the third s''. Three equations with a symmetric
 matrix remain for w'.
 
-Packed numbers, from the index of each damper: 1/M [1/kg]; m; a; S_0 and S_i0 [kg m]; I_0, I_1, I_2
-as xx, yy, zz, xy, xz, yz [kg m^2, kg m, kg]; then those of `TelescopicDamperParameters`.
-
-State of a damper, behind the deformations of the strut dampers: roll, pitch, yaw, position of the
-outer tube, extension; angular velocity, velocity, rate of extension; deformation of the sponge.
+The packed numbers of a damper are those of `TUBES_AND_DAMPER`; its state is a `TUBES_STATE`.
 """
 
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import sine_cosine
-from wm_drake.compiler.matrices import about_centre, inverse, less_square, plus, six, three, times
+from wm_drake.compiler.matrices import about_centre, inverse, less_square, plus, times
+from wm_drake.compiler.packed import LAYOUT, SCALAR, SYMMETRIC, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import add, cross, dot, rotate, rotate_back, scale, subtract
-from wm_drake.elements.motion import motion_from_sines, rpy_rates
-from wm_drake.elements.telescopic_damper import telescopic_damper_forces
+from wm_drake.elements.motion import (
+    TREE_STATE,
+    motion_from_sines,
+    read_tree_state,
+    rpy_rates,
+    write_tree_state,
+)
+from wm_drake.elements.telescopic_damper import TELESCOPIC_DAMPER, telescopic_damper_forces
 
-INVERSE_MASS, INNER_MASS, AXIS, MOMENT, INNER_MOMENT, INERTIA = 0, 1, 2, 5, 8, 11
-TUBES_SIZE = 29
-"""Numbers of the bodies of a damper."""
-TUBES_STATE_SIZE = 15
-"""Numbers of a damper in the state."""
+TUBES = PackedLayout(
+    "TubesNumbers",
+    inverse_mass=SCALAR,
+    inner_mass=SCALAR,
+    axis=VECTOR,
+    moment=VECTOR,
+    inner_moment=VECTOR,
+    inertia=SYMMETRIC,
+    inertia_slope=SYMMETRIC,
+    inertia_curvature=SYMMETRIC,
+)
+"""Bodies of a damper: 1/M [1/kg], m [kg], a, S_0 and S_i0 [kg m], I_0 [kg m^2], I_1 [kg m], I_2
+[kg]."""
+TUBES_AND_DAMPER = PackedLayout(
+    "TubesAndDamperNumbers", tubes=LAYOUT(TUBES), damper=LAYOUT(TELESCOPIC_DAMPER)
+)
+"""Packed numbers of a telescopic damper: its bodies, then its forces."""
+TUBES_STATE = PackedLayout("TubesState", tubes=LAYOUT(TREE_STATE), deformation=SCALAR)
+"""State of a telescopic damper: outer tube and joint, then deformation of the sponge. [m]"""
+TUBES_STATE_SIZE, DEFORMATION = TUBES_STATE.fixed_size, TUBES_STATE.offsets["deformation"]
+
+read_tubes, read_tubes_and_damper = TUBES.read, TUBES_AND_DAMPER.read
+read_tubes_state = TUBES_STATE.read
 
 
 @law
@@ -44,15 +65,16 @@ def tube_accelerations(motion, s, s_rate, wrench, along, gravity, p, at):
         wrench: Moment about O and force on both tubes, in W, without gravity. [N m, N]
         along: Force on the joint. [N]
         gravity: Acceleration in W. [m/s^2]
-        p, at: Packed numbers and index of the damper in them.
+        p, at: Array that holds the numbers of `TUBES`, and index where they begin.
 
     Returns:
         Angular acceleration and acceleration of O, in W [rad/s^2, m/s^2], and s'' [m/s^2].
     """
-    q, m, a = p[at + INVERSE_MASS], p[at + INNER_MASS], three(p, at + AXIS)
+    tubes = read_tubes(p, at)
+    q, m, a = tubes.inverse_mass, tubes.inner_mass, tubes.axis
     moved = scale(m * s, a)
-    first, inner = add(three(p, at + MOMENT), moved), add(three(p, at + INNER_MOMENT), moved)
-    i_0, i_1, i_2 = six(p, at + INERTIA), six(p, at + INERTIA + 6), six(p, at + INERTIA + 12)
+    first, inner = add(tubes.moment, moved), add(tubes.inner_moment, moved)
+    i_0, i_1, i_2 = tubes.inertia, tubes.inertia_slope, tubes.inertia_curvature
     i = (
         i_0[0] + s * (i_1[0] + s * i_2[0]),
         i_0[1] + s * (i_1[1] + s * i_2[1]),
@@ -102,22 +124,30 @@ def add_telescopic_dampers(x, dx, motion, gravity, p, telescopes, first, total):
     if telescopes is None:
         return total
     for i in range(len(telescopes)):
-        at, k = telescopes[i], first + TUBES_STATE_SIZE * i
-        roll, pitch, yaw = sine_cosine(x[k]), sine_cosine(x[k + 1]), sine_cosine(x[k + 2])
+        numbers = read_tubes_and_damper(p, telescopes[i])
+        k = first + TUBES_STATE_SIZE * i
+        own = read_tubes_state(x, k)
+        state = read_tree_state(*own.tubes)
+        angles, s, s_rate = state.angles, state.joint_position, state.joint_rate
+        roll, pitch, yaw = sine_cosine(angles[0]), sine_cosine(angles[1]), sine_cosine(angles[2])
         outer = motion_from_sines(x, k, roll, pitch, yaw)
-        s, s_rate = x[k + 6], x[k + 13]
-        forces = telescopic_damper_forces(motion, outer, s, s_rate, x[k + 14], p, at + TUBES_SIZE)
-        on_tub, on_tubes, along, deformation_rate, _, _, _ = forces
-        w_rate, v_rate, s_acceleration = tube_accelerations(
-            outer, s, s_rate, on_tubes, along, gravity, p, at
+        on_tub, on_tubes, along, deformation_rate, _, _, _ = telescopic_damper_forces(
+            motion, outer, s, s_rate, own.deformation, *numbers.damper
         )
-        dx[k], dx[k + 1], dx[k + 2] = rpy_rates(outer.angular_velocity, pitch, yaw)
-        dx[k + 3], dx[k + 4], dx[k + 5] = outer.velocity
-        dx[k + 6] = s_rate
-        dx[k + 7], dx[k + 8], dx[k + 9] = w_rate
-        dx[k + 10], dx[k + 11], dx[k + 12] = v_rate
-        dx[k + 13] = s_acceleration
-        dx[k + 14] = deformation_rate
+        w_rate, v_rate, s_acceleration = tube_accelerations(
+            outer, s, s_rate, on_tubes, along, gravity, *numbers.tubes
+        )
+        write_tree_state(
+            dx,
+            k,
+            angles=rpy_rates(outer.angular_velocity, pitch, yaw),
+            position=outer.velocity,
+            joint_position=s_rate,
+            angular_velocity=w_rate,
+            velocity=v_rate,
+            joint_rate=s_acceleration,
+        )
+        dx[k + DEFORMATION] = deformation_rate
         total = plus(total, on_tub)
     return total
 

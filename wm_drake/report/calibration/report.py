@@ -1,6 +1,7 @@
 """Report of a calibration: one self-contained HTML file."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -16,7 +17,7 @@ from wm_drake.studies.calibration.calibration import Calibration
 from wm_drake.studies.calibration.outcome import mean_and_largest, quantity_table
 from wm_drake.studies.calibration.prediction import Prediction
 from wm_drake.studies.description.modal import Modes
-from wm_drake.studies.spin.study import SpinResult
+from wm_drake.studies.spin.study import Comparison, SpinResult
 
 
 def calibration_report(
@@ -35,6 +36,7 @@ def calibration_report(
         modes: Titles and natural modes of that machine, for each state that is shown.
         command: Command line of the calibration, shown on the page.
     """
+    best = replace(best, comparison=Comparison.ALL)  # the targets were named
     table = tables.amplitude_table(best)
     others = _other_models(table)
     return render(

@@ -1,7 +1,7 @@
 """Figures of a screening study: contributions, spread, effects, interactions, residuals."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,10 +11,21 @@ from matplotlib.lines import Line2D
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH
 from wm_drake.report.formatting import number
-from wm_drake.studies.gasket.screening import Label, Screening, contributions, main_effects, mean_at
+from wm_drake.report.gasket.words import LEVELS, Words
+from wm_drake.studies.gasket.screening import (
+    LEADING_MAIN_PERCENT,
+    Label,
+    Screening,
+    contributions,
+    main_effects,
+    mean_at,
+)
 
 LEVEL_COLOURS = (OURS, QUIET, MEASURED)
 """Colours of the levels -1, 0 and 1."""
+
+LEVEL_WORDS = ("low", "middle", "high")
+"""Words for the levels -1, 0 and 1."""
 
 LEVEL_MARKS = ("v", "o", "^")
 """Marks of the levels -1, 0 and 1, which stay distinct in grey print."""
@@ -25,11 +36,14 @@ SMALLEST_PERCENT = 1.0
 MOST_POINTS = 1500
 """Largest number of points of a scatter plot; of more points, every n-th is drawn."""
 
+CHARACTER = 0.08
+"""Width of a character of a label. [in]"""
+
 COLUMNS = 3
 """Number of panels in a row."""
 
 
-def heat_map_figure(screening: Screening) -> Figure:
+def heat_map_figure(screening: Screening, words: Words) -> Figure:
     """Draw the contributions in percent: one row per term, one column per load and response."""
     table = contributions(screening).fillna(0.0)
     shown = table[table.max(axis=1) >= SMALLEST_PERCENT]
@@ -47,11 +61,18 @@ def heat_map_figure(screening: Screening) -> Figure:
             )
     axes.set_yticks(
         range(len(shown)),
-        [str(name).replace(":", " × ") for name in shown.index],
-        fontsize=9,
+        [words.term(str(name)) for name in shown.index],
+        fontsize=8.5,
         parse_math=False,
     )
-    axes.set_xticks(range(len(labels)), [name for _, name in labels], fontsize=9)
+    is_long = max(len(name) for _, name in labels) > 4
+    axes.set_xticks(
+        range(len(labels)),
+        [name for _, name in labels],
+        fontsize=9,
+        rotation=90 if is_long else 0,
+        parse_math=False,
+    )
     axes.xaxis.tick_top()
     axes.tick_params(length=0)
     for index, load in enumerate(screening.loads):
@@ -61,7 +82,7 @@ def heat_map_figure(screening: Screening) -> Figure:
             f"load {load}",
             (middle, 1.0),
             xycoords=("data", "axes fraction"),
-            xytext=(0, 22),
+            xytext=(0, 22 + (5 * max(len(name) for _, name in labels) if is_long else 0)),
             textcoords="offset points",
             ha="center",
             fontsize=10,
@@ -71,7 +92,8 @@ def heat_map_figure(screening: Screening) -> Figure:
         if index:
             axes.axvline(first - 0.5, color="white", linewidth=5.0)
     mains = sum(":" not in str(name) for name in shown.index)
-    axes.axhline(mains - 0.5, color="white", linewidth=5.0)
+    if 0 < mains < len(shown):
+        axes.axhline(mains - 0.5, color="white", linewidth=5.0)
     for side in axes.spines.values():
         side.set_visible(False)
     bar = figure.colorbar(
@@ -82,7 +104,7 @@ def heat_map_figure(screening: Screening) -> Figure:
     return figure
 
 
-def spread_figure(screening: Screening, names: Sequence[str], what: str) -> Figure:
+def spread_figure(screening: Screening, names: Sequence[str], what: str, words: Words) -> Figure:
     """Draw all values of some responses, one panel per load, as [B] Figs. 10-12.
 
     The values are points, with a box from the first to the third quartile.
@@ -105,45 +127,77 @@ def spread_figure(screening: Screening, names: Sequence[str], what: str) -> Figu
                 rasterized=True,
             )
             _box(axes, place, every, 0.34)
-        axes.set_xticks(range(len(names)), list(names))
+        titles = [words.response(name) for name in names]
+        width = WIDTH / len(screening.loads) / len(names) / CHARACTER
+        is_long = max(map(len, titles)) > width
+        axes.set_xticks(
+            range(len(names)), titles, fontsize=9, rotation=90 if is_long else 0, parse_math=False
+        )
         axes.set_xlim(-0.6, len(names) - 0.4)
-        axes.set_ylim(bottom=0.0)
         axes.set_title(
             f"load {load}", fontsize=10.5, loc="left", fontweight="bold", parse_math=False
         )
         _style_panel(axes, "y")
+    # after all panels: a limit that is set earlier ends the common scaling with the first panel
+    low, high = panels[0].get_ylim()
+    smallest = min(v[name].min() for v in screening.responses.values.values() for name in names)
+    panels[0].set_ylim(low if smallest < 0.0 else 0.0, high)
+    if smallest < 0.0:
+        for axes in panels:
+            axes.axhline(0.0, color=MARK, linewidth=0.8)
     panels[0].set_ylabel(f"{what}, {screening.responses.units[names[0]]}", fontsize=9.5)
     return figure
 
 
-def main_effects_figure(screening: Screening, load: str) -> Figure:
-    """Draw the mean response at the three levels of each factor, one panel per response."""
+def main_effects_figure(screening: Screening, load: str, words: Words) -> Figure:
+    """Draw the mean response at the three values of each factor, one panel per response.
+
+    A line of a panel is a factor; its name and its values are at the left end of the row.
+    """
+    names = screening.design.factors
+    titles = [f"{words.factor(name)}\n{words.span(name)}" for name in names]
 
     def draw(axes: Axes, label: Label) -> None:
         table = screening.tables[label]
-        factors = screening.design.factors
-        axes.axhline(table.constant, color=QUIET, linewidth=0.8)
-        for place, factor in enumerate(factors):
-            means = mean_at(screening, label, [factor])
+        axes.axvline(table.constant, color=QUIET, linewidth=0.8)
+        for place, factor in enumerate(names):
+            means = list(mean_at(screening, label, [factor]).values())
             percent = next(term.percent for term in table.terms if term.factors == (factor,))
-            strong = percent >= 10.0
-            at = place + 0.3 * np.array([-1.0, 0.0, 1.0])
-            line: dict[str, Any] = {
-                "color": OURS if strong else QUIET,
-                "linewidth": 1.8 if strong else 1.0,
-            }
-            axes.plot(at, list(means.values()), "-", marker="o", markersize=3.5, **line)
-        axes.set_xticks(
-            range(len(factors)), list(factors), rotation=90, fontsize=8.5, parse_math=False
+            strong = percent >= LEADING_MAIN_PERCENT
+            at = place + 0.28 * np.array(LEVELS)
+            axes.plot(means, at, color=MARK if strong else QUIET, linewidth=1.4 if strong else 0.6)
+            shown = zip(means, at, LEVEL_COLOURS, LEVEL_MARKS, strict=True)
+            for mean, y, colour, mark in shown:
+                axes.plot(mean, y, mark, color=colour, markersize=4.5 if strong else 3.0)
+        is_first = axes.get_subplotspec().is_first_col()  # type: ignore[union-attr]
+        axes.set_yticks(
+            range(len(names)),
+            titles if is_first else [""] * len(names),
+            fontsize=7.5,
+            parse_math=False,
         )
-        _style_panel(axes, "y")
+        axes.set_ylim(len(names) - 0.5, -0.5)
+        _style_panel(axes, "x")
+        axes.tick_params(axis="y", labelsize=7.5, length=0)
 
-    return _panels(
-        screening, load, draw, extra=0.5 + 0.055 * max(map(len, screening.design.factors))
-    )
+    extra = 0.31 * len(names) - 1.1
+    figure = _panels(screening, load, draw, words, extra=extra, name_axis="x")
+    return _with_level_legend(figure)
 
 
-def interactions_figure(screening: Screening, load: str) -> Figure:
+def _with_level_legend(figure: Figure) -> Figure:
+    """Add the legend of the low, middle and high value below the panels."""
+    handles = [
+        Line2D(
+            [], [], color=colour, marker=mark, markersize=5, linewidth=1.4, label=f"{text} value"
+        )
+        for colour, mark, text in zip(LEVEL_COLOURS, LEVEL_MARKS, LEVEL_WORDS, strict=True)
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+    return figure
+
+
+def interactions_figure(screening: Screening, load: str, words: Words) -> Figure:
     """Draw the strongest interaction of each response, one panel per response.
 
     A panel shows the mean response over one factor, with one line per level of the other factor.
@@ -157,34 +211,13 @@ def interactions_figure(screening: Screening, load: str) -> Figure:
         for level, colour, mark in zip((-1, 0, 1), LEVEL_COLOURS, LEVEL_MARKS, strict=True):
             line = [means[x, level] for x in (-1, 0, 1)]
             axes.plot((-1, 0, 1), line, color=colour, marker=mark, markersize=5, linewidth=1.4)
-        text = f"lines: {second};  {number(strongest.percent, 1)} %"
-        axes.text(
-            0.98,
-            1.03,
-            text,
-            transform=axes.transAxes,
-            ha="right",
-            fontsize=8.5,
-            color=QUIET,
-            parse_math=False,
-        )
-        axes.set_xticks((-1, 0, 1), ["−1", "0", "1"])
-        axes.set_xlabel(first, fontsize=9, parse_math=False)
         axes.margins(0.12)
-        _style_panel(axes, "y")
+        _label_pair(axes, first, second, words, f"  {number(strongest.percent, 1)} %")
 
-    figure = _panels(screening, load, draw, extra=0.45)
-    handles = [
-        Line2D(
-            [], [], color=colour, marker=mark, markersize=5, linewidth=1.4, label=f"level {text}"
-        )
-        for colour, mark, text in zip(LEVEL_COLOURS, LEVEL_MARKS, ("−1", "0", "1"), strict=True)
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
-    return figure
+    return _with_level_legend(_panels(screening, load, draw, words, extra=0.75))
 
 
-def combinations_figure(screening: Screening, load: str) -> Figure:
+def combinations_figure(screening: Screening, load: str, words: Words) -> Figure:
     """Draw the values at each level combination of two factors, as [B] Fig. 13.
 
     Each panel uses the two most influential factors of its response.
@@ -199,24 +232,12 @@ def combinations_figure(screening: Screening, load: str) -> Figure:
             for level, colour in zip((-1, 0, 1), LEVEL_COLOURS, strict=True):
                 here = values[(levels[:, 0] == x) & (levels[:, 1] == level)]
                 _box(axes, x + 0.27 * level, here[np.isfinite(here)], 0.1, colour)
-        axes.set_xticks((-1, 0, 1), ["−1", "0", "1"])
-        axes.set_xlabel(first, fontsize=9, parse_math=False)
-        axes.text(
-            0.98,
-            1.03,
-            f"colour: {second}",
-            transform=axes.transAxes,
-            ha="right",
-            fontsize=8.5,
-            color=QUIET,
-            parse_math=False,
-        )
-        _style_panel(axes, "y")
+        _label_pair(axes, first, second, words)
 
-    figure = _panels(screening, load, draw, extra=0.45)
+    figure = _panels(screening, load, draw, words, extra=0.75)
     handles = [
-        Line2D([], [], color=colour, linewidth=5, label=f"level {text}")
-        for colour, text in zip(LEVEL_COLOURS, ("−1", "0", "1"), strict=True)
+        Line2D([], [], color=colour, linewidth=5, label=f"{text} value")
+        for colour, text in zip(LEVEL_COLOURS, LEVEL_WORDS, strict=True)
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     return figure
@@ -228,7 +249,7 @@ def two_most_influential(screening: Screening, label: Label) -> tuple[str, str]:
     return first.name, second.name
 
 
-def residuals_figure(screening: Screening, load: str) -> Figure:
+def residuals_figure(screening: Screening, load: str, words: Words) -> Figure:
     """Draw residuals against fitted values, one panel per response."""
 
     def draw(axes: Axes, label: Label) -> None:
@@ -243,20 +264,53 @@ def residuals_figure(screening: Screening, load: str) -> Figure:
         axes.plot(_thinned(table.fitted), _thinned(table.residual), ".", color=OURS, **shown)
         _style_panel(axes, "both")
 
-    return _panels(screening, load, draw, extra=0.1)
+    return _panels(screening, load, draw, words, extra=0.1)
+
+
+def _label_pair(axes: Axes, first: str, second: str, words: Words, more: str = "") -> None:
+    """Label a panel of two factors: the first on the axis, the second, by colour, above it."""
+    axes.set_xticks(LEVELS, [words.number(first, level) for level in LEVELS])
+    axes.set_xlabel(words.axis(first), fontsize=8.5, parse_math=False)
+    values = ", ".join(words.number(second, level) for level in LEVELS)
+    axes.set_title(
+        f"{words.factor(second)}:\n{values} {words.unit(second)}{more}",
+        fontsize=8,
+        color=QUIET,
+        loc="right",
+        parse_math=False,
+    )
+    _style_panel(axes, "y")
 
 
 def _panels(
-    screening: Screening, load: str, draw: Callable[[Axes, Label], None], extra: float
+    screening: Screening,
+    load: str,
+    draw: Callable[[Axes, Label], None],
+    words: Words,
+    extra: float,
+    name_axis: Literal["x", "y"] = "y",
 ) -> Figure:
-    """Make one panel per response of a load, three in a row, each with name and unit."""
+    """Make one panel per response of a load, three in a row, each with name and unit.
+
+    Args:
+        screening: Result of the study.
+        load: Name of the load.
+        draw: Function that draws a panel.
+        words: Names of the responses.
+        extra: Height of a row beyond that of its axes. [in]
+        name_axis: Axis that has the values of the response.
+    """
     names = screening.names
     rows = -(-len(names) // COLUMNS)
     figure = Figure(figsize=(WIDTH, rows * (1.75 + extra) + 0.4), layout="constrained")
-    for axes, name in zip(figure.subplots(rows, COLUMNS, squeeze=False).flat, names, strict=False):
-        axes.text(0.0, 1.03, name, transform=axes.transAxes, fontsize=10.5, fontweight="bold")
-        axes.set_ylabel(screening.responses.units[name], fontsize=9)
+    panels = list(figure.subplots(rows, COLUMNS, squeeze=False).flat)
+    for axes, name in zip(panels, names, strict=False):
         draw(axes, (load, name))
+        text = f"{words.response(name)}, {screening.responses.units[name]}"
+        set_label = axes.set_xlabel if name_axis == "x" else axes.set_ylabel
+        set_label(text, fontsize=8.5, parse_math=False)
+    for axes in panels[len(names) :]:
+        axes.set_visible(False)
     return figure
 
 

@@ -6,15 +6,13 @@ from pathlib import Path
 from wm_drake.parameters.machine import DEFAULT_STEP
 from wm_drake.report.formatting import number
 from wm_drake.report.gasket import figures, tables
-from wm_drake.report.gasket.findings import about_residual, findings, load_findings, summary
+from wm_drake.report.gasket.findings import about_residual, advice, load_findings, summary, warnings
+from wm_drake.report.gasket.words import Words
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.tables import Table, parameter_table
 from wm_drake.simulation.records import versions
 from wm_drake.studies.gasket.screening import Screening
 from wm_drake.studies.gasket.study import GasketTrials
-
-KINDS = {"D": "displacement", "F": "force", "M": "moment"}
-"""Quantity of a response, by the first letter of its name."""
 
 
 @dataclass(frozen=True)
@@ -41,20 +39,25 @@ def gasket_report(
         wall_s: Computing time. [s]
     """
     parameters = trials.parameters
+    words = Words(trials.factors, screening.responses.meanings)
     return render(
         "gasket/page.html",
         title=f"Gasket study of machine {parameters.name}",
         about=parameters.about,
-        summary=summary(screening),
-        findings=findings(screening),
-        warnings=_warnings(screening, trials),
-        heat_map=_heat_map(screening),
-        variance=tables.variance(screening),
+        summary=" ".join(summary(screening, words)),
+        advice=advice(screening, words),
+        warnings=warnings(screening, words) + _warnings(screening, trials),
+        heat_map=_heat_map(screening, words),
+        variance=tables.variance(screening, words),
+        touching=tables.touching(screening, words) if screening.responses.touching else None,
         about_residual=about_residual(screening),
-        spreads=_spreads(screening),
-        loads=[_load_view(screening, index, load) for index, load in enumerate(screening.loads)],
+        spreads=_spreads(screening, words),
+        loads=[
+            _load_view(screening, index, load, words) for index, load in enumerate(screening.loads)
+        ],
         design=tables.design(screening),
-        factors=tables.factors(trials.factors),
+        factors=tables.factors(trials.factors, words),
+        responses=_about_responses(screening, words),
         facts=_facts(trials, command, wall_s),
         numbers=parameter_table(parameters),
     )
@@ -100,87 +103,96 @@ def _facts(trials: GasketTrials, command: str, wall_s: float) -> list[tuple[str,
     return [(word, text) for word, text in facts if text]
 
 
-def _heat_map(screening: Screening) -> Picture:
+def _about_responses(screening: Screening, words: Words) -> list[str]:
+    """Return a text for each kind of response: symbols, and what is measured."""
+    return [
+        f"{', '.join(names)}: {words.meaning(names[0]).about}."
+        for names in _by_kind(screening, words).values()
+        if words.meaning(names[0]).about
+    ]
+
+
+def _by_kind(screening: Screening, words: Words) -> dict[str, list[str]]:
+    kinds: dict[str, list[str]] = {}
+    for name in screening.names:
+        kinds.setdefault(words.meaning(name).kind, []).append(name)
+    return kinds
+
+
+def _heat_map(screening: Screening, words: Words) -> Picture:
     caption = (
         "Contribution of each term to the variance of each response, in percent: main effects "
-        "above, interactions below. D: largest displacement of the tub point nearest to the "
-        "detergent box. F, M: largest force and moment of the gasket on the housing. Terms that "
-        f"contribute less than {figures.SMALLEST_PERCENT:g} % to every response are not shown. "
-        "The colour scale follows the square root of the percentage."
+        "above, interactions below. The symbols of the responses are explained under Run details. "
+        f"Terms that contribute less than {figures.SMALLEST_PERCENT:g} % to every response are "
+        "not shown. The colour scale follows the square root of the percentage."
     )
     return picture(
-        figures.heat_map_figure(screening),
+        figures.heat_map_figure(screening, words),
         "Heat map of contributions; the numbers are in the tables below.",
         caption,
     )
 
 
-def _spreads(screening: Screening) -> list[Picture]:
+def _spreads(screening: Screening, words: Words) -> list[Picture]:
     shown = []
-    for letter, what in KINDS.items():
-        names = [name for name in screening.names if name.startswith(letter)]
-        if names:
-            caption = (
-                f"Largest {what} of every run ({', '.join(names)}). Box: quartiles and median. "
-                "Vertical line: smallest to largest value. The horizontal position of the points "
-                "within a column is random and has no meaning."
-            )
-            figure = figures.spread_figure(screening, names, f"largest {what}")
-            shown.append(
-                picture(
-                    figure,
-                    f"Points and boxes of the largest {what} over all trials, by load.",
-                    caption,
-                )
-            )
+    for kind, names in _by_kind(screening, words).items():
+        caption = (
+            f"{kind} of every run ({', '.join(names)}). Box: quartiles and median. Vertical line: "
+            "smallest to largest value. The horizontal position of the points within a column is "
+            "random and has no meaning."
+        )
+        figure = figures.spread_figure(screening, names, kind, words)
+        alternative = f"Points and boxes of the {kind} over all trials, by load."
+        shown.append(picture(figure, alternative, caption[0].upper() + caption[1:]))
     return shown
 
 
-def _load_view(screening: Screening, index: int, load: str) -> LoadView:
+def _load_view(screening: Screening, index: int, load: str, words: Words) -> LoadView:
     return LoadView(
         anchor=f"load-{index + 1}",
         title=load,
-        findings=tuple(load_findings(screening, load)),
-        leading=tables.leading(screening, load),
-        contributions=tables.contributions(screening, load),
-        pictures=tuple(_pictures(screening, load)),
+        findings=tuple(load_findings(screening, load, words)),
+        leading=tables.leading(screening, load, words),
+        contributions=tables.contributions(screening, load, words),
+        pictures=tuple(_pictures(screening, load, words)),
     )
 
 
-def _pictures(screening: Screening, load: str) -> list[Picture]:
+def _pictures(screening: Screening, load: str, words: Words) -> list[Picture]:
     shown = [
         picture(
-            figures.main_effects_figure(screening, load),
+            figures.main_effects_figure(screening, load, words),
             f"Main effects of every factor on every response, load {load}.",
-            f"Main effects, load {load}: mean response at the levels −1, 0 and +1 of each factor, "
-            "averaged over all levels of the other factors. Blue: factors that contribute 10 % of "
-            "the variance or more. Horizontal line: overall mean.",
+            f"Main effects, load {load}: mean response at the low, middle and high value of each "
+            "factor, averaged over all values of the other factors. Black lines: factors that "
+            "contribute 10 % of the variance or more. Vertical line: overall mean.",
         )
     ]
     if screening.design.model != "main":
         shown.append(
             picture(
-                figures.interactions_figure(screening, load),
+                figures.interactions_figure(screening, load, words),
                 f"Strongest interaction of each response, load {load}.",
                 f"Strongest interaction of each response, load {load}, with its contribution: mean "
-                "response over the levels of one factor, with one line per level of the other "
-                "factor. Without an interaction the lines would be parallel.",
+                "response over the values of one factor, with one line per value of the other "
+                "factor, named above the panel with its low, middle and high value. Without an "
+                "interaction the lines would be parallel.",
             )
         )
     if len(screening.design.factors) > 1:
         shown.append(
             picture(
-                figures.combinations_figure(screening, load),
+                figures.combinations_figure(screening, load, words),
                 "Responses at the level combinations of the two most influential factors, "
                 f"load {load}.",
                 "Responses at each level combination of the two most influential factors, load "
                 f"{load}: quartiles, median, smallest and largest value over the runs ([B] Fig. "
-                "13).",
+                "13). Colour: low, middle and high value of the factor named above the panel.",
             )
         )
     shown.append(
         picture(
-            figures.residuals_figure(screening, load),
+            figures.residuals_figure(screening, load, words),
             f"Residual against fitted value of every run, load {load}.",
             f"Residual against fitted value of every run, load {load}, both in the unit of the "
             "response. A pattern shows that the model lacks terms.",

@@ -70,6 +70,7 @@ def summary(result: Damping) -> str:
         f"{_damping_text(result.scipy.best)}, with an envelope distance of "
         f"{number(result.scipy.value, 2)} mm, after {result.scipy.evaluations} evaluations."
     )
+    text += f" {_interval_text(result)}"
     if result.truth is None:
         return text
     errors = [
@@ -80,6 +81,17 @@ def summary(result: Damping) -> str:
     return (
         f"{text} The planted values are {_damping_text(result.truth)}. The values of the grid "
         f"search differ from them by {' and '.join(errors)}."
+    )
+
+
+def _interval_text(result: Damping) -> str:
+    """Return a sentence about the confidence interval."""
+    if result.interval is None:
+        return "There is no confidence interval: fewer than three curves, or a run diverged."
+    low, high = (in_units_of_paper(end) for end in (result.interval.low, result.interval.high))
+    return (
+        f"95 % intervals of the better optimum: {number(low[0], 4)} to {number(high[0], 4)} N s/mm "
+        f"for C_L and {number(low[1], 1)} to {number(high[1], 1)} N mm s/deg for C_T."
     )
 
 
@@ -129,6 +141,10 @@ def _optima(result: Damping) -> Table:
         line("grid search of [B]", result.grid),
         line("SciPy, bounded Nelder-Mead", result.scipy),
     ]
+    if result.interval is not None:
+        ends = [in_units_of_paper(end) for end in (result.interval.low, result.interval.high)]
+        texts = [f"{number(a, d)} to {number(b, d)}" for a, b, d in zip(*ends, (4, 1), strict=True)]
+        groups.append(Group("95 % interval of the better one", (Row((*texts, "", "")),)))
     if result.truth is not None:
         linear, torsional = in_units_of_paper(result.truth)
         groups.append(
@@ -138,7 +154,10 @@ def _optima(result: Damping) -> Table:
     caption = (
         "Distance: sum over the loads of the 2-norm of the differences of the upper and lower "
         f"envelopes at all sensors, every 5 ms from {WINDOW[0]:g} to {WINDOW[1]:g} s, [B] Eq. (2), "
-        f"(3). The grid search ends when a round reduces the distance by less than {STOP:g} mm."
+        f"(3). The grid search ends when a round reduces the distance by less than {STOP:g} mm. "
+        "The interval shows how much the optimum depends on single curves (one sensor with one "
+        "load): each is left out once (jackknife). An error that all curves share, such as a "
+        "wrong stiffness of a spring, is not in it."
     )
     return Table(caption, header, tuple(groups))
 
@@ -174,6 +193,23 @@ def surface_figure(result: Damping) -> Figure:
     path = np.array([in_units_of_paper(grid.best) for grid in result.grid.rounds])
     axes.plot(*path.T, "-", color=MEASURED, linewidth=1.6, label="path of the best point")
     axes.plot(*path[-1], "o", color=MEASURED, markersize=6)
+    if result.interval is not None:
+        best, *ends = (
+            in_units_of_paper(point)
+            for point in (result.interval.best, result.interval.low, result.interval.high)
+        )
+        low, high = ends
+        axes.errorbar(
+            *best,
+            xerr=[[best[0] - low[0]], [high[0] - best[0]]],
+            yerr=[[best[1] - low[1]], [high[1] - best[1]]],
+            fmt="s",
+            color=MARK,
+            markersize=4,
+            capsize=3,
+            linewidth=1.2,
+            label="better optimum, 95 % intervals",
+        )
     if result.truth is not None:
         axes.plot(
             *in_units_of_paper(result.truth),
@@ -192,7 +228,8 @@ def surface_figure(result: Damping) -> Figure:
     )
     space.set_xlabel("C_L, N s/mm", fontsize=8.5)
     space.set_ylabel("C_T, N mm s/deg", fontsize=8.5)
-    space.set_zlabel("distance, mm", fontsize=8.5)
+    # a label of the vertical axis would lie on the colour bar
+    space.set_title("distance, mm", fontsize=9.5)
     space.tick_params(labelsize=8)
     # seen from the far corner, because the high corner at little damping would hide the valley
     space.view_init(30, 40)

@@ -59,8 +59,8 @@ def loops_figure(fit: Fit, motions: Sequence[MeasuredMotion], *, over: str) -> F
     return figure
 
 
-def history_figure(fit: Fit) -> Figure:
-    """Draw the smallest RMSE after each round of the search."""
+def history_figure(fit: Fit, unit: str) -> Figure:
+    """Draw the smallest RMSE, with its unit, after each round of the search."""
     figure = Figure(figsize=(WIDTH, 2.3), layout="constrained")
     axes = figure.subplots()
     axes.semilogy(
@@ -72,7 +72,7 @@ def history_figure(fit: Fit) -> Figure:
         markersize=3.5,
     )
     axes.set_xlabel("round of the search", fontsize=9.5)
-    axes.set_ylabel("smallest RMSE", fontsize=9.5)
+    axes.set_ylabel(f"smallest RMSE, {unit}", fontsize=9.5)
     style_panel(axes)
     return figure
 

@@ -1,10 +1,12 @@
 """Report page and tables of an identification of a component."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MISSING, number
 from wm_drake.report.identify.figures import history_figure, loops_figure, motion_text
 from wm_drake.report.page import picture, render
@@ -12,10 +14,18 @@ from wm_drake.report.rig.figures import force_scale, motion_scale
 from wm_drake.report.tables import Group, Row, Table
 from wm_drake.rigs.measured import MeasuredMotion
 from wm_drake.studies.fitting import Estimate, Fit
+from wm_drake.studies.identification import Judgement
+from wm_drake.studies.identification.judgement import per_cent
+from wm_drake.studies.identification.models import unit_of_field
 
 
 def identify_report(
-    title: str, fit: Fit, motions: Sequence[MeasuredMotion], command: str = ""
+    title: str,
+    fit: Fit,
+    motions: Sequence[MeasuredMotion],
+    judgement: Judgement,
+    fixed: Mapping[str, float],
+    command: str = "",
 ) -> str:
     """Return the report as text of one self-contained HTML file.
 
@@ -23,6 +33,8 @@ def identify_report(
         title: Component and law, for the heading.
         fit: Result of the fit.
         motions: Measured motions of the fit.
+        judgement: Judgement of the fit.
+        fixed: Numbers that were not searched, by name. [SI]
         command: Command line of the identification, shown on the page.
     """
     alternative = "Measured samples and the fitted loop, one panel per file"
@@ -30,9 +42,9 @@ def identify_report(
         "identify/page.html",
         title=f"Identification of {title}",
         about=f"Fit to {len(motions)} measured loop{'s' if len(motions) > 1 else ''}.",
-        warnings=_warnings(fit),
-        summary=_summary(fit, motions),
-        estimates=_estimates(fit),
+        warnings=_warnings(fit, judgement),
+        summary=_summary(fit, motions, judgement),
+        estimates=_estimates(fit, fixed),
         undetermined=undetermined_sentences(fit),
         pictures=[
             picture(
@@ -43,9 +55,9 @@ def identify_report(
             )
             for over in ("displacement", "velocity")
         ],
-        errors=_errors(fit, motions),
+        errors=_errors(fit, motions, judgement),
         history=picture(
-            history_figure(fit),
+            history_figure(fit, force_scale(motions[0].loop.rotates)[1]),
             "Smallest RMSE after each round of the search.",
             "Smallest RMSE that was found up to the end of each round of the search.",
         ),
@@ -61,17 +73,36 @@ def identify_report(
     )
 
 
-def estimate_cells(fit: Fit) -> list[tuple[str, str, str, str, str]]:
-    """Return name, value, interval, unit and remark of each unknown as text."""
+def estimate_cells(
+    fit: Fit, fixed: Mapping[str, float] | None = None
+) -> list[tuple[str, str, str, str, str]]:
+    """Return name, value, interval, unit and remark of each unknown and fixed number as text."""
     found = []
     for e, unknown in zip(fit.estimates, fit.problem.unknowns, strict=True):
         unit = unknown.unit
-        value = f"{unit.from_si(e.value):.5g}" if e.determined else MISSING
+        text = f"{unit.from_si(e.value):.5g}" if e.determined else MISSING
         interval = MISSING
         if np.isfinite(e.lower):
             interval = f"{unit.from_si(e.lower):.5g} to {unit.from_si(e.upper):.5g}"
-        found.append((e.name, value, interval, unit.shown.replace("*", " "), _remark(e)))
+        found.append((e.name, text, interval, unit.shown.replace("*", " "), _remark(e)))
+    for name, value, unit in _shown_fixed(fixed or {}):
+        found.append((name, f"{value:.5g}", MISSING, unit.shown.replace("*", " "), FIXED))
     return found
+
+
+FIXED = "fixed"
+"""Remark on a number that was not searched."""
+
+
+def _shown_fixed(fixed: Mapping[str, float]) -> list[tuple[str, float, Unit]]:
+    """Return fixed numbers in their unit for reading."""
+    units = {name: unit_of_field(name) for name in fixed}
+    return [(name, unit.from_si(fixed[name]), unit) for name, unit in units.items() if unit]
+
+
+def fixed_numbers(fixed: Mapping[str, float]) -> dict[str, dict[str, Any]]:
+    """Return fixed numbers for JSON, in SI."""
+    return {name: {"value": fixed[name], "unit": unit.si} for name, _, unit in _shown_fixed(fixed)}
 
 
 def _remark(e: Estimate) -> str:
@@ -101,9 +132,9 @@ def undetermined_sentences(fit: Fit) -> list[str]:
     return found
 
 
-def estimates_table(fit: Fit) -> pd.DataFrame:
-    """Return value, interval and bounds of each unknown in its unit for reading."""
-    rows = []
+def estimates_table(fit: Fit, fixed: Mapping[str, float] | None = None) -> pd.DataFrame:
+    """Return value, interval and bounds of each unknown, and each fixed number, for reading."""
+    rows: list[dict[str, Any]] = []
     for e, unknown in zip(fit.estimates, fit.problem.unknowns, strict=True):
         shown = [
             unknown.unit.from_si(v) if np.isfinite(v) else np.nan
@@ -121,13 +152,17 @@ def estimates_table(fit: Fit) -> pd.DataFrame:
                 "remark": _remark(e),
             }
         )
+    rows += [
+        {"unknown": name, "value": value, "unit": unit.shown, "remark": FIXED}
+        for name, value, unit in _shown_fixed(fixed or {})
+    ]
     return pd.DataFrame(rows)
 
 
-def errors_table(fit: Fit, motions: Sequence[MeasuredMotion]) -> pd.DataFrame:
-    """Return the RMSE of each test, as [A] Tables 2, 4, 5 and 7."""
+def errors_table(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) -> pd.DataFrame:
+    """Return the RMSE of each test, as [A] Tables 2, 4, 5 and 7, with noise and lack of fit."""
     rows = []
-    for test, measured in zip(fit.tests, motions, strict=True):
+    for test, measured, judged in zip(fit.tests, motions, judgement.loops, strict=True):
         factor, _, unit = motion_scale(measured.loop.rotates)
         force = force_scale(measured.loop.rotates)[1].replace(" ", "")
         rows.append(
@@ -137,6 +172,9 @@ def errors_table(fit: Fit, motions: Sequence[MeasuredMotion]) -> pd.DataFrame:
                 f"amplitude_{unit}": factor * measured.motion.amplitude,
                 f"rmse_{force}": test.rmse,
                 "rmse_by_largest_force": test.normalised,
+                f"noise_{force}": judged.noise,
+                "lack_of_fit_by_rms_force": judged.missed,
+                "work_per_cycle_J": judged.work,
             }
         )
     return pd.DataFrame(rows)
@@ -159,22 +197,22 @@ def fitted_loops(fit: Fit, motions: Sequence[MeasuredMotion]) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def _estimates(fit: Fit) -> Table:
+def _estimates(fit: Fit, fixed: Mapping[str, float]) -> Table:
     groups = tuple(
         Group(name, (Row(cells),))
-        for name, *cells_ in estimate_cells(fit)
+        for name, *cells_ in estimate_cells(fit, fixed)
         for cells in [tuple(cells_)]
     )
     caption = (
         "Estimated values with 95 % confidence intervals. There is no interval if the value is at "
-        "a bound or if the data do not determine it."
+        "a bound, if the data do not determine it or if it was fixed."
     )
     return Table(
         caption, ("unknown", "value", "95 % interval", "unit", "remark"), groups, text_columns=5
     )
 
 
-def _errors(fit: Fit, motions: Sequence[MeasuredMotion]) -> Table:
+def _errors(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) -> Table:
     unit = force_scale(motions[0].loop.rotates)[1]
     groups = tuple(
         Group(
@@ -186,20 +224,32 @@ def _errors(fit: Fit, motions: Sequence[MeasuredMotion]) -> Table:
                         str(len(measured.phase)),
                         f"{test.rmse:.4g}",
                         number(test.normalised, 4),
+                        f"{judged.noise:.2g}",
+                        per_cent(judged.missed),
                     )
                 ),
             ),
         )
-        for test, measured in zip(fit.tests, motions, strict=True)
+        for test, measured, judged in zip(fit.tests, motions, judgement.loops, strict=True)
     )
     name = force_scale(motions[0].loop.rotates)[0]
     caption = (
         "Root mean square error (RMSE) of each test, absolute and relative to the largest measured "
-        f"{name}, as [A] Tables 2, 4, 5 and 7."
+        f"{name}, as [A] Tables 2, 4, 5 and 7. The noise follows from the differences between "
+        "samples of nearly the same phase. The lack of fit is what the noise does not explain, "
+        f"relative to the root mean square of the measured {name}."
     )
     return Table(
         caption,
-        ("file", "motion", "samples", f"RMSE, {unit}", f"RMSE / largest {name}"),
+        (
+            "file",
+            "motion",
+            "samples",
+            f"RMSE, {unit}",
+            f"RMSE / largest {name}",
+            f"noise, {unit}",
+            "lack of fit",
+        ),
         groups,
         text_columns=2,
     )
@@ -230,10 +280,12 @@ def _correlations(fit: Fit) -> Table:
     return Table(caption, ("unknown", "standard deviation", *names), groups, text_columns=2)
 
 
-def _warnings(fit: Fit) -> list[str]:
+def _warnings(fit: Fit, judgement: Judgement) -> list[str]:
     # A rise of a monotone curve that is zero means a flat piece, which needs no warning.
     flat = [e.name for e in fit.estimates if ".rise_" in e.name and e.at_bound == "lower"]
-    found = [
+    is_good = judgement.verdict == "good"
+    found = [*judgement.sentences[1 if is_good else 0 :]]
+    found += [
         f"The value of {e.name} is at its {e.at_bound} bound."
         for e in fit.estimates
         if e.at_bound and e.name not in flat
@@ -244,13 +296,20 @@ def _warnings(fit: Fit) -> list[str]:
     return found
 
 
-def _summary(fit: Fit, motions: Sequence[MeasuredMotion]) -> str:
+def _summary(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) -> str:
     name, unit = force_scale(motions[0].loop.rotates)
     normalised = [test.normalised for test in fit.tests]
     determined = sum(e.determined for e in fit.estimates)
-    least, most = (f"{100.0 * value:.2g}" for value in (min(normalised), max(normalised)))
+    least, most = (per_cent(value) for value in (min(normalised), max(normalised)))
+    opening = judgement.sentences[0] + " " if judgement.verdict == "good" else ""
+    ending = (
+        f"The data give a best value of {determined} of {len(fit.estimates)} unknowns, but the law "
+        "does not describe the loops."
+        if judgement.verdict == "poor"
+        else f"The data determine {determined} of {len(fit.estimates)} unknowns."
+    )
     return (
-        "The root mean square difference (RMSE) between fitted and measured loops is "
-        f"{fit.rmse:.3g} {unit} over all samples. For single tests it is {least} to {most} % of "
-        f"the largest {name}. The data determine {determined} of {len(fit.estimates)} unknowns."
+        f"{opening}The root mean square difference (RMSE) between fitted and measured loops is "
+        f"{fit.rmse:.3g} {unit} over all samples. For single tests it is {least} to {most} of "
+        f"the largest {name}. {ending}"
     )

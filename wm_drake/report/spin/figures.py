@@ -16,7 +16,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH, style_axes
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, shape_name
 from wm_drake.report.spin.cases import case_title, speed_rpm
-from wm_drake.simulation.measures import axis_motion, envelopes
+from wm_drake.simulation.measures import axis_motion, envelopes, moment_of_largest_amplitude
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record
 from wm_drake.studies.spin.study import CaseResult
@@ -31,7 +31,7 @@ COLUMNS = 3
 """Number of panels in a row, one for each of the axes x, y and z."""
 
 ORBIT_REVOLUTIONS = 6.0
-"""Number of drum revolutions that an orbit shows, with the largest motion in the middle."""
+"""Number of drum revolutions that an orbit shows, with the largest amplitude in the middle."""
 
 FEWEST_REVOLUTIONS = 20
 """Smallest number of revolutions in a record for which extremes per revolution are drawn."""
@@ -111,7 +111,7 @@ def gasket_figure(record: Record) -> Figure:
 def orbits_figure(record: Record, y_front: float, y_rear: float) -> Figure:
     """Draw the paths of two points of the drum axis in the x-z plane, seen from the front.
 
-    The paths cover the drum revolutions around the largest motion of the two points.
+    The paths cover the drum revolutions around the largest amplitude of all sensors.
 
     Args:
         record: A record with at least two samples.
@@ -119,7 +119,7 @@ def orbits_figure(record: Record, y_front: float, y_rear: float) -> Figure:
         y_rear: Position of the rear point on the drum axis. [m]
     """
     paths = [axis_path_mm(record, y) for y in (y_front, y_rear)]
-    largest = int(np.argmax(np.max([np.hypot(path[:, 0], path[:, 2]) for path in paths], axis=0)))
+    largest = moment_of_largest_amplitude(record)
     window = orbit_window(record, largest, ORBIT_REVOLUTIONS)
     x_limit, z_limit = orbit_limits([path[window] for path in paths])
     height = 4.6 * z_limit / x_limit + 1.3
@@ -136,7 +136,7 @@ def orbits_figure(record: Record, y_front: float, y_rear: float) -> Figure:
         axes.set_ylabel("z, up, mm", fontsize=9.5)
         axes.set_title(title, fontsize=10.5, loc="left", fontweight="bold")
     speed = record.drum_speed.values[largest] * RPM_PER_RAD_S
-    moment = f"largest motion: {record.time.values[largest]:.2f} s, {number(speed, 0)} rpm"
+    moment = f"largest amplitude: {record.time.values[largest]:.2f} s, {number(speed, 0)} rpm"
     _legend(figure, _orbit_handles(record.time.values[window], moment))
     return figure
 
@@ -374,7 +374,8 @@ def _largest_handle() -> Artist:
 
 def _orbit_handles(window: FloatArray, moment: str) -> list[Artist]:
     return [
-        Line2D([], [], color=OURS, linewidth=2.0, label="revolution with the largest motion"),
+        Line2D([], [], color=MARK, marker="o", markersize=5, linestyle="none", label=moment),
+        Line2D([], [], color=OURS, linewidth=2.0, label="revolution around it"),
         Line2D(
             [],
             [],
@@ -383,7 +384,6 @@ def _orbit_handles(window: FloatArray, moment: str) -> list[Artist]:
             linewidth=0.9,
             label=f"{window[0]:.1f} s to {window[-1]:.1f} s",
         ),
-        Line2D([], [], color=MARK, marker="o", markersize=5, linestyle="none", label=moment),
         Line2D(
             [], [], color=QUIET, marker="+", markersize=10, linestyle="none", label="rest position"
         ),

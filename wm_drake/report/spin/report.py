@@ -1,12 +1,14 @@
 """Report of a spin run: one self-contained HTML file."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from wm_drake.model.scene import Gap
+from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.report.formatting import (
     MM_PER_M,
     RPM_PER_RAD_S,
@@ -20,7 +22,8 @@ from wm_drake.report.spin.cases import case_title, has_gasket, speed_rpm
 from wm_drake.report.spin.figures import envelopes_figure, gaps_figure, gasket_figure, orbits_figure
 from wm_drake.report.spin.tables import amplitude_table
 from wm_drake.report.tables import Table, parameter_table
-from wm_drake.studies.spin.study import CaseResult, SpinResult
+from wm_drake.simulation.cases import UNUSED_PHASE_ERROR
+from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
 
 __all__ = ["amplitude_table", "spin_report"]
 
@@ -35,6 +38,7 @@ class CaseView:
         facts: Short sentences above the figures.
         pictures: Figures.
         changed: Parameters of the case that differ from the machine's, if any.
+        replay: Name of the file with the 3D replay, beside the page; empty if there is none.
     """
 
     anchor: str
@@ -42,14 +46,18 @@ class CaseView:
     facts: str
     pictures: tuple[Picture, ...]
     changed: Table | None
+    replay: str = ""
 
 
-def spin_report(result: SpinResult, command: str = "") -> str:
+def spin_report(
+    result: SpinResult, command: str = "", replays: Mapping[str, str] | None = None
+) -> str:
     """Return the report as text of one self-contained HTML file.
 
     Args:
         result: Result with at least one case.
         command: Command line of the run, shown on the page.
+        replays: Names of the files with a 3D replay, by name of the case.
 
     Raises:
         InputError: A file of measured amplitudes cannot be used.
@@ -66,7 +74,12 @@ def spin_report(result: SpinResult, command: str = "") -> str:
         critical_speeds=tables.critical_speeds(result),
         smallest_gaps=tables.smallest_gaps(result),
         gaps_picture=_gaps_picture(result),
-        cases=[_case_view(result, index, table) for index in range(len(result.results))],
+        cases=[
+            replace(
+                _case_view(result, index, table), replay=(replays or {}).get(case.case.name, "")
+            )
+            for index, case in enumerate(result.results)
+        ],
         facts=facts_of_run(result, command),
         loads=tables.loads(result),
         profiles=tables.profiles(result),
@@ -93,7 +106,7 @@ def summary(result: SpinResult, table: pd.DataFrame) -> str:
                 opening,
                 _largest_amplitude_sentence(ended),
                 _smallest_gap_sentence(ended),
-                _agreement_sentence(ended, table),
+                _agreement_sentence(result, ended, table),
             ],
         )
     )
@@ -151,7 +164,7 @@ def _case_facts(case: CaseResult) -> str:
     return f"{facts} Smallest gap to the housing: {_gap_text(case, gap)}." if gap else facts
 
 
-def _agreement_sentence(cases: list[CaseResult], table: pd.DataFrame) -> str:
+def _agreement_sentence(result: SpinResult, cases: list[CaseResult], table: pd.DataFrame) -> str:
     changes = [
         change
         for case in cases
@@ -159,7 +172,7 @@ def _agreement_sentence(cases: list[CaseResult], table: pd.DataFrame) -> str:
         if np.isfinite(change.percent)
     ]
     if not changes:
-        return "The machine file has no measured amplitudes for these cases."
+        return _why_not_compared(result)
     mean = float(np.mean([abs(change.percent) for change in changes]))
     worst = max(changes, key=lambda change: abs(change.percent))
     return (
@@ -169,9 +182,27 @@ def _agreement_sentence(cases: list[CaseResult], table: pd.DataFrame) -> str:
     )
 
 
+def _why_not_compared(result: SpinResult) -> str:
+    if not result.parameters.measured:
+        return "The machine file has no measured amplitudes."
+    if result.comparison is Comparison.NONE:
+        return (
+            "There is no comparison with the measured amplitudes of the machine file, because its "
+            "numbers were changed."
+        )
+    if not any(result.is_compared(case) for case in result.results):
+        return (
+            "There is no comparison with the measured amplitudes of the machine file, because they "
+            "belong to other loads or to another spin profile."
+        )
+    return "The machine file has no measured amplitudes for these cases."
+
+
 def warnings_of(result: SpinResult) -> list[str]:
-    """Return warnings about runs that diverged, parts that overlap, and another spin profile."""
-    found = []
+    """Return warnings about unusual numbers, runs that diverged, and parts that overlap."""
+    found = [f"{problem.key}: {problem.message}." for problem in unusual_numbers(result.parameters)]
+    if result.parameters.imperfections.phase_error:
+        found.append(UNUSED_PHASE_ERROR)
     for case in result.results:
         gap, title = case.measures.smallest_gap, case_title(case)
         if case.record.attrs["diverged"]:
@@ -185,11 +216,6 @@ def warnings_of(result: SpinResult) -> list[str]:
                 f"Load {title}: {parts} overlap by {number(-MM_PER_M * gap.distance)} mm. The "
                 "model has no contact forces. In the real machine these parts would collide, and "
                 "the motion after that is not valid."
-            )
-        if case.case.profile != result.parameters.profile:
-            found.append(
-                f"Load {title}: the spin profile differs from the one in the machine file. "
-                "Measured amplitudes belong to the profile of the machine file."
             )
     return found
 
@@ -255,11 +281,11 @@ def _orbits_picture(case: CaseResult) -> Picture | None:
     depths = case.record.sensor_point.sel(axis="y")
     caption = (
         "Path of the drum axis in the planes of the foremost and the rearmost sensor, seen from "
-        "the front of the machine. Dark line: the drum revolution in which the axis is farthest "
-        "from its rest position. Pale line: the revolutions before and after it."
+        "the front of the machine. Dot and dark line: the moment of the largest amplitude of all "
+        "sensors, and the drum revolution around it. Pale line: the revolutions before and after."
     )
     alternative = (
-        "Orbits of the drum axis, front and rear, around the largest motion, "
+        "Orbits of the drum axis, front and rear, around the largest amplitude, "
         f"load {case_title(case)}."
     )
     return picture(

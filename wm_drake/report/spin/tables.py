@@ -40,18 +40,19 @@ class Difference:
 def amplitude_table(result: SpinResult) -> pd.DataFrame:
     """Return the amplitudes: load, gasket (yes, no), source, and one column per sensor. [mm]
 
-    For each case, the table holds the measured rows of the machine file with the same load and
-    gasket, then the computed row with the source 'wm_drake'. A machine file can name this table,
-    saved as CSV, in `measured`.
+    For each case, the table holds the measured rows with the same load and gasket, if the case is
+    compared with them, then the computed row with the source 'wm_drake'. A machine file can name
+    this table, saved as CSV, in `measured`.
     """
     sensors = list(result.parameters.sensors)
     measured = measured_amplitudes(result.parameters)
     parts = []
     for case in result.results:
         gasket = case.record.attrs["gasket"]
-        parts.append(
-            measured[(measured["load"] == case.case.name) & (measured["gasket"] == gasket)]
-        )
+        if result.is_compared(case):
+            parts.append(
+                measured[(measured["load"] == case.case.name) & (measured["gasket"] == gasket)]
+            )
         values = {
             name: MM_PER_M * float(case.measures.amplitude.sel(sensor=name)) for name in sensors
         }

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MISSING, number
@@ -50,14 +51,12 @@ def summary(result: SpinIdentification) -> str:
         100.0 * float(average_errors(values, result.measured).mean())
         for values in (result.before, result.after)
     )
-    opening = "" if result.planted is None else VIRTUAL
+    opening = ("" if result.planted is None else VIRTUAL) + f"{judged(result)} "
     unknowns_were = f"{count} unknown{'s were' if count > 1 else ' was'}"
     cases = f"{len(result.cases)} case{'s' if len(result.cases) > 1 else ''}"
     text = (
         f"{opening}{unknowns_were} fitted to the RMS displacements of {cases}. The data determine "
-        f"{known} of {count} to within ±{number(100 * KNOWN, 0)} % (95 % confidence interval). The "
-        f"average error of an RMS displacement is {number(begin)} % before the search and "
-        f"{number(end)} % after it."
+        f"{known} of {count} to within ±{number(100 * KNOWN, 0)} % (95 % confidence interval)."
     )
     if result.recovered is not None and known:
         worst = np.max(np.abs(result.recovered[np.array(result.identifiable)]))
@@ -65,6 +64,10 @@ def summary(result: SpinIdentification) -> str:
             " The determined unknowns differ from their planted values by at most "
             f"{number(100 * worst, 2)} %."
         )
+    text += (
+        f" The search reduced the average error of an RMS displacement from {number(begin)} % to "
+        f"{number(end)} %."
+    )
     left = [
         s.unknown.name
         for s, fine in zip(result.sought, result.identifiable, strict=True)
@@ -75,9 +78,21 @@ def summary(result: SpinIdentification) -> str:
     return text
 
 
+def judged(result: SpinIdentification) -> str:
+    """Return the verdict on the fit as a sentence."""
+    text = (
+        f"{result.verdict.capitalize()} fit: the computed RMS displacements miss the measured ones "
+        f"by {number(100.0 * result.error_after)} % on average."
+    )
+    if result.verdict == "poor":
+        text += " The machine does not describe the measurement: do not use the values found."
+    return text
+
+
 def warnings_of(result: SpinIdentification) -> list[str]:
-    """Return a warning for each unknown whose search ended at a bound."""
-    return [
+    """Return a warning for a fit that is not good and for each search that ended at a bound."""
+    found = [] if result.verdict == "good" else [judged(result)]
+    return found + [
         f"The search for {e.name} ended at its {e.at_bound} bound. Widen the range, or check "
         "whether the model is right."
         for e in result.fit.estimates
@@ -121,6 +136,35 @@ def unknowns(result: SpinIdentification) -> Table:
         f"±{number(100 * KNOWN, 0)} % (95 % confidence interval)."
     )
     return Table(caption, tuple(header), tuple(groups), text_columns=2)
+
+
+def values_table(result: SpinIdentification) -> pd.DataFrame:
+    """Return the unknowns as numbers in their unit, one row for each key."""
+    rows = []
+    for k, (sought, estimate) in enumerate(zip(result.sought, result.fit.estimates, strict=True)):
+        unit = sought.unknown.unit
+
+        def shown(value: float | None, unit: Unit = unit) -> float:
+            return np.nan if value is None or not np.isfinite(value) else unit.from_si(value)
+
+        for key in sought.keys:
+            row: dict[str, object] = {
+                "unknown": key,
+                "before": shown(sought.unknown.start),
+                "value": shown(estimate.value) if estimate.determined else np.nan,
+                "lower_95": shown(estimate.lower),
+                "upper_95": shown(estimate.upper),
+                "unit": unit.shown,
+                "lower_bound": shown(sought.unknown.lower),
+                "upper_bound": shown(sought.unknown.upper),
+                "identifiable": result.identifiable[k],
+                "at_bound": estimate.at_bound,
+            }
+            if result.planted is not None and result.recovered is not None:
+                row["planted"] = shown(float(result.planted[k]))
+                row["error_percent"] = 100.0 * float(result.recovered[k])
+            rows.append(row)
+    return pd.DataFrame(rows)
 
 
 def _with_unit(value: float | None, unit: Unit) -> str:

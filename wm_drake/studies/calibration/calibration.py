@@ -65,10 +65,18 @@ class Plan:
             )
         if self.starts < 1:
             raise input_error(f"{self.starts} starts; allowed is 1 or more", key="starts")
-        if not self.deviation > 0.0:
-            raise input_error(f"{self.deviation:g} is not allowed; must be > 0", key="deviation")
-        if not self.resolution >= 0.0:
-            raise input_error(f"{self.resolution:g} is not allowed; must be >= 0", key="resolution")
+        if self.iterations < 0:
+            raise input_error(f"{self.iterations} is not allowed; must be >= 0", key="iterations")
+        if self.seed < 0:
+            raise input_error(f"{self.seed} is not allowed; must be >= 0", key="seed")
+        if not 0.0 < self.deviation < np.inf:
+            raise input_error(
+                f"{self.deviation:g} is not allowed; must be > 0 and finite", key="deviation"
+            )
+        if not 0.0 <= self.resolution < np.inf:
+            raise input_error(
+                f"{self.resolution:g} is not allowed; must be >= 0 and finite", key="resolution"
+            )
 
     def spread(self, amplitude: FloatArray) -> FloatArray:
         """Return the standard deviations of the logarithms of measured amplitudes."""

@@ -13,10 +13,17 @@ from wm_drake.studies.calibration.solutions import AT_BOUND, DETERMINED, UNDETER
 from wm_drake.studies.calibration.targets import EXPERIMENT, MILLIMETRE
 
 
-def solved_machine(parameter_map: ParameterMap, solution: Solution) -> MachineParameters:
+def solved_machine(
+    parameter_map: ParameterMap, solution: Solution, number: int = 0
+) -> MachineParameters:
     """Return the machine of a solution.
 
     The source of each fitted number is "fit: " followed by the text of `fit_text`.
+
+    Args:
+        parameter_map: Map of the calibration.
+        solution: The solution.
+        number: Number of the solution, for the name of the machine; 0 keeps the name.
     """
     spread = solution.spread()
     sources: dict[str, list[str]] = {}
@@ -35,7 +42,8 @@ def solved_machine(parameter_map: ParameterMap, solution: Solution) -> MachinePa
         for key, text in parameters.sources.items()
         if not any(key.startswith(f"{k}.") for k in fitted)
     }
-    return parameters.model_copy(update={"sources": {**kept, **fitted}})
+    name = f"{parameters.name}_calibrated_{number}" if number else parameters.name
+    return parameters.model_copy(update={"name": name, "sources": {**kept, **fitted}})
 
 
 def _rounded(parameter_map: ParameterMap, solution: Solution) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from wm_drake.errors import InputError, Problem, nearest_names
-from wm_drake.model.bodies import spelled_out
+from wm_drake.model.bodies import with_sdf_values
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.free import FreeFile, FreeQuantity, Measured
@@ -96,7 +96,7 @@ def parameter_map_of(machine: Machine, free: FreeFile) -> ParameterMap:
     keys = list(
         dict.fromkeys(key for quantity in free.quantities.values() for key in quantity.sets)
     )
-    base = spelled_out(machine.plant, machine.parameters, keys)
+    base = with_sdf_values(machine.plant, machine.parameters, keys)
     known = {key: (value, unit) for key, value, unit in quantities(base)}
     problems: list[Problem] = []
     values = []

@@ -90,6 +90,8 @@ def check_held_out(targets: Targets, held_out: Sequence[Sequence[str]]) -> None:
     known = {name for name, _ in targets.loads}
     for loads in held_out:
         for name in loads:
+            if list(loads).count(name) > 1:
+                raise input_error(f"'{name}' is given twice", key="leave-out")
             if name not in known:
                 raise input_error(
                     f"no measured load '{name}'{nearest_names(name, known)}", key="leave-out"

@@ -8,8 +8,7 @@ import pandas as pd
 
 from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
-from wm_drake.model.machine import Machine
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import Machine, Setup
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
@@ -70,9 +69,9 @@ class Targets:
                     f"'{key}' is no load, sensor, or LOAD:SENSOR{nearest_names(key, known)}",
                     key="weight",
                 )
-            if not factor >= 0.0:
+            if not 0.0 <= factor < np.inf:
                 raise input_error(
-                    f"{factor:g} is not allowed; must be >= 0", key=f"weight of '{key}'"
+                    f"{factor:g} is not allowed; must be >= 0 and finite", key=f"weight of '{key}'"
                 )
             weight[np.ix_(loads, sensors)] *= factor
         return replace(self, weight=weight)

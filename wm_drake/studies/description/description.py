@@ -6,18 +6,47 @@ import numpy as np
 
 from wm_drake.compiler.compilation import generic
 from wm_drake.compiler.vectors import rotation_from_rpy
+from wm_drake.elements.spin_profile import drum_motion
+from wm_drake.engines.compiled.step_check import BEARING, fastest_motions
 from wm_drake.model.bodies import tubes_of
-from wm_drake.model.machine import Machine
-from wm_drake.model.setup import Setup
+from wm_drake.model.machine import OUTPUT_PERIOD, Machine, Setup
 from wm_drake.model.state_layout import CARRIER
-from wm_drake.parameters import ForceTable, TorqueTable
+from wm_drake.parameters import DAMPER_LAWS, ForceTable, MachineParameters, TorqueTable
+from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.measures import BAND_HZ, FILTER_ORDER, PADDING
+from wm_drake.simulation.vibration import HIGH_PASS_HZ
+from wm_drake.simulation.vibration import ORDER as RMS_ORDER
 from wm_drake.studies.description.modal import natural_modes
+from wm_drake.studies.description.schema import VERSION
 
 _BEARING_NUMBERS = [
     f"{kind}_{axis}"
     for kind in ("stiffness", "rotational_stiffness", "damping", "rotational_damping")
     for axis in "xyz"
 ]
+CONVENTIONS = {
+    "frames": "W housing, T tub, D drum; x right, y to the rear, z up. As drawn, all coincide.",
+    "rest pose": "Equilibrium of the empty machine. Displacements count from it.",
+    "drum angle": "Right-handed about drum_joint.axis_T, measured from T. The speed is its rate.",
+    "phase": "A mass at phase 0 is on +z of D, at phase 90 deg on +x: the sense of rotation "
+    "about +y.",
+    "start of a run": "Tub at the rest pose without velocity, drum at drum_joint.start_angle with "
+    "the first speed of the profile, sponges undeformed.",
+    "loads": "Point masses are added to mass, centre and inertia of the drum. The empty machine "
+    "has none.",
+    "drum motion": "Prescribed by the profile; the motor torque reacts on the tub.",
+    "tables": "PCHIP (Fritsch and Carlson 1980, as in scipy) between points; beyond the ends "
+    "straight, with the slope at the end.",
+    "rotation vector": "Axis times angle of the rotation of the tub-side frame in the law frame "
+    "of a bushing. Torques do work on the rates of its components.",
+    "bushing forces": "On the tub side at its point; the reaction on the other side acts at the "
+    "same point of space.",
+    "end bushings": "Neutral as drawn. The moment is proportional to the angle between strut and "
+    "neutral direction; spin about the strut is free; the couple on the strut is balanced by "
+    "transverse forces at its ends.",
+}
+"""Conventions that a rebuilt machine needs, by subject."""
+
 PRODUCTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
@@ -34,11 +63,15 @@ def describe(machine: Machine) -> dict[str, Any]:
     return {
         "machine": parameters.name,
         "units": "SI: m, kg, s, rad, N; x right, y to the rear, z up",
+        "format": VERSION,
+        "conventions": CONVENTIONS,
+        "laws": _laws(parameters),
         "gravity_W": [0.0, 0.0, -parameters.gravity],
         "bodies": _bodies(setup),
         "oscillating_mass_kg": oscillating_mass(setup),
         "drum_joint": {"name": parameters.drive.joint, **_drum_axis(setup)},
         "drum_bearing": _drum_bearing(setup),
+        "imperfections": parameters.imperfections.model_dump(exclude={"bearing"}),
         "springs": {name: _spring(setup, name) for name in setup.springs},
         "dampers": {name: _damper(setup, name) for name in setup.dampers},
         "bushings": {name: _bushing(setup, name) for name in setup.bushings},
@@ -47,12 +80,14 @@ def describe(machine: Machine) -> dict[str, Any]:
             name: {"point_T": setup.sensor_points[name].tolist(), "axis_W": sensor.axis}
             for name, sensor in parameters.sensors.items()
         },
+        "accelerometers": {
+            name: {"point_T": point.tolist()} for name, point in setup.accelerometer_points.items()
+        },
         "detergent_point_T": setup.detergent_point.tolist(),
         "loads": {name: load.model_dump() for name, load in parameters.loads.items()},
         "profile": parameters.profile.model_dump(),
-        "rest_pose": dict(
-            zip(("roll", "pitch", "yaw", "x", "y", "z"), setup.rest_pose.tolist(), strict=True)
-        ),
+        "numerics": _numerics(parameters),
+        "rest_pose": _pose(setup.rest_pose),
         "equilibrium_residual": {
             "moment_Nm": setup.residual[:3].tolist(),
             "force_N": setup.residual[3:].tolist(),
@@ -60,6 +95,39 @@ def describe(machine: Machine) -> dict[str, Any]:
         "natural_frequencies_hz": modes.frequency_hz.tolist(),
         "mode_damping_ratios": modes.damping_ratio.tolist(),
     }
+
+
+def _laws(parameters: MachineParameters) -> dict[str, str]:
+    """Return the equation numbers of the laws that a machine uses, by name of the law."""
+    found = {
+        kind.law: f"{DAMPER_LAWS[kind.law].equations}; wm_drake.laws.damper."
+        f"{DAMPER_LAWS[kind.law].response.__name__}"
+        for kind in parameters.damper_types.values()
+    }
+    found["spring"] = "Hooke's law; wm_drake.laws.spring.spring_tension"
+    if parameters.all_bushings() or parameters.telescopic_dampers:
+        found["bushing"] = "[A] (7), (8), [B] Fig. 4; wm_drake.laws.bushing.bushing_force"
+    if parameters.dampers:
+        found["end_bushing"] = "[A] (7), [B] section 3; wm_drake.laws.strut.bending_moment"
+    return found
+
+
+def _numerics(parameters: MachineParameters) -> dict[str, Any]:
+    both_ways = "forwards and backwards, so that no phase is shifted"
+    return {
+        "integrator": "classical Runge-Kutta method of fourth order, fixed step",
+        "step_s": parameters.step,
+        "output_period_s": OUTPUT_PERIOD,
+        "displacement_filter": f"Butterworth band-pass of order {FILTER_ORDER}, {both_ways}; ends "
+        f"mirrored over {PADDING:g} s",
+        "displacement_band_hz": list(BAND_HZ),
+        "rms_filter": f"Butterworth high-pass of order {RMS_ORDER}, {both_ways}",
+        "rms_high_pass_hz": HIGH_PASS_HZ,
+    }
+
+
+def _pose(values: FloatArray) -> dict[str, float]:
+    return dict(zip(("roll", "pitch", "yaw", "x", "y", "z"), values.tolist(), strict=True))
 
 
 def oscillating_mass(setup: Setup) -> float:
@@ -100,11 +168,16 @@ def _bodies(setup: Setup) -> dict[str, Any]:
     return described
 
 
-def _drum_axis(setup: Setup) -> dict[str, list[float]]:
+def _drum_axis(setup: Setup) -> dict[str, Any]:
     joint = setup.machine.plant.GetJointByName(setup.parameters.drive.joint)
     X_TF = joint.frame_on_parent().CalcPoseInBodyFrame(setup.plant_context)
     axis = X_TF.rotation() @ joint.revolute_axis()
-    return {"axis_T": list(map(float, axis)), "through_T": list(map(float, X_TF.translation()))}
+    _, start_angle = drum_motion(setup.parameters.profile, np.zeros(1))
+    return {
+        "axis_T": list(map(float, axis)),
+        "through_T": list(map(float, X_TF.translation())),
+        "start_angle": float(start_angle[0]),
+    }
 
 
 def _drum_bearing(setup: Setup) -> dict[str, Any] | None:
@@ -117,7 +190,7 @@ def _drum_bearing(setup: Setup) -> dict[str, Any] | None:
         return None
     kind = bearing.as_bushing().model_dump(include=set(_BEARING_NUMBERS))
     sag = setup.carrier_rest[3:] - setup.rest_pose[3:]
-    rate = {"fastest_motion_hz": setup.bearing_rate / (2.0 * np.pi)}
+    rate = {"fastest_motion_hz": fastest_motions(setup)[BEARING].rate / (2.0 * np.pi)}
     return {
         "point_T": placed.ground_side_point.tolist(),
         "rotation_T": placed.ground_side_rotation.tolist(),
@@ -156,7 +229,10 @@ def _spring(setup: Setup, name: str) -> dict[str, Any]:
 
 def _damper(setup: Setup, name: str) -> dict[str, Any]:
     kind = setup.parameters.damper_types[setup.parameters.dampers[name].type]
-    return {**_line(setup, setup.dampers[name]), **kind.model_dump()}
+    placed = setup.dampers[name]
+    line = placed.p_ToA_T - placed.p_WH
+    neutral = (line / np.linalg.norm(line)).tolist()
+    return {**_line(setup, placed), "neutral_direction": neutral, **kind.model_dump()}
 
 
 def _bushing(setup: Setup, name: str) -> dict[str, Any]:
@@ -180,6 +256,7 @@ def _telescope(setup: Setup, name: str) -> dict[str, Any]:
     placed, damper = setup.telescopes[name], setup.parameters.telescopic_dampers[name]
     kind = setup.parameters.damper_types[damper.type]
     tubes = [body.name() for body in tubes_of(setup.machine.plant, damper.joint)]
+    rest = setup.tube_rest[list(setup.telescopes).index(name)]
     return {
         "outer_tube": tubes[0],
         "inner_tube": tubes[1],
@@ -190,6 +267,14 @@ def _telescope(setup: Setup, name: str) -> dict[str, Any]:
         "housing_point_W": placed.housing_bushing.ground_side_point.tolist(),
         "tub_bushing": setup.parameters.bushing_types[damper.tub_bushing].model_dump(),
         "housing_bushing": setup.parameters.bushing_types[damper.housing_bushing].model_dump(),
+        "tub_bushing_on_tub_rotation_T": placed.tub_bushing.tub_side_rotation.tolist(),
+        "tub_bushing_law_rotation_outer_tube": placed.tub_bushing.ground_side_rotation.tolist(),
+        "housing_bushing_on_inner_tube_rotation_outer_tube": (
+            placed.housing_bushing.tub_side_rotation.tolist()
+        ),
+        "housing_bushing_law_rotation_W": placed.housing_bushing.ground_side_rotation.tolist(),
+        "outer_tube_rest_pose": _pose(rest[:6]),
+        "extension_at_rest": float(rest[6]),
         **kind.model_dump(exclude={"end_bushing"}),
     }
 

@@ -4,22 +4,40 @@ The coding is sum-to-zero: the constant is the mean over all level combinations,
 a term sum to zero over the levels of each of its factors. Fits and tests are done by statsmodels.
 
 A contribution is the variance of a term's effects over the grid of all level combinations, as a
-fraction of the total variance there. On an orthogonal design it equals the ratio of the term's sum
-of squares to the total one, for all types of sums of squares. On other designs, sums of squares of
+fraction of the total variance there. On the full factorial it equals the ratio of the term's sum of
+squares to the total one, for all types of sums of squares. On other designs, sums of squares of
 type III do not add up to the total, and those of type I depend on the order of the terms.
 Contributions by variance and the residual add up to 100 % on any design.
+
+The variance of the residual over the grid is estimated from the n trials with the degrees of
+freedom that p coefficients leave, and with the finite number N of level combinations:
+
+    s^2 = SSR / (n - p) (1 - p / N)
+
+It is SSR / n on the full factorial (n = N), where nothing is estimated. Repeated trials show noise,
+which has no grid: N is infinite then.
+
+All these numbers describe the trials of the design. How well the model predicts a trial that it has
+not seen is the predicted R2. It leaves each trial out once (PRESS: prediction error sum of
+squares), by the leverages h of the hat matrix:
+
+    R2_predicted = 1 - sum (e_i / (1 - h_i))^2 / SST
 """
 
 import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from scipy.stats import f as f_distribution
-from statsmodels.regression.linear_model import OLS
+from statsmodels.regression.linear_model import OLS, RegressionResults
 from threadpoolctl import threadpool_limits
 
 from wm_drake.parameters.types import FloatArray
+
+LARGEST_LEVERAGE = 1.0 - 1e-9
+"""Leverage above which a trial cannot be left out: the others do not determine the model."""
 
 Combination = tuple[int, ...]
 """One level for each factor of a term."""
@@ -63,10 +81,16 @@ class AnovaTable:
         constant: Mean over all level combinations. [unit of the response]
         terms: Main effects, then interactions, in the order of the factors.
         main_percent, interaction_percent, residual_percent: Contributions of all main effects, all
-            interactions and the residual; they sum to 100. [%]
+            interactions and the residual; they sum to 100. [%] If there are as many coefficients
+            as trials, the residual is unknown: NaN, and the other two sum to 100.
         total_sum_sq, residual_sum_sq: Sums of squares over the trials, about the mean and about the
             fit. [unit of the response, squared]
         residual_df: Degrees of freedom of the residual.
+        adjusted_r2: Explained part of the variance, adjusted for the degrees of freedom; NaN
+            without any. At most 1.
+        predicted_r2: Part of the variance that the model predicts of trials that are left out, one
+            at a time; NaN without degrees of freedom. At most 1; negative if the mean predicts
+            better than the model.
         fitted, residual: (trials,) fitted value and residual. [unit of the response]
     """
 
@@ -78,6 +102,8 @@ class AnovaTable:
     total_sum_sq: float
     residual_sum_sq: float
     residual_df: int
+    adjusted_r2: float
+    predicted_r2: float
     fitted: FloatArray
     residual: FloatArray
 
@@ -117,6 +143,24 @@ class SumCoding:
             zip(self.terms, itertools.starmap(slice, itertools.pairwise(ends)), strict=True)
         )
         self.matrix = np.hstack(blocks)
+        self.residual_df = len(levels) - self.matrix.shape[1]
+        self._is_repeated = bool(levels.duplicated().any())
+        self._grid_size = math.prod(len(found) for found in self.levels.values())
+
+    def residual_variance(self, sum_sq: float) -> float:
+        """Return the variance over the grid of what the model does not explain.
+
+        Args:
+            sum_sq: Sum of squares of the residual over the trials. [unit of the response, squared]
+
+        Returns:
+            The estimate of the module docstring. [unit of the response, squared] NaN without
+            degrees of freedom.
+        """
+        if self.residual_df == 0:
+            return math.nan
+        unseen = 0.0 if self._is_repeated else self.matrix.shape[1] / self._grid_size
+        return sum_sq / self.residual_df * (1.0 - unseen)
 
     def effects(self, term: tuple[str, ...], coefficients: FloatArray) -> dict[Combination, float]:
         """Return the effects of a term at all its level combinations, from its coefficients."""
@@ -165,7 +209,8 @@ def _analysed(coding: SumCoding, response: FloatArray) -> AnovaTable:
     variances = {
         term: float(np.mean(np.square(list(values.values())))) for term, values in effects.items()
     }
-    variance = sum(variances.values()) + float(fit.ssr) / len(response)
+    unexplained = coding.residual_variance(float(fit.ssr))
+    variance = sum(variances.values()) + (0.0 if math.isnan(unexplained) else unexplained)
     # the variance of a constant response is not 0 but about 1e-32 of its square, by rounding
     scale = 100.0 / variance if variance > 1e-20 * float(np.mean(response**2)) else np.nan
     identity = np.eye(coding.matrix.shape[1])
@@ -184,10 +229,20 @@ def _analysed(coding: SumCoding, response: FloatArray) -> AnovaTable:
         terms=tuple(terms),
         main_percent=sum(term.percent for term in terms if len(term.factors) == 1),
         interaction_percent=sum(term.percent for term in terms if len(term.factors) > 1),
-        residual_percent=scale * float(fit.ssr) / len(response),
+        residual_percent=scale * unexplained,
         total_sum_sq=float(fit.centered_tss),
         residual_sum_sq=float(fit.ssr),
         residual_df=int(fit.df_resid),
+        adjusted_r2=float(fit.rsquared_adj) if math.isfinite(scale) and fit.df_resid else math.nan,
+        predicted_r2=_predicted_r2(fit) if math.isfinite(scale) else math.nan,
         fitted=np.asarray(fit.fittedvalues),
         residual=np.asarray(fit.resid),
     )
+
+
+def _predicted_r2(fit: RegressionResults) -> float:
+    """Return the predicted R2 of a fit; NaN if a trial alone determines a coefficient."""
+    influence = fit.get_influence()
+    if fit.df_resid == 0 or np.max(influence.hat_matrix_diag) > LARGEST_LEVERAGE:
+        return math.nan
+    return 1.0 - float(influence.ess_press / fit.centered_tss)

@@ -1,5 +1,6 @@
 """Designs of experiments: make one of a kind, write it and read it as CSV."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.parameters.csv_files import read_csv
+from wm_drake.parameters.csv_files import read_csv, read_header
 from wm_drake.studies.doe.coding import LEVELS, MODELS, Levels, columns, efficiency, level_matrix
 from wm_drake.studies.doe.exchange import d_optimal_levels
 from wm_drake.studies.doe.orthogonal import orthogonal_levels
@@ -17,6 +18,10 @@ DESIGNS = ("d-optimal", "orthogonal", "full")
 
 TRIAL = "trial"
 """Name of the CSV column with the numbers of the trials, which start at 1."""
+
+
+_VALUES = re.compile(r".* \[[^\]]*\]")
+"""Name of a column with physical values."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,16 @@ class Design:
     def trials(self) -> int:
         """Number of trials."""
         return len(self.levels)
+
+    @property
+    def combinations(self) -> int:
+        """Number of all level combinations."""
+        return len(LEVELS) ** len(self.factors)
+
+    @property
+    def residual_df(self) -> int:
+        """Number of trials beyond the coefficients of the model."""
+        return self.trials - columns(len(self.factors), self.model)
 
     def efficiency(self, model: str | None = None) -> float:
         """Return the D-efficiency for a model; for the design's own model if None. [%]"""
@@ -122,16 +137,24 @@ def _check_size(trials: int) -> None:
         )
 
 
-def write_design(design: Design, path: Path) -> None:
-    """Write a design as CSV: number of the trial, then one column of levels per factor."""
-    design.frame().to_csv(path, index=False)
+def write_design(design: Design, path: Path, values: pd.DataFrame | None = None) -> None:
+    """Write a design as CSV: number of the trial, then one column of levels per factor.
+
+    Args:
+        design: The design.
+        path: The file.
+        values: More columns, with the physical values of each trial. Their names end with a unit in
+            brackets, so that `read_design` ignores them.
+    """
+    pd.concat([design.frame(), values], axis=1).to_csv(path, index=False, float_format="%.9g")
 
 
 def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -> Design:
     """Read a design from a CSV file.
 
     The file has one column per factor, in any order, with the levels -1, 0 and 1. A column `trial`
-    is optional.
+    is optional. Columns whose names end with a unit in brackets, such as `C_L [N s/mm]`, are for
+    the reader and are ignored.
 
     Args:
         path: The file.
@@ -142,8 +165,8 @@ def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -
         InputError: the file has other columns, other levels or a repeated trial, or the trials do
             not determine the model.
     """
-    named = list(_header(path))
-    wanted = [name for name in named if name != TRIAL]
+    named = list(read_header(path))
+    wanted = [name for name in named if name != TRIAL and not _VALUES.fullmatch(name)]
     if sorted(wanted) != sorted(factors):
         raise input_error(
             f"needs the columns {','.join(factors)} (and may have {TRIAL}), has {','.join(named)}",
@@ -178,12 +201,3 @@ def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -
             where=str(path),
         )
     return design
-
-
-def _header(path: Path) -> pd.Index:
-    try:
-        return pd.read_csv(path, comment="#", skipinitialspace=True, nrows=0).columns
-    except (OSError, ValueError) as error:
-        raise input_error(
-            f"cannot be read as CSV ({' '.join(str(error).split())})", where=str(path)
-        ) from None

@@ -1,4 +1,4 @@
-"""Identification: unknown numbers of any model from what was measured, by three methods with one kind of result."""
+"""Identify unknown numbers of any model from measurements, by three methods."""
 
 from wm_drake.studies.fitting.assessment import assess
 from wm_drake.studies.fitting.fit import Direction, Estimate, Fit, TestError
@@ -13,6 +13,7 @@ from wm_drake.studies.fitting.problem import (
     rmse,
 )
 from wm_drake.studies.fitting.surfaces import response_surface
+from wm_drake.studies.fitting.verdict import Verdict, verdict_of
 
 __all__ = [
     "METHODS",
@@ -25,6 +26,7 @@ __all__ = [
     "Progress",
     "TestError",
     "Unknown",
+    "Verdict",
     "assess",
     "evolution",
     "identify",
@@ -32,4 +34,5 @@ __all__ = [
     "point_by_point",
     "response_surface",
     "rmse",
+    "verdict_of",
 ]

@@ -1,4 +1,4 @@
-"""How well the data determine what a search found: bounds that were hit, covariance, intervals, directions not seen."""
+"""Assessment of a fit: bounds that were hit, covariance, confidence intervals."""
 
 from typing import TypeAlias
 
@@ -23,13 +23,13 @@ FLAT_SIDE = 0.1
 """Effect of a step to one side by that of a step to the other, below which that side is flat."""
 
 RESOLUTION = 1e-4
-"""Errors below this part of the measured values are not told from errors of model and integration."""
+"""Errors below this part of the measured values cannot be separated from those of integration."""
 
 WIDEST = 0.25
-"""Standard deviation, in ranges, from which the 95 % interval says no more than the bounds did."""
+"""Standard deviation, in ranges, from which on the 95 % interval is as wide as the bounds."""
 
 TAKES_PART = 0.3
-"""Component of a unit direction from which an unknown is named with it."""
+"""Component of a unit direction from which on an unknown is named with it."""
 
 
 def assess(
@@ -42,10 +42,19 @@ def assess(
     history: tuple[float, ...],
     notes: tuple[str, ...] = (),
 ) -> Fit:
-    """The fit at a point in unit coordinates (p,) where a search ended.
+    """Return the fit at a point in unit coordinates (p,) where a search ended.
 
-    Covariance by the sandwich of generalised least squares: each test errs by its own variance, larger by the correlation
-    of its samples where they follow each other, so that tests sampled densely do not claim more than they know.
+    The covariance is the sandwich of generalised least squares: each test has its own variance,
+    larger by the correlation of its samples where they follow each other. So a densely sampled test
+    does not count for more than it contains.
+
+    Args:
+        problem: The problem.
+        point: Where the search ended.
+        method, seed: Of the search.
+        evaluations: Points that the search evaluated.
+        history: Least RMSE after each round.
+        notes: Remarks of the search.
     """
     residuals = problem.residuals(point[None])[0]
     jacobian, evaluated = central_differences(problem, point, residuals)
@@ -76,10 +85,10 @@ def assess(
 
 
 def _bounds_hit(problem: FitProblem, point: FloatArray, jacobian: FloatArray) -> IndexArray:
-    """Which unknowns are at their lower (-1) or upper (1) bound; 0 too for those that the data do not see."""
+    """Return which unknowns are at their lower (-1) or upper (1) bound; 0 for unseen ones."""
     bound = np.where(point < AT_BOUND, -1, np.where(point > 1.0 - AT_BOUND, 1, 0))
     unseen = WIDEST * np.linalg.norm(jacobian, axis=0) < float(rmse(_resolution(problem)))
-    return np.where(unseen, 0, bound)  # those came there by chance
+    return np.where(unseen, 0, bound)  # an unseen unknown is at a bound by chance
 
 
 def central_differences(
@@ -118,7 +127,7 @@ def central_differences(
 def _flat_sides(
     point: FloatArray, residuals: FloatArray, above: FloatArray, below: FloatArray
 ) -> FloatArray:
-    """Return for each unknown the side, 1 or -1, to which a step has nearly no effect; 0 if none."""
+    """Return for each unknown the side, 1 or -1, where a step has nearly no effect; 0 if none."""
     upwards = np.linalg.norm(above - residuals, axis=1)
     downwards = np.linalg.norm(below - residuals, axis=1)
     side = np.where(
@@ -129,7 +138,7 @@ def _flat_sides(
 
 
 class _Spread:
-    """What the singular values of the Jacobian say of the free unknowns, in unit coordinates."""
+    """Spread of the free unknowns in unit coordinates, from the singular values of the Jacobian."""
 
     def __init__(self, jacobian: FloatArray, variance: FloatArray, resolution: FloatArray) -> None:
         _, self.singular, rows = np.linalg.svd(jacobian, full_matrices=False)
@@ -151,13 +160,13 @@ class _Spread:
 
     @property
     def condition(self) -> float:
-        """Largest by smallest singular value."""
+        """Quotient of the largest and the smallest singular value."""
         if not len(self.singular):
             return 1.0
         return float(self.singular[0] / self.singular[-1]) if self.singular[-1] > 0.0 else np.inf
 
     def undetermined(self, names: list[str]) -> tuple[Direction, ...]:
-        """The directions along which the data leave the unknowns where they like."""
+        """Return the directions along which the data do not determine the unknowns."""
         found = []
         for row, deviation in zip(self.directions, self.deviations, strict=True):
             if deviation > WIDEST:
@@ -179,7 +188,7 @@ def _spread(problem: FitProblem, residuals: FloatArray, jacobian: FloatArray) ->
 def _estimates(
     problem: FitProblem, point: FloatArray, bound: IndexArray, spread: _Spread
 ) -> tuple[Estimate, ...]:
-    """What is said of each unknown; `bound` is 0 for those whose `spread` is known."""
+    """Return the estimate of each unknown; `bound` is 0 for those whose `spread` is known."""
     free = np.flatnonzero(bound == 0)
     resolved, wide = np.zeros((2, len(point)))
     resolved[free] = spread.resolved_deviation
@@ -200,7 +209,7 @@ def _estimates(
 
 
 def _slopes(problem: FitProblem, point: FloatArray) -> FloatArray:
-    """Derivative of the SI value of each unknown by its unit coordinate."""
+    """Return the derivative of the SI value of each unknown by its unit coordinate."""
     values = problem.from_unit(point)
     return np.array(
         [
@@ -215,10 +224,11 @@ def _degrees_of_freedom(problem: FitProblem, free: int) -> int:
 
 
 def _variances(problem: FitProblem, residuals: FloatArray, jacobian: FloatArray) -> FloatArray:
-    """Variance of each scaled residual (n,), with what estimating and correlation take from it.
+    """Return the variance of each scaled residual (n,).
 
-    Samples of one test have a variance of their own, whose degrees of freedom are less what its baseline and its share of the
-    unknowns (its leverages) take; values that are no samples have one together.
+    Samples of one test have a variance of their own; its degrees of freedom are less by its
+    baseline and by its share of the unknowns (its leverages). Values that are no samples share one
+    variance.
     """
     leverage = np.sum(np.square(np.linalg.svd(jacobian, full_matrices=False)[0]), axis=1)
     pooled = float(np.sum(np.square(residuals))) / max(
@@ -236,15 +246,17 @@ def _variances(problem: FitProblem, residuals: FloatArray, jacobian: FloatArray)
 
 
 def correlation_time(series: FloatArray) -> float:
-    """How many samples say as much as one independent one: 1 + 2 sum of the autocorrelation up to its first zero."""
+    """Return how many samples count as one independent one.
+
+    It is 1 + 2 times the sum of the autocorrelation up to its first zero.
+    """
     power = float(np.mean(np.square(series)))
     if power == 0.0:
         return 1.0
     spectrum = np.fft.rfft(series, 2 * len(series))
     correlation = np.fft.irfft(np.abs(spectrum) ** 2)[: len(series)] / (len(series) * power)
-    below = np.flatnonzero(
-        correlation[1:] <= 2.0 / np.sqrt(len(series))
-    )  # what white noise shows by chance
+    # white noise shows a correlation of that size by chance
+    below = np.flatnonzero(correlation[1:] <= 2.0 / np.sqrt(len(series)))
     end = 1 + int(below[0]) if len(below) else len(series)
     return max(1.0, 1.0 + 2.0 * float(np.sum(correlation[1:end])))
 
@@ -266,7 +278,7 @@ def _test_errors(problem: FitProblem, residuals: FloatArray) -> tuple[TestError,
 
 
 def _computed(problem: FitProblem, point: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-    """Computed values with the best baselines added (n,), and the amounts of their columns."""
+    """Return computed values with the best baselines added (n,), and the baselines' amounts."""
     computed = problem.evaluate(problem.from_unit(point)[None])[0].copy()
     amounts = []
     for where, m in zip(problem.slices, problem.measurements, strict=True):

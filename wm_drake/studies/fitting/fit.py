@@ -1,4 +1,4 @@
-"""What an identification found."""
+"""Result of an identification."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,7 +11,13 @@ from wm_drake.studies.fitting.problem import FitProblem
 
 @dataclass(frozen=True)
 class TestError:
-    """Error of one test, as in [A] Tables 2, 4, 5, 7. `rmse` in the test's unit, `normalised` by its largest measured value."""
+    """Error of one test, as in [A] Tables 2, 4, 5, 7.
+
+    Attributes:
+        name: Name of the test.
+        rmse: In the unit of the test.
+        normalised: RMSE by the largest measured value.
+    """
 
     __test__ = False  # not one of pytest's
 
@@ -22,13 +28,13 @@ class TestError:
 
 @dataclass(frozen=True)
 class Estimate:
-    """One unknown, found.
+    """Estimate of one unknown.
 
     Attributes:
-        name: Of the unknown.
+        name: Name of the unknown.
         value: Where the search ended. [SI]
-        lower, upper: 95 % interval; NaN where there is none: at a bound, or not determined. [SI]
-        determined: Whether the data say more about it than its bounds did.
+        lower, upper: 95 % confidence interval; NaN at a bound or if not determined. [SI]
+        determined: Whether the data limit it more than its bounds do.
         at_bound: "lower" or "upper" if it hit one, else "".
     """
 
@@ -47,7 +53,7 @@ class Direction:
     Attributes:
         names: The unknowns that take part.
         parts: How far each moves, in its range (log range if searched so), largest 1.
-        deviation: Standard deviation along it, in ranges; infinite if the data do not see it at all.
+        deviation: Standard deviation along it, in ranges; infinite if the data do not see it.
     """
 
     names: tuple[str, ...]
@@ -60,19 +66,20 @@ class Fit:
     """Result of an identification; the same for every method.
 
     Attributes:
-        problem: What was asked.
-        method, seed: How it was searched.
+        problem: The problem.
+        method, seed: Of the search.
         estimates: One for each unknown.
-        rmse: Over all values of all tests, scaled as the problem says.
+        rmse: Over all values of all tests, scaled as in the problem.
         tests: Error of each test.
-        computed: Best values of the model (n,), baselines included: beside the measured ones.
+        computed: Best values of the model (n,), baselines included, to compare with the measured.
         baselines: Amounts of each test's baseline columns.
-        covariance: Of the unknowns (p, p); NaN in rows of those at a bound. [SI]
-        condition: Of the scaled Jacobian: 1 if all directions are seen alike, large if one is hardly seen.
-        undetermined: Directions the data do not determine.
-        evaluations: Points the model was asked for.
+        covariance: Covariance of the unknowns (p, p); NaN in rows of those at a bound. [SI]
+        condition: Condition of the scaled Jacobian: 1 if the data see all directions alike, large
+            if they hardly see one.
+        undetermined: Directions that the data do not determine.
+        evaluations: Points at which the model was evaluated.
         history: Least RMSE after each round of the search.
-        notes: What a reader should know of the search.
+        notes: Remarks on the search, for the reader.
     """
 
     problem: FitProblem
@@ -91,7 +98,7 @@ class Fit:
     notes: tuple[str, ...]
 
     def without_intervals(self, reason: str) -> "Fit":
-        """The same, claiming no interval of any unknown."""
+        """Return the fit without intervals and covariance, with the reason as a note."""
         bare = tuple(replace(estimate, lower=np.nan, upper=np.nan) for estimate in self.estimates)
         return replace(
             self,
@@ -102,15 +109,18 @@ class Fit:
 
     @property
     def values(self) -> FloatArray:
-        """Where the search ended (p,). [SI]"""
+        """Values where the search ended (p,). [SI]"""
         return np.array([estimate.value for estimate in self.estimates])
 
     def __getitem__(self, name: str) -> Estimate:
-        """The estimate of an unknown."""
+        """Return the estimate of an unknown."""
         return next(estimate for estimate in self.estimates if estimate.name == name)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON, in SI: numbers that are not finite become null, as does the value of an unknown not determined."""
+        """Return the fit for JSON, in SI.
+
+        Numbers that are not finite become null, and so does the value of an undetermined unknown.
+        """
         return {
             "method": self.method,
             "seed": self.seed,

@@ -1,6 +1,7 @@
-"""The ways to search: iterated response surfaces as in [A], least squares from many starts, evolution with polish.
+"""Methods of search: response surfaces as in [A], least squares from many starts, evolution.
 
-All take the same problem, ask the model for many points at once, repeat from their seed, and give the same `Fit`.
+All take the same problem, evaluate the model at many points at once, are repeated by their seed,
+and return the same type `Fit`.
 """
 
 from collections.abc import Callable
@@ -24,10 +25,10 @@ from wm_drake.studies.fitting.search import (
 from wm_drake.studies.fitting.surfaces import response_surface
 
 AGREEING = 2
-"""Searches from different starts that came to the same least end: no more are made."""
+"""Searches from different starts with the same least end that are enough: no more are made."""
 
 POLISHED_EVERY = 5
-"""Generations of an evolution, after which least squares shows where its best point leads."""
+"""Generations of an evolution between two searches by least squares from its best point."""
 
 
 def least_squares(
@@ -38,14 +39,16 @@ def least_squares(
     screened: int = 32,
     progress: Progress = silent,
 ) -> Fit:
-    """Trust-region least squares from the problem's start and the best of many scattered points, until two agree.
+    """Search by trust-region least squares from several starts, until two searches agree.
+
+    The starts are the problem's start and the best of many scattered points.
 
     Args:
-        problem: What to find.
-        seed: Of the scattered points.
+        problem: The problem.
+        seed: Seed of the scattered points.
         starts: Searches at most.
-        screened: Points that are looked at (a power of two), of which the best become starts.
-        progress: Told after every step.
+        screened: Points that are evaluated (a power of two), of which the best become starts.
+        progress: Called after every step.
     """
     count = Count(problem)
     points = scattered(len(problem.unknowns), screened, seed)
@@ -75,17 +78,17 @@ def evolution(
     generations: int = 120,
     progress: Progress = silent,
 ) -> Fit:
-    """Differential evolution over the whole range; least squares from its best point every few generations.
+    """Search by differential evolution, with least squares from its best point now and then.
 
-    The evolution has only to find the valley, not its floor: it ends when least squares from the best points of two
-    generations come to the same least RMSE.
+    The evolution has to find the valley only, not its floor: it ends when least squares from the
+    best points of two generations come to the same least RMSE.
 
     Args:
-        problem: What to find.
-        seed: Of the evolution.
+        problem: The problem.
+        seed: Seed of the evolution.
         population: Members for each unknown.
-        generations: At most.
-        progress: Told after every generation.
+        generations: Generations at most.
+        progress: Called after every generation.
     """
     count = Count(problem)
     polish = _Polish(problem, count)
@@ -129,7 +132,10 @@ class _Polish:
         self.ends: list[End] = []
 
     def agrees_from(self, point: FloatArray) -> bool:
-        """Searches from one more point, unless that is the last one again or enough agree already; whether they do now."""
+        """Search from one more point, and return whether enough searches agree.
+
+        There is no search if enough agree already, or if the point is the last one again.
+        """
         if self.agreeing < AGREEING and not (
             self._last is not None and np.array_equal(point, self._last)
         ):
@@ -139,12 +145,12 @@ class _Polish:
 
     @property
     def agreeing(self) -> int:
-        """How many came to the least end."""
+        """Number of searches that came to the least end."""
         return agreeing(self._problem, self.ends)
 
     @property
     def best(self) -> FloatArray:
-        """The least end."""
+        """Point of the least end."""
         return min(self.ends, key=lambda end: end[1])[0]
 
 
@@ -162,10 +168,10 @@ def identify(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Fit:
-    """Searches by the method of a name.
+    """Search by the method of a name.
 
     Raises:
-        InputError: no such method.
+        InputError: There is no such method.
     """
     if method not in METHODS:
         raise input_error(f"no method '{method}'{nearest_names(method, METHODS)}", where="--method")

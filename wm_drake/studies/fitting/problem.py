@@ -1,7 +1,8 @@
-"""What an identification is about: numbers that are not known, what was measured, and a model that computes it.
+"""Problem of an identification: unknown numbers, measurements, and a model that computes them.
 
-Engine-free: the model is any function of the unknowns. It is asked for many points at once, so that it can run them side by
-side; `point_by_point` makes it from a function of one point.
+It depends on no engine: the model is any function of the unknowns. It is evaluated at many points
+at once, so that it can run them side by side; `point_by_point` makes it from a function of one
+point.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,13 +17,15 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 
 Evaluate: TypeAlias = Callable[[FloatArray], FloatArray]
-"""Points (k, p), in SI -> computed values (k, n), those of all measurements in a row. A row of NaN: the model fails there."""
+"""Points (k, p), in SI -> computed values (k, n), those of all measurements in a row.
+
+A row of NaN means that the model fails at the point."""
 
 Progress: TypeAlias = Callable[[float, float], None]
-"""Called with the fraction that is done and the least RMSE so far."""
+"""Function that is called with the fraction done and the least RMSE so far."""
 
 FAILED = 1e3
-"""Residual that stands for a failed model, in largest measured values: worse than any point that can be computed."""
+"""Residual of a point where the model fails, in largest measured values: worse than any other."""
 
 
 PURE_NUMBER = Unit("dimensionless", "dimensionless")
@@ -30,10 +33,10 @@ PURE_NUMBER = Unit("dimensionless", "dimensionless")
 
 @dataclass(frozen=True)
 class Unknown:
-    """A number to be found.
+    """An unknown number.
 
     Attributes:
-        name: What users call it; a key path where it is a number of a machine.
+        name: Name for users; a key path where it is a number of a machine.
         lower, upper: Bounds of the search. [SI]
         unit: Unit in SI and as people read it; a pure number by default.
         start: A first guess; the middle of the bounds if None. [SI]
@@ -48,7 +51,11 @@ class Unknown:
     logarithmic: bool = False
 
     def __post_init__(self) -> None:
-        """Refuses bounds that leave nothing to search, and starts outside of them."""
+        """Check bounds and start.
+
+        Raises:
+            InputError: The bounds are no range, or the start is outside of them.
+        """
         if not (np.isfinite(self.lower) and np.isfinite(self.upper) and self.lower < self.upper):
             raise input_error(
                 f"bounds {self._shown(self.lower)} to {self._shown(self.upper)} are not a range",
@@ -72,15 +79,17 @@ class Unknown:
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """What one test measured.
+    """Measured values of one test.
 
     Attributes:
-        name: Of the test.
+        name: Name of the test.
         values: Measured values (n,). [any unit, the model's]
-        baseline: Columns (n, q) that the instrument may have added in unknown amounts, such as an offset or a drift; the
-            best of each is taken out of every residual. None: the instrument is trusted.
-        scale: Residuals are divided by it before tests are put together: the error that is expected, where tests differ.
-        correlated: Neighbouring values err alike (samples over time): intervals widen accordingly.
+        baseline: Columns (n, q) that the instrument may have added in unknown amounts, such as an
+            offset or a drift; the best amount of each is taken out of every residual. None for an
+            instrument without such errors.
+        scale: Expected error, by which residuals are divided before tests are put together.
+        correlated: Whether errors of neighbouring values are correlated (samples over time), which
+            widens the intervals.
     """
 
     name: str
@@ -91,7 +100,7 @@ class Measurement:
 
     @property
     def largest(self) -> float:
-        """Largest measured value, by which [A] normalises."""
+        """Largest absolute measured value; [A] normalises by it."""
         return float(np.max(np.abs(self.values)))
 
     @cached_property
@@ -104,16 +113,17 @@ class Measurement:
         )
 
     def residuals(self, computed: FloatArray) -> FloatArray:
-        """Measured less computed (k, n), less the baseline that fits it best."""
+        """Return measured less computed values (k, n), less the best baseline."""
         plain = self.values - computed
         return np.asarray(plain - (plain @ self.basis) @ self.basis.T)
 
 
 @dataclass(frozen=True, eq=False)
 class FitProblem:
-    """Find the unknowns with which the model comes nearest to what was measured.
+    """Problem of finding the unknowns with which the model is nearest to the measurements.
 
-    Nearest by the root mean square error over all values of all tests, [A] Eq. (1) = [C] Eq. (5).
+    The distance is the root mean square error over all values of all tests, [A] Eq. (1) = [C] Eq.
+    (5).
     """
 
     unknowns: tuple[Unknown, ...]
@@ -121,7 +131,11 @@ class FitProblem:
     evaluate: Evaluate
 
     def __post_init__(self) -> None:
-        """Refuses problems without unknowns or without data, and names that stand twice."""
+        """Check that there are unknowns with different names, and data.
+
+        Raises:
+            InputError: There are none, or a name is there twice.
+        """
         names = [unknown.name for unknown in self.unknowns]
         if not names or not self.measurements:
             raise input_error("an identification needs at least one unknown and one measurement")
@@ -131,7 +145,7 @@ class FitProblem:
 
     @cached_property
     def slices(self) -> tuple[slice, ...]:
-        """Where the values of each measurement stand in a row of the model's."""
+        """Columns of each measurement in the values of the model."""
         ends = np.cumsum([len(m.values) for m in self.measurements])
         return tuple(
             slice(int(end) - len(m.values), int(end))
@@ -148,12 +162,12 @@ class FitProblem:
         return np.where(known, guess, 0.5)
 
     def to_unit(self, points: FloatArray) -> FloatArray:
-        """SI values (..., p) -> coordinates from 0 at the lower to 1 at the upper bound."""
+        """Return coordinates from 0 at the lower to 1 at the upper bound, of SI values (..., p)."""
         lower, upper = self._ends
         return np.asarray((self._straight(points) - lower) / (upper - lower))
 
     def from_unit(self, coordinates: FloatArray) -> FloatArray:
-        """The way back of `to_unit`."""
+        """Return the SI values of unit coordinates, the inverse of `to_unit`."""
         lower, upper = self._ends
         straight = lower + np.asarray(coordinates) * (upper - lower)
         return np.where(
@@ -161,7 +175,7 @@ class FitProblem:
         )
 
     def residuals(self, coordinates: FloatArray) -> FloatArray:
-        """Scaled residuals (k, n) at points in unit coordinates (k, p); finite also where the model fails."""
+        """Return scaled residuals (k, n) at points in unit coordinates (k, p), always finite."""
         computed = self.evaluate(self.from_unit(coordinates))
         parts = []
         for where, m in zip(self.slices, self.measurements, strict=True):
@@ -187,10 +201,10 @@ class FitProblem:
 
 
 def point_by_point(model: Callable[[FloatArray], Sequence[FloatArray]]) -> Evaluate:
-    """The form `FitProblem` asks for, from a model of one point (p,) that answers with an array for each measurement."""
+    """Return a model of many points from one of a point (p,): an array per measurement."""
     return lambda points: np.array([np.concatenate(model(point)) for point in points])
 
 
 def rmse(residuals: FloatArray) -> FloatArray:
-    """Root mean square over the last axis; [A] Eq. (1), [C] Eq. (5)."""
+    """Return the root mean square over the last axis; [A] Eq. (1), [C] Eq. (5)."""
     return np.asarray(np.sqrt(np.mean(np.square(residuals), axis=-1)))

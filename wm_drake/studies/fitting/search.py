@@ -1,4 +1,4 @@
-"""What the ways to search share: a count of what they ask, scattered points to begin from, and descent by least squares."""
+"""Shared by all methods of search: count of evaluations, scattered points, descent."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -14,27 +14,27 @@ from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.problem import FitProblem, rmse
 
 STEP = 1e-5
-"""Of one-sided differences during a search, in ranges."""
+"""Step of one-sided differences during a search, in ranges."""
 
 SAME_END = 1e-3
-"""Searches whose RMSE differ by less than this part came to the same end."""
+"""Searches whose RMSE differ by less than this part have the same end."""
 
 End: TypeAlias = tuple[FloatArray, float]
-"""Where a search ended, in unit coordinates (p,), and its RMSE."""
+"""Point where a search ended, in unit coordinates (p,), and its RMSE."""
 
 
 def silent(fraction: float, least: float) -> None:
-    """Progress that nobody looks at."""
+    """Ignore progress."""
 
 
 def underway(done: int, usual: int) -> float:
-    """Fraction shown of a search that may end any time: 2/3 after as many rounds as it usually takes."""
+    """Return the fraction to show of a search that may end any time: 2/3 after the usual rounds."""
     return done / (done + 0.5 * usual)
 
 
 @dataclass
 class Count:
-    """The problem, with a count of what it is asked and the best point so far."""
+    """A problem with a count of its evaluations and the best point so far."""
 
     problem: FitProblem
     evaluations: int = 0
@@ -43,7 +43,7 @@ class Count:
     history: list[float] = field(default_factory=list)
 
     def residuals(self, points: FloatArray) -> FloatArray:
-        """Scaled residuals (k, n) at points in unit coordinates (k, p)."""
+        """Return scaled residuals (k, n) at points in unit coordinates (k, p)."""
         found = self.problem.residuals(points)
         self.evaluations += len(points)
         errors = rmse(found)
@@ -53,15 +53,15 @@ class Count:
         return found
 
     def errors(self, points: FloatArray) -> FloatArray:
-        """RMSE at each point (k,)."""
+        """Return the RMSE at each point (k,)."""
         return rmse(self.residuals(points))
 
     def round_done(self) -> None:
-        """Notes the least RMSE so far."""
+        """Append the least RMSE so far to the history."""
         self.history.append(self.least)
 
     def fit(self, point: FloatArray, method: str, seed: int, notes: tuple[str, ...] = ()) -> Fit:
-        """The fit at the point where the search ended."""
+        """Return the fit at the point where the search ended."""
         rounds = (*self.history, self.least)
         return assess(
             self.problem,
@@ -75,12 +75,12 @@ class Count:
 
 
 def scattered(p: int, number: int, seed: int) -> FloatArray:
-    """Points that fill the ranges evenly (number, p); a power of two of them fills best."""
+    """Return points that fill the ranges evenly (number, p); best a power of two of them."""
     return np.asarray(qmc.Sobol(p, rng=np.random.default_rng(seed)).random(number))
 
 
 def agreeing(problem: FitProblem, ends: list[End]) -> int:
-    """How many searches came to the least RMSE of all."""
+    """Return how many searches came to the least RMSE of all."""
     if not ends:
         return 0
     errors = np.array([error for _, error in ends])
@@ -91,7 +91,7 @@ def agreeing(problem: FitProblem, ends: list[End]) -> int:
 def descend(
     count: Count, begin: FloatArray, step_done: Callable[[float], None], most: int = 60
 ) -> End:
-    """One search by scipy's trust-region reflective method."""
+    """Search once by scipy's trust-region reflective method, and return its end."""
     steps = 0
     last: tuple[FloatArray, FloatArray] = (np.full(len(begin), np.nan), np.empty(0))
 

@@ -1,8 +1,9 @@
-"""Iterated response surfaces, the method of [A] section 3: designed points, a quadratic surface, a move, a smaller region.
+"""Iterated response surfaces, the method of [A] section 3.
 
-The region is not a box along the unknowns: its axes follow the valley that the last surface showed, each as long as the surface
-bends alike along all of them. In a narrow valley that runs across the unknowns a box is soon as small as the valley is narrow,
-and takes as many rounds as the valley is long in such steps.
+Each round has designed points, a quadratic surface, a move and a new region. The region is not a
+box along the unknowns: its axes follow the valley of the last surface, with lengths along which the
+surface bends alike. In a narrow valley across the unknowns a box would soon be as small as the
+valley is narrow, and would need as many rounds as the valley is long in such steps.
 """
 
 import itertools
@@ -17,22 +18,23 @@ from wm_drake.studies.fitting.problem import FitProblem, Progress
 from wm_drake.studies.fitting.search import Count, scattered, silent, underway
 
 WIDEST = 0.5
-"""Longest half axis of a region, in ranges; the first region has it everywhere."""
+"""Longest half axis of a region, in ranges; all half axes of the first region."""
 
 SMALLEST = 1e-6
-"""A search has come to an end if no half axis is longer, in ranges."""
+"""A search ends if no half axis is longer, in ranges."""
 
 FLAT = 1e-2
-"""It has also come to an end if no point of the region is worse by more than this part of what one standard error costs, the
-mean square error per value: the region is then a tenth of a standard error to either side, its centre nearer still."""
+"""A search also ends if no point of the region is worse by more than this part of the cost of one
+standard error, which is the mean square error per value. The region is then a tenth of a standard
+error to either side, and its centre is nearer still."""
 
 STRETCH = 3.0
-"""Most by which an axis is stretched or shortened against the others in a round."""
+"""Largest factor by which an axis is stretched or shortened against the others in a round."""
 
 USUAL_ROUNDS = 20
 
 SLENDEREST = 1e3
-"""Longest by shortest axis, at most."""
+"""Largest quotient of the longest and the shortest axis."""
 
 
 def response_surface(
@@ -43,18 +45,20 @@ def response_surface(
     rounds: int = 80,
     progress: Progress = silent,
 ) -> Fit:
-    """Iterated response surfaces.
+    """Search by iterated response surfaces.
 
-    In each round the model is evaluated at designed points of a region, a quadratic surface is fitted to the mean square
-    error, and the region moves to the least point of the surface, checked by the model, or to the best designed point. It
-    grows where the surface foretold a move to its rim, and shrinks where it stays.
+    In each round the model is evaluated at designed points of a region, a quadratic surface is
+    fitted to the mean square error, and the region moves to the least point of the surface, checked
+    by the model, or to the best designed point. It grows where the surface predicted a move to its
+    rim, and shrinks where it stays.
 
     Args:
-        problem: What to find.
-        seed: Of the scattered points.
-        screened: Points (a power of two) that are looked at beside the problem's start; the best is the first centre.
-        rounds: At most.
-        progress: Told after every round.
+        problem: The problem.
+        seed: Seed of the scattered points.
+        screened: Points (a power of two) that are evaluated beside the problem's start; the best is
+            the first centre.
+        rounds: Rounds at most.
+        progress: Called after every round.
     """
     count = Count(problem)
     design = surface_design(len(problem.unknowns))
@@ -77,11 +81,11 @@ def response_surface(
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Where a surface is fitted: centre + axes x, each |x| <= 1, within the ranges.
+    """Region where a surface is fitted: centre + axes x, each |x| <= 1, within the ranges.
 
     Attributes:
         centre: In unit coordinates (p,).
-        value: Mean square error there.
+        value: Mean square error at the centre.
         axes: Half axes as columns (p, p), perpendicular to each other.
     """
 
@@ -95,10 +99,11 @@ class Region:
         return float(np.max(np.linalg.norm(self.axes, axis=0)))
 
     def designed(self, design: FloatArray) -> FloatArray:
-        """Points (k, p) of a design (k, p) along the axes, all within the ranges.
+        """Return the points (k, p) of a design (k, p) along the axes, all within the ranges.
 
-        A point beyond them goes half as far to the other side instead, if that is less beyond: points that are brought back
-        to a bound lie on it together, and say little of the surface. Then most searches take fewer rounds.
+        A point beyond them goes half as far to the other side instead, if that is less beyond:
+        points that are moved back to a bound lie on it together and determine little of the
+        surface. Most searches take fewer rounds then.
         """
         ahead, back = self.centre + design @ self.axes.T, self.centre - 0.5 * design @ self.axes.T
         beyond = [
@@ -107,19 +112,24 @@ class Region:
         return np.clip(np.where((beyond[1] < beyond[0])[:, None], back, ahead), 0.0, 1.0)
 
     def points(self, places: FloatArray) -> FloatArray:
-        """Points (k, p) at places along the axes, brought back into the ranges."""
+        """Return points (k, p) at places along the axes, moved back into the ranges."""
         return np.clip(self.centre + places @ self.axes.T, 0.0, 1.0)
 
     def places(self, points: FloatArray) -> FloatArray:
-        """The way back of `points`."""
+        """Return the places of points, the inverse of `points`."""
         return np.asarray(np.linalg.solve(self.axes, (points - self.centre).T).T)
 
     def moved(self, centre: FloatArray, value: float) -> "Region":
-        """The same about another centre."""
+        """Return the region about another centre."""
         return Region(centre, value, self.axes)
 
     def reshaped(self, hessian: FloatArray, factor: float) -> "Region":
-        """Larger by a factor, with axes along which a surface of this Hessian (p, p), in places, bends more alike."""
+        """Return a region larger by a factor, with axes along which a surface bends more alike.
+
+        Args:
+            hessian: Hessian of the surface (p, p), by places.
+            factor: Factor of its size.
+        """
         bends, directions = np.linalg.eigh(hessian)
         bend = np.abs(bends) + 1e-12 * np.max(np.abs(bends)) + 1e-300
         stretch = np.clip(np.sqrt(np.exp(np.mean(np.log(bend))) / bend), 1.0 / STRETCH, STRETCH)
@@ -131,7 +141,7 @@ class Region:
 
 
 def _first_region(count: Count, seed: int, screened: int) -> Region:
-    """The whole ranges, about the best of the problem's start and scattered points."""
+    """Return the whole ranges, about the best of the problem's start and scattered points."""
     p = len(count.problem.unknowns)
     begins = np.concatenate([count.problem.start[None], scattered(p, screened, seed)])
     values = np.square(count.errors(begins))
@@ -141,7 +151,7 @@ def _first_region(count: Count, seed: int, screened: int) -> Region:
 
 
 def _round(count: Count, region: Region, design: FloatArray) -> tuple[Region, bool]:
-    """The region after a round, and whether the search has come to an end."""
+    """Return the region after a round, and whether the search ends."""
     points = region.designed(design)
     places, values = region.places(points), np.square(count.errors(points))
     surface = QuadraticSurface(places, values, region.value)
@@ -161,7 +171,7 @@ def _round(count: Count, region: Region, design: FloatArray) -> tuple[Region, bo
 
 
 def _resize(moved: float, better: bool, foretold: bool) -> float:
-    """Factor of a region whose centre moved so far, in half axes: more at the rim, less the nearer to the centre."""
+    """Return the factor of a region from the move of its centre: larger near the rim."""
     if not better:
         return 0.5
     if moved > 0.9:
@@ -170,10 +180,10 @@ def _resize(moved: float, better: bool, foretold: bool) -> float:
 
 
 def surface_design(p: int) -> FloatArray:
-    """Points for a quadratic surface of p variables in [-1, 1]: both ends of each axis, a corner of each pair.
+    """Return points for a quadratic surface of p variables in [-1, 1].
 
-    With the centre as many as the surface has coefficients: where surfaces are iterated, more points a round were seen to
-    save no rounds.
+    They are both ends of each axis and a corner of each pair: with the centre, as many as the
+    surface has coefficients. More points a round saved no rounds in trials.
     """
     points = [sign * np.eye(p)[k] for k in range(p) for sign in (-1.0, 1.0)]
     for number, (i, j) in enumerate(itertools.combinations(range(p), 2)):
@@ -187,13 +197,18 @@ class QuadraticSurface:
     """Least-squares quadratic through values at places, exact at the centre."""
 
     def __init__(self, places: FloatArray, values: FloatArray, at_centre: float) -> None:
-        """FramePoses (k, p) about the centre, values (k,), the value at the centre."""
+        """Fit the surface.
+
+        Args:
+            places: Places (k, p) about the centre.
+            values: Values there (k,).
+            at_centre: Value at the centre.
+        """
         p = places.shape[1]
         self._pairs = list(itertools.combinations_with_replacement(range(p), 2))
         products = np.stack([places[:, i] * places[:, j] for i, j in self._pairs], axis=1)
-        near = 1.0 / np.sqrt(
-            1e-300 + np.abs(values) + 1e-3 * np.max(np.abs(values))
-        )  # low values matter most
+        # low values matter most
+        near = 1.0 / np.sqrt(1e-300 + np.abs(values) + 1e-3 * np.max(np.abs(values)))
         rows = np.concatenate([places, products], axis=1) * near[:, None]
         found = np.linalg.lstsq(rows, (values - at_centre) * near, rcond=None)[0]
         self.gradient = found[:p]
@@ -203,11 +218,11 @@ class QuadraticSurface:
             self.hessian[j, i] += coefficient
 
     def rise(self, place: FloatArray) -> float:
-        """Of the surface from its centre to a place (p,)."""
+        """Return the rise of the surface from its centre to a place (p,)."""
         return float((self.gradient + 0.5 * self.hessian @ place) @ place)
 
     def least_place(self, region: Region) -> FloatArray:
-        """Where the surface is least in a region, searched from its centre and from two opposite corners."""
+        """Return the least place of a region, searched from its centre and two opposite corners."""
         size = max(
             float(np.max(np.abs(self.hessian))), float(np.max(np.abs(self.gradient))), 1e-300
         )

@@ -5,7 +5,7 @@ the forces and moments of the gasket.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -13,23 +13,10 @@ import pandas as pd
 import xarray as xr
 
 from wm_drake.parameters import FactorLevels, MachineParameters, at_levels
-from wm_drake.parameters.units import Unit
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.outputs import AXES
 from wm_drake.studies.doe import Design
+from wm_drake.studies.gasket.responses import MM, Response, chosen_responses, measures_of
 from wm_drake.studies.gasket.screening import Responses
-
-MEASURES = ("extremes",)
-"""Measures of each run, as for `simulate_many`."""
-
-VARIABLES = {
-    "D": ("detergent_displacement", Unit("m", "mm")),
-    "F": ("gasket_force", Unit("N", "N")),
-    "M": ("gasket_moment", Unit("N*m", "N*m")),
-}
-"""By the letter in [B]: variable of the table of runs, and the unit of the report."""
-
-RESPONSES = [f"{letter}{axis}" for letter in VARIABLES for axis in AXES]
 
 LOADS = ("middle", "counter")
 """Loads of [B] section 4."""
@@ -46,11 +33,29 @@ class GasketTrials:
         parameters: The machine; only the factors change.
         factors: Levels of the factors for this machine.
         loads: One case for each load to run, without parameters.
+        wanted: Names of the responses, as for `chosen_responses`; empty for the default.
+        chosen: The responses.
     """
 
     parameters: MachineParameters
     factors: tuple[FactorLevels, ...]
     loads: Sequence[Case]
+    wanted: Sequence[str] = ()
+    chosen: tuple[Response, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Look up the responses.
+
+        Raises:
+            InputError: a response is unknown, or the machine does not have it.
+        """
+        found = chosen_responses(self.parameters, self.loads[0].profile, self.wanted)
+        object.__setattr__(self, "chosen", found)
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """Measures of each run, as for `simulate_many`."""
+        return measures_of(self.parameters, self.chosen)
 
     def cases(self, design: Design) -> Iterator[Case]:
         """Yield all runs: for each trial, one for each load."""
@@ -64,31 +69,36 @@ class GasketTrials:
 
     def responses(self, design: Design, run: Run) -> Responses:
         """Run all trials and return their responses."""
-        return as_responses(run(self.cases(design)), [case.name for case in self.loads])
+        table = run(self.cases(design))
+        return as_responses(table, [case.name for case in self.loads], self.chosen)
 
 
-def as_responses(table: xr.Dataset, loads: Sequence[str]) -> Responses:
-    """Return the responses D, F and M for each load from a table of runs.
+def as_responses(table: xr.Dataset, loads: Sequence[str], chosen: Sequence[Response]) -> Responses:
+    """Return the responses for each load from a table of runs.
 
     Args:
         table: Table of runs; the loads of one trial follow each other.
         loads: Names of the loads, in the order of the runs.
+        chosen: The responses.
     """
-    blocks = [unit.from_si(1.0) * table[name].values for name, unit in VARIABLES.values()]
-    numbers = np.hstack(blocks)
+    columns = {response.name: response.values(table) for response in chosen}
     values = {
-        load: pd.DataFrame(numbers[index :: len(loads)], columns=RESPONSES)
+        load: pd.DataFrame({name: column[index :: len(loads)] for name, column in columns.items()})
         for index, load in enumerate(loads)
     }
-    failed = {}
-    for index, reason in enumerate(table.diverged.values):
-        if reason:
-            trial, load = index // len(loads), loads[index % len(loads)]
-            failed[trial, load] = str(reason)
-            values[load].loc[trial] = np.nan
-    units = {
-        f"{letter}{axis}": unit.shown.replace("*", " ")
-        for letter, (_, unit) in VARIABLES.items()
-        for axis in AXES
-    }
-    return Responses(values, units, failed)
+    places = [(index // len(loads), loads[index % len(loads)]) for index in range(table.run.size)]
+    reasons = dict(zip(places, map(str, table.diverged.values), strict=True))
+    failed = {place: reason for place, reason in reasons.items() if reason}
+    for trial, load in failed:
+        values[load].loc[trial] = np.nan
+    touching = {}
+    if "smallest_gap" in table:
+        gaps = zip(places, map(float, table.smallest_gap.values), strict=True)
+        touching = {p: MM.from_si(gap) for p, gap in gaps if gap <= 0.0 and p not in failed}
+    return Responses(
+        values,
+        {response.name: response.unit_text for response in chosen},
+        failed,
+        {response.name: response.meaning for response in chosen},
+        touching,
+    )

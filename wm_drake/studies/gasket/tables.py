@@ -2,13 +2,15 @@
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from wm_drake.studies.doe import write_design
+from wm_drake.parameters import FactorLevels
+from wm_drake.studies.doe import Design, write_design
 from wm_drake.studies.doe.anova import Term
 from wm_drake.studies.gasket.screening import Screening, leading_terms
 
@@ -16,11 +18,18 @@ DIGITS = "%.9g"
 """Format of numbers in CSV files; it has more digits than the results are accurate to."""
 
 
-def write_tables(screening: Screening, folder: Path) -> None:
-    """Write all tables as CSV files. One screening always results in the same bytes."""
-    write_design(screening.design, folder / "design.csv")
+def write_tables(screening: Screening, folder: Path, factors: Sequence[FactorLevels] = ()) -> None:
+    """Write all tables as CSV files. One screening always results in the same bytes.
+
+    Args:
+        screening: Result of the study.
+        folder: Where the files are written.
+        factors: Levels of the factors, for their physical values in design.csv and runs.csv.
+    """
+    values = physical_values(screening.design, factors)
+    write_design(screening.design, folder / "design.csv", values)
     tables = {
-        "runs.csv": runs_table(screening),
+        "runs.csv": runs_table(screening, values),
         "variance.csv": variance_table(screening),
         "contributions.csv": contributions_table(screening),
         "effects.csv": effects_table(screening),
@@ -30,16 +39,42 @@ def write_tables(screening: Screening, folder: Path) -> None:
         table.to_csv(folder / name, index=False, float_format=DIGITS)
 
 
-def runs_table(screening: Screening) -> pd.DataFrame:
-    """Return the table of all runs: trial, load, levels, responses, reason if the run failed."""
+def physical_values(design: Design, factors: Sequence[FactorLevels]) -> pd.DataFrame:
+    """Return the physical values of each trial: one column `NAME [unit]` for each factor.
+
+    If the keys of a factor have different values, there is a column `NAME KEY [unit]` for each.
+    """
+    columns = {}
+    for factor in factors:
+        places = design.levels[:, design.factors.index(factor.name)] + 1
+        is_same = len(set(factor.numbers.values())) == 1
+        for key in list(factor.numbers)[: 1 if is_same else None]:
+            title = factor.name if is_same else f"{factor.name} {key}"
+            columns[f"{title} [{factor.units[key]}]"] = np.array(factor.numbers[key])[places]
+    return pd.DataFrame(columns, index=range(design.trials))
+
+
+def runs_table(screening: Screening, physical: pd.DataFrame | None = None) -> pd.DataFrame:
+    """Return the table of all runs.
+
+    Its columns are trial, load, levels, physical values, responses, whether the tub touches the
+    housing, and the reason if the run failed.
+
+    Args:
+        screening: Result of the study.
+        physical: Physical values of each trial, from `physical_values`.
+    """
     design, responses = screening.design, screening.responses
     parts = []
     for load in screening.loads:
         values = responses.values[load].rename(
             columns={name: f"{name} [{unit}]" for name, unit in responses.units.items()}
         )
-        part = pd.concat([design.frame(), values], axis=1)
+        part = pd.concat([design.frame(), physical, values], axis=1)
         part.insert(1, "load", load)
+        part["touches"] = [
+            "yes" if (trial, load) in responses.touching else "" for trial in range(design.trials)
+        ]
         part["failed"] = [responses.failed.get((trial, load), "") for trial in range(design.trials)]
         parts.append(part)
     return pd.concat(parts).sort_values("trial", kind="stable")
@@ -48,8 +83,8 @@ def runs_table(screening: Screening) -> pd.DataFrame:
 def variance_table(screening: Screening) -> pd.DataFrame:
     """Return the table of variance of each response, as [B] Table 4.
 
-    It has the percentages of main effects, interactions and residual, and mean and range of the
-    runs.
+    It has the percentages of main effects, interactions and residual, mean and range of the runs,
+    and adjusted and predicted R2.
     """
     rows = []
     for (load, name), table in screening.tables.items():
@@ -68,6 +103,8 @@ def variance_table(screening: Screening) -> pd.DataFrame:
                 "total_sum_sq": table.total_sum_sq,
                 "residual_sum_sq": table.residual_sum_sq,
                 "residual_df": table.residual_df,
+                "adjusted_r2": table.adjusted_r2,
+                "predicted_r2": table.predicted_r2,
             }
         )
     return pd.DataFrame(rows)
@@ -132,8 +169,9 @@ def effects_of(term: Term) -> dict[str, float]:
 def as_plain_data(screening: Screening) -> dict[str, Any]:
     """Return a screening as data for JSON.
 
-    It has the design with its efficiency, and for each load and response the contributions and the
-    effects at each level.
+    It has the design with its efficiency, the runs in which the tub touches the housing, and for
+    each load and response the contributions, the effects at each level, and how well the model
+    predicts.
     """
     responses: dict[str, dict[str, Any]] = {load: {} for load in screening.loads}
     for (load, name), table in screening.tables.items():
@@ -143,6 +181,9 @@ def as_plain_data(screening: Screening) -> dict[str, Any]:
             "main_percent": finite(table.main_percent),
             "interaction_percent": finite(table.interaction_percent),
             "residual_percent": finite(table.residual_percent),
+            "residual_df": table.residual_df,
+            "adjusted_r2": finite(table.adjusted_r2),
+            "predicted_r2": finite(table.predicted_r2),
             "terms": [
                 {
                     "term": t.name,
@@ -159,6 +200,11 @@ def as_plain_data(screening: Screening) -> dict[str, Any]:
         "seed": design.seed,
         "trials": design.trials,
         "d_efficiency": design.efficiency(),
+        "residual_df": design.residual_df,
+        "touching": [
+            {"trial": trial + 1, "load": load, "gap_mm": gap}
+            for (trial, load), gap in screening.responses.touching.items()
+        ],
         "responses": responses,
     }
 

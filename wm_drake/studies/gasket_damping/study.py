@@ -1,6 +1,6 @@
 """Identification of the gasket damping C_L and C_T from measured envelopes, [B] section 3.1.2."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -9,7 +9,8 @@ import xarray as xr
 
 from wm_drake.batch import RunResult, simulate_many
 from wm_drake.errors import input_error
-from wm_drake.model.machine import OUTPUT_PERIOD, Machine, build_machine
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import OUTPUT_PERIOD, Machine
 from wm_drake.parameters import (
     GASKET_FACTORS,
     MachineParameters,
@@ -23,6 +24,12 @@ from wm_drake.simulation.measures import envelopes
 from wm_drake.simulation.records import Record
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.gasket_damping.grid_search import Search, bounded_search, grid_search
+from wm_drake.studies.gasket_damping.uncertainty import (
+    Interval,
+    curves_of,
+    difference_points,
+    jackknife_interval,
+)
 
 UNKNOWNS = ("C_L", "C_T")
 
@@ -60,6 +67,8 @@ class Damping:
         truth: True values of a virtual experiment; None for a measurement. [N s/m, N m s/rad]
         at_best: Computed record at the optimum of the grid search, by load.
         measured: The measured displacements.
+        interval: Confidence interval of the better of the two optima; None if there are too few
+            curves. [N s/m, N m s/rad]
     """
 
     grid: Search
@@ -67,6 +76,7 @@ class Damping:
     truth: FloatArray | None
     at_best: dict[str, Record]
     measured: Measured
+    interval: Interval | None = None
 
 
 def identify_damping(
@@ -86,7 +96,8 @@ def identify_damping(
     grid = grid_search(objective, LOWER, UPPER, STOP)
     scipy = bounded_search(objective, LOWER, UPPER, STOP)
     at_best = {case.name: simulate(objective.machine, case) for case in objective.cases(grid.best)}
-    return Damping(grid, scipy, truth, at_best, measured)
+    best = min((scipy, grid), key=lambda search: search.value).best
+    return Damping(grid, scipy, truth, at_best, measured, objective.interval(best))
 
 
 def virtual_experiment(
@@ -157,22 +168,51 @@ class EnvelopeDistance:
     def __call__(self, points: Sequence[FloatArray]) -> list[float]:
         """Return the values at several points (C_L, C_T); infinite where a run diverges. [mm]"""
         values = np.zeros(len(points))
-        cases = [case for damping in points for case in self.cases(damping)]
 
-        def add(run: RunResult) -> None:
-            good = run.record is not None and not run.diverged
-            values[run.number // len(self.measured)] += (
-                self._distance(run.case.name, run.record) if good else np.inf
-            )
+        def add(point: int, load: str, record: Record | None) -> None:
+            values[point] += np.inf if record is None else self._distance(load, record)
 
-        simulate_many(self.machine, cases, measures=("extremes",), histories=True, finished=add)
+        self._run(points, add)
         return [float(value) for value in values]
 
-    def _distance(self, load: str, record: Record | None) -> float:
-        assert record is not None  # because of histories=True
-        return MM_PER_M * float(
-            np.linalg.norm(_envelopes(record.displacement) - self._targets[load])
-        )
+    def interval(self, best: FloatArray) -> Interval | None:
+        """Return the confidence interval of an optimum (C_L, C_T). [N s/m, N m s/rad]
+
+        It is None if there are too few curves, or if a run diverges.
+        """
+        points = difference_points(best, LOWER, UPPER)
+        found: list[dict[str, FloatArray]] = [{} for _ in points]
+
+        def add(point: int, load: str, record: Record | None) -> None:
+            if record is not None:
+                found[point][load] = self._curves(load, record)
+
+        self._run(points, add)
+        if any(len(differences) < len(self.measured) for differences in found):
+            return None
+        loads = list(self.measured)  # threads end in any order
+        ordered = [{load: differences[load] for load in loads} for differences in found]
+        return jackknife_interval(best, LOWER, UPPER, curves_of(ordered, points, UPPER - LOWER))
+
+    def _run(
+        self, points: Sequence[FloatArray], add: Callable[[int, str, Record | None], None]
+    ) -> None:
+        """Run all loads at several points and pass each record, or None if the run diverged."""
+        cases = [case for damping in points for case in self.cases(damping)]
+
+        def pass_on(run: RunResult) -> None:
+            record = None if run.diverged else run.record
+            add(run.number // len(self.measured), run.case.name, record)
+
+        simulate_many(self.machine, cases, measures=("extremes",), histories=True, finished=pass_on)
+
+    def _curves(self, load: str, record: Record) -> FloatArray:
+        """Return the differences (sensor, n) of both envelopes in the window. [mm]"""
+        differences = _envelopes(record.displacement) - self._targets[load]
+        return MM_PER_M * np.moveaxis(differences, 2, 0).reshape(differences.shape[2], -1)
+
+    def _distance(self, load: str, record: Record) -> float:
+        return float(np.linalg.norm(self._curves(load, record)))
 
 
 def _envelopes(displacement: xr.DataArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """Identified numbers as a file: a fragment that changes one component, or a component file."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +19,11 @@ from wm_drake.parameters import (
 )
 from wm_drake.parameters.units import Unit
 from wm_drake.studies.fitting import Fit
-from wm_drake.studies.identification.models import ComponentModel
+from wm_drake.studies.identification.models import ComponentModel, unit_of_field
 from wm_drake.studies.identification.scales import FORCE, TORQUE
+
+FIXED = "fixed by the user in an identification"
+"""Source of a number that was not searched."""
 
 _LENGTH, _ANGLE = Unit("m", "mm"), Unit("rad", "deg")
 
@@ -33,6 +36,8 @@ def fragment(
     key: str,
     copies: Mapping[str, str],
     out: Path,
+    remarks: Sequence[str] = (),
+    changes: Mapping[str, str] | None = None,
 ) -> str:
     """Return the text of a YAML file with identified numbers; comments name the undetermined ones.
 
@@ -45,6 +50,9 @@ def fragment(
         key: Key path of the component in the machine.
         copies: Fields that get the value of another, such as z of an axisymmetric bushing from x.
         out: Folder the file goes to, from which a machine file is named.
+        remarks: Sentences on the fit for the head of the file.
+        changes: Other numbers of the machine that the user changed: text by key path. A number
+            inside a list cannot be in a fragment; a comment names it.
 
     Raises:
         InputError: The data do not determine a number that a new law needs.
@@ -52,27 +60,45 @@ def fragment(
     entries, comments = _entries(fit, model, target)
     for field, source in copies.items():
         if source in entries:
-            entries[field] = entries[source]
+            entries[field] = dict(entries[source])
     tests = ", ".join(test.name for test in fit.tests)
     unit = "N m" if any(unknown.unit == TORQUE for unknown in fit.problem.unknowns) else "N"
+    written, left_out = _of_fragment(changes or {})
+    if left_out and machine:
+        comments.append(f"Not in this file: --set {', '.join(left_out)}.")
     head = [
         f"# Identified by least RMSE, method {fit.method}, seed {fit.seed}, from {tests}.",
         f"# RMSE {fit.rmse:.4g} {unit} over all tests.",
-        *(f"# {line}" for line in comments),
+        *(f"# {line}" for line in (*remarks, *comments)),
     ]
     if not machine:
         body: Any = _whole(entries, target)
     else:
         body = {"extends": _named_from(machine, out)}
-        node = body
-        for part in key.split("."):
-            node = node.setdefault(part, {})
-        node.update(_leaving(entries, target))
+        for path, text in written.items():
+            *parents, name = path.split(".")
+            _node(body, parents)[name] = YAML(typ="safe").load(text)
+        _node(body, key.split(".")).update(_leaving(entries, target))
     lines: list[str] = []
     yaml = YAML()
     yaml.width = 4096
     yaml.dump(body, _Lines(lines))
     return "\n".join(head) + "\n" + "".join(lines)
+
+
+def _of_fragment(changes: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
+    """Return the changes that a fragment can have, and those inside of a list as KEY=VALUE."""
+    inside = [path for path in changes if any(part.isdigit() for part in path.split("."))]
+    return (
+        {path: text for path, text in changes.items() if path not in inside},
+        [f"{path}={changes[path]}" for path in inside],
+    )
+
+
+def _node(tree: Any, path: Sequence[str]) -> Any:
+    for part in path:
+        tree = tree.setdefault(part, {})
+    return tree
 
 
 class _Lines:
@@ -95,7 +121,7 @@ def _entries(
     comments = []
     for name, value in fields.items():
         if isinstance(value, dict):
-            entries[name] = _table(value, fit)
+            entries[name] = _table(value, fit, _fixed_rises(name, model))
             open_ends = [
                 e.name for e in fit.estimates if e.name.startswith(f"{name}.") and not e.determined
             ]
@@ -104,6 +130,9 @@ def _entries(
                     f"The data do not determine {', '.join(open_ends)}: "
                     "the table's rises there are not to be trusted."
                 )
+        elif name in model.fixed:
+            unit = _unit_of_fixed(name)
+            entries[name] = {"value": f"{unit.from_si(value):.10g} {_plain(unit)}", "source": FIXED}
         elif name in estimates:
             estimate, unit = estimates[name], units[name]
             if not estimate.determined:
@@ -121,7 +150,8 @@ def _entries(
     missing = [name for name in _required(target, entries) if name not in entries]
     if missing and "law" in entries and entries["law"] != getattr(target.parameters, "law", None):
         raise input_error(
-            f"not determined by the data, and law {entries['law']} is new to {target.name}",
+            f"not determined by the data, and {target.name} had another law than {entries['law']}; "
+            "give its value with --fix",
             key=", ".join(missing),
         )
     return entries, comments
@@ -136,7 +166,19 @@ def _normalised(fit: Fit) -> float:
     return float(np.sqrt(np.mean([test.normalised**2 for test in fit.tests])))
 
 
-def _table(value: Mapping[str, Any], fit: Fit) -> dict[str, str]:
+def _unit_of_fixed(name: str) -> Unit:
+    unit = unit_of_field(name)
+    assert unit is not None, name  # the model has checked the names
+    return unit
+
+
+def _fixed_rises(table: str, model: ComponentModel) -> str:
+    """Return a text with the rises of a table that the user fixed; "" if there are none."""
+    names = [name.split(".")[1] for name in model.fixed if name.startswith(f"{table}.")]
+    return f"; {', '.join(names)} fixed" if names else ""
+
+
+def _table(value: Mapping[str, Any], fit: Fit, fixed: str) -> dict[str, str]:
     units = {"displacement": _LENGTH, "angle": _ANGLE, "force": FORCE, "torque": TORQUE}
     shown = {
         name: f"({', '.join(f'{units[name].from_si(x):.6g}' for x in given)}) {_plain(units[name])}"
@@ -144,7 +186,8 @@ def _table(value: Mapping[str, Any], fit: Fit) -> dict[str, str]:
     }
     return {
         **shown,
-        "source": f"identified from {len(fit.tests)} loops, normalised RMSE {_normalised(fit):.3g}",
+        "source": f"identified from {len(fit.tests)} loops, normalised RMSE {_normalised(fit):.3g}"
+        f"{fixed}",
     }
 
 

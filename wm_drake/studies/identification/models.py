@@ -5,7 +5,7 @@ steepest loop by orders of magnitude. They are where a search begins; the user m
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from wm_drake.parameters import DAMPER_LAWS, DamperType, ForceTable, TorqueTable
 from wm_drake.parameters.damper_laws import DamperLaw, DamperNumbers, Kind
 from wm_drake.parameters.elements import BushingType
 from wm_drake.parameters.keys import unit_of
+from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.rigs import Bench, bushing_bench, damper_bench
@@ -51,12 +52,14 @@ class ComponentModel:
         fields: Function of a point (p,) that returns the component's fields, in SI; a table as a
             mapping.
         bench: Function of a point that returns the component on the bench.
+        fixed: Numbers that the user gave, by name; they are no unknowns. [SI]
     """
 
     law: str
     unknowns: tuple[Unknown, ...]
     fields: Callable[[FloatArray], dict[str, Any]]
     bench: Callable[[FloatArray], Bench]
+    fixed: Mapping[str, float] = field(default_factory=dict)
 
 
 def damper_model(
@@ -65,6 +68,7 @@ def damper_model(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     knots: int = KNOTS,
+    kept: Mapping[str, float] | None = None,
 ) -> ComponentModel:
     """Return a damper with unknown numbers.
 
@@ -77,6 +81,7 @@ def damper_model(
         bounds: Bounds of unknowns, by field, in place of the default ones. [SI]
         fixed: Values that are known, by field. [SI]
         knots: Points of each curve of the law on each side of zero.
+        kept: Numbers of the component that stay as they are, unless they are fixed. [SI]
 
     Raises:
         InputError: There is no such law, or no such field.
@@ -91,10 +96,13 @@ def damper_model(
     check_names([*numbers_of_law, *_rises(tables)], bounds, fixed)
     bounded = {name: own for name, own in (bounds or {}).items() if name in numbers_of_law}
     searched = {**registered.unknowns, **bounded}
-    numbers = unknowns_of(searched, _units(registered), scale, bounds, fixed)
-    fields = _Fields({"law": law, **(fixed or {})}, numbers, tables)
-    unknowns = (*numbers, *with_bounds(_unknown_rises(tables), bounds))
-    return ComponentModel(law, unknowns, fields, lambda point: damper_bench(_damper(fields(point))))
+    known = {**(kept or {}), **(fixed or {})}
+    numbers = unknowns_of(searched, _units(registered), scale, bounds, known)
+    unknowns = (*numbers, *_free_rises(tables, bounds, fixed))
+    fields = _Fields({"law": law, **known}, _some_unknown(unknowns), tables)
+    return ComponentModel(
+        law, unknowns, fields, lambda point: damper_bench(_damper(fields(point))), fixed or {}
+    )
 
 
 def _units(law: DamperLaw) -> dict[str, Unit]:
@@ -155,7 +163,9 @@ def bushing_model(
     kinds_of_units = ABOUT if about else ALONG
     units = {name: kinds_of_units[kind] for name, kind in searched.items()}
     numbers = unknowns_of(searched, units, scale, bounds, fixed)
-    fields = _Fields(fixed or {}, numbers, tables)
+    unknowns = _some_unknown((*numbers, *_free_rises(tables, bounds, fixed)))
+    _check_fixed(base, {name: value for name, value in (fixed or {}).items() if name in searched})
+    fields = _Fields(fixed or {}, unknowns, tables)
 
     def bench(point: FloatArray) -> Bench:
         kind = TorqueTable if about else ForceTable
@@ -165,9 +175,20 @@ def bushing_model(
         }
         return bushing_bench(base.model_copy(update=values), axis, arm)
 
-    return ComponentModel(
-        law, (*numbers, *with_bounds(_unknown_rises(tables), bounds)), fields, bench
-    )
+    return ComponentModel(law, unknowns, fields, bench, fixed or {})
+
+
+def _check_fixed(base: BushingType, fixed: Mapping[str, float]) -> None:
+    """Check that fixed numbers are allowed for a bushing.
+
+    Raises:
+        InputError: A number is outside of its range.
+    """
+    try:
+        type(base).model_validate({**base.model_dump(), **fixed})
+    except ValidationError as error:
+        problem = problems_of(error, type(base))[0]
+        raise input_error(problem.message, where="--fix", key=problem.key) from None
 
 
 def _bushing_kinds(axis: str) -> dict[str, Kind]:
@@ -183,20 +204,44 @@ def _bushing_kinds(axis: str) -> dict[str, Kind]:
 
 @dataclass(frozen=True)
 class _Fields:
-    """Fields of a component at a point (p,): known ones, numbers, then rises of its tables."""
+    """Fields of a component at a point (p,): known numbers, then unknown ones, then tables.
+
+    Rises of the tables are known or unknown numbers.
+    """
 
     known: Mapping[str, Any]
-    numbers: tuple[Unknown, ...]
+    unknowns: tuple[Unknown, ...]
     tables: tuple[OddTable | TwoSidedTable, ...]
 
     def __call__(self, point: FloatArray) -> dict[str, Any]:
-        named = {u.name: float(value) for u, value in zip(self.numbers, point, strict=False)}
-        sizes = [len(self.numbers), *(len(table.unknowns) for table in self.tables)]
-        rises = np.split(point, np.cumsum(sizes)[:-1])[1:]
+        named = {u.name: float(value) for u, value in zip(self.unknowns, point, strict=True)}
+        found = {**self.known, **named}
         curves = {
-            table.name: table.curve(own) for table, own in zip(self.tables, rises, strict=True)
+            table.name: table.curve(np.array([found.pop(rise.name) for rise in table.unknowns]))
+            for table in self.tables
         }
-        return {**self.known, **named, **curves}
+        return {**found, **curves}
+
+
+def _free_rises(
+    tables: tuple[OddTable | TwoSidedTable, ...],
+    bounds: Mapping[str, tuple[float, float]] | None,
+    fixed: Mapping[str, float] | None,
+) -> tuple[Unknown, ...]:
+    """Return the rises of tables that are not fixed, with the user's bounds where there are any."""
+    rises = with_bounds(_unknown_rises(tables), bounds)
+    return tuple(rise for rise in rises if rise.name not in (fixed or {}))
+
+
+def _some_unknown(unknowns: tuple[Unknown, ...]) -> tuple[Unknown, ...]:
+    """Return the unknowns.
+
+    Raises:
+        InputError: There are none.
+    """
+    if not unknowns:
+        raise input_error("all numbers of the law are fixed; leave one out", where="--fix")
+    return unknowns
 
 
 def _unknown_rises(tables: tuple[OddTable | TwoSidedTable, ...]) -> tuple[Unknown, ...]:

@@ -7,11 +7,13 @@ import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
+from enum import Enum
 from functools import partial
 from queue import Empty
 from typing import Any
 
-from wm_drake.model.machine import Machine, build_machine
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case
@@ -36,6 +38,21 @@ class CaseResult:
     wall_s: float
 
 
+class Comparison(Enum):
+    """Which cases are compared with the measured amplitudes of a machine.
+
+    Attributes:
+        AS_MEASURED: Cases with a load and the spin profile of the machine file, since these were
+            measured.
+        ALL: All cases; the user named the measurements.
+        NONE: No case; the numbers of the machine are not those that were measured.
+    """
+
+    AS_MEASURED = "as measured"
+    ALL = "all"
+    NONE = "none"
+
+
 @dataclass(frozen=True)
 class SpinResult:
     """Results of all cases, in the order in which the cases were given."""
@@ -44,6 +61,18 @@ class SpinResult:
     engine: str
     step: float
     results: tuple[CaseResult, ...]
+    comparison: Comparison = Comparison.AS_MEASURED
+
+    def is_compared(self, result: CaseResult) -> bool:
+        """Return whether a case is compared with the measured amplitudes of the machine."""
+        if self.comparison is not Comparison.AS_MEASURED:
+            return self.comparison is Comparison.ALL
+        case = result.case
+        return (
+            case.parameters in (None, self.parameters)
+            and case.load == self.parameters.loads.get(case.name)
+            and case.profile == self.parameters.profile
+        )
 
 
 @dataclass(frozen=True)
@@ -64,6 +93,7 @@ def run_spin(
     step: float | None = None,
     progress: Callable[[int, float], None] = lambda index, fraction: None,
     workers: int | None = None,
+    comparison: Comparison = Comparison.AS_MEASURED,
 ) -> SpinResult:
     """Run cases and return their records and measures.
 
@@ -77,6 +107,7 @@ def run_spin(
         progress: Called with the index of a case and the fraction of it that is done.
         workers: Number of processes for an engine that needs processes; None for the number of
             cores. A single case always runs in this process.
+        comparison: Which cases are compared with the measured amplitudes of the machine.
 
     Raises:
         InputError: a case or an argument is wrong.
@@ -92,7 +123,7 @@ def run_spin(
             _run(item, machine, scene, partial(progress, index))
             for index, item in enumerate(work_items)
         ]
-    return SpinResult(parameters, engine, step, tuple(results))
+    return SpinResult(parameters, engine, step, tuple(results), comparison)
 
 
 def _run_in_processes(

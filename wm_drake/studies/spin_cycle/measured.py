@@ -44,7 +44,7 @@ def read_rms(path: Path, labels: Mapping[str, Sequence[str]]) -> xr.DataArray:
     table = read_csv(path, RMS_COLUMNS)
     if table.empty:
         raise input_error("has no row; at least one is needed", where=str(path))
-    names = table[RMS_COLUMNS[:4]].astype(str)
+    names = table[RMS_COLUMNS[:4]].astype(object).fillna("").astype(str)
     for column, dim in zip(RMS_COLUMNS, DIMS, strict=False):
         for name in names[column]:
             if name not in labels[dim]:

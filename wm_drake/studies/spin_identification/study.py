@@ -16,8 +16,17 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.fitting import Fit, FitProblem, Measurement, Progress, Unknown, least_squares
-from wm_drake.studies.spin_cycle.study import DIMS, labels_of, runs_of
+from wm_drake.studies.fitting import (
+    Fit,
+    FitProblem,
+    Measurement,
+    Progress,
+    Unknown,
+    Verdict,
+    least_squares,
+    verdict_of,
+)
+from wm_drake.studies.spin_cycle.study import DIMS, average_errors, labels_of, runs_of
 
 SPAN = 1.5
 """Default bounds of an unknown: the number of the machine divided and multiplied by this."""
@@ -103,6 +112,16 @@ class SpinIdentification:
         return tuple(bool(half <= KNOWN) for half in self.uncertainty)
 
     @property
+    def error_after(self) -> float:
+        """Average relative error of an RMS displacement with the identified numbers."""
+        return float(average_errors(self.after, self.measured).mean())
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the machine with the identified numbers fits the measured displacements."""
+        return verdict_of(self.error_after)
+
+    @property
     def recovered(self) -> FloatArray | None:
         """Relative error of each unknown in a virtual experiment; None for a real experiment."""
         return None if self.planted is None else self.fit.values / self.planted - 1.0
@@ -183,6 +202,36 @@ def planted_values(sought: Sequence[Sought], seed: int) -> FloatArray:
     starts = [s.unknown.start or np.sqrt(s.unknown.lower * s.unknown.upper) for s in sought]
     bounds = np.array([(s.unknown.lower, s.unknown.upper) for s in sought])
     return np.clip(np.array(starts) * np.exp(drawn), 1.02 * bounds[:, 0], 0.98 * bounds[:, 1])
+
+
+def identified_machine(result: SpinIdentification) -> MachineParameters:
+    """Return the machine with the identified numbers and the source of each.
+
+    A number that the data do not determine stays as it is. The machine has a name of its own.
+    """
+    virtual = "virtual experiment: " if result.planted is not None else ""
+    cases = ", ".join(case.name for case in result.cases)
+    values: dict[str, float] = {}
+    sources: dict[str, str] = {}
+    for sought, estimate in zip(result.sought, result.fit.estimates, strict=True):
+        if not estimate.determined:
+            continue
+        text = f"{virtual}identified from spin cycle, cases {cases}"
+        if estimate.at_bound:
+            text += f"; at the {estimate.at_bound} bound of the search"
+        elif np.isfinite(estimate.lower):
+            unit = sought.unknown.unit
+            lower, upper = (unit.from_si(value) for value in (estimate.lower, estimate.upper))
+            text += f"; 95 % interval {lower:.4g} to {upper:.4g} {unit.shown}"
+        values |= dict.fromkeys(sought.keys, estimate.value)
+        sources |= dict.fromkeys(sought.keys, text)
+    changed = with_values(result.parameters, values)
+    return changed.model_copy(
+        update={
+            "name": f"{result.parameters.name}_identified",
+            "sources": {**changed.sources, **sources},
+        }
+    )
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+spin record_c.nc

@@ -1,0 +1,79 @@
+"""Files of compiled code: a damaged one is compiled anew, with one line of notice."""
+
+import os
+import resource
+import subprocess
+import sys
+
+import pytest
+
+LAW = """
+from wm_drake.compiler.compilation import law
+
+@law
+def spring(x, k):
+    return -k * x
+
+print(spring(2.0, 3.0), sum(spring.stats.cache_hits.values()))
+"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """Runs a law in a process of its own, with a cache of its own."""
+    folder = tmp_path_factory.mktemp("law")
+    (folder / "spring.py").write_text(LAW, encoding="utf-8")
+
+    def run(cache, largest=resource.RLIM_INFINITY):
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+        environment["PYTHONPATH"] = os.pathsep.join(sys.path)
+        ended = subprocess.run(
+            [sys.executable, folder / "spring.py"],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+            preexec_fn=lambda: resource.setrlimit(
+                resource.RLIMIT_FSIZE, (largest, resource.RLIM_INFINITY)
+            ),
+        )
+        return ended.stdout.split(), ended.stderr.splitlines()
+
+    return run
+
+
+def changed(kind, content):
+    if kind == "flipped":
+        middle = len(content) // 2
+        return content[:middle] + bytes([content[middle] ^ 4]) + content[middle + 1 :]
+    return content[: {"empty": 0, "half": len(content) // 2}[kind]]
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+def test_damaged_file_is_compiled_anew(run, tmp_path, suffix):
+    assert run(tmp_path) == (["-6.0", "0"], [])
+    for kind in ("empty", "half", "flipped"):
+        (path,) = tmp_path.rglob(f"spring*.{suffix}")
+        path.write_bytes(changed(kind, path.read_bytes()))
+        result, notice = run(tmp_path)
+        assert result == ["-6.0", "0"], kind
+        assert len(notice) == 1
+        assert notice[0].endswith("is damaged; it is compiled anew")
+    assert run(tmp_path) == (["-6.0", "1"], [])
+
+
+def test_cache_that_cannot_be_written_is_left_out(run, tmp_path):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    result, notice = run(tmp_path / "file")
+    assert result == ["-6.0", "0"]
+    (line,) = notice
+    assert line.startswith("compiled code is not kept (")
+
+
+def test_disk_that_is_full_leaves_the_cache_out(run, tmp_path):
+    result, notice = run(tmp_path, largest=1000)
+    assert result == ["-6.0", "0"]
+    (line,) = notice
+    assert line == f"compiled code cannot be kept in {next(tmp_path.glob('*/*'))} (File too large)"
+    assert run(tmp_path) == (["-6.0", "0"], [])
+    assert run(tmp_path) == (["-6.0", "1"], [])

@@ -1,0 +1,156 @@
+"""Process that runs the cases of a campaign: numbers on standard input, outcomes on output, as JSON lines."""
+
+import functools
+import json
+import os
+import resource
+import shutil
+import sys
+import tempfile
+import time
+import traceback
+from importlib import import_module
+from pathlib import Path
+from unittest import mock
+
+import typer
+from fuzz.cases import case_of
+
+from wm_drake.cli import main
+from wm_drake.parameters import load_machine
+from wm_drake.parameters.files import shipped_machines
+
+MEMORY_LIMIT = 2 << 30
+COMPUTATIONS = (
+    "wm_drake.studies.spin.study.run_spin",
+    "wm_drake.studies.gasket.screening.run_screening",
+    "wm_drake.studies.spin_cycle.study.run_spin_cycle",
+    "wm_drake.studies.spin_identification.study.identify_from_spin",
+    "wm_drake.studies.gasket_damping.study.virtual_experiment",
+    "wm_drake.studies.gasket_damping.study.identify_damping",
+    "wm_drake.studies.fitting.identify",
+    "wm_drake.studies.calibration.calibration.calibrate",
+    "wm_drake.rigs.run_rig",
+    "wm_drake.studies.description.description.describe",
+)
+"""What the commands do once the input is accepted; here they end instead."""
+
+
+def accepted(*_, **__):
+    """End the command: its input was accepted."""
+    raise typer.Exit(0)
+
+
+@functools.cache
+def shipped_machine(name: str):
+    """Return a shipped machine; reading one takes longer than most cases."""
+    return load_machine(name)
+
+
+def load_machine_once(name_or_path="reference"):
+    """Read a machine as `load_machine` does, a shipped one only once."""
+    if str(name_or_path) in shipped_machines():
+        return shipped_machine(str(name_or_path))
+    return load_machine(name_or_path)
+
+
+def files(folder: Path) -> dict[str, tuple[int, int]]:
+    """Return size and time of each file and folder, by path."""
+    return {
+        str(path.relative_to(folder)): (path.lstat().st_size, path.lstat().st_mtime_ns)
+        for path in folder.rglob("*")
+        if path.is_symlink() or path.is_file() or path.is_dir()
+    }
+
+
+def run(arguments: list[str]) -> tuple[int, str, str]:
+    """Run a command in this process and return exit code, standard output and standard error."""
+    kept = os.dup(1), os.dup(2)
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        os.dup2(out.fileno(), 1)
+        os.dup2(err.fileno(), 2)
+        try:
+            sys.argv = ["wm-drake", *arguments]
+            try:
+                main()
+                code = 0
+            except SystemExit as ended:
+                code = ended.code or 0
+            except BaseException:
+                traceback.print_exc()
+                code = 1
+            sys.stdout.flush()
+            sys.stderr.flush()
+        finally:
+            os.dup2(kept[0], 1)
+            os.dup2(kept[1], 2)
+            os.close(kept[0])
+            os.close(kept[1])
+        texts = []
+        for stream in (out, err):
+            stream.seek(0)
+            texts.append(stream.read().decode(errors="replace"))
+    return int(code), texts[0], texts[1]
+
+
+def outcome(number: int, top: Path) -> dict:
+    """Run one case in a new folder and return what happened."""
+    around = top / "around"
+    folder = around / "work"
+    folder.mkdir(parents=True)
+    case = case_of(number, folder)
+    before = files(around)
+    os.chdir(folder)
+    begin = time.perf_counter()
+    code, out, err = run(case.arguments)
+    seconds = time.perf_counter() - begin
+    os.chdir(top)
+    after = files(around)
+    changed = sorted(
+        p for p in before.keys() | after.keys() if before.get(p) != after.get(p) and p != "work"
+    )
+    shutil.rmtree(around)
+    return {
+        "number": number,
+        "door": case.door,
+        "arguments": case.arguments,
+        "names": case.names,
+        "keys": case.keys,
+        "code": code,
+        "out": out,
+        "err": err,
+        "changed": changed,
+        "seconds": seconds,
+    }
+
+
+def limit_memory() -> None:
+    """Limit the memory that a case may take, on top of what the package itself takes."""
+    size = (
+        int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[0])
+        * resource.getpagesize()
+    )
+    resource.setrlimit(resource.RLIMIT_AS, (size + MEMORY_LIMIT, resource.RLIM_INFINITY))
+
+
+def serve() -> None:
+    """Run each case whose number arrives, until the input ends."""
+    os.environ["COLUMNS"] = "200"
+    with tempfile.TemporaryDirectory() as name:
+        top = Path(name)
+        os.chdir(top)
+        for name_of_machine in ("reference", "free_stroke"):  # imports and compiles
+            run(["machine", "check", name_of_machine])
+        for place in COMPUTATIONS:
+            module, _, function = place.rpartition(".")
+            mock.patch.object(import_module(module), function, accepted).start()
+        mock.patch("wm_drake.parameters.load_machine", load_machine_once).start()
+        if sys.platform == "linux":
+            limit_memory()
+        print("ready", flush=True)  # noqa: T201
+        for line in sys.stdin:
+            print(json.dumps(outcome(int(line), top)), flush=True)  # noqa: T201
+
+
+if __name__ == "__main__":
+    serve()

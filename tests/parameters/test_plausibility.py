@@ -1,0 +1,80 @@
+"""Tests of usual ranges: shipped machines are inside, slips of unit and keyboard are found."""
+
+import pytest
+
+from wm_drake.model.build import build_machine
+from wm_drake.model.plausibility import unusual_springs, unusual_values
+from wm_drake.parameters import load_machine, quantities, with_values
+from wm_drake.parameters.files import shipped_machines
+from wm_drake.parameters.plausibility import RANGES, _range_of, unusual_numbers
+
+
+@pytest.mark.parametrize("name", shipped_machines())
+def test_shipped_machine_has_nothing_unusual(name):
+    machine = load_machine(name)
+    assert unusual_values(build_machine(machine).set_up()) == []
+
+
+SLIPS = {
+    "mass of a load in g": {"loads.middle.unbalances.0.mass": "800 kg"},
+    "radius in m": {"loads.middle.unbalances.0.radius": "240 m"},
+    "y in m": {"loads.middle.unbalances.0.y": "-20 m"},
+    "spring in N/m": {"spring_types.suspension.stiffness": "6.5 N/m"},
+    "spring in kN/mm": {"spring_types.suspension.stiffness": "6.5 kN/mm"},
+    "gasket in N/mm^-1": {"gasket.damping_x": "19 N s/mm"},
+    "friction in kN": {"damper_types.friction.friction_force": "40 kN"},
+    "sponge in N/m": {"damper_types.friction.sponge_stiffness": "50 N/m"},
+    "no gravity": {"gravity": "981 m/s^2"},
+    "phase in rad": {"imperfections.phase_error": "180 deg"},
+}
+
+
+@pytest.mark.parametrize("slip", SLIPS)
+def test_slip_is_found(reference, slip):
+    (key,) = SLIPS[slip]
+    (problem,) = unusual_numbers(with_values(reference, SLIPS[slip]))
+    assert problem.key == key
+    assert " is unusual; usual is " in problem.message
+
+
+@pytest.mark.parametrize(
+    ("key", "inside", "outside"),
+    [
+        ("loads.middle.unbalances.0.mass", "5 kg", "5.001 kg"),
+        ("loads.middle.unbalances.0.radius", "400 mm", "400.1 mm"),
+        ("spring_types.suspension.stiffness", "1 N/mm", "0.999 N/mm"),
+        ("imperfections.phase_error", "45 deg", "45.1 deg"),
+    ],
+)
+def test_ends_of_a_range_are_usual(reference, key, inside, outside):
+    assert unusual_numbers(with_values(reference, {key: inside})) == []
+    assert len(unusual_numbers(with_values(reference, {key: outside}))) == 1
+
+
+MORE = """extends: reference
+bodies: {drum: {mass: 9 kg, centre_of_mass: "(0, 0, 0) mm"}}
+frames: {gasket_tub: {position: "(0, 0, 0) mm"}}
+spring_types:
+  table: {stiffness: {displacement: "(-20, 0, 20) mm", force: "(-160, 0, 160) N"}}
+"""
+
+
+def test_every_range_belongs_to_a_number_and_has_its_unit(tmp_path):
+    (tmp_path / "more.yaml").write_text(MORE)
+    machines = map(load_machine, [*shipped_machines(), tmp_path / "more.yaml"])
+    units = {key: unit.shown for machine in machines for key, _, unit in quantities(machine)}
+    used = {usual: key for key in units if (usual := _range_of(key)) and usual.unit == units[key]}
+    assert [usual.pattern for usual in RANGES if usual not in used] == []
+
+
+def test_spring_too_soft_for_its_weight_has_no_free_length(reference):
+    """Free length = length - preload / stiffness; the limit is stiffness = preload / length."""
+    setup = build_machine(reference).set_up()
+    rear = setup.springs["rear"]
+    limit = rear.preload / rear.rest_length
+    for factor, found in ((1.001, []), (0.999, ["springs.rear"])):
+        soft = with_values(reference, {"spring_types.suspension.stiffness": factor * limit})
+        problems = unusual_springs(build_machine(soft).set_up())
+        assert [problem.key for problem in problems] == found
+    stiff = with_values(reference, {"spring_types.suspension.stiffness": "6.5 N/m"})
+    assert len(unusual_springs(build_machine(stiff).set_up())) == 3

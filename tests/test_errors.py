@@ -1,0 +1,43 @@
+"""Messages: one printable line of limited length."""
+
+from wm_drake.errors import LONGEST_LINE, MOST_LINES, InputError, Problem, nearest_names, shortened
+
+
+def test_short_text_stays():
+    assert shortened("a spring of 5 N/mm", 100) == "a spring of 5 N/mm"
+
+
+def test_long_word_loses_its_middle_before_the_text_does():
+    text = shortened("value '" + "x" * 1000 + "' is out of range; allowed is > 0", 300)
+    assert text.endswith("' is out of range; allowed is > 0")
+    assert text.startswith("value 'xxx")
+    assert len(text) < 150
+
+
+def test_long_text_keeps_its_end():
+    text = shortened("word " * 1000 + "allowed is > 0", 300)
+    assert len(text) == 300
+    assert text.endswith("allowed is > 0")
+
+
+def test_characters_that_a_terminal_acts_on_are_escaped():
+    assert shortened("a\x1b[31m\nb\u202e", 100) == "a\\x1b[31m\\nb\\u202e"
+
+
+def test_problem_fits_in_a_line():
+    problem = Problem("w " * 5000, "k" * 5000, "m " * 5000)
+    assert len(str(problem)) <= LONGEST_LINE
+    assert str(Problem("f:1", "gravity", "is missing")) == "f:1: gravity: is missing"
+
+
+def test_error_lists_the_first_problems():
+    lines = str(InputError(Problem("", "", str(n)) for n in range(1000))).splitlines()
+    assert lines[:2] == ["0", "1"]
+    assert lines[MOST_LINES:] == [f"and {1000 - MOST_LINES} more problems"]
+
+
+def test_long_list_of_names_ends_with_their_number():
+    hint = nearest_names("nothing like it", [f"name_{n:04d}" for n in range(1000)])
+    assert "known: name_0000, name_0001, " in hint
+    assert hint.endswith("973 more)")
+    assert len(hint) < 350

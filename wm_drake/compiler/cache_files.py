@@ -1,0 +1,71 @@
+"""Files of compiled code on disk, with a checksum: a damaged file is compiled anew.
+
+numba itself trusts its files. A file that is cut short, empty or changed ends in an error of its
+reader or of the linker, or crashes the process.
+"""
+
+import functools
+import hashlib
+import pickle
+import sys
+from pathlib import Path
+from typing import Any
+
+from numba.core.caching import IndexDataCacheFile
+
+_DIGEST = hashlib.sha256().digest_size
+
+
+class CheckedCacheFile(IndexDataCacheFile):
+    """The index and the data files of one compiled function, each behind the hash of its content.
+
+    A file that is damaged counts as missing; one that cannot be written is left out. Both are said
+    in one line on standard error, once in a process.
+    """
+
+    def _load_index(self) -> dict[Any, str]:
+        found = _read(Path(self._index_path))
+        if found is None:
+            return {}
+        version, stamp, overloads = found
+        fits = version == self._version and stamp == self._source_stamp
+        return overloads if fits else {}
+
+    def _save_index(self, overloads: dict[Any, str]) -> None:
+        content = (self._version, self._source_stamp, overloads)
+        self._write(self._index_path, self._dump(content))
+
+    def _load_data(self, name: str) -> Any:
+        found = _read(Path(self._data_path(name)))
+        if found is None:
+            raise FileNotFoundError(name)  # what numba takes as "compile it"
+        return found
+
+    def _save_data(self, name: str, data: Any) -> None:
+        self._write(self._data_path(name), self._dump(data))
+
+    def _write(self, path: str, content: bytes) -> None:
+        try:
+            with self._open_for_write(path) as file:
+                file.write(hashlib.sha256(content).digest() + content)
+        except OSError as error:
+            say_once(f"compiled code cannot be kept in {self._cache_path} ({error.strerror})")
+
+
+def _read(path: Path) -> Any:
+    """Return the content of a file; None if it is missing or damaged."""
+    try:
+        stored = path.read_bytes()
+    except OSError:
+        return None
+    digest, content = stored[:_DIGEST], stored[_DIGEST:]
+    if hashlib.sha256(content).digest() != digest:
+        say_once(f"compiled code in {path.parents[1]} is damaged; it is compiled anew")
+        return None
+    return pickle.loads(content)
+
+
+@functools.cache
+def say_once(text: str) -> None:
+    """Write a line on standard error, once in a process."""
+    sys.stderr.write(f"{text}\n")

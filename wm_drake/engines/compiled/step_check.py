@@ -1,0 +1,200 @@
+"""Check that fixed steps are short enough for the fastest motion of a machine.
+
+Own derivation. The explicit Runge-Kutta scheme of fourth order follows a linear motion
+exp(lambda t) while |lambda h| stays small. Friction, sponges, bushings and a compliant bearing
+make lambda large: friction over its transition velocity acts as a dashpot, and a stiff dashpot on a
+light body decays within a step. The eigenvalues of the machine's Jacobian at a few states with slow
+and fast motion show it, whatever the law.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from wm_drake.compiler.lanes import WIDTH
+from wm_drake.engines.compiled.derivative import StateDerivative
+from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
+from wm_drake.engines.compiled.packing import initial_state
+from wm_drake.engines.compiled.tubes import TUBES_STATE_SIZE
+from wm_drake.errors import input_error
+from wm_drake.model.machine import OUTPUT_PERIOD, Setup
+from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.types import FloatArray
+
+LARGEST_DECAY = 2.0
+"""Largest |lambda h| of a motion that decays without oscillation.
+
+The scheme is stable up to 2.78."""
+
+LARGEST_PHASE = 1.0
+"""Largest |lambda h| of a motion that oscillates, about a sixth of its period. [rad] The scheme is
+stable up to 2.83; at 1 rad a step damps the motion by 0.6 % of its amplitude."""
+
+SPEEDS = (1e-6, 1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0)
+"""Speeds of the states that are looked at, one a lane. [m/s, rad/s]
+
+The slowest has every friction on its steepest part; in the fast ones the sponges slip."""
+
+TUB, BEARING = "the tub", "the drum in its bearing"
+"""Names of parts that move."""
+
+DEFORMATION = 1e-4
+"""Deformation of the sponges in these states. [m]"""
+
+DIFFERENCE = 1e-9
+"""Half a step of the central differences: below the slowest speed, so that friction that jumps at
+zero counts as constant on either side. [m, rad, m/s, rad/s]"""
+
+
+@dataclass(frozen=True)
+class FastestMotion:
+    """The motion of a machine that changes fastest.
+
+    Attributes:
+        rate: |lambda|. [1/s]
+        oscillates: Whether it oscillates more than it decays.
+        part: What moves, in words.
+    """
+
+    rate: float
+    oscillates: bool
+    part: str
+
+    @property
+    def longest_step(self) -> float:
+        """Return the longest step that follows it. [s]"""
+        largest = LARGEST_PHASE if self.oscillates else LARGEST_DECAY
+        return largest / self.rate if self.rate else np.inf
+
+
+def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
+    """Return the motion of each part of a machine that needs the shortest step, by part.
+
+    The parts are `TUB`, `BEARING`, and the sponge and the tubes of each damper, as far as they have
+    a fastest motion of their own. The drum's own angle is prescribed.
+
+    Raises:
+        InputError: the machine has something that the compiled engine does not represent.
+    """
+    free, parts = _free_states(setup)
+    jacobians = _jacobians(setup, free)
+    if not np.all(np.isfinite(jacobians)):
+        return {"the machine": FastestMotion(np.inf, False, "the machine")}
+    moving = np.isin(free, _velocities(setup, len(free) + 2))
+    values, vectors = np.linalg.eig(jacobians)
+    found: dict[str, FastestMotion] = {}
+    for rates, modes in zip(values, vectors, strict=True):
+        for rate, mode in zip(rates, modes.T, strict=True):
+            size = float(abs(rate))
+            # velocities as the displacements that they make within 1 / |lambda|
+            amplitude = np.abs(mode) / np.where(moving, max(size, 1e-9), 1.0)
+            part = parts[int(np.argmax(amplitude))]
+            motion = FastestMotion(size, bool(abs(rate.imag) > abs(rate.real)), part)
+            if part not in found or motion.longest_step < found[part].longest_step:
+                found[part] = motion
+    return found
+
+
+def fastest_motion(setup: Setup) -> FastestMotion:
+    """Return the motion of a machine that needs the shortest step; see `fastest_motions`."""
+    return min(fastest_motions(setup).values(), key=lambda motion: motion.longest_step)
+
+
+def _jacobians(setup: Setup, free: list[int]) -> FloatArray:
+    """Return the Jacobian of the free states at each of the states to look at. (WIDTH, n, n)"""
+    derivative, states = StateDerivative(setup), _states(setup, free)
+    jacobians = np.empty((WIDTH, len(free), len(free)))
+    for column, index in enumerate(free):
+        ahead, back = states.copy(), states.copy()
+        ahead[:, index] += DIFFERENCE
+        back[:, index] -= DIFFERENCE
+        change = derivative.at_states(ahead) - derivative.at_states(back)
+        jacobians[:, :, column] = change[:, free] / (2.0 * DIFFERENCE)
+    return jacobians
+
+
+def check_step(setup: Setup, step: float) -> None:
+    """Check that a step is short enough for the fastest motion of a machine.
+
+    Args:
+        setup: The machine as it is set up for the run.
+        step: Step size. [s]
+
+    Raises:
+        InputError: the step is too long; the message names the longest one.
+    """
+    fastest = fastest_motion(setup)
+    if step <= fastest.longest_step:
+        return
+    if not np.isfinite(fastest.rate):
+        raise input_error(
+            "forces near rest are not finite numbers; no step follows them", key="step"
+        )
+    how = f"oscillates at {fastest.rate / (2.0 * np.pi):.4g} Hz"
+    if not fastest.oscillates:
+        how = f"decays at {fastest.rate:.4g} 1/s"
+    raise input_error(
+        f"{1e3 * step:g} ms is too long for {fastest.part}, whose fastest motion {how}; "
+        f"allowed are up to {_allowed(fastest.longest_step)}",
+        key="step",
+    )
+
+
+def _allowed(longest: float) -> str:
+    """Return the longest step that divides the output period, in words."""
+    pieces = int(np.ceil(OUTPUT_PERIOD / longest))
+    text = f"{1e3 * OUTPUT_PERIOD / pieces:.4g} ms"
+    if 10**9 % pieces:  # this step has no finite decimal expansion: name one that has
+        pieces = next(more for more in itertools.count(pieces) if 10**9 % more == 0)
+        text += f", such as {1e3 * OUTPUT_PERIOD / pieces:g} ms"
+    return text
+
+
+def _free_states(setup: Setup) -> tuple[list[int], list[str]]:
+    """Return the indices of the states that are not prescribed, and what each belongs to."""
+    parts = [TUB] * STATE_SIZE
+    parts += [f"the sponge of damper '{name}'" for name in setup.dampers]
+    for name in setup.telescopes:
+        parts += [f"the tubes of damper '{name}'"] * (TUBES_STATE_SIZE - 1)
+        parts.append(f"the sponge of damper '{name}'")
+    size = len(initial_state(setup, _standstill()))
+    parts += [BEARING] * (size - len(parts))
+    free = [index for index in range(size) if index not in (DRUM_ANGLE, DRUM_RATE)]
+    return free, [parts[index] for index in free]
+
+
+def _states(setup: Setup, free: list[int]) -> FloatArray:
+    """Return the states to look at (WIDTH, size): the rest pose, with speeds of each size."""
+    rest = initial_state(setup, _standstill())
+    states = np.tile(rest, (WIDTH, 1))
+    directions = np.random.default_rng(0).uniform(-1.0, 1.0, len(rest))
+    speeds = np.resize(SPEEDS, WIDTH)
+    for index in set(free) & set(_velocities(setup, len(rest))):
+        states[:, index] += speeds * directions[index]
+    for index in _sponges(setup):
+        states[:, index] += DEFORMATION * directions[index]
+    return states
+
+
+def _velocities(setup: Setup, size: int) -> list[int]:
+    """Return the indices of all velocities in the state."""
+    found = list(range(STATE_SIZE // 2, STATE_SIZE))
+    begin = STATE_SIZE + len(setup.dampers)
+    for _ in setup.telescopes:
+        found += range(begin + 7, begin + TUBES_STATE_SIZE - 1)
+        begin += TUBES_STATE_SIZE
+    found += range(begin + (size - begin) // 2, size)
+    return found
+
+
+def _sponges(setup: Setup) -> list[int]:
+    """Return the indices of all deformations of sponges in the state."""
+    struts = len(setup.dampers)
+    found = list(range(STATE_SIZE, STATE_SIZE + struts))
+    first = STATE_SIZE + struts + TUBES_STATE_SIZE - 1
+    return found + [first + TUBES_STATE_SIZE * number for number in range(len(setup.telescopes))]
+
+
+def _standstill() -> SpinProfile:
+    return SpinProfile(time=(0.0, 1.0), speed=(0.0, 0.0))

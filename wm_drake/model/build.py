@@ -1,0 +1,162 @@
+"""Add a machine to a diagram, or build a diagram of it alone."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from pydrake.geometry import Meshcat
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder
+
+from wm_drake.model.bodies import add_bodies
+from wm_drake.model.frame_poses import FramePoses
+from wm_drake.model.machine import Machine, MachineSystems
+from wm_drake.model.placed_elements import placed_elements
+from wm_drake.model.state_layout import state_layout_of
+from wm_drake.model.tub_points import measured_points, tub_points
+from wm_drake.model.visualization import add_visualizer
+from wm_drake.model.wiring import Link, Wiring
+from wm_drake.parameters import MachineParameters
+from wm_drake.systems.drum_bearing import DrumBearing
+from wm_drake.systems.friction_damper import FrictionDamper
+from wm_drake.systems.sensors import Sensors
+from wm_drake.systems.six_component_bushing import SixComponentBushing
+from wm_drake.systems.speed_source import MotorTorque, SpeedSource
+from wm_drake.systems.spin_profile_source import SpinProfileSource
+from wm_drake.systems.spring_strut import SpringStrut
+from wm_drake.systems.telescopic_damper import TelescopicDamper
+from wm_drake.systems.tub_force import TubForce
+
+
+def add_washing_machine(
+    builder: DiagramBuilder, parameters: MachineParameters, *, name: str = ""
+) -> MachineSystems:
+    """Add a washing machine to a diagram.
+
+    Connect your own systems to the ports of the result, build the diagram, and call `set_up` with a
+    Context of it.
+
+    Args:
+        builder: Any DiagramBuilder.
+        parameters: The machine.
+        name: Prefix of the names of its systems, for several machines in one diagram.
+
+    Raises:
+        InputError: the SDF or the machine file has an error.
+    """
+    prefix = f"{name}_" if name else ""
+    plant = builder.AddNamedSystem(f"{prefix}bodies", MultibodyPlant(time_step=0.0))
+    add_bodies(plant, parameters)
+    layout = state_layout_of(plant, parameters)
+    poses = FramePoses(plant, parameters)
+    placed = placed_elements(plant, poses, parameters)
+    points = measured_points(parameters, tub_points(poses, parameters), np.zeros(6))
+    wiring = Wiring(builder, plant, layout, prefix)
+    springs = {key: SpringStrut(spring.packed()) for key, spring in placed.springs.items()}
+    dampers = {
+        key: FrictionDamper(damper.packed(), int(damper.has_sponge))
+        for key, damper in placed.dampers.items()
+    }
+    bushings = {key: SixComponentBushing(bush.packed()) for key, bush in placed.bushings.items()}
+    telescopes = {
+        key: TelescopicDamper(telescope.packed(), int(telescope.has_sponge))
+        for key, telescope in placed.telescopes.items()
+    }
+    bearing = DrumBearing(placed.bearing.packed()) if placed.bearing else None
+    on_tub, links = _labelled(springs, dampers, bushings, telescopes, bearing)
+    profile, source, torque = _add_drive(wiring, parameters)
+    tub_force, sensors = TubForce(), Sensors(points)
+    tub_state = wiring.tub_state()
+    wiring.connect_elements(tub_state, [*on_tub, ("tub_force", tub_force)], links)
+    builder.Connect(tub_state, wiring.add("sensors", sensors).GetInputPort("plant_state"))
+    inputs = {"drum_acceleration": source.GetInputPort("drum_acceleration")}
+    inputs["tub_force"] = tub_force.GetInputPort("tub_force")
+    outputs = {"state": plant.get_state_output_port()}
+    for port in ("displacement", "detergent_displacement", "drum_speed"):
+        outputs[port] = sensors.GetOutputPort(port)
+    outputs["motor_torque"] = torque.GetOutputPort("torque")
+    for label, system in [*on_tub, *((link.label, link.system) for link in links)]:
+        for port in _own_outputs(system):
+            outputs[f"{label}_{port}"] = system.GetOutputPort(port)
+    systems = springs, dampers, bushings, telescopes, bearing
+    return MachineSystems(
+        parameters, plant, layout, profile, source, sensors, *systems, inputs, outputs
+    )
+
+
+def build_machine(parameters: MachineParameters, *, meshcat: Meshcat | None = None) -> Machine:
+    """Build the diagram of a machine alone, with its named ports exported.
+
+    Build once and reuse: a Drake diagram with Python systems is never freed. Every number can be
+    changed afterwards in a Context (`Machine.set_up`).
+
+    Args:
+        parameters: The machine.
+        meshcat: Shows the moving machine if given; the shapes cannot touch the dynamics.
+
+    Raises:
+        InputError: the SDF or the machine file has an error.
+    """
+    builder = DiagramBuilder()
+    systems = add_washing_machine(builder, parameters)
+    if meshcat is not None:
+        add_visualizer(builder, parameters, systems.state_layout, systems.outputs["state"], meshcat)
+    for name, port in systems.inputs.items():
+        builder.ExportInput(port, name)
+    for name, port in systems.outputs.items():
+        builder.ExportOutput(port, name)
+    diagram = builder.Build()
+    diagram.set_name(parameters.name)
+    values = {key: value for key, value in vars(systems).items() if key != "_poses"}
+    return Machine(**values, diagram=diagram)
+
+
+def _labelled(
+    springs: Mapping[str, Any],
+    dampers: Mapping[str, Any],
+    bushings: Mapping[str, Any],
+    telescopes: Mapping[str, Any],
+    bearing: DrumBearing | None,
+) -> tuple[list[tuple[str, Any]], list[Link]]:
+    """Return the elements on the tub with their labels, and the links to other trees."""
+    on_tub = [(f"spring_{name}", system) for name, system in springs.items()]
+    on_tub += [(f"damper_{name}", system) for name, system in dampers.items()]
+    on_tub += [
+        ("gasket" if name == "gasket" else f"bushing_{name}", system)
+        for name, system in bushings.items()
+    ]
+    links = [
+        Link(f"damper_{name}", system, tree)
+        for tree, (name, system) in enumerate(telescopes.items(), start=1)
+    ]
+    if bearing:
+        links.append(Link("drum_bearing", bearing, 1 + len(telescopes)))
+    return on_tub, links
+
+
+def _add_drive(
+    wiring: Wiring, parameters: MachineParameters
+) -> tuple[SpinProfileSource, SpeedSource, MotorTorque]:
+    """Add spin profile, speed source and motor torque, and connect them to the plant."""
+    builder, plant = wiring.builder, wiring.plant
+    profile = wiring.add("spin_profile", SpinProfileSource(parameters.profile))
+    source = wiring.add("speed_source", SpeedSource())
+    size, drum = plant.num_velocities(), wiring.layout.drum
+    torque = wiring.add("motor_torque", MotorTorque(size, drum))
+    actuation = source.GetOutputPort("actuation")
+    builder.Connect(
+        profile.GetOutputPort("acceleration"), source.GetInputPort("profile_acceleration")
+    )
+    builder.Connect(actuation, plant.get_actuation_input_port())
+    builder.Connect(actuation, torque.GetInputPort("actuation"))
+    builder.Connect(
+        plant.get_generalized_acceleration_output_port(),
+        torque.GetInputPort("generalized_acceleration"),
+    )
+    return profile, source, torque
+
+
+def _own_outputs(system: Any) -> list[str]:
+    """Return the names of the element's own output ports."""
+    names = [system.get_output_port(i).get_name() for i in range(system.num_output_ports())]
+    return [name for name in names if name not in ("generalized_force", "state")]
