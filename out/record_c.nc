@@ -1,1 +1,0 @@
-spin record_c.nc
