@@ -148,11 +148,10 @@ def test_run_killed_while_moving_can_be_replaced(monkeypatch):
             raise KeyboardInterrupt
         return replace(path, target)
 
-    monkeypatch.setattr(Path, "replace", killed)
-    with pytest.raises(KeyboardInterrupt):
-        written(Run("spin", overwrite=True), "report.html", "record_b.nc")
-    monkeypatch.undo()
-    monkeypatch.chdir(OUT.resolve().parent)
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "replace", killed)
+        with pytest.raises(KeyboardInterrupt):
+            written(Run("spin", overwrite=True), "report.html", "record_b.nc")
     written(Run("spin", overwrite=True), "report.html", "record_c.nc")
     assert sorted(content()) == ["record_c.nc", "report.html"]
 
