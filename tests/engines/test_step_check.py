@@ -114,3 +114,14 @@ def test_unbalance_does_not_change_the_step():
     machine = build_machine(isotropic_machine())
     empty, loaded = machine.set_up(), machine.set_up(unbalance(1.0))
     assert fastest_motion(loaded).rate == pytest.approx(fastest_motion(empty).rate, rel=0.05)
+
+
+def test_a_machine_that_no_step_can_follow_is_refused_at_once(machine, reference):
+    parameters = with_value(reference, "damper_types.friction.sponge_stiffness", 1e15)
+    case = Case(
+        "stiff", reference.loads["middle"], constant_speed(20.0, 1.0), parameters=parameters
+    )
+    with pytest.raises(
+        InputError, match=r"too long for the sponge of damper .*; allowed are up to"
+    ):
+        simulate(machine, case)

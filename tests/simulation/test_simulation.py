@@ -239,8 +239,9 @@ def test_diverging_run_stops_keeps_its_record_and_reports_time_and_reason(machin
     assert np.max(np.abs(record.tub_position)) <= 0.5
 
 
-def test_run_that_ends_in_nan_reports_it(machine, reference, engine):
+def test_run_that_ends_in_nan_reports_it(machine, reference, engine, monkeypatch):
     # the sponge is so stiff that the second sample is NaN; Drake reports this itself
+    monkeypatch.setattr("wm_drake.simulation.runs.check_step", lambda setup, step: None)
     parameters = with_value(reference, "damper_types.friction.sponge_stiffness", 1e15)
     case = Case("stiff", reference.loads["middle"], FAST_RUN_UP, parameters=parameters)
     why = {"compiled": "roll = nan rad", "drake": "Detected NaN"}[engine]

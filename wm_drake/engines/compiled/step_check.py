@@ -42,6 +42,9 @@ TUB, BEARING = "the tub", "the drum in its bearing"
 DEFORMATION = 1e-4
 """Deformation of the sponges in these states. [m]"""
 
+MOST_PIECES = 10**6
+"""Number of steps in an output period from which on no decimal step is looked for."""
+
 DIFFERENCE = 1e-9
 """Half a step of the central differences: below the slowest speed, so that friction that jumps at
 zero counts as constant on either side. [m, rad, m/s, rad/s]"""
@@ -145,7 +148,8 @@ def _allowed(longest: float) -> str:
     """Return the longest step that divides the output period, in words."""
     pieces = int(np.ceil(OUTPUT_PERIOD / longest))
     text = f"{1e3 * OUTPUT_PERIOD / pieces:.4g} ms"
-    if 10**9 % pieces:  # this step has no finite decimal expansion: name one that has
+    if pieces < MOST_PIECES and 10**9 % pieces:
+        # this step has no finite decimal expansion: name one that has
         pieces = next(more for more in itertools.count(pieces) if 10**9 % more == 0)
         text += f", such as {1e3 * OUTPUT_PERIOD / pieces:g} ms"
     return text
