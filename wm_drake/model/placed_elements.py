@@ -19,6 +19,7 @@ from wm_drake.elements.friction_damper import FrictionDamperParameters, evaluate
 from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.elements.spring import SpringStrutParameters, evaluate_spring_strut
 from wm_drake.elements.telescopic_damper import (
+    FORCE_SIZE,
     TelescopicDamperParameters,
     evaluate_telescopic_damper,
 )
@@ -31,8 +32,8 @@ from wm_drake.parameters.types import FloatArray
 SHORTEST_STRUT = 1e-3
 """A spring or damper that is shorter than this as drawn has no defined direction. [m]"""
 
-LARGEST_OWN_SIZE = 13
-"""Upper bound of the own numbers that an element writes beside its generalized force."""
+LARGEST_OWN_SIZE = FORCE_SIZE
+"""Most own numbers that an element writes beside its generalized force: the telescopic damper's."""
 
 
 @dataclass(frozen=True)
