@@ -40,9 +40,10 @@ def calibration(machine, tmp_path_factory):
     slopes = np.zeros((18, 3))
     slopes[:2] = [[10.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     coordinates = (point - parameter_map.expected) / parameter_map.deviation
-    best = Solution(0, point, coordinates, computed, 20.0, 2.0, slopes, 123)
-    other = Solution(1, point, -coordinates, computed, 21.0, 2.0, slopes, 77)
-    bad = Solution(2, point, coordinates, 2.0 * computed, 2000.0, 2.0, slopes, 55)
+    none = np.empty(0)
+    best = Solution(0, point, coordinates, computed, none, 20.0, 2.0, slopes, 18, 123)
+    other = Solution(1, point, -coordinates, computed, none, 21.0, 2.0, slopes, 18, 77)
+    bad = Solution(2, point, coordinates, 2.0 * computed, none, 2000.0, 2.0, slopes, 18, 55)
     return Calibration(parameter_map, targets, Plan(starts=3), (best, other), (best, other, bad))
 
 

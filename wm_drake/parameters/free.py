@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from wm_drake.errors import nearest_names
 from wm_drake.parameters import units as u
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.files import read_model
@@ -119,22 +120,99 @@ class ExpectedPreload(Frozen):
 
     @model_validator(mode="after")
     def _force(self) -> "ExpectedPreload":
-        if u.dimension(self.prior.unit) != u.dimension("N"):
-            raise ValueError(
-                f"the prior is in {self.prior.unit or 'pure numbers'}; a preload needs a unit of "
-                "force such as N"
-            )
-        if not self.prior.values[1] > 0.0:
+        _check_force(self.prior, "a preload")
+        return self
+
+
+def _check_force(pair: Measured, what: str) -> None:
+    if u.dimension(pair.unit) != u.dimension("N"):
+        raise ValueError(
+            f"the numbers are in {pair.unit or 'pure numbers'}; {what} needs a unit of force such "
+            "as N"
+        )
+    if not pair.values[1] > 0.0:
+        raise ValueError("the standard deviation must be above 0")
+
+
+class Relation(Frozen):
+    """What physics says about one free quantity when others are given.
+
+    Example: a rubber ring of radius R, whose radial stiffness is K, has at most the torsional
+    stiffness 2 K R^2.
+
+    Attributes:
+        quantity: Name of the quantity.
+        to: Factors by name of other quantities. Their weighted sum is what the quantity is compared
+            with; it has the dimension of the quantity.
+        prior: Expected ratio of the quantity to the sum, and its standard deviation.
+        at_most: Largest ratio, and the standard deviation by which it may be exceeded.
+        source: Derivation.
+    """
+
+    quantity: Name
+    to: Annotated[dict[Name, Annotated[Measured, BeforeValidator(_measured)]], Field(min_length=1)]
+    prior: _Pair | None = None
+    at_most: _Pair | None = None
+    source: str
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> "Relation":
+        if (self.prior is None) == (self.at_most is None):
+            raise ValueError("needs either 'prior' or 'at_most'")
+        pair = self.prior or self.at_most
+        assert pair is not None
+        if u.dimension(pair.unit) != u.dimension(""):
+            raise ValueError(f"the ratio is in {pair.unit}; it is a pure number")
+        if not pair.values[1] > 0.0:
             raise ValueError("the standard deviation must be above 0")
         return self
 
 
+class LeastTension(Frozen):
+    """Smallest tension of a spring that hangs in hooks, over all runs with measured values.
+
+    Attributes:
+        at_least: The tension, and the standard deviation by which it may be missed.
+        source: Reason.
+    """
+
+    at_least: _Pair
+    source: str
+
+    @model_validator(mode="after")
+    def _force(self) -> "LeastTension":
+        _check_force(self.at_least, "a tension")
+        return self
+
+
 class FreeFile(Frozen):
-    """The free quantities of a calibration, by name, and the prior of the spring preloads."""
+    """The free quantities of a calibration, by name, and what is known of them together."""
 
     about: str = ""
     spring_preload: ExpectedPreload | None = None
+    spring_tension: LeastTension | None = None
+    relations: dict[Name, Relation] = Field(default_factory=dict)
     quantities: dict[Name, FreeQuantity] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _known_quantities(self) -> "FreeFile":
+        for name, relation in self.relations.items():
+            unit = self._unit(f"relations.{name}", relation.quantity)
+            for other, factor in relation.to.items():
+                product = u.dimension(self._unit(f"relations.{name}", other)) * u.dimension(
+                    factor.unit
+                )
+                if factor.is_list or product != u.dimension(unit):
+                    raise ValueError(
+                        f"relations.{name}: {other} times its factor has not the dimension of "
+                        f"{relation.quantity}"
+                    )
+        return self
+
+    def _unit(self, where: str, name: str) -> str:
+        if name not in self.quantities:
+            raise ValueError(f"{where}: no quantity '{name}'{nearest_names(name, self.quantities)}")
+        return self.quantities[name].unit
 
     def without_starts(self) -> "FreeFile":
         """Return a copy without start values, so that searches start at the expected values."""

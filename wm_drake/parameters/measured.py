@@ -1,37 +1,132 @@
-"""Measured amplitudes from the files that a machine file names."""
+"""Measured amplitudes and other responses, from the files that a machine file names."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from wm_drake.errors import input_error
-from wm_drake.parameters.csv_files import read_csv
+from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.units import comma_hint
 
 _KEYS = ["load", "gasket", "source"]
+
+OF = "of"
+"""Column that only files of responses have. It says what a value belongs to."""
+
+MACHINE, DESIGN = "machine", "design"
+"""Entries of the column `OF`: the machine itself, or the mean over a design of gasket factors."""
+
+_HEAD = re.compile(r"\s*(\w+)\s*\[([^\]]+)\]\s*")
+
+
+@dataclass(frozen=True)
+class NamedValue:
+    """A value of a response, as a file gives it.
+
+    Attributes:
+        load: Name of the load.
+        gasket: Whether the machine has its gasket.
+        source: Where the value comes from.
+        of: `MACHINE` or `DESIGN`.
+        name: Name of the response, such as ``Dx``.
+        value: The value, in `unit`.
+        unit: Unit in the head of the column.
+        where: The file, for messages.
+    """
+
+    load: str
+    gasket: bool
+    source: str
+    of: str
+    name: str
+    value: float
+    unit: str
+    where: str
 
 
 def measured_amplitudes(parameters: MachineParameters) -> pd.DataFrame:
     """Read the measured amplitudes of a machine.
 
     Returns:
-        All rows of the CSV files in `measured`: load, gasket (yes, no), source, then one column per
-        sensor. [mm]
+        All rows of the files of amplitudes in `measured`: load, gasket (yes, no), source, then one
+        column per sensor. [mm]
 
     Raises:
         InputError: a file is missing, has other columns, or contains a value that is not a number.
     """
     sensors = list(parameters.sensors)
-    tables = [_read(path, sensors) for path in parameters.measured]
+    tables = [_read(path, sensors) for path in parameters.measured if not _has_responses(path)]
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=_KEYS + sensors)
+
+
+def measured_responses(parameters: MachineParameters) -> list[NamedValue]:
+    """Read the responses that are not amplitudes of sensors, such as forces of the gasket.
+
+    Returns:
+        All values of the files of responses in `measured`. Such a file has the columns ``load``,
+        ``gasket`` (yes, no), ``source``, ``of`` (machine, design) and one for each response, with
+        its unit in the head: ``Fx [N]``.
+
+    Raises:
+        InputError: a file is missing, has another column, or contains a value that is not allowed.
+    """
+    paths = [path for path in parameters.measured if _has_responses(path)]
+    return [value for path in paths for value in _responses(path)]
+
+
+def _has_responses(path: str) -> bool:
+    return OF in read_header(Path(path))
+
+
+def _responses(path: str) -> list[NamedValue]:
+    head = read_header(Path(path))
+    columns = head[len(_KEYS) + 1 :]
+    named = [_HEAD.fullmatch(column) for column in columns]
+    table = read_csv(path, [*_KEYS, OF, *columns], key="measured")
+    if not columns or None in named:
+        wrong = [column for column, match in zip(columns, named, strict=True) if match is None]
+        raise input_error(
+            f"the head {', '.join(map(repr, wrong)) or 'of a response'} is not of the form "
+            "'NAME [unit]', such as 'Fx [N]'",
+            where=path,
+            key="measured",
+        )
+    _check_entries(table, "gasket", ("yes", "no"), path)
+    _check_entries(table, OF, (MACHINE, DESIGN), path)
+    numbers = finite_numbers(table[columns], path)
+    return [
+        NamedValue(
+            str(row["load"]),
+            row["gasket"] == "yes",
+            str(row["source"]),
+            str(row[OF]),
+            match[1],
+            float(number),
+            match[2],
+            path,
+        )
+        for row, values in zip(table.to_dict("records"), numbers, strict=True)
+        for match, number in zip(named, values, strict=True)
+        if match is not None
+    ]
+
+
+def _check_entries(table: pd.DataFrame, column: str, allowed: tuple[str, str], path: str) -> None:
+    if not set(table[column]) <= set(allowed):
+        raise input_error(
+            f"a value in the column {column} is neither {allowed[0]} nor {allowed[1]}",
+            where=path,
+            key="measured",
+        )
 
 
 def _read(path: str, sensors: list[str]) -> pd.DataFrame:
     table = read_csv(path, _KEYS + sensors, key="measured")
-    if not set(table["gasket"]) <= {"yes", "no"}:
-        raise input_error(
-            "a value in the column gasket is neither yes nor no", where=path, key="measured"
-        )
+    _check_entries(table, "gasket", ("yes", "no"), path)
     values = table[sensors].apply(pd.to_numeric, errors="coerce")
     if not np.isfinite(values.to_numpy(dtype=float)).all():
         cells = table[sensors].to_numpy()[~np.isfinite(values.to_numpy(dtype=float))]

@@ -1,5 +1,6 @@
 """Calibration of a machine: parameter map, targets, recovery of a known machine, interruption."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,16 +13,12 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile, load_machine
 from wm_drake.parameters.free import Measured, load_free
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
+from wm_drake.studies.calibration.computed import Evaluation
 from wm_drake.studies.calibration.outcome import amplitude_rows, quantity_table, solved_machine
 from wm_drake.studies.calibration.parameter_map import parameter_map_of
 from wm_drake.studies.calibration.prediction import check_held_out, predict
 from wm_drake.studies.calibration.solutions import Solution, distinct
-from wm_drake.studies.calibration.targets import (
-    Targets,
-    amplitudes_at,
-    preload_residuals,
-    targets_of,
-)
+from wm_drake.studies.calibration.targets import Targets, targets_of
 
 FREE = """
 quantities:
@@ -83,8 +80,10 @@ def planted(
     machine, parameter_map, point, loads=(("middle", True), ("counter", True), ("counter", False))
 ):
     """Return the amplitudes of the machine at a point as targets."""
-    amplitude = amplitudes_at(machine, parameter_map, loads, np.array([point]))[0, 0]
-    return Targets(loads, tuple(machine.parameters.sensors), amplitude, np.ones(amplitude.shape))
+    shape = len(loads), len(machine.parameters.sensors)
+    empty = Targets(loads, tuple(machine.parameters.sensors), np.ones(shape), np.ones(shape))
+    amplitude = Evaluation(machine, parameter_map, empty)(np.array([point])).amplitude[0]
+    return replace(empty, amplitude=amplitude)
 
 
 def test_values_depend_linearly_on_the_quantities(short, tmp_path):
@@ -143,7 +142,7 @@ FAULTS = {
     "nothing free": ("quantities: {}\n", "quantities"),
     "preload that is no force": (
         PRELOAD.replace(") N", ") kg") + FREE,
-        "the prior is in kg; a preload needs a unit of force",
+        "the numbers are in kg; a preload needs a unit of force",
     ),
 }
 
@@ -230,10 +229,11 @@ def test_point_without_a_machine_is_nan_and_does_not_change_others(short, tmp_pa
     ).replace("(4, 6)", "(-6, 6)")
     parameter_map = parameter_map_of(short, free_file(tmp_path, text))
     points = np.array([[30.0, 0.0, 5.0], [30.0, 0.0, -5.0], [30.0, 0.0, 5.0]])
-    values = amplitudes_at(short, parameter_map, (("middle", True),), points)
-    assert np.isnan(values[:, 1]).all()
-    assert np.array_equal(values[:, 0], values[:, 2])
-    assert np.isfinite(values[:, 0]).all()
+    values = Evaluation(short, parameter_map, one_case(short))(points)
+    for array in (values.amplitude, values.power_mean, values.preload):
+        assert np.isnan(array[1]).all()
+        assert np.array_equal(array[0], array[2])
+        assert np.isfinite(array[0]).all()
 
 
 def test_preload_residuals_compare_with_the_prior(short, tmp_path):
@@ -243,15 +243,22 @@ def test_preload_residuals_compare_with_the_prior(short, tmp_path):
     )  # the second has a motor that no spring holds
     springs = short.set_up(parameters=parameter_map.parameters_at(points[0])).springs.values()
     expected = [(spring.preload - 100.0) / 20.0 for spring in springs]
-    residuals = preload_residuals(short, parameter_map, points)
+    residuals = known_residuals(short, parameter_map, points)
     assert residuals[0] == pytest.approx(expected)
     assert np.isnan(residuals[1]).all()
-    assert preload_residuals(
-        short, parameter_map_of(short, free_file(tmp_path, FREE)), points
-    ).shape == (
-        2,
-        0,
-    )
+    without = parameter_map_of(short, free_file(tmp_path, FREE))
+    assert known_residuals(short, without, points).shape == (2, 0)
+
+
+def one_case(machine):
+    sensors = tuple(machine.parameters.sensors)
+    ones = np.ones((1, len(sensors)))
+    return Targets((("middle", True),), sensors, 0.01 * ones, ones)
+
+
+def known_residuals(machine, parameter_map, points):
+    preload = Evaluation(machine, parameter_map, one_case(machine))(points).preload
+    return parameter_map.prior_residuals(points, preload)
 
 
 def test_expected_preload_is_prior_not_data(short, tmp_path):
@@ -261,7 +268,8 @@ def test_expected_preload_is_prior_not_data(short, tmp_path):
         (found,) = calibrate(short, free, targets, Plan(starts=1, iterations=1), ledger).ended
     assert found.slopes.shape == (6, 3)
     parameter_map = parameter_map_of(short, free)
-    rows = preload_residuals(short, parameter_map, found.point[None])[0]
+    rows = known_residuals(short, parameter_map, found.point[None])[0]
+    assert found.all_slopes.shape == (6 + 3, 3)
     assert found.prior_cost == pytest.approx(0.5 * (np.sum(rows**2) + np.sum(found.coordinates**2)))
 
 
@@ -351,7 +359,7 @@ def test_finished_calibration_is_read_back_without_a_run(recovered, short, monke
     def no_run(*_, **__):
         raise AssertionError("ran again")
 
-    monkeypatch.setattr("wm_drake.studies.calibration.calibration.amplitudes_at", no_run)
+    monkeypatch.setattr("wm_drake.studies.calibration.computed.simulate_many", no_run)
     with open_ledger(folder / "ledger.sqlite", identity_of(short, free, targets, plan)) as ledger:
         again = calibrate(short, free, targets, plan, ledger)
     assert quantity_table(again).equals(quantity_table(calibration))
@@ -415,9 +423,11 @@ def solution(coordinates, amplitude, slopes, cost=1.0):
         np.array(coordinates),
         np.array(coordinates),
         np.array([amplitude]),
+        np.empty(0),
         cost,
         0.0,
         np.array(slopes),
+        len(slopes),
         1,
     )
 

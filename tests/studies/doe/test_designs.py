@@ -122,6 +122,21 @@ def test_efficiency_by_oapackage(d_optimal, model, columns):
         assert efficiency(levels, model) == pytest.approx(expected, abs=1e-8)
 
 
+@pytest.mark.parametrize("factors", [4, 8])
+def test_array_of_27_trials_has_the_mean_of_the_full_factorial_for_interactions_of_two(factors):
+    rng = np.random.default_rng(3)
+    linear, pairs = rng.normal(size=factors), rng.normal(size=(factors, factors))
+
+    def mean(levels):
+        x = levels.astype(float)
+        return np.mean(x @ linear + np.einsum("ij,ni,nj->n", pairs, x, x), axis=0)
+
+    small, full = orthogonal_levels(factors, 27), level_matrix(factors)
+    assert len(small) == 27
+    assert oapackage_array(small).strength() == strength(small) == 2
+    assert mean(small) == pytest.approx(mean(full), abs=1e-12)
+
+
 def test_strength_of_an_unbalanced_array_is_less():
     levels = orthogonal_levels(6, 243).copy()
     levels[0, 0] = (levels[0, 0] + 2) % 3 - 1
@@ -177,7 +192,10 @@ FAULTS = {
     ),
     "too many": ({"kind": "d-optimal", "trials": 6562}, "6561 different trials"),
     "full of another size": ({"kind": "full", "trials": 1000}, "has 6561 trials, not 1000"),
-    "no such array": ({"kind": "orthogonal", "trials": 1000}, "orthogonal designs have 243 or 729"),
+    "no such array": (
+        {"kind": "orthogonal", "trials": 1000},
+        "orthogonal designs have 27, 243 or 729",
+    ),
 }
 
 

@@ -5,16 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wm_drake.batch.ledger import Ledger, Result, key_of
+from wm_drake.batch.ledger import Ledger, key_of
 from wm_drake.batch.remembered import model_version, sources_version
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.calibration.computed import Evaluation, StoredValues
 from wm_drake.studies.calibration.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibration.search import METHODS, SearchProblem
 from wm_drake.studies.calibration.solutions import Solution, distinct
-from wm_drake.studies.calibration.targets import Targets, amplitudes_at, preload_residuals
+from wm_drake.studies.calibration.targets import Targets
 
 RELATIVE_DEVIATION = 0.05
 """Relative standard deviation of a measured amplitude from the computed one.
@@ -111,9 +112,7 @@ def identity_of(machine: Machine, free: FreeFile, targets: Targets, plan: Plan) 
             model=model_version(machine.parameters),
         )[:8],
         "free": key_of(free=free)[:8],
-        "targets": key_of(loads=targets.loads, amplitude=targets.amplitude, weight=targets.weight)[
-            :8
-        ],
+        "targets": key_of(targets=targets)[:8],
         "plan": key_of(plan=plan)[:8],
         "sources": sources_version(),
     }
@@ -150,9 +149,9 @@ def calibrate(
     """
     plan.check()
     parameter_map = parameter_map_of(machine, free)
-    amplitudes = _StoredAmplitudes(machine, parameter_map, targets, ledger, workers)
+    values = StoredValues(Evaluation(machine, parameter_map, targets, workers), ledger)
     ended = [
-        _search(number, parameter_map, targets, plan, amplitudes, report)
+        _search(number, parameter_map, targets, plan, values, report)
         for number in range(plan.starts)
     ]
     return Calibration(parameter_map, targets, plan, tuple(distinct(ended, targets)), tuple(ended))
@@ -163,21 +162,20 @@ def _search(
     parameter_map: ParameterMap,
     targets: Targets,
     plan: Plan,
-    amplitudes: "_StoredAmplitudes",
+    values: StoredValues,
     report: Callable[[int, int, float], None],
 ) -> Solution:
-    scale = np.sqrt(targets.weight) / plan.spread(targets.amplitude)
+    spread = plan.spread(targets.amplitude)
 
     def residuals(coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
-        computed = amplitudes(parameter_map.expected + coordinates * parameter_map.deviation)
-        logarithms = np.log(computed / targets.amplitude) * scale
-        exact, smooth = logarithms[..., targets.weight > 0.0]
-        preloads = preload_residuals(
-            amplitudes.machine,
-            parameter_map,
-            parameter_map.expected + coordinates * parameter_map.deviation,
+        points = parameter_map.expected + coordinates * parameter_map.deviation
+        found = values(points)
+        known = parameter_map.prior_residuals(points, found.preload)
+        exact, smooth = (
+            targets.residuals(amplitude, found.responses, spread)
+            for amplitude in (found.amplitude, found.power_mean)
         )
-        return np.hstack([exact, preloads]), np.hstack([smooth, preloads])
+        return np.hstack([exact, known]), np.hstack([smooth, known])
 
     lower, upper = (
         (bound - parameter_map.expected) / parameter_map.deviation
@@ -192,67 +190,22 @@ def _search(
         problem, problem.start(number, plan.seed), iterations, plan.seed + number
     )
     point = parameter_map.expected + found.point * parameter_map.deviation
-    # the residuals after these are those of the preloads, which belong to the prior
-    measured = np.count_nonzero(targets.weight)
+    # the residuals after those of the data belong to the prior
     squares = residuals(found.point[None])[0][0] ** 2
     data, prior = (
-        0.5 * float(np.sum(squares[:measured])),
-        0.5 * float(np.sum(squares[measured:]) + np.sum(found.point**2)),
+        0.5 * float(np.sum(squares[: targets.count])),
+        0.5 * float(np.sum(squares[targets.count :]) + np.sum(found.point**2)),
     )
-    slopes = problem.jacobian(found.point)[:measured]
+    computed = values(point[None])
     return Solution(
         number,
         point,
         found.point,
-        amplitudes(point[None])[0, 0],
+        computed.amplitude[0],
+        computed.responses[0],
         data,
         prior,
-        slopes,
+        problem.jacobian(found.point),
+        targets.count,
         problem.evaluations,
     )
-
-
-_KINDS = ("amplitude", "power_mean")
-
-
-class _StoredAmplitudes:
-    """Function that returns the amplitudes at points and stores them in the ledger.
-
-    Amplitudes that are in the ledger already are not computed again.
-    """
-
-    def __init__(
-        self,
-        machine: Machine,
-        parameter_map: ParameterMap,
-        targets: Targets,
-        ledger: Ledger,
-        workers: int | None,
-    ) -> None:
-        self.machine, self.parameter_map, self.targets, self.ledger, self.workers = (
-            machine,
-            parameter_map,
-            targets,
-            ledger,
-            workers,
-        )
-
-    def __call__(self, points: FloatArray) -> FloatArray:
-        """Return amplitudes and power means (2, points, case, sensor) at points. [m]"""
-        keys = [key_of(point=point) for point in points]
-        new = [index for index, key in enumerate(keys) if key not in self.ledger]
-        if new:
-            values = amplitudes_at(
-                self.machine,
-                self.parameter_map,
-                self.targets.loads,
-                points[new],
-                workers=self.workers,
-            )
-            results = {
-                keys[i]: Result(dict(zip(_KINDS, values[:, row], strict=True)))
-                for row, i in enumerate(new)
-            }
-            self.ledger.put_all(results)
-        found = [self.ledger.get(key).values for key in keys]
-        return np.array([[values[kind] for values in found] for kind in _KINDS])

@@ -1,6 +1,6 @@
 """The linear map from free quantities to the values of a machine."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,6 +39,35 @@ class Value:
 
 
 @dataclass(frozen=True)
+class KnownRatio:
+    """What is known of the ratio of one free quantity to a weighted sum of others.
+
+    Attributes:
+        name: Name of the relation.
+        quantity: Index of the quantity.
+        factors: (quantities) weights of the sum.
+        ratio, deviation: Expected or largest ratio, and its standard deviation.
+        is_limit: Whether `ratio` is the largest one. Then smaller ratios are as good.
+    """
+
+    name: str
+    quantity: int
+    factors: FloatArray
+    ratio: float
+    deviation: float
+    is_limit: bool
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the ratio (point) at points (point, quantity)."""
+        return np.asarray(points[:, self.quantity] / (points @ self.factors))
+
+    def residuals(self, points: FloatArray) -> FloatArray:
+        """Return (ratio - expected) / deviation (point); 0 where a largest ratio is not reached."""
+        residual = (self.at(points) - self.ratio) / self.deviation
+        return np.maximum(residual, 0.0) if self.is_limit else residual
+
+
+@dataclass(frozen=True)
 class ParameterMap:
     """The free quantities of a machine and the values that depend on them.
 
@@ -53,6 +82,7 @@ class ParameterMap:
         values: Values of the machine that depend on the quantities.
         preload: Expected preload of each spring and its standard deviation; None without a prior.
             [N]
+        relations: What is known of ratios of quantities.
     """
 
     base: MachineParameters
@@ -65,7 +95,24 @@ class ParameterMap:
     start: FloatArray
     values: tuple[Value, ...]
     preload: tuple[float, float] | None
+    relations: tuple[KnownRatio, ...]
     _tree: dict[str, Any]
+
+    def prior_residuals(self, points: FloatArray, preload: FloatArray) -> FloatArray:
+        """Return the residuals of what is known beside the priors of the quantities.
+
+        Args:
+            points: (point, quantity) in SI units.
+            preload: (point, spring) preloads. [N]
+
+        Returns:
+            (point, n) in standard deviations: preloads, then relations.
+        """
+        parts = [relation.residuals(points)[:, None] for relation in self.relations]
+        if self.preload is not None:
+            expected, deviation = self.preload
+            parts.insert(0, (preload - expected) / deviation)
+        return np.hstack([np.empty((len(points), 0)), *parts])
 
     def parameters_at(self, point: FloatArray) -> MachineParameters:
         """Return the machine at a point.
@@ -118,8 +165,35 @@ def parameter_map_of(machine: Machine, free: FreeFile) -> ParameterMap:
     if free.spring_preload is not None:
         preload = (free.spring_preload.prior.values[0], free.spring_preload.prior.values[1])
     return ParameterMap(
-        base, names, units, lower, upper, expected, deviation, start, tuple(values), preload, tree
+        base,
+        names,
+        units,
+        lower,
+        upper,
+        expected,
+        deviation,
+        start,
+        tuple(values),
+        preload,
+        tuple(_known_ratios(free)),
+        tree,
     )
+
+
+def _known_ratios(free: FreeFile) -> Iterator[KnownRatio]:
+    names = list(free.quantities)
+    for name, relation in free.relations.items():
+        pair = relation.at_most or relation.prior
+        assert pair is not None  # the file was checked
+        factors = np.array([relation.to[n].values[0] if n in relation.to else 0.0 for n in names])
+        yield KnownRatio(
+            name,
+            names.index(relation.quantity),
+            factors,
+            pair.values[0],
+            pair.values[1],
+            relation.at_most is not None,
+        )
 
 
 def _value(

@@ -32,8 +32,11 @@ class Solution:
         point: (n) values of the free quantities, in SI units.
         coordinates: (n) point in units of the prior: (quantity - expected) / deviation.
         amplitude: (case, sensor) computed amplitudes. [m]
+        responses: (response) other computed responses. [unit for reading]
         data_cost, prior_cost: Half the sums of squares of data and prior.
-        slopes: (m, n) derivatives of the data's residuals with respect to the coordinates.
+        all_slopes: (m + k, n) derivatives of the residuals with respect to the coordinates: of the
+            data, then of what is known beside the priors.
+        data_count: Number m of residuals of the data.
         evaluations: Number of points that the search evaluated.
     """
 
@@ -41,15 +44,27 @@ class Solution:
     point: FloatArray
     coordinates: FloatArray
     amplitude: FloatArray
+    responses: FloatArray
     data_cost: float
     prior_cost: float
-    slopes: FloatArray
+    all_slopes: FloatArray
+    data_count: int
     evaluations: int
 
     @property
     def cost(self) -> float:
         """Cost that the search minimizes: the sum of data cost and prior cost."""
         return self.data_cost + self.prior_cost
+
+    @property
+    def slopes(self) -> FloatArray:
+        """Derivatives (m, n) of the data's residuals with respect to the coordinates."""
+        return self.all_slopes[: self.data_count]
+
+    def response_errors(self, targets: Targets) -> FloatArray:
+        """Return (computed - wanted) / wanted (response); NaN where the weight is 0."""
+        wanted = np.array([target.value for target in targets.responses])
+        return np.where(targets.response_weight > 0.0, self.responses / wanted - 1.0, np.nan)
 
     def errors(self, targets: Targets) -> FloatArray:
         """Return (computed - measured) / measured (case, sensor); NaN where the weight is 0."""
@@ -61,8 +76,15 @@ class Solution:
         It is 1 if the data contain no information about the quantity. The posterior is approximated
         by a normal distribution around the point, with the logarithms of the amplitudes linearized.
         """
-        information = self.slopes.T @ self.slopes + np.eye(len(self.coordinates))
-        return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
+        return np.asarray(np.sqrt(np.diag(self.covariance())))
+
+    def covariance(self) -> FloatArray:
+        """Return the covariance (n, n) of the coordinates given the data (Laplace approximation).
+
+        The residuals are linearized around the point.
+        """
+        information = self.all_slopes.T @ self.all_slopes + np.eye(len(self.coordinates))
+        return np.asarray(np.linalg.inv(information))
 
     def directions(self) -> FloatArray:
         """Return the singular values of the slopes, in falling order.

@@ -3,8 +3,10 @@
 H is the parity-check matrix of a linear code over the field of three elements. With two of its rows
 729 of the 3^8 trials remain, in which any five factors have all their level combinations equally
 often (strength 5). With three rows 243 trials of strength 4 remain. Both arrays determine main
-effects and two-factor interactions as well as the full factorial does. For fewer factors, columns
-are removed, which does not reduce the strength.
+effects and two-factor interactions as well as the full factorial does. With all five rows 27 trials
+of strength 2 remain, which are enough for a mean: main effects and interactions of two factors
+cancel in it as in the full factorial. For fewer factors, columns are removed, which does not reduce
+the strength.
 """
 
 import itertools
@@ -14,10 +16,22 @@ import numpy as np
 from wm_drake.errors import input_error
 from wm_drake.studies.doe.coding import Levels, level_matrix
 
-CHECKS = np.array([[1, 1, 1, 1, 1, 1, 0, 0], [2, 1, 0, 2, 1, 0, 1, 2], [1, 1, 0, 2, 0, 2, 2, 0]])
-"""Parity-check matrix H for eight factors: the first two rows for 729 trials, all for 243."""
+CHECKS = np.array(
+    [
+        [1, 1, 1, 1, 1, 1, 0, 0],
+        [2, 1, 0, 2, 1, 0, 1, 2],
+        [1, 1, 0, 2, 0, 2, 2, 0],
+        [2, 2, 0, 2, 0, 0, 0, 1],
+        [0, 1, 0, 2, 1, 2, 2, 2],
+    ]
+)
+"""Parity-check matrix H for eight factors: two rows for 729 trials, three for 243, all for 27.
 
-_ROWS = {729: 2, 243: 3}
+The last two rows were searched for the fewest sets of three factors (8 of 56) whose combinations
+are not all equally frequent among the 27 trials.
+"""
+
+_ROWS = {729: 2, 243: 3, 27: 5}
 
 
 def orthogonal_levels(factors: int, trials: int) -> Levels:
@@ -27,15 +41,14 @@ def orthogonal_levels(factors: int, trials: int) -> Levels:
 
     Args:
         factors: Number of factors, at most eight.
-        trials: Number of trials, 243 or 729.
+        trials: Number of trials, 27, 243 or 729.
 
     Raises:
         InputError: there is no such array.
     """
     if trials not in _ROWS:
         raise input_error(
-            f"{trials} trials are not possible; orthogonal designs have "
-            f"{' or '.join(map(str, sorted(_ROWS)))}"
+            f"{trials} trials are not possible; orthogonal designs have 27, 243 or 729"
         )
     if factors > CHECKS.shape[1]:
         raise input_error(

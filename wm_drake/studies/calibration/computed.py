@@ -1,0 +1,132 @@
+"""Computed values at points: amplitudes, other responses, and what is known of the springs."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wm_drake.batch import simulate_many
+from wm_drake.batch.ledger import Ledger, Result, key_of
+from wm_drake.errors import InputError
+from wm_drake.model.machine import Machine, Setup
+from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.cases import Case
+from wm_drake.studies.calibration.parameter_map import ParameterMap
+from wm_drake.studies.calibration.response_targets import ComputedResponses
+from wm_drake.studies.calibration.targets import Targets
+
+_KINDS = ("amplitude", "power_mean", "responses", "preload")
+
+
+@dataclass(frozen=True)
+class Computed:
+    """Computed values at points. They are NaN if no machine exists at a point or a run diverged.
+
+    Attributes:
+        amplitude: (point, case, sensor) amplitudes. [m]
+        power_mean: (point, case, sensor) smooth substitutes of the amplitudes
+            (`wm_drake.simulation.measures.power_means`). [m]
+        responses: (point, response) other responses. [unit for reading]
+        preload: (point, spring) preloads. [N]
+    """
+
+    amplitude: FloatArray
+    power_mean: FloatArray
+    responses: FloatArray
+    preload: FloatArray
+
+
+@dataclass
+class Evaluation:
+    """Function that computes values at points.
+
+    Attributes:
+        machine: A built machine.
+        parameter_map: Map from points to machines.
+        targets: Targets; they say which cases are run.
+        workers: Number of threads; None for the number of cores.
+    """
+
+    machine: Machine
+    parameter_map: ParameterMap
+    targets: Targets
+    workers: int | None = None
+    _responses: ComputedResponses = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Build what the other responses need."""
+        self._responses = ComputedResponses(self.machine, self.targets.responses, self.workers)
+
+    def __call__(self, points: FloatArray) -> Computed:
+        """Return the values at points (point, quantity), in SI units."""
+        preloads = {
+            index: ([spring.preload for spring in setup.springs.values()], setup.parameters)
+            for index, setup in self._set_up(points)
+        }
+        places, result = list(preloads), self._nothing(len(points))
+        if not places:
+            return result
+        machines = [parameters for _, parameters in preloads.values()]
+        loads = self.targets.loads
+        cases = (
+            Case(name, parameters.loads[name], parameters.profile, gasket, parameters=parameters)
+            for parameters in machines
+            for name, gasket in loads
+        )
+        table = simulate_many(
+            self.machine, cases, measures=("amplitudes", "power means"), workers=self.workers
+        )
+        ended = (table.diverged == "").values[:, None]
+        for array, values in (
+            (result.amplitude, table.amplitude.values),
+            (result.power_mean, table.power_mean.values),
+        ):
+            array[places] = np.where(ended, values, np.nan).reshape(-1, *array.shape[1:])
+        result.responses[places] = self._responses(machines)
+        result.preload[places] = [preload for preload, _ in preloads.values()]
+        return result
+
+    def _nothing(self, points: int) -> Computed:
+        amplitude = (points, *self.targets.amplitude.shape)
+        others = (points, len(self.targets.responses)), (points, len(self.machine.springs))
+        return Computed(*(np.full(shape, np.nan) for shape in (amplitude, amplitude, *others)))
+
+    def _set_up(self, points: FloatArray) -> Iterator[tuple[int, Setup]]:
+        """Yield the index of each point and the machine set up there, always in the same Context.
+
+        Points with values that are not allowed or without static equilibrium are omitted.
+        """
+        context = None
+        for index, point in enumerate(points):
+            try:
+                parameters = self.parameter_map.parameters_at(point)
+                setup = self.machine.set_up(parameters=parameters, context=context)
+            except InputError:
+                continue
+            context = setup.context
+            yield index, setup
+
+
+@dataclass(frozen=True)
+class StoredValues:
+    """Evaluation that stores its values in a ledger.
+
+    Values that are in the ledger already are not computed again.
+    """
+
+    evaluation: Evaluation
+    ledger: Ledger
+
+    def __call__(self, points: FloatArray) -> Computed:
+        """Return the values at points (point, quantity), in SI units."""
+        keys = [key_of(point=point) for point in points]
+        new = [index for index, key in enumerate(keys) if key not in self.ledger]
+        if new:
+            found = self.evaluation(points[new])
+            results = {
+                keys[i]: Result({kind: getattr(found, kind)[row] for kind in _KINDS})
+                for row, i in enumerate(new)
+            }
+            self.ledger.put_all(results)
+        stored = [self.ledger.get(key).values for key in keys]
+        return Computed(*(np.array([values[kind] for values in stored]) for kind in _KINDS))

@@ -1,0 +1,271 @@
+"""Targets of a calibration that are no amplitudes of sensors, such as the forces of the gasket."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from wm_drake.batch import simulate_many
+from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import FactorLevels, MachineParameters, at_levels, levels_of, load_factors
+from wm_drake.parameters.factors import GASKET_FACTORS
+from wm_drake.parameters.measured import DESIGN, NamedValue
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import dimension, from_base, to_base
+from wm_drake.simulation.cases import Case
+from wm_drake.studies.doe.coding import Levels
+from wm_drake.studies.doe.orthogonal import orthogonal_levels
+from wm_drake.studies.gasket.responses import Response, known_responses
+
+TRIALS = 27
+"""Trials of the orthogonal array that stands for the design of a mean.
+
+In it each level of a factor occurs equally often together with each level of another factor. Its
+mean is therefore that of the full factorial up to interactions of three factors.
+"""
+
+DEVIATION = 0.10
+"""Default relative standard deviation of a response that is not an amplitude.
+
+It is twice that of an amplitude: the published forces are those of another model ([B]'s own, whose
+amplitudes miss the experiment by 7.8 % in the mean).
+"""
+
+
+@dataclass(frozen=True)
+class ResponseTarget:
+    """A value that a response of the machine should have.
+
+    Attributes:
+        load: Name of the load.
+        gasket: Whether the machine has its gasket.
+        of_design: Whether the value is the mean over a design of gasket factors. Otherwise it
+            belongs to the machine itself.
+        response: The response.
+        value: The value. [unit for reading of the response]
+        weight: Weight of its squared log ratio; 0 if it is not used.
+        deviation: Relative standard deviation.
+    """
+
+    load: str
+    gasket: bool
+    of_design: bool
+    response: Response
+    value: float
+    weight: float = 1.0
+    deviation: float = DEVIATION
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names under which weights and deviations are given, from one target to many."""
+        return (
+            f"{self.load}:{self.response.name}",
+            self.response.name,
+            self.response.group,
+            self.response.meaning.kind,
+            self.load,
+        )
+
+    def spread(self) -> float:
+        """Return the standard deviation of the logarithm, divided by the root of the weight."""
+        return self.deviation / np.sqrt(self.weight)
+
+
+def response_targets_of(
+    parameters: MachineParameters, values: Iterable[NamedValue]
+) -> tuple[ResponseTarget, ...]:
+    """Return the targets for values from files.
+
+    Args:
+        parameters: The machine.
+        values: Named values from `wm_drake.parameters.measured_responses`.
+
+    Raises:
+        InputError: the machine does not have a load or a response, a unit does not fit, a value is
+            not above 0, or a target occurs twice.
+    """
+    known = {r.name: r for r in known_responses(parameters, parameters.profile)}
+    problems: list[Problem] = []
+    found: dict[tuple[object, ...], ResponseTarget] = {}
+    for value in values:
+        message = _problem(parameters, known, value)
+        key = (value.load, value.gasket, value.of, value.name)
+        if not message and key in found:
+            message = f"'{value.name}' of load '{value.load}' occurs twice"
+        if message:
+            problems.append(Problem(value.where, "measured", message))
+            continue
+        response = known[value.name]
+        number = from_base(to_base(value.value, value.unit), response.unit.shown)
+        found[key] = ResponseTarget(value.load, value.gasket, value.of == DESIGN, response, number)
+    if problems:
+        raise InputError(problems)
+    return tuple(found.values())
+
+
+def _problem(
+    parameters: MachineParameters, known: Mapping[str, Response], value: NamedValue
+) -> str:
+    """Return what is wrong with a value; "" if nothing is."""
+    if value.load not in parameters.loads:
+        return f"no load '{value.load}' in the machine{nearest_names(value.load, parameters.loads)}"
+    if value.name not in known:
+        return f"no response '{value.name}'{nearest_names(value.name, known)}"
+    shown = known[value.name].unit.shown
+    try:
+        fits = dimension(value.unit) == dimension(shown)
+    except ValueError as error:
+        return f"column '{value.name}': {error}"
+    if not fits:
+        return f"column '{value.name}' is in {value.unit}; it needs a unit such as {shown}"
+    if not value.value > 0.0:
+        return (
+            f"{value.name} of load '{value.load}' is {value.value:g}; it must be above 0, so that "
+            "the logarithm of its ratio to the computed one exists"
+        )
+    if parameters.gasket is None and (value.gasket or value.of == DESIGN):
+        return f"load '{value.load}' is with gasket, and the machine has none"
+    if value.of == DESIGN and not value.gasket:
+        return f"load '{value.load}': a mean over the gasket's design needs the gasket"
+    return ""
+
+
+def with_weights(
+    targets: Sequence[ResponseTarget], weights: Mapping[str, float]
+) -> tuple[tuple[ResponseTarget, ...], set[str]]:
+    """Return targets with weights multiplied by factors, and the names that fitted one.
+
+    Args:
+        targets: The targets.
+        weights: Factors by name, one of `ResponseTarget.names`.
+    """
+    used: set[str] = set()
+    result = []
+    for target in targets:
+        names = [name for name in target.names if name in weights]
+        used.update(names)
+        factor = float(np.prod([weights[name] for name in names]))
+        result.append(replace(target, weight=target.weight * factor))
+    return tuple(result), used
+
+
+def with_deviations(
+    targets: Sequence[ResponseTarget], deviations: Mapping[str, float]
+) -> tuple[ResponseTarget, ...]:
+    """Return targets with other relative standard deviations.
+
+    Args:
+        targets: The targets.
+        deviations: Relative deviations by name, one of `ResponseTarget.names`. Where several names
+            fit, the one that fits the fewest targets counts.
+
+    Raises:
+        InputError: a name fits no target.
+    """
+    known = {name for target in targets for name in target.names}
+    for name in deviations:
+        if name not in known:
+            raise input_error(
+                f"'{name}' is no response of the targets{nearest_names(name, sorted(known))}",
+                key="deviation",
+            )
+    return tuple(
+        replace(
+            target,
+            deviation=next(
+                (deviations[name] for name in target.names if name in deviations),
+                target.deviation,
+            ),
+        )
+        for target in targets
+    )
+
+
+@dataclass
+class ComputedResponses:
+    """Function that computes the responses of machines for targets.
+
+    Attributes:
+        machine: The built machine.
+        targets: The targets; they say which cases are run.
+        workers: Number of threads; None for the number of cores.
+    """
+
+    machine: Machine
+    targets: tuple[ResponseTarget, ...]
+    workers: int | None = None
+    _design: "_Design | None" = field(init=False, default=None)
+
+    def __post_init__(self) -> None:
+        """Build the machine of the design's trials, if a target is a mean over the design."""
+        if any(target.of_design for target in self.targets):
+            self._design = _Design.of(self.machine.parameters)
+
+    def __call__(self, machines: Sequence[MachineParameters]) -> FloatArray:
+        """Return the responses (machine, target) of machines. [unit for reading]
+
+        They are NaN where a run diverged.
+        """
+        result = np.full((len(machines), len(self.targets)), np.nan)
+        if self._design is not None:
+            self._fill(result, machines, self._design)
+        if not all(target.of_design for target in self.targets):
+            self._fill(result, machines, _Itself(self.machine))
+        return result
+
+    def _fill(
+        self, result: FloatArray, machines: Sequence[MachineParameters], way: "_Itself | _Design"
+    ) -> None:
+        """Write the responses that are evaluated in one way."""
+        places = [i for i, t in enumerate(self.targets) if t.of_design == way.is_design]
+        wanted = [self.targets[i] for i in places]
+        loads = list(dict.fromkeys((t.load, t.gasket) for t in wanted))
+        cases = (
+            Case(load, trial.loads[load], trial.profile, gasket, parameters=trial)
+            for parameters in machines
+            for trial in way.trials(parameters)
+            for load, gasket in loads
+        )
+        measures = dict.fromkeys(target.response.measure for target in wanted)
+        table = simulate_many(way.machine, cases, measures=measures, workers=self.workers)
+        ended = table.diverged.values == ""
+        for place, target in zip(places, wanted, strict=True):
+            values = np.where(ended, target.response.values(table), np.nan)
+            runs = values.reshape(len(machines), -1, len(loads))
+            result[:, place] = runs[..., loads.index((target.load, target.gasket))].mean(axis=1)
+
+
+@dataclass(frozen=True)
+class _Itself:
+    """Evaluation of a response at the machine itself."""
+
+    machine: Machine
+    is_design: bool = False
+
+    def trials(self, parameters: MachineParameters) -> Iterable[MachineParameters]:
+        return [parameters]
+
+
+@dataclass(frozen=True)
+class _Design:
+    """Evaluation of a response as the mean over the trials of the gasket study of [B]."""
+
+    machine: Machine
+    levels: Levels
+    is_design: bool = True
+
+    @classmethod
+    def of(cls, parameters: MachineParameters) -> "_Design":
+        levels = orthogonal_levels(len(load_factors(GASKET_FACTORS)), TRIALS)
+        middle = at_levels(parameters, cls._factors(parameters), [0] * levels.shape[1])
+        return cls(build_machine(middle), levels)
+
+    @staticmethod
+    def _factors(parameters: MachineParameters) -> tuple[FactorLevels, ...]:
+        return levels_of(parameters, load_factors(GASKET_FACTORS))
+
+    def trials(self, parameters: MachineParameters) -> Iterable[MachineParameters]:
+        factors = self._factors(parameters)
+        return (at_levels(parameters, factors, row.tolist()) for row in self.levels)
