@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -50,7 +51,8 @@ def calibrate(
     targets: Annotated[
         list[Path] | None,
         typer.Option(
-            help="Measured amplitudes. Repeatable. Default: those of the machine file.",
+            help="Measured amplitudes, or other responses (docs/how-to/calibrate.md). Repeatable. "
+            "Default: those of the machine file.",
             metavar="CSV",
         ),
     ] = None,
@@ -73,15 +75,21 @@ def calibrate(
     ] = 0,
     seed: Annotated[int, typer.Option(help="Seed of the random starting points.", min=0)] = 0,
     deviation: Annotated[
-        float, typer.Option(help="Standard deviation of a measured amplitude, in percent.")
-    ] = 5.0,
+        list[str] | None,
+        typer.Option(
+            help="Standard deviation of a measured amplitude, in percent (default: 5), or that of "
+            "other responses by name or kind, such as Fx=8 or moment=15 (default: 10). Repeatable.",
+            metavar="PERCENT|NAME=PERCENT",
+        ),
+    ] = None,
     resolution: Annotated[
         float, typer.Option(help="Step to which measured amplitudes are rounded, in mm.")
     ] = 0.1,
     weight: Annotated[
         list[str] | None,
         typer.Option(
-            help="Weight of a load, a sensor, or LOAD:SENSOR. Default: 1. Repeatable.",
+            help="Weight of a load, a sensor, a response, a kind of response, or LOAD:NAME. "
+            "Default: 1. Repeatable.",
             metavar="NAME=NUMBER",
         ),
     ] = None,
@@ -108,10 +116,11 @@ def calibrate(
 
     groups = _groups(leave_out)
     parameters = with_measured(load_parameters(machine, sets), targets, "--targets")
-    wanted = _targets(parameters).weighted(_weights(weight))
+    amplitudes, responses = _deviations(deviation)
+    wanted = _targets(parameters, responses).weighted(_weights(weight))
     check_buildable(machine, parameters)
     warn_of_phase_error(parameters)
-    plan = Plan(method, starts, seed, iterations, deviation / 100.0, 1e-3 * resolution)
+    plan = Plan(method, starts, seed, iterations, amplitudes, 1e-3 * resolution)
     with interruptible(f"finished evaluations are kept in {out}; continue with --resume"):
         calibration, predictions, writer = _run(
             parameters, free, wanted, plan, groups, out, workers, resume, overwrite
@@ -124,8 +133,9 @@ def calibrate(
         _print(calibration, predictions, out)
 
 
-def _targets(parameters: "MachineParameters") -> "Targets":
-    from wm_drake.parameters import measured_amplitudes
+def _targets(parameters: "MachineParameters", deviations: dict[str, float]) -> "Targets":
+    from wm_drake.parameters.measured import measured_amplitudes, measured_responses
+    from wm_drake.studies.calibration.response_targets import with_deviations
     from wm_drake.studies.calibration.targets import targets_of
 
     if not parameters.measured:
@@ -133,30 +143,63 @@ def _targets(parameters: "MachineParameters") -> "Targets":
             f"machine '{parameters.name}' names no measured amplitudes of its own; name a CSV file",
             where="--targets",
         )
-    return targets_of(
+    targets = targets_of(
         parameters,
         measured_amplitudes(parameters),
         ", ".join(Path(name).name for name in parameters.measured),
+        measured_responses(parameters),
     )
+    try:
+        responses = with_deviations(targets.responses, deviations)
+    except InputError as error:
+        raise InputError(replace(p, where="--deviation", key="") for p in error.problems) from None
+    return replace(targets, responses=responses)
+
+
+def _deviations(entries: list[str] | None) -> tuple[float, dict[str, float]]:
+    """Return the relative standard deviations of amplitudes, and of other responses by name."""
+    from wm_drake.studies.calibration.calibration import RELATIVE_DEVIATION
+
+    named = [entry for entry in entries or [] if "=" in entry]
+    plain = [entry for entry in entries or [] if "=" not in entry]
+    if len(plain) > 1:
+        raise input_error(
+            f"{' and '.join(plain)} are given; one number without a name is allowed, that of the "
+            "amplitudes",
+            where="--deviation",
+        )
+    numbers = _numbers(named, "--deviation")
+    numbers |= _numbers([f"amplitudes={entry}" for entry in plain], "--deviation")
+    for name, percent in numbers.items():
+        if not percent > 0.0:
+            message = f"{percent:g} is not allowed; must be > 0"
+            raise input_error(message, where="--deviation", key=name)
+    responses = {name: percent / 100.0 for name, percent in numbers.items()}
+    return responses.pop("amplitudes", RELATIVE_DEVIATION), responses
+
+
+def _numbers(entries: list[str] | None, option: str) -> dict[str, float]:
+    """Return the numbers of NAME=NUMBER entries, each finite and at least 0."""
+    from wm_drake.parameters.units import plain_number
+
+    numbers: dict[str, float] = {}
+    for name, text in pairs_of(entries, option):
+        try:
+            number = plain_number(text)
+        except ValueError as error:
+            raise input_error(str(error), where=option, key=name) from None
+        if not 0.0 <= number < math.inf:
+            raise input_error(
+                f"'{text}' is not allowed; must be >= 0 and finite", where=option, key=name
+            )
+        if name in numbers:
+            raise input_error("is given twice", where=option, key=name)
+        numbers[name] = number
+    return numbers
 
 
 def _weights(entries: list[str] | None) -> dict[str, float]:
-    from wm_drake.parameters.units import plain_number
-
-    weights: dict[str, float] = {}
-    for name, number in pairs_of(entries, "--weight"):
-        try:
-            weight = plain_number(number)
-        except ValueError as error:
-            raise input_error(str(error), where="--weight", key=name) from None
-        if not 0.0 <= weight < math.inf:
-            raise input_error(
-                f"'{number}' is not allowed; must be >= 0 and finite", where="--weight", key=name
-            )
-        if name in weights:
-            raise input_error("is given twice", where="--weight", key=name)
-        weights[name] = weight
-    return weights
+    return _numbers(entries, "--weight")
 
 
 def _groups(entries: list[str] | None) -> list[list[str]]:
@@ -267,13 +310,21 @@ def _write(
 ) -> None:
     from wm_drake.parameters import machine_yaml
     from wm_drake.report.calibration.report import calibration_report
-    from wm_drake.studies.calibration.outcome import amplitude_rows, quantity_table, solved_machine
+    from wm_drake.studies.calibration.outcome import (
+        amplitude_rows,
+        quantity_table,
+        response_table,
+        solved_machine,
+    )
 
     for number, solution in enumerate(calibration.solutions, start=1):
         text = machine_yaml(solved_machine(calibration.parameter_map, solution, number))
         (folder / f"machine_{number}.yaml").write_text(text, encoding="utf-8")
     quantity_table(calibration).to_csv(folder / "quantities.csv", index=False, float_format="%.6g")
     amplitude_rows(calibration).to_csv(folder / "amplitudes.csv", index=False, float_format="%.4f")
+    if calibration.targets.responses:
+        table = response_table(calibration)
+        table.to_csv(folder / "responses.csv", index=False, float_format="%.6g")
     best, modes = _shown(parameters, calibration)
     page = calibration_report(calibration, predictions, best, modes, command_line())
     (folder / "report.html").write_text(page, encoding="utf-8")
@@ -312,6 +363,10 @@ def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Pat
     )
     say("Absolute differences of the amplitudes from the experiment:")
     say(f"  best solution: mean {100 * mean:.1f} %, largest {100 * largest:.1f} %")
+    if calibration.targets.responses:
+        mean, largest = mean_and_largest(best.response_errors(calibration.targets))
+        say("Absolute differences of the other responses:")
+        say(f"  best solution: mean {100 * mean:.1f} %, largest {100 * largest:.1f} %")
     for prediction in predictions:
         pairs = [
             mean_and_largest(errors)
@@ -324,6 +379,9 @@ def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Pat
         say(f"    used for the calibration: {calibrated}")
         say(f"    held out and predicted: {predicted}")
         say(f"    other loads in that calibration: {others}")
+        say(
+            f"    95 % intervals contain {100 * prediction.covered:.0f} % of the held-out amplitudes"
+        )
     say(f"Results in {out}: report.html, machine_<n>.yaml, quantities.csv, amplitudes.csv")
 
 
@@ -360,6 +418,9 @@ def _as_json(calibration: "Calibration", predictions: "list[Prediction]") -> dic
                 "cost": s.cost,
                 "data_cost": s.data_cost,
                 **errors(s.errors(calibration.targets)),
+                "other_responses": errors(s.response_errors(calibration.targets))
+                if calibration.targets.responses
+                else None,
             }
             for s in calibration.solutions
         ],
@@ -367,6 +428,7 @@ def _as_json(calibration: "Calibration", predictions: "list[Prediction]") -> dic
         "predictions": [
             {"loads": list(p.loads)}
             | {kind: errors(getattr(p, kind)) for kind in ("calibrated", "predicted", "seen")}
+            | {"covered_percent": 100 * p.covered}
             for p in predictions
         ],
     }

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.measured import DESIGN, MACHINE
 from wm_drake.parameters.units import from_base, to_base
 from wm_drake.studies.calibration.calibration import Calibration
 from wm_drake.studies.calibration.parameter_map import ParameterMap
@@ -163,4 +164,27 @@ def amplitude_rows(calibration: Calibration) -> pd.DataFrame:
             rows.append(
                 {"load": load, "gasket": "yes" if gasket else "no", "source": source, **amplitudes}
             )
+    return pd.DataFrame(rows)
+
+
+def response_table(calibration: Calibration) -> pd.DataFrame:
+    """Return the targets that are no amplitudes, and those responses of each solution.
+
+    Columns: load, gasket (yes, no), of (machine, design), response, unit, target, deviation in
+    percent, and one for each solution.
+    """
+    rows = []
+    for index, target in enumerate(calibration.targets.responses):
+        row: dict[str, object] = {
+            "load": target.load,
+            "gasket": "yes" if target.gasket else "no",
+            "of": DESIGN if target.of_design else MACHINE,
+            "response": target.response.name,
+            "unit": target.response.unit_text,
+            "target": target.value,
+            "deviation_percent": 100.0 * target.deviation,
+        }
+        for number, solution in enumerate(calibration.solutions, start=1):
+            row[f"solution_{number}"] = float(solution.responses[index])
+        rows.append(row)
     return pd.DataFrame(rows)

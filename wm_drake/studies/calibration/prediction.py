@@ -1,7 +1,14 @@
-"""Prediction of held-out loads: calibrate without some loads, then compute their amplitudes."""
+"""Prediction of held-out loads: calibrate without some loads, then compute their amplitudes.
+
+An interval says how far the data and the priors determine a predicted amplitude. It comes from
+machines that are drawn from the posterior of the calibration, and from the scatter of the
+amplitudes that this calibration has seen.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from wm_drake.batch.ledger import Ledger
 from wm_drake.errors import input_error, nearest_names
@@ -9,6 +16,7 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate
+from wm_drake.studies.calibration.computed import Evaluation, StoredValues
 from wm_drake.studies.calibration.targets import Targets
 
 
@@ -23,12 +31,31 @@ class Prediction:
         predicted: (case, sensor) relative errors of their amplitudes in the calibration without
             them.
         seen: (case, sensor) relative errors of the other loads in the calibration without them.
+        interval: (2, case, sensor) limits of the 95 % intervals of the predicted amplitudes,
+            relative to the measured ones: (limit - measured) / measured.
+        scatter: Standard deviation of the logarithms of an amplitude that the intervals assume
+            beside the uncertainty of the machine.
     """
 
     loads: tuple[str, ...]
     calibrated: FloatArray
     predicted: FloatArray
     seen: FloatArray
+    interval: FloatArray
+    scatter: float
+
+    @property
+    def covered(self) -> float:
+        """Fraction of the measured amplitudes that the intervals contain."""
+        lower, upper = self.interval
+        return float(np.mean((lower <= 0.0) & (upper >= 0.0)))
+
+
+DRAWS = 200
+"""Number of machines that are drawn from the posterior."""
+
+LEVEL = 0.95
+"""Probability of an interval."""
 
 
 def predict(
@@ -68,17 +95,53 @@ def predict(
     targets, plan, found = calibration.targets, plan or calibration.plan, []
     for loads in map(tuple, held_out):
         seen = targets.without(*loads)
-        without_loads = calibrate(
+        others = calibrate(
             machine, free.without_starts(), seen, plan, ledger, workers=workers, report=report
         )
-        cases = targets.of(*loads)
-        calibrated, predicted = (
-            best.amplitude[cases] / targets.amplitude[cases] - 1.0
-            for best in (calibration.solutions[0], without_loads.solutions[0])
+        cases, best = targets.of(*loads), others.solutions[0]
+        evaluation = Evaluation(machine, others.parameter_map, targets, workers)
+        limits, scatter = _interval(others, StoredValues(evaluation, ledger))
+        found.append(
+            Prediction(
+                loads,
+                calibration.solutions[0].amplitude[cases] / targets.amplitude[cases] - 1.0,
+                best.amplitude[cases] / targets.amplitude[cases] - 1.0,
+                best.errors(seen)[~cases],
+                limits[:, cases] / targets.amplitude[cases] - 1.0,
+                scatter,
+            )
         )
-        errors_seen = without_loads.solutions[0].errors(seen)[~cases]
-        found.append(Prediction(loads, calibrated, predicted, errors_seen))
     return found
+
+
+def _interval(calibration: Calibration, values: StoredValues) -> tuple[FloatArray, float]:
+    """Return the limits (2, case, sensor) of predicted amplitudes [m], and the scatter.
+
+    Machines are drawn in equal numbers from the normal distributions around all distinct good
+    solutions, because the data cannot tell these apart.
+    """
+    targets, plan, parameter_map = calibration.targets, calibration.plan, calibration.parameter_map
+    generator = np.random.default_rng([plan.seed, DRAWS])
+    logarithms = np.log1p(calibration.solutions[0].errors(targets))
+    scatter = max(plan.deviation, float(np.sqrt(np.nanmean(logarithms**2))))
+    each = -(-DRAWS // len(calibration.solutions))
+    drawn = np.concatenate(
+        [
+            generator.multivariate_normal(
+                solution.coordinates, solution.covariance(scatter / plan.deviation), each
+            )
+            for solution in calibration.solutions
+        ]
+    )
+    points = np.clip(
+        parameter_map.expected + drawn * parameter_map.deviation,
+        parameter_map.lower,
+        parameter_map.upper,
+    )
+    amplitude = np.log(values(points).amplitude)
+    amplitude += generator.normal(0.0, scatter, amplitude.shape)
+    tail = 50.0 * (1.0 - LEVEL)
+    return np.exp(np.nanpercentile(amplitude, [tail, 100.0 - tail], axis=0)), scatter
 
 
 def check_held_out(targets: Targets, held_out: Sequence[Sequence[str]]) -> None:

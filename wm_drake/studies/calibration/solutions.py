@@ -78,13 +78,18 @@ class Solution:
         """
         return np.asarray(np.sqrt(np.diag(self.covariance())))
 
-    def covariance(self) -> FloatArray:
+    def covariance(self, scatter: float = 1.0) -> FloatArray:
         """Return the covariance (n, n) of the coordinates given the data (Laplace approximation).
 
         The residuals are linearized around the point.
+
+        Args:
+            scatter: Standard deviation of the residuals of the data. It is 1 if they scatter as the
+                plan assumes.
         """
-        information = self.all_slopes.T @ self.all_slopes + np.eye(len(self.coordinates))
-        return np.asarray(np.linalg.inv(information))
+        slopes = self.all_slopes.copy()
+        slopes[: self.data_count] /= scatter
+        return np.asarray(np.linalg.inv(slopes.T @ slopes + np.eye(len(self.coordinates))))
 
     def directions(self) -> FloatArray:
         """Return the singular values of the slopes, in falling order.
