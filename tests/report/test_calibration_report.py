@@ -52,7 +52,14 @@ def page(machine, calibration):
     short = SpinProfile(time=(0.0, 3.0), speed=(5.0, 20.0))
     cases = [Case(name, machine.parameters.loads[name], short, gasket) for name, gasket in LOADS]
     predictions = [
-        Prediction(("back",), np.full((1, 6), 0.02), np.full((1, 6), -0.31), np.full((1, 6), 0.04))
+        Prediction(
+            ("back",),
+            np.full((1, 6), 0.02),
+            np.full((1, 6), -0.31),
+            np.full((1, 6), 0.04),
+            np.array([np.full((1, 6), -0.5), [[0.1, 0.1, 0.1, -0.1, -0.1, -0.1]]]),
+            0.07,
+        )
     ]
     modes = [("without gasket", natural_modes(machine, gasket=False))]
     best = run_spin(machine.parameters, cases)
@@ -85,6 +92,14 @@ def test_page_shows_every_search_prediction_and_quantity(page):
     for text in ("2000.0", "31.0", "4.001 ± ", "determined by", "bound", "123", "back"):
         assert text in page
     assert page.count("<h3>Load ") == 3
+
+
+def test_page_shows_the_intervals_of_held_out_loads(page):
+    section = page[page.index('id="prediction"') : page.index('id="quantities"')]
+    assert "The intervals contain 50 % of the measured ones" in section
+    assert "5.0 to 11.0" in section
+    assert "5.0 to 9.0" in section
+    assert "a scatter of 7 % of an amplitude" in section
 
 
 def test_page_compares_the_gasket_s_effect(page):

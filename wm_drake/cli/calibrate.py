@@ -379,9 +379,8 @@ def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Pat
         say(f"    used for the calibration: {calibrated}")
         say(f"    held out and predicted: {predicted}")
         say(f"    other loads in that calibration: {others}")
-        say(
-            f"    95 % intervals contain {100 * prediction.covered:.0f} % of the held-out amplitudes"
-        )
+        covered = f"{100 * prediction.covered:.0f} %"
+        say(f"    95 % intervals contain {covered} of the held-out amplitudes")
     say(f"Results in {out}: report.html, machine_<n>.yaml, quantities.csv, amplitudes.csv")
 
 

@@ -16,6 +16,7 @@ from wm_drake.report.tables import Group, Row, Table, line
 from wm_drake.studies.calibration.calibration import Calibration
 from wm_drake.studies.calibration.outcome import mean_and_largest, quantity_table
 from wm_drake.studies.calibration.prediction import Prediction
+from wm_drake.studies.calibration.response_targets import TRIALS
 from wm_drake.studies.description.modal import Modes
 from wm_drake.studies.spin.study import Comparison, SpinResult
 
@@ -48,7 +49,10 @@ def calibration_report(
         errors_picture=_errors_picture(best, table, others),
         comparison=tables.comparison(best, table),
         effects=effects_table(calibration),
+        responses=responses_table(calibration),
         predictions=predictions_table(predictions) if predictions else None,
+        intervals=[(", ".join(p.loads), intervals_table(calibration, p)) for p in predictions],
+        relations=relations_table(calibration),
         certainty=certainty(calibration),
         quantities_picture=_quantities_picture(calibration),
         quantities=quantities_of(calibration),
@@ -84,12 +88,20 @@ def summary(calibration: Calibration, predictions: Sequence[Prediction]) -> str:
         f"{'solution' if count == 1 else 'solutions'}. The data determine {determined} of "
         f"{quantities} independent combinations of the free quantities better than the priors do."
     )
+    if targets.responses:
+        mean, largest = mean_and_largest(best.response_errors(targets))
+        text += (
+            f" Of {len(targets.responses)} other responses, the mean absolute difference is "
+            f"{number(100 * mean)} % and the largest {number(100 * largest)} %."
+        )
     if predictions:
+        covered = float(np.mean([p.covered for p in predictions]))
         worst = max(predictions, key=lambda p: mean_and_largest(p.predicted)[0])
         text += (
             " Held-out loads are predicted with a mean absolute difference of at most "
             f"{number(100 * mean_and_largest(worst.predicted)[0])} % (worst case: "
-            f"{', '.join(worst.loads)})."
+            f"{', '.join(worst.loads)}). Their 95 % intervals contain "
+            f"{number(100 * covered, 0)} % of the measured amplitudes."
         )
     return text
 
@@ -164,17 +176,93 @@ def effects_table(calibration: Calibration) -> Table | None:
     return Table(caption, ("load", "source", *targets.sensors), tuple(groups), text_columns=2)
 
 
+def responses_table(calibration: Calibration) -> Table | None:
+    """Return the targets that are no amplitudes, beside those of the best solution."""
+    targets, best = calibration.targets, calibration.solutions[0]
+    if not targets.responses:
+        return None
+    errors = best.responses / [target.value for target in targets.responses] - 1.0
+    groups = [
+        line(
+            f"{target.load}, {'with' if target.gasket else 'without'} gasket",
+            [
+                target.response.name,
+                "mean over the design" if target.of_design else "the machine",
+                target.response.unit_text,
+                f"{target.value:.4g}",
+                f"{value:.4g}",
+                percent(100 * error) if target.weight > 0.0 else MISSING,
+            ],
+        )
+        for target, value, error in zip(targets.responses, best.responses, errors, strict=True)
+    ]
+    caption = (
+        "Responses that are no amplitudes of sensors. A mean over the design is the mean over "
+        f"{TRIALS} trials of an orthogonal array of the gasket's factors ([B] section 4). A "
+        "response without a difference was not used."
+    )
+    header = ("load", "response", "of", "unit", "target", "calibrated machine", "difference")
+    return Table(caption, header, tuple(groups), text_columns=4)
+
+
+def relations_table(calibration: Calibration) -> Table | None:
+    """Return the relations of the free file and their ratios at the best solution."""
+    parameter_map, best = calibration.parameter_map, calibration.solutions[0]
+    if not parameter_map.relations:
+        return None
+    groups = [
+        line(
+            relation.name.replace("_", " "),
+            [
+                ("at most " if relation.is_limit else "expected ")
+                + f"{relation.ratio:.3g} ± {relation.deviation:.2g}",
+                f"{float(relation.at(best.point[None])[0]):.3g}",
+            ],
+        )
+        for relation in parameter_map.relations
+    ]
+    caption = "Ratios of free quantities to what physics gives for them (free file)."
+    return Table(caption, ("relation", "known", "calibrated machine"), tuple(groups), 2)
+
+
+def intervals_table(calibration: Calibration, prediction: Prediction) -> Table:
+    """Return the predicted amplitudes of held-out loads with their 95 % intervals. [mm]"""
+    targets = calibration.targets
+    cases = targets.of(*prediction.loads)
+    measured = MM_PER_M * targets.amplitude[cases]
+    lower, upper = measured * (1.0 + prediction.interval)
+    predicted = measured * (1.0 + prediction.predicted)
+    held = [case for case, is_held in zip(targets.loads, cases, strict=True) if is_held]
+    groups = []
+    for row, (load, gasket) in enumerate(held):
+        ends = zip(lower[row], upper[row], strict=True)
+        rows = (
+            Row(("measured", *map(number, measured[row])), "measured"),
+            Row(("predicted", *map(number, predicted[row])), "ours"),
+            Row(("95 % interval", *(f"{number(low)} to {number(high)}" for low, high in ends)), ""),
+        )
+        groups.append(Group(f"{load}, {'with' if gasket else 'without'} gasket", rows))
+    caption = (
+        f"Predicted amplitudes, mm. The intervals contain {number(100 * prediction.covered, 0)} % "
+        "of the measured ones. They allow for the uncertainty of the free quantities and for a "
+        f"scatter of {number(100 * prediction.scatter, 0)} % of an amplitude."
+    )
+    return Table(caption, ("load", "source", *targets.sensors), tuple(groups), text_columns=2)
+
+
 def predictions_table(predictions: Sequence[Prediction]) -> Table:
     """Return the errors of loads when they were used for the calibration and when held out."""
     groups = []
     for prediction in predictions:
         kinds = (prediction.calibrated, prediction.predicted, prediction.seen)
         cells = [number(100 * v) for errors in kinds for v in mean_and_largest(errors)]
+        cells.append(number(100 * prediction.covered, 0))
         groups.append(line(", ".join(prediction.loads), cells))
     errors = ("mean, %", "largest, %")
     header = (
         "held-out loads",
         *(f"{kind}: {error}" for kind in ("calibrated", "predicted", "others") for error in errors),
+        "in the 95 % intervals, %",
     )
     caption = (
         "Absolute differences from the experiment. Calibrated: these loads in the calibration "
