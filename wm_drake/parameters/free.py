@@ -105,6 +105,35 @@ class FreeQuantity(Frozen):
         return self
 
 
+class KnownQuantity(Frozen):
+    """One number that a calibration does not change, in the form of a free quantity.
+
+    Attributes:
+        value: The value.
+        sets: As in `FreeQuantity`.
+        source: Reason for the value.
+    """
+
+    value: Annotated[Measured, BeforeValidator(_measured)]
+    sets: Annotated[
+        dict[str, Annotated[Measured, BeforeValidator(_measured)]],
+        BeforeValidator(_one_key),
+        Field(min_length=1),
+    ]
+    source: str
+
+    @property
+    def unit(self) -> str:
+        """Unit in which the value is written and displayed."""
+        return self.value.unit
+
+    @model_validator(mode="after")
+    def _one_number(self) -> "KnownQuantity":
+        if self.value.is_list:
+            raise ValueError("the value is a list; it must be one number with a unit")
+        return self
+
+
 class ExpectedPreload(Frozen):
     """Prior of the spring preloads.
 
@@ -186,16 +215,28 @@ class LeastTension(Frozen):
 
 
 class FreeFile(Frozen):
-    """The free quantities of a calibration, by name, and what is known of them together."""
+    """The free quantities of a calibration, by name, and what is known beside them.
+
+    A known quantity becomes free, or a free one known, by moving its entry from one section to the
+    other.
+    """
 
     about: str = ""
     spring_preload: ExpectedPreload | None = None
     spring_tension: LeastTension | None = None
     relations: dict[Name, Relation] = Field(default_factory=dict)
+    known: dict[Name, KnownQuantity] = Field(default_factory=dict)
     quantities: dict[Name, FreeQuantity] = Field(min_length=1)
 
     @model_validator(mode="after")
-    def _known_quantities(self) -> "FreeFile":
+    def _one_section(self) -> "FreeFile":
+        for name in self.known:
+            if name in self.quantities:
+                raise ValueError(f"'{name}' is both free and known; it may be one of them")
+        return self
+
+    @model_validator(mode="after")
+    def _related_quantities(self) -> "FreeFile":
         for name, relation in self.relations.items():
             unit = self._unit(f"relations.{name}", relation.quantity)
             for other, factor in relation.to.items():

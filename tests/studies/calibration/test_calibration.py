@@ -451,3 +451,38 @@ def test_distinct_solutions_are_good_and_far_apart():
         )
     )
     assert distinct([bad, far, near, best], targets) == [best, far]
+
+
+KNOWN = """
+known:
+  slope:
+    value: 3 N/mm
+    sets: {gasket.stiffness_x.force: "(-30, 0, 30) mm"}
+    source: data sheet
+"""
+
+
+def test_known_quantities_enter_like_free_ones(short, tmp_path):
+    hardening = TABLE[TABLE.index("  hardening") :]
+    parameter_map = parameter_map_of(short, free_file(tmp_path, KNOWN + FREE + hardening))
+    made = parameter_map.parameters_at(np.array([40.0, 0.03, 5.5, 10.0]))
+    assert made.gasket.stiffness_x.force == pytest.approx((-100.0, 0.0, 100.0))
+    found = solution([0.0] * 4, [1.0], np.zeros((1, 4)))
+    found = replace(found, point=parameter_map.expected)
+    text = solved_machine(parameter_map, found).sources["gasket.stiffness_x.force"]
+    assert text.startswith("fit: hardening 20 ± 20 N (expected 20 ± 20 N); assumption: ")
+    assert text.endswith("slope 3 N/mm (data sheet)")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (KNOWN.replace("slope", "friction") + FREE, "'friction' is both free and known"),
+        (KNOWN.replace("3 N/mm", "3 kg") + FREE, "known.slope.sets: 'gasket.stiffness_x.force'"),
+        (KNOWN.replace("3 N/mm", "(3, 4) N/mm") + FREE, "it must be one number with a unit"),
+    ],
+)
+def test_wrong_known_quantities_are_refused(short, tmp_path, text, message):
+    with pytest.raises(InputError) as refused:
+        parameter_map_of(short, free_file(tmp_path, text))
+    assert message in str(refused.value)

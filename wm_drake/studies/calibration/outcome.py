@@ -19,7 +19,8 @@ def solved_machine(
 ) -> MachineParameters:
     """Return the machine of a solution.
 
-    The source of each fitted number is "fit: " followed by the text of `fit_text`.
+    The source of each fitted number is "fit: " followed by the text of `fit_text`, and
+    "assumption: " followed by the known quantities that enter.
 
     Args:
         parameter_map: Map of the calibration.
@@ -27,24 +28,31 @@ def solved_machine(
         number: Number of the solution, for the name of the machine; 0 keeps the name.
     """
     spread = solution.spread()
-    sources: dict[str, list[str]] = {}
+    fits: dict[str, list[str]] = {}
+    reasons: dict[str, list[str]] = {}
     for value in parameter_map.values:
+        key = ".".join(value.path)
         entering = np.flatnonzero(np.any(value.factors != 0.0, axis=1))
-        texts = sources.setdefault(".".join(value.path), [])
-        texts.extend(
-            text
-            for index in entering
-            if (text := fit_text(parameter_map, solution, spread, int(index))) not in texts
-        )
+        texts = (fit_text(parameter_map, solution, spread, int(index)) for index in entering)
+        for listed, new in ((fits, texts), (reasons, value.reasons)):
+            kept = listed.setdefault(key, [])
+            kept.extend(text for text in new if text not in kept)
     parameters = parameter_map.parameters_at(_rounded(parameter_map, solution))
-    fitted = {key: "fit: " + "; ".join(texts) for key, texts in sources.items()}
-    kept = {
+    fitted = {
+        key: "; ".join(
+            kind + "; ".join(listed[key])
+            for kind, listed in (("fit: ", fits), ("assumption: ", reasons))
+            if listed[key]
+        )
+        for key in fits
+    }
+    others = {
         key: text
         for key, text in parameters.sources.items()
         if not any(key.startswith(f"{k}.") for k in fitted)
     }
     name = f"{parameters.name}_calibrated_{number}" if number else parameters.name
-    return parameters.model_copy(update={"name": name, "sources": {**kept, **fitted}})
+    return parameters.model_copy(update={"name": name, "sources": {**others, **fitted}})
 
 
 def _rounded(parameter_map: ParameterMap, solution: Solution) -> np.ndarray:

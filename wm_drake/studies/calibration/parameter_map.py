@@ -11,11 +11,11 @@ from wm_drake.errors import InputError, Problem, nearest_names
 from wm_drake.model.bodies import with_sdf_values
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
-from wm_drake.parameters.free import FreeFile, FreeQuantity, Measured
+from wm_drake.parameters.free import FreeFile, FreeQuantity, KnownQuantity, Measured
 from wm_drake.parameters.keys import quantities
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit, dimension
+from wm_drake.parameters.units import Unit, dimension, from_base
 
 COMPONENTS = {"x": 0, "y": 1, "z": 2}
 
@@ -29,12 +29,16 @@ class Value:
         component: Index of the component of a vector; None for the whole value.
         factors: (quantities, 1 or points) factors of each free quantity: one for a number, several
             for the column of a table.
+        constant: (1 or points) what the known quantities add.
+        reasons: Texts of the known quantities that enter.
         is_list: Whether the value is the column of a table.
     """
 
     path: tuple[str, ...]
     component: int | None
     factors: FloatArray
+    constant: FloatArray
+    reasons: tuple[str, ...]
     is_list: bool
 
 
@@ -125,7 +129,7 @@ class ParameterMap:
         """
         tree = dict(self._tree)
         for value in self.values:
-            set_to = np.asarray(point) @ value.factors
+            set_to = value.constant + np.asarray(point) @ value.factors
             _set(tree, value, tuple(map(float, set_to)) if value.is_list else float(set_to[0]))
         try:
             return MachineParameters.model_validate(tree)
@@ -140,19 +144,19 @@ def parameter_map_of(machine: Machine, free: FreeFile) -> ParameterMap:
         InputError: the machine does not have a key, or a factor has the wrong dimension or the
             wrong number of values.
     """
-    keys = list(
-        dict.fromkeys(key for quantity in free.quantities.values() for key in quantity.sets)
-    )
+    listed: dict[str, FreeQuantity | KnownQuantity] = {**free.quantities, **free.known}
+    keys = list(dict.fromkeys(key for quantity in listed.values() for key in quantity.sets))
     base = with_sdf_values(machine.plant, machine.parameters, keys)
     known = {key: (value, unit) for key, value, unit in quantities(base)}
     problems: list[Problem] = []
     values = []
     for key in keys:
         try:
-            values.append(_value(key, known, free.quantities))
+            values.append(_value(key, known, free))
         except ValueError as error:
-            first = next(name for name, quantity in free.quantities.items() if key in quantity.sets)
-            problems.append(Problem("", f"quantities.{first}.sets", f"'{key}' {error}"))
+            first = next(name for name, quantity in listed.items() if key in quantity.sets)
+            section = "quantities" if first in free.quantities else "known"
+            problems.append(Problem("", f"{section}.{first}.sets", f"'{key}' {error}"))
     if problems:
         raise InputError(problems)
     entries = list(free.quantities.values())
@@ -196,9 +200,7 @@ def _known_ratios(free: FreeFile) -> Iterator[KnownRatio]:
         )
 
 
-def _value(
-    key: str, known: Mapping[str, tuple[Any, Unit]], free: Mapping[str, FreeQuantity]
-) -> Value:
+def _value(key: str, known: Mapping[str, tuple[Any, Unit]], free: FreeFile) -> Value:
     name, _, last = key.rpartition(".")
     component = None
     if key not in known and last in COMPONENTS and name in known:
@@ -210,15 +212,31 @@ def _value(
     value, unit = known[shape_key]
     is_list = isinstance(value, tuple) and component is None
     size = len(value) if is_list else 1
-    rows = []
-    for quantity in free.values():
+
+    def factors(quantity: FreeQuantity | KnownQuantity) -> FloatArray:
         factor = quantity.sets.get(key)
-        rows.append(
-            np.zeros(size)
-            if factor is None
-            else _factor(factor, quantity.unit, unit, size, is_list)
-        )
-    return Value(tuple(shape_key.split(".")), component, np.array(rows), is_list)
+        if factor is None:
+            return np.zeros(size)
+        return _factor(factor, quantity.unit, unit, size, is_list)
+
+    entering = {name: entry for name, entry in free.known.items() if key in entry.sets}
+    constant = sum(
+        (entry.value.values[0] * factors(entry) for entry in entering.values()), np.zeros(size)
+    )
+    return Value(
+        tuple(shape_key.split(".")),
+        component,
+        np.array([factors(quantity) for quantity in free.quantities.values()]),
+        constant,
+        tuple(_known_text(name, entry) for name, entry in entering.items()),
+        is_list,
+    )
+
+
+def _known_text(name: str, entry: KnownQuantity) -> str:
+    """Return a text such as ``drum_mass 9 kg (parts list)``."""
+    value = f"{from_base(entry.value.values[0], entry.unit):.10g} {entry.unit}".rstrip()
+    return f"{name} {value} ({entry.source})"
 
 
 def _factor(
