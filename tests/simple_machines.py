@@ -34,7 +34,7 @@ def isotropic_machine(stiffness=STIFFNESS, damping=DAMPING, rotational_stiffness
         "gravity": 0.0,
         "bodies": dict.fromkeys(bodies, ball.model_dump()),
         "frames": {"gasket_tub": origin, "gasket_housing": origin},
-        "spring_types": {"suspension": {"stiffness": 0.0}},
+        "spring_types": {"suspension": {"stiffness": 0.0, "action": "tension-compression"}},
         "dampers": {},
         "gasket": {"tub_frame": "gasket_tub", "housing_frame": "gasket_housing"}
         | linear

@@ -82,7 +82,7 @@ FAULTY_MACHINES = {
     ),
     "spring that would push": (
         in_machine("frames: {spring_left_housing: {position: '(-250, 0, -600) mm'}}"),
-        "springs.left: would be pushed, not pulled",
+        "springs.left: would be slack at rest",
     ),
 }
 

@@ -81,7 +81,7 @@ LAWS = {
     "spring_tension": (
         1,
         spring.spring_tension,
-        lambda f, x: f(0.2 + 0.02 * x[0], 0.2, 110.0, (CURVE, 0)),
+        lambda f, x: f(0.2 + 0.02 * x[0], 0.2, 110.0, 40.0, (CURVE, 0)),
     ),
     "stiffness_force": (1, table.stiffness_force, lambda f, x: f(0.015 * x[0], CURVE, 0)),
     "bushing_force": (

@@ -18,7 +18,7 @@ from wm_drake.elements.bushing import (
 from wm_drake.elements.damper_law import packed_damper_law
 from wm_drake.elements.friction_damper import FrictionDamperParameters, evaluate_friction_damper
 from wm_drake.elements.layouts import packed_stiffness
-from wm_drake.elements.spring import SpringStrutParameters, evaluate_spring_strut
+from wm_drake.elements.spring import SPRING, SpringStrutParameters, evaluate_spring_strut
 from wm_drake.elements.telescopic_damper import (
     FORCE_SIZE,
     TelescopicDamperParameters,
@@ -47,8 +47,9 @@ def law(name):
     return packed_damper_law(TypeAdapter(DamperType).validate_python({"law": name} | DAMPERS[name]))
 
 
-def spring(stiffness):
-    return SpringStrutParameters(HOOK, GROUND, 90.0, packed_stiffness(stiffness)).packed()
+def spring(stiffness, **changes):
+    placed = SpringStrutParameters(HOOK, GROUND, 90.0, packed_stiffness(stiffness))
+    return SPRING.replaced(placed.packed(), **changes)
 
 
 def damper(name):
@@ -67,6 +68,7 @@ def telescope(name):
 ELEMENTS = {
     "spring, number": (spring(5e3), evaluate_spring_strut, 1, 1, 0),
     "spring, table": (spring(ForceTable(**LINEAR_TABLE)), evaluate_spring_strut, 1, 1, 0),
+    "spring, nearly slack": (spring(5e3, taut_from=300.0), evaluate_spring_strut, 1, 1, 0),
     "bushing": (PLACED.packed(), evaluate_six_component_bushing, 1, 6, 0),
     "bearing": (PLACED.packed(), evaluate_drum_bearing, 2, BEARING_FORCE_SIZE, 0),
     "telescopic damper": (telescope("mstv"), evaluate_telescopic_damper, 2, FORCE_SIZE, 1),

@@ -46,6 +46,19 @@ def test_preloads_carry_the_weight_and_its_moments(machine):
     np.testing.assert_allclose(moment, -weight_moment, atol=1e-10)
 
 
+def test_only_a_spring_that_pushes_may_have_a_compressive_preload(machine, reference):
+    """The hook of the left spring is below the tub: it has to push upwards."""
+    below = with_value(reference, "frames.spring_left_housing.position", (-0.25, 0.0, -0.6))
+    with pytest.raises(InputError, match=r"springs.left: would be slack at rest \(preload -"):
+        machine.set_up(parameters=below)
+    action = "spring_types.suspension.action"
+    setup = machine.set_up(parameters=with_value(below, action, "tension-compression"))
+    left = setup.springs["left"]
+    assert left.preload < -10.0
+    assert left.free_length > left.rest_length
+    assert np.max(np.abs(setup.residual)) < 1e-9
+
+
 @pytest.mark.parametrize(
     ("key", "value"),
     [

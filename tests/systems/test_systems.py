@@ -14,7 +14,7 @@ from scipy.interpolate import PchipInterpolator
 from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bushing_law
 from wm_drake.elements.friction_damper import FrictionDamperParameters, packed_damper_law
 from wm_drake.elements.layouts import packed_stiffness
-from wm_drake.elements.spring import SpringStrutParameters
+from wm_drake.elements.spring import SPRING, SpringStrutParameters
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.damper_laws import (
     CoulombDamper,
@@ -181,6 +181,9 @@ class Element:
 ELEMENTS = {
     "spring": Element(SpringStrut, spring_parameters().packed()),
     "spring with a table": Element(SpringStrut, spring_parameters(SPRING_CURVE).packed()),
+    "spring that is nearly slack": Element(
+        SpringStrut, SPRING.replaced(spring_parameters().packed(), taut_from=2000.0)
+    ),
     "bushing": Element(SixComponentBushing, bushing_parameters().packed()),
 }
 SPONGE_STATES = {"mstv": (2.3e-4,), "free_stroke": (0.012,)}  # m

@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+from scipy.optimize import brentq
+
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import numbers
 from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
@@ -10,7 +12,7 @@ from wm_drake.compiler.vectors import rotate, scale
 from wm_drake.elements.motion import tub_motion, write_generalized_force
 from wm_drake.elements.strut import strut_line, wrench_at_origin
 from wm_drake.laws.spring import spring_tension
-from wm_drake.laws.table import CURVE
+from wm_drake.laws.table import CURVE, stiffness_force
 from wm_drake.parameters.types import FloatArray
 
 SPRING = PackedLayout(
@@ -19,26 +21,69 @@ SPRING = PackedLayout(
     p_WH=VECTOR,
     rest_length=SCALAR,
     preload=SCALAR,
+    taut_from=SCALAR,
     stiffness=CURVE,
 )
-"""Tub hook (T) and housing hook (W) [m], rest length [m], preload [N], stiffness [N/m or a
-table]."""
+"""Tub hook (T) and housing hook (W) [m], rest length [m], preload [N], tension from which it is
+taut [N], stiffness [N/m or a table]."""
 read_spring = SPRING.read
+
+SLACK_TRANSITION = 1e-3
+"""Elongation over which a spring changes from slack to taut. [m]
+
+Assumption: a hook settles in its eye over about this distance. A run crosses it within a few steps;
+amplitudes do not depend on it (docs/decisions/0100).
+"""
+
+_LARGEST_SHARE = 0.5
+"""Largest part of the preload at which a spring is fully taut, so that it is taut at rest."""
+
+_SMALLEST_TAUT = 1e-9
+"""Smallest tension at which a spring is taut, for springs whose stiffness is zero. [N]"""
 
 
 @dataclass(frozen=True)
 class SpringStrutParameters:
-    """A spring in its place: hooks at the rest pose, preload, packed stiffness."""
+    """A spring in its place: hooks at the rest pose, preload, packed stiffness, whether it pushes.
+
+    `pushes` is True for a spring that can be compressed; others go slack.
+    """
 
     p_ToA_T: FloatArray
     p_WH: FloatArray
     preload: float
     packed_stiffness: FloatArray
+    pushes: bool = False
 
     @property
     def rest_length(self) -> float:
         """Distance of the hooks when T coincides with W. [m]"""
         return math.dist(self.p_ToA_T, self.p_WH)
+
+    @property
+    def free_length(self) -> float | None:
+        """Length without tension; None if it is not between 0 and twice the drawn length. [m]"""
+        stiffness = self.packed_stiffness, 0
+
+        def tension(length: float) -> float:
+            return float(
+                spring_tension(length, self.rest_length, self.preload, -math.inf, stiffness)
+            )
+
+        ends = 0.0, 2.0 * self.rest_length
+        if not tension(ends[0]) < 0.0 <= tension(ends[1]):
+            return None
+        return float(brentq(tension, *ends, xtol=1e-12))
+
+    @property
+    def taut_from(self) -> float:
+        """Tension from which it is fully taut; -inf if it pushes. [N]"""
+        if self.pushes:
+            return -math.inf
+        stretched, drawn = (
+            stiffness_force(x, self.packed_stiffness, 0) for x in (SLACK_TRANSITION, 0.0)
+        )
+        return max(min(stretched - drawn, _LARGEST_SHARE * self.preload), _SMALLEST_TAUT)
 
     @property
     def structure(self) -> list[int]:
@@ -52,6 +97,7 @@ class SpringStrutParameters:
             p_WH=self.p_WH,
             rest_length=self.rest_length,
             preload=self.preload,
+            taut_from=self.taut_from,
             stiffness=self.packed_stiffness,
         )
 
@@ -67,7 +113,9 @@ def spring_strut_wrench(motion, p, at):
     spring = read_spring(p, at)
     arm = rotate(motion.rotation, spring.p_ToA_T)
     length, _, direction, _, _ = strut_line(motion, arm, spring.p_WH)
-    tension = spring_tension(length, spring.rest_length, spring.preload, spring.stiffness)
+    tension = spring_tension(
+        length, spring.rest_length, spring.preload, spring.taut_from, spring.stiffness
+    )
     return wrench_at_origin(arm, scale(-tension, direction), (0.0, 0.0, 0.0)), tension
 
 

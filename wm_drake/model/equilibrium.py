@@ -66,7 +66,8 @@ def preloaded(
         elements: All elements, springs without preload.
 
     Raises:
-        InputError: a spring would have to push, or the attached bodies have no equilibrium.
+        InputError: a tension-only spring would have to push, or the attached bodies have no
+            equilibrium.
     """
     statics = Statics(plant, context, state_layout, elements)
     if state_layout.attached.size:
@@ -78,17 +79,16 @@ def preloaded(
     wrenches = np.column_stack([np.cross(hooks, pulls), pulls]).T
     solution = np.linalg.lstsq(wrenches, -statics.force_on_tub(), rcond=None)[0]
     preloads = dict(zip(springs, map(float, solution), strict=True))
-    weightless = not np.any(plant.gravity_field().gravity_vector())
-    pushed = [name for name, preload in preloads.items() if preload <= 0.0 and not weightless]
-    if pushed:
+    slack = [name for name in springs if preloads[name] <= 0.0 and not springs[name].pushes]
+    if slack:
         raise InputError(
             Problem(
                 "",
                 f"springs.{name}",
-                f"would be pushed, not pulled, at rest (preload {preloads[name]:.1f} N); "
-                "move its hooks or the centre of mass",
+                f"would be slack at rest (preload {preloads[name]:.1f} N); move its hooks or the "
+                "centre of mass, or give its type the action tension-compression",
             )
-            for name in pushed
+            for name in slack
         )
     loaded = {name: replace(spring, preload=preloads[name]) for name, spring in springs.items()}
     return replace(elements, springs=loaded)

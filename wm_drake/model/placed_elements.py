@@ -143,14 +143,16 @@ def _strut_ends(poses: FramePoses, element: Any, key: str) -> tuple[FloatArray, 
 
 def _springs(poses: FramePoses, parameters: MachineParameters) -> dict[str, SpringStrutParameters]:
     """Place the springs, without preload."""
-    return {
-        name: SpringStrutParameters(
+    placed = {}
+    for name, spring in parameters.springs.items():
+        kind = parameters.spring_types[spring.type]
+        placed[name] = SpringStrutParameters(
             *_strut_ends(poses, spring, f"springs.{name}"),
             0.0,
-            packed_stiffness(parameters.spring_types[spring.type].stiffness),
+            packed_stiffness(kind.stiffness),
+            pushes=kind.action == "tension-compression",
         )
-        for name, spring in parameters.springs.items()
-    }
+    return placed
 
 
 def _dampers(

@@ -1,8 +1,6 @@
 """Faults of a built machine that are legal mathematics but no possible machine."""
 
-from wm_drake.elements.spring import SpringStrutParameters
 from wm_drake.errors import Problem
-from wm_drake.laws.spring import spring_tension
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.plausibility import unusual_numbers
 
@@ -28,15 +26,10 @@ def unusual_springs(setup: Setup) -> list[Problem]:
             "the unit of its stiffness right?",
         )
         for name, spring in setup.springs.items()
-        if _tension_at_zero_length(spring) >= 0.0
+        if spring.preload > 0.0 and spring.free_length is None
     ]
 
 
 def unusual_values(setup: Setup) -> list[Problem]:
     """Return one problem for each unusual number and each impossible spring of a machine."""
     return [*unusual_numbers(setup.parameters), *unusual_springs(setup)]
-
-
-def _tension_at_zero_length(spring: SpringStrutParameters) -> float:
-    stiffness = (spring.packed_stiffness, 0)
-    return float(spring_tension(0.0, spring.rest_length, spring.preload, stiffness))

@@ -1,7 +1,7 @@
 """Springs, dampers, bushings of a machine: frozen, SI; fields are the keys of the machine file."""
 
 import itertools
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
@@ -106,9 +106,16 @@ PositiveRate: TypeAlias = Annotated[u.AngularVelocity, Field(gt=0.0)]
 
 
 class SpringType(Frozen):
-    """A suspension spring as bought. Its preload is no input: static equilibrium decides it."""
+    """A suspension spring as bought. Its preload is no input: static equilibrium decides it.
+
+    Attributes:
+        stiffness: Tension over elongation.
+        action: A tension-only spring hangs in hooks and goes slack; a tension-compression spring
+            pushes too.
+    """
 
     stiffness: Stiffness
+    action: Literal["tension-only", "tension-compression"] = "tension-only"
 
 
 class Spring(Frozen):

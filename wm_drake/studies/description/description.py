@@ -221,9 +221,12 @@ def _spring(setup: Setup, name: str) -> dict[str, Any]:
     kind = setup.parameters.spring_types[setup.parameters.springs[name].type]
     return {
         **_line(setup, placed),
+        "action": kind.action,
         "stiffness": _stiffness(kind.stiffness),
         "length_at_preload": placed.rest_length,
         "preload": placed.preload,
+        "taut_from": None if placed.pushes else placed.taut_from,
+        "free_length": placed.free_length,
     }
 
 

@@ -7,8 +7,9 @@ from typing import Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
-VERSION = "wm_drake machine description 2"
-"""Name and version of the format. Version 1 had no key `format`."""
+VERSION = "wm_drake machine description 3"
+"""Name and version of the format. In version 2 springs could not go slack; version 1 had no key
+`format`."""
 
 Vector: TypeAlias = tuple[float, float, float]
 Rotation: TypeAlias = tuple[Vector, Vector, Vector]
@@ -123,11 +124,20 @@ class Strut(_Part):
 
 
 class Spring(Strut):
-    """A spring: tension = preload + F(length - length_at_preload), F = k x or a table."""
+    """A spring: h = preload + F(length - length_at_preload), F = k x or a table.
 
+    The tension is h from `taut_from` on, 0 where h <= 0, and between them w s^2 (2 - s) with w =
+    taut_from and s = h / w. A tension-compression spring has the tension h everywhere.
+    """
+
+    action: Literal["tension-only", "tension-compression"]
     stiffness: float | ForceCurve = Field(description="[N/m]")
     length_at_preload: float = Field(description="Length as drawn. [m]")
     preload: float = Field(description="Tension as drawn. [N]")
+    taut_from: float | None = Field(description="None for tension-compression. [N]")
+    free_length: float | None = Field(
+        description="Length at which h is 0; None if there is none. [m]"
+    )
 
 
 class EndBushing(_Part):
