@@ -20,7 +20,7 @@ from wm_drake.parameters import (
 )
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import number, percent
-from wm_drake.report.spin.figures import revolution_starts, simplified_indices
+from wm_drake.report.spin.panels import revolution_starts, simplified_indices
 from wm_drake.report.spin.report import amplitude_table, spin_report
 from wm_drake.report.spin.tables import differences, profiles
 from wm_drake.report.tables import readable
