@@ -76,6 +76,20 @@ def test_gasket_that_is_taken_out_is_left_out():
     ]
 
 
+def test_damper_with_tubes_acts_through_its_bushing_at_the_housing():
+    plain = record()
+    names = ["gasket", "rear_tub", "rear_housing"]
+    scales = xr.DataArray([1.0, 7.0, 3.0], {"bushing": names}, ["bushing"])
+    with_tubes = plain.drop_vars(["bushing_force", "bushing"]).assign(
+        bushing_force=plain.bushing_force.isel(bushing=0, drop=True).expand_dims(bushing=names)
+        * scales,
+        tube_extension=(("time", "tube"), np.zeros((len(TIME), 1))),
+    )
+    with_tubes = with_tubes.transpose("time", ...).assign_coords(tube=["rear"])
+    found = {force.name: force.peak for force in mount_forces(with_tubes)}
+    assert found == pytest.approx({"spring left": 120.0, "damper rear": 30.0, "gasket": 10.0})
+
+
 def test_regions_of_the_profile_are_used():
     regions = (Region(name="R1", begin=0.0, end=10.0), Region(name="R2", begin=20.0, end=40.0))
     ranges = speed_ranges(record(), profile(regions=regions))

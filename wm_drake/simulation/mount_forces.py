@@ -29,7 +29,7 @@ class MountForce:
     Attributes:
         name: `spring left`, `damper left`, `gasket` or the name of the bushing.
         force: (n, 1) tension of a spring or a damper, or (n, 3) force of the gasket or a bushing on
-            the housing in W. [N]
+            the housing. [N]
         at_rest: Size of the force at the first sample, with the machine at rest; with its sign for
             a tension. [N]
         peak: Largest absolute value, or largest length of the vector. [N]
@@ -62,8 +62,9 @@ class SpeedRange:
 def mount_forces(record: Record) -> list[MountForce]:
     """Return the forces of all mounts of a record; none if the record has no samples.
 
-    A gasket that is taken out is left out. The forces are those at the ends of the elements; the
-    transverse forces of the bushings at the ends of dampers are not among them.
+    A gasket that is taken out is left out. The force of a spring, or of a damper that is a massless
+    strut, is its tension; the transverse forces of its end bushings are not included. A damper
+    whose tubes are bodies acts through the bushing at its housing end.
     """
     if not record.sizes["time"]:
         return []
@@ -72,9 +73,14 @@ def mount_forces(record: Record) -> list[MountForce]:
         tensions = record[f"{kind}_tension"].values
         for index, name in enumerate(record[kind].values):
             histories[f"{kind} {name}"] = tensions[:, index : index + 1]
-    for index, name in enumerate(record["bushing"].values):
-        if name != "gasket" or record.attrs["gasket"] == "yes":
-            histories[str(name)] = record.bushing_force.values[:, index]
+    tubes = [str(name) for name in record["tube"].values] if "tube" in record.dims else []
+    dampers = {f"{name}_housing": f"damper {name}" for name in tubes}
+    elsewhere = {f"{name}_tub" for name in tubes}  # between tub and tube, not on the cabinet
+    if record.attrs["gasket"] != "yes":
+        elsewhere.add("gasket")
+    for index, name in enumerate(map(str, record["bushing"].values)):
+        if name not in elsewhere:
+            histories[dampers.get(name, name)] = record.bushing_force.values[:, index]
     return [_mount_force(name, force) for name, force in histories.items()]
 
 

@@ -205,6 +205,10 @@ def envelopes_picture(variants: Sequence[Variant], index: int) -> Picture | None
             " Dots: the largest absolute values; the top of the panel gives them with their drum "
             "speeds."
         )
+    profiles = {name: case.case.profile for name, case in cases.items()}
+    if len(set(map(str, profiles.values()))) > 1:
+        longest = max(profiles, key=lambda name: profiles[name].duration)
+        caption += f" The drum speed along the top is that of {longest}."
     if measured:
         caption += (
             " Dashed lines: measured amplitude, on both sides of zero, in the colour of the "
@@ -252,7 +256,7 @@ def comparison_report(
         )
     return render(
         "spin/comparison.html",
-        title=f"Comparison of {_listed([variant.name for variant in variants])}",
+        title=title(variants),
         about="",
         summary=summary(variants, table),
         warnings=[
@@ -269,11 +273,19 @@ def comparison_report(
     )
 
 
+def title(variants: Sequence[Variant]) -> str:
+    """Return the title of the page: the machine, if there is only one, and the variants."""
+    names, machine = _listed([variant.name for variant in variants]), variants[0].result.parameters
+    if all(variant.result.parameters.name == machine.name for variant in variants):
+        return f"Comparison of machine {machine.name}: {names}"
+    return f"Comparison of machines {names}"
+
+
 def summary(variants: Sequence[Variant], table: pd.DataFrame) -> str:
     """Return one paragraph: the largest amplitude and the smallest gap of each variant."""
     count = len(variants[0].result.results)
     loads = "1 load was" if count == 1 else f"{count} loads were"
-    opening = f"{loads} run with {_listed([variant.name for variant in variants])}."
+    opening = f"{loads} run for each of {len(variants)} machines or variants."
     sentences = [opening, *(_of_variant(variant) for variant in variants)]
     changes = table[(table["measure"] == "amplitude") & np.isfinite(table["percent"])]
     if len(changes):
@@ -321,7 +333,7 @@ def facts_of_comparison(variants: Sequence[Variant], command: str) -> list[tuple
     for variant in variants:
         machine = variant.result.parameters
         step = f"step {1e3 * variant.result.step:g} ms"
-        facts.append((variant.name, "; ".join(filter(None, [machine.about, step]))))
+        facts.append((variant.name, f"{machine.about} {step.capitalize()}.".strip()))
     facts += [
         ("Engine", first.engine),
         ("Versions", versions_of(first.results[0].record.attrs)),
