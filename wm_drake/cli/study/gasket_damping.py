@@ -50,6 +50,16 @@ def gasket_damping(
     seed: Annotated[
         int, typer.Option(help="Seed of the noise of the virtual experiment.", min=0)
     ] = 0,
+    mesh: Annotated[
+        float,
+        typer.Option(
+            help="Spacing at which the grid search ends, in percent of the region (0 to 0.05 "
+            "N s/mm, 0 to 200 N mm s/deg).",
+            min=1e-3,
+            max=25.0,
+            metavar="PERCENT",
+        ),
+    ] = 0.1,
     out: OutOption = DEFAULT_OUT,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
@@ -69,7 +79,7 @@ def gasket_damping(
         else:
             truth = _planted(parameters, planted_linear, planted_torsional)
             measured = _virtual(parameters, truth, seed)
-        result = identify_damping(parameters, measured, truth)
+        result = identify_damping(parameters, measured, truth, mesh / 100.0)
         _write(result, parameters, folder)
     if as_json:
         typer.echo(json.dumps(_as_json(result)))
@@ -185,7 +195,14 @@ def _as_json(result: "Damping") -> dict[str, Any]:
         "units": {"C_L": "N s/mm", "C_T": "N mm s/deg"},
         "virtual_experiment": result.truth is not None,
         "planted": truth,
-        "grid": found(result.grid) | {"rounds": len(result.grid.rounds)},
+        "best": found(result.better)
+        | {"search": "grid" if result.better is result.grid else "scipy"},
+        "searches_agree": result.searches_agree,
+        "grid": found(result.grid)
+        | {
+            "rounds": len(result.grid.rounds),
+            "mesh_percent": 100.0 * result.grid.rounds[-1].spacing,
+        },
         "scipy": found(result.scipy),
         "interval_95": interval,
     }

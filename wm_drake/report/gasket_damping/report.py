@@ -9,12 +9,20 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH
-from wm_drake.report.formatting import MM_PER_M, number, percent
+from wm_drake.report.formatting import MM_PER_M, number, percent, significant
 from wm_drake.report.page import Picture, picture, render, versions_of
 from wm_drake.report.tables import Group, Row, Table, parameter_table
 from wm_drake.simulation.measures import envelopes, percent_difference
 from wm_drake.studies.gasket_damping.grid_search import Search
-from wm_drake.studies.gasket_damping.study import NOISE, STOP, UNKNOWNS, WINDOW, Damping
+from wm_drake.studies.gasket_damping.study import (
+    AGREEMENT,
+    LOWER,
+    NOISE,
+    UNKNOWNS,
+    UPPER,
+    WINDOW,
+    Damping,
+)
 
 UNITS = (Unit("N*s/m", "N*s/mm"), Unit("N*m*s/rad", "N*mm*s/deg"))
 """SI units and printed units of C_L and C_T."""
@@ -58,29 +66,47 @@ def gasket_damping_report(result: Damping, parameters: MachineParameters, comman
     )
 
 
+NAMES = {"grid": "grid search", "scipy": "bounded Nelder-Mead method of SciPy"}
+"""Names of the searches for reading."""
+
+
 def summary(result: Damping) -> str:
-    """Return one paragraph about the damping that each search found."""
+    """Return one paragraph: the better optimum, whether both searches agree, the planted values."""
     source = "a virtual experiment" if result.truth is not None else "measured records"
     loads = f"load{'s' if len(result.measured) > 1 else ''} {' and '.join(result.measured)}"
     text = (
-        f"The computed envelopes were fitted to {source} of {loads}. The grid search found "
-        f"{_damping_text(result.grid.best)}, with an envelope distance of "
-        f"{number(result.grid.value, 2)} mm, after {result.grid.evaluations} evaluations in "
-        f"{len(result.grid.rounds)} rounds. The bounded Nelder-Mead method of SciPy found "
-        f"{_damping_text(result.scipy.best)}, with an envelope distance of "
-        f"{number(result.scipy.value, 2)} mm, after {result.scipy.evaluations} evaluations."
+        f"The computed envelopes agree best with {source} of {loads} at "
+        f"{_damping_text(result.better.best)}, with an envelope distance of "
+        f"{number(result.better.value, 2)} mm. {_interval_text(result)} {_agreement(result)}"
     )
-    text += f" {_interval_text(result)}"
     if result.truth is None:
         return text
     errors = [
-        percent(100.0 * (b - t) / t)
-        for b, t in zip(result.grid.best, result.truth, strict=True)
+        f"{number(100.0 * (b - t) / t, 1)} %"
+        for b, t in zip(result.better.best, result.truth, strict=True)
         if t
     ]
     return (
-        f"{text} The planted values are {_damping_text(result.truth)}. The values of the grid "
-        f"search differ from them by {' and '.join(errors)}."
+        f"{text} The planted values are {_damping_text(result.truth)}; the optimum differs from "
+        f"them by {' and '.join(errors)}."
+    )
+
+
+def _agreement(result: Damping) -> str:
+    """Return sentences on what each search found and whether both agree."""
+    first, other = sorted(
+        (("grid", result.grid), ("scipy", result.scipy)),
+        key=lambda item: item[1] is not result.better,
+    )
+    verdict = (
+        f"The two searches agree within {100.0 * AGREEMENT:g} % of the region."
+        if result.searches_agree
+        else "The two searches disagree; the better one is reported."
+    )
+    return (
+        f"{verdict} The {NAMES[first[0]]} found this optimum after {first[1].evaluations} "
+        f"evaluations; the {NAMES[other[0]]} found {_damping_text(other[1].best)}, with a distance "
+        f"of {number(other[1].value, 2)} mm, after {other[1].evaluations}."
     )
 
 
@@ -90,19 +116,27 @@ def _interval_text(result: Damping) -> str:
         return "There is no confidence interval: fewer than three curves, or a run diverged."
     low, high = (in_units_of_paper(end) for end in (result.interval.low, result.interval.high))
     return (
-        f"95 % intervals of the better optimum: {number(low[0], 4)} to {number(high[0], 4)} N s/mm "
+        f"95 % intervals: {number(low[0], 4)} to {number(high[0], 4)} N s/mm "
         f"for C_L and {number(low[1], 1)} to {number(high[1], 1)} N mm s/deg for C_T."
     )
 
 
 def _warnings(result: Damping) -> list[str]:
+    found = []
+    if not result.searches_agree:
+        found.append(
+            "The grid search and the Nelder-Mead search found different optima (see the table of "
+            "optima). The one with the smaller distance is reported. A finer mesh (--mesh) may "
+            "bring them together."
+        )
     if result.truth is None:
-        return []
+        return found
     return [
+        *found,
         "No measured records were given. The records on this page come from a virtual experiment: "
         f"the Drake engine ran the same machine with {_damping_text(result.truth)}, and noise of "
         f"{number(MM_PER_M * NOISE, 1)} mm was added to each sample. The experiment shows that the "
-        "study finds known values. It gives no information about a real gasket."
+        "study finds known values. It gives no information about a real gasket.",
     ]
 
 
@@ -116,6 +150,7 @@ def points_table(result: Damping) -> pd.DataFrame:
     rows = [
         {
             "round": index,
+            "spacing [% of region]": 100.0 * grid.spacing,
             "C_L [N s/mm]": in_units_of_paper(point)[0],
             "C_T [N mm s/deg]": in_units_of_paper(point)[1],
             "objective [mm]": value,
@@ -128,6 +163,7 @@ def points_table(result: Damping) -> pd.DataFrame:
 
 def _optima(result: Damping) -> Table:
     def line(name: str, search: Search) -> Group:
+        name = f"{name} (better)" if search is result.better else name
         linear, torsional = in_units_of_paper(search.best)
         cells = (
             number(linear, 4),
@@ -154,7 +190,8 @@ def _optima(result: Damping) -> Table:
     caption = (
         "Distance: sum over the loads of the 2-norm of the differences of the upper and lower "
         f"envelopes at all sensors, every 5 ms from {WINDOW[0]:g} to {WINDOW[1]:g} s, [B] Eq. (2), "
-        f"(3). The grid search ends when a round reduces the distance by less than {STOP:g} mm. "
+        f"(3). The grid of the search moves to its best point and is halved when it has no better "
+        f"point than its centre, until its spacing is at most {_mesh_text(result)}. "
         "The interval shows how much the optimum depends on single curves (one sensor with one "
         "load): each is left out once (jackknife). An error that all curves share, such as a "
         "wrong stiffness of a spring, is not in it."
@@ -162,10 +199,17 @@ def _optima(result: Damping) -> Table:
     return Table(caption, header, tuple(groups))
 
 
+def _mesh_text(result: Damping) -> str:
+    """Return the spacing of the last grid in both unknowns."""
+    linear, torsional = in_units_of_paper(result.grid.rounds[-1].spacing * (UPPER - LOWER))
+    return f"{significant(linear, 2)} N s/mm and {significant(torsional, 2)} N mm s/deg"
+
+
 def _surface_picture(result: Damping) -> Picture:
     caption = (
         "Left: points of the grid search, darker in each later round, and the path of the best "
-        "point. Right: value of the objective function at these points ([B] Fig. 7)."
+        "point from the first grid on. Right: value of the objective function at these points "
+        "([B] Fig. 7)."
     )
     return picture(
         surface_figure(result),
@@ -191,8 +235,8 @@ def surface_figure(result: Damping) -> Figure:
         shade = min(1.0, 0.35 + 0.15 * index)
         axes.plot(*own.T, mark, color=MARK, alpha=shade, markersize=size, fillstyle="none")
     path = np.array([in_units_of_paper(grid.best) for grid in result.grid.rounds])
-    axes.plot(*path.T, "-", color=MEASURED, linewidth=1.6, label="path of the best point")
-    axes.plot(*path[-1], "o", color=MEASURED, markersize=6)
+    axes.plot(*path.T, "-", color=MEASURED, linewidth=1.6, zorder=4, label="path of the best point")
+    axes.plot(*path[-1], "o", color=MEASURED, markersize=6, zorder=4)
     if result.interval is not None:
         best, *ends = (
             in_units_of_paper(point)

@@ -1,7 +1,9 @@
 """Grid search of [B] section 3.1.2, and a bounded Nelder-Mead search to compare with.
 
-The first grid covers the region. Each further grid has half the size and is centred at the best
-point so far.
+The first grid covers the region. Each further grid is centred at the best point so far. Its spacing
+is halved only if the last grid gave no better point; otherwise the grid moves on with the same
+spacing. So the search follows a diagonal valley, where the best point of a grid is far from the
+optimum. This is a pattern search; it ends when the spacing is as fine as demanded.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,21 +18,27 @@ from wm_drake.parameters.types import FloatArray
 POINTS_PER_AXIS = 5
 """Points of a grid along each axis: 25 points for two unknowns, as in [B]."""
 
-MOST_ROUNDS = 12
-"""Limit of the number of grids; the last one is about 2000 times finer than the first."""
-
 Objective: TypeAlias = Callable[[Sequence[FloatArray]], list[float]]
 """Function that returns the values at several points, so that they can be computed in parallel."""
 
 
 @dataclass(frozen=True)
 class Round:
-    """One grid: its new points, their values, and the best point so far with its value."""
+    """One grid.
+
+    Attributes:
+        points: Its new points.
+        values: Objective at these points.
+        best: The best point so far.
+        best_value: Objective at the best point.
+        spacing: Distance of neighbouring points, as a part of the region.
+    """
 
     points: FloatArray
     values: FloatArray
     best: FloatArray
     best_value: float
+    spacing: float
 
 
 @dataclass(frozen=True)
@@ -50,42 +58,49 @@ class Search:
     rounds: tuple[Round, ...] = ()
 
 
-def grid_search(objective: Objective, lower: FloatArray, upper: FloatArray, stop: float) -> Search:
-    """Minimize an objective by grids that are refined around the best point.
+def grid_search(objective: Objective, lower: FloatArray, upper: FloatArray, mesh: float) -> Search:
+    """Minimize an objective by grids that move to the best point and are refined there.
 
-    Points of a finer grid that are outside the region are omitted. Points that are known already
-    are not computed again.
+    Points of a grid that are outside the region are omitted. Points that are known already are not
+    computed again. The number of grids is finite: each one either finds a better point of the same
+    mesh or is the last one of its spacing.
 
     Args:
         objective: Objective to minimize.
         lower, upper: Bounds of the region.
-        stop: The search ends when a round reduces the objective by less than this.
+        mesh: Spacing at which the search ends, as a part of the region, > 0. The last grid has at
+            most this spacing, and no point of it is better than its centre.
     """
     known: dict[tuple[float, ...], float] = {}
-    offsets = np.stack(
-        np.meshgrid(
-            *[np.arange(POINTS_PER_AXIS) - POINTS_PER_AXIS // 2] * len(lower), indexing="ij"
-        ),
-        axis=-1,
-    )
-    steps = offsets.reshape(-1, len(lower)) / (POINTS_PER_AXIS - 1)
-    centre, rounds = np.full(len(lower), 0.5), list[Round]()
-    for number in range(MOST_ROUNDS):
+    steps = _offsets(len(lower))
+    centre, spacing = np.full(len(lower), 0.5), 1.0 / (POINTS_PER_AXIS - 1)
+    rounds = list[Round]()
+    while True:
         # in units of the region; the coordinates are dyadic fractions, which floats hold exactly
-        grid = centre + steps / 2.0**number
+        grid = centre + spacing * steps
         inside = grid[np.all((grid >= 0.0) & (grid <= 1.0), axis=1)]
         new = [point for point in inside if tuple(point) not in known]
         points = [lower + point * (upper - lower) for point in new]
         values = objective(points)
         known |= dict(zip((tuple(map(float, point)) for point in new), values, strict=True))
-        centre = np.array(min(known, key=lambda point: known[point]))
-        best_value = known[tuple(centre)]
-        best = lower + centre * (upper - lower)
+        best = min(known, key=lambda point: known[point])
+        is_better = known[best] < known[tuple(map(float, centre))]
+        centre = np.array(best) if is_better else centre
+        best_value = known[tuple(map(float, centre))]
         new_points = np.array(points).reshape(-1, len(lower))
-        rounds.append(Round(new_points, np.array(values), best, best_value))
-        if number and rounds[-2].best_value - best_value < stop:
-            break
+        best_point = lower + centre * (upper - lower)
+        rounds.append(Round(new_points, np.array(values), best_point, best_value, spacing))
+        if not is_better:
+            if spacing <= mesh:
+                break
+            spacing *= 0.5
     return Search(rounds[-1].best, rounds[-1].best_value, len(known), tuple(rounds))
+
+
+def _offsets(size: int) -> FloatArray:
+    """Return the points of a grid with spacing 1 around its centre, one row per point."""
+    along = [np.arange(POINTS_PER_AXIS) - POINTS_PER_AXIS // 2] * size
+    return np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, size).astype(float)
 
 
 def bounded_search(

@@ -1,7 +1,7 @@
 """Identification of the gasket damping C_L and C_T from measured envelopes, [B] section 3.1.2."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -38,7 +38,13 @@ UPPER = np.array([50.0, 0.2 * 180.0 / np.pi])
 """Upper bounds of [B]: 0.05 N s/mm for C_L and 200 N mm s/deg for C_T. [N s/m, N m s/rad]"""
 
 STOP = 0.02
-"""Gain of the objective below which the search ends ([B] section 3.1.2). [mm]"""
+"""Gain of the objective below which the bounded search ends ([B] section 3.1.2). [mm]"""
+
+MESH = 1e-3
+"""Default spacing of the finest grid, as a part of the region."""
+
+AGREEMENT = 0.01
+"""Largest difference of the two optima in each unknown, as a part of the region, if they agree."""
 
 WINDOW = (10.0, 50.0)
 """Time interval that is compared ([B] section 3.1.2). [s]"""
@@ -65,7 +71,7 @@ class Damping:
         grid: Optimum of the grid search. [N s/m, N m s/rad]
         scipy: Optimum of the bounded search of scipy. [N s/m, N m s/rad]
         truth: True values of a virtual experiment; None for a measurement. [N s/m, N m s/rad]
-        at_best: Computed record at the optimum of the grid search, by load.
+        at_best: Computed record at the better optimum, by load.
         measured: The measured displacements.
         interval: Confidence interval of the better of the two optima; None if there are too few
             curves. [N s/m, N m s/rad]
@@ -78,9 +84,23 @@ class Damping:
     measured: Measured
     interval: Interval | None = None
 
+    @property
+    def better(self) -> Search:
+        """The search that found the smaller distance; the grid search if both found the same."""
+        return min((self.grid, self.scipy), key=lambda search: search.value)
+
+    @property
+    def searches_agree(self) -> bool:
+        """Whether the optima of both searches differ by at most `AGREEMENT`."""
+        difference = np.abs(self.grid.best - self.scipy.best) / (UPPER - LOWER)
+        return bool(np.all(difference <= AGREEMENT))
+
 
 def identify_damping(
-    parameters: MachineParameters, measured: Measured, truth: FloatArray | None = None
+    parameters: MachineParameters,
+    measured: Measured,
+    truth: FloatArray | None = None,
+    mesh: float = MESH,
 ) -> Damping:
     """Identify C_L and C_T from measured displacements.
 
@@ -88,16 +108,18 @@ def identify_damping(
         parameters: The machine.
         measured: Displacements of its sensors, by load.
         truth: True values if `measured` is from `virtual_experiment`. [N s/m, N m s/rad]
+        mesh: Spacing at which the grid search ends, as a part of the region.
 
     Raises:
         InputError: the machine has no gasket, or its profile ends before the window.
     """
     objective = EnvelopeDistance(parameters, measured)
-    grid = grid_search(objective, LOWER, UPPER, STOP)
+    grid = grid_search(objective, LOWER, UPPER, mesh)
     scipy = bounded_search(objective, LOWER, UPPER, STOP)
-    at_best = {case.name: simulate(objective.machine, case) for case in objective.cases(grid.best)}
-    best = min((scipy, grid), key=lambda search: search.value).best
-    return Damping(grid, scipy, truth, at_best, measured, objective.interval(best))
+    found = Damping(grid, scipy, truth, {}, measured)
+    best = found.better.best
+    at_best = {case.name: simulate(objective.machine, case) for case in objective.cases(best)}
+    return replace(found, at_best=at_best, interval=objective.interval(best))
 
 
 def virtual_experiment(
