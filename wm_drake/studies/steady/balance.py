@@ -25,7 +25,7 @@ from wm_drake.studies.steady.series import Series
 HARMONICS = 9
 """Default number of harmonics."""
 
-SAMPLES = 64
+SAMPLES = 128
 """Default number of samples of a period."""
 
 ANGLE_ARM = 0.25

@@ -121,18 +121,25 @@ def follow(
             break
         reach = (target - place.speed) / place.speed_along if place.speed_along else np.inf
         landing = reach <= step
-        found = _step(balance, metric, place, reach if landing else step, target, landing)
+        length = reach if landing else step
+        begin = place.coefficients + length * place.along
+        ahead = target if landing else place.speed + length * place.speed_along
+        found = _step(balance, metric, place, length, begin, ahead, landing)
+        if found is not None and not landing and (found[0].speed - target) * place.speed_along > 0:
+            # the branch reached the speed of the grid before its tangent did: stop there first
+            share = (target - place.speed) / (found[0].speed - place.speed)
+            begin = place.coefficients + share * (found[0].coefficients - place.coefficients)
+            found = _step(balance, metric, place, length, begin, target, landing := True)
         if found is None:
             step = 0.5 * min(step, reach, 4.0)
             if step < SHORTEST_STEP:
                 break
             continue
-        previous, (place, quick) = place, found
+        place, quick = found
         if quick:
             step *= 2.0
         if not low - 1e-9 <= place.speed <= high + 1e-9:
             break
-        del previous
         points.append(_point(balance, place, landing, way))
         progress(abs(place.speed - speeds[0]) / (high - low))
         if landing and target == speeds[-1]:
@@ -198,13 +205,20 @@ def _step(
     metric: _Metric,
     place: _Place,
     length: float,
-    target: float,
+    begin: FloatArray,
+    speed: float,
     landing: bool,
 ) -> tuple[_Place, bool] | None:
-    """Return the next place along a branch, and whether it was found at once; None if not found."""
+    """Return the next place along a branch, and whether it was found at once; None if not found.
+
+    Args:
+        balance, metric: The machine, and the size of a step.
+        place: Where the step begins.
+        length: Arc length of the step.
+        begin, speed: First guess of the motion and its speed.
+        landing: Whether the speed is kept; else the motion is on the plane across the tangent.
+    """
     row = metric.row(place.along, place.speed_along)
-    begin = place.coefficients + length * place.along
-    speed = target if landing else place.speed + length * place.speed_along
     coefficients, factors, last, count = begin.copy(), None, np.inf, 0
     right = np.zeros((len(row), 2))
     right[-1, 1] = 1.0
@@ -224,7 +238,7 @@ def _step(
         if not np.all(np.isfinite(change)):
             return None
         coefficients = coefficients + change[:-1].reshape(begin.shape)
-        speed = target if landing else speed + float(change[-1])
+        speed += 0.0 if landing else float(change[-1])
         size = balance.extent(change[:-1].reshape(begin.shape))
         count += 1
         if size < TOLERANCE:
