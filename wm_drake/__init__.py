@@ -27,6 +27,7 @@ _HOMES = {
     "load_profile": "parameters",
     "load_record": "simulation.records",
     "measure": "simulation.measures",
+    "modes": "studies.modes.study",
     "natural_modes": "studies.description.modal",
     "progress_bar": "cli.progress",
     "run_spin": "studies.spin.study",

@@ -7,9 +7,18 @@ states are evaluated side by side.
 
 import numpy as np
 
-from wm_drake.compiler.compilation import long_running
+from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.elements.bushing import six_component_bushing_wrench
+from wm_drake.elements.friction_damper import (
+    friction_damper_line,
+    friction_damper_tension,
+    friction_damper_wrench,
+)
+from wm_drake.elements.motion import motion_at, read_tree_state, tub_motion
+from wm_drake.elements.spring import spring_strut_wrench
+from wm_drake.elements.telescopic_damper import telescopic_damper_forces
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
@@ -18,16 +27,23 @@ from wm_drake.engines.compiled.mechanics import (
     state_derivative,
 )
 from wm_drake.engines.compiled.packing import initial_state, pack
-from wm_drake.engines.compiled.tubes import TUBES_STATE_SIZE
+from wm_drake.engines.compiled.tubes import (
+    TUBES_STATE_SIZE,
+    read_tubes_and_damper,
+    read_tubes_state,
+    telescopic_damper_count,
+)
 from wm_drake.model.machine import Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 
-POSITION_STEP, VELOCITY_STEP = 1e-6, 1e-7
-"""Steps of the differences. [m or rad, m/s or rad/s]
+POSITION_STEP, VELOCITY_STEP = 2.0**-28, 2.0**-23
+"""Steps of the differences, about 4e-9 and 1e-7. [m or rad, m/s or rad/s]
 
-The step of a velocity is a tenth of the regularisation velocity of the papers' friction, so that
-the slope at rest is that of a friction damper that sticks."""
+Tables bend at their points, where the error grows with the step of a position, while rounding grows
+the other way: at this step both are about 1e-7 of a slope. The step of a velocity is a tenth of the
+regularisation velocity of the papers' friction, so that the slope at rest is that of a friction
+damper that sticks."""
 
 
 class SlopedDerivative:
@@ -97,6 +113,28 @@ class SlopedDerivative:
         slopes = (moved[:, :half] - moved[:, half:]) / (2.0 * steps[:, None])
         return np.ascontiguousarray(slopes.transpose(0, 2, 1))
 
+    def wrench_slopes(self, state: FloatArray) -> FloatArray:
+        """Return the slopes of the wrench of each element on the tub at a state.
+
+        The elements are springs, strut dampers, bushings and telescopic dampers, in this order.
+
+        Returns:
+            (elements, 6, free) moment about To and force, in W, by each free number. [N m, N]
+        """
+        indices = self.layout.elements
+        count = len(indices.springs) + len(indices.dampers) + len(indices.bushings)
+        count += telescopic_damper_count.py_func(indices.telescopes)
+        steps = self._steps[self.free]
+        columns, both = np.tile(self.free, 2), np.concatenate([steps, -steps])
+        idle = -len(columns) % WIDTH
+        columns, both = np.pad(columns, (0, idle)), np.pad(both, (0, idle))
+        wrenches = np.empty((len(columns), count, 6))
+        states = np.tile(state, (len(columns), 1))
+        tub_wrenches_at(states, columns, both, self.packed, indices, wrenches)
+        half = len(self.free)
+        slopes = (wrenches[:half] - wrenches[half : 2 * half]) / (2.0 * steps[:, None, None])
+        return np.ascontiguousarray(slopes.transpose(1, 2, 0))
+
     def _evaluate(
         self, states: FloatArray, columns: FloatArray, steps: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
@@ -145,3 +183,94 @@ def derivatives_at(states, columns, steps, p, elements, rates, moved):
             else:
                 for k in range(size):
                     moved[row, move - 1, k] = dx_numbers[k * WIDTH + lane]
+
+
+@long_running
+def tub_wrenches_at(states, columns, steps, p, elements, wrenches):
+    """Evaluate the wrench of each element on the tub, at states that are moved in one number each.
+
+    The elements are springs, strut dampers, bushings and telescopic dampers, in this order.
+
+    Args:
+        states: (n, size), n a multiple of `WIDTH`.
+        columns, steps: Index and size of the move of each state. (n,)
+        p: Packed numbers.
+        elements: `Elements`.
+        wrenches: Moment about To and force on the tub, in W, written. (n, elements, 6) [N m, N]
+    """
+    align_stack()
+    size = states.shape[1]
+    x_numbers, p_numbers, out = (
+        np.empty(size * WIDTH),
+        in_each_lane(p),
+        np.empty(6 * wrenches.shape[1] * WIDTH),
+    )
+    x, numbers, answer = lane_array(x_numbers), lane_array(p_numbers), lane_array(out)
+    for begin in range(0, len(states), WIDTH):
+        for lane in range(WIDTH):
+            for k in range(size):
+                x_numbers[k * WIDTH + lane] = states[begin + lane, k]
+            x_numbers[columns[begin + lane] * WIDTH + lane] += steps[begin + lane]
+        motion = tub_motion(x)
+        at_row = 0
+        for at in elements.springs:
+            wrench, _ = spring_strut_wrench(motion, numbers, at)
+            write_six(answer, at_row, wrench)
+            at_row += 6
+        for i in range(len(elements.dampers)):
+            at = elements.dampers[i]
+            arm, line = friction_damper_line(motion, numbers, at)
+            tension, _ = friction_damper_tension(line[1], x[STATE_SIZE + i], numbers, at)
+            write_six(
+                answer, at_row, friction_damper_wrench(motion, arm, line, tension, numbers, at)
+            )
+            at_row += 6
+        for at in elements.bushings:
+            wrench, _ = six_component_bushing_wrench(motion, numbers, at)
+            write_six(answer, at_row, wrench)
+            at_row += 6
+        for i in range(telescopic_damper_count(elements.telescopes)):
+            write_six(
+                answer,
+                at_row,
+                telescope_on_tub(x, motion, numbers, elements.telescopes, elements.tubes, i),
+            )
+            at_row += 6
+        for k in range(6 * wrenches.shape[1]):
+            for lane in range(WIDTH):
+                wrenches[begin + lane, k // 6, k % 6] = out[k * WIDTH + lane]
+
+
+@law
+def telescope_on_tub(x, motion, p, telescopes, first, i):
+    """Return the wrench of a telescopic damper on the tub (six numbers, W). [N m, N]
+
+    Args:
+        x: State.
+        motion: `TubMotion` of the tub.
+        p: Packed numbers.
+        telescopes, first: Fields `telescopes` and `tubes` of `Elements`.
+        i: Number of the damper.
+    """
+    if telescopes is None:
+        zero = 0.0 * x[0]
+        return (zero, zero, zero, zero, zero, zero)
+    numbers = read_tubes_and_damper(p, telescopes[i])
+    own = read_tubes_state(x, first + TUBES_STATE_SIZE * i)
+    state = read_tree_state(*own.tubes)
+    on_tub, _, _, _, _, _, _ = telescopic_damper_forces(
+        motion,
+        motion_at(*own.tubes),
+        state.joint_position,
+        state.joint_rate,
+        own.deformation,
+        *numbers.damper,
+    )
+    return on_tub
+
+
+@law
+def write_six(array, at, six):
+    """Write six numbers into an array from an index."""
+    for k in range(6):
+        array[at + k] = six[k]

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE
+from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
 from wm_drake.engines.compiled.slopes import SlopedDerivative
-from wm_drake.engines.compiled.tubes import TUBES_STATE_SIZE
+from wm_drake.engines.compiled.tubes import DEFORMATION, TUBES_STATE_SIZE
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.steady.series import Series
@@ -31,11 +31,12 @@ SAMPLES = 128
 ANGLE_ARM = 0.25
 """Length that converts angles to displacements: about the radius of the tub. [m]"""
 
-SPIN_HOLD = 1e-6
-"""Rate at which the angles of damper tubes return to their angles at rest. [1/s]
+HOLD = 1e-6
+"""Rate at which held numbers of the state return to their values at rest. [1/s]
 
-Nothing holds the spin of a tube about its axis, so its mean angle would be undetermined. The other
-motions change by this rate over their angular frequency, less than one part in a million."""
+Held are the angles of damper tubes and the deformations of sponges. Nothing holds the spin of a
+tube about its axis, nor a sponge within its free stroke, so that their mean would be undetermined.
+Other motions change by this rate over their angular frequency, less than one part in a million."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,7 @@ class HarmonicBalance:
         series: Order and samples.
         scale: Factor of each number in the size of a motion: 1 for positions, `ANGLE_ARM` for
             angles, 0 for velocities, so that a size is in m. (n,)
+        held: Indices of the numbers that `HOLD` is about.
     """
 
     def __init__(self, setup: Setup, series: Series) -> None:
@@ -73,7 +75,7 @@ class HarmonicBalance:
         """
         self.derivative, self.series = SlopedDerivative(setup), series
         self.scale = _scale(self.derivative, setup)
-        self._held = _angles_of_tubes(self.derivative, setup)
+        self.held = _held(self.derivative, setup)
 
     @property
     def size(self) -> int:
@@ -107,10 +109,13 @@ class HarmonicBalance:
     ) -> FloatArray:
         series = self.series
         residual = speed * (series.slope @ coefficients) - series.analysis @ rates
-        if self._held.size:
-            moved = coefficients[0] - self.derivative.rest[self.derivative.free]
-            residual[0, self._held] += SPIN_HOLD * moved[self._held]
-        return np.asarray(residual)
+        return self.with_hold(residual, coefficients)
+
+    def with_hold(self, residual: FloatArray, coefficients: FloatArray) -> FloatArray:
+        """Return a residual with the hold of the numbers that nothing else may hold."""
+        moved = coefficients[0] - self.derivative.rest[self.derivative.free]
+        residual[0, self.held] += HOLD * moved[self.held]
+        return residual
 
     def linearised(self, coefficients: FloatArray, speed: float) -> Linearised:
         """Return the residual and its derivatives."""
@@ -134,7 +139,7 @@ class HarmonicBalance:
         np.negative(blocks.transpose(0, 3, 1, 2), out=matrix)
         each = np.arange(n)
         matrix[:, each, :, each] += speed * self.series.slope
-        matrix[0, self._held, 0, self._held] += SPIN_HOLD
+        matrix[0, self.held, 0, self.held] += HOLD
         return matrix.reshape(size * n, size * n)
 
     def extent(self, coefficients: FloatArray) -> float:
@@ -145,14 +150,18 @@ class HarmonicBalance:
 def _scale(derivative: SlopedDerivative, setup: Setup) -> FloatArray:
     scale = np.where(derivative.is_velocity, 0.0, 1.0)
     scale[:3] = ANGLE_ARM
-    scale[_angles_of_tubes(derivative, setup)] = ANGLE_ARM
+    tubes, own = derivative.layout.elements.tubes, TUBES_STATE_SIZE
+    angles = [tubes + own * i + k for i in range(len(setup.telescopes)) for k in range(3)]
+    scale[np.isin(derivative.free, angles)] = ANGLE_ARM
     if setup.bearing:
         scale[len(scale) - 12 : len(scale) - 9] = ANGLE_ARM
     return scale
 
 
-def _angles_of_tubes(derivative: SlopedDerivative, setup: Setup) -> np.ndarray:
-    """Return the indices among the free numbers of the angles of damper tubes."""
-    tubes = derivative.layout.elements.tubes
-    angles = [tubes + TUBES_STATE_SIZE * i + k for i in range(len(setup.telescopes)) for k in range(3)]
-    return np.flatnonzero(np.isin(derivative.free, angles))
+def _held(derivative: SlopedDerivative, setup: Setup) -> np.ndarray:
+    """Return the indices among the free numbers of tube angles and of sponge deformations."""
+    tubes, own = derivative.layout.elements.tubes, TUBES_STATE_SIZE
+    held = [STATE_SIZE + k for k in range(len(setup.dampers))]
+    for i in range(len(setup.telescopes)):
+        held += [tubes + own * i + k for k in (0, 1, 2, DEFORMATION)]
+    return np.flatnonzero(np.isin(derivative.free, held))

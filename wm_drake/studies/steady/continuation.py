@@ -5,13 +5,14 @@ solved at that speed; else on the plane across the tangent (Keller 1977). The ma
 linearisation serves all corrections of a step that converge fast (chord method).
 """
 
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
 
-from wm_drake.errors import InputError, input_error
+from wm_drake.errors import input_error
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.steady.balance import HarmonicBalance
 from wm_drake.studies.steady.stability import floquet_multipliers, is_stable
@@ -227,9 +228,10 @@ def _step(
         if factors is None:
             at = balance.linearised(coefficients, speed)
             residual = at.residual
-            factors = lu_factor(
-                _bordered(at.matrix, at.by_speed, constraint), overwrite_a=True, check_finite=False
-            )
+            with warnings.catch_warnings():  # a singular matrix gives no finite step
+                warnings.simplefilter("ignore", LinAlgWarning)
+                bordered = _bordered(at.matrix, at.by_speed, constraint)
+                factors = lu_factor(bordered, overwrite_a=True, check_finite=False)
             count = 0
         else:
             residual = balance.residual(coefficients, speed)
@@ -299,6 +301,3 @@ def _at_speed(balance: HarmonicBalance, guess: FloatArray, speed: float) -> Floa
         if size < TOLERANCE:
             return coefficients
     return None
-
-
-__all__ = ["InputError", "Point", "first_motion", "follow"]
