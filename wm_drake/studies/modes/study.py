@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
+from threadpoolctl import threadpool_limits
 
 from wm_drake.batch import simulate_many
 from wm_drake.errors import input_error
@@ -117,6 +118,18 @@ def modes(
             f"{1e3 * amplitude:g} mm is no amplitude; allowed are more than 0 and up to 100 mm",
             key="amplitude",
         )
+    with threadpool_limits(1, "blas"):  # the matrices are small: several threads would be slower
+        return _modes(machine, load, gasket, amplitude, run_up, progress)
+
+
+def _modes(
+    machine: Machine,
+    load: Load | str | None,
+    gasket: bool,
+    amplitude: float,
+    run_up: bool,
+    progress: Callable[[float], None],
+) -> MachineModes:
     parameters = machine.parameters
     linear = {
         STUCK: _linearisation(machine, load, gasket, friction=True),
