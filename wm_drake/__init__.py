@@ -34,6 +34,7 @@ _HOMES = {
     "save_record": "simulation.records",
     "simulate": "simulation.runs",
     "simulate_many": "batch",
+    "steady_response": "studies.steady.response",
     "with_value": "parameters",
     "with_values": "parameters",
 }
