@@ -21,6 +21,10 @@ _LAYOUTS = {
 }
 
 
+_FRICTION = ("friction_force", "basic_friction_force")
+"""Fields of a law that hold the force of its dry friction."""
+
+
 def packed_damper_law(damper: DamperNumbers) -> FloatArray:
     """Return the packed law of a damper of a machine file."""
     number = DAMPER_LAWS[damper.law].number
@@ -41,6 +45,21 @@ def law_structure(packed: FloatArray, at: int = 0) -> list[int]:
     """Return number of a packed law and points of its tables, which are equal in a batch."""
     number = law_of(packed, at).number
     return [number, *_LAYOUTS[number].structure(packed, at + 1)]
+
+
+def frictionless_law(packed: FloatArray) -> FloatArray:
+    """Return the packed law of a damper whose friction is saturated: the force of it is constant.
+
+    A small motion on top of steady sliding has no friction, only the dashpots. Friction that grows
+    with the velocity of the slider is a dashpot beside that of the slider, if the law has one.
+    """
+    layout = _LAYOUTS[law_of(packed).number]
+    numbers = law_numbers(packed)
+    changed = {name: 0.0 for name in _FRICTION if name in numbers._fields}
+    if {"friction_damping", "slider_damping"} <= set(numbers._fields):
+        changed["slider_damping"] = numbers.slider_damping + numbers.friction_damping
+        changed["friction_damping"] = 0.0
+    return np.concatenate([packed[:1], layout.replaced(packed[1:], **changed)])
 
 
 def _choice(

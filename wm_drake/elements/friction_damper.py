@@ -1,7 +1,7 @@
 """Friction damper, as a massless strut between a point of the tub and a point of the housing."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import numbers
@@ -10,6 +10,7 @@ from wm_drake.compiler.vectors import add, cross, rotate, scale, subtract
 from wm_drake.elements.damper_law import (
     LAW,
     damper_response,
+    frictionless_law,
     law_of,
     law_structure,
     packed_damper_law,
@@ -56,6 +57,12 @@ class FrictionDamperParameters:
     def structure(self) -> list[int]:
         """Number of its law, and of the points of its sponge's table if it has one."""
         return law_structure(self.packed_law)
+
+    def without_friction(self) -> "FrictionDamperParameters":
+        """Return the damper without friction, as a small motion on top of steady sliding has it."""
+        bushing = self.end_bushing.model_copy(update={"friction_torque": 0.0})
+        law = frictionless_law(self.packed_law)
+        return replace(self, end_bushing=bushing, packed_law=law)
 
     def packed(self) -> FloatArray:
         """Return the numbers of `FRICTION_DAMPER`."""

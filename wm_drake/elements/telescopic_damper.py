@@ -15,7 +15,13 @@ from wm_drake.elements.bushing import (
     six_component_bushing_between,
     six_component_bushing_wrench,
 )
-from wm_drake.elements.damper_law import LAW, damper_response, law_of, law_structure
+from wm_drake.elements.damper_law import (
+    LAW,
+    damper_response,
+    frictionless_law,
+    law_of,
+    law_structure,
+)
 from wm_drake.elements.motion import (
     GENERALIZED_FORCE_SIZE,
     PLANT_STATE_SIZE,
@@ -90,6 +96,15 @@ class TelescopicDamperParameters:
             tub_bushing=self.tub_bushing.without_friction(),
             housing_bushing=self.housing_bushing.without_friction(),
             engaged=0.0,
+        )
+
+    def sliding(self) -> "TelescopicDamperParameters":
+        """Return the damper without friction but with its law, as steady sliding has it."""
+        return replace(
+            self,
+            tub_bushing=self.tub_bushing.without_friction(),
+            housing_bushing=self.housing_bushing.without_friction(),
+            packed_law=frictionless_law(self.packed_law),
         )
 
     def packed(self) -> FloatArray:

@@ -165,6 +165,7 @@ class MachineSystems:
         profile: SpinProfile | None = None,
         gasket: bool = True,
         dampers: bool = True,
+        friction: bool = True,
     ) -> Setup:
         """Set numbers and load in a Context, at the rest pose and the first speed of the profile.
 
@@ -180,6 +181,8 @@ class MachineSystems:
                 elements, the same laws and tables of the same length.
             profile: Spin profile to follow; that of the parameters if None.
             gasket, dampers: False disengages them.
+            friction: False takes the dry friction out of all elements, as for a small motion on top
+                of steady sliding.
 
         Raises:
             InputError: the elements are not those that were built, a name is not in the SDF, or
@@ -196,6 +199,7 @@ class MachineSystems:
         elements = preloaded(self.plant, plant_context, layout, unloaded)
         elements = elements if gasket else elements.without_gasket()
         elements = elements if dampers else elements.without_dampers()
+        elements = elements if friction else elements.without_friction()
         residual = put_to_rest(self.plant, plant_context, layout, elements)
         self._add_load(plant_context, parameters, load)
         q = self.plant.GetPositions(plant_context)
@@ -317,6 +321,7 @@ class Machine(MachineSystems):
         profile: SpinProfile | None = None,
         gasket: bool = True,
         dampers: bool = True,
+        friction: bool = True,
     ) -> Setup:
         """Set numbers and load in a Context, at rest; a fresh Context at time 0 if None is given.
 
@@ -329,6 +334,7 @@ class Machine(MachineSystems):
             profile=profile,
             gasket=gasket,
             dampers=dampers,
+            friction=friction,
         )
 
     def set_up_bodies(

@@ -59,6 +59,15 @@ class PlacedElements:
         telescopes = {name: tubes.without_friction() for name, tubes in self.telescopes.items()}
         return replace(self, dampers=dampers, telescopes=telescopes)
 
+    def without_friction(self) -> "PlacedElements":
+        """Return the elements with saturated friction: dry friction is zero, dashpots remain."""
+        return replace(
+            self,
+            dampers={name: damper.without_friction() for name, damper in self.dampers.items()},
+            bushings={name: bushing.without_friction() for name, bushing in self.bushings.items()},
+            telescopes={name: tubes.sliding() for name, tubes in self.telescopes.items()},
+        )
+
     def links(self) -> Iterator[tuple[Any, Callable[..., None], int]]:
         """Yield each element, its law and the tree it acts on beside tub and drum; 0 for none."""
         for spring in self.springs.values():

@@ -157,6 +157,10 @@ class Scene:
             is_round=False,
         )
 
+    def tub_outlines(self) -> dict[str, Outline]:
+        """Return the outlines in T of the shapes that move with the tub, by name."""
+        return {self._name(shape): self._outline(shape) for shape in self._shapes("tub")}
+
     def _name(self, shape: GeometryId) -> str:
         """Return the name of a shape in the SDF."""
         return str(self._scene_graph.model_inspector().GetName(shape)).split("::")[-1]

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.systems.framework import InputPortSelection, OutputPortSelection
-from pydrake.systems.primitives import Linearize
 
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.modes.linearisation import MODES, Linearisation
+from wm_drake.studies.modes.shapes import shape_of
 
 
 @dataclass(frozen=True)
@@ -28,27 +28,15 @@ class Modes:
     shape: FloatArray
 
 
-_SLOWEST = 2.0 * np.pi * 0.01
-"""Least angular frequency of a mode. [rad/s]
-
-Slower eigenvalues result from rounding only: nothing holds the rotation of a damper's tubes about
-its axis.
-"""
-
-_ANGLE_ARM = 0.25
-"""Length that converts angles to displacements in a mode shape: about the radius of the tub. [m]"""
-
-
 def natural_modes(
     machine: Machine, parameters: MachineParameters | None = None, *, gasket: bool = True
 ) -> Modes:
     """Compute the natural modes of the empty machine about its rest pose without dampers.
 
-    The diagram is linearized with Drake's `Linearize`. The drum stands still. Dampers are removed,
-    because friction at rest is neither a spring nor a dashpot: a smoothed friction law would
-    linearize to a very stiff dashpot. Overdamped motions are not included. Of the others, only the
-    six slowest are included; damper tubes on their bushings and a drum in a compliant bearing have
-    faster ones.
+    The drum stands still. Dampers are removed, because friction at rest is neither a spring nor a
+    dashpot; `wm_drake.studies.modes.study.modes` treats it. Overdamped motions are not included. Of
+    the others, only the six slowest are included; damper tubes on their bushings and a drum in a
+    compliant bearing have faster ones.
 
     Args:
         machine: A built machine.
@@ -56,21 +44,6 @@ def natural_modes(
         gasket: False removes the gasket.
     """
     setup = machine.set_up(parameters=parameters, gasket=gasket, dampers=False)
-    # the drum stands still, whatever speed the spin profile begins with
-    machine.set_drum_acceleration(setup.context, 0.0)
-    machine.plant.SetVelocities(setup.plant_context, np.zeros(machine.plant.num_velocities()))
-    system = Linearize(
-        machine.diagram, setup.context, InputPortSelection.kNoInput, OutputPortSelection.kNoOutput
-    )
-    values, vectors = np.linalg.eig(system.A())
-    oscillating = np.flatnonzero(values.imag > max(_SLOWEST, 1e-6 * np.abs(values).max()))
-    order = oscillating[np.argsort(np.abs(values[oscillating]))][:6]
-    shapes = [_real_shape(vectors[machine.state_layout.tub, index]) for index in order]
-    size = np.abs(values[order])
-    return Modes(size / (2.0 * np.pi), -values[order].real / size, np.array(shapes))
-
-
-def _real_shape(vector: FloatArray) -> FloatArray:
-    weight = np.repeat([_ANGLE_ARM, 1.0], 3)
-    largest = int(np.argmax(np.abs(vector * weight)))
-    return np.asarray((vector / (vector[largest] * weight[largest])).real)
+    found = Linearisation(setup).spectrum().first(MODES)
+    shapes = [shape_of(vector).real for vector in found.right.T]
+    return Modes(found.frequency_hz, found.damping_ratio, np.array(shapes))

@@ -1,0 +1,276 @@
+"""Time derivatives of the state at many states of a machine, and their slopes, in one pass.
+
+Linearisation and harmonic balance stand on these: they evaluate the same compiled right-hand side
+that runs integrate, so that no law is written twice. A slope is a difference quotient. Eight moved
+states are evaluated side by side.
+"""
+
+import numpy as np
+
+from wm_drake.compiler.compilation import law, long_running
+from wm_drake.compiler.elementary import in_each_lane, sine_cosine
+from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.elements.bushing import six_component_bushing_wrench
+from wm_drake.elements.friction_damper import (
+    friction_damper_line,
+    friction_damper_tension,
+    friction_damper_wrench,
+)
+from wm_drake.elements.motion import motion_at, read_tree_state, tub_motion
+from wm_drake.elements.spring import spring_strut_wrench
+from wm_drake.elements.telescopic_damper import telescopic_damper_forces
+from wm_drake.engines.compiled.mechanics import (
+    DRUM_ANGLE,
+    DRUM_RATE,
+    STATE_SIZE,
+    mass_properties,
+    state_derivative,
+)
+from wm_drake.engines.compiled.packing import initial_state, pack
+from wm_drake.engines.compiled.tubes import (
+    TUBES_STATE_SIZE,
+    read_tubes_and_damper,
+    read_tubes_state,
+    telescopic_damper_count,
+)
+from wm_drake.model.machine import Setup
+from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.types import FloatArray
+
+POSITION_STEP, VELOCITY_STEP = 2.0**-28, 2.0**-23
+"""Steps of the differences, about 4e-9 and 1e-7. [m or rad, m/s or rad/s]
+
+Tables bend at their points, where the error grows with the step of a position, while rounding grows
+the other way: at this step both are about 1e-7 of a slope. The step of a velocity is a tenth of the
+regularisation velocity of the papers' friction, so that the slope at rest is that of a friction
+damper that sticks."""
+
+
+class SlopedDerivative:
+    """The time derivative of the state of a machine as it is set up, and its slopes.
+
+    A state has the layout of `wm_drake.engines.compiled.mechanics`. Free are all its numbers but
+    angle and rate of the drum, which are prescribed.
+
+    Attributes:
+        layout: Indices of the parts of the machine in packed numbers and states.
+        packed: Packed numbers of the machine.
+        rest: State of rest, with a drum that stands still.
+        free: Indices of the free numbers.
+        is_velocity: Whether a free number is a velocity. (free,)
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        """Pack a machine.
+
+        Raises:
+            InputError: the machine has something that the compiled engine does not represent.
+        """
+        self.packed, self.layout = pack(setup)
+        self.rest = initial_state(setup, SpinProfile(time=(0.0, 1.0), speed=(0.0, 0.0)))
+        size = len(self.rest)
+        self.free = np.setdiff1d(np.arange(size), (DRUM_ANGLE, DRUM_RATE))
+        velocities = np.zeros(size, dtype=bool)
+        velocities[STATE_SIZE // 2 : STATE_SIZE] = True
+        begin = STATE_SIZE + len(setup.dampers)
+        for _ in setup.telescopes:
+            velocities[begin + 7 : begin + TUBES_STATE_SIZE - 1] = True
+            begin += TUBES_STATE_SIZE
+        velocities[begin + (size - begin) // 2 :] = True
+        self.is_velocity = velocities[self.free]
+        self._steps = np.where(velocities, VELOCITY_STEP, POSITION_STEP)
+        self._steps[DRUM_RATE] = POSITION_STEP
+
+    def __call__(self, states: FloatArray) -> FloatArray:
+        """Return the time derivatives (n, size) at states (n, size)."""
+        return self._evaluate(states, np.zeros(0, dtype=np.int64), np.zeros(0))[0]
+
+    def with_slopes(
+        self, states: FloatArray, *, drum_rate: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the time derivatives of the free numbers, and their slopes by forward differences.
+
+        Args:
+            states: (n, size), the drum's angle and rate among them.
+            drum_rate: Whether the last slope is that by the drum's rate.
+
+        Returns:
+            (n, free), and (n, k, free) with the slope by each free number k.
+        """
+        columns = np.append(self.free, DRUM_RATE) if drum_rate else self.free
+        steps = self._steps[columns]
+        rates, moved = self._evaluate(states, columns, steps)
+        moved -= rates[:, None, :]
+        moved /= steps[:, None]
+        return rates[:, self.free], moved[:, :, self.free]
+
+    def jacobian(self, states: FloatArray) -> FloatArray:
+        """Return the Jacobian of the free numbers by central differences. (n, free, free)"""
+        steps = self._steps[self.free]
+        columns, both = np.tile(self.free, 2), np.concatenate([steps, -steps])
+        moved = self._evaluate(states, columns, both)[1][:, :, self.free]
+        half = len(self.free)
+        slopes = (moved[:, :half] - moved[:, half:]) / (2.0 * steps[:, None])
+        return np.ascontiguousarray(slopes.transpose(0, 2, 1))
+
+    def wrench_slopes(self, state: FloatArray) -> FloatArray:
+        """Return the slopes of the wrench of each element on the tub at a state.
+
+        The elements are springs, strut dampers, bushings and telescopic dampers, in this order.
+
+        Returns:
+            (elements, 6, free) moment about To and force, in W, by each free number. [N m, N]
+        """
+        indices = self.layout.elements
+        count = len(indices.springs) + len(indices.dampers) + len(indices.bushings)
+        count += telescopic_damper_count.py_func(indices.telescopes)
+        steps = self._steps[self.free]
+        columns, both = np.tile(self.free, 2), np.concatenate([steps, -steps])
+        idle = -len(columns) % WIDTH
+        columns, both = np.pad(columns, (0, idle)), np.pad(both, (0, idle))
+        wrenches = np.empty((len(columns), count, 6))
+        states = np.tile(state, (len(columns), 1))
+        tub_wrenches_at(states, columns, both, self.packed, indices, wrenches)
+        half = len(self.free)
+        slopes = (wrenches[:half] - wrenches[half : 2 * half]) / (2.0 * steps[:, None, None])
+        return np.ascontiguousarray(slopes.transpose(1, 2, 0))
+
+    def _evaluate(
+        self, states: FloatArray, columns: FloatArray, steps: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        states = np.ascontiguousarray(states)
+        rates = np.empty_like(states)
+        moved = np.empty((len(states), len(columns), states.shape[1]))
+        derivatives_at(states, columns, steps, self.packed, self.layout.elements, rates, moved)
+        return rates, moved
+
+
+@long_running
+def derivatives_at(states, columns, steps, p, elements, rates, moved):
+    """Evaluate the time derivative at states, and at each of them moved in each of some numbers.
+
+    Args:
+        states: (n, size); angle and rate of the drum are read from them.
+        columns, steps: Index and size of each move. (k,)
+        p: Packed numbers.
+        elements: `Elements`.
+        rates: Time derivatives at the states, written. (n, size)
+        moved: Time derivatives at the moved states, written. (n, k, size)
+    """
+    align_stack()
+    count, size, moves = len(states), states.shape[1], len(columns)
+    x_numbers, dx_numbers = np.empty(size * WIDTH), np.empty(size * WIDTH)
+    p_numbers = in_each_lane(p)
+    x, dx, numbers = lane_array(x_numbers), lane_array(dx_numbers), lane_array(p_numbers)
+    total = count * (moves + 1)
+    for begin in range(0, total, WIDTH):
+        for lane in range(WIDTH):
+            at = min(begin + lane, total - 1)
+            row, move = at // (moves + 1), at % (moves + 1)
+            for k in range(size):
+                x_numbers[k * WIDTH + lane] = states[row, k]
+            if move > 0:
+                x_numbers[columns[move - 1] * WIDTH + lane] += steps[move - 1]
+        sine, cosine = sine_cosine(x[DRUM_ANGLE])
+        masses = mass_properties(numbers, cosine, sine)
+        state_derivative(x, dx, masses, x[DRUM_RATE], 0.0, numbers, elements)
+        for lane in range(min(WIDTH, total - begin)):
+            at = begin + lane
+            row, move = at // (moves + 1), at % (moves + 1)
+            if move == 0:
+                for k in range(size):
+                    rates[row, k] = dx_numbers[k * WIDTH + lane]
+            else:
+                for k in range(size):
+                    moved[row, move - 1, k] = dx_numbers[k * WIDTH + lane]
+
+
+@long_running
+def tub_wrenches_at(states, columns, steps, p, elements, wrenches):
+    """Evaluate the wrench of each element on the tub, at states that are moved in one number each.
+
+    The elements are springs, strut dampers, bushings and telescopic dampers, in this order.
+
+    Args:
+        states: (n, size), n a multiple of `WIDTH`.
+        columns, steps: Index and size of the move of each state. (n,)
+        p: Packed numbers.
+        elements: `Elements`.
+        wrenches: Moment about To and force on the tub, in W, written. (n, elements, 6) [N m, N]
+    """
+    align_stack()
+    size = states.shape[1]
+    x_numbers, p_numbers, out = (
+        np.empty(size * WIDTH),
+        in_each_lane(p),
+        np.empty(6 * wrenches.shape[1] * WIDTH),
+    )
+    x, numbers, answer = lane_array(x_numbers), lane_array(p_numbers), lane_array(out)
+    for begin in range(0, len(states), WIDTH):
+        for lane in range(WIDTH):
+            for k in range(size):
+                x_numbers[k * WIDTH + lane] = states[begin + lane, k]
+            x_numbers[columns[begin + lane] * WIDTH + lane] += steps[begin + lane]
+        motion = tub_motion(x)
+        at_row = 0
+        for at in elements.springs:
+            wrench, _ = spring_strut_wrench(motion, numbers, at)
+            write_six(answer, at_row, wrench)
+            at_row += 6
+        for i in range(len(elements.dampers)):
+            at = elements.dampers[i]
+            arm, line = friction_damper_line(motion, numbers, at)
+            tension, _ = friction_damper_tension(line[1], x[STATE_SIZE + i], numbers, at)
+            write_six(
+                answer, at_row, friction_damper_wrench(motion, arm, line, tension, numbers, at)
+            )
+            at_row += 6
+        for at in elements.bushings:
+            wrench, _ = six_component_bushing_wrench(motion, numbers, at)
+            write_six(answer, at_row, wrench)
+            at_row += 6
+        for i in range(telescopic_damper_count(elements.telescopes)):
+            write_six(
+                answer,
+                at_row,
+                telescope_on_tub(x, motion, numbers, elements.telescopes, elements.tubes, i),
+            )
+            at_row += 6
+        for k in range(6 * wrenches.shape[1]):
+            for lane in range(WIDTH):
+                wrenches[begin + lane, k // 6, k % 6] = out[k * WIDTH + lane]
+
+
+@law
+def telescope_on_tub(x, motion, p, telescopes, first, i):
+    """Return the wrench of a telescopic damper on the tub (six numbers, W). [N m, N]
+
+    Args:
+        x: State.
+        motion: `TubMotion` of the tub.
+        p: Packed numbers.
+        telescopes, first: Fields `telescopes` and `tubes` of `Elements`.
+        i: Number of the damper.
+    """
+    if telescopes is None:
+        zero = 0.0 * x[0]
+        return (zero, zero, zero, zero, zero, zero)
+    numbers = read_tubes_and_damper(p, telescopes[i])
+    own = read_tubes_state(x, first + TUBES_STATE_SIZE * i)
+    state = read_tree_state(*own.tubes)
+    on_tub, _, _, _, _, _, _ = telescopic_damper_forces(
+        motion,
+        motion_at(*own.tubes),
+        state.joint_position,
+        state.joint_rate,
+        own.deformation,
+        *numbers.damper,
+    )
+    return on_tub
+
+
+@law
+def write_six(array, at, six):
+    """Write six numbers into an array from an index."""
+    for k in range(6):
+        array[at + k] = six[k]

@@ -1,0 +1,240 @@
+"""Modes that depend on the amplitude, by harmonic balance of the free motion.
+
+With friction, frequency and damping depend on the amplitude. The extended periodic motion concept
+(Krack, Nonlinear modal analysis of nonconservative systems, Computers and Structures 154, 2015)
+makes the free motion periodic with a negative damping in proportion to the mass, which balances the
+dissipation of a cycle:
+
+    x' = f(x) + 2 beta v        omega: frequency,  beta / omega: damping ratio
+
+v: all velocities. Harmonic balance gives the periodic motion with the forces of all elements
+themselves, over a cycle; equivalent stiffness and damping are what they do in it. For a linear
+machine with damping in proportion to mass and stiffness it is the natural mode.
+"""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
+
+from wm_drake.model.machine import Setup
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.modes.linearisation import Spectrum
+from wm_drake.studies.modes.shapes import Mode
+from wm_drake.studies.steady.balance import HarmonicBalance
+from wm_drake.studies.steady.series import Series
+
+SMALLEST_AMPLITUDE = 1e-5
+"""Amplitude at which a mode is followed from its linearisation with stuck friction. [m]"""
+
+ORDER, SAMPLES = 5, 64
+"""Number of harmonics and samples of a cycle."""
+
+TOLERANCE = 1e-6
+"""Largest last correction, as part of the amplitude."""
+
+FIRST_FACTOR, LEAST_FACTOR = 1.5, 1.05
+"""First and smallest ratio of two amplitudes of a step."""
+
+
+@dataclass(frozen=True)
+class AmplitudeMode:
+    """A mode over its amplitude.
+
+    Attributes:
+        name: Name of the mode with stuck friction that it continues.
+        amplitude: Rising amplitudes: root of the sum of squares of the first harmonics of the
+            coordinates of To, with angles times 0.25 m. (a,) [m]
+        frequency_hz: (a,) [Hz]
+        damping_ratio: (a,)
+        shape: First harmonic of roll, pitch, yaw, x, y, z, per amplitude. (a, 6) complex
+    """
+
+    name: str
+    amplitude: FloatArray
+    frequency_hz: FloatArray
+    damping_ratio: FloatArray
+    shape: FloatArray
+
+    def at(self, amplitude: float) -> tuple[float, float] | None:
+        """Return frequency and damping ratio at an amplitude; None if it was not reached."""
+        if not len(self.amplitude) or not (
+            self.amplitude[0] <= amplitude <= self.amplitude[-1] * (1.0 + 1e-9)
+        ):
+            return None
+        at = np.log(amplitude), np.log(self.amplitude)
+        return (
+            float(np.interp(*at, self.frequency_hz)),
+            float(np.interp(*at, self.damping_ratio)),
+        )
+
+
+def amplitude_modes(
+    setup: Setup, stuck: Spectrum, modes: list[Mode], amplitudes: FloatArray
+) -> list[AmplitudeMode]:
+    """Follow each stuck mode over its amplitude.
+
+    Args:
+        setup: Machine at rest, with friction.
+        stuck: Its modes with stuck friction.
+        modes: The same, named.
+        amplitudes: Rising amplitudes at which values are wanted; steps between them are as short as
+            convergence needs. [m]
+
+    Returns:
+        A mode each; it ends where it cannot be followed any further.
+    """
+    balance = HarmonicBalance(setup, Series(ORDER, SAMPLES))
+    return [
+        _follow(balance, stuck.values[index], stuck.right[:, index], mode.name, amplitudes)
+        for index, mode in enumerate(modes)
+    ]
+
+
+class _Free:
+    """Residual of the free periodic motion, with frequency and negative damping as unknowns."""
+
+    def __init__(self, balance: HarmonicBalance) -> None:
+        self.balance = balance
+        self.velocity = balance.derivative.is_velocity.astype(float)
+        weight = np.zeros(balance.size)
+        weight[:6] = balance.scale[:6]
+        self.weights = np.zeros((balance.series.size, balance.size))
+        self.weights[1:3] = weight**2
+
+    def turned(self, coefficients: FloatArray) -> FloatArray:
+        """Return the first harmonic a quarter of a cycle later."""
+        turned = np.zeros_like(coefficients)
+        turned[1], turned[2] = -coefficients[2], coefficients[1]
+        return turned
+
+    def states(self, coefficients: FloatArray) -> FloatArray:
+        states = np.tile(self.balance.derivative.rest, (self.balance.series.samples, 1))
+        states[:, self.balance.derivative.free] = self.balance.series.synthesis @ coefficients
+        return states
+
+    def correction(
+        self,
+        coefficients: FloatArray,
+        omega: float,
+        beta: float,
+        amplitude: float,
+        reference: FloatArray,
+    ) -> FloatArray:
+        """Return the Newton step of coefficients, frequency and damping."""
+        balance, series = self.balance, self.balance.series
+        rates, slopes = balance.derivative.with_slopes(self.states(coefficients))
+        damping = 2.0 * beta * coefficients * self.velocity
+        moved = series.slope @ coefficients
+        residual = omega * moved - series.analysis @ rates - damping
+        residual = balance.with_hold(residual, coefficients)
+        matrix = balance.matrix(slopes, omega)
+        size = len(matrix)
+        matrix[np.arange(size), np.arange(size)] -= 2.0 * beta * np.tile(
+            self.velocity, series.size
+        )
+        bordered = np.zeros((size + 2, size + 2))
+        bordered[:size, :size] = matrix
+        bordered[:size, size] = moved.ravel()
+        bordered[:size, size + 1] = -(2.0 * coefficients * self.velocity).ravel()
+        bordered[size, :size] = (2.0 * self.weights * coefficients).ravel()
+        turned = self.weights * self.turned(reference)
+        bordered[size + 1, :size] = turned.ravel()
+        right = np.concatenate(
+            [
+                residual.ravel(),
+                [np.sum(self.weights * coefficients**2) - amplitude**2],
+                [np.sum(turned * coefficients)],
+            ]
+        )
+        return np.asarray(
+            lu_solve(lu_factor(bordered, check_finite=False), -right, check_finite=False)
+        )
+
+    def solve(
+        self, coefficients: FloatArray, omega: float, beta: float, amplitude: float
+    ) -> tuple[FloatArray, float, float] | None:
+        """Return the motion of an amplitude from a guess; None if Newton's method fails."""
+        reference, shape = coefficients.copy(), coefficients.shape
+        for _ in range(15):
+            with warnings.catch_warnings():  # a singular matrix gives no finite step
+                warnings.simplefilter("ignore", LinAlgWarning)
+                step = self.correction(coefficients, omega, beta, amplitude, reference)
+            if not np.all(np.isfinite(step)):
+                return None
+            change = step[:-2].reshape(shape)
+            coefficients = coefficients + change
+            omega, beta = omega + float(step[-2]), beta + float(step[-1])
+            if omega <= 0.0:
+                return None
+            extent = self.balance.extent(change)
+            if extent < TOLERANCE * amplitude and abs(step[-2]) < TOLERANCE * omega:
+                return coefficients, omega, beta
+        return None
+
+
+def _follow(
+    balance: HarmonicBalance,
+    value: complex,
+    vector: FloatArray,
+    name: str,
+    amplitudes: FloatArray,
+) -> AmplitudeMode:
+    free = _Free(balance)
+    amplitude = min(SMALLEST_AMPLITUDE, float(amplitudes[0]))
+    motion = balance.rest()
+    motion[1], motion[2] = vector.real, -vector.imag
+    size = float(np.sqrt(np.sum(free.weights * motion**2)))
+    motion[1:3] *= amplitude / size
+    here = free.solve(motion, float(abs(value)), float(-value.real), amplitude)
+    found: list[tuple[float, FloatArray, float, float]] = []
+    factor, before = FIRST_FACTOR, None
+    while here is not None:
+        found.append((amplitude, *here))
+        target = next((a for a in amplitudes if a > amplitude * (1.0 + 1e-9)), None)
+        if target is None:
+            break
+        moved = None
+        while moved is None and factor > LEAST_FACTOR:
+            ahead = min(target, amplitude * factor)
+            moved = free.solve(*_guess(balance, amplitude, here, before, ahead), ahead)
+            if moved is None or abs(moved[1] / here[1] - 1.0) > 0.15:
+                moved, factor = None, np.sqrt(factor)
+        if moved is None:
+            break
+        before, here, amplitude = (amplitude, here), moved, ahead
+        factor = min(factor * 1.3, 2.0)
+    shapes = [_shape(coefficients, amplitude) for amplitude, coefficients, _, _ in found]
+    return AmplitudeMode(
+        name,
+        np.array([entry[0] for entry in found]),
+        np.array([entry[2] for entry in found]) / (2.0 * np.pi),
+        np.array([entry[3] / entry[2] for entry in found]),
+        np.array(shapes).reshape(-1, 6),
+    )
+
+
+def _guess(
+    balance: HarmonicBalance,
+    amplitude: float,
+    here: tuple[FloatArray, float, float],
+    before: tuple[float, tuple[FloatArray, float, float]] | None,
+    ahead: float,
+) -> tuple[FloatArray, float, float]:
+    """Return a guess of the motion at a larger amplitude, extrapolated from the last two."""
+    if before is None:
+        rest = balance.rest()
+        return rest + (here[0] - rest) * (ahead / amplitude), here[1], here[2]
+    share = (ahead - amplitude) / (amplitude - before[0])
+    share = min(share, 2.0)
+    first = here[0] + share * (here[0] - before[1][0])
+    return (
+        first,
+        here[1] + 0.5 * share * (here[1] - before[1][1]),
+        here[2] + 0.5 * share * (here[2] - before[1][2]),
+    )
+
+
+def _shape(coefficients: FloatArray, amplitude: float) -> FloatArray:
+    return np.asarray((coefficients[1, :6] - 1j * coefficients[2, :6]) / amplitude)

@@ -1,0 +1,146 @@
+"""Names and participation of modes: which coordinates move, which elements store and dissipate."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from wm_drake.engines.trajectory import COORDINATES
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.modes.linearisation import Spectrum
+
+NAMES = {
+    "roll": "roll",
+    "pitch": "pitch",
+    "yaw": "yaw",
+    "x": "sway",
+    "y": "fore-aft",
+    "z": "bounce",
+}
+"""Name of a motion by its coordinate: angles about x, y, z as in records; sway to the sides, fore-aft
+along the drum axis, bounce up and down."""
+
+ANGLE_ARM = 0.25
+"""Length that converts angles to displacements in a mode shape: about the radius of the tub. [m]"""
+
+_POSITIONS, _VELOCITIES = slice(0, 6), slice(6, 12)
+"""Tub's positions and velocities among the free numbers of the state."""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """Natural mode.
+
+    Attributes:
+        name: Of its motion, one of `NAMES`; no two modes of a linearisation have the same.
+        eigenvalue: lambda. [1/s]
+        frequency_hz: Natural frequency |lambda| / (2 pi). [Hz]
+        damping_ratio: -Re(lambda) / |lambda|.
+        shape: Motion of T: roll, pitch, yaw, x, y, z. The largest component is 1 after angles are
+            multiplied by `ANGLE_ARM`. (6,) complex [rad, m]
+        participation: Of each coordinate of the tub, as in `shape`; the sum is 1. (6,)
+        strain_energy, dissipation: Part of each element. The sum is 1. Preload may make the energy
+            of a spring negative. (elements,)
+    """
+
+    name: str
+    eigenvalue: complex
+    frequency_hz: float
+    damping_ratio: float
+    shape: FloatArray
+    participation: FloatArray
+    strain_energy: FloatArray
+    dissipation: FloatArray
+
+    @property
+    def real_shape(self) -> FloatArray:
+        """Return the shape at the phase of its largest component. (6,) [rad, m]"""
+        return np.asarray(self.shape.real)
+
+
+def modes_of(spectrum: Spectrum, wrench_slopes: FloatArray) -> list[Mode]:
+    """Return named modes.
+
+    Args:
+        spectrum: Eigenvalues of the free numbers of the state.
+        wrench_slopes: Slopes of the wrench of each element on the tub. (elements, 6, n)
+    """
+    shares = participation(spectrum)
+    names = names_of(shares)
+    modes = []
+    for index, value in enumerate(spectrum.values):
+        vector = spectrum.right[:, index]
+        strain, dissipated = energies(value, vector, wrench_slopes)
+        modes.append(
+            Mode(
+                names[index],
+                complex(value),
+                float(spectrum.frequency_hz[index]),
+                float(spectrum.damping_ratio[index]),
+                shape_of(vector),
+                shares[index],
+                _share(strain),
+                _share(dissipated),
+            )
+        )
+    return modes
+
+
+def shape_of(vector: FloatArray) -> FloatArray:
+    """Return the motion of the tub in an eigenvector; the largest component becomes 1. (6,)"""
+    weight = np.repeat([ANGLE_ARM, 1.0], 3)
+    tub = vector[_POSITIONS]
+    largest = int(np.argmax(np.abs(tub * weight)))
+    return np.asarray(tub / (tub[largest] * weight[largest]))
+
+
+def participation(spectrum: Spectrum) -> FloatArray:
+    """Return the part of each coordinate of the tub in each mode. (modes, 6)
+
+    It is the participation factor |left x right| of the coordinate and its rate (Perez-Arriaga,
+    Verghese and Schweppe 1982). It does not depend on the units of the coordinates.
+    """
+    both = np.abs(spectrum.left.T * spectrum.right)
+    shares = (both[_POSITIONS] + both[_VELOCITIES]).T
+    return np.asarray(shares / shares.sum(axis=1, keepdims=True))
+
+
+def names_of(shares: FloatArray) -> list[str]:
+    """Return a name for each mode such that the named coordinates participate most overall.
+
+    Args:
+        shares: Participation of the six coordinates in up to six modes. (modes, 6)
+    """
+    modes, coordinates = linear_sum_assignment(-shares)
+    words = [NAMES[coordinate] for coordinate in COORDINATES]
+    found = {int(mode): words[c] for mode, c in zip(modes, coordinates, strict=True)}
+    return [found.get(mode, "other") for mode in range(len(shares))]
+
+
+def energies(
+    value: complex, vector: FloatArray, wrench_slopes: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the strain energy of each element and the energy that it dissipates. (elements,)
+
+    An element with stiffness K and damping C has the complex force F = -(K + lambda C) U on the
+    displacement U of the tub. With a = -Re(F* U) / 2, b = -Re(F* V) / 2, V = lambda U:
+
+        k = U* K U / 2 = (a |lambda|^2 - Re(lambda) b) / Im(lambda)^2
+        c = U* C U / 2 = (b - Re(lambda) a) / Im(lambda)^2        own derivation
+
+    They are the peak of the strain energy, and the dissipated power divided by |lambda|^2.
+    """
+    forces = wrench_slopes @ vector
+    velocity = vector[_VELOCITIES]
+    displacement = velocity / value
+    a = -0.5 * np.real(np.conj(forces) @ displacement)
+    b = -0.5 * np.real(np.conj(forces) @ velocity)
+    square = value.imag**2
+    stored = (a * abs(value) ** 2 - value.real * b) / square
+    dissipated = (b - value.real * a) / square
+    return np.asarray(stored), np.asarray(dissipated)
+
+
+def _share(values: FloatArray) -> FloatArray:
+    total = float(values.sum())
+    return np.asarray(values / total) if total else values

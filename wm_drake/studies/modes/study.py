@@ -1,0 +1,212 @@
+"""Modes of a machine: three linearisations, Campbell diagram, critical speeds, sensitivities."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from threadpoolctl import threadpool_limits
+
+from wm_drake.batch import simulate_many
+from wm_drake.errors import input_error
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import Load, MachineParameters
+from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.cases import case_of
+from wm_drake.studies.modes.amplitude import AmplitudeMode, amplitude_modes
+from wm_drake.studies.modes.campbell import Campbell, CriticalSpeed, campbell, critical_speeds
+from wm_drake.studies.modes.linearisation import MODES, Linearisation, Spectrum
+from wm_drake.studies.modes.sensitivity import Sensitivity, numbers_of, sensitivities
+from wm_drake.studies.modes.shapes import Mode, modes_of
+
+STUCK, SLIDING, AMPLITUDE = "stuck", "sliding", "amplitude"
+"""Linearisations.
+
+stuck: slope of all laws at rest. Friction holds, so that the sponges of dampers are springs.
+sliding: dry friction is saturated. Its force is constant and its slope zero; dashpots remain.
+amplitude: harmonic balance of a free motion of a given amplitude."""
+
+DEFAULT_AMPLITUDE = 5e-3
+"""Amplitude of the third linearisation. [m]"""
+
+AMPLITUDES = np.geomspace(1e-5, 2e-2, 34)
+"""Amplitudes of the curves over the amplitude. [m]"""
+
+SPEEDS_RPM = (0.0, 1.5, 61)
+"""Speeds of the Campbell diagram: the first [rpm], the last over the fastest of the spin profile,
+and their number."""
+
+ORDERS = (1.0, 2.0)
+"""Orders of the drum's speed in the Campbell diagram."""
+
+
+@dataclass(frozen=True)
+class AmplitudeValue:
+    """A mode at the given amplitude; the values are None if it could not be followed there."""
+
+    name: str
+    frequency_hz: float | None
+    damping_ratio: float | None
+
+
+@dataclass(frozen=True)
+class MachineModes:
+    """Modes of a machine.
+
+    Attributes:
+        parameters: The machine.
+        load: Name of the load; "" for the empty drum.
+        gasket: Whether the gasket is in place.
+        elements: Names of the elements on the tub, in the order of the shares of a mode.
+        modes: Modes of the linearisations `STUCK` and `SLIDING` with a drum that stands still.
+        amplitude: Amplitude of the values in `at_amplitude`. [m]
+        at_amplitude: Modes at that amplitude.
+        over_amplitude: Each mode over its amplitude.
+        diagrams: Campbell diagram of `STUCK` and `SLIDING`.
+        critical: Critical speeds of each.
+        sensitivities: Of each, for a drum that stands still.
+        run_up: Peaks of the machine's own run-up, one run a load: `critical_speed` and `amplitude`
+            at the sensors, as `simulate_many` returns them. None if not computed.
+    """
+
+    parameters: MachineParameters
+    load: str
+    gasket: bool
+    elements: list[str]
+    modes: dict[str, list[Mode]]
+    amplitude: float
+    at_amplitude: list[AmplitudeValue]
+    over_amplitude: list[AmplitudeMode]
+    diagrams: dict[str, Campbell]
+    critical: dict[str, list[CriticalSpeed]]
+    sensitivities: dict[str, list[Sensitivity]]
+    run_up: xr.Dataset | None
+
+    @property
+    def critical_speeds(self) -> FloatArray:
+        """Return the speeds at which the unbalance meets a mode with sliding friction. [rad/s]"""
+        return np.array([c.speed for c in self.critical[SLIDING] if c.order == 1.0])
+
+
+def modes(
+    machine: Machine,
+    load: Load | str | None = None,
+    *,
+    gasket: bool = True,
+    amplitude: float = DEFAULT_AMPLITUDE,
+    run_up: bool = False,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> MachineModes:
+    """Return the modes of a machine.
+
+    Args:
+        machine: A built machine.
+        load: Point masses in the drum, or the name of one of the machine's loads; None for the
+            empty drum. With a load, the equilibrium and the matrix are means over a revolution.
+        gasket: False removes the gasket.
+        amplitude: Amplitude of the third linearisation: displacement of To, with angles times
+            0.25 m. [m]
+        run_up: Whether to run the machine's loads over its spin profile, for the peaks.
+        progress: Called with the fraction done.
+
+    Raises:
+        InputError: the load is unknown, the amplitude is not positive, or the machine cannot be
+            set up.
+    """
+    if not 0.0 < amplitude <= 0.1:
+        raise input_error(
+            f"{1e3 * amplitude:g} mm is no amplitude; allowed are more than 0 and up to 100 mm",
+            key="amplitude",
+        )
+    with threadpool_limits(1, "blas"):  # the matrices are small: several threads would be slower
+        return _modes(machine, load, gasket, amplitude, run_up, progress)
+
+
+def _modes(
+    machine: Machine,
+    load: Load | str | None,
+    gasket: bool,
+    amplitude: float,
+    run_up: bool,
+    progress: Callable[[float], None],
+) -> MachineModes:
+    parameters = machine.parameters
+    linear = {
+        STUCK: _linearisation(machine, load, gasket, friction=True),
+        SLIDING: _linearisation(machine, load, gasket, friction=False),
+    }
+    spectra = {name: one.spectrum().first(MODES) for name, one in linear.items()}
+    found = {name: modes_of(spectra[name], one.wrench_slopes()) for name, one in linear.items()}
+    progress(0.1)
+    setup = machine.set_up(load, gasket=gasket)
+    amplitudes = np.union1d(AMPLITUDES, amplitude)
+    over = amplitude_modes(setup, spectra[STUCK], found[STUCK], amplitudes)
+    progress(0.3)
+    last = SPEEDS_RPM[1] * max(parameters.profile.speed)
+    speeds = np.linspace(SPEEDS_RPM[0] * np.pi / 30.0, last, int(SPEEDS_RPM[2]))
+    diagrams = {
+        name: campbell(one.spectrum, speeds, len(spectra[name].values))
+        for name, one in linear.items()
+    }
+    progress(0.4)
+    bars = _sensitivities(machine, load, gasket, spectra, lambda part: progress(0.4 + 0.5 * part))
+    peaks = None
+    if run_up and parameters.loads:
+        cases = [case_of(parameters, name, gasket=gasket) for name in parameters.loads]
+        peaks = simulate_many(machine, cases, measures=["amplitudes"])
+    progress(1.0)
+    return MachineModes(
+        parameters,
+        load if isinstance(load, str) else "" if load is None else "given",
+        gasket,
+        linear[STUCK].names,
+        found,
+        amplitude,
+        [AmplitudeValue(mode.name, *(mode.at(amplitude) or (None, None))) for mode in over],
+        over,
+        diagrams,
+        {name: critical_speeds(diagram, ORDERS) for name, diagram in diagrams.items()},
+        bars,
+        peaks,
+    )
+
+
+def _linearisation(
+    machine: Machine, load: Load | str | None, gasket: bool, *, friction: bool
+) -> Linearisation:
+    setup = machine.set_up(load, gasket=gasket, friction=friction)
+    return Linearisation(setup, loaded=load is not None)
+
+
+def _sensitivities(
+    machine: Machine,
+    load: Load | str | None,
+    gasket: bool,
+    spectra: dict[str, Spectrum],
+    progress: Callable[[float], None],
+) -> dict[str, list[Sensitivity]]:
+    context = machine.diagram.CreateDefaultContext()
+    loaded = load is not None
+    count = 2 * sum(1 for _ in numbers_of(machine.parameters, loaded))
+    done = 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        progress(done / count)
+
+    def matrix_of(friction: bool) -> Callable[[MachineParameters], FloatArray]:
+        def matrix(parameters: MachineParameters) -> FloatArray:
+            setup = machine.set_up(
+                load, context=context, parameters=parameters, gasket=gasket, friction=friction
+            )
+            return Linearisation(setup, loaded=loaded).matrix()
+
+        return matrix
+
+    return {
+        name: sensitivities(
+            machine.parameters, spectra[name], matrix_of(name == STUCK), loaded, step
+        )
+        for name in (STUCK, SLIDING)
+    }

@@ -1,0 +1,167 @@
+"""Harmonic balance of a machine whose drum turns at a constant speed.
+
+The state x of the machine obeys x' = f(x, phi), with the drum angle phi = Omega t. A periodic
+motion is a Fourier series X of the drum angle. With D the derivative by the angle and A the
+analysis of samples, it satisfies
+
+    R(X, Omega) = Omega D X - A f(S X, phi) = 0      alternating frequency/time method
+
+(Cameron and Griffin 1989; Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems,
+2019). f is evaluated at the samples of a period by the compiled right-hand side: rigid bodies and
+the laws of all elements. Deformations of sponges and motions of damper tubes are unknowns too.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
+from wm_drake.engines.compiled.slopes import SlopedDerivative
+from wm_drake.engines.compiled.tubes import DEFORMATION, TUBES_STATE_SIZE
+from wm_drake.model.machine import Setup
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.steady.series import Series
+
+HARMONICS = 9
+"""Default number of harmonics."""
+
+SAMPLES = 128
+"""Default number of samples of a period."""
+
+ANGLE_ARM = 0.25
+"""Length that converts angles to displacements: about the radius of the tub. [m]"""
+
+HOLD = 1e-6
+"""Rate at which held numbers of the state return to their values at rest. [1/s]
+
+Held are the angles of damper tubes and the deformations of sponges. Nothing holds the spin of a
+tube about its axis, nor a sponge within its free stroke, so that their mean would be undetermined.
+Other motions change by this rate over their angular frequency, less than one part in a million."""
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Residual of the harmonic balance and its derivatives at a motion.
+
+    Attributes:
+        residual: (2 N + 1, n)
+        matrix: Derivative by the coefficients. ((2 N + 1) n, (2 N + 1) n)
+        by_speed: Derivative by the speed. (2 N + 1, n)
+        slopes: Slopes of the time derivative at the samples, by each number k. (samples, n, n)
+    """
+
+    residual: FloatArray
+    matrix: FloatArray
+    by_speed: FloatArray
+    slopes: FloatArray
+
+
+class HarmonicBalance:
+    """Residual of the periodic motions of a machine.
+
+    Attributes:
+        derivative: Compiled right-hand side.
+        series: Order and samples.
+        scale: Factor of each number in the size of a motion: 1 for positions, `ANGLE_ARM` for
+            angles, 0 for velocities, so that a size is in m. (n,)
+        held: Indices of the numbers that `HOLD` is about.
+    """
+
+    def __init__(self, setup: Setup, series: Series) -> None:
+        """Pack a machine.
+
+        Raises:
+            InputError: the machine has something that the compiled engine does not represent.
+        """
+        self.derivative, self.series = SlopedDerivative(setup), series
+        self.scale = _scale(self.derivative, setup)
+        self.held = _held(self.derivative, setup)
+
+    @property
+    def size(self) -> int:
+        """Return the number of free numbers of the state."""
+        return len(self.derivative.free)
+
+    def rest(self) -> FloatArray:
+        """Return the coefficients of the state of rest."""
+        coefficients = np.zeros((self.series.size, self.size))
+        coefficients[0] = self.derivative.rest[self.derivative.free]
+        return coefficients
+
+    def states(
+        self, coefficients: FloatArray, speed: float, phase: FloatArray | None = None
+    ) -> FloatArray:
+        """Return the states over a period, at the samples or at given phases. (samples, size)"""
+        synthesis = self.series.synthesis if phase is None else self.series.at(phase)
+        states = np.empty((len(synthesis), len(self.derivative.rest)))
+        states[:, self.derivative.free] = synthesis @ coefficients
+        states[:, DRUM_ANGLE] = self.series.phase if phase is None else phase
+        states[:, DRUM_RATE] = speed
+        return states
+
+    def residual(self, coefficients: FloatArray, speed: float) -> FloatArray:
+        """Return R(X, Omega). (2 N + 1, n)"""
+        rates = self.derivative(self.states(coefficients, speed))[:, self.derivative.free]
+        return self._residual(coefficients, speed, rates)
+
+    def _residual(
+        self, coefficients: FloatArray, speed: float, rates: FloatArray
+    ) -> FloatArray:
+        series = self.series
+        residual = speed * (series.slope @ coefficients) - series.analysis @ rates
+        return self.with_hold(residual, coefficients)
+
+    def with_hold(self, residual: FloatArray, coefficients: FloatArray) -> FloatArray:
+        """Return a residual with the hold of the numbers that nothing else may hold."""
+        moved = coefficients[0] - self.derivative.rest[self.derivative.free]
+        residual[0, self.held] += HOLD * moved[self.held]
+        return residual
+
+    def linearised(self, coefficients: FloatArray, speed: float) -> Linearised:
+        """Return the residual and its derivatives."""
+        states = self.states(coefficients, speed)
+        rates, slopes = self.derivative.with_slopes(states, drum_rate=True)
+        by_speed = self.series.slope @ coefficients - self.series.analysis @ slopes[:, -1]
+        own = np.ascontiguousarray(slopes[:, :-1])
+        residual = self._residual(coefficients, speed, rates)
+        return Linearised(residual, self.matrix(own, speed), by_speed, own)
+
+    def matrix(self, slopes: FloatArray, speed: float) -> FloatArray:
+        """Return the derivative of the residual by the coefficients.
+
+        Args:
+            slopes: (samples, n, n) slope of the time derivative by each number k at the samples.
+            speed: Omega. [rad/s]
+        """
+        size, n = self.series.size, self.size
+        blocks = (self.series.products @ slopes.reshape(len(slopes), -1)).reshape(size, size, n, n)
+        matrix = np.empty((size, n, size, n))
+        np.negative(blocks.transpose(0, 3, 1, 2), out=matrix)
+        each = np.arange(n)
+        matrix[:, each, :, each] += speed * self.series.slope
+        matrix[0, self.held, 0, self.held] += HOLD
+        return matrix.reshape(size * n, size * n)
+
+    def extent(self, coefficients: FloatArray) -> float:
+        """Return the size of a change of the coefficients. [m]"""
+        return float(np.linalg.norm(coefficients * self.scale))
+
+
+def _scale(derivative: SlopedDerivative, setup: Setup) -> FloatArray:
+    scale = np.where(derivative.is_velocity, 0.0, 1.0)
+    scale[:3] = ANGLE_ARM
+    tubes, own = derivative.layout.elements.tubes, TUBES_STATE_SIZE
+    angles = [tubes + own * i + k for i in range(len(setup.telescopes)) for k in range(3)]
+    scale[np.isin(derivative.free, angles)] = ANGLE_ARM
+    if setup.bearing:
+        scale[len(scale) - 12 : len(scale) - 9] = ANGLE_ARM
+    return scale
+
+
+def _held(derivative: SlopedDerivative, setup: Setup) -> np.ndarray:
+    """Return the indices among the free numbers of tube angles and of sponge deformations."""
+    tubes, own = derivative.layout.elements.tubes, TUBES_STATE_SIZE
+    held = [STATE_SIZE + k for k in range(len(setup.dampers))]
+    for i in range(len(setup.telescopes)):
+        held += [tubes + own * i + k for k in (0, 1, 2, DEFORMATION)]
+    return np.flatnonzero(np.isin(derivative.free, held))

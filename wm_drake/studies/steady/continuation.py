@@ -1,0 +1,303 @@
+"""Branch of periodic motions over the drum's speed, followed around folds by its arc length.
+
+A step goes along the tangent of the branch. If it reaches the next speed of the grid, the motion is
+solved at that speed; else on the plane across the tangent (Keller 1977). The matrix of one
+linearisation serves all corrections of a step that converge fast (chord method).
+"""
+
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
+
+from wm_drake.errors import input_error
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.steady.balance import HarmonicBalance
+from wm_drake.studies.steady.stability import floquet_multipliers, is_stable
+
+LENGTH = 5e-3
+"""Displacement that counts as much in the arc length as `SPEEDS` of the range of speeds. [m]"""
+
+SPEEDS = 0.05
+"""Part of the range of speeds that counts as much as `LENGTH`."""
+
+TOLERANCE = 1e-8
+"""Largest last correction of a motion. [m]"""
+
+MOST_CORRECTIONS, MOST_CHORDS = 12, 6
+"""Largest number of corrections of a step, and of those with one matrix."""
+
+FAST = 0.3
+"""Largest ratio of two corrections at which the matrix is kept."""
+
+SHORTEST_STEP = 1e-4
+"""Shortest arc length of a step, in units of `LENGTH`."""
+
+MOST_POINTS = 20
+"""Largest number of points of a branch, as a multiple of the number of speeds."""
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Point:
+    """Periodic motion on a branch.
+
+    Attributes:
+        speed: Of the drum. [rad/s]
+        coefficients: Of its Fourier series. (2 N + 1, n)
+        stable: Whether all Floquet multipliers are inside the unit circle.
+        multiplier: The largest of their absolute values.
+        on_grid: Whether the speed is one of those asked for.
+        back: Whether the branch goes to lower speeds here.
+    """
+
+    speed: float
+    coefficients: FloatArray
+    stable: bool
+    multiplier: float
+    on_grid: bool
+    back: bool
+
+
+@dataclass
+class _Place:
+    """A motion with the tangent of the branch: direction of coefficients and speed."""
+
+    coefficients: FloatArray
+    speed: float
+    along: FloatArray
+    speed_along: float
+
+
+def first_motion(
+    balance: HarmonicBalance, speed: float, guesses: Iterator[FloatArray]
+) -> FloatArray:
+    """Return the periodic motion at a speed, from the first guess that leads to one.
+
+    Raises:
+        InputError: no guess does.
+    """
+    for guess in guesses:
+        solved = _at_speed(balance, guess, speed)
+        if solved is not None:
+            return solved
+    raise input_error(
+        f"no periodic motion was found at {speed * 30.0 / np.pi:.4g} rpm; choose another first "
+        "speed, or more harmonics",
+        key="speeds",
+    )
+
+
+def follow(
+    balance: HarmonicBalance,
+    speeds: FloatArray,
+    first: FloatArray,
+    progress: Progress = lambda fraction: None,
+) -> list[Point]:
+    """Return the periodic motions along the branch through a first one.
+
+    Args:
+        balance: The machine.
+        speeds: Speeds in rising or falling order, at least two; the branch is followed from the
+            first to the last. [rad/s]
+        first: Coefficients of the motion at the first speed.
+        progress: Called with the fraction done.
+
+    Returns:
+        A point at each crossing of a speed, and some between them where the branch bends. Behind a
+        fold the speed changes the other way. If the branch cannot be followed to its end, the
+        points up to there.
+    """
+    metric = _Metric(balance, float(np.ptp(speeds)))
+    way = 1.0 if speeds[-1] > speeds[0] else -1.0
+    place = metric.place(first, float(speeds[0]), balance, None, way)
+    points = [_point(balance, place, True, way)]
+    step, low, high = np.inf, min(speeds), max(speeds)
+    while len(points) < MOST_POINTS * len(speeds):
+        target = _next_speed(speeds, place.speed, place.speed_along)
+        if target is None:
+            break
+        reach = (target - place.speed) / place.speed_along if place.speed_along else np.inf
+        landing = reach <= step
+        length = reach if landing else step
+        begin = place.coefficients + length * place.along
+        ahead = target if landing else place.speed + length * place.speed_along
+        found = _step(balance, metric, place, length, begin, ahead, landing)
+        if found is not None and not landing and (found[0].speed - target) * place.speed_along > 0:
+            # the branch reached the speed of the grid before its tangent did: stop there first
+            share = (target - place.speed) / (found[0].speed - place.speed)
+            begin = place.coefficients + share * (found[0].coefficients - place.coefficients)
+            found = _step(balance, metric, place, length, begin, target, landing := True)
+        if found is None:
+            step = 0.5 * min(step, reach, 4.0)
+            if step < SHORTEST_STEP:
+                break
+            continue
+        place, quick = found
+        if quick:
+            step *= 2.0
+        if not low - 1e-9 <= place.speed <= high + 1e-9:
+            break
+        points.append(_point(balance, place, landing, way))
+        progress(abs(place.speed - speeds[0]) / (high - low))
+        if landing and target == speeds[-1]:
+            break
+    return points
+
+
+def _next_speed(speeds: FloatArray, speed: float, direction: float) -> float | None:
+    """Return the next speed of the grid in a direction; None beyond its ends."""
+    ahead = (speeds - speed) * np.sign(direction or 1.0)
+    beyond = np.flatnonzero(ahead > 1e-9 * np.max(np.abs(speeds)))
+    return float(speeds[beyond[np.argmin(ahead[beyond])]]) if beyond.size else None
+
+
+class _Metric:
+    """Size of a step along a branch."""
+
+    def __init__(self, balance: HarmonicBalance, span: float) -> None:
+        self.weights = (balance.scale / LENGTH) ** 2
+        self.speed_weight = 1.0 / (SPEEDS * span) ** 2
+
+    def row(self, along: FloatArray, speed_along: float) -> FloatArray:
+        """Return the equation of the plane across a tangent."""
+        return np.append((along * self.weights).ravel(), speed_along * self.speed_weight)
+
+    def unit(self, along: FloatArray, speed_along: float) -> tuple[FloatArray, float]:
+        """Return a direction scaled to an arc length of 1."""
+        size = np.sqrt(
+            np.sum(along * along * self.weights) + speed_along * speed_along * self.speed_weight
+        )
+        return along / size, float(speed_along / size)
+
+    def place(
+        self,
+        coefficients: FloatArray,
+        speed: float,
+        balance: HarmonicBalance,
+        before: _Place | None,
+        way: float,
+    ) -> _Place:
+        """Return a motion with the tangent of its branch; it goes on from the place before."""
+        at = balance.linearised(coefficients, speed)
+        if before is None:
+            along = -np.linalg.solve(at.matrix, at.by_speed.ravel()).reshape(coefficients.shape)
+            return _Place(coefficients, speed, *self.unit(way * along, way))
+        matrix = _bordered(at.matrix, at.by_speed, self.row(before.along, before.speed_along))
+        right = np.zeros(len(matrix))
+        right[-1] = 1.0
+        solved = np.linalg.solve(matrix, right)
+        along = solved[:-1].reshape(coefficients.shape)
+        return _Place(coefficients, speed, *self.unit(along, float(solved[-1])))
+
+
+def _bordered(matrix: FloatArray, by_speed: FloatArray, row: FloatArray) -> FloatArray:
+    size = len(matrix)
+    result = np.empty((size + 1, size + 1))
+    result[:size, :size], result[:size, size], result[size] = matrix, by_speed.ravel(), row
+    return result
+
+
+def _step(
+    balance: HarmonicBalance,
+    metric: _Metric,
+    place: _Place,
+    length: float,
+    begin: FloatArray,
+    speed: float,
+    landing: bool,
+) -> tuple[_Place, bool] | None:
+    """Return the next place along a branch, and whether it was found at once; None if not found.
+
+    Args:
+        balance, metric: The machine, and the size of a step.
+        place: Where the step begins.
+        length: Arc length of the step.
+        begin, speed: First guess of the motion and its speed.
+        landing: Whether the speed is kept; else the motion is on the plane across the tangent.
+    """
+    row = metric.row(place.along, place.speed_along)
+    coefficients, factors, last, count = begin.copy(), None, np.inf, 0
+    right = np.zeros((len(row), 2))
+    right[-1, 1] = 1.0
+    constraint = np.append(np.zeros(len(row) - 1), 1.0) if landing else row
+    for correction in range(MOST_CORRECTIONS):
+        if factors is None:
+            at = balance.linearised(coefficients, speed)
+            residual = at.residual
+            with warnings.catch_warnings():  # a singular matrix gives no finite step
+                warnings.simplefilter("ignore", LinAlgWarning)
+                bordered = _bordered(at.matrix, at.by_speed, constraint)
+                factors = lu_factor(bordered, overwrite_a=True, check_finite=False)
+            count = 0
+        else:
+            residual = balance.residual(coefficients, speed)
+        right[:-1, 0] = -residual.ravel()
+        change = lu_solve(factors, right[:, 0], check_finite=False)
+        if not np.all(np.isfinite(change)):
+            return None
+        coefficients = coefficients + change[:-1].reshape(begin.shape)
+        speed += 0.0 if landing else float(change[-1])
+        size = balance.extent(change[:-1].reshape(begin.shape))
+        count += 1
+        if size < TOLERANCE:
+            break
+        if size > FAST * last or count >= MOST_CHORDS:
+            factors = None
+        last = size
+    else:
+        return None
+    moved = balance.extent(coefficients - begin) / LENGTH
+    if moved > 0.5 * max(length, 0.05) or factors is None:
+        return None
+    solved = lu_solve(factors, right[:, 1], check_finite=False)
+    along, speed_along = solved[:-1].reshape(begin.shape), float(solved[-1])
+    along, speed_along = metric.unit(along, speed_along)
+    forwards = np.sum(along * place.along * metric.weights)
+    forwards += speed_along * place.speed_along * metric.speed_weight
+    if forwards < 0.0:
+        along, speed_along = -along, -speed_along
+    if abs(forwards) < 0.6:  # the branch bends by more than 50 degrees
+        return None
+    return _Place(coefficients, speed, along, speed_along), correction < 4 and abs(forwards) > 0.9
+
+
+def _point(balance: HarmonicBalance, place: _Place, on_grid: bool, way: float) -> Point:
+    states = balance.states(place.coefficients, place.speed)
+    _, slopes = balance.derivative.with_slopes(states)
+    multipliers = floquet_multipliers(slopes, 2.0 * np.pi / abs(place.speed))
+    return Point(
+        place.speed,
+        place.coefficients,
+        is_stable(multipliers),
+        float(np.max(np.abs(multipliers))),
+        on_grid,
+        place.speed_along * way < 0.0,
+    )
+
+
+def _at_speed(balance: HarmonicBalance, guess: FloatArray, speed: float) -> FloatArray | None:
+    """Return the motion at a speed by Newton's method with halved steps; None if it fails."""
+    coefficients = guess.copy()
+    for _ in range(60):
+        at = balance.linearised(coefficients, speed)
+        try:
+            change = -np.linalg.solve(at.matrix, at.residual.ravel()).reshape(guess.shape)
+        except np.linalg.LinAlgError:
+            return None
+        size = balance.extent(change)
+        if not np.isfinite(size):
+            return None
+        share, before = 1.0, float(np.linalg.norm(at.residual))
+        while share > 0.01:
+            trial = coefficients + share * change
+            if np.linalg.norm(balance.residual(trial, speed)) < (1.0 - 0.1 * share) * before:
+                break
+            share *= 0.5
+        coefficients = coefficients + share * change
+        if size < TOLERANCE:
+            return coefficients
+    return None

@@ -1,0 +1,234 @@
+"""Steady unbalance response of a machine over the speed of its drum."""
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+import xarray as xr
+from threadpoolctl import threadpool_limits
+
+from wm_drake.engines.trajectory import COORDINATES, Trajectory
+from wm_drake.errors import input_error
+from wm_drake.model.machine import Machine, Setup
+from wm_drake.parameters import Load
+from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.outputs import AXES, variables_of
+from wm_drake.studies.steady.balance import HARMONICS, SAMPLES, HarmonicBalance
+from wm_drake.studies.steady.continuation import Point, first_motion, follow
+from wm_drake.studies.steady.series import Series
+from wm_drake.studies.steady.settled import settled_coefficients
+
+MOST_HARMONICS, MOST_SAMPLES = 40, 1024
+"""Largest number of harmonics, and of samples of a period."""
+
+
+def steady_response(
+    machine: Machine,
+    load: Load | str,
+    speeds: Sequence[float] | FloatArray,
+    *,
+    gasket: bool = True,
+    harmonics: int = HARMONICS,
+    samples: int = SAMPLES,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> xr.Dataset:
+    """Return the steady response of a machine to its unbalance, over the speed of its drum.
+
+    The periodic motion is found by harmonic balance and followed around folds.
+
+    Args:
+        machine: A built machine.
+        load: Point masses in the drum, or the name of one of the machine's loads.
+        speeds: Rising or falling speeds, at least two. [rad/s]
+        gasket: False removes the gasket.
+        harmonics: Number of harmonics of the drum's rotation.
+        samples: Number of samples of a revolution at which forces are evaluated; more than twice
+            the number of harmonics.
+        progress: Called with the fraction done.
+
+    Returns:
+        Values over `point`, along the branch, with the coordinate `speed` [rad/s]. Behind a fold
+        the speed changes the other way. `on_grid` is true at the speeds that were asked for,
+        `stable` says whether the motion attracts its neighbours, `multiplier` is the size of the
+        largest Floquet multiplier. `amplitude` (sensor) is the largest deviation from the mean of a
+        revolution; `detergent_displacement` (axis), `gasket_force`, `gasket_moment` (axis) are
+        largest absolute values as in `Measures`; `spring_tension`, `damper_tension` are half the
+        range of a revolution; `first_harmonic` (coordinate, part) is the tub's pose. SI.
+
+    Raises:
+        InputError: an argument is wrong, or no periodic motion is found at the first speed.
+    """
+    setup = machine.set_up(load, gasket=gasket)
+    return response_of(setup, speeds, harmonics, samples, progress)
+
+
+def response_of(
+    setup: Setup,
+    speeds: Sequence[float] | FloatArray,
+    harmonics: int = HARMONICS,
+    samples: int = SAMPLES,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> xr.Dataset:
+    """Return the steady response of a machine as it is set up; see `steady_response`."""
+    grid = _checked(speeds, harmonics, samples)
+    with threadpool_limits(1, "blas"):  # the matrices are small: several threads would be slower
+        balance = HarmonicBalance(setup, Series(harmonics, samples))
+        points = branch_of(balance, setup, grid, progress)
+        return _measured(setup, balance, points)
+
+
+def branch_of(
+    balance: HarmonicBalance,
+    setup: Setup,
+    speeds: FloatArray,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> list[Point]:
+    """Return the branch of periodic motions over the speeds."""
+
+    def guesses() -> Iterator[FloatArray]:
+        yield balance.rest()
+        settled = settled_coefficients(balance, setup, float(speeds[0]))
+        if np.all(np.isfinite(settled)):
+            yield settled
+
+    return follow(balance, speeds, first_motion(balance, speeds[0], guesses()), progress)
+
+
+def _checked(
+    speeds: Sequence[float] | FloatArray, harmonics: int, samples: int
+) -> FloatArray:
+    """Return the speeds as an array.
+
+    Raises:
+        InputError: an argument of `steady_response` is wrong.
+    """
+    grid = np.atleast_1d(np.asarray(speeds, dtype=float))
+    steps = np.diff(grid)
+    ordered = grid.ndim == 1 and len(grid) > 1 and (np.all(steps > 0.0) or np.all(steps < 0.0))
+    if not ordered or not np.all(np.isfinite(grid)) or np.min(grid) <= 0.0:
+        raise input_error(
+            "needs at least two speeds above 0 that rise or fall all the way", key="speeds"
+        )
+    if not 1 <= harmonics <= MOST_HARMONICS:
+        raise input_error(f"{harmonics} is not between 1 and {MOST_HARMONICS}", key="harmonics")
+    if not 2 * harmonics < samples <= MOST_SAMPLES:
+        raise input_error(
+            f"{samples} is not above {2 * harmonics}, twice the number of harmonics, and up to "
+            f"{MOST_SAMPLES}",
+            key="samples",
+        )
+    return grid
+
+
+def trajectory_of_period(
+    setup: Setup, balance: HarmonicBalance, coefficients: FloatArray, speed: float, samples: int
+) -> Trajectory:
+    """Return a revolution of a periodic motion; it has no torque and no accelerations (NaN)."""
+    phase = 2.0 * np.pi * np.arange(samples) / samples
+    states = balance.states(coefficients, speed, phase)
+    motion, deformation, tubes, carrier = balance.derivative.layout.parts(states)
+    return Trajectory(
+        phase / speed,
+        np.ascontiguousarray(motion),
+        np.ascontiguousarray(deformation),
+        np.full(samples, np.nan),
+        np.full((samples, 6), np.nan),
+        tubes,
+        np.ascontiguousarray(carrier),
+    )
+
+
+def _measured(setup: Setup, balance: HarmonicBalance, points: list[Point]) -> xr.Dataset:
+    samples = balance.series.samples
+    periods = [
+        trajectory_of_period(setup, balance, point.coefficients, point.speed, samples)
+        for point in points
+    ]
+    whole = Trajectory(
+        *(
+            np.concatenate([getattr(period, name) for period in periods])
+            for name in (
+                "time",
+                "state",
+                "deformation",
+                "motor_torque",
+                "acceleration",
+                "tubes",
+                "carrier",
+            )
+        )
+    )
+    variables = variables_of(setup, whole)
+
+    def by_point(name: str) -> FloatArray:
+        values = variables[name][1]
+        return values.reshape(len(points), samples, *values.shape[1:])
+
+    def deviation(name: str) -> FloatArray:
+        values = by_point(name)
+        return np.abs(values - values.mean(axis=1, keepdims=True)).max(axis=1)
+
+    def half_range(name: str) -> FloatArray:
+        return 0.5 * np.ptp(by_point(name), axis=1)
+
+    names = list(setup.bushings)
+    gasket = names.index("gasket") if "gasket" in names else None
+
+    def largest_of_gasket(name: str) -> FloatArray:
+        if gasket is None:
+            return np.zeros((len(points), 3))
+        return np.abs(by_point(name)[:, :, gasket]).max(axis=1)
+
+    first = np.stack([point.coefficients[1:3, :6].T for point in points])
+    dampers = [*setup.dampers, *setup.telescopes]
+    return xr.Dataset(
+        {
+            "amplitude": (
+                ("point", "sensor"),
+                deviation("displacement"),
+                {"units": "m", "long_name": "largest deviation from the mean of a revolution"},
+            ),
+            "detergent_displacement": (
+                ("point", "axis"),
+                np.abs(by_point("detergent_displacement")).max(axis=1),
+                {"units": "m", "long_name": "largest displacement nearest the detergent box"},
+            ),
+            "gasket_force": (
+                ("point", "axis"),
+                largest_of_gasket("bushing_force"),
+                {"units": "N", "long_name": "largest force of the gasket on the housing"},
+            ),
+            "gasket_moment": (
+                ("point", "axis"),
+                largest_of_gasket("bushing_moment"),
+                {"units": "N m", "long_name": "largest moment of the gasket on the housing"},
+            ),
+            "spring_tension": (
+                ("point", "spring"),
+                half_range("spring_tension"),
+                {"units": "N", "long_name": "half the range of the tension in a revolution"},
+            ),
+            "damper_tension": (
+                ("point", "damper"),
+                half_range("damper_tension"),
+                {"units": "N", "long_name": "half the range of the tension in a revolution"},
+            ),
+            "first_harmonic": (
+                ("point", "coordinate", "part"),
+                first,
+                {"units": "rad, m", "long_name": "first harmonic of the pose of the tub"},
+            ),
+            "stable": ("point", [point.stable for point in points]),
+            "multiplier": ("point", [point.multiplier for point in points]),
+            "on_grid": ("point", [point.on_grid for point in points]),
+        },
+        {
+            "speed": ("point", [point.speed for point in points], {"units": "rad/s"}),
+            "sensor": list(setup.sensors),
+            "axis": list(AXES),
+            "spring": list(setup.springs),
+            "damper": dampers,
+            "coordinate": list(COORDINATES),
+            "part": ["cosine", "sine"],
+        },
+        {"harmonics": balance.series.order, "samples": samples},
+    )

@@ -1,0 +1,60 @@
+"""Periodic motion by time integration: the compiled engine at constant speed until it has settled.
+
+It is an independent check of harmonic balance, and a first guess where no better one is at hand.
+"""
+
+import numpy as np
+
+from wm_drake.engines.compiled.run import run_compiled
+from wm_drake.engines.trajectory import Trajectory
+from wm_drake.model.machine import Setup
+from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.steady.balance import HarmonicBalance
+
+REVOLUTIONS = 60
+"""Default number of drum revolutions until the motion has settled."""
+
+
+def settled_trajectory(
+    setup: Setup, speed: float, samples: int, revolutions: int = REVOLUTIONS
+) -> Trajectory:
+    """Return the last drum revolution of a run at constant speed that starts at rest.
+
+    Args:
+        setup: Machine at rest with its load.
+        speed: Of the drum. [rad/s]
+        samples: Number of samples of a revolution.
+        revolutions: Number of drum revolutions.
+
+    Returns:
+        `samples` samples at equal distances; none if the run diverged.
+    """
+    period = 2.0 * np.pi / speed
+    profile = SpinProfile(time=(0.0, revolutions * period), speed=(speed, speed))
+    step = min(setup.parameters.step, period / samples)
+    run = run_compiled(setup, profile, step, lambda fraction: None, period / samples)
+    kept = slice(-samples - 1, -1) if run.divergence is None else slice(0, 0)
+    return Trajectory(
+        run.time[kept],
+        run.state[kept],
+        run.deformation[kept],
+        run.motor_torque[kept],
+        run.acceleration[kept],
+        run.tubes[kept],
+        run.carrier[kept],
+        run.divergence,
+    )
+
+
+def settled_coefficients(balance: HarmonicBalance, setup: Setup, speed: float) -> FloatArray:
+    """Return the Fourier coefficients of the settled motion; NaN if the run diverged."""
+    run = settled_trajectory(setup, speed, balance.series.samples)
+    if run.divergence is not None:
+        return np.full((balance.series.size, balance.size), np.nan)
+    tubes = np.concatenate(
+        [run.tubes, run.deformation[:, len(setup.dampers) :, None]], axis=2
+    ).reshape(len(run.time), -1)
+    own = run.deformation[:, : len(setup.dampers)]
+    states = np.hstack([run.state, own, tubes, run.carrier])
+    return np.asarray(balance.series.analysis @ states[:, balance.derivative.free])
