@@ -331,7 +331,7 @@ BAD_FILE = "time_s,displacement_mm,force_N\n" + "\n".join(
             "arm: an arm drives a rotation",
         ),
         (("identify", "damper", "none.csv"), "none.csv: no such file"),
-        (("identify", "damper", "bad.csv"), "bad.csv: displacement is not harmonic"),
+        (("identify", "damper", "bad.csv"), "bad.csv: displacement is not resolved by its samples"),
         (
             ("identify", "damper", "bad.csv", "--units", "s,mm"),
             "--units: 's,mm' is not three units",

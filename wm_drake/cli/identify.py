@@ -224,10 +224,7 @@ def _motions(asked: _Asked, *, rotates: bool) -> "list[MeasuredMotion]":
             problems += error.problems
     if problems:
         raise InputError(problems)
-    return sorted(
-        motions,
-        key=lambda measured: (round(measured.motion.frequency, 2), measured.motion.amplitude),
-    )
+    return sorted(motions, key=lambda measured: measured.order)
 
 
 def _kept_fields(

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figures import MEASURED, OURS, WIDTH
 from wm_drake.report.rig.figures import force_scale, legend_line, motion_scale, style_panel
-from wm_drake.rigs.measured import MeasuredMotion
+from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion
 from wm_drake.studies.fitting import Fit
 
 COLUMNS = 4
@@ -17,8 +17,14 @@ COLUMNS = 4
 
 
 def motion_text(measured: MeasuredMotion) -> str:
-    """Return frequency and amplitude of a measured loop with their units."""
+    """Return frequency and amplitude of a measured loop with their units; of another motion, range.
+
+    The range goes from the least to the greatest displacement.
+    """
     factor, _, unit = motion_scale(measured.loop.rotates)
+    if not isinstance(measured, HarmonicMotion):
+        low, high = (factor * side(measured.position) for side in (np.min, np.max))
+        return f"as recorded, {low:.3g} to {high:.3g} {unit}"
     return f"{measured.motion.frequency:.3g} Hz, {factor * measured.motion.amplitude:.3g} {unit}"
 
 
@@ -59,6 +65,14 @@ def loops_figure(fit: Fit, motions: Sequence[MeasuredMotion], *, over: str) -> F
     return figure
 
 
+def drawing_order(measured: MeasuredMotion) -> np.ndarray:
+    """Return the order of samples along a line: by phase and closed for a sine, else by time."""
+    if not isinstance(measured, HarmonicMotion):
+        return np.arange(len(measured.position))
+    order = np.argsort(measured.phase)
+    return np.append(order, order[0])
+
+
 def history_figure(fit: Fit, unit: str) -> Figure:
     """Draw the smallest RMSE, with its unit, after each round of the search."""
     figure = Figure(figsize=(WIDTH, 2.3), layout="constrained")
@@ -85,12 +99,8 @@ def _panel(
     over: str,
     factor: float,
 ) -> None:
-    amplitude, omega = factor * measured.motion.amplitude, measured.motion.angular_frequency
-    order = np.argsort(measured.phase)
-    order = np.append(order, order[0])
-    turn = np.sin(measured.phase) if over == "displacement" else omega * np.cos(measured.phase)
-    axes.plot(
-        amplitude * turn, force, "o", color=MEASURED, markersize=2.0, alpha=0.45, rasterized=True
-    )
-    axes.plot(amplitude * turn[order], computed[order], color=OURS, linewidth=1.6)
+    x = factor * (measured.position if over == "displacement" else measured.rate)
+    order = drawing_order(measured)
+    axes.plot(x, force, "o", color=MEASURED, markersize=2.0, alpha=0.45, rasterized=True)
+    axes.plot(x[order], computed[order], color=OURS, linewidth=1.6)
     style_panel(axes)

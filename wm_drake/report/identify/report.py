@@ -12,7 +12,7 @@ from wm_drake.report.identify.figures import history_figure, loops_figure, motio
 from wm_drake.report.page import picture, render
 from wm_drake.report.rig.figures import force_scale, motion_scale
 from wm_drake.report.tables import Group, Row, Table
-from wm_drake.rigs.measured import MeasuredMotion
+from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion, RecordedMotion
 from wm_drake.studies.fitting import Estimate, Fit
 from wm_drake.studies.identification import Judgement
 from wm_drake.studies.identification.judgement import per_cent
@@ -67,6 +67,7 @@ def identify_report(
             ("Seed", str(fit.seed)),
             ("Evaluated points", str(fit.evaluations)),
             ("Condition number", f"{fit.condition:.3g}"),
+            *(("Motion", text) for text in motion_sentences(motions)),
             *(("Note", note) for note in fit.notes),
             ("Command", command),
         ],
@@ -168,8 +169,8 @@ def errors_table(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgeme
         rows.append(
             {
                 "file": measured.loop.path,
-                "frequency_hz": measured.motion.frequency,
-                f"amplitude_{unit}": factor * measured.motion.amplitude,
+                "frequency_hz": _frequency(measured),
+                f"amplitude_{unit}": factor * measured.stroke,
                 f"rmse_{force}": test.rmse,
                 "rmse_by_largest_force": test.normalised,
                 f"noise_{force}": judged.noise,
@@ -180,6 +181,35 @@ def errors_table(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgeme
     return pd.DataFrame(rows)
 
 
+def motion_sentences(motions: Sequence[MeasuredMotion]) -> list[str]:
+    """Return a sentence for each test whose own displacement drives the law, on its smoothing."""
+    found = []
+    for m in motions:
+        if not isinstance(m, RecordedMotion):
+            continue
+        factor, _, unit = motion_scale(m.loop.rotates)
+        smoothing = (
+            f"smoothed by a cubic spline that halves a motion at {m.cutoff:.3g} Hz; "
+            f"{factor * m.noise:.2g} {unit} (root mean square) is taken out as noise"
+            if np.isfinite(m.cutoff)
+            else "interpolated by a cubic spline without smoothing"
+        )
+        begin = (
+            "a sponge begins in the steady state of the first period"
+            if m.repeats
+            else "a sponge begins without deformation"
+        )
+        found.append(
+            f"{m.loop.name} is no sine: its displacement drives the law as recorded, {smoothing}; "
+            f"{begin}."
+        )
+    return found
+
+
+def _frequency(measured: MeasuredMotion) -> float:
+    return measured.motion.frequency if isinstance(measured, HarmonicMotion) else float("nan")
+
+
 def fitted_loops(fit: Fit, motions: Sequence[MeasuredMotion]) -> pd.DataFrame:
     """Return the measured and the fitted force at every sample. [SI]"""
     parts = [
@@ -187,7 +217,7 @@ def fitted_loops(fit: Fit, motions: Sequence[MeasuredMotion]) -> pd.DataFrame:
             {
                 "file": measured.loop.name,
                 "time_s": measured.loop.time,
-                "phase_rad": measured.phase,
+                "phase_rad": measured.phase if isinstance(measured, HarmonicMotion) else np.nan,
                 "measured": measured.loop.force,
                 "fitted": fit.computed[where],
             }
@@ -221,7 +251,7 @@ def _errors(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) -
                 Row(
                     (
                         motion_text(measured),
-                        str(len(measured.phase)),
+                        str(len(measured.position)),
                         f"{test.rmse:.4g}",
                         number(test.normalised, 4),
                         f"{judged.noise:.2g}",

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import f as fisher
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.rigs.measured import MeasuredMotion
+from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion
 from wm_drake.studies.fitting import Fit, Verdict, rmse, verdict_of
 from wm_drake.studies.fitting.verdict import FAIR
 
@@ -34,9 +34,10 @@ class LoopJudgement:
         residual: Root mean square of measured less fitted force. [N; N m]
         noise: Standard deviation of the noise of the measured force. [N; N m]
         samples: Number of samples.
-        work: Work that the measured motion does on the component in a period. [J]
+        work: Work that the measured motion does on the component in a period; NaN for a motion
+            that is no sine. [J]
         in_phase, out_of_phase: Amplitudes of the measured force in phase with the displacement and
-            with the velocity. [N; N m]
+            with the velocity: by least squares, at the largest of both. [N; N m]
     """
 
     name: str
@@ -169,7 +170,7 @@ class Judgement:
                     "name": loop.name,
                     "missed": loop.missed,
                     "noise": loop.noise,
-                    "work_per_cycle_J": loop.work,
+                    "work_per_cycle_J": loop.work if np.isfinite(loop.work) else None,
                 }
                 for loop in self.loops
             ],
@@ -216,15 +217,19 @@ def judge(fit: Fit, motions: Sequence[MeasuredMotion]) -> Judgement:
     found = []
     for where, measured, amounts in zip(fit.problem.slices, motions, fit.baselines, strict=True):
         force = measured.loop.force - measured.baseline @ amounts
-        in_phase, out_of_phase = _fundamental(measured.phase, force)
+        in_phase, out_of_phase = _parts(measured, force)
+        is_sine = isinstance(measured, HarmonicMotion)
         found.append(
             LoopJudgement(
                 name=measured.loop.name,
                 force=float(rmse(force)),
                 residual=float(rmse(measured.loop.force - fit.computed[where])),
-                noise=noise_of(measured.phase, force),
+                noise=noise_of(
+                    measured.phase if isinstance(measured, HarmonicMotion) else measured.loop.time,
+                    force,
+                ),
                 samples=len(force),
-                work=float(np.pi * measured.motion.amplitude * out_of_phase),
+                work=np.pi * measured.stroke * out_of_phase if is_sine else float("nan"),
                 in_phase=in_phase,
                 out_of_phase=out_of_phase,
             )
@@ -240,7 +245,7 @@ def noise_of(phase: FloatArray, values: FloatArray) -> float:
     The median does not see the few samples at a jump of the force.
 
     Args:
-        phase: Phase of each sample, in any order (n,). [rad]
+        phase: Phase of each sample, in any order, or its time if the signal is not periodic (n,).
         values: The signal (n,).
     """
     order = np.argsort(phase, kind="stable")
@@ -258,8 +263,9 @@ NORMAL_MEDIAN = 0.6744897501960817
 """Median of the absolute value of a standard normal variable."""
 
 
-def _fundamental(phase: FloatArray, force: FloatArray) -> tuple[float, float]:
+def _parts(measured: MeasuredMotion, force: FloatArray) -> tuple[float, float]:
     """Return the amplitudes of a force in phase with displacement and velocity."""
-    columns = np.stack([np.sin(phase), np.cos(phase), np.ones_like(phase)], axis=1)
+    position, rate = measured.position / measured.stroke, measured.rate / measured.fastest
+    columns = np.stack([position, rate, np.ones_like(rate)], axis=1)
     amounts = np.linalg.lstsq(columns, force, rcond=None)[0]
     return float(amounts[0]), float(amounts[1])

@@ -9,7 +9,13 @@ from wm_drake.rigs import Bench, BushingBench, DamperBench, NotSteadyError
 from wm_drake.rigs.forces import bushing_loads, damper_tensions
 from wm_drake.rigs.integration import PHASE
 from wm_drake.rigs.loops import steady_deformations
-from wm_drake.rigs.measured import MeasuredMotion
+from wm_drake.rigs.measured import (
+    HarmonicMotion,
+    MeasuredMotion,
+    RecordedMotion,
+    sines_of,
+)
+from wm_drake.rigs.recorded import recorded_forces
 from wm_drake.studies.fitting import FitProblem, Measurement
 from wm_drake.studies.identification.models import ComponentModel
 
@@ -35,11 +41,33 @@ def fit_problem(model: ComponentModel, motions: Sequence[MeasuredMotion]) -> Fit
 def computed_forces(
     model: ComponentModel, motions: Sequence[MeasuredMotion], points: FloatArray
 ) -> FloatArray:
-    """Return the forces at the samples of all loops, at each point (k, n); NaN if not steady."""
+    """Return the forces at the samples of all tests, at each point (k, n); NaN if not steady."""
     benches = [model.bench(point) for point in points]
+    ends = np.cumsum([len(m.position) for m in motions])
+    found = np.empty((len(points), ends[-1]))
+    sines = sines_of(motions)
+    if sines:
+        steady = _steady_forces(benches, sines)
+        begin = 0
+    for motion, end in zip(motions, ends, strict=True):
+        where = slice(end - len(motion.position), end)
+        if isinstance(motion, HarmonicMotion):
+            found[:, where] = steady[:, begin : begin + len(motion.position)]
+            begin += len(motion.position)
+        elif isinstance(motion, RecordedMotion):
+            found[:, where] = [recorded_forces(bench, motion) for bench in benches]
+    return found
+
+
+def _steady_forces(benches: Sequence[Bench], motions: Sequence[HarmonicMotion]) -> FloatArray:
+    """Return the forces of steady loops at their samples, of each bench (k, n)."""
     if isinstance(benches[0], BushingBench):
         return np.array(
-            [np.concatenate([_bushing_forces(bench, m) for m in motions]) for bench in benches]
+            [
+                np.concatenate([bushing_loads(bench, m.position, m.rate) for m in motions])
+                for bench in benches
+                if isinstance(bench, BushingBench)
+            ]
         )
     at_once = max(1, MOST_ROWS // len(motions))
     parts = [
@@ -48,15 +76,7 @@ def computed_forces(
     return np.concatenate(parts)
 
 
-def _bushing_forces(bench: Bench, measured: MeasuredMotion) -> FloatArray:
-    assert isinstance(bench, BushingBench)
-    amplitude, omega = measured.motion.amplitude, measured.motion.angular_frequency
-    return bushing_loads(
-        bench, amplitude * np.sin(measured.phase), amplitude * omega * np.cos(measured.phase)
-    )
-
-
-def _damper_forces(benches: Sequence[Bench], motions: Sequence[MeasuredMotion]) -> FloatArray:
+def _damper_forces(benches: Sequence[Bench], motions: Sequence[HarmonicMotion]) -> FloatArray:
     dampers = [bench for bench in benches if isinstance(bench, DamperBench)]
     amplitude = np.array([m.motion.amplitude for _ in dampers for m in motions])
     omega = np.array([m.motion.angular_frequency for _ in dampers for m in motions])
@@ -75,7 +95,6 @@ def _damper_forces(benches: Sequence[Bench], motions: Sequence[MeasuredMotion]) 
         forces = []
         for number, m in enumerate(motions):
             own = np.interp(m.phase, PHASE, deformation[index * len(motions) + number])
-            speed = m.motion.amplitude * m.motion.angular_frequency
-            forces.append(damper_tensions(speed * np.cos(m.phase), own, bench.packed))
+            forces.append(damper_tensions(m.rate, own, bench.packed))
         rows.append(np.concatenate(forces))
     return np.array(rows)

@@ -67,10 +67,8 @@ def scale_of(motions: Sequence[MeasuredMotion], arm: float = 0.0) -> Scale:
     force, stiffness, damping, speeds, strokes = [], [], [], [], []
     for measured in motions:
         size = 0.5 * float(np.ptp(measured.loop.force)) * (arm or 1.0)
-        stroke = (
-            float(np.arcsin(measured.motion.amplitude / arm)) if arm else measured.motion.amplitude
-        )
-        speed = stroke * measured.motion.angular_frequency
+        stroke = float(np.arcsin(min(measured.stroke / arm, 1.0))) if arm else measured.stroke
+        speed = measured.fastest * stroke / measured.stroke
         force.append(size)
         stiffness.append(size / stroke)
         damping.append(size / speed)
