@@ -43,6 +43,12 @@ _VARIABLES = {
         "m",
         "RMS displacement in each region, from the acceleration integrated twice",
     ),
+    "smallest_spring_tension": ("spring", "N", "smallest tension; 0 if the spring goes slack"),
+    "smallest_spring_elongation": (
+        "spring",
+        "m",
+        "smallest elongation from the free length; negative if the spring goes slack",
+    ),
 }
 
 
@@ -81,7 +87,9 @@ def simulate_many(
             "power means": smooth substitutes for the amplitudes (`measures.power_means`);
             "gap": smallest distance between tub group and housing, NaN if the SDF has no shapes;
             "regions": RMS displacements of the accelerometers in the regions of the profile
-            (`wm_drake.simulation.vibration`).
+            (`wm_drake.simulation.vibration`);
+            "spring tensions": smallest tension of each spring, 0 if it goes slack, and smallest
+            elongation from its free length.
         step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
             step size of the machine is used. [s]
         histories: Whether each `RunResult` contains the record of the run, as from `simulate`.
@@ -144,6 +152,8 @@ def as_table(
         "axis": list(AXES),
         "sensor": list(parameters.sensors),
     }
+    if "spring tensions" in measures:
+        labels["spring"] = list(parameters.springs)
     if "regions" in measures:
         labels |= {
             "accelerometer": list(parameters.accelerometer_frames()),

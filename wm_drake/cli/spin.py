@@ -22,7 +22,7 @@ from wm_drake.cli.common import (
 )
 from wm_drake.cli.progress import progress_bars
 from wm_drake.cli.result_folder import Run, result_folder
-from wm_drake.cli.terminal import Console
+from wm_drake.cli.terminal import Console, say
 from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -102,6 +102,7 @@ def spin(
         typer.echo(json.dumps(_as_json(result)))
     else:
         _print_tables(result, out, replay)
+    _warn_of_slack_springs(result)
     for message in diverged:
         typer.echo(message, err=True)
     if diverged:
@@ -172,8 +173,21 @@ def _print_tables(result: "SpinResult", out: Path, replay: bool) -> None:
                 f"{case.case.name}: smallest gap {millimetre.from_si(gap.distance):.1f} mm between "
                 f"{gap.moving} and {gap.fixed}, at {gap.time:.2f} s"
             )
+        tensions = case.measures.smallest_tension
+        shown = zip(tensions.spring.values, tensions.values, strict=True)
+        console.print(
+            f"{case.case.name}: smallest spring tension "
+            + ", ".join(f"{name} {tension:.1f} N" for name, tension in shown)
+        )
     replays = ", replay_<load>.html" if replay else ""
     console.print(f"Results in {out}: report.html, amplitudes.csv, record_<load>.nc{replays}")
+
+
+def _warn_of_slack_springs(result: "SpinResult") -> None:
+    from wm_drake.report.spin.report import slack_springs_warning
+
+    for text in slack_springs_warning(result):
+        say(f"warning: {text}", err=True)
 
 
 def _as_json(result: "SpinResult") -> dict[str, Any]:
@@ -206,6 +220,7 @@ def _case_as_json(case: "CaseResult") -> dict[str, Any]:
         "smallest_gap_mm": millimetre.from_si(measures.smallest_gap.distance)
         if measures.smallest_gap
         else None,
+        "smallest_spring_tension_N": numbers(measures.smallest_tension, Unit("N", "N")),
         "critical_rpm": numbers(measures.critical_speed, Unit("rad/s", "rpm")),
         "diverged": case.record.attrs["diverged"] or None,
         "wall_s": case.wall_s,

@@ -11,6 +11,7 @@ from wm_drake.model.scene import REPLAY_RATE, Gap, Scene
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record
+from wm_drake.simulation.spring_tension import smallest_tensions
 
 BAND_HZ = (0.5, 20.0)
 """Pass band of the displacements ([B] section 2.2)."""
@@ -44,6 +45,7 @@ class Measures:
         gasket_force, gasket_moment: (axis) largest absolute force and moment of the gasket on the
             housing; F and M of [B]. Zero without gasket. [N, N m]
         smallest_gap: Smallest gap between tub group and housing; None if it was not measured.
+        smallest_tension: (spring) smallest tension, 0 if the spring goes slack. [N]
     """
 
     amplitude: xr.DataArray
@@ -52,6 +54,7 @@ class Measures:
     gasket_force: xr.DataArray
     gasket_moment: xr.DataArray
     smallest_gap: Gap | None
+    smallest_tension: xr.DataArray
 
 
 def filtered(displacement: FloatArray, period: float) -> FloatArray:
@@ -233,6 +236,9 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
         gasket_force=xr.DataArray(_largest(force), by_axis),
         gasket_moment=xr.DataArray(_largest(moment), by_axis),
         smallest_gap=gap,
+        smallest_tension=xr.DataArray(
+            smallest_tensions(values["spring_tension"]), record.coords["spring"].coords
+        ),
     )
 
 
