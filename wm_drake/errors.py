@@ -42,6 +42,10 @@ class Problem:
         return ": ".join(part for part in (where, key, message) if part)
 
 
+class InputNotice(UserWarning):
+    """A remark on an input that is used, but not exactly as it was given."""
+
+
 class InputError(WmDrakeError):
     """An input that cannot be used; the message has one line per problem."""
 

@@ -214,3 +214,11 @@ def test_phase_error_without_effect_is_said(wm_drake):
     (message,) = ended.messages
     assert message.startswith("warning: imperfections.phase_error has no effect on the loads")
     assert "imperfections.phase_error has no effect" in Path("out/report.html").read_text()
+
+
+def test_set_null_removes_an_element(wm_drake):
+    shown = json.loads(wm_drake("machine", "show", "--json", "--set", "dampers.left=null").out)
+    assert list(shown["dampers"]) == ["right_rear", "right_front"]
+    ended = wm_drake("machine", "show", "--set", "dampers.lft=null")
+    assert (ended.code, ended.out) == (2, "")
+    assert "--set: dampers.lft: unknown key 'lft' (did you mean 'left'?" in ended.err

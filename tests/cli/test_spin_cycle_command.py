@@ -44,6 +44,11 @@ def test_prints_one_json_object_and_writes_what_it_says(study):
     assert (ended.code, len(ended.out.splitlines())) == (0, 1)
     shown = json.loads(ended.out)
     assert [case["case"] for case in shown["cases"]] == ["front", "both"]
+    tensions = [case["smallest_spring_tension_N"] for case in shown["cases"]]
+    assert all(min(found.values()) >= 0.0 for found in tensions)
+    assert list(tensions[0]) == ["left", "right", "rear"]
+    slack = any(0.0 in found.values() for found in tensions)
+    assert slack == ("Springs go slack" in Path("out/report.html").read_text(encoding="utf-8"))
     rms = np.array([case["rms_mm"] for case in shown["cases"]])
     assert rms.shape == (2, 2, 3, 3)
     assert rms.min() > 0.0

@@ -122,7 +122,7 @@ def test_unknown_key_is_refused(reference, key, message):
         ("gasket.stiffness_x", "3 N", "does not fit"),
         ("gasket.stiffness_x", "3", "has no unit"),
         ("gasket.stiffness_x", float("nan"), "not a finite number"),
-        ("gasket.stiffness_x", None, "not a number"),
+        ("gasket.stiffness_x", None, "is missing"),
         ("bodies.tub.mass", 0.0, "out of range; allowed is > 0"),
         ("springs.left.type", "rear", "'rear' is not in spring_types .known: suspension"),
         ("sensors.Xr.axis", "w", "'w' is not allowed; allowed are 'x', 'y' or 'z'"),
@@ -185,3 +185,37 @@ def test_every_problem_among_several_values_names_its_key(reference):
         "gasket.damping_x",
         "gasket.damping_z",
     ]
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        ("dampers.lft", r"dampers.lft: unknown key 'lft' \(did you mean 'left'"),
+        ("gravity", "gravity: is missing"),
+        ("loads.counter.unbalances.1", "one entry of a list cannot be removed"),
+        ("damper_types.friction", r"left\.type: 'friction' is not in damper_types"),
+        ("frames.nosuch", r"frames\.nosuch: unknown key 'nosuch'"),
+    ],
+)
+def test_what_cannot_be_removed_is_refused(reference, key, message):
+    with pytest.raises(InputError, match=message):
+        with_value(reference, key, None)
+
+
+@pytest.mark.parametrize(
+    ("key", "text"),
+    [
+        ("dampers.left", "dampers: {left: null}"),
+        ("gasket", "gasket: null"),
+        ("gasket.damping_x", "gasket: {damping_x: null}"),
+        ("sensors.Xr", "sensors: {Xr: null}"),
+        ("loads.front", "loads: {front: null}"),
+    ],
+)
+def test_none_removes_as_null_in_a_file(reference, tmp_path, key, text):
+    path = tmp_path / "file.yaml"
+    path.write_text(f"extends: reference\n{text}\n")
+    in_file = load_machine(path).model_dump(exclude={"sources", "measured"})
+    removed = with_value(reference, key, None).model_dump(exclude={"sources", "measured"})
+    assert removed == in_file
+    assert removed != reference.model_dump(exclude={"sources", "measured"})

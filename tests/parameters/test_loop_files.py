@@ -103,7 +103,7 @@ def test_angle_and_moment_are_a_rotation(tmp_path):
         (HEAD, changed(3, "0.1,1.0,-"), ":6: force [N]: '-' is not a number"),
         (HEAD, changed(3, "0.1,5 mm,3.0"), ":6: displacement [mm]: '5 mm' is not a number"),
         (HEAD, changed(3, "0.1,1.0"), ":6: has 2 values but the header has 3 columns"),
-        (HEAD, changed(5, "0.01,1.0,2.0"), ":8: time [s]: time does not rise: 0.01 after 0.102564"),
+        (HEAD, changed(5, "0.01,1.0,2.0"), ":8: time [s]: time falls: 0.01 after 0.102564"),
         (HEAD, rows(force=np.full(40, 7.0)), ":3: force [N]: is constant (7 on lines 3 to 42)"),
         (HEAD, rows(displacement=np.zeros(40)), ":3: displacement [mm]: is constant"),
         (HEAD, rows()[:19], ": has 19 samples; a loop needs at least 20"),

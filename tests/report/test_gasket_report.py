@@ -23,6 +23,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket.screening import Meaning, Responses, run_screening
 from wm_drake.studies.gasket.study import GasketTrials
+from wm_drake.studies.gasket.tables import as_plain_data, runs_table
 
 NAMES = ("C_L", "C_T", "K_Lx", "K_Ly")
 RESPONSES = [letter + axis for letter in "DFM" for axis in "xyz"]
@@ -172,6 +173,22 @@ def test_contact_is_said_first_and_listed(trials, words):
     assert "The tub touches the housing in 1 of 81 runs" in first
     assert "trial 5, load middle" in first
     assert "Runs in which the tub touches the housing" in gasket_report(screening, trials)
+
+
+def test_slack_springs_are_counted_by_spring_and_load(words):
+    frame = pd.DataFrame({"y": np.arange(9.0) ** 2})
+    slack = {(0, "middle"): ["left"], (3, "middle"): ["left", "rear"]}
+    responses = Responses({"middle": frame}, {"y": "mm"}, {}, slack=slack)
+    screening = run_screening(make_design("full", NAMES[:2]), lambda _: responses)
+    (found,) = [text for text in warnings(screening, words) if "slack" in text]
+    assert found.startswith(
+        "Springs go slack in 2 of 9 runs: left with load middle (2) and rear with load middle (1)."
+    )
+    assert as_plain_data(screening)["slack"] == [
+        {"trial": 1, "load": "middle", "springs": ["left"]},
+        {"trial": 4, "load": "middle", "springs": ["left", "rear"]},
+    ]
+    assert list(runs_table(screening)["slack"])[:4] == ["left", "", "", "left, rear"]
 
 
 def test_spread_shows_all_points_of_all_loads(screening, words):

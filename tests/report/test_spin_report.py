@@ -20,13 +20,19 @@ from wm_drake.parameters import (
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import number, percent
 from wm_drake.report.spin.panels import revolution_starts, simplified_indices
-from wm_drake.report.spin.report import amplitude_table, spin_report
-from wm_drake.report.spin.tables import differences, profiles
+from wm_drake.report.spin.report import amplitude_table, spin_report, warnings_of
+from wm_drake.report.spin.tables import differences, profiles, smallest_tensions
 from wm_drake.report.tables import readable
 from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
 
 DIVERGED = "the run diverged at 1.234 s: x = 0.6 m, bound 0.5 m"
 VOID = ("meta", "img", "br", "hr", "link", "input")
+
+
+def slack_case(parameters: MachineParameters, load: str, tensions: Sequence[float]) -> CaseResult:
+    case = case_result(parameters, load)
+    smallest = case.measures.smallest_tension.copy(data=np.array(tensions))
+    return replace(case, measures=replace(case.measures, smallest_tension=smallest))
 
 
 @pytest.fixture(scope="module")
@@ -382,3 +388,20 @@ def test_numbers_are_rounded_with_a_true_minus() -> None:
         "–",
         "2",
     ]
+
+
+def test_slack_springs_are_warned_of(machine: MachineParameters) -> None:
+    loads = {"middle": (0.0, 12.0, 0.0), "back": (0.0, 3.0, 40.0), "front": (-5.0, 1.0, 1.0)}
+    cases = [slack_case(machine, load, tensions) for load, tensions in loads.items()]
+    result = spin_result(machine, cases)
+    (warning,) = [text for text in warnings_of(result) if "slack" in text]
+    assert warning.startswith(
+        "Springs go slack: left in load middle (with gasket), back (with gasket); "
+        "rear in load middle (with gasket). A slack spring"
+    )
+    rows = [group.rows[0] for group in smallest_tensions(result).groups]
+    assert [row.cells for row in rows][2] == ("−5.0", "1.0", "1.0")
+    assert [row.kind for row in rows] == ["alarm", "alarm", ""]
+    assert "smallest tension of each spring" in spin_report(result).lower()
+    taut = spin_result(machine, [case_result(machine)])
+    assert not any("slack" in text for text in warnings_of(taut))

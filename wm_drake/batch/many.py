@@ -56,6 +56,12 @@ _VARIABLES = {
         )
         for kind in KINDS
     },
+    "smallest_spring_tension": ("spring", "N", "smallest tension; 0 if the spring goes slack"),
+    "smallest_spring_elongation": (
+        "spring",
+        "m",
+        "smallest elongation from the free length; negative if the spring goes slack",
+    ),
 }
 
 
@@ -96,7 +102,9 @@ def simulate_many(
             "regions": RMS displacements of the accelerometers in the regions of the profile
             (`wm_drake.simulation.vibration`);
             "mounts": peak, RMS and dynamic RMS of the force of each mount on the cabinet;
-            "cabinet": the same of force and moment of all mounts on the cabinet, for each axis.
+            "cabinet": the same of force and moment of all mounts on the cabinet, for each axis;
+            "spring tensions": smallest tension of each spring, 0 if it goes slack, and smallest
+            elongation from its free length.
         step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
             step size of the machine is used. [s]
         histories: Whether each `RunResult` contains the record of the run, as from `simulate`.
@@ -160,6 +168,8 @@ def as_table(
         "sensor": list(parameters.sensors),
         "mount": list(mount_names(parameters)),
     }
+    if "spring tensions" in measures:
+        labels["spring"] = list(parameters.springs)
     if "regions" in measures:
         labels |= {
             "accelerometer": list(parameters.accelerometer_frames()),

@@ -38,6 +38,7 @@ from wm_drake.simulation.mounts import (
     sums_size,
 )
 from wm_drake.simulation.records import Record, as_record
+from wm_drake.simulation.spring_tension import smallest_lengths_lanes, tensions_at
 from wm_drake.simulation.vibration import region_displacements
 
 MEASURES = {
@@ -48,6 +49,7 @@ MEASURES = {
     "regions": ("region_displacement", "region_displacement_integrated"),
     "mounts": tuple(f"mount_force_{kind}" for kind in KINDS),
     "cabinet": tuple(f"cabinet_{of}_{kind}" for of in ("force", "moment") for kind in KINDS),
+    "spring tensions": ("smallest_spring_tension", "smallest_spring_elongation"),
 }
 """What can be measured of each run, with the names of its variables."""
 
@@ -133,8 +135,9 @@ class Runner:
             extremes.reshape(-1, WIDTH),
             self._forces_of_mounts(key, samples, rows, size, p).reshape(-1, WIDTH),
         )
+        lengths = self._spring_lengths(key, p, samples, rows, size)
         return [
-            self._result(item, schedule, *(a[..., lane] for a in histories))
+            self._result(item, schedule, *(a[..., lane] for a in (*histories, lengths)))
             for lane, item in enumerate(work_items)
         ]
 
@@ -158,6 +161,7 @@ class Runner:
         moved: FloatArray,
         extremes: FloatArray,
         mounts: FloatArray,
+        spring_lengths: FloatArray,
     ) -> RunResult:
         # the last three points are the detergent point's
         good, sensors = int(extremes[-1]), moved.shape[1] - 3
@@ -171,6 +175,8 @@ class Runner:
                 arrays = [self._gap(schedule.time[:good], samples[:good, :6], item.begin[:6])]
             elif measure == "regions":
                 arrays = self._regions(item, np.ascontiguousarray(samples[:good]))
+            elif measure == "spring tensions":
+                arrays = tensions_at(item.numbers.setup.springs.values(), spring_lengths)
             elif measure == "power means":
                 arrays = [power_means(displacement)]
             elif measure == "mounts":
@@ -185,6 +191,18 @@ class Runner:
         return RunResult(
             item.number, item.case, values, _divergence(schedule.time, samples, good), record
         )
+
+    def _spring_lengths(
+        self, key: BatchKey, p: FloatArray, samples: FloatArray, rows: int, size: int
+    ) -> FloatArray:
+        """Return the smallest length of each spring (springs, WIDTH), if it is measured. [m]"""
+        springs = key.layout.elements.springs
+        if "spring tensions" not in self.measures:
+            return np.empty((0, WIDTH))
+        smallest = self._array("spring lengths", len(springs))
+        bounds = (LARGEST_ANGLE, LARGEST_DISPLACEMENT)
+        smallest_lengths_lanes(samples, rows, size, bounds, p, springs, smallest)
+        return smallest.reshape(-1, WIDTH)
 
     def _record(self, item: WorkItem, schedule: Schedule, samples: FloatArray) -> Record:
         trajectory = trajectory_of(samples, schedule, item.packed, item.numbers.layout)

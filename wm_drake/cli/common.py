@@ -27,7 +27,8 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
-        help="Change a number of the machine file: gasket.stiffness_x='5 N/mm'. Repeatable.",
+        help="Change a number of the machine file: gasket.stiffness_x='5 N/mm'; null removes an "
+        "element: dampers.left=null. Repeatable.",
         metavar="KEY=VALUE",
     ),
 ]
@@ -104,7 +105,7 @@ def with_sets(
     changed = dict(sources)
     for key, text in pairs_of(sets, "--set"):
         try:
-            parameters = with_value(parameters, key, text)
+            parameters = with_value(parameters, key, None if text in ("null", "~") else text)
         except InputError as error:
             raise InputError(Problem("--set", p.key, p.message) for p in error.problems) from None
         changed[key] = "set on the command line"

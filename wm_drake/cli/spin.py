@@ -30,7 +30,7 @@ from wm_drake.cli.spin_results import (
     gap_text,
     write_cases,
 )
-from wm_drake.cli.terminal import Console
+from wm_drake.cli.terminal import Console, say
 from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -127,7 +127,15 @@ def spin(
         typer.echo(json.dumps(_as_json(result)))
     else:
         _print_tables(result, out, replay)
+    _warn_of_slack_springs(result)
     end_with(diverged)
+
+
+def _warn_of_slack_springs(result: "SpinResult") -> None:
+    from wm_drake.report.spin.report import slack_springs_warning
+
+    for text in slack_springs_warning(result):
+        say(f"warning: {text}", err=True)
 
 
 def _write(result: "SpinResult", folder: Path, replay: bool) -> None:
@@ -148,6 +156,12 @@ def _print_tables(result: "SpinResult", out: Path, replay: bool) -> None:
     for case in result.results:
         if case.measures.smallest_gap:
             console.print(f"{case.case.name}: {gap_text(case.measures.smallest_gap)}")
+        tensions = case.measures.smallest_tension
+        shown = zip(tensions.spring.values, tensions.values, strict=True)
+        console.print(
+            f"{case.case.name}: smallest spring tension "
+            + ", ".join(f"{name} {tension:.1f} N" for name, tension in shown)
+        )
     replays = ", replay_<load>.html" if replay else ""
     console.print(f"Results in {out}: report.html, amplitudes.csv, record_<load>.nc{replays}")
 

@@ -126,6 +126,7 @@ def case_as_json(case: "CaseResult") -> dict[str, Any]:
         "smallest_gap_mm": millimetre.from_si(measures.smallest_gap.distance)
         if measures.smallest_gap
         else None,
+        "smallest_spring_tension_N": numbers(measures.smallest_tension, Unit("N", "N")),
         "critical_rpm": numbers(measures.critical_speed, Unit("rad/s", "rpm")),
         "diverged": case.record.attrs["diverged"] or None,
         "wall_s": case.wall_s,

@@ -4,12 +4,16 @@ import functools
 import inspect
 import os
 import sys
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Annotated, Any
 
 import rich.console
 import typer
+
+from wm_drake.errors import InputNotice
 
 QuietOption = Annotated[
     bool,
@@ -44,7 +48,8 @@ def _with_quiet(command: Callable[..., Any]) -> Callable[..., Any]:
     def run(*arguments: Any, quiet: bool = False, **options: Any) -> Any:
         token = _quiet.set(quiet)
         try:
-            return command(*arguments, **options)
+            with _notices_shown():
+                return command(*arguments, **options)
         finally:
             _quiet.reset(token)
 
@@ -56,6 +61,23 @@ def _with_quiet(command: Callable[..., Any]) -> Callable[..., Any]:
     run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {**command.__annotations__, "quiet": QuietOption}
     return run
+
+
+@contextmanager
+def _notices_shown() -> Iterator[None]:
+    """Print each `InputNotice` on standard error while the context lasts."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", InputNotice)
+        others = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *place: Any) -> None:
+            if issubclass(category, InputNotice):
+                say(f"notice: {message}", err=True)
+            else:
+                others(message, category, *place)
+
+        warnings.showwarning = show
+        yield
 
 
 def say(text: str, *, err: bool = False) -> None:

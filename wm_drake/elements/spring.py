@@ -63,17 +63,10 @@ class SpringStrutParameters:
     @property
     def free_length(self) -> float | None:
         """Length without tension; None if it is not between 0 and twice the drawn length. [m]"""
-        stiffness = self.packed_stiffness, 0
-
-        def tension(length: float) -> float:
-            return float(
-                spring_tension(length, self.rest_length, self.preload, -math.inf, stiffness)
-            )
-
         ends = 0.0, 2.0 * self.rest_length
-        if not tension(ends[0]) < 0.0 <= tension(ends[1]):
+        if not self._tension(ends[0], -math.inf) < 0.0 <= self._tension(ends[1], -math.inf):
             return None
-        return float(brentq(tension, *ends, xtol=1e-12))
+        return float(brentq(self._tension, *ends, args=(-math.inf,), xtol=1e-12))
 
     @property
     def taut_from(self) -> float:
@@ -84,6 +77,14 @@ class SpringStrutParameters:
             stiffness_force(x, self.packed_stiffness, 0) for x in (SLACK_TRANSITION, 0.0)
         )
         return max(min(stretched - drawn, _LARGEST_SHARE * self.preload), _SMALLEST_TAUT)
+
+    def tension(self, length: float) -> float:
+        """Return its tension at a length. [m -> N]"""
+        return self._tension(length, self.taut_from)
+
+    def _tension(self, length: float, taut_from: float) -> float:
+        stiffness = self.packed_stiffness, 0
+        return float(spring_tension(length, self.rest_length, self.preload, taut_from, stiffness))
 
     @property
     def structure(self) -> list[int]:

@@ -23,7 +23,8 @@ def with_value(parameters: Tree, key: str, value: Any) -> Tree:
         key: Names from the top, joined by dots, such as ``gasket.stiffness_x`` or
             ``loads.middle.unbalances.0.mass``. ``bodies.NAME`` and ``frames.NAME`` need not be in
             the machine file.
-        value: SI number or text with a unit (``"5 N/mm"``); a mapping for a group of values.
+        value: SI number or text with a unit (``"5 N/mm"``); a mapping for a group of values; None
+            removes an element, or sets a number to its default, as null in a machine file.
 
     Raises:
         InputError: the key is unknown (the message names similar ones), or the value is not
@@ -95,12 +96,7 @@ def _replaced(node: Any, changes: list[_Change]) -> Any:
     if isinstance(node, BaseModel):
         return _replaced_in_model(node, parts)
     if isinstance(node, dict):
-        for name, inner in parts.items():
-            if name not in node:
-                raise input_error(
-                    f"unknown key '{name}'" + nearest_names(name, node), key=inner[0].key
-                )
-        return {**node, **{name: _replaced(node[name], inner) for name, inner in parts.items()}}
+        return _replaced_in_mapping(node, parts)
     for name, inner in parts.items():
         if node is None:
             whole = inner[0].key.removesuffix("." + ".".join([name, *inner[0].path]))
@@ -116,9 +112,29 @@ def _replaced(node: Any, changes: list[_Change]) -> Any:
             )
             raise input_error(f"'{name}' does not exist; {allowed}", key=inner[0].key)
     return tuple(
-        _replaced(entry, parts[str(i)]) if str(i) in parts else entry
+        _replaced_entry(entry, parts[str(i)]) if str(i) in parts else entry
         for i, entry in enumerate(node)
     )
+
+
+def _replaced_in_mapping(node: dict[str, Any], parts: dict[str, list[_Change]]) -> dict[str, Any]:
+    """Return a mapping with entries replaced; those whose new value is None are removed."""
+    for name, inner in parts.items():
+        if name not in node:
+            raise input_error(f"unknown key '{name}'" + nearest_names(name, node), key=inner[0].key)
+    new = {name: _replaced(node[name], inner) for name, inner in parts.items()}
+    changed = {**node, **new}
+    return {name: changed[name] for name in node if name not in new or new[name] is not None}
+
+
+def _replaced_entry(entry: Any, changes: list[_Change]) -> Any:
+    new = _replaced(entry, changes)
+    if new is None:
+        raise input_error(
+            "one entry of a list cannot be removed; write the whole list in a machine file",
+            key=changes[0].key,
+        )
+    return new
 
 
 def _replaced_in_model(node: BaseModel, parts: dict[str, list[_Change]]) -> BaseModel:
@@ -130,6 +146,8 @@ def _replaced_in_model(node: BaseModel, parts: dict[str, list[_Change]]) -> Base
                 f"unknown key '{name}'" + nearest_names(name, fields), key=changes[0].key
             )
         values[name] = _changed_field(node, name, changes)
+        if values[name] is None:
+            del values[name]
     try:
         return type(node).model_validate(values)
     except ValidationError as error:
@@ -160,7 +178,12 @@ def _changed_field(node: BaseModel, name: str, changes: list[_Change]) -> Any:
     # an override of the SDF is added when a change names it for the first time
     new = [change for change in changes if change.path and change.path[0] not in child]
     known = [change for change in changes if change not in new]
-    return {**(_replaced(child, known) if known else child), **(_nested(new) if new else {})}
+    for change in new:
+        if change.value is None:
+            name = change.path[0]
+            raise input_error(f"unknown key '{name}'{nearest_names(name, child)}", key=change.key)
+    kept = _replaced(child, known) if known else child
+    return {**(kept or {}), **_nested(new)} if new else kept
 
 
 def _nested(changes: list[_Change]) -> Any:

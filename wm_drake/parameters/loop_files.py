@@ -10,6 +10,7 @@ import numpy as np
 
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.parameters.text_files import read_text
+from wm_drake.parameters.time_stamps import with_distinct_times
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit, comma_hint, convert, plain_number
 
@@ -58,15 +59,15 @@ def read_loop(path: Path, units: tuple[str, str, str] | None = None) -> Measured
 
     The first line that is not a comment (#) names the columns, in any order: ``time [s],
     displacement [mm], force [N]`` or ``time_s,displacement_mm,force_N``; for rotations ``angle``
-    and ``moment``. Other columns are ignored.
+    and ``moment``. Other columns are ignored. Samples with equal time stamps are averaged.
 
     Args:
         path: CSV file with commas, semicolons or tabs.
         units: Units of time, displacement and force if the header has none.
 
     Raises:
-        InputError: columns or units are wrong, a value is not a finite number, the time does not
-            rise, a signal is constant, or there are too few samples. The message names file and
+        InputError: columns or units are wrong, a value is not a finite number, the time
+            falls, a signal is constant, or there are too few samples. The message names file and
             line.
     """
     rows = list(_rows(path))
@@ -77,18 +78,19 @@ def read_loop(path: Path, units: tuple[str, str, str] | None = None) -> Measured
     table = np.array(
         [_numbers(cells, head, columns, f"{path}:{at}") for at, cells in rows[1:]]
     ).reshape(-1, 3)
-    if len(table) < FEWEST:
-        raise input_error(
-            f"has {len(table)} samples; a loop needs at least {FEWEST}", where=str(path)
-        )
     lines = [at for at, _ in rows[1:]]
-    not_rising = np.flatnonzero(np.diff(table[:, 0]) <= 0.0)
+    not_rising = np.flatnonzero(np.diff(table[:, 0]) < 0.0)
     if len(not_rising):
         at = int(not_rising[0]) + 1
         raise input_error(
-            f"time does not rise: {table[at, 0]:g} after {table[at - 1, 0]:g}",
+            f"time falls: {table[at, 0]:g} after {table[at - 1, 0]:g}",
             where=f"{path}:{lines[at]}",
             key=head[columns[0]],
+        )
+    table = with_distinct_times(table, str(path))
+    if len(table) < FEWEST:
+        raise input_error(
+            f"has {len(table)} samples; a loop needs at least {FEWEST}", where=str(path)
         )
     for column in (1, 2):
         if np.ptp(table[:, column]) == 0.0:

@@ -13,6 +13,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.mounts import KINDS, force_measures
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record
+from wm_drake.simulation.spring_tension import smallest_tensions
 
 BAND_HZ = (0.5, 20.0)
 """Pass band of the displacements ([B] section 2.2)."""
@@ -52,6 +53,7 @@ class Measures:
             force of all mounts on the cabinet, in W. [N]
         cabinet_moment_peak, cabinet_moment_rms, cabinet_moment_dynamic_rms: (axis) the same of
             their moment about the origin of W. [N m]
+        smallest_tension: (spring) smallest tension, 0 if the spring goes slack. [N]
     """
 
     amplitude: xr.DataArray
@@ -69,6 +71,7 @@ class Measures:
     cabinet_moment_peak: xr.DataArray
     cabinet_moment_rms: xr.DataArray
     cabinet_moment_dynamic_rms: xr.DataArray
+    smallest_tension: xr.DataArray
 
 
 def filtered(displacement: FloatArray, period: float) -> FloatArray:
@@ -251,6 +254,9 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
         gasket_moment=xr.DataArray(_largest(moment), by_axis),
         smallest_gap=gap,
         **_forces_on_cabinet(values, by_axis, record.coords["mount"].coords),
+        smallest_tension=xr.DataArray(
+            smallest_tensions(values["spring_tension"]), record.coords["spring"].coords
+        ),
     )
 
 

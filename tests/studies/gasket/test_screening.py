@@ -136,7 +136,7 @@ def test_cases_of_trials_have_their_levels(reference):
     machine = build_machine(middle)
     loads = [Case(name, reference.loads[name], SHORT) for name in ("middle", "counter")]
     trials = GasketTrials(middle, factors, loads)
-    assert trials.measures == ("extremes", "gap")
+    assert trials.measures == ("extremes", "gap", "spring tensions")
     design = Design("own", texts, level_matrix(2), "main")
     responses = trials.responses(
         design, lambda cases: simulate_many(machine, cases, measures=trials.measures)
@@ -194,17 +194,20 @@ def test_unknown_responses_are_refused(reference, name, message):
 
 def test_runs_that_touch_are_marked(reference):
     chosen = chosen_responses(reference, SHORT, ["Dx"])
-    assert measures_of(reference, chosen) == ("extremes", "gap")  # also where it is no response
+    # gap and tensions are measured also where they are no responses
+    assert measures_of(reference, chosen) == ("extremes", "gap", "spring tensions")
     table = xr.Dataset(
         {
             "detergent_displacement": (("run", "axis"), np.ones((4, 3))),
             "smallest_gap": ("run", [0.002, -0.001, 0.0, -0.003]),
+            "smallest_spring_tension": (("run", "spring"), [[0, 1], [0, 0], [-1, 2], [0, 0]]),
             "diverged": ("run", np.array(["", "", "", "at 1 s"], dtype=object)),
         },
-        {"run": range(4)},
+        {"run": range(4), "spring": ["left", "rear"]},
     )
     responses = as_responses(table, ["one", "two"], chosen)
     assert responses.touching == pytest.approx({(0, "two"): -1.0, (1, "one"): 0.0})
+    assert responses.slack == {(0, "one"): ["left"], (0, "two"): ["left", "rear"]}
     assert np.isnan(responses.values["two"].loc[1, "Dx"])
 
 

@@ -45,6 +45,7 @@ TERMINAL_HEADS = {
     "region": "region",
     "sensor_axis": "sensor axis",
     "smallest_gap_mm": "gap, mm",
+    "smallest_tension_N": "tension, N",
     "average_error_percent": "error, %",
     "published_error_percent": "error in [A], %",
 }
@@ -255,7 +256,7 @@ def _print_table(result: "SpinCycleResult", out: Path) -> None:
     numbers = case_table(result)
     table = Table(
         title=f"Spin cycle of machine '{result.parameters.name}': largest RMS displacement, "
-        "smallest gap"
+        "smallest gap, smallest spring tension"
     )
     for name in numbers.columns:
         table.add_column(TERMINAL_HEADS[str(name)], justify="right", overflow="fold")
@@ -299,6 +300,10 @@ def _as_json(result: "SpinCycleResult", engine: str) -> dict[str, Any]:
                 "rms_mm": plain(result.displacement.sel(case=case.name), 1e3),
                 "rms_from_acceleration_mm": plain(result.integrated.sel(case=case.name), 1e3),
                 "smallest_gap_mm": plain(result.smallest_gap.sel(case=case.name), 1e3),
+                "smallest_spring_tension_N": {
+                    str(name): plain(result.smallest_tension.sel(case=case.name, spring=name))
+                    for name in result.smallest_tension.spring.values
+                },
                 "diverged": diverged or None,
             }
             for case, diverged in zip(result.cases, result.diverged, strict=True)

@@ -1,5 +1,6 @@
 """Findings of a screening study as sentences, made from its numbers."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -8,6 +9,7 @@ import numpy as np
 from wm_drake.report.formatting import number
 from wm_drake.report.gasket.tables import digits, r2_text
 from wm_drake.report.gasket.words import LEVELS, Words
+from wm_drake.report.springs import CONSEQUENCE
 from wm_drake.studies.doe.anova import Term
 from wm_drake.studies.gasket.responses import GAP
 from wm_drake.studies.gasket.screening import (
@@ -52,6 +54,21 @@ def _contact(screening: Screening) -> list[str]:
         return []
     least = min(float(v[GAP].min()) for v in screening.responses.values.values())
     return [f"The tub touches the housing in no run; the smallest gap is {digits(least)} mm."]
+
+
+def _slack(screening: Screening) -> list[str]:
+    """Return a warning with the number of runs in which each spring goes slack, or none."""
+    counts = Counter(
+        (spring, load) for (_, load), names in screening.responses.slack.items() for spring in names
+    )
+    if not counts:
+        return []
+    springs = _joined([f"{spring} with load {load} ({n})" for (spring, load), n in counts.items()])
+    runs = screening.design.trials * len(screening.loads)
+    return [
+        f"Springs go slack in {len(screening.responses.slack)} of {runs} runs: {springs}. "
+        f"{CONSEQUENCE} They are marked in runs.csv, column slack."
+    ]
 
 
 def _drivers(screening: Screening, words: Words) -> list[str]:
@@ -187,6 +204,7 @@ def warnings(screening: Screening, words: Words) -> list[str]:
             f"{trial + 1}, load {load}. The model has no contact force: these runs show only that "
             "the tub touches. They are marked in runs.csv, column touches."
         )
+    found += _slack(screening)
     design = screening.design
     coefficients = design.trials - design.residual_df
     if design.residual_df < 1:

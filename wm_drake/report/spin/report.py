@@ -21,8 +21,10 @@ from wm_drake.report.spin import tables
 from wm_drake.report.spin.cases import case_title, has_gasket, speed_rpm
 from wm_drake.report.spin.figures import envelopes_figure, gaps_figure, gasket_figure, orbits_figure
 from wm_drake.report.spin.tables import amplitude_table
+from wm_drake.report.springs import slack_warning
 from wm_drake.report.tables import Table, parameter_table
 from wm_drake.simulation.cases import UNUSED_PHASE_ERROR
+from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
 
 __all__ = ["amplitude_table", "spin_report"]
@@ -74,6 +76,7 @@ def spin_report(
         critical_speeds=tables.critical_speeds(result),
         smallest_gaps=tables.smallest_gaps(result),
         gaps_picture=_gaps_picture(result),
+        smallest_tensions=tables.smallest_tensions(result),
         cases=[
             replace(
                 _case_view(result, index, table), replay=(replays or {}).get(case.case.name, "")
@@ -199,7 +202,7 @@ def _why_not_compared(result: SpinResult) -> str:
 
 
 def warnings_of(result: SpinResult) -> list[str]:
-    """Return warnings about unusual numbers, runs that diverged, and parts that overlap."""
+    """Return warnings about unusual numbers, divergence, overlaps, and springs that go slack."""
     found = [f"{problem.key}: {problem.message}." for problem in unusual_numbers(result.parameters)]
     if result.parameters.imperfections.phase_error:
         found.append(UNUSED_PHASE_ERROR)
@@ -217,7 +220,14 @@ def warnings_of(result: SpinResult) -> list[str]:
                 "model has no contact forces. In the real machine these parts would collide, and "
                 "the motion after that is not valid."
             )
-    return found
+    return found + slack_springs_warning(result)
+
+
+def slack_springs_warning(result: SpinResult) -> list[str]:
+    """Return a warning of the springs that go slack, or none."""
+    return slack_warning(
+        {case_title(c): slack_springs(c.measures.smallest_tension) for c in result.results}, "load"
+    )
 
 
 def facts_of_run(result: SpinResult, command: str) -> list[tuple[str, str]]:

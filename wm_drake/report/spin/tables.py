@@ -19,6 +19,7 @@ from wm_drake.report.formatting import (
 from wm_drake.report.spin.cases import case_title, has_gasket, speed_rpm
 from wm_drake.report.tables import MOST_SHOWN, Group, Row, Table, line, readable
 from wm_drake.simulation.measures import percent_difference
+from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 OURS = "wm_drake"
@@ -224,6 +225,21 @@ def _gap(case: CaseResult) -> Group:
         *place,
     ]
     return line(case_title(case), cells, "alarm" if gap.distance <= 0.0 else "")
+
+
+def smallest_tensions(result: SpinResult) -> Table:
+    """Return the smallest tension of each spring for each case."""
+    caption = (
+        "Smallest tension of each spring over all samples, in N. A spring that only pulls goes "
+        "slack at 0; a spring that also pushes can fall below."
+    )
+    groups = []
+    for case in result.results:
+        smallest = case.measures.smallest_tension
+        cells = [number(float(value)) for value in smallest.values]
+        groups.append(line(case_title(case), cells, "alarm" if slack_springs(smallest) else ""))
+    names = result.results[0].measures.smallest_tension.spring.values
+    return Table(caption, ("load", *(f"{name}, N" for name in names)), tuple(groups))
 
 
 def loads(result: SpinResult) -> Table:

@@ -11,8 +11,10 @@ from wm_drake.report.formatting import MM_PER_M, number
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.spin_cycle import tables
 from wm_drake.report.spin_cycle.figures import bars_figure, heat_map_figure, profile_figure
+from wm_drake.report.springs import slack_warning
 from wm_drake.report.tables import Table, parameter_table
 from wm_drake.simulation.records import versions
+from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.studies.spin_cycle.study import SpinCycleResult, average_errors, disagreement, largest
 
 SHOWN_MASSES = ((0.4, 0.0, 0.0), (0.0, 0.4, 0.0), (0.4, 0.4, 180.0))
@@ -126,7 +128,7 @@ def shown_cases(result: SpinCycleResult) -> list[UnbalanceCase]:
 
 
 def warnings_of(result: SpinCycleResult) -> list[str]:
-    """Return warnings about divergence, overlap, inaccurate integration, and imperfections."""
+    """Return warnings about divergence, overlap, slack springs, integration, imperfections."""
     found = [
         f"Case {case.name}: {text}. Regions that this run did not complete have no values."
         for case, text in zip(result.cases, result.diverged, strict=True)
@@ -144,6 +146,9 @@ def warnings_of(result: SpinCycleResult) -> list[str]:
             f"Tub and housing overlap in case {', '.join(touching)}. The model has no contact "
             "forces. In the real machine, tub and housing would collide."
         )
+    smallest = result.smallest_tension
+    names = map(str, smallest.case.values)
+    found += slack_warning({c: slack_springs(smallest.sel(case=c)) for c in names}, "case")
     apart = float(disagreement(result).max(skipna=True))
     if apart > 0.01:
         found.append(

@@ -35,6 +35,7 @@ def case_table(result: SpinCycleResult) -> pd.DataFrame:
             "region": worst.region if worst else MISSING,
             "sensor_axis": f"{worst.accelerometer} {worst.axis}" if worst else MISSING,
             "smallest_gap_mm": MM_PER_M * float(result.smallest_gap.sel(case=case.name)),
+            "smallest_tension_N": float(result.smallest_tension.sel(case=case.name).min()),
         }
         if errors is not None:
             row["average_error_percent"] = 100.0 * float(errors.sel(case=case.name))
@@ -55,12 +56,14 @@ def cases(result: SpinCycleResult) -> Table:
         "sensor_axis": "sensor, axis",
         "largest_rms_mm": "largest RMS, mm",
         "smallest_gap_mm": "smallest gap, mm",
+        "smallest_tension_N": "smallest spring tension, N",
         "average_error_percent": "average error, %",
         "published_error_percent": "[A] Table 9, %",
     }
     decimals = {
         "largest_rms_mm": 2,
         "smallest_gap_mm": 1,
+        "smallest_tension_N": 1,
         "average_error_percent": 1,
         "published_error_percent": 1,
     }
@@ -71,11 +74,13 @@ def cases(result: SpinCycleResult) -> Table:
             row[name] if isinstance(row[name], str) else number(row[name], decimals.get(name, 0))
             for name in shown
         ]
-        alarm = row["smallest_gap_mm"] <= 0.0
+        slack = bool((result.smallest_tension.sel(case=row["case"]) == 0.0).any())
+        alarm = row["smallest_gap_mm"] <= 0.0 or slack
         groups.append(Group(str(row["case"]), (Row(tuple(cells), "alarm" if alarm else ""),)))
     caption = (
         "Cases in the order of the input table, with the largest RMS displacement of any sensor "
-        "and axis in any region, and the smallest gap between tub and housing."
+        "and axis in any region, the smallest gap between tub and housing, and the smallest "
+        "tension of any spring; a spring goes slack at 0."
     )
     if "average_error_percent" in table:
         caption += (

@@ -26,6 +26,9 @@ KIND_TITLES = {"peak": "peak", "rms": "RMS", "dynamic_rms": "dynamic RMS"}
 GAP = "gap"
 """Name of the response that tells whether the tub touches the housing."""
 
+TENSIONS = "spring tensions"
+"""Measure that tells whether a spring goes slack."""
+
 DEFAULT = ("D", "F", "M", GAP)
 """Responses of a study that names none: those of [B] section 4 and the smallest gap."""
 
@@ -68,7 +71,7 @@ class Response:
 def known_responses(parameters: MachineParameters, profile: SpinProfile) -> tuple[Response, ...]:
     """Return all responses that a machine has over a spin profile."""
     found = [*_extremes(), _gap(), *_by_sensor(parameters), *_by_region(parameters, profile)]
-    return (*found, *_on_cabinet(parameters))
+    return (*found, *_on_cabinet(parameters), *_by_spring(parameters))
 
 
 def chosen_responses(
@@ -107,10 +110,10 @@ def chosen_responses(
 def measures_of(parameters: MachineParameters, responses: Iterable[Response]) -> tuple[str, ...]:
     """Return the measures of `simulate_many` that a study needs, in the order of `MEASURES`.
 
-    These are the measures of its responses, and the gap: a run in which the tub touches the housing
-    is marked whatever the responses are.
+    These are the measures of its responses, the gap and the spring tensions: a run in which the tub
+    touches the housing or a spring goes slack is marked whatever the responses are.
     """
-    needed = {response.measure for response in responses}
+    needed = {response.measure for response in responses} | {TENSIONS}
     if has_gap(parameters):
         needed.add(GAP)
     return tuple(name for name in MEASURES if name in needed)
@@ -211,6 +214,17 @@ def _on_cabinet(parameters: MachineParameters) -> Iterator[Response]:
                 meaning = Meaning(title, about, f"{KIND_TITLES[kind]} {quantity} on the cabinet")
                 name = f"{variable}_{axis}"
                 yield Response(name, variable, "cabinet", variable, (index,), unit, meaning)
+
+
+def _by_spring(parameters: MachineParameters) -> Iterator[Response]:
+    """Yield the smallest tension of each spring."""
+    for index, spring in enumerate(parameters.springs):
+        about = "smallest tension; the spring goes slack at 0"
+        meaning = Meaning(f"smallest tension {spring}", about, "spring tension", "larger")
+        name, variable = f"spring_tension_{spring}", "smallest_spring_tension"
+        yield Response(
+            name, "spring_tension", TENSIONS, variable, (index,), Unit("N", "N"), meaning
+        )
 
 
 def _by_region(parameters: MachineParameters, profile: SpinProfile) -> Iterator[Response]:

@@ -66,6 +66,7 @@ class Responses:
         meanings: Words for each response, by its name; a response may have none.
         touching: Smallest gap of each run in which the tub touches the housing, by index of the
             trial (from 0) and load. [mm] At most 0.
+        slack: Names of the springs that go slack in a run, by index of the trial (from 0) and load.
     """
 
     values: dict[str, pd.DataFrame]
@@ -73,6 +74,7 @@ class Responses:
     failed: dict[tuple[int, str], str]
     meanings: dict[str, Meaning] = field(default_factory=dict)
     touching: dict[tuple[int, str], float] = field(default_factory=dict)
+    slack: dict[tuple[int, str], list[str]] = field(default_factory=dict)
 
 
 Evaluate: TypeAlias = Callable[[Design], Responses]

@@ -95,10 +95,21 @@ def as_responses(table: xr.Dataset, loads: Sequence[str], chosen: Sequence[Respo
     if "smallest_gap" in table:
         gaps = zip(places, map(float, table.smallest_gap.values), strict=True)
         touching = {p: MM.from_si(gap) for p, gap in gaps if gap <= 0.0 and p not in failed}
+    springs = zip(places, _slack(table), strict=True)
+    slack = {place: names for place, names in springs if names and place not in failed}
     return Responses(
         values,
         {response.name: response.unit_text for response in chosen},
         failed,
         {response.name: response.meaning for response in chosen},
         touching,
+        slack,
     )
+
+
+def _slack(table: xr.Dataset) -> list[list[str]]:
+    """Return the names of the springs that go slack in each run of a table."""
+    if "smallest_spring_tension" not in table:
+        return [[]] * table.run.size
+    names = np.array(list(map(str, table.spring.values)))
+    return [names[slack].tolist() for slack in table.smallest_spring_tension.values == 0.0]

@@ -58,7 +58,7 @@ def runs_table(screening: Screening, physical: pd.DataFrame | None = None) -> pd
     """Return the table of all runs.
 
     Its columns are trial, load, levels, physical values, responses, whether the tub touches the
-    housing, and the reason if the run failed.
+    housing, the springs that go slack, and the reason if the run failed.
 
     Args:
         screening: Result of the study.
@@ -74,6 +74,9 @@ def runs_table(screening: Screening, physical: pd.DataFrame | None = None) -> pd
         part.insert(1, "load", load)
         part["touches"] = [
             "yes" if (trial, load) in responses.touching else "" for trial in range(design.trials)
+        ]
+        part["slack"] = [
+            ", ".join(responses.slack.get((trial, load), [])) for trial in range(design.trials)
         ]
         part["failed"] = [responses.failed.get((trial, load), "") for trial in range(design.trials)]
         parts.append(part)
@@ -169,9 +172,9 @@ def effects_of(term: Term) -> dict[str, float]:
 def as_plain_data(screening: Screening) -> dict[str, Any]:
     """Return a screening as data for JSON.
 
-    It has the design with its efficiency, the runs in which the tub touches the housing, and for
-    each load and response the contributions, the effects at each level, and how well the model
-    predicts.
+    It has the design with its efficiency, the runs in which the tub touches the housing or a spring
+    goes slack, and for each load and response the contributions, the effects at each level, and how
+    well the model predicts.
     """
     responses: dict[str, dict[str, Any]] = {load: {} for load in screening.loads}
     for (load, name), table in screening.tables.items():
@@ -204,6 +207,10 @@ def as_plain_data(screening: Screening) -> dict[str, Any]:
         "touching": [
             {"trial": trial + 1, "load": load, "gap_mm": gap}
             for (trial, load), gap in screening.responses.touching.items()
+        ],
+        "slack": [
+            {"trial": trial + 1, "load": load, "springs": springs}
+            for (trial, load), springs in screening.responses.slack.items()
         ],
         "responses": responses,
     }

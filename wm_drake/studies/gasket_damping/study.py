@@ -18,6 +18,7 @@ from wm_drake.parameters import (
     load_factors,
     with_values,
 )
+from wm_drake.parameters.time_stamps import with_distinct_times
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import envelopes
@@ -282,12 +283,13 @@ def as_measured(table: xr.DataArray, sensors: list[str], where: str) -> xr.DataA
         raise input_error(
             f"has no sensor {', '.join(missing)}; needs {', '.join(sensors)}", where=where
         )
-    time = table.time.values
+    samples = np.column_stack([table.time.values, table.sel(sensor=sensors).values])
+    samples = with_distinct_times(samples, where)
+    time, values = samples[:, 0], samples[:, 1:]
     if len(time) < 2 or time[0] > WINDOW[0] or time[-1] < WINDOW[1]:
         raise input_error(f"must cover {WINDOW[0]:g} to {WINDOW[1]:g} s", where=where)
     if not np.all(np.diff(time) > 0.0):
-        raise input_error("times must rise from row to row", where=where)
-    values = table.sel(sensor=sensors).values
+        raise input_error("times must not fall from row to row", where=where)
     if not np.isfinite(values).all():
         raise input_error("a displacement is not a finite number", where=where)
     grid = (

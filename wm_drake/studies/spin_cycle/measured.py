@@ -10,6 +10,7 @@ import xarray as xr
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.csv_files import read_csv
+from wm_drake.parameters.time_stamps import with_distinct_times
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.vibration import HIGH_PASS_HZ, high_passed, integrated_twice, region_rms
 from wm_drake.studies.spin_cycle.study import DIMS
@@ -117,6 +118,7 @@ def _from_acceleration(
             "finite numbers are needed",
             where=str(path),
         )
+    numbers = with_distinct_times(numbers, str(path))
     time, acceleration = numbers[:, 0], numbers[:, 1:]
     period = float((time[-1] - time[0]) / (len(time) - 1))
     if (

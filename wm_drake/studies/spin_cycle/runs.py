@@ -70,7 +70,7 @@ def drake_runs(
 
 def _table(results: Iterable[CaseResult]) -> xr.Dataset:
     """Return results as a table in the form of `simulate_many`."""
-    direct, integrated, gaps, diverged = [], [], [], []
+    direct, integrated, gaps, tensions, diverged = [], [], [], [], []
     for result in results:
         points = result.record.accelerometer_point.values
         first, second = record_region_displacements(result.record, points, result.case.profile)
@@ -79,6 +79,7 @@ def _table(results: Iterable[CaseResult]) -> xr.Dataset:
         gaps.append(
             result.measures.smallest_gap.distance if result.measures.smallest_gap else np.nan
         )
+        tensions.append(result.measures.smallest_tension.values)
         diverged.append(result.record.attrs["diverged"])
     dims = ("run", "region", "accelerometer", "axis")
     return xr.Dataset(
@@ -86,6 +87,7 @@ def _table(results: Iterable[CaseResult]) -> xr.Dataset:
             "region_displacement": (dims, np.array(direct)),
             "region_displacement_integrated": (dims, np.array(integrated)),
             "smallest_gap": ("run", np.array(gaps)),
+            "smallest_spring_tension": (("run", "spring"), np.array(tensions)),
             "diverged": ("run", np.array(diverged, dtype=object)),
         }
     )

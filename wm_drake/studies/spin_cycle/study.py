@@ -14,7 +14,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.outputs import AXES
 from wm_drake.simulation.vibration import relative_error
 
-MEASURES = ("regions", "gap")
+MEASURES = ("regions", "gap", "spring tensions")
 """Measures of each run, as for `simulate_many`."""
 
 DIMS = ("case", "region", "accelerometer", "axis")
@@ -36,6 +36,7 @@ class SpinCycleResult:
         integrated: (case, region, accelerometer, axis) RMS displacement from the acceleration,
             integrated twice. [m]
         smallest_gap: (case) smallest gap between tub group and housing. [m]
+        smallest_tension: (case, spring) smallest tension of each spring. [N]
         diverged: (case) time and reason if a run diverged, else "".
         measured: (case, region, accelerometer, axis) measured RMS displacement; NaN where nothing
             was measured. None without a measurement. [m]
@@ -47,6 +48,7 @@ class SpinCycleResult:
     displacement: xr.DataArray
     integrated: xr.DataArray
     smallest_gap: xr.DataArray
+    smallest_tension: xr.DataArray
     diverged: tuple[str, ...]
     measured: xr.DataArray | None = None
 
@@ -93,8 +95,14 @@ def run_spin_cycle(
         for name in ("region_displacement", "region_displacement_integrated")
     )
     gap = xr.DataArray(table.smallest_gap.values, {"case": labels["case"]}, attrs={"units": "m"})
+    tension = xr.DataArray(
+        table.smallest_spring_tension.values,
+        {"case": labels["case"], "spring": list(parameters.springs)},
+        attrs={"units": "N"},
+    )
     diverged = tuple(map(str, table.diverged.values))
-    return SpinCycleResult(parameters, profile, tuple(cases), direct, integrated, gap, diverged)
+    measured = direct, integrated, gap, tension
+    return SpinCycleResult(parameters, profile, tuple(cases), *measured, diverged)
 
 
 def labels_of(
