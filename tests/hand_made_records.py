@@ -47,6 +47,8 @@ def harmonic_record(
         "tub_position": (("time", "axis"), position),
         "tub_angular_velocity": (("time", "axis"), np.zeros((samples, 3))),
         "tub_velocity": (("time", "axis"), np.zeros((samples, 3))),
+        "tub_angular_acceleration": (("time", "axis"), -((8.0 * np.pi) ** 2) * angle),
+        "tub_acceleration": (("time", "axis"), -((8.0 * np.pi) ** 2) * position),
         "drum_angle": (("time",), 8.0 * np.pi * time),
         "drum_speed": (("time",), np.full(samples, 8.0 * np.pi)),
         "motor_torque": (("time",), np.zeros(samples)),

@@ -22,6 +22,7 @@ from wm_drake.cli.progress import progress_bars
 from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.spin_comparison import Choice, compare
 from wm_drake.cli.spin_results import (
+    Pages,
     amplitude_lines,
     case_as_json,
     compared_cases,
@@ -83,6 +84,14 @@ def spin(
             "--replay", help="Also write a 3D replay around the largest amplitude of each load."
         ),
     ] = False,
+    detail: Annotated[
+        bool,
+        typer.Option(
+            "--detail",
+            help="Draw mount forces, accelerations and spectra of every load, not only of the load "
+            "with the largest amplitude.",
+        ),
+    ] = False,
     measured: Annotated[
         list[Path] | None,
         typer.Option(
@@ -107,7 +116,7 @@ def spin(
     machines = machine or ["reference"]
     if len(machines) > 1 or compare_gasket:
         choice = Choice(machines, load, no_gasket, compare_gasket, profile, measured, sets)
-        compare(choice, engine, out, overwrite, replay, as_json)
+        compare(choice, engine, out, overwrite, Pages(replay, detail), as_json)
         return
     parameters = with_measured(load_parameters(machines[0], sets), measured, "--measured")
     cases = cases_of(parameters, load, not no_gasket, profile)
@@ -121,7 +130,7 @@ def spin(
                 progress=progress,
                 comparison=compared_cases(measured, sets),
             )
-        _write(result, folder, replay)
+        _write(result, folder, Pages(replay, detail))
     diverged = divergences(result)
     if as_json:
         typer.echo(json.dumps(_as_json(result)))
@@ -138,13 +147,14 @@ def _warn_of_slack_springs(result: "SpinResult") -> None:
         say(f"warning: {text}", err=True)
 
 
-def _write(result: "SpinResult", folder: Path, replay: bool) -> None:
+def _write(result: "SpinResult", folder: Path, pages: Pages) -> None:
     from wm_drake.report.spin.report import amplitude_table, spin_report
 
-    replays = write_cases(result, folder, replay)
+    replays = write_cases(result, folder, pages.replay)
     amplitude_table(result).to_csv(folder / "amplitudes.csv", index=False, float_format="%.4f")
     command = command_line()
-    (folder / "report.html").write_text(spin_report(result, command, replays), encoding="utf-8")
+    page = spin_report(result, command, replays, detail=pages.detail)
+    (folder / "report.html").write_text(page, encoding="utf-8")
 
 
 def _print_tables(result: "SpinResult", out: Path, replay: bool) -> None:

@@ -20,6 +20,7 @@ from wm_drake.cli.common import (
 from wm_drake.cli.progress import progress_bars
 from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.spin_results import (
+    Pages,
     amplitude_lines,
     case_as_json,
     compared_cases,
@@ -75,7 +76,7 @@ class _Planned:
 
 
 def compare(
-    choice: Choice, engine: str, out: Path, overwrite: bool, replay: bool, as_json: bool
+    choice: Choice, engine: str, out: Path, overwrite: bool, pages: Pages, as_json: bool
 ) -> None:
     """Run the machines of a choice and write the comparison.
 
@@ -85,11 +86,11 @@ def compare(
     planned = _plan(choice)
     with interruptible(), result_folder(out, Run("spin", overwrite)) as folder:
         variants = _run(planned, choice, engine)
-        table = _write(variants, folder, replay)
+        table = _write(variants, folder, pages)
     if as_json:
         typer.echo(json.dumps(_as_json(variants, table, engine)))
     else:
-        _print_tables(variants, out, replay)
+        _print_tables(variants, out, pages.replay)
     end_with([f"{v.name}: {text}" for v in variants for text in divergences(v.result)])
 
 
@@ -183,22 +184,22 @@ def _run(planned: list[_Planned], choice: Choice, engine: str) -> "list[Variant]
     return variants
 
 
-def _write(variants: "list[Variant]", folder: Path, replay: bool) -> "pd.DataFrame":
+def _write(variants: "list[Variant]", folder: Path, pages: Pages) -> "pd.DataFrame":
     from wm_drake.report.spin.comparison import comparison_report
     from wm_drake.report.spin.report import spin_report
     from wm_drake.studies.spin.comparison import difference_table
 
     parts = file_parts([variant.name for variant in variants])
-    command, pages = command_line(), {}
+    command, links = command_line(), {}
     for variant, part in zip(variants, parts, strict=True):
-        replays = write_cases(variant.result, folder, replay, part)
-        pages[variant.name] = page = f"report_{part}.html"
-        text = spin_report(variant.result, command, replays)
+        replays = write_cases(variant.result, folder, pages.replay, part)
+        links[variant.name] = page = f"report_{part}.html"
+        text = spin_report(variant.result, command, replays, detail=pages.detail)
         (folder / page).write_text(text, encoding="utf-8")
     table = difference_table(variants)
     table.to_csv(folder / "differences.csv", index=False, float_format="%.6g")
     _amplitudes(variants).to_csv(folder / "amplitudes.csv", index=False, float_format="%.4f")
-    report = comparison_report(variants, command, pages)
+    report = comparison_report(variants, command, links)
     (folder / "report.html").write_text(report, encoding="utf-8")
     return table
 

@@ -1,6 +1,7 @@
 """Results of a spin run on the terminal, in files and as JSON, for one machine or several."""
 
 import logging
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,19 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.model.scene import Gap
     from wm_drake.simulation.measures import Measures
     from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
+
+
+@dataclass(frozen=True)
+class Pages:
+    """Which pages and pictures are written beside the usual ones.
+
+    Attributes:
+        replay: A 3D replay for each case.
+        detail: Pictures of vibration for every case, not only for the main one.
+    """
+
+    replay: bool
+    detail: bool
 
 
 def compared_cases(measured: list[Path] | None, sets: list[str] | None) -> "Comparison":

@@ -30,13 +30,19 @@ def inline_svg_or_png(figure: Figure) -> str:
     The format is SVG, which is sharp at any size, or PNG if the SVG is large. The same figure
     always gives the same text: it holds no date and no random names.
     """
-    svg, png = io.BytesIO(), io.BytesIO()
+    svg = io.BytesIO()
     with mpl.rc_context({"svg.hashsalt": "wm-drake", "svg.fonttype": "path"}):
         figure.savefig(svg, format="svg", metadata={"Date": None})
     if len(svg.getvalue()) <= LARGEST_SVG:
         # matplotlib repeats each text as a comment, names from files among them
         drawn = re.sub(rb"<!--.*?-->\n?", b"", svg.getvalue(), flags=re.DOTALL)
         return f"data:image/svg+xml;base64,{base64.b64encode(drawn).decode()}"
+    return inline_png(figure)
+
+
+def inline_png(figure: Figure) -> str:
+    """Return a figure as PNG in a data URI, for a figure that consists of images."""
+    png = io.BytesIO()
     figure.savefig(png, format="png", dpi=PNG_DPI, metadata={"Software": None})
     return f"data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}"
 

@@ -10,7 +10,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from wm_drake.report.figures import inline_svg_or_png
+from wm_drake.report.figures import inline_png, inline_svg_or_png
 from wm_drake.report.provenance import now, program
 
 
@@ -29,9 +29,10 @@ class Picture:
     caption: str
 
 
-def picture(figure: Figure, alternative: str, caption: str) -> Picture:
-    """Return a figure in the form that a page shows."""
-    return Picture(inline_svg_or_png(figure), alternative, caption)
+def picture(figure: Figure, alternative: str, caption: str, *, has_images: bool = False) -> Picture:
+    """Return a figure in the form that a page shows; one that has images becomes a PNG."""
+    source = inline_png(figure) if has_images else inline_svg_or_png(figure)
+    return Picture(source, alternative, caption)
 
 
 def render(template: str, **values: Any) -> str:

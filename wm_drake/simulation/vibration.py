@@ -7,14 +7,16 @@ compared with each other and with a measurement.
 """
 
 import functools
+from collections.abc import Mapping
 
 import numpy as np
+import xarray as xr
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 from wm_drake.compiler.compilation import generic
 from wm_drake.compiler.vectors import rotation_from_rpy
-from wm_drake.parameters import SpinProfile
+from wm_drake.parameters import Sensor, SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.outputs import point_displacements
 from wm_drake.simulation.records import Record
@@ -92,6 +94,16 @@ def record_region_displacements(
     Returns:
         Two arrays (regions, k, 3) as returned by `region_displacements`. [m]
     """
+    states, acceleration = _motion_of(record)
+    time = record.time.values
+    period = float(time[1] - time[0]) if len(time) > 1 else 1.0
+    return region_displacements(
+        states, acceleration, points, np.asarray(record.attrs["rest_pose"]), period, profile
+    )
+
+
+def _motion_of(record: Record) -> tuple[FloatArray, FloatArray]:
+    """Return states (n, 13) and accelerations (n, 6) of the tub in the form of this module."""
     angle = record.drum_angle.values[:, None]
     motion = [
         record.tub_angle.values,
@@ -103,10 +115,27 @@ def record_region_displacements(
     acceleration = np.hstack(
         [record.tub_angular_acceleration.values, record.tub_acceleration.values]
     )
-    time = record.time.values
-    period = float(time[1] - time[0]) if len(time) > 1 else 1.0
-    return region_displacements(
-        states, acceleration, points, np.asarray(record.attrs["rest_pose"]), period, profile
+    return states, acceleration
+
+
+def sensor_accelerations(record: Record, sensors: Mapping[str, Sensor]) -> xr.DataArray:
+    """Return the accelerations at the points of displacement sensors, along their axes in W.
+
+    Gravity is not included: an accelerometer that measures down to 0 Hz shows it in addition.
+
+    Args:
+        record: Record of a run.
+        sensors: The sensors of the machine by name.
+
+    Returns:
+        (time, sensor) with the sensors of the record. [m/s^2]
+    """
+    names = [str(name) for name in record.sensor.values]
+    axes = ["xyz".index(sensors[name].axis) for name in names]
+    at_points = point_accelerations(*_motion_of(record), record.sensor_point.values)
+    along = np.stack([at_points[:, k, axis] for k, axis in enumerate(axes)], axis=1)
+    return record.displacement.copy(data=along).assign_attrs(
+        units="m/s^2", long_name="acceleration at the sensors, along their axes"
     )
 
 

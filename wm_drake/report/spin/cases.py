@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from wm_drake.parameters import Sensor
 from wm_drake.report.formatting import RPM_PER_RAD_S
-from wm_drake.studies.spin.study import CaseResult
+from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 
 def has_gasket(result: CaseResult) -> bool:
@@ -20,3 +21,8 @@ def speed_rpm(result: CaseResult, time: float) -> float:
     """Return the drum speed at a time of a case. [rpm]"""
     record = result.record
     return float(np.interp(time, record.time.values, record.drum_speed.values)) * RPM_PER_RAD_S
+
+
+def sensors_of(result: SpinResult, case: CaseResult) -> dict[str, Sensor]:
+    """Return the displacement sensors of the machine that a case was run with."""
+    return (case.case.parameters or result.parameters).sensors

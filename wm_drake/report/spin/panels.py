@@ -1,6 +1,6 @@
 """Panels over time that the figures of a spin page share: axes, bands, marks and legends."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -62,13 +62,16 @@ def simplified_indices(x: FloatArray, y: FloatArray, tolerance: float) -> IndexA
     return np.array(sorted(kept))
 
 
-def time_panels(record: Record, count: int, labels: Sequence[str]) -> tuple[Figure, list[Axes]]:
+def time_panels(
+    record: Record, count: int, labels: Sequence[str], hidden: Collection[int] = ()
+) -> tuple[Figure, list[Axes]]:
     """Make panels over time, with a common scale and label per row and the drum speed at the top.
 
     Args:
         record: Record that gives the time range and the drum speed.
         count: Number of panels.
         labels: Label of the vertical axis of each row.
+        hidden: Indices of panels that stay empty.
     """
     rows, end = len(labels), float(record.time[-1])
     height = 2.05 * rows + 1.4
@@ -84,16 +87,17 @@ def time_panels(record: Record, count: int, labels: Sequence[str]) -> tuple[Figu
     panels: list[Axes] = list(
         figure.subplots(rows, COLUMNS, sharex=True, sharey="row", squeeze=False).flat
     )
-    ticks = np.array([tick for tick in MaxNLocator(7).tick_values(0.0, end) if 0.0 <= tick <= end])
+    ticks = time_ticks(end)
     panels[0].set(xlim=(0.0, end), xticks=ticks)
+    shown = [index < count and index not in hidden for index in range(len(panels))]
     for index, axes in enumerate(panels):
-        axes.set_visible(index < count)
+        axes.set_visible(shown[index])
         axes.grid(color=GRID)
         axes.axhline(0.0, color=QUIET, linewidth=0.6)
         style_axes(axes)
-        if index < COLUMNS:
-            _speed_axis(axes, record, ticks)
-        if index + COLUMNS >= count:
+        if shown[index] and not any(shown[index % COLUMNS : index : COLUMNS]):
+            speed_axis(axes, record, ticks)
+        if shown[index] and not any(shown[index + COLUMNS :: COLUMNS]):
             axes.tick_params(labelbottom=True)
             axes.set_xlabel("time, s", fontsize=9.5)
         if index % COLUMNS == 0:
@@ -101,7 +105,12 @@ def time_panels(record: Record, count: int, labels: Sequence[str]) -> tuple[Figu
     return figure, panels[:count]
 
 
-def _speed_axis(axes: Axes, record: Record, ticks: FloatArray) -> None:
+def time_ticks(end: float) -> FloatArray:
+    """Return round times from 0 to the end of a record. [s]"""
+    return np.array([tick for tick in MaxNLocator(7).tick_values(0.0, end) if 0.0 <= tick <= end])
+
+
+def speed_axis(axes: Axes, record: Record, ticks: FloatArray) -> None:
     """Label the time ticks along the top with the drum speed, for any spin profile."""
     speeds = np.interp(ticks, record.time.values, record.drum_speed.values) * RPM_PER_RAD_S
     top = axes.secondary_xaxis("top")

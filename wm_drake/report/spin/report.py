@@ -22,6 +22,7 @@ from wm_drake.report.spin.cases import case_title, has_gasket, speed_rpm
 from wm_drake.report.spin.figures import envelopes_figure, gaps_figure, gasket_figure, orbits_figure
 from wm_drake.report.spin.tables import amplitude_table
 from wm_drake.report.springs import slack_warning
+from wm_drake.report.spin.vibration_pictures import vibration_pictures
 from wm_drake.report.tables import Table, parameter_table
 from wm_drake.simulation.cases import UNUSED_PHASE_ERROR
 from wm_drake.simulation.spring_tension import slack_springs
@@ -52,7 +53,11 @@ class CaseView:
 
 
 def spin_report(
-    result: SpinResult, command: str = "", replays: Mapping[str, str] | None = None
+    result: SpinResult,
+    command: str = "",
+    replays: Mapping[str, str] | None = None,
+    *,
+    detail: bool = False,
 ) -> str:
     """Return the report as text of one self-contained HTML file.
 
@@ -60,11 +65,15 @@ def spin_report(
         result: Result with at least one case.
         command: Command line of the run, shown on the page.
         replays: Names of the files with a 3D replay, by name of the case.
+        detail: Whether spectra, accelerations and mount forces are drawn for every case; else they
+            are drawn for the case with the largest amplitude.
 
     Raises:
         InputError: A file of measured amplitudes cannot be used.
     """
     table = amplitude_table(result)
+    main = max(result.results, key=lambda case: _peak(case)[0])
+    detailed = [case for case in result.results if detail or case is main]
     return render(
         "spin/page.html",
         title=f"Spin run of machine {result.parameters.name}",
@@ -74,12 +83,16 @@ def spin_report(
         comparison=tables.comparison(result, table),
         largest_values=tables.largest_values(result),
         critical_speeds=tables.critical_speeds(result),
+        accelerations=tables.accelerations(result),
+        mount_forces=tables.mount_force_tables(result),
+        drawn_alone="" if len(detailed) == len(result.results) else case_title(main),
         smallest_gaps=tables.smallest_gaps(result),
         gaps_picture=_gaps_picture(result),
         smallest_tensions=tables.smallest_tensions(result),
         cases=[
             replace(
-                _case_view(result, index, table), replay=(replays or {}).get(case.case.name, "")
+                _case_view(result, index, table, any(case is one for one in detailed)),
+                replay=(replays or {}).get(case.case.name, ""),
             )
             for index, case in enumerate(result.results)
         ],
@@ -246,9 +259,11 @@ def facts_of_run(result: SpinResult, command: str) -> list[tuple[str, str]]:
     return [(word, text) for word, text in facts if text]
 
 
-def _case_view(result: SpinResult, index: int, table: pd.DataFrame) -> CaseView:
+def _case_view(result: SpinResult, index: int, table: pd.DataFrame, is_detailed: bool) -> CaseView:
     case = result.results[index]
-    pictures = (_envelopes_picture(case, table), _orbits_picture(case), _gasket_picture(case))
+    pictures = [_envelopes_picture(case, table), _orbits_picture(case), _gasket_picture(case)]
+    if is_detailed and case.record.sizes["time"] > 1:
+        pictures += vibration_pictures(result, case)
     shown = tuple(picture for picture in pictures if picture is not None)
     return CaseView(
         f"case-{index + 1}",

@@ -8,6 +8,7 @@ import pandas as pd
 import xarray as xr
 
 from wm_drake.parameters import Load, measured_amplitudes, quantities
+from wm_drake.parameters.types import FloatArray
 from wm_drake.report.formatting import (
     MISSING,
     MM_PER_M,
@@ -16,10 +17,12 @@ from wm_drake.report.formatting import (
     percent,
     shape_name,
 )
-from wm_drake.report.spin.cases import case_title, has_gasket, speed_rpm
+from wm_drake.report.spin.cases import case_title, has_gasket, sensors_of, speed_rpm
 from wm_drake.report.tables import MOST_SHOWN, Group, Row, Table, line, readable
 from wm_drake.simulation.measures import percent_difference
 from wm_drake.simulation.spring_tension import slack_springs
+from wm_drake.simulation.mount_forces import MountForce, mount_forces, rms_table, speed_ranges
+from wm_drake.simulation.vibration import sensor_accelerations
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 OURS = "wm_drake"
@@ -187,6 +190,53 @@ def _largest_cells(case: CaseResult) -> list[str]:
         *shown,
         *(number(float(value), places) for value, places in zip(gasket, decimals, strict=True)),
     ]
+
+
+def accelerations(result: SpinResult) -> Table:
+    """Return the largest acceleration at each sensor, and the RMS over the run."""
+    groups = []
+    for case in result.results:
+        if not case.record.sizes["time"]:
+            continue
+        values = sensor_accelerations(case.record, sensors_of(result, case)).values
+        shown = {"largest": np.abs(values).max(axis=0), "RMS": np.sqrt(np.mean(values**2, axis=0))}
+        rows = (Row((name, *(number(s, 2) for s in sizes))) for name, sizes in shown.items())
+        groups.append(Group(case_title(case), tuple(rows)))
+    caption = (
+        "Acceleration of the tub at each sensor, along its axis: the largest absolute value and "
+        "the RMS over the whole run. Gravity is not included, and nothing is filtered."
+    )
+    header = ("load", "value", *(f"{name}, m/s²" for name in result.parameters.sensors))
+    return Table(caption, header, tuple(groups), text_columns=2)
+
+
+def mount_force_tables(result: SpinResult) -> list[Table]:
+    """Return the forces of the mounts on the cabinet, one table for each spin profile."""
+    caption = (
+        "Forces of the mounts on the cabinet: force at rest, largest absolute value with its drum "
+        "speed, and RMS of the change from rest in ranges of drum speed or in the regions of the "
+        "profile. Springs and massless dampers: tension along their line; others: length of the "
+        "force vector."
+    )
+    by_ranges: dict[tuple[str, ...], list[Group]] = {}
+    for case in result.results:
+        forces, ranges = mount_forces(case.record), speed_ranges(case.record, case.case.profile)
+        rms = rms_table(forces, ranges)
+        rows = tuple(_mount_row(case, force, rms[i]) for i, force in enumerate(forces))
+        if rows:
+            names = tuple(part.name for part in ranges)
+            by_ranges.setdefault(names, []).append(Group(case_title(case), rows))
+    start = ("load", "mount", "at rest, N", "largest, N", "at, rpm")
+    return [
+        Table(caption, (*start, *(f"RMS {name}, N" for name in names)), tuple(groups), 2)
+        for names, groups in by_ranges.items()
+    ]
+
+
+def _mount_row(case: CaseResult, force: MountForce, rms: FloatArray) -> Row:
+    speed = speed_rpm(case, float(case.record.time[force.peak_index]))
+    cells = [number(force.at_rest), number(force.peak), number(speed, 0), *map(number, rms)]
+    return Row((force.name.replace("_", " "), *cells))
 
 
 def smallest_gaps(result: SpinResult) -> Table:
