@@ -14,6 +14,7 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.feet import BY_FOOT, FOOT_VARIABLES, MARGINS, WORDS, cabinet_of
 from wm_drake.simulation.mounts import KINDS, POINT, mount_names
 from wm_drake.simulation.outputs import AXES
 from wm_drake.simulation.runs import checked_step
@@ -62,6 +63,12 @@ _VARIABLES = {
         "m",
         "smallest elongation from the free length; negative if the spring goes slack",
     ),
+    **{name: ("foot" if name in BY_FOOT else "", *WORDS[name]) for name in FOOT_VARIABLES},
+    **{
+        f"region_{name}": ("region", unit, f"{text}; smallest in each region")
+        for name, (unit, text) in WORDS.items()
+        if name in MARGINS
+    },
 }
 
 
@@ -104,7 +111,9 @@ def simulate_many(
             "mounts": peak, RMS and dynamic RMS of the force of each mount on the cabinet;
             "cabinet": the same of force and moment of all mounts on the cabinet, for each axis;
             "spring tensions": smallest tension of each spring, 0 if it goes slack, and smallest
-            elongation from its free length.
+            elongation from its free length;
+            "feet": loads of the feet, and margins of sliding, turning and tilting;
+            "feet regions": the smallest of them in each region of the profile.
         step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
             step size of the machine is used. [s]
         histories: Whether each `RunResult` contains the record of the run, as from `simulate`.
@@ -126,6 +135,8 @@ def simulate_many(
     for name in wanted:
         if name not in MEASURES:
             raise input_error(f"no measure '{name}'{nearest_names(name, MEASURES)}", key="measures")
+    if {"feet", "feet regions"} & set(wanted):
+        cabinet_of(machine.parameters)
     step = checked_step(machine.parameters, step)
     results: dict[int, tuple[str, str, list[FloatArray]]] = {}
 
@@ -170,11 +181,12 @@ def as_table(
     }
     if "spring tensions" in measures:
         labels["spring"] = list(parameters.springs)
+    if parameters.cabinet:
+        labels["foot"] = list(parameters.cabinet.corners)
     if "regions" in measures:
-        labels |= {
-            "accelerometer": list(parameters.accelerometer_frames()),
-            "region": range(_region_count(measures, results)),
-        }
+        labels["accelerometer"] = list(parameters.accelerometer_frames())
+    if {"regions", "feet regions"} & set(measures):
+        labels["region"] = range(_region_count(measures, results))
     variables = {}
     for index, name in enumerate(name for measure in measures for name in MEASURES[measure]):
         dim, unit, text = _VARIABLES[name]
@@ -196,7 +208,8 @@ def _region_count(
         InputError: the runs have different numbers of regions.
     """
     names = [name for measure in measures for name in MEASURES[measure]]
-    counts = {len(values[names.index("region_displacement")]) for _, _, values in results.values()}
+    first = next(at for at, name in enumerate(names) if _VARIABLES[name][0].startswith("region"))
+    counts = {len(values[first]) for _, _, values in results.values()}
     if len(counts) > 1:
         raise input_error(
             f"the profiles have {' and '.join(map(str, sorted(counts)))} regions; "

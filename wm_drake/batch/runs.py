@@ -8,6 +8,7 @@ import numpy as np
 
 from wm_drake.batch.work_items import BatchKey, WorkItem
 from wm_drake.compiler.lanes import WIDTH
+from wm_drake.elements.mount import WRENCH_SIZE
 from wm_drake.elements.sensor import POINT_SIZE
 from wm_drake.engines.compiled.mechanics import DRUM_RATE, RATES_SIZE, STATE_SIZE
 from wm_drake.engines.compiled.packing import aligned, fill_lanes
@@ -26,6 +27,7 @@ from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.feet import FOOT_VARIABLES, REGION_VARIABLES, cabinet_of, foot_measures
 from wm_drake.simulation.histories import measure_samples_lanes
 from wm_drake.simulation.measures import amplitudes, filtered, power_means
 from wm_drake.simulation.mount_histories import measure_mounts_lanes
@@ -48,6 +50,8 @@ MEASURES = {
     "gap": ("smallest_gap",),
     "regions": ("region_displacement", "region_displacement_integrated"),
     "mounts": tuple(f"mount_force_{kind}" for kind in KINDS),
+    "feet": FOOT_VARIABLES,
+    "feet regions": REGION_VARIABLES,
     "cabinet": tuple(f"cabinet_{of}_{kind}" for of in ("force", "moment") for kind in KINDS),
     "spring tensions": ("smallest_spring_tension", "smallest_spring_elongation"),
 }
@@ -56,7 +60,10 @@ MEASURES = {
 _FILTERED = {"amplitudes", "power means"}
 """Measures that need the filtered displacements at the sensors."""
 
-_OF_MOUNTS = {"mounts", "cabinet"}
+_OF_FEET = {"feet", "feet regions"}
+"""Measures that need the wrench on the cabinet over time."""
+
+_OF_MOUNTS = {"mounts", "cabinet"} | _OF_FEET
 """Measures that need the forces of the mounts."""
 
 
@@ -133,7 +140,7 @@ class Runner:
             samples.reshape(rows, size, WIDTH),
             moved.reshape(rows, count, WIDTH),
             extremes.reshape(-1, WIDTH),
-            self._forces_of_mounts(key, samples, rows, size, p).reshape(-1, WIDTH),
+            *self._forces_of_mounts(key, samples, rows, size, p),
         )
         lengths = self._spring_lengths(key, p, samples, rows, size)
         return [
@@ -143,15 +150,22 @@ class Runner:
 
     def _forces_of_mounts(
         self, key: BatchKey, samples: FloatArray, rows: int, size: int, p: FloatArray
-    ) -> FloatArray:
-        """Return the sums of `measure_mounts_lanes`; an empty array if they are not needed."""
-        if not _OF_MOUNTS & set(self.measures):
-            return np.empty(0)
-        mounts, bounds = mounts_of(key.layout), (LARGEST_ANGLE, LARGEST_DISPLACEMENT)
-        count = len(mount_names(self.parameters))
-        sums, nothing = self._array("sums", sums_size(count)), np.empty(0)
-        measure_mounts_lanes(samples, rows, size, bounds, p, mounts, count, nothing, sums)
-        return sums
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the sums and the wrenches on the cabinet of `measure_mounts_lanes`.
+
+        Returns:
+            (sums, lanes) and (rows, 6, lanes); empty if no measure needs them.
+        """
+        sums: FloatArray = np.empty(0)
+        cabinet: FloatArray = np.empty(0)
+        if _OF_MOUNTS & set(self.measures):
+            mounts, bounds = mounts_of(key.layout), (LARGEST_ANGLE, LARGEST_DISPLACEMENT)
+            count = len(mount_names(self.parameters))
+            sums = self._array("sums", sums_size(count))
+            keeps = bool(_OF_FEET & set(self.measures))
+            cabinet = self._array("cabinet", rows * WRENCH_SIZE) if keeps else np.empty(0)
+            measure_mounts_lanes(samples, rows, size, bounds, p, mounts, count, cabinet, sums)
+        return sums.reshape(-1, WIDTH), cabinet.reshape(-1, WRENCH_SIZE, WIDTH)
 
     def _result(
         self,
@@ -161,11 +175,13 @@ class Runner:
         moved: FloatArray,
         extremes: FloatArray,
         mounts: FloatArray,
+        cabinet: FloatArray,
         spring_lengths: FloatArray,
     ) -> RunResult:
         # the last three points are the detergent point's
         good, sensors = int(extremes[-1]), moved.shape[1] - 3
         values: dict[str, FloatArray] = {}
+        feet: dict[str, FloatArray] = {}
         if _FILTERED & set(self.measures):
             displacement = filtered(moved[:good, :sensors], OUTPUT_PERIOD)
         for measure in self.measures:
@@ -183,6 +199,9 @@ class Runner:
                 arrays = mount_measures(mounts)
             elif measure == "cabinet":
                 arrays = cabinet_measures(mounts)
+            elif measure in _OF_FEET:
+                feet = feet or self._feet(item, cabinet[:good])
+                arrays = [feet[name] for name in MEASURES[measure]]
             else:
                 size, at = amplitudes(displacement)
                 arrays = size, np.where(np.isnan(size), np.nan, samples[at, DRUM_RATE])
@@ -218,6 +237,16 @@ class Runner:
         )
         return region_displacements(
             motion, acceleration, points, setup.rest_pose, OUTPUT_PERIOD, item.case.profile
+        )
+
+    def _feet(self, item: WorkItem, wrenches: FloatArray) -> dict[str, FloatArray]:
+        parameters = item.numbers.setup.parameters
+        return foot_measures(
+            cabinet_of(parameters),
+            parameters.gravity,
+            wrenches,
+            item.case.profile,
+            OUTPUT_PERIOD,
         )
 
     def _gap(self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray) -> FloatArray:

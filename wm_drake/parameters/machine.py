@@ -8,6 +8,7 @@ from pydantic import Field, StringConstraints, ValidationInfo, field_validator, 
 from wm_drake.errors import nearest_names
 from wm_drake.parameters import units as u
 from wm_drake.parameters.bearing import Bearing
+from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.damper_laws import DamperType
 from wm_drake.parameters.elements import (
     Bushing,
@@ -163,6 +164,7 @@ class MachineParameters(Frozen):
     sensors: dict[Name, Sensor]
     accelerometers: dict[Name, Accelerometer] = {}
     clearance: Clearance
+    cabinet: Cabinet | None = None
     unbalance_planes: UnbalancePlanes | None = None
     imperfections: Imperfections = Imperfections()
     loads: dict[Name, Load]

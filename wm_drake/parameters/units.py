@@ -281,6 +281,45 @@ def _plain_number(value: Any, info: ValidationInfo, example: str) -> float:
     return number
 
 
+@dataclass(frozen=True)
+class PureNumber(Unit):
+    """A number without a unit, such as a friction coefficient."""
+
+    si: str = ""
+    shown: str = ""
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Return a schema that parses text before the other checks of the field."""
+        return with_info_before_validator_function(
+            lambda value, info: _pure_number(value), handler(source)
+        )
+
+    def text(self, value: Any) -> str:
+        """Return a number as text that reads back as the same number."""
+        return repr(value)
+
+
+def _pure_number(value: Any) -> float:
+    """Return a number, or text of one, as a finite float.
+
+    Raises:
+        ValueError: it is not one, or it has a unit.
+    """
+    text = value if isinstance(value, str) else ""
+    if text and not _BARE.fullmatch(text.strip()):
+        hint = comma_hint(text) or "; write for example 0.4"
+        raise ValueError(f"'{shortened(text, 60)}' is not a number without unit{hint}")
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        raise ValueError(f"{shortened(repr(value), 60)} is not a number; write for example 0.4")
+    number = float(value) if value != "" else math.nan
+    if not math.isfinite(number):
+        raise ValueError("this is not a finite number; write for example 0.4")
+    return number
+
+
+Ratio = Annotated[float, PureNumber()]
 Mass = Annotated[float, Unit("kg", "kg")]
 Inertia = Annotated[float, Unit("kg*m^2", "kg*m^2")]
 Length = Annotated[float, Unit("m", "mm")]

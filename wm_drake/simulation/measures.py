@@ -1,6 +1,7 @@
 """Measures of a record: filtered displacements, envelopes, amplitudes, largest forces, gap."""
 
 import functools
+import json
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 
@@ -9,7 +10,10 @@ import xarray as xr
 from scipy.signal import butter, find_peaks, sosfiltfilt
 
 from wm_drake.model.scene import REPLAY_RATE, Gap, Scene
+from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.feet import BY_FOOT, REGION_VARIABLES, foot_measures
 from wm_drake.simulation.mounts import KINDS, force_measures
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record
@@ -54,6 +58,8 @@ class Measures:
         cabinet_moment_peak, cabinet_moment_rms, cabinet_moment_dynamic_rms: (axis) the same of
             their moment about the origin of W. [N m]
         smallest_tension: (spring) smallest tension, 0 if the spring goes slack. [N]
+        feet: Measures of the feet of the cabinet by the names in `wm_drake.simulation.feet`, with
+            the dimensions foot and region; None if the machine has no cabinet.
     """
 
     amplitude: xr.DataArray
@@ -72,6 +78,7 @@ class Measures:
     cabinet_moment_rms: xr.DataArray
     cabinet_moment_dynamic_rms: xr.DataArray
     smallest_tension: xr.DataArray
+    feet: xr.Dataset | None
 
 
 def filtered(displacement: FloatArray, period: float) -> FloatArray:
@@ -257,7 +264,34 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
         smallest_tension=xr.DataArray(
             smallest_tensions(values["spring_tension"]), record.coords["spring"].coords
         ),
+        feet=feet_of(record),
     )
+
+
+def cabinet_in(record: Record) -> tuple[Cabinet, float] | None:
+    """Return cabinet and gravity [m/s^2] of the machine of a record; None without a cabinet."""
+    parameters = json.loads(record.attrs["parameters"])
+    if not parameters.get("cabinet"):
+        return None
+    return Cabinet.model_validate(parameters["cabinet"]), float(parameters["gravity"])
+
+
+def wrenches_on_cabinet(record: Record) -> FloatArray:
+    """Return moment about the origin of W and force of all mounts on the cabinet (n, 6)."""
+    return np.hstack([record.cabinet_moment.values, record.cabinet_force.values])
+
+
+def feet_of(record: Record) -> xr.Dataset | None:
+    """Return the measures of the feet of the cabinet; None if the machine has no cabinet."""
+    found = cabinet_in(record)
+    if found is None:
+        return None
+    profile = SpinProfile.model_validate_json(record.attrs["profile"])
+    values = foot_measures(*found, wrenches_on_cabinet(record), profile, _period(record))
+    labels = {"foot": list(found[0].corners), "region": [r.name for r in profile.regions]}
+
+    dims = dict.fromkeys(REGION_VARIABLES, "region") | dict.fromkeys(BY_FOOT, "foot")
+    return xr.Dataset({n: ([dims[n]] if n in dims else [], v) for n, v in values.items()}, labels)
 
 
 def _forces_on_cabinet(

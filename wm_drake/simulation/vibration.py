@@ -228,10 +228,7 @@ def region_rms(signal: FloatArray, period: float, profile: SpinProfile) -> Float
         (regions, k) in the unit of the signals. NaN where the signals end before the region does.
     """
     rows = []
-    for region in profile.regions:
-        first, last = (
-            int(np.ceil(time / period * (1.0 - 1e-12))) for time in (region.begin, region.end)
-        )
+    for first, last in region_limits(profile, period):
         is_complete = last <= len(signal) and last > first
         rows.append(
             np.sqrt(np.mean(signal[first:last] ** 2, axis=0))
@@ -239,6 +236,20 @@ def region_rms(signal: FloatArray, period: float, profile: SpinProfile) -> Float
             else np.full(signal.shape[1], np.nan)
         )
     return np.array(rows).reshape(len(profile.regions), signal.shape[1])
+
+
+def region_limits(profile: SpinProfile, period: float) -> list[tuple[int, int]]:
+    """Return the first sample of each region of a profile, and the one after its last.
+
+    Args:
+        profile: Spin profile.
+        period: Time between samples; the first is at time 0. [s]
+    """
+
+    def first_at(time: float) -> int:
+        return int(np.ceil(time / period * (1.0 - 1e-12)))
+
+    return [(first_at(region.begin), first_at(region.end)) for region in profile.regions]
 
 
 def relative_error(computed: FloatArray, measured: FloatArray) -> FloatArray:

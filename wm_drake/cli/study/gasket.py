@@ -103,6 +103,7 @@ def gasket(
             help="What is measured of each run: D, F, M, gap, amplitude, critical_speed, "
             "power_mean, region_displacement, region_displacement_integrated, mounts, cabinet, "
             "mount_force_peak, mount_force_rms, mount_force_dynamic_rms, cabinet_force_peak, ..., "
+            "feet, smallest_foot_load, slide_margin, turn_margin, tilt_margin, "
             "or one number such as Dx, amplitude_Xr or mount_force_rms_springs.left. Repeatable. "
             "Default: D, F, M and gap.",
             metavar="NAME",

@@ -13,12 +13,16 @@ from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
+from wm_drake.simulation.feet import BY_FOOT, FOOT_VARIABLES, WORDS, cabinet_of
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.outputs import AXES
-from wm_drake.studies.gasket.screening import Meaning
+from wm_drake.studies.gasket.screening import Goal, Meaning
 
 MM = Unit("m", "mm")
 NEWTON = Unit("N", "N")
+
+LOADS_OF_FEET = ("foot_normal_largest", "foot_tangential_largest")
+"""Measures of the feet that are better when smaller."""
 
 KIND_TITLES = {"peak": "peak", "rms": "RMS", "dynamic_rms": "dynamic RMS"}
 """Title of each kind of measure of a force, `wm_drake.simulation.mounts.KINDS`."""
@@ -71,7 +75,8 @@ class Response:
 def known_responses(parameters: MachineParameters, profile: SpinProfile) -> tuple[Response, ...]:
     """Return all responses that a machine has over a spin profile."""
     found = [*_extremes(), _gap(), *_by_sensor(parameters), *_by_region(parameters, profile)]
-    return (*found, *_on_cabinet(parameters), *_by_spring(parameters))
+    found += [*_on_cabinet(parameters), *_of_feet(parameters, profile), *_by_spring(parameters)]
+    return tuple(found)
 
 
 def chosen_responses(
@@ -92,6 +97,8 @@ def chosen_responses(
     allowed = sorted({text for r in known for text in (r.name, r.group, r.measure)})
     for name in names or DEFAULT:
         new = [r for r in known if name in (r.name, r.group, r.measure)]
+        if not new and name in ("feet", *FOOT_VARIABLES):
+            cabinet_of(parameters)
         if not new and name in MEASURES:
             raise input_error(f"'{name}' needs a spin profile with regions", key="response")
         if not new:
@@ -225,6 +232,36 @@ def _by_spring(parameters: MachineParameters) -> Iterator[Response]:
         yield Response(
             name, "spring_tension", TENSIONS, variable, (index,), Unit("N", "N"), meaning
         )
+
+
+def _of_feet(parameters: MachineParameters, profile: SpinProfile) -> Iterator[Response]:
+    """Yield loads and margins of the feet, of the run and of each region; none without cabinet."""
+    if parameters.cabinet is None:
+        return
+    for variable, (unit_text, about) in WORDS.items():
+        unit, kind = (
+            Unit(unit_text.replace(" ", "*"), unit_text.replace(" ", "*")),
+            _words(variable),
+        )
+        goal: Goal = "smaller" if variable in LOADS_OF_FEET else "larger"
+        if variable in BY_FOOT:
+            for index, foot in enumerate(parameters.cabinet.corners):
+                meaning = Meaning(f"{kind} {foot}", about, kind, goal)
+                name = f"{variable}_{foot}"
+                yield Response(name, variable, "feet", variable, (index,), unit, meaning)
+            continue
+        yield Response(
+            variable, variable, "feet", variable, (), unit, Meaning(kind, about, kind, goal)
+        )
+        for index, region in enumerate(profile.regions):
+            own = f"region_{variable}"
+            meaning = Meaning(f"{kind} {region.name}", f"{about}, in a region", kind, goal)
+            name = f"{own}_{region.name}"
+            yield Response(name, own, "feet regions", own, (index,), unit, meaning)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def _by_region(parameters: MachineParameters, profile: SpinProfile) -> Iterator[Response]:

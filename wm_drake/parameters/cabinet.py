@@ -1,0 +1,71 @@
+"""The cabinet on its four feet: mass, centre of mass, height, positions of the feet, friction."""
+
+import math
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, StringConstraints, model_validator
+
+from wm_drake.parameters import units as u
+from wm_drake.parameters.elements import Frozen
+
+SMALLEST_SINE = 0.02
+"""Smallest sine of the angle at a foot between its neighbours; below it, three feet are in line."""
+
+FootName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$")]
+
+
+class Foot(Frozen):
+    """Position of a foot on the floor, in W."""
+
+    x: u.Length
+    y: u.Length
+
+
+class Cabinet(Frozen):
+    """A rigid cabinet that stands on four feet on a rigid level floor.
+
+    The bodies of the SDF are not part of it, except for the housing, which has no mass there.
+
+    Attributes:
+        mass: Mass of everything that does not hang on the mounts. [kg]
+        centre_of_mass: Its centre of mass in W. [m]
+        floor: z of the floor in W. [m]
+        friction: Coefficient of Coulomb friction between feet and floor.
+        feet: The four feet by name, corners of a convex quadrilateral, in any order.
+    """
+
+    mass: Annotated[u.Mass, Field(gt=0.0)]
+    centre_of_mass: u.Position
+    floor: u.Length
+    friction: Annotated[u.Ratio, Field(gt=0.0)]
+    feet: dict[FootName, Foot]
+
+    @model_validator(mode="after")
+    def _stands(self) -> "Cabinet":
+        if len(self.feet) != 4:
+            raise ValueError(f"feet: has {len(self.feet)} feet; allowed are four")
+        corners = [(self.feet[name].x, self.feet[name].y) for name in self.corners]
+        for index in range(4):
+            before, here, after = (np.array(corners[(index + k) % 4]) for k in (-1, 0, 1))
+            first, second = here - before, after - here
+            lengths = math.hypot(*first) * math.hypot(*second)
+            if not first[0] * second[1] - first[1] * second[0] > SMALLEST_SINE * lengths:
+                raise ValueError(
+                    f"feet: '{self.corners[index]}' is in a line with two others or between them; "
+                    "the four feet must be the corners of a convex quadrilateral"
+                )
+        return self
+
+    @property
+    def corners(self) -> tuple[str, ...]:
+        """Names of the feet, counterclockwise from above, from the left front corner on."""
+        x, y = (
+            float(np.mean([getattr(foot, axis) for foot in self.feet.values()])) for axis in "xy"
+        )
+        return tuple(
+            sorted(
+                self.feet,
+                key=lambda name: math.atan2(self.feet[name].y - y, self.feet[name].x - x),
+            )
+        )

@@ -1,0 +1,134 @@
+"""Loads of the feet of the cabinet and margins against lift-off, sliding, turning and tilting."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wm_drake.elements.feet import packed_feet
+from wm_drake.errors import input_error
+from wm_drake.parameters import MachineParameters, SpinProfile
+from wm_drake.parameters.cabinet import Cabinet
+from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.foot_histories import (
+    FEET_COUNT,
+    NORMAL_LARGEST,
+    NORMAL_SMALLEST,
+    TANGENTIAL_LARGEST,
+    foot_extremes,
+    foot_history,
+)
+from wm_drake.simulation.vibration import region_limits
+
+MARGINS = ("smallest_foot_load", "slide_margin", "turn_margin", "tilt_margin")
+"""Names of the smallest values, in the order of the columns of `foot_histories`."""
+
+BY_FOOT = ("foot_normal_smallest", "foot_normal_largest", "foot_tangential_largest")
+"""Names of what is measured of each foot, in the order of the rows of `foot_histories`."""
+
+FOOT_VARIABLES = (*BY_FOOT, *MARGINS)
+REGION_VARIABLES = tuple(f"region_{name}" for name in MARGINS)
+"""Names of what is measured of the feet over a run, and in each region of the profile."""
+
+
+WORDS = {
+    "smallest_foot_load": ("N", "smallest normal load of any foot; 0 if one lifts off"),
+    "slide_margin": (
+        "N",
+        "horizontal force that friction can still take; the cabinet slides below 0",
+    ),
+    "turn_margin": (
+        "N m",
+        "vertical moment that friction can still take beside the horizontal force; the cabinet "
+        "turns below 0",
+    ),
+    "tilt_margin": ("N m", "moment that keeps the cabinet from tipping over; it tips below 0"),
+    "foot_normal_smallest": ("N", "smallest normal load of each foot"),
+    "foot_normal_largest": ("N", "largest normal load of each foot"),
+    "foot_tangential_largest": ("N", "largest horizontal load of each foot"),
+}
+"""Unit and meaning of each measure of the feet, without the prefix `region_`."""
+
+
+def cabinet_of(parameters: MachineParameters) -> Cabinet:
+    """Return the cabinet of a machine.
+
+    Raises:
+        InputError: the machine has none.
+    """
+    if parameters.cabinet is None:
+        raise input_error(
+            f"machine '{parameters.name}' has no cabinet, so the loads of its feet are unknown; "
+            "add mass, centre_of_mass, floor, friction and feet under the key 'cabinet'",
+            key="cabinet",
+        )
+    return parameters.cabinet
+
+
+@dataclass(frozen=True)
+class FootLoads:
+    """Loads and margins of the feet over time.
+
+    Attributes:
+        feet: Names of the feet, in the order of the columns.
+        normal, tangential: (n, 4) loads of each foot. [N]
+        margins: (n, 4) smallest normal load of the feet [N] and margins of sliding [N], turning
+            [N m] and tilting [N m].
+    """
+
+    feet: tuple[str, ...]
+    normal: FloatArray
+    tangential: FloatArray
+    margins: FloatArray
+
+
+def foot_loads(cabinet: Cabinet, gravity: float, wrenches: FloatArray) -> FootLoads:
+    """Return loads and margins of the feet over time.
+
+    Args:
+        cabinet: The cabinet.
+        gravity: [m/s^2]
+        wrenches: (n, 6) moment about the origin of W and force of all mounts on the cabinet, in W.
+            [N m, N]
+    """
+    loads, margins = np.empty((len(wrenches), 2, FEET_COUNT)), np.empty((len(wrenches), 4))
+    p = packed_feet(cabinet, gravity)
+    foot_history(np.ascontiguousarray(wrenches), p, loads, margins)
+    return FootLoads(cabinet.corners, loads[:, 0], loads[:, 1], margins)
+
+
+def foot_measures(
+    cabinet: Cabinet,
+    gravity: float,
+    wrenches: FloatArray,
+    profile: SpinProfile,
+    period: float,
+) -> dict[str, FloatArray]:
+    """Return the measures of the feet of a run.
+
+    Args:
+        cabinet: The cabinet.
+        gravity: [m/s^2]
+        wrenches: (n, 6) moment about the origin of W and force of all mounts on the cabinet, in W.
+            [N m, N]
+        profile: Spin profile of the run.
+        period: Time between samples. [s]
+
+    Returns:
+        By the names of `FOOT_VARIABLES` and `REGION_VARIABLES`: smallest and largest normal load
+        and largest tangential load (4,) of the feet [N]; smallest load of any foot [N] and smallest
+        margins of sliding [N], turning [N m] and tilting [N m] over the run; the same in each
+        region (regions,). NaN without samples, and where the run ended before the region did.
+    """
+    p, regions = packed_feet(cabinet, gravity), region_limits(profile, period)
+    extremes, smallest = np.empty((3, FEET_COUNT)), np.empty((1 + len(regions), len(MARGINS)))
+    region_of = np.full(len(wrenches), -1, dtype=np.int64)
+    for number, (first, last) in enumerate(regions):
+        region_of[first:last] = number
+    foot_extremes(np.ascontiguousarray(wrenches), p, region_of, extremes, smallest)
+    complete = [first < last <= len(wrenches) for first, last in regions]
+    smallest[1:][~np.array(complete, dtype=bool)] = np.nan
+    smallest[~np.isfinite(smallest)] = np.nan
+    rows = (NORMAL_SMALLEST, NORMAL_LARGEST, TANGENTIAL_LARGEST)
+    of_feet = dict(zip(BY_FOOT, (extremes[row] for row in rows), strict=True))
+    of_run = dict(zip(MARGINS, map(np.array, smallest[0]), strict=True))
+    return of_feet | of_run | dict(zip(REGION_VARIABLES, smallest[1:].T, strict=True))
