@@ -2,11 +2,19 @@
 
 import typer
 
-from wm_drake.cli.study import gasket, gasket_damping, modes, spin_cycle, spin_identify
+from wm_drake.cli.study import (
+    gasket,
+    gasket_damping,
+    modes,
+    response,
+    spin_cycle,
+    spin_identify,
+)
 
 app = typer.Typer(help="Run a study of many runs and write a report.", no_args_is_help=True)
 app.command("gasket")(gasket.gasket)
 app.command("gasket-damping")(gasket_damping.gasket_damping)
 app.command("modes")(modes.modes)
+app.command("response")(response.response)
 app.command("spin-cycle")(spin_cycle.spin_cycle)
 app.command("spin-identify")(spin_identify.spin_identify)

@@ -160,7 +160,7 @@ def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> Figure:
     views = (("front", 0, 2), ("side", 1, 2), ("top", 0, 1))
     figure = Figure(figsize=(WIDTH, 5.9), layout="constrained")
     panels = figure.subplots(3, len(modes), squeeze=False)
-    lines = _tub_lines(outlines)
+    lines = tub_lines(outlines)
     reach = max(float(np.abs(line).max()) for line in lines)
     for column, mode in enumerate(modes):
         ends = _ends_of_motion(mode, lines, reach)
@@ -185,7 +185,7 @@ def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> Figure:
     return figure
 
 
-def _tub_lines(outlines: Mapping[str, Outline]) -> list[FloatArray]:
+def tub_lines(outlines: Mapping[str, Outline]) -> list[FloatArray]:
     """Return lines (n, 3) in T that show the tub: circles and generators of its largest cylinder.
 
     Without a cylinder among the shapes they are those of one of 0.5 m diameter and 0.35 m length.
