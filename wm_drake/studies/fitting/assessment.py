@@ -84,6 +84,29 @@ def assess(
     )
 
 
+def evaluated(problem: FitProblem) -> Fit:
+    """Return the fit of a problem without unknowns: its errors only."""
+    nowhere = np.zeros(0)
+    residuals = problem.residuals(nowhere[None])[0]
+    computed, baselines = _computed(problem, nowhere)
+    return Fit(
+        problem=problem,
+        method="evaluation",
+        seed=0,
+        estimates=(),
+        rmse=float(rmse(residuals)),
+        tests=_test_errors(problem, residuals),
+        computed=computed,
+        baselines=baselines,
+        covariance=np.zeros((0, 0)),
+        condition=1.0,
+        undetermined=(),
+        evaluations=2,
+        history=(),
+        notes=("all numbers are given: nothing was searched",),
+    )
+
+
 def _bounds_hit(problem: FitProblem, point: FloatArray, jacobian: FloatArray) -> IndexArray:
     """Return which unknowns are at their lower (-1) or upper (1) bound; 0 for unseen ones."""
     bound = np.where(point < AT_BOUND, -1, np.where(point > 1.0 - AT_BOUND, 1, 0))
