@@ -355,20 +355,6 @@ BAD_FILE = "time_s,displacement_mm,force_N\n" + "\n".join(
             "--fix: damping_x: '-1000.0' is out of range; allowed is >= 0",
         ),
         (
-            (
-                "identify",
-                "gasket",
-                "good.csv",
-                "--axis",
-                "x",
-                "--fix",
-                "damping_x=1 N s/mm",
-                "--fix",
-                "stiffness_x=1 N/mm",
-            ),
-            "--fix: all numbers of the law are fixed; leave one out",
-        ),
-        (
             ("identify", "gasket", "good.csv", "--axis", "tilt"),
             "good.csv: holds displacements and forces, needs angles and moments",
         ),

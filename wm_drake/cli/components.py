@@ -77,6 +77,27 @@ class DamperCommand(TyperCommand):
         super().format_help(ctx, formatter)
 
 
+class ValidatingCommand(DamperCommand):
+    """A command whose option ``--validate`` takes all names that follow it, as a shell expands it.
+
+    Without this, of ``--validate held/*.csv`` only the first file would be held out, and the fit
+    would see the others.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Repeat the option before each name that follows it."""
+        spread, follows = list[str](), False
+        for word in args:
+            if word == "--validate":
+                follows = True
+                continue
+            follows = follows and not word.startswith("-")
+            spread += ["--validate", word] if follows else [word]
+        if args and args[-1] == "--validate":
+            spread.append("--validate")  # click says that its value is missing
+        return super().parse_args(ctx, spread)
+
+
 @dataclass(frozen=True)
 class Target:
     """A component, the machine as it was named, and its key there; both "" for a component file."""

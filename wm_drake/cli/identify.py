@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,9 +22,9 @@ from wm_drake.cli.components import (
     ArmOption,
     AxisOption,
     ComponentOption,
-    DamperCommand,
     NameOption,
     Target,
+    ValidatingCommand,
     axes_of,
     existing_files,
     quantities_of,
@@ -77,6 +77,22 @@ UnitsOption = Annotated[
         metavar="UNITS",
     ),
 ]
+ValidateOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--validate",
+        help="Files that no fit sees: their loops are predicted. Takes all names that follow it.",
+        metavar="FILES...",
+    ),
+]
+CutoffOption = Annotated[
+    str | None,
+    typer.Option(
+        "--cutoff",
+        help="Take each motion as recorded, smoothed so that this frequency is halved: '50 Hz'.",
+        metavar="FREQUENCY",
+    ),
+]
 KnotsOption = Annotated[
     int, typer.Option("--knots", help="Points of a table on each side of zero.", min=1, max=12)
 ]
@@ -95,19 +111,23 @@ class _Asked:
     overwrite: bool
     as_json: bool
     sets: list[str] | None
+    validate: list[Path] = field(default_factory=list)
+    cutoff: str | None = None
 
 
-@app.command("damper", cls=DamperCommand)
+@app.command("damper", cls=ValidatingCommand)
 def identify_damper(
     files: FilesArgument,
     law: Annotated[
         str | None,
-        typer.Option(help="{laws}; the component's by default."),
+        typer.Option(help="{laws}; the component's by default. Several: mstv,stv."),
     ] = None,
+    validate: ValidateOption = None,
     method: MethodOption = "least-squares",
     bounds: BoundsOption = None,
     fix: FixOption = None,
     units: UnitsOption = None,
+    cutoff: CutoffOption = None,
     knots: KnotsOption = 5,
     seed: SeedOption = 0,
     machine: MachineOption = "reference",
@@ -118,17 +138,24 @@ def identify_damper(
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
-    """Identify a friction damper; a curve of its law is found as a monotone table."""
+    """Identify a friction damper; a curve of its law is found as a monotone table.
+
+    Several laws are fitted to the same files and compared.
+    """
     from wm_drake.studies.identification import damper_model
 
     target = target_of("damper", machine, name, component, sets)
     own = str(target.component.parameters.law)  # type: ignore[union-attr]
-    asked = _Asked(files, units, method, seed, out, overwrite, as_json, sets)
-    motions = _motions(asked, rotates=False)
-    ranges = _ranges(bounds)
-    kept = _kept_fields(target, law or own, ranges)
-    model = damper_model(law or own, motions, ranges, _single(fix, "--fix"), knots, kept)
-    _run(asked, f"damper {target.component.name}, law {model.law}", target, model, motions, {})
+    asked = _Asked(
+        files, units, method, seed, out, overwrite, as_json, sets, validate or [], cutoff
+    )
+    laws, ranges, fixed = _laws(law or own, ""), _ranges(bounds), _single(fix, "--fix")
+    motions = _motions(asked, asked.files, rotates=False)
+    models = {
+        one: damper_model(one, motions, *given, knots, _kept_fields(target, one, given[0]))
+        for one, given in _given_by_law(laws, ranges, fixed, "").items()
+    }
+    _run_all(asked, f"damper {target.component.name}", target, models, motions, {})
 
 
 def _axis_command(kind: str) -> Callable[..., None]:
@@ -140,11 +167,13 @@ def _axis_command(kind: str) -> Callable[..., None]:
         law: Annotated[
             str, typer.Option(help="voigt, table (monotone curve) or, about an axis, voigt_havsin.")
         ] = "voigt",
+        validate: ValidateOption = None,
         arm: ArmOption = None,
         method: MethodOption = "least-squares",
         bounds: BoundsOption = None,
         fix: FixOption = None,
         units: UnitsOption = None,
+        cutoff: CutoffOption = None,
         knots: KnotsOption = 5,
         seed: SeedOption = 0,
         machine: MachineOption = "reference",
@@ -159,28 +188,39 @@ def _axis_command(kind: str) -> Callable[..., None]:
         from wm_drake.studies.identification import bushing_model
 
         target = target_of(kind, machine, name, component, sets)
-        asked = _Asked(files, units, method, seed, out, overwrite, as_json, sets)
+        asked = _Asked(
+            files, units, method, seed, out, overwrite, as_json, sets, validate or [], cutoff
+        )
         axes = axes_of(axis)
         radius = quantities_of(arm, Unit("m", "mm"), "--arm")[0] if arm else 0.0
-        motions = _motions(asked, rotates=axes[0].startswith("about") and not radius)
-        model = bushing_model(
-            law,
-            motions,
-            target.component.parameters,  # type: ignore[arg-type]
-            axes[0],
-            arm=radius,
-            bounds=_ranges(bounds),
-            fixed=_single(fix, "--fix"),
-            knots=knots,
-        )
-        title = f"{target.component.name}, {axis.replace('_', ' ')}, law {law}"
-        _run(asked, title, target, model, motions, _copies(model, axes))
+        laws, ranges, fixed = _laws(law, axes[0]), _ranges(bounds), _single(fix, "--fix")
+        motions = _motions(asked, asked.files, rotates=axes[0].startswith("about") and not radius)
+        models = {
+            one: bushing_model(
+                one,
+                motions,
+                target.component.parameters,  # type: ignore[arg-type]
+                axes[0],
+                arm=radius,
+                bounds=given[0],
+                fixed=given[1],
+                knots=knots,
+            )
+            for one, given in _given_by_law(laws, ranges, fixed, axes[0]).items()
+        }
+        title = f"{target.component.name}, {axis.replace('_', ' ')}"
+        copies = {one: _copies(model, axes) for one, model in models.items()}
+        _run_all(asked, title, target, models, motions, copies)
 
     return identify_axis
 
 
-app.command("bushing", help="One axis of a six-component bushing.")(_axis_command("bushing"))
-app.command("gasket", help="One axis of the gasket.")(_axis_command("gasket"))
+app.command("bushing", cls=ValidatingCommand, help="One axis of a six-component bushing.")(
+    _axis_command("bushing")
+)
+app.command("gasket", cls=ValidatingCommand, help="One axis of the gasket.")(
+    _axis_command("gasket")
+)
 
 
 def _copies(model: "ComponentModel", axes: tuple[str, ...]) -> dict[str, str]:
@@ -191,10 +231,93 @@ def _copies(model: "ComponentModel", axes: tuple[str, ...]) -> dict[str, str]:
     return {f"{field[: -len(ours)]}{other}": field for field in fields for other in others}
 
 
-def _motions(asked: _Asked, *, rotates: bool) -> "list[MeasuredMotion]":
+def _laws(text: str, axis: str) -> list[str]:
+    """Return the laws that an option names, separated by commas."""
+    from wm_drake.studies.identification import fields_of_law
+
+    found = [part.strip() for part in text.split(",")]
+    for law in found:
+        fields_of_law(law, axis)
+        if found.count(law) > 1:
+            raise input_error(f"'{law}' is there twice", where="--law")
+    return found
+
+
+def _given_by_law(
+    laws: list[str],
+    bounds: dict[str, tuple[float, float]],
+    fixed: dict[str, float],
+    axis: str,
+) -> dict[str, tuple[dict[str, tuple[float, float]], dict[str, float]]]:
+    """Return bounds and fixed numbers of each law: of several laws, those of its own fields.
+
+    Raises:
+        InputError: No law has a field.
+    """
+    from wm_drake.studies.identification import fields_of_law
+
+    if len(laws) == 1:
+        return {laws[0]: (bounds, fixed)}
+    fields = {law: fields_of_law(law, axis) for law in laws}
+    known = sorted({name for names in fields.values() for name in names})
+    for option, given in (("--bounds", bounds), ("--fix", fixed)):
+        for name in given:
+            if name.split(".")[0] not in known:
+                raise input_error(
+                    f"none of these laws has a number '{name}'{nearest_names(name, known)}",
+                    where=option,
+                )
+    return {
+        law: (
+            {name: value for name, value in bounds.items() if name.split(".")[0] in names},
+            {name: value for name, value in fixed.items() if name.split(".")[0] in names},
+        )
+        for law, names in fields.items()
+    }
+
+
+def _run_all(
+    asked: _Asked,
+    title: str,
+    target: Target,
+    models: "dict[str, ComponentModel]",
+    motions: "list[MeasuredMotion]",
+    copies: Mapping[str, dict[str, str]],
+) -> None:
+    """Fit one law, or compare several."""
+    rotates = motions[0].loop.rotates
+    if len(models) == 1 and not asked.validate:
+        ((law, model),) = models.items()
+        _run(asked, f"{title}, law {law}", target, model, motions, copies.get(law, {}))
+        return
+    from wm_drake.cli.rival_laws import run_comparison
+    from wm_drake.studies.identification import check_blind
+
+    validation = []
+    if asked.validate:
+        check_blind(asked.files, existing_files(asked.validate))
+        validation = _motions(asked, asked.validate, rotates=rotates)
+    run_comparison(
+        title,
+        target,
+        models,
+        motions,
+        validation,
+        copies,
+        method=asked.method,
+        seed=asked.seed,
+        out=asked.out,
+        overwrite=asked.overwrite,
+        as_json=asked.as_json,
+        sets=asked.sets,
+    )
+
+
+def _motions(asked: _Asked, files: list[Path], *, rotates: bool) -> "list[MeasuredMotion]":
     """Return the loops of the files, with the motion of each."""
     from wm_drake.errors import InputError, Problem
     from wm_drake.parameters import read_loops
+    from wm_drake.parameters.units import Unit
     from wm_drake.rigs.measured import measured_motion
     from wm_drake.studies.fitting import METHODS
 
@@ -210,7 +333,12 @@ def _motions(asked: _Asked, *, rotates: bool) -> "list[MeasuredMotion]":
                 f"'{asked.units}' is not three units; write for example 's,mm,N'", where="--units"
             )
         units = (parts[0], parts[1], parts[2])
-    loops = read_loops(existing_files(asked.files), units)
+    cutoff = None
+    if asked.cutoff is not None:
+        cutoff = quantities_of(asked.cutoff, Unit("Hz", "Hz"), "--cutoff")[0]
+        if not cutoff > 0.0:
+            raise input_error(f"is {cutoff:g} Hz; allowed is > 0", where="--cutoff")
+    loops = read_loops(existing_files(files), units)
     if loops[0].rotates != rotates:
         holds, needs = ("angles and moments", "displacements and forces")[
             :: 1 if loops[0].rotates else -1
@@ -219,7 +347,7 @@ def _motions(asked: _Asked, *, rotates: bool) -> "list[MeasuredMotion]":
     motions, problems = [], list[Problem]()
     for loop in loops:
         try:
-            motions.append(measured_motion(loop))
+            motions.append(measured_motion(loop, cutoff))
         except InputError as error:
             problems += error.problems
     if problems:
@@ -290,32 +418,29 @@ def _run(
         fixed_numbers,
         identify_report,
     )
-    from wm_drake.report.rig.figures import force_scale
-    from wm_drake.studies.fitting import identify
-    from wm_drake.studies.identification import fit_problem, fragment, judge
+    from wm_drake.studies.identification import fit_law, judge
 
     writer = Run("identify", asked.overwrite)
     with interruptible(), result_folder(asked.out, writer) as folder:
         with progress_bar(PER_CENT, "identify") as bar:
-            fit = identify(
-                fit_problem(model, motions),
+            fit = fit_law(
+                model,
+                motions,
                 asked.method,
                 seed=asked.seed,
                 progress=lambda fraction, least: bar(int(PER_CENT * fraction)),
             )
         judgement = judge(fit, motions)
-        text = fragment(
+        told = write_fragment(
+            folder / "identified.yaml",
             fit,
             model,
-            target.component,
-            target.machine,
-            target.key,
+            target,
             copies,
             asked.out,
             judgement.sentences,
-            dict(pairs_of(asked.sets, "--set")),
+            asked.sets,
         )
-        (folder / "identified.yaml").write_text(text, encoding="utf-8")
         estimates_table(fit, model.fixed).to_csv(folder / "parameters.csv", index=False)
         errors_table(fit, motions, judgement).to_csv(folder / "errors.csv", index=False)
         fitted_loops(fit, motions).to_csv(folder / "loops.csv", index=False, float_format="%.7g")
@@ -333,25 +458,62 @@ def _run(
     if asked.as_json:
         typer.echo(json.dumps({"component": title, **found}))
     else:
-        _print(
-            title, fit, judgement, force_scale(motions[0].loop.rotates)[1], model.fixed, asked.out
+        _print(title, fit, judgement, motions, model.fixed, told, asked.out)
+
+
+def write_fragment(
+    path: Path,
+    fit: "Fit",
+    model: "ComponentModel",
+    target: Target,
+    copies: Mapping[str, str],
+    out: Path,
+    remarks: tuple[str, ...],
+    sets: list[str] | None,
+) -> str:
+    """Write the identified numbers as a machine or component file, if they are complete.
+
+    Returns:
+        A sentence that names what is missing for the file; "" if it is written.
+    """
+    from wm_drake.studies.identification import fragment, missing_numbers
+
+    missing = missing_numbers(fit, model, target.component)
+    if missing:
+        return (
+            f"{path.name} is not written: the data do not determine {', '.join(missing)}, which "
+            f"the law {model.law} needs and {target.component.name} did not have; give a value "
+            "with --fix."
         )
+    changes = dict(pairs_of(sets, "--set"))
+    text = fragment(
+        fit, model, target.component, target.machine, target.key, copies, out, remarks, changes
+    )
+    path.write_text(text, encoding="utf-8")
+    return ""
 
 
 def _print(
     title: str,
     fit: "Fit",
     judgement: "Judgement",
-    unit: str,
+    motions: "list[MeasuredMotion]",
     fixed: Mapping[str, float],
+    told: str,
     out: Path,
 ) -> None:
     from rich.table import Table
 
-    from wm_drake.report.identify.report import estimate_cells, undetermined_sentences
+    from wm_drake.report.identify.report import (
+        estimate_cells,
+        motion_sentences,
+        undetermined_sentences,
+    )
+    from wm_drake.report.rig.figures import force_scale
 
+    unit = force_scale(motions[0].loop.rotates)[1]
     console = Console()
-    for sentence in judgement.sentences:
+    for sentence in (*judgement.sentences, *motion_sentences(motions)):
         console.print(sentence, highlight=False)
     table = Table(title=f"{title}: RMSE {fit.rmse:.4g} {unit} by {fit.method}")
     table.add_column("unknown", no_wrap=True)
@@ -360,9 +522,9 @@ def _print(
     for cells in estimate_cells(fit, fixed):
         table.add_row(*cells)
     console.print(table)
-    for sentence in (*undetermined_sentences(fit), *fit.notes):
+    for sentence in (*undetermined_sentences(fit), *fit.notes, *([told] if told else [])):
         console.print(sentence, highlight=False)
     console.print(
-        f"Results in {out}: report.html, identified.yaml, parameters.csv, errors.csv, loops.csv, "
-        "fit.json"
+        f"Results in {out}: report.html, {'' if told else 'identified.yaml, '}parameters.csv, "
+        "errors.csv, loops.csv, fit.json"
     )

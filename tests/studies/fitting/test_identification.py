@@ -334,7 +334,7 @@ def test_a_quadratic_is_its_own_surface(p):
         ),
         (
             lambda: FitProblem((), (), decay_and_swing),
-            "an identification needs at least one unknown",
+            "an identification needs at least one measurement",
         ),
         (
             lambda: FitProblem((UNKNOWNS[0],) * 2, planted().measurements, decay_and_swing),

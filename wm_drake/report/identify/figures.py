@@ -65,6 +65,90 @@ def loops_figure(fit: Fit, motions: Sequence[MeasuredMotion], *, over: str) -> F
     return figure
 
 
+MOST_PANELS = 12
+"""Largest number of tests in a figure of several laws."""
+
+LAW_COLOURS = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#d55e00")
+"""Colours of laws, of Okabe and Ito."""
+
+
+def measured_files(motions: Sequence[MeasuredMotion]) -> list[int]:
+    """Return the indices of at most `MOST_PANELS` tests, evenly chosen."""
+    places = np.linspace(0, len(motions) - 1, min(MOST_PANELS, len(motions)))
+    return [round(place) for place in places]
+
+
+def rival_loops_figure(
+    laws: Sequence[str],
+    fits: Sequence[Fit],
+    motions: Sequence[MeasuredMotion],
+    chosen: Sequence[int],
+    *,
+    over: str,
+) -> Figure:
+    """Draw measured samples and the loop of each law, one panel per test.
+
+    Args:
+        laws: Names of the laws.
+        fits: Fit or evaluation of each law on all motions.
+        motions: Measured motions.
+        chosen: Indices of the motions that are drawn.
+        over: Abscissa: displacement or velocity.
+    """
+    columns = min(COLUMNS, max(2, len(chosen)))
+    rows = -(-len(chosen) // columns)
+    figure = Figure(figsize=(WIDTH, 2.55 * rows + 0.45), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False)
+    factor, name, unit = motion_scale(motions[0].loop.rotates)
+    head = f"{name}, {unit}" if over == "displacement" else f"velocity, {unit}/s"
+    for place, axes in enumerate(grid.flat):
+        axes.set_visible(place < len(chosen))
+        if place >= len(chosen):
+            continue
+        index = chosen[place]
+        measured = motions[index]
+        x = factor * (measured.position if over == "displacement" else measured.rate)
+        order = drawing_order(measured)
+        shown = measured.baseline @ fits[0].baselines[index]
+        axes.plot(
+            x,
+            measured.loop.force - shown,
+            "o",
+            color=MEASURED,
+            markersize=2.0,
+            alpha=0.35,
+            rasterized=True,
+        )
+        for k, fit in enumerate(fits):
+            own = fit.computed[fit.problem.slices[index]]
+            computed = own - measured.baseline @ fit.baselines[index]
+            axes.plot(x[order], computed[order], color=_law_colour(k), linewidth=1.3)
+        style_panel(axes)
+        axes.set_title(
+            motion_text(measured), fontsize=10, loc="left", fontweight="bold", parse_math=False
+        )
+        if place >= len(chosen) - columns:
+            axes.set_xlabel(head, fontsize=9.5)
+        if place % columns == 0:
+            axes.set_ylabel(", ".join(force_scale(measured.loop.rotates)), fontsize=9.5)
+    handles = [
+        legend_line(MEASURED, "measured", marker="o", markersize=3.0, linestyle="none"),
+        *(legend_line(_law_colour(k), law, linewidth=1.8) for k, law in enumerate(laws)),
+    ]
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=len(handles),
+        frameon=False,
+        fontsize=9.5,
+    )
+    return figure
+
+
+def _law_colour(index: int) -> str:
+    return LAW_COLOURS[index % len(LAW_COLOURS)]
+
+
 def drawing_order(measured: MeasuredMotion) -> np.ndarray:
     """Return the order of samples along a line: by phase and closed for a sine, else by time."""
     if not isinstance(measured, HarmonicMotion):

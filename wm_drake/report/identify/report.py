@@ -60,8 +60,10 @@ def identify_report(
             history_figure(fit, force_scale(motions[0].loop.rotates)[1]),
             "Smallest RMSE after each round of the search.",
             "Smallest RMSE that was found up to the end of each round of the search.",
-        ),
-        correlations=_correlations(fit),
+        )
+        if fit.history
+        else None,
+        correlations=_correlations(fit) if fit.estimates else None,
         facts=[
             ("Method", fit.method),
             ("Seed", str(fit.seed)),
@@ -169,7 +171,7 @@ def errors_table(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgeme
         rows.append(
             {
                 "file": measured.loop.path,
-                "frequency_hz": _frequency(measured),
+                "frequency_hz": frequency_of(measured),
                 f"amplitude_{unit}": factor * measured.stroke,
                 f"rmse_{force}": test.rmse,
                 "rmse_by_largest_force": test.normalised,
@@ -206,7 +208,8 @@ def motion_sentences(motions: Sequence[MeasuredMotion]) -> list[str]:
     return found
 
 
-def _frequency(measured: MeasuredMotion) -> float:
+def frequency_of(measured: MeasuredMotion) -> float:
+    """Return the frequency of a sine; NaN for another motion. [Hz]"""
     return measured.motion.frequency if isinstance(measured, HarmonicMotion) else float("nan")
 
 
@@ -332,12 +335,15 @@ def _summary(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) 
     determined = sum(e.determined for e in fit.estimates)
     least, most = (per_cent(value) for value in (min(normalised), max(normalised)))
     opening = judgement.sentences[0] + " " if judgement.verdict == "good" else ""
-    ending = (
-        f"The data give a best value of {determined} of {len(fit.estimates)} unknowns, but the law "
-        "does not describe the loops."
-        if judgement.verdict == "poor"
-        else f"The data determine {determined} of {len(fit.estimates)} unknowns."
-    )
+    if not fit.estimates:
+        ending = "All numbers were given; nothing was searched."
+    elif judgement.verdict == "poor":
+        ending = (
+            f"The data give a best value of {determined} of {len(fit.estimates)} unknowns, but the "
+            "law does not describe the loops."
+        )
+    else:
+        ending = f"The data determine {determined} of {len(fit.estimates)} unknowns."
     return (
         f"{opening}The root mean square difference (RMSE) between fitted and measured loops is "
         f"{fit.rmse:.3g} {unit} over all samples. For single tests it is {least} to {most} of "

@@ -1,8 +1,9 @@
 """Identify unknown numbers of any model from measurements, by three methods."""
 
-from wm_drake.studies.fitting.assessment import assess
+from wm_drake.studies.fitting.assessment import assess, evaluated
+from wm_drake.studies.fitting.cross_validation import left_out_errors
 from wm_drake.studies.fitting.fit import Direction, Estimate, Fit, TestError
-from wm_drake.studies.fitting.methods import METHODS, evolution, identify, least_squares
+from wm_drake.studies.fitting.methods import METHODS, evolution, identify, least_squares, refined
 from wm_drake.studies.fitting.problem import (
     Evaluate,
     FitProblem,
@@ -28,10 +29,13 @@ __all__ = [
     "Unknown",
     "Verdict",
     "assess",
+    "evaluated",
     "evolution",
     "identify",
     "least_squares",
+    "left_out_errors",
     "point_by_point",
+    "refined",
     "response_surface",
     "rmse",
     "verdict_of",

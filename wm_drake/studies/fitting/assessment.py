@@ -8,6 +8,7 @@ from scipy.stats import t as student
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.fitting.fit import Direction, Estimate, Fit, TestError
 from wm_drake.studies.fitting.problem import FitProblem, rmse
+from wm_drake.studies.fitting.profile import profiled_end
 
 IndexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 
@@ -46,7 +47,8 @@ def assess(
 
     The covariance is the sandwich of generalised least squares: each test has its own variance,
     larger by the correlation of its samples where they follow each other. So a densely sampled test
-    does not count for more than it contains.
+    does not count for more than it contains. An interval that would leave the bounds ends by its
+    profile (`wm_drake.studies.fitting.profile`).
 
     Args:
         problem: The problem.
@@ -81,6 +83,29 @@ def assess(
         evaluations=evaluations + evaluated + 2,
         history=history,
         notes=notes,
+    )
+
+
+def evaluated(problem: FitProblem) -> Fit:
+    """Return the fit of a problem without unknowns: its errors only."""
+    nowhere = np.zeros(0)
+    residuals = problem.residuals(nowhere[None])[0]
+    computed, baselines = _computed(problem, nowhere)
+    return Fit(
+        problem=problem,
+        method="evaluation",
+        seed=0,
+        estimates=(),
+        rmse=float(rmse(residuals)),
+        tests=_test_errors(problem, residuals),
+        computed=computed,
+        baselines=baselines,
+        covariance=np.zeros((0, 0)),
+        condition=1.0,
+        undetermined=(),
+        evaluations=2,
+        history=(),
+        notes=("all numbers are given: nothing was searched",),
     )
 
 
@@ -147,6 +172,7 @@ class _Spread:
         self._inverse = np.array([0.0 if s <= smallest else 1.0 / s for s in self.singular])
         rotated = jacobian @ rows.T
         self.covariance = rows.T @ self._sandwich(rotated, variance) @ rows
+        self.inverse = rows.T @ np.diag(np.square(self._inverse)) @ rows
         with np.errstate(divide="ignore"):
             seen = np.diag(self._sandwich(rotated, resolution))
         self.deviations = np.where(self._inverse > 0.0, np.sqrt(seen), np.inf)
@@ -202,10 +228,28 @@ def _estimates(
     for k, unknown in enumerate(problem.unknowns):
         determined = bool(resolved[k] <= WIDEST)
         claims = determined and bound[k] == 0
-        interval = (float(lower[k]), float(upper[k])) if claims else (np.nan, np.nan)
+        interval = (np.nan, np.nan)
+        if claims:
+            place = int(np.flatnonzero(free == k)[0])
+            reach = quantile * wide[k]
+            ends = point[k] - reach, point[k] + reach
+            rise = reach**2 / spread.inverse[place, place]
+            interval = (
+                _end(problem, point, k, free, -1, rise) if ends[0] < 0.0 else float(lower[k]),
+                _end(problem, point, k, free, 1, rise) if ends[1] > 1.0 else float(upper[k]),
+            )
         at_bound = {-1: "lower", 0: "", 1: "upper"}[int(bound[k])]
         found.append(Estimate(unknown.name, float(values[k]), *interval, determined, at_bound))
     return tuple(found)
+
+
+def _end(
+    problem: FitProblem, point: FloatArray, held: int, free: IndexArray, side: int, rise: float
+) -> float:
+    """Return the end of an interval by its profile, within the bounds. [SI]"""
+    whole = point.copy()
+    whole[held] = profiled_end(problem, point, held, free, side, rise)
+    return float(problem.from_unit(whole)[held])
 
 
 def _slopes(problem: FitProblem, point: FloatArray) -> FloatArray:

@@ -33,7 +33,8 @@ class Estimate:
     Attributes:
         name: Name of the unknown.
         value: Where the search ended. [SI]
-        lower, upper: 95 % confidence interval; NaN at a bound or if not determined. [SI]
+        lower, upper: 95 % confidence interval within the bounds; NaN if the value is at a bound or
+            not determined. [SI]
         determined: Whether the data limit it more than its bounds do.
         at_bound: "lower" or "upper" if it hit one, else "".
     """

@@ -11,6 +11,7 @@ from scipy import optimize
 
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.fitting.assessment import evaluated
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.problem import FitProblem, Progress
 from wm_drake.studies.fitting.search import (
@@ -154,6 +155,21 @@ class _Polish:
         return min(self.ends, key=lambda end: end[1])[0]
 
 
+def refined(problem: FitProblem, values: FloatArray, note: str, method: str, seed: int) -> Fit:
+    """Search by least squares from one point, the end of a search with a part of the measurements.
+
+    Args:
+        problem: The problem.
+        values: The point (p,). [SI]
+        note: Remark on the search that led there.
+        method, seed: Of this search.
+    """
+    count = Count(problem)
+    end, _ = descend(count, np.clip(problem.to_unit(values), 0.0, 1.0), lambda fraction: None)
+    count.round_done()
+    return count.fit(end, method, seed, (note,))
+
+
 METHODS: dict[str, Callable[..., Fit]] = {
     "response-surface": response_surface,
     "least-squares": least_squares,
@@ -168,11 +184,14 @@ def identify(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Fit:
-    """Search by the method of a name.
+    """Search by the method of a name; without unknowns, evaluate the model.
 
     Raises:
         InputError: There is no such method.
     """
     if method not in METHODS:
         raise input_error(f"no method '{method}'{nearest_names(method, METHODS)}", where="--method")
+    if not problem.unknowns:
+        progress(1.0, 0.0)
+        return evaluated(problem)
     return METHODS[method](problem, seed=seed, progress=progress)

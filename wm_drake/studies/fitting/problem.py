@@ -122,6 +122,8 @@ class Measurement:
 class FitProblem:
     """Problem of finding the unknowns with which the model is nearest to the measurements.
 
+    Without unknowns the model is only evaluated.
+
     The distance is the root mean square error over all values of all tests, [A] Eq. (1) = [C] Eq.
     (5).
     """
@@ -131,14 +133,14 @@ class FitProblem:
     evaluate: Evaluate
 
     def __post_init__(self) -> None:
-        """Check that there are unknowns with different names, and data.
+        """Check that there are data, and that unknowns have different names.
 
         Raises:
             InputError: There are none, or a name is there twice.
         """
         names = [unknown.name for unknown in self.unknowns]
-        if not names or not self.measurements:
-            raise input_error("an identification needs at least one unknown and one measurement")
+        if not self.measurements:
+            raise input_error("an identification needs at least one measurement")
         for name in names:
             if names.count(name) > 1:
                 raise input_error("is unknown twice", key=name)
@@ -186,7 +188,7 @@ class FitProblem:
 
     @cached_property
     def _logarithmic(self) -> np.ndarray:
-        return np.array([u.logarithmic for u in self.unknowns])
+        return np.array([u.logarithmic for u in self.unknowns], dtype=bool)
 
     @cached_property
     def _ends(self) -> tuple[FloatArray, FloatArray]:

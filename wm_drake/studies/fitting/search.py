@@ -5,16 +5,13 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
-from scipy import optimize
 from scipy.stats import qmc
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.fitting.assessment import assess
+from wm_drake.studies.fitting.descent import descended
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.problem import FitProblem, rmse
-
-STEP = 1e-5
-"""Step of one-sided differences during a search, in ranges."""
 
 SAME_END = 1e-3
 """Searches whose RMSE differ by less than this part have the same end."""
@@ -91,34 +88,5 @@ def agreeing(problem: FitProblem, ends: list[End]) -> int:
 def descend(
     count: Count, begin: FloatArray, step_done: Callable[[float], None], most: int = 60
 ) -> End:
-    """Search once by scipy's trust-region reflective method, and return its end."""
-    steps = 0
-    last: tuple[FloatArray, FloatArray] = (np.full(len(begin), np.nan), np.empty(0))
-
-    def residuals(z: FloatArray) -> FloatArray:
-        nonlocal last
-        last = (z.copy(), np.asarray(count.residuals(z[None])[0]))
-        return last[1]
-
-    def jacobian(z: FloatArray) -> FloatArray:
-        nonlocal steps
-        steps += 1
-        step_done(min(1.0, steps / 25))
-        here = last[1] if np.array_equal(z, last[0]) else count.residuals(z[None])[0]
-        sign = np.where(z > 0.5, -1.0, 1.0)
-        found = count.residuals(z + np.diag(STEP * sign))
-        return np.asarray(((found - here) / (STEP * sign)[:, None]).T)
-
-    inside = np.clip(begin, 1e-4, 1.0 - 1e-4)
-    end = optimize.least_squares(
-        residuals,
-        inside,
-        jacobian,
-        bounds=(0.0, 1.0),
-        x_scale=1.0,
-        ftol=1e-9,
-        xtol=1e-9,
-        gtol=1e-14,
-        max_nfev=most,
-    )
-    return end.x, float(rmse(end.fun))
+    """Search once by least squares from a point, and return its end."""
+    return descended(count.residuals, begin, step_done, most)

@@ -147,14 +147,28 @@ def _entries(
                 lower, upper = unit.from_si(estimate.lower), unit.from_si(estimate.upper)
                 text += f"; 95 % interval {lower:.4g} to {upper:.4g} {_plain(unit)}"
             entries[name] = {"value": f"{unit.from_si(value):.7g} {_plain(unit)}", "source": text}
-    missing = [name for name in _required(target, entries) if name not in entries]
-    if missing and "law" in entries and entries["law"] != getattr(target.parameters, "law", None):
+    missing = _missing(entries, target)
+    if missing:
         raise input_error(
             f"not determined by the data, and {target.name} had another law than {entries['law']}; "
             "give its value with --fix",
             key=", ".join(missing),
         )
     return entries, comments
+
+
+def missing_numbers(fit: Fit, model: ComponentModel, target: Component) -> list[str]:
+    """Return the numbers of a new law that the data do not determine: a fragment needs them."""
+    undetermined = {e.name for e in fit.estimates if not e.determined}
+    return _missing(
+        {k: v for k, v in model.fields(fit.values).items() if k not in undetermined}, target
+    )
+
+
+def _missing(entries: Mapping[str, Any], target: Component) -> list[str]:
+    if "law" not in entries or entries["law"] == getattr(target.parameters, "law", None):
+        return []
+    return [name for name in _required(target, entries) if name not in entries]
 
 
 def _required(target: Component, entries: Mapping[str, Any]) -> list[str]:

@@ -99,7 +99,7 @@ def damper_model(
     known = {**(kept or {}), **(fixed or {})}
     numbers = unknowns_of(searched, _units(registered), scale, bounds, known)
     unknowns = (*numbers, *_free_rises(tables, bounds, fixed))
-    fields = _Fields({"law": law, **known}, _some_unknown(unknowns), tables)
+    fields = _Fields({"law": law, **known}, unknowns, tables)
     return ComponentModel(
         law, unknowns, fields, lambda point: damper_bench(_damper(fields(point))), fixed or {}
     )
@@ -163,7 +163,7 @@ def bushing_model(
     kinds_of_units = ABOUT if about else ALONG
     units = {name: kinds_of_units[kind] for name, kind in searched.items()}
     numbers = unknowns_of(searched, units, scale, bounds, fixed)
-    unknowns = _some_unknown((*numbers, *_free_rises(tables, bounds, fixed)))
+    unknowns = (*numbers, *_free_rises(tables, bounds, fixed))
     _check_fixed(base, {name: value for name, value in (fixed or {}).items() if name in searched})
     fields = _Fields(fixed or {}, unknowns, tables)
 
@@ -233,23 +233,32 @@ def _free_rises(
     return tuple(rise for rise in rises if rise.name not in (fixed or {}))
 
 
-def _some_unknown(unknowns: tuple[Unknown, ...]) -> tuple[Unknown, ...]:
-    """Return the unknowns.
-
-    Raises:
-        InputError: There are none.
-    """
-    if not unknowns:
-        raise input_error("all numbers of the law are fixed; leave one out", where="--fix")
-    return unknowns
-
-
 def _unknown_rises(tables: tuple[OddTable | TwoSidedTable, ...]) -> tuple[Unknown, ...]:
     return tuple(unknown for table in tables for unknown in table.unknowns)
 
 
 def _rises(tables: tuple[OddTable | TwoSidedTable, ...]) -> list[str]:
     return [unknown.name for unknown in _unknown_rises(tables)]
+
+
+def fields_of_law(law: str, axis: str = "") -> tuple[str, ...]:
+    """Return the fields of a law that can be unknown or fixed; a table counts with all its rises.
+
+    Args:
+        law: A damper law, or a law of a bushing.
+        axis: Axis of a bushing; "" for a damper.
+
+    Raises:
+        InputError: There is no such law.
+    """
+    laws: Mapping[str, Any] = BUSHING_LAWS if axis else DAMPER_LAWS
+    if law not in laws:
+        what = "a bushing" if axis else "a damper"
+        raise input_error(f"no law '{law}' of {what}{nearest_names(law, laws)}", where="--law")
+    if not axis:
+        return DAMPER_LAWS[law].fields
+    kinds = list(_bushing_kinds(axis))
+    return (*kinds[BUSHING_LAWS[law]], *(kinds[:1] if law == "table" else ()))
 
 
 def units_of_fields() -> dict[str, Unit]:

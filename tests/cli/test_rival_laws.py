@@ -1,0 +1,132 @@
+"""`wm-drake identify` with several laws: fits, left-out tests, blind predictions, one page."""
+
+import json
+import re
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from wm_drake.parameters import load_component, load_machine
+
+LAWS = "coulomb,mstv,havsin"
+
+
+@pytest.fixture
+def bench(wm_drake):
+    """Loops of the MSTV damper: four to fit, two to predict."""
+    loops = ("rig", "damper", "--component", "mstv_damper", "-a", "0.5,2 mm")
+    assert wm_drake(*loops, "-f", "1,10 Hz", "--out", "fitted").code == 0
+    assert wm_drake(*loops, "-f", "3 Hz", "--out", "held").code == 0
+    return [sorted(Path(name).glob("loop_*.csv")) for name in ("fitted", "held")]
+
+
+def test_rival_laws_are_fitted_compared_and_predict_blind(wm_drake, bench):
+    files, held = bench
+    ended = wm_drake("identify", "damper", *files, "--law", LAWS, "--validate", *held, "--json")
+    assert ended.code == 0
+    found = json.loads(ended.out)
+    assert found["supported"] == "mstv"
+    assert found["decided_by"] == "cross-validation"
+    mstv, coulomb = (found["laws"][law] for law in ("mstv", "coulomb"))
+    for name in ("friction_force", "sponge_stiffness", "sponge_damping", "slider_damping"):
+        planted = getattr(load_component("mstv_damper").parameters, name)
+        assert mstv["unknowns"][name]["value"] == pytest.approx(planted, rel=0.01)
+    assert mstv["prediction"]["rmse"] < 0.01 * coulomb["prediction"]["rmse"]
+    assert mstv["rmse_left_out"] < 0.01 * coulomb["rmse_left_out"]
+    assert [t["name"] for t in mstv["prediction"]["tests"]] == [p.stem for p in held]
+    out = Path("wm-drake-identify")
+    errors = pd.read_csv(out / "errors.csv")
+    assert list(errors.test) == ["fitted"] * 4 + ["blind"] * 2
+    assert set(pd.read_csv(out / "laws.csv").law) == {"coulomb", "mstv", "havsin"}
+    assert {"measured", "coulomb", "mstv", "havsin"} < set(pd.read_csv(out / "loops.csv").columns)
+    page = (out / "report.html").read_text()
+    assert page.count("<img ") == 4
+    assert re.findall(r'(?:src|href)="(?!data:|#|https://doi.org/)', page) == []
+    damper = load_machine(str(out / "identified_mstv.yaml")).damper_types["friction"]
+    assert damper.sponge_stiffness == pytest.approx(176e3, rel=0.01)
+    assert load_machine(str(out / "identified_coulomb.yaml")).damper_types["friction"].law == (
+        "coulomb"
+    )
+
+
+def test_all_numbers_may_be_fixed_and_are_only_evaluated(wm_drake, bench):
+    files, held = bench
+    fix = [
+        part
+        for text in (
+            "friction_force=45 N",
+            "sponge_stiffness=176 N/mm",
+            "sponge_damping=0.09 N s/mm",
+            "slider_damping=0.4 N s/mm",
+        )
+        for part in ("--fix", text)
+    ]
+    one = wm_drake("identify", "damper", *files, "--law", "mstv", *fix, "--out", "one", "--json")
+    assert one.code == 0
+    assert json.loads(one.out)["method"] == "evaluation"
+    assert json.loads(one.out)["rmse"] < 0.05
+    both = wm_drake(
+        "identify", "damper", *files, "--law", "mstv,coulomb", *fix, "--validate", *held
+    )
+    assert both.code == 0
+    laws = pd.read_csv("wm-drake-identify/laws.csv").set_index("law")
+    assert laws.unknowns.to_dict() == {"mstv": 0, "coulomb": 1}
+    assert laws.supported["mstv"]
+    damper = load_machine("wm-drake-identify/identified_mstv.yaml").damper_types["friction"]
+    assert damper.friction_force == 45.0
+
+
+@pytest.mark.parametrize("law", ["stv", "havsin"])
+def test_a_law_with_numbers_that_one_loop_does_not_show_reports_its_error(wm_drake, law):
+    """A loop of a dashpot shows no number of a friction that grows with velocity."""
+    Path("dashpot.yaml").write_text("law: coulomb\nfriction_force: 0 N\ndamping: 0.5 N s/mm\n")
+    bench = ("rig", "damper", "--component", "dashpot.yaml", "-f", "2 Hz", "-a", "5 mm")
+    assert wm_drake(*bench, "--out", "bench").code == 0
+    files = sorted(Path("bench").glob("loop_*.csv"))
+    ended = wm_drake("identify", "damper", *files, "--law", law, "--out", "fit")
+    assert ended.code == 0
+    assert "identified.yaml is not written: the data do not determine" in ended.out
+    assert re.search(r"RMSE [\d.e-]+ N\b", ended.out)
+    assert not Path("fit/identified.yaml").exists()
+    assert Path("fit/report.html").exists()
+    both = wm_drake("identify", "damper", *files, "--law", f"coulomb,{law}", "--out", "two")
+    assert both.code == 0
+    assert f"identified_{law}.yaml is not written" in both.out
+    assert json.loads(Path("two/fit.json").read_text())["supported"] == "coulomb"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--law", "mstv,glue"), "--law: no law 'glue' of a damper"),
+        (("--law", "mstv,mstv"), "--law: 'mstv' is there twice"),
+        (("--law", "mstv,stv", "--fix", "sponge=1 N"), "--fix: unknown number 'sponge'"),
+        (
+            ("--law", "coulomb,stv", "--fix", "sponge_stiffness=1 N/mm"),
+            "--fix: none of these laws has a number 'sponge_stiffness'",
+        ),
+        (("--validate", "copy.csv"), "copy.csv: has the same content as loop.csv, which is fitted"),
+        (("--validate", "none.csv"), "none.csv: no such file"),
+        (("--cutoff", "0 Hz"), "--cutoff: is 0 Hz; allowed is > 0"),
+    ],
+)
+def test_bad_comparisons_get_one_message(wm_drake, arguments, message):
+    lines = ["time_s,displacement_mm,force_N"]
+    lines += [f"{0.01 * k},{(k % 20 - 10) ** 2},{k % 20}" for k in range(100)]
+    Path("loop.csv").write_text("\n".join(lines))
+    Path("copy.csv").write_text("\n".join(lines))
+    ended = wm_drake("identify", "damper", "loop.csv", *arguments, "--out", "out")
+    assert ended.code == 2
+    assert ended.err.strip().splitlines()[0].startswith(message)
+    assert not Path("out").exists()
+
+
+def test_all_names_after_validate_are_held_out(wm_drake, bench):
+    """A shell expands held/*.csv to several names: none of them may reach the fit."""
+    files, held = bench
+    ended = wm_drake(
+        "identify", "damper", "--validate", *held, "--law", "coulomb", *files[:0], "--json"
+    )
+    assert ended.code == 2
+    assert "FILES" in ended.err

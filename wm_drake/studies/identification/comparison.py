@@ -1,0 +1,392 @@
+"""Rival laws of one component: fitted to the same tests, judged on tests that no fit has seen."""
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import t as student
+
+from wm_drake.errors import InputError, Problem
+from wm_drake.parameters.types import FloatArray
+from wm_drake.rigs.measured import MeasuredMotion
+from wm_drake.studies.fitting import (
+    Fit,
+    FitProblem,
+    Progress,
+    evaluated,
+    identify,
+    left_out_errors,
+    refined,
+)
+from wm_drake.studies.fitting.assessment import correlation_time
+from wm_drake.studies.identification.judgement import Judgement, judge, per_cent
+from wm_drake.studies.identification.models import ComponentModel
+from wm_drake.studies.identification.problem import computed_forces, fit_problem
+
+MANY = 12
+"""Tests from which on a search begins with a part of them."""
+
+FEWEST_LEFT_OUT = 3
+"""Tests from which on each is predicted from the others; with fewer, the information criterion
+decides."""
+
+CHANCE = 0.05
+"""Probability that a law that is as good as another one seems worse."""
+
+STRONG = 6.0
+"""Difference of the information criterion that is strong evidence (Kass and Raftery 1995)."""
+
+
+@dataclass(frozen=True, eq=False)
+class LawResult:
+    """One of the rival laws.
+
+    Attributes:
+        law: Its name.
+        model: Its model.
+        fit: Its fit to the tests.
+        judgement: Judgement of the fit.
+        left_out: RMSE of each test, predicted from the others (m,); NaN with less than
+            `FEWEST_LEFT_OUT` tests. [N; N m]
+        criterion: Bayesian information criterion with the number of independent samples; smaller is
+            better, only differences count.
+        prediction: Evaluation at the fitted numbers of tests that no fit has seen; None without.
+        predicted: Judgement of the prediction.
+    """
+
+    law: str
+    model: ComponentModel
+    fit: Fit
+    judgement: Judgement
+    left_out: FloatArray
+    criterion: float
+    prediction: Fit | None
+    predicted: Judgement | None
+
+    @property
+    def left_out_rmse(self) -> float:
+        """RMSE over all samples of all tests, each predicted from the others. [N; N m]"""
+        return _pooled(self.left_out, self.fit)
+
+    @property
+    def undetermined(self) -> list[str]:
+        """Names of the unknowns that the tests do not determine."""
+        return [e.name for e in self.fit.estimates if not e.determined]
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Rival laws on the same tests.
+
+    Attributes:
+        results: One for each law, in the order of the command.
+        motions: The tests that were fitted.
+        validation: Tests that no fit has seen; may be empty.
+    """
+
+    results: tuple[LawResult, ...]
+    motions: tuple[MeasuredMotion, ...]
+    validation: tuple[MeasuredMotion, ...]
+
+    @property
+    def by_left_out(self) -> bool:
+        """Whether cross-validation decides, and not the information criterion."""
+        return len(self.motions) >= FEWEST_LEFT_OUT
+
+    @property
+    def order(self) -> list[LawResult]:
+        """Laws from the best to the worst by the deciding measure."""
+        return sorted(self.results, key=self._score)
+
+    @property
+    def as_good(self) -> list[LawResult]:
+        """Laws that the data do not tell apart from the best one, which is the first."""
+        best, *others = self.order
+        return [best, *(other for other in others if not self._is_worse(other, best))]
+
+    @property
+    def supported(self) -> LawResult:
+        """Law that the data support: of those as good as the best, the one with fewest unknowns."""
+        return min(self.as_good, key=lambda r: (len(r.model.unknowns), self._score(r)))
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What the data say about the laws, in words."""
+        return (*self._verdict(), *self._blind(), *self._remarks())
+
+    def _score(self, result: LawResult) -> float:
+        return result.left_out_rmse if self.by_left_out else result.criterion
+
+    def _is_worse(self, other: LawResult, best: LawResult) -> bool:
+        """Return whether a law is worse than the best one by more than chance.
+
+        By a paired t test of the logarithms of the errors of the left-out tests, or by a strong
+        difference of the information criterion.
+        """
+        if not self.by_left_out:
+            return other.criterion - best.criterion > STRONG
+        floor = 1e-12 * max(best.fit.problem.measurements[0].largest, 1e-300)
+        ratio = np.log(np.maximum(other.left_out, floor) / np.maximum(best.left_out, floor))
+        error = float(np.std(ratio, ddof=1)) / np.sqrt(len(ratio))
+        limit = float(student.isf(CHANCE, len(ratio) - 1))
+        return float(np.mean(ratio)) > limit * error
+
+    def _verdict(self) -> list[str]:
+        best, unit = self.order[0], self.unit
+        if len(self.results) == 1:
+            return list(best.judgement.sentences[:1])
+        alike = [r.law for r in self.as_good if r is not self.supported]
+        if self.by_left_out:
+            how = "each test predicted from all the others, RMSE " + ", ".join(
+                f"{r.law} {r.left_out_rmse:.3g} {unit}" for r in self.order
+            )
+        else:
+            how = (
+                f"Bayesian information criterion from {len(self.motions)} "
+                f"test{'s' if len(self.motions) > 1 else ''}, above the best: "
+                + ", ".join(f"{r.law} {r.criterion - best.criterion:.3g}" for r in self.order)
+            )
+        found = [f"The data support the law {self.supported.law} ({how})."]
+        if alike:
+            found.append(
+                f"They do not tell it apart from {', '.join(alike)}; it has the fewest unknown "
+                "numbers of these."
+            )
+        if self.supported.judgement.verdict != "good":
+            found.append(
+                f"{self.supported.law}: {self.supported.judgement.sentences[0][0].lower()}"
+                f"{self.supported.judgement.sentences[0][1:]}"
+            )
+        return found
+
+    def _blind(self) -> list[str]:
+        if not self.validation:
+            return []
+        ranked = sorted(self.results, key=lambda r: r.prediction.rmse if r.prediction else np.inf)
+        texts = [
+            f"{r.law} {r.prediction.rmse:.3g} {self.unit}, "
+            f"lack of fit {per_cent(r.predicted.missed)}"
+            for r in ranked
+            if r.prediction and r.predicted
+        ]
+        count = len(self.validation)
+        found = [
+            f"Blind prediction of {count} test{'s' if count > 1 else ''} that no fit has seen, "
+            f"RMSE: {'; '.join(texts)}."
+        ]
+        if len(ranked) > 1 and ranked[0].law not in [r.law for r in self.as_good]:
+            found.append(
+                f"There {ranked[0].law} is best, not {self.supported.law}: the tests of the fit do "
+                "not hold what those of the prediction show."
+            )
+        return found
+
+    def _remarks(self) -> list[str]:
+        return [
+            f"{r.law}: the data do not determine {', '.join(r.undetermined)}; its errors hold for "
+            "any value within the bounds on the fitted tests, for the value where the search ended "
+            "on others."
+            for r in self.results
+            if r.undetermined
+        ]
+
+    @property
+    def unit(self) -> str:
+        """Unit of the errors."""
+        return "N m" if self.motions[0].loop.rotates else "N"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the comparison for JSON, in SI."""
+        return {
+            "supported": self.supported.law,
+            "as_good": [r.law for r in self.as_good],
+            "decided_by": "cross-validation" if self.by_left_out else "information criterion",
+            "sentences": list(self.sentences),
+            "laws": {r.law: _law_as_dict(r) for r in self.results},
+        }
+
+
+def _law_as_dict(r: LawResult) -> dict[str, Any]:
+    return {
+        **r.fit.as_dict(),
+        "judgement": r.judgement.as_dict(),
+        "rmse_left_out": _finite(r.left_out_rmse),
+        "bayesian_information_criterion": _finite(r.criterion),
+        "prediction": None
+        if r.prediction is None or r.predicted is None
+        else {
+            "rmse": r.prediction.rmse,
+            "missed": r.predicted.missed,
+            "tests": r.prediction.as_dict()["tests"],
+        },
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def compare_laws(
+    models: Mapping[str, ComponentModel],
+    motions: Sequence[MeasuredMotion],
+    validation: Sequence[MeasuredMotion] = (),
+    method: str = "least-squares",
+    *,
+    seed: int = 0,
+    progress: Callable[[str, float], None] = lambda law, fraction: None,
+) -> Comparison:
+    """Fit rival laws to the same tests and predict others.
+
+    Args:
+        models: Model of each law.
+        motions: Tests to fit.
+        validation: Tests to predict; no fit sees them.
+        method, seed: Of the search.
+        progress: Called with a law and the fraction done of its search.
+    """
+    fits = {
+        law: fit_law(
+            model,
+            motions,
+            method,
+            seed=seed,
+            progress=lambda fraction, least, law=law: progress(law, fraction),  # type: ignore[misc]
+        )
+        for law, model in models.items()
+    }
+    best = min(fits.values(), key=lambda fit: fit.rmse)
+    independent = _independent_samples(best)
+    return Comparison(
+        tuple(
+            _result(law, models[law], fit, motions, validation, independent)
+            for law, fit in fits.items()
+        ),
+        tuple(motions),
+        tuple(validation),
+    )
+
+
+def fit_law(
+    model: ComponentModel,
+    motions: Sequence[MeasuredMotion],
+    method: str,
+    *,
+    seed: int,
+    progress: Progress,
+) -> Fit:
+    """Fit a law; from many tests, search with a part of them and then refine with all.
+
+    Args:
+        model: The law with its unknowns.
+        motions: Tests, sorted by their motion.
+        method, seed, progress: As for `identify`.
+    """
+    problem = fit_problem(model, motions)
+    stride = -(-len(motions) // MANY)
+    if stride < 2 or not model.unknowns:
+        return identify(problem, method, seed=seed, progress=progress)
+    part = list(motions[::stride])
+    first = identify(
+        fit_problem(model, part),
+        method,
+        seed=seed,
+        progress=lambda fraction, least: progress(0.8 * fraction, least),
+    )
+    note = (
+        f"{first.notes[0]}; searched with {len(part)} of {len(motions)} tests, then refined by "
+        "least squares with all"
+    )
+    fit = refined(problem, first.values, note, method, seed)
+    progress(1.0, fit.rmse)
+    return fit
+
+
+def _result(
+    law: str,
+    model: ComponentModel,
+    fit: Fit,
+    motions: Sequence[MeasuredMotion],
+    validation: Sequence[MeasuredMotion],
+    independent: float,
+) -> LawResult:
+    left_out: FloatArray = np.full(len(motions), np.nan)
+    if len(motions) >= FEWEST_LEFT_OUT:
+        left_out = left_out_errors(
+            fit, lambda chosen: fit_problem(model, [motions[k] for k in chosen])
+        )
+    prediction = _prediction(model, fit, validation) if validation else None
+    return LawResult(
+        law,
+        model,
+        fit,
+        judge(fit, motions),
+        left_out,
+        information_criterion(fit, independent),
+        prediction,
+        judge(prediction, validation) if prediction else None,
+    )
+
+
+def _prediction(model: ComponentModel, fit: Fit, motions: Sequence[MeasuredMotion]) -> Fit:
+    """Return the evaluation of tests at fitted numbers."""
+    values = fit.values[None]
+    seen = fit_problem(model, motions)
+    blind = FitProblem(
+        (), seen.measurements, lambda points: computed_forces(model, motions, values)
+    )
+    return evaluated(blind)
+
+
+def information_criterion(fit: Fit, independent: float) -> float:
+    """Return the Bayesian information criterion N ln(mean square error) + k ln N.
+
+    Args:
+        fit: Fit of a law; its k unknowns and the variance of the error count.
+        independent: Number N of independent samples.
+    """
+    floor = 1e-12 * max(m.largest for m in fit.problem.measurements)
+    count = len(fit.estimates) + 1
+    return float(
+        2.0 * independent * np.log(max(fit.rmse, floor)) + count * np.log(max(independent, 2.0))
+    )
+
+
+def _independent_samples(fit: Fit) -> float:
+    """Return how many independent samples the tests have, by the residuals of the best law."""
+    residuals = np.concatenate([m.values for m in fit.problem.measurements]) - fit.computed
+    return float(
+        sum(len(residuals[w]) / correlation_time(residuals[w]) for w in fit.problem.slices)
+    )
+
+
+def _pooled(errors: FloatArray, fit: Fit) -> float:
+    counts = np.array([len(m.values) for m in fit.problem.measurements])
+    return float(np.sqrt(np.sum(counts * np.square(errors)) / np.sum(counts)))
+
+
+def check_blind(files: Sequence[Path], validation: Sequence[Path]) -> None:
+    """Check that no file is both fitted and predicted, under any name.
+
+    Raises:
+        InputError: One is.
+    """
+    seen = {_content(path): path for path in files}
+    problems = [
+        Problem(
+            str(path),
+            "",
+            f"has the same content as {seen[_content(path)]}, which is fitted; a blind prediction "
+            "needs files that no fit has seen",
+        )
+        for path in validation
+        if _content(path) in seen
+    ]
+    if problems:
+        raise InputError(problems)
+
+
+def _content(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
