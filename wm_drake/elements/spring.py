@@ -36,7 +36,7 @@ amplitudes do not depend on it (docs/decisions/0100).
 """
 
 _LARGEST_SHARE = 0.5
-"""Largest part of the preload at which a spring is fully taut, so that it is taut at rest."""
+"""Largest part of a positive preload at which a spring is fully taut, so that it is so as drawn."""
 
 _SMALLEST_TAUT = 1e-9
 """Smallest tension at which a spring is taut, for springs whose stiffness is zero. [N]"""
@@ -46,7 +46,8 @@ _SMALLEST_TAUT = 1e-9
 class SpringStrutParameters:
     """A spring in its place: hooks at the rest pose, preload, packed stiffness, whether it pushes.
 
-    `pushes` is True for a spring that can be compressed; others go slack.
+    `pushes` is True for a spring that can be compressed; others go slack. `is_given` is True if the
+    preload follows from numbers of the machine file, not from static equilibrium.
     """
 
     p_ToA_T: FloatArray
@@ -54,6 +55,7 @@ class SpringStrutParameters:
     preload: float
     packed_stiffness: FloatArray
     pushes: bool = False
+    is_given: bool = False
 
     @property
     def rest_length(self) -> float:
@@ -76,7 +78,10 @@ class SpringStrutParameters:
         stretched, drawn = (
             stiffness_force(x, self.packed_stiffness, 0) for x in (SLACK_TRANSITION, 0.0)
         )
-        return max(min(stretched - drawn, _LARGEST_SHARE * self.preload), _SMALLEST_TAUT)
+        w = stretched - drawn
+        if self.preload > 0.0:
+            w = min(w, _LARGEST_SHARE * self.preload)
+        return max(w, _SMALLEST_TAUT)
 
     def tension(self, length: float) -> float:
         """Return its tension at a length. [m -> N]"""

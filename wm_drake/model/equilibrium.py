@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from pydrake.math import RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 from scipy.optimize import root
@@ -21,6 +22,14 @@ their axis by some 1e-6 rad/s, where nothing but friction resists."""
 
 _LARGEST_REST_POSITION = 0.02
 _LARGEST_REST_ANGLE = np.deg2rad(3.0)
+
+_LARGEST_SAG = 0.1
+"""Largest distance of the rest pose from the drawn one if preloads are given. [m]"""
+
+_LARGEST_SAG_ANGLE = np.deg2rad(15.0)
+
+_STARTS = (0.0, -0.01, -0.03)
+"""Heights from which an equilibrium is looked for: as drawn, given springs may be slack. [m]"""
 
 
 class Statics:
@@ -57,13 +66,15 @@ def preloaded(
 ) -> PlacedElements:
     """Return the elements with the spring preloads that balance the empty machine as drawn (T = W).
 
-    The balance is a least-squares one: fewer than six springs cannot balance every moment. Bodies
-    attached to the tub (damper tubes, drum in a compliant bearing) are moved to their equilibrium.
+    The balance is a least-squares one: fewer than six springs cannot balance every moment. Given
+    preloads stay; the others balance what these leave. If all are given, the machine sags
+    (`put_to_rest`). Bodies attached to the tub (damper tubes, drum in a compliant bearing) are
+    moved to their equilibrium.
 
     Args:
         plant, context: The plant and its Context, at the drawn pose.
         state_layout: State layout of the plant.
-        elements: All elements, springs without preload.
+        elements: All elements, springs without the preloads to find.
 
     Raises:
         InputError: a tension-only spring would have to push, or the attached bodies have no
@@ -72,7 +83,9 @@ def preloaded(
     statics = Statics(plant, context, state_layout, elements)
     if state_layout.attached.size:
         _balance(statics, state_layout.attached)  # so that their weight is on the tub
-    springs = elements.springs
+    springs = {name: spring for name, spring in elements.springs.items() if not spring.is_given}
+    if not springs:
+        return elements
     hooks = np.stack([spring.p_ToA_T for spring in springs.values()])
     lines = np.stack([spring.p_WH for spring in springs.values()]) - hooks
     pulls = lines / np.linalg.norm(lines, axis=1, keepdims=True)
@@ -91,7 +104,7 @@ def preloaded(
             for name in slack
         )
     loaded = {name: replace(spring, preload=preloads[name]) for name, spring in springs.items()}
-    return replace(elements, springs=loaded)
+    return replace(elements, springs=elements.springs | loaded)
 
 
 def put_to_rest(
@@ -108,9 +121,11 @@ def put_to_rest(
         Moment about To and force that remain on the tub, in W. (6,) [N m, N]
 
     Raises:
-        InputError: there is no equilibrium near the drawn pose.
+        InputError: there is no equilibrium near the drawn pose, or a tension-only spring is slack
+            there.
     """
     statics = Statics(plant, context, state_layout, elements)
+    sags = any(spring.is_given for spring in elements.springs.values())
     tolerance = EQUILIBRIUM_TOLERANCE
     if state_layout.attached.size:
         every = np.setdiff1d(np.arange(state_layout.size), state_layout.drum)
@@ -132,13 +147,21 @@ def put_to_rest(
             "range"
         )
     if np.max(np.abs(remaining)) > EQUILIBRIUM_TOLERANCE and not state_layout.attached.size:
-        pose = np.asarray(root(residual, pose, tol=1e-12).x)
-        remaining = residual(pose)
-    far = (
-        np.max(np.abs(pose[:3])) > _LARGEST_REST_ANGLE
-        or np.max(np.abs(pose[3:])) > _LARGEST_REST_POSITION
+        for height in _STARTS if sags else (0.0,):
+            pose = np.asarray(root(residual, [*np.zeros(5), height], tol=1e-12).x)
+            remaining = residual(pose)
+            if np.max(np.abs(remaining)) <= tolerance:
+                break
+    angle, position = (
+        (_LARGEST_SAG_ANGLE, _LARGEST_SAG)
+        if sags
+        else (_LARGEST_REST_ANGLE, _LARGEST_REST_POSITION)
     )
-    if not np.max(np.abs(remaining)) <= tolerance or far:
+    far = np.max(np.abs(pose[:3])) > angle or np.max(np.abs(pose[3:])) > position
+    balanced = np.max(np.abs(remaining)) <= tolerance
+    if balanced and sags:
+        _check_sag(elements, pose, far=bool(far))
+    if not balanced or far:
         plant.SetPositions(context, np.zeros(state_layout.size))
         m_x, m_y, m_z, f_x, f_y, f_z = statics.force_on_tub()
         raise input_error(
@@ -147,6 +170,43 @@ def put_to_rest(
             "remain; move spring frames or masses"
         )
     return remaining
+
+
+def tensions_at(elements: PlacedElements, pose: FloatArray) -> dict[str, float]:
+    """Return the tension of each spring at a pose of the tub: roll, pitch, yaw, x, y, z. [N]"""
+    rotation = RollPitchYaw(pose[:3]).ToRotationMatrix().matrix()
+    return {
+        name: spring.tension(
+            float(np.linalg.norm(pose[3:] + rotation @ spring.p_ToA_T - spring.p_WH))
+        )
+        for name, spring in elements.springs.items()
+    }
+
+
+def _check_sag(elements: PlacedElements, pose: FloatArray, *, far: bool) -> None:
+    """Raise InputError for a rest pose that is far from the drawn one, or with slack springs."""
+    if far:
+        x, y, z = 1e3 * pose[3:]
+        raise input_error(
+            f"with the given preloads or free lengths the tub rests at ({x:.0f}, {y:.0f}, {z:.0f}) "
+            f"mm from its drawn pose; allowed are {1e3 * _LARGEST_SAG:g} mm and "
+            f"{np.rad2deg(_LARGEST_SAG_ANGLE):g} deg",
+            key="springs",
+        )
+    slack = [
+        name
+        for name, tension in tensions_at(elements, pose).items()
+        if tension <= 0.0 and not elements.springs[name].pushes
+    ]
+    if slack:
+        raise InputError(
+            Problem(
+                "",
+                f"springs.{name}",
+                "is slack at rest; it needs a shorter free length or more preload",
+            )
+            for name in slack
+        )
 
 
 def _balance(statics: Statics, chosen: Indices) -> float:

@@ -24,6 +24,7 @@ from wm_drake.elements.telescopic_damper import (
     evaluate_telescopic_damper,
 )
 from wm_drake.errors import input_error
+from wm_drake.laws.table import stiffness_force
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.state_layout import StateLayout
 from wm_drake.parameters import MachineParameters
@@ -151,16 +152,24 @@ def _strut_ends(poses: FramePoses, element: Any, key: str) -> tuple[FloatArray, 
 
 
 def _springs(poses: FramePoses, parameters: MachineParameters) -> dict[str, SpringStrutParameters]:
-    """Place the springs, without preload."""
+    """Place the springs, without the preloads that follow from static equilibrium."""
     placed = {}
     for name, spring in parameters.springs.items():
         kind = parameters.spring_types[spring.type]
-        placed[name] = SpringStrutParameters(
+        found = SpringStrutParameters(
             *_strut_ends(poses, spring, f"springs.{name}"),
             0.0,
             packed_stiffness(kind.stiffness),
             pushes=kind.action == "tension-compression",
         )
+        preload = spring.preload
+        if kind.free_length is not None:
+            preload = -stiffness_force(
+                kind.free_length - found.rest_length, found.packed_stiffness, 0
+            )
+        if preload is not None:
+            found = replace(found, preload=float(preload), is_given=True)
+        placed[name] = found
     return placed
 
 

@@ -106,24 +106,32 @@ PositiveRate: TypeAlias = Annotated[u.AngularVelocity, Field(gt=0.0)]
 
 
 class SpringType(Frozen):
-    """A suspension spring as bought. Its preload is no input: static equilibrium decides it.
+    """A suspension spring as bought.
 
     Attributes:
-        stiffness: Tension over elongation.
+        stiffness: Tension over elongation from the drawn length.
+        free_length: Length without tension. None: the preload follows from static equilibrium at
+            the drawn pose.
         action: A tension-only spring hangs in hooks and goes slack; a tension-compression spring
             pushes too.
     """
 
     stiffness: Stiffness
+    free_length: Annotated[u.Length, Field(gt=0.0)] | None = None
     action: Literal["tension-only", "tension-compression"] = "tension-only"
 
 
 class Spring(Frozen):
-    """A suspension spring in its place."""
+    """A suspension spring in its place.
+
+    `preload` is its tension as drawn. None: it follows from the free length of its type, or else
+    from static equilibrium at the drawn pose.
+    """
 
     type: str
     tub_frame: str
     housing_frame: str
+    preload: u.Force | None = None
 
 
 class EndBushing(Frozen):

@@ -190,6 +190,21 @@ class MachineParameters(Frozen):
                     )
         return places
 
+    @field_validator("springs")
+    @classmethod
+    def _preload_is_given_once(
+        cls, springs: dict[str, Spring], info: ValidationInfo
+    ) -> dict[str, Spring]:
+        types = info.data.get("spring_types") or {}
+        for name, spring in springs.items():
+            kind = types.get(spring.type)
+            if spring.preload is not None and kind and kind.free_length is not None:
+                raise ValueError(
+                    f"{name}.preload: type '{spring.type}' has a free_length, which decides the "
+                    "preload; give only one of them"
+                )
+        return springs
+
     @field_validator("telescopic_dampers")
     @classmethod
     def _names_are_unique(cls, places: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:

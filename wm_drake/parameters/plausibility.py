@@ -40,6 +40,8 @@ RANGES = (
     UsualRange("cabinet.feet.*", -800.0, 800.0, "mm"),
     UsualRange("frames.*.position", -1500.0, 1500.0, "mm"),
     UsualRange("spring_types.*.stiffness", 1.0, 60.0, "N/mm"),
+    UsualRange("spring_types.*.free_length", 30.0, 600.0, "mm"),
+    UsualRange("springs.*.preload", 0.0, 500.0, "N"),
     UsualRange("spring_types.*.displacement", -200.0, 200.0, "mm"),
     UsualRange("spring_types.*.force", -2000.0, 2000.0, "N"),
     UsualRange("damper_types.*friction_force", 0.0, 300.0, "N"),

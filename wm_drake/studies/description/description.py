@@ -9,6 +9,7 @@ from wm_drake.compiler.vectors import rotation_from_rpy
 from wm_drake.elements.spin_profile import drum_motion
 from wm_drake.engines.compiled.step_check import BEARING, fastest_motions
 from wm_drake.model.bodies import tubes_of
+from wm_drake.model.equilibrium import tensions_at
 from wm_drake.model.machine import OUTPUT_PERIOD, Machine, Setup
 from wm_drake.model.state_layout import CARRIER
 from wm_drake.parameters import DAMPER_LAWS, ForceTable, MachineParameters, TorqueTable
@@ -59,7 +60,7 @@ def describe(machine: Machine) -> dict[str, Any]:
     """
     setup = machine.set_up()
     modes = natural_modes(machine)
-    parameters = setup.parameters
+    parameters, bodies = setup.parameters, _bodies(setup)
     return {
         "machine": parameters.name,
         "units": "SI: m, kg, s, rad, N; x right, y to the rear, z up",
@@ -67,7 +68,7 @@ def describe(machine: Machine) -> dict[str, Any]:
         "conventions": CONVENTIONS,
         "laws": _laws(parameters),
         "gravity_W": [0.0, 0.0, -parameters.gravity],
-        "bodies": _bodies(setup),
+        "bodies": bodies,
         "oscillating_mass_kg": oscillating_mass(setup),
         "drum_joint": {"name": parameters.drive.joint, **_drum_axis(setup)},
         "drum_bearing": _drum_bearing(setup),
@@ -88,6 +89,7 @@ def describe(machine: Machine) -> dict[str, Any]:
         "profile": parameters.profile.model_dump(),
         "numerics": _numerics(parameters),
         "rest_pose": _pose(setup.rest_pose),
+        "sag_at_rest": _sag(setup, bodies),
         "equilibrium_residual": {
             "moment_Nm": setup.residual[:3].tolist(),
             "force_N": setup.residual[3:].tolist(),
@@ -132,16 +134,35 @@ def _pose(values: FloatArray) -> dict[str, float]:
 
 def oscillating_mass(setup: Setup) -> float:
     """Return the mass of the tub, all bodies welded to it, the drum and its load. [kg]"""
+    return float(sum(body.get_mass(setup.plant_context) for body in _moving(setup)))
+
+
+def _moving(setup: Setup) -> list[Any]:
+    """Return the tub, the bodies welded to it, and the drum."""
     plant = setup.machine.plant
-    moving = [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]
-    return float(sum(body.get_mass(setup.plant_context) for body in moving))
+    return [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]
+
+
+def _sag(setup: Setup, bodies: dict[str, Any]) -> float:
+    """Return by how much the centre of mass of tub and drum is below its place as drawn. [m]
+
+    Args:
+        setup: The machine at rest.
+        bodies: Its described bodies: T and W coincide as drawn.
+    """
+    context, lost = setup.plant_context, 0.0
+    for body in _moving(setup):
+        centre = body.EvalPoseInWorld(context) @ body.CalcCenterOfMassInBodyFrame(context)
+        drawn = bodies[body.name()]["centre_of_mass_T"][2]
+        lost += body.get_mass(context) * (drawn - float(centre[2]))
+    return lost / oscillating_mass(setup)
 
 
 def _bodies(setup: Setup) -> dict[str, Any]:
     plant, context = setup.machine.plant, setup.plant_context
     tub = plant.GetBodyByName("tub").body_frame()
     described = {}
-    moving = [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]
+    moving = _moving(setup)
     groups = {part.name(): "drum" if part.name() == "drum" else "tub" for part in moving}
     # in a compliant bearing, describe the drum relative to its carrier, which is T in the SDF
     carriers = {"drum": plant.GetBodyByName(CARRIER).body_frame()} if setup.bearing else {}
@@ -225,6 +246,7 @@ def _spring(setup: Setup, name: str) -> dict[str, Any]:
         "stiffness": _stiffness(kind.stiffness),
         "length_at_preload": placed.rest_length,
         "preload": placed.preload,
+        "tension_at_rest": tensions_at(setup.elements, setup.rest_pose)[name],
         "taut_from": None if placed.pushes else placed.taut_from,
         "free_length": placed.free_length,
     }

@@ -134,6 +134,7 @@ class Spring(Strut):
     stiffness: float | ForceCurve = Field(description="[N/m]")
     length_at_preload: float = Field(description="Length as drawn. [m]")
     preload: float = Field(description="Tension as drawn. [N]")
+    tension_at_rest: float = Field(description="[N]")
     taut_from: float | None = Field(description="None for tension-compression. [N]")
     free_length: float | None = Field(
         description="Length at which h is 0; None if there is none. [m]"
@@ -300,6 +301,9 @@ class Description(_Part):
     profile: Profile
     numerics: Numerics
     rest_pose: Pose
+    sag_at_rest: float = Field(
+        description="By how much the centre of mass of tub and drum is below its drawn place. [m]"
+    )
     equilibrium_residual: Residual
     natural_frequencies_hz: list[float]
     mode_damping_ratios: list[float]
