@@ -20,6 +20,7 @@ from wm_drake.report.page import Picture, picture, render, versions_of
 from wm_drake.report.spin import tables
 from wm_drake.report.spin.cases import case_title, has_gasket, speed_rpm
 from wm_drake.report.spin.figures import envelopes_figure, gaps_figure, gasket_figure, orbits_figure
+from wm_drake.report.spin.floor import floor_view, floor_warnings
 from wm_drake.report.spin.tables import amplitude_table
 from wm_drake.report.tables import Table, parameter_table
 from wm_drake.simulation.cases import UNUSED_PHASE_ERROR
@@ -72,6 +73,7 @@ def spin_report(
         comparison=tables.comparison(result, table),
         largest_values=tables.largest_values(result),
         critical_speeds=tables.critical_speeds(result),
+        floor=floor_view(result),
         smallest_gaps=tables.smallest_gaps(result),
         gaps_picture=_gaps_picture(result),
         cases=[
@@ -217,7 +219,7 @@ def warnings_of(result: SpinResult) -> list[str]:
                 "model has no contact forces. In the real machine these parts would collide, and "
                 "the motion after that is not valid."
             )
-    return found
+    return found + floor_warnings(result)
 
 
 def facts_of_run(result: SpinResult, command: str) -> list[tuple[str, str]]:
