@@ -3,6 +3,8 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    import xarray as xr
+
     from wm_drake.simulation.measures import Measures
 
 FEET = {
@@ -29,11 +31,23 @@ def forces_as_json(measures: "Measures") -> dict[str, Any]:
             "force_N": _sizes(measures, "cabinet_force"),
             "moment_Nm": _sizes(measures, "cabinet_moment"),
         },
-        "feet": _feet(measures),
+        "feet": None if measures.feet is None else _feet(measures.feet),
     }
 
 
-def _sizes(measures: "Measures", name: str) -> dict[str, dict[str, float | None]]:
+def forces_of_run_as_json(forces: "xr.Dataset") -> dict[str, Any]:
+    """Return forces of the mounts and loads of the feet of one run.
+
+    Args:
+        forces: Measures of the run by name, those of the feet only if the machine has a cabinet.
+    """
+    return {
+        "mount_force_N": _sizes(forces, "mount_force"),
+        "feet": _feet(forces) if "turn_margin" in forces else None,
+    }
+
+
+def _sizes(measures: "Measures | xr.Dataset", name: str) -> dict[str, dict[str, float | None]]:
     """Return peak and RMS values of forces on the cabinet, by mount or axis. [N or N m]"""
     found: dict[str, dict[str, float | None]] = {}
     for kind in ("peak", "rms", "dynamic_rms"):
@@ -44,11 +58,8 @@ def _sizes(measures: "Measures", name: str) -> dict[str, dict[str, float | None]
     return found
 
 
-def _feet(measures: "Measures") -> dict[str, Any] | None:
+def _feet(feet: "xr.Dataset") -> dict[str, Any]:
     """Return the smallest load and margins of the feet over the run and in each region."""
-    feet = measures.feet
-    if feet is None:
-        return None
     of_run = {key: _number(float(feet[name])) for key, name in FEET.items()}
     of_regions = {
         str(region): {

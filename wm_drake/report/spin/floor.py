@@ -25,8 +25,8 @@ VERBS = ("lifts a foot", "slides", "turns on the floor", "tips over")
 HEADS = (
     "smallest load of a foot, N",
     "margin of sliding, N",
-    "margin of turning, N m",
-    "margin of tilting, N m",
+    "margin of turning, N\u00a0m",
+    "margin of tilting, N\u00a0m",
 )
 """Heads of the columns of `MARGINS`."""
 
@@ -207,7 +207,7 @@ def windows(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArra
         values: (n, k)
     """
     length = max(1, round(WINDOW / float(time[1] - time[0])))
-    begins = np.arange(0, len(time), length)
+    begins = np.arange(0, max(1, len(time) - length // 2), length)  # no short window at the end
     ends = np.append(begins[1:], len(time)) - 1
     return 0.5 * (time[begins] + time[ends]), np.minimum.reduceat(values, begins, axis=0)
 
