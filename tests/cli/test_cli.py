@@ -407,7 +407,15 @@ def test_spin_prints_one_json_object(plain):
             "gasket_force_N",
             "gasket_moment_Nm",
         ),
-        *("mount_force_N", "smallest_gap_mm", "critical_rpm", "diverged", "wall_s"),
+        *(
+            "mount_force_N",
+            "cabinet_wrench",
+            "feet",
+            "smallest_gap_mm",
+            "critical_rpm",
+            "diverged",
+            "wall_s",
+        ),
     }
     assert (case["load"], case["gasket"], case["diverged"]) == ("middle", True, None)
     assert list(case["amplitudes_mm"]) == list(case["critical_rpm"]) == SENSORS
@@ -418,6 +426,16 @@ def test_spin_prints_one_json_object(plain):
     assert list(case["mount_force_N"])[-1] == "gasket"
     for force in case["mount_force_N"].values():
         assert force["peak"] > force["rms"] >= force["dynamic_rms"] > 0.0
+    feet = case["feet"]
+    assert set(feet) == {
+        *("smallest_normal_force_N", "slide_margin_N", "turn_margin_Nm", "tilt_margin_Nm"),
+        "regions",
+    }
+    assert feet["regions"] == {}
+    assert 0.0 < feet["smallest_normal_force_N"] < 250.0
+    assert 0.0 < feet["slide_margin_N"] < 0.4 * 71.0 * 9.81
+    assert set(case["cabinet_wrench"]) == {"about", "force_N", "moment_Nm"}
+    assert list(case["cabinet_wrench"]["moment_Nm"]) == ["x", "y", "z"]
     assert 0.0 < case["smallest_gap_mm"] < 100.0
     assert all(0.0 <= rpm <= 100.0 + 1e-9 for rpm in case["critical_rpm"].values())
     assert all(size > 0.0 for size in case["amplitudes_mm"].values())

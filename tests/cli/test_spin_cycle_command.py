@@ -54,6 +54,7 @@ def test_prints_one_json_object_and_writes_what_it_says(study):
     assert rms.min() > 0.0
     assert sorted(path.name for path in Path("out").iterdir()) == [
         "cases.csv",
+        "feet.csv",
         "ledger.sqlite",
         "report.html",
         "rms.csv",
@@ -62,6 +63,17 @@ def test_prints_one_json_object_and_writes_what_it_says(study):
     table = pd.read_csv("out/rms.csv")
     np.testing.assert_allclose(table["rms_mm"].to_numpy().reshape(rms.shape), rms, rtol=1e-5)
     page = Path("out/report.html").read_text(encoding="utf-8")
+    feet = pd.read_csv("out/feet.csv").set_index(["case", "part"])
+    for case in shown["cases"]:
+        parts = {"run": case["feet"], **case["feet"]["regions"]}
+        assert list(parts) == ["run", "R1", "R2"]
+        for part, values in parts.items():
+            for key in ("smallest_normal_force_N", "slide_margin_N", "turn_margin_Nm"):
+                assert feet.loc[(case["case"], part), key] == pytest.approx(values[key], rel=1e-5)
+                assert parts["run"][key] <= values[key]
+        assert case["feet"]["slide_margin_N"] > 0.0
+        assert case["mount_force_N"]["gasket"]["peak"] > case["mount_force_N"]["gasket"]["rms"] > 0
+    assert "Forces on the floor" in page
     assert "Case both: 400 g at the front and 400 g at the rear, 180° apart" in page
     assert "http" not in page.replace("http://www.w3.org", "").replace("https://doi.org/", "")
     assert versions()["drake"] in page
@@ -88,6 +100,12 @@ def test_drakes_engine_runs_a_case_too(study):
         shown[engine] = json.loads(ended.out)["cases"][0]
     for name in ("rms_mm", "rms_from_acceleration_mm"):
         np.testing.assert_allclose(shown["drake"][name], shown["compiled"][name], rtol=5e-4)
+    for key in ("smallest_normal_force_N", "slide_margin_N", "turn_margin_Nm"):
+        assert shown["drake"]["feet"][key] == pytest.approx(
+            shown["compiled"]["feet"][key], rel=5e-3
+        )
+    for mount, force in shown["compiled"]["mount_force_N"].items():
+        assert shown["drake"]["mount_force_N"][mount] == pytest.approx(force, rel=5e-3)
     # Drake's distance of two shapes is good to some micrometres
     np.testing.assert_allclose(
         shown["drake"]["smallest_gap_mm"], shown["compiled"]["smallest_gap_mm"], atol=1e-2

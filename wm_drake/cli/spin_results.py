@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from wm_drake.cli.spin_forces import forces_as_json
+
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import pandas as pd
     from rich.table import Table
 
     from wm_drake.model.scene import Gap
-    from wm_drake.simulation.measures import Measures
     from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
 
 
@@ -119,7 +120,6 @@ def end_with(diverged: list[str]) -> None:
 def case_as_json(case: "CaseResult") -> dict[str, Any]:
     """Return the measures of a case as an object for JSON."""
     from wm_drake.parameters.units import Unit
-    from wm_drake.simulation.mounts import POINT
 
     measures = case.measures
     millimetre = Unit("m", "mm")
@@ -137,13 +137,7 @@ def case_as_json(case: "CaseResult") -> dict[str, Any]:
         "detergent_box_mm": numbers(measures.detergent_displacement, millimetre, "D"),
         "gasket_force_N": numbers(measures.gasket_force, Unit("N", "N"), "F"),
         "gasket_moment_Nm": numbers(measures.gasket_moment, Unit("N*m", "N*m"), "M"),
-        "mount_force_N": _sizes(measures, "mount_force"),
-        "cabinet_wrench": {
-            "about": POINT,
-            "force_N": _sizes(measures, "cabinet_force"),
-            "moment_Nm": _sizes(measures, "cabinet_moment"),
-        },
-        "feet": _feet(measures),
+        **forces_as_json(measures),
         "smallest_gap_mm": millimetre.from_si(measures.smallest_gap.distance)
         if measures.smallest_gap
         else None,
@@ -152,40 +146,3 @@ def case_as_json(case: "CaseResult") -> dict[str, Any]:
         "diverged": case.record.attrs["diverged"] or None,
         "wall_s": case.wall_s,
     }
-
-
-def _sizes(measures: "Measures", name: str) -> dict[str, dict[str, float | None]]:
-    """Return peak and RMS values of forces on the cabinet, by mount or axis. [N or N m]"""
-    found: dict[str, dict[str, float | None]] = {}
-    for kind in ("peak", "rms", "dynamic_rms"):
-        values = getattr(measures, f"{name}_{kind}")
-        labels = values[values.dims[0]].values
-        for label, value in zip(labels, map(float, values.values), strict=True):
-            found.setdefault(str(label), {})[kind] = _json_number(value)
-    return found
-
-
-def _feet(measures: "Measures") -> dict[str, Any] | None:
-    """Return the smallest load and margins of the feet over the run and in each region."""
-    feet = measures.feet
-    if feet is None:
-        return None
-    keys = {
-        "smallest_normal_force_N": "smallest_foot_load",
-        "slide_margin_N": "slide_margin",
-        "turn_margin_Nm": "turn_margin",
-        "tilt_margin_Nm": "tilt_margin",
-    }
-    of_run = {key: _json_number(float(feet[name])) for key, name in keys.items()}
-    of_regions = {
-        str(region): {
-            key: _json_number(float(feet[f"region_{name}"][index])) for key, name in keys.items()
-        }
-        for index, region in enumerate(feet.region.values)
-    }
-    return of_run | {"regions": of_regions}
-
-
-def _json_number(value: float) -> float | None:
-    """Return a number, or None for NaN, which JSON does not have."""
-    return value if value == value else None

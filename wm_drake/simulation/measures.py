@@ -2,7 +2,6 @@
 
 import functools
 import json
-from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,7 +58,8 @@ class Measures:
             their moment about the origin of W. [N m]
         smallest_tension: (spring) smallest tension, 0 if the spring goes slack. [N]
         feet: Measures of the feet of the cabinet by the names in `wm_drake.simulation.feet`, with
-            the dimensions foot and region; None if the machine has no cabinet.
+            the dimensions foot and region; None if the machine has no cabinet, or for a record of
+            version 0.1.
     """
 
     amplitude: xr.DataArray
@@ -260,7 +260,7 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
         gasket_force=xr.DataArray(_largest(force), by_axis),
         gasket_moment=xr.DataArray(_largest(moment), by_axis),
         smallest_gap=gap,
-        **_forces_on_cabinet(values, by_axis, record.coords["mount"].coords),
+        **_forces_on_cabinet(record),
         smallest_tension=xr.DataArray(
             smallest_tensions(values["spring_tension"]), record.coords["spring"].coords
         ),
@@ -270,7 +270,7 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
 
 def cabinet_in(record: Record) -> tuple[Cabinet, float] | None:
     """Return cabinet and gravity [m/s^2] of the machine of a record; None without a cabinet."""
-    parameters = json.loads(record.attrs["parameters"])
+    parameters = json.loads(record.attrs.get("parameters", "{}"))
     if not parameters.get("cabinet"):
         return None
     return Cabinet.model_validate(parameters["cabinet"]), float(parameters["gravity"])
@@ -284,25 +284,27 @@ def wrenches_on_cabinet(record: Record) -> FloatArray:
 def feet_of(record: Record) -> xr.Dataset | None:
     """Return the measures of the feet of the cabinet; None if the machine has no cabinet."""
     found = cabinet_in(record)
-    if found is None:
+    if found is None or "cabinet_force" not in record:
         return None
     profile = SpinProfile.model_validate_json(record.attrs["profile"])
     values = foot_measures(*found, wrenches_on_cabinet(record), profile, _period(record))
     labels = {"foot": list(found[0].corners), "region": [r.name for r in profile.regions]}
-
     dims = dict.fromkeys(REGION_VARIABLES, "region") | dict.fromkeys(BY_FOOT, "foot")
     return xr.Dataset({n: ([dims[n]] if n in dims else [], v) for n, v in values.items()}, labels)
 
 
-def _forces_on_cabinet(
-    values: Mapping[Hashable, FloatArray], by_axis: xr.Coordinates, by_mount: xr.Coordinates
-) -> dict[str, xr.DataArray]:
-    """Return the measures of the forces of the mounts, by the names of the `Measures`."""
+def _forces_on_cabinet(record: Record) -> dict[str, xr.DataArray]:
+    """Return the measures of the forces of the mounts, by the names of the `Measures`.
+
+    A record of version 0.1 has no such forces: then there are no mounts, and the others are NaN.
+    """
     found = {}
     for name in ("mount_force", "cabinet_force", "cabinet_moment"):
-        coordinates = by_mount if name == "mount_force" else by_axis
-        for kind, value in zip(KINDS, force_measures(values[name]), strict=True):
-            found[f"{name}_{kind}"] = xr.DataArray(value, coordinates)
+        dim = "mount" if name == "mount_force" else "axis"
+        labels = np.asarray(record[dim].values if dim in record.dims else [])
+        history = record[name].values if name in record else np.empty((0, len(labels)))
+        for kind, value in zip(KINDS, force_measures(history), strict=True):
+            found[f"{name}_{kind}"] = xr.DataArray(value, {dim: labels}, [dim])
     return found
 
 

@@ -27,12 +27,10 @@ class MountForce:
     """Force of one mount on the cabinet over a run.
 
     Attributes:
-        name: `spring left`, `damper left`, `gasket` or the name of the bushing.
-        force: (n, 1) tension of a spring or a damper, or (n, 3) force of the gasket or a bushing on
-            the housing. [N]
-        at_rest: Size of the force at the first sample, with the machine at rest; with its sign for
-            a tension. [N]
-        peak: Largest absolute value, or largest length of the vector. [N]
+        name: Key path of the mount: `springs.left`, `dampers.left`, `gasket`.
+        force: (n, 3) force on the cabinet, in W. [N]
+        at_rest: Size of the force at the first sample, with the machine at rest. [N]
+        peak: Largest size of the force. [N]
         peak_index: Sample of the peak.
     """
 
@@ -45,7 +43,7 @@ class MountForce:
     def rms(self, samples: BoolArray) -> float:
         """Return the RMS of the change of the force from rest over some samples. [N]
 
-        For a vector it is the root of the mean square length. NaN without samples.
+        It is the root of the mean square length of the vector. NaN without samples.
         """
         change = self.force[samples] - self.force[0]
         return float(np.sqrt(np.mean(np.sum(change**2, axis=1)))) if len(change) else np.nan
@@ -62,33 +60,22 @@ class SpeedRange:
 def mount_forces(record: Record) -> list[MountForce]:
     """Return the forces of all mounts of a record; none if the record has no samples.
 
-    A gasket that is taken out is left out. The force of a spring, or of a damper that is a massless
-    strut, is its tension; the transverse forces of its end bushings are not included. A damper
-    whose tubes are bodies acts through the bushing at its housing end.
+    A gasket that is taken out is left out.
     """
     if not record.sizes["time"]:
         return []
-    histories: dict[str, FloatArray] = {}
-    for kind in ("spring", "damper"):
-        tensions = record[f"{kind}_tension"].values
-        for index, name in enumerate(record[kind].values):
-            histories[f"{kind} {name}"] = tensions[:, index : index + 1]
-    tubes = [str(name) for name in record["tube"].values] if "tube" in record.dims else []
-    dampers = {f"{name}_housing": f"damper {name}" for name in tubes}
-    elsewhere = {f"{name}_tub" for name in tubes}  # between tub and tube, not on the cabinet
-    if record.attrs["gasket"] != "yes":
-        elsewhere.add("gasket")
-    for index, name in enumerate(map(str, record["bushing"].values)):
-        if name not in elsewhere:
-            histories[dampers.get(name, name)] = record.bushing_force.values[:, index]
-    return [_mount_force(name, force) for name, force in histories.items()]
+    missing = {"gasket"} if record.attrs["gasket"] != "yes" else set()
+    return [
+        _mount_force(str(name), record.mount_force.values[:, index])
+        for index, name in enumerate(record.mount.values)
+        if name not in missing
+    ]
 
 
 def _mount_force(name: str, force: FloatArray) -> MountForce:
     size = np.linalg.norm(force, axis=1)
     index = int(np.argmax(size))
-    at_rest = float(force[0, 0] if force.shape[1] == 1 else size[0])
-    return MountForce(name, force, at_rest, float(size[index]), index)
+    return MountForce(name, force, float(size[0]), float(size[index]), index)
 
 
 def speed_ranges(record: Record, profile: SpinProfile) -> list[SpeedRange]:

@@ -23,6 +23,7 @@ from wm_drake.cli.common import (
 )
 from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import LEDGER, Run, result_folder
+from wm_drake.cli.spin_forces import forces_of_run_as_json
 from wm_drake.cli.study.common import WorkersOption
 from wm_drake.cli.terminal import Console
 from wm_drake.errors import InputError, input_error, nearest_names
@@ -236,12 +237,15 @@ def _with(result: "SpinCycleResult", measured: "xr.DataArray") -> "SpinCycleResu
 
 
 def _write(result: "SpinCycleResult", folder: Path, engine: str) -> None:
+    from wm_drake.report.spin_cycle.floor import feet_table
     from wm_drake.report.spin_cycle.report import spin_cycle_report
     from wm_drake.report.spin_cycle.tables import case_table
     from wm_drake.studies.spin_cycle.measured import rms_table
 
     rms_table(result.displacement).to_csv(folder / "rms.csv", index=False, float_format="%.6g")
     case_table(result).to_csv(folder / "cases.csv", index=False, float_format="%.4g")
+    if "turn_margin" in result.forces:
+        feet_table(result).to_csv(folder / "feet.csv", index=False, float_format="%.6g")
     command = command_line()
     (folder / "report.html").write_text(
         spin_cycle_report(result, engine, command), encoding="utf-8"
@@ -304,6 +308,7 @@ def _as_json(result: "SpinCycleResult", engine: str) -> dict[str, Any]:
                     str(name): plain(result.smallest_tension.sel(case=case.name, spring=name))
                     for name in result.smallest_tension.spring.values
                 },
+                **forces_of_run_as_json(result.forces.sel(case=case.name)),
                 "diverged": diverged or None,
             }
             for case, diverged in zip(result.cases, result.diverged, strict=True)

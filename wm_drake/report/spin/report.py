@@ -20,9 +20,10 @@ from wm_drake.report.page import Picture, picture, render, versions_of
 from wm_drake.report.spin import tables
 from wm_drake.report.spin.cases import case_title, has_gasket, speed_rpm
 from wm_drake.report.spin.figures import envelopes_figure, gaps_figure, gasket_figure, orbits_figure
+from wm_drake.report.spin.floor import floor_view, floor_warnings
 from wm_drake.report.spin.tables import amplitude_table
-from wm_drake.report.springs import slack_warning
 from wm_drake.report.spin.vibration_pictures import vibration_pictures
+from wm_drake.report.springs import slack_warning
 from wm_drake.report.tables import Table, parameter_table
 from wm_drake.simulation.cases import UNUSED_PHASE_ERROR
 from wm_drake.simulation.spring_tension import slack_springs
@@ -86,6 +87,7 @@ def spin_report(
         accelerations=tables.accelerations(result),
         mount_forces=tables.mount_force_tables(result),
         drawn_alone="" if len(detailed) == len(result.results) else case_title(main),
+        floor=floor_view(result),
         smallest_gaps=tables.smallest_gaps(result),
         gaps_picture=_gaps_picture(result),
         smallest_tensions=tables.smallest_tensions(result),
@@ -233,7 +235,7 @@ def warnings_of(result: SpinResult) -> list[str]:
                 "model has no contact forces. In the real machine these parts would collide, and "
                 "the motion after that is not valid."
             )
-    return found + slack_springs_warning(result)
+    return found + slack_springs_warning(result) + floor_warnings(result)
 
 
 def slack_springs_warning(result: SpinResult) -> list[str]:

@@ -20,8 +20,8 @@ from wm_drake.report.formatting import (
 from wm_drake.report.spin.cases import case_title, has_gasket, sensors_of, speed_rpm
 from wm_drake.report.tables import MOST_SHOWN, Group, Row, Table, line, readable
 from wm_drake.simulation.measures import percent_difference
-from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.simulation.mount_forces import MountForce, mount_forces, rms_table, speed_ranges
+from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.simulation.vibration import sensor_accelerations
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
@@ -213,10 +213,8 @@ def accelerations(result: SpinResult) -> Table:
 def mount_force_tables(result: SpinResult) -> list[Table]:
     """Return the forces of the mounts on the cabinet, one table for each spin profile."""
     caption = (
-        "Forces of the mounts on the cabinet: force at rest, largest absolute value with its drum "
-        "speed, and RMS of the change from rest in ranges of drum speed or in the regions of the "
-        "profile. Springs and massless dampers: tension along their line; others: length of the "
-        "force vector."
+        "Size of the force of each mount on the cabinet: at rest, largest with its drum speed, and "
+        "RMS of the change from rest in ranges of drum speed or in the regions of the profile."
     )
     by_ranges: dict[tuple[str, ...], list[Group]] = {}
     for case in result.results:

@@ -185,8 +185,7 @@ def accelerations_figure(record: Record, values: xr.DataArray) -> Figure:
 def mounts_figure(record: Record, forces: Sequence[MountForce]) -> Figure:
     """Draw the forces of the mounts over time, a row of panels for each kind of mount.
 
-    A band shows the smallest to the largest value in each drum revolution. A tension has its sign;
-    of a vector the length is drawn.
+    A band shows the smallest to the largest size of the force in each drum revolution.
     """
     rows = _rows(forces)
     places = [COLUMNS * row + column for row, of in enumerate(rows) for column in range(len(of))]
@@ -195,7 +194,7 @@ def mounts_figure(record: Record, forces: Sequence[MountForce]) -> Figure:
         record, count, ["force, N"] * len(rows), set(range(count)) - set(places)
     )
     for row, of_row in enumerate(rows):
-        signals = [_size(force) for force in of_row]
+        signals = [np.asarray(np.linalg.norm(force.force, axis=1)) for force in of_row]
         own = panels[COLUMNS * row : COLUMNS * row + len(of_row)]
         low = min(0.0, *(float(signal.min()) for signal in signals))
         high = max(0.0, *(float(signal.max()) for signal in signals))
@@ -209,21 +208,15 @@ def mounts_figure(record: Record, forces: Sequence[MountForce]) -> Figure:
 
 
 def _rows(forces: Sequence[MountForce]) -> list[list[MountForce]]:
-    """Return the forces in rows; each kind (spring, damper, other) begins a new one."""
+    """Return the forces in rows; each kind of mount begins a new one."""
     kinds: dict[str, list[MountForce]] = {}
     for force in forces:
-        kind = force.name.split(" ")[0]
-        kinds.setdefault(kind if kind in ("spring", "damper") else "", []).append(force)
+        kinds.setdefault(force.name.split(".")[0], []).append(force)
     return [
         of_kind[begin : begin + COLUMNS]
         for of_kind in kinds.values()
         for begin in range(0, len(of_kind), COLUMNS)
     ]
-
-
-def _size(force: MountForce) -> FloatArray:
-    is_tension = force.force.shape[1] == 1
-    return force.force[:, 0] if is_tension else np.asarray(np.linalg.norm(force.force, axis=1))
 
 
 def _legend_of_bands(figure: Figure) -> None:

@@ -38,8 +38,8 @@ def _mounts_picture(case: CaseResult) -> Picture | None:
         return None
     caption = (
         "Forces of springs, dampers and bushings on the cabinet over time. The shaded area extends "
-        "from the smallest to the largest value within each drum revolution. Springs and massless "
-        "dampers: tension; others: length of the force vector. Each row has its own scale."
+        "from the smallest to the largest size within each drum revolution. Each row has its own "
+        "scale."
     )
     largest = max(forces, key=lambda force: force.peak)
     alternative = (

@@ -11,6 +11,7 @@ from wm_drake.report.formatting import MM_PER_M, number
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.spin_cycle import tables
 from wm_drake.report.spin_cycle.figures import bars_figure, heat_map_figure, profile_figure
+from wm_drake.report.spin_cycle.floor import floor_table, floor_warnings
 from wm_drake.report.springs import slack_warning
 from wm_drake.report.tables import Table, parameter_table
 from wm_drake.simulation.records import versions
@@ -49,6 +50,7 @@ def spin_cycle_report(result: SpinCycleResult, engine: str, command: str = "") -
         regions=tables.regions(result),
         worst_picture=_worst_picture(result),
         cases_table=tables.cases(result),
+        floor_table=floor_table(result),
         cases=[_case_view(result, case) for case in shown_cases(result)],
         facts=_facts(result, engine, command),
         numbers=parameter_table(result.parameters),
@@ -149,6 +151,7 @@ def warnings_of(result: SpinCycleResult) -> list[str]:
     smallest = result.smallest_tension
     names = map(str, smallest.case.values)
     found += slack_warning({c: slack_springs(smallest.sel(case=c)) for c in names}, "case")
+    found += floor_warnings(result)
     apart = float(disagreement(result).max(skipna=True))
     if apart > 0.01:
         found.append(

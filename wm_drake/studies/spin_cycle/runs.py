@@ -1,11 +1,12 @@
 """Functions that run the cases of a spin-cycle study with the compiled or the Drake engine."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 import numpy as np
 import xarray as xr
 
+from wm_drake.batch import MEASURES as KNOWN_MEASURES
 from wm_drake.batch import simulate_many, simulate_remembered
 from wm_drake.batch.ledger import Ledger
 from wm_drake.model.machine import Machine
@@ -13,7 +14,7 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.vibration import record_region_displacements
 from wm_drake.studies.spin.study import CaseResult, run_spin
-from wm_drake.studies.spin_cycle.study import MEASURES, Evaluate
+from wm_drake.studies.spin_cycle.study import FEET, MEASURES, Evaluate, measures_of
 
 
 def compiled_runs(
@@ -31,15 +32,16 @@ def compiled_runs(
         workers: Number of threads; None for the number of cores.
         progress: Called with the number of finished cases.
     """
+    measures = measures_of(machine.parameters)
     if ledger is None:
         return partial(
-            simulate_many, machine, measures=MEASURES, workers=workers, progress=progress
+            simulate_many, machine, measures=measures, workers=workers, progress=progress
         )
     return partial(
         simulate_remembered,
         machine,
         ledger=ledger,
-        measures=MEASURES,
+        measures=measures,
         workers=workers,
         progress=progress,
     )
@@ -70,6 +72,7 @@ def drake_runs(
 
 def _table(results: Iterable[CaseResult]) -> xr.Dataset:
     """Return results as a table in the form of `simulate_many`."""
+    results = list(results)
     direct, integrated, gaps, tensions, diverged = [], [], [], [], []
     for result in results:
         points = result.record.accelerometer_point.values
@@ -90,4 +93,19 @@ def _table(results: Iterable[CaseResult]) -> xr.Dataset:
             "smallest_spring_tension": (("run", "spring"), np.array(tensions)),
             "diverged": ("run", np.array(diverged, dtype=object)),
         }
+        | _forces(results)
     )
+
+
+def _forces(results: Sequence[CaseResult]) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    """Return the variables of the forces of the mounts and of the loads of the feet."""
+    found: dict[str, list[xr.DataArray]] = {}
+    for result in results:
+        for measure in (*MEASURES[3:], *(FEET if result.measures.feet is not None else ())):
+            own = result.measures.feet if measure in FEET else result.measures
+            for name in KNOWN_MEASURES[measure]:
+                found.setdefault(name, []).append(getattr(own, name))
+    return {
+        name: (("run", *map(str, values[0].dims)), np.array([value.values for value in values]))
+        for name, values in found.items()
+    }

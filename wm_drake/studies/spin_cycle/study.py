@@ -7,15 +7,20 @@ from typing import TypeAlias
 import numpy as np
 import xarray as xr
 
+from wm_drake.batch import MEASURES as KNOWN_MEASURES
 from wm_drake.errors import input_error
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.outputs import AXES
 from wm_drake.simulation.vibration import relative_error
 
-MEASURES = ("regions", "gap", "spring tensions")
+MEASURES = ("regions", "gap", "spring tensions", "mounts", "cabinet")
 """Measures of each run, as for `simulate_many`."""
+
+FEET = ("feet", "feet regions")
+"""Measures of each run of a machine with a cabinet."""
 
 DIMS = ("case", "region", "accelerometer", "axis")
 
@@ -38,6 +43,8 @@ class SpinCycleResult:
         smallest_gap: (case) smallest gap between tub group and housing. [m]
         smallest_tension: (case, spring) smallest tension of each spring. [N]
         diverged: (case) time and reason if a run diverged, else "".
+        forces: Forces of the mounts and, if the machine has a cabinet, loads and margins of its
+            feet: the variables of `simulate_many` over case. SI.
         measured: (case, region, accelerometer, axis) measured RMS displacement; NaN where nothing
             was measured. None without a measurement. [m]
     """
@@ -50,7 +57,37 @@ class SpinCycleResult:
     smallest_gap: xr.DataArray
     smallest_tension: xr.DataArray
     diverged: tuple[str, ...]
+    forces: xr.Dataset
     measured: xr.DataArray | None = None
+
+
+def measures_of(parameters: MachineParameters) -> tuple[str, ...]:
+    """Return the measures of each run of a machine, as for `simulate_many`."""
+    return (*MEASURES, *(FEET if parameters.cabinet else ()))
+
+
+def forces_of(
+    parameters: MachineParameters, table: xr.Dataset, labels: dict[str, list[str]]
+) -> xr.Dataset:
+    """Return the forces of a table of runs, with cases and regions by name.
+
+    Args:
+        parameters: The machine.
+        table: Table of runs with the measures of `measures_of`.
+        labels: From `labels_of`.
+    """
+    coordinates = {name: labels[name] for name in ("case", "region", "axis")}
+    coordinates["mount"] = list(mount_names(parameters))
+    if parameters.cabinet:
+        coordinates["foot"] = list(parameters.cabinet.corners)
+    names = [
+        name
+        for measure in measures_of(parameters)
+        if measure not in ("regions", "gap")
+        for name in KNOWN_MEASURES[measure]
+    ]
+    variables = {name: (("case", *table[name].dims[1:]), table[name].values) for name in names}
+    return xr.Dataset(variables, coordinates)
 
 
 def runs_of(
@@ -101,8 +138,9 @@ def run_spin_cycle(
         attrs={"units": "N"},
     )
     diverged = tuple(map(str, table.diverged.values))
+    forces = forces_of(parameters, table, labels)
     measured = direct, integrated, gap, tension
-    return SpinCycleResult(parameters, profile, tuple(cases), *measured, diverged)
+    return SpinCycleResult(parameters, profile, tuple(cases), *measured, diverged, forces)
 
 
 def labels_of(

@@ -1,0 +1,89 @@
+"""Section of the spin page about forces on cabinet and floor, from a short run."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wm_drake.parameters import SpinProfile, with_value
+from wm_drake.parameters.spin import Region
+from wm_drake.report.spin.floor import floor_figure, floor_view, floor_warnings, windows
+from wm_drake.report.spin.report import spin_report
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.measures import measure
+from wm_drake.simulation.runs import simulate
+from wm_drake.studies.spin.study import CaseResult, SpinResult
+
+PROFILE = SpinProfile(
+    time=(0.0, 6.0), speed=(5.0, 30.0), regions=(Region(name="low", begin=0.0, end=2.0),)
+)
+
+
+def spin_result(machine, parameters):
+    """Return the result of a short run of the load `counter`."""
+    case = Case("counter", parameters.loads["counter"], PROFILE, parameters=parameters)
+    record = simulate(machine, case)
+    return SpinResult(
+        parameters, "compiled", 2.5e-3, (CaseResult(case, record, measure(record), 1.0),)
+    )
+
+
+@pytest.fixture(scope="module")
+def result(machine, reference):
+    """Return the result with the cabinet of the machine file."""
+    return spin_result(machine, reference)
+
+
+def test_tables_have_the_measures(result):
+    view = floor_view(result)
+    resultant, margins, feet = view.tables
+    measures = result.results[0].measures
+    largest = float(measures.cabinet_force_peak.sel(axis="z"))
+    assert resultant.groups[0].rows[0].cells[3] == f"{largest:.0f}"
+    rows = margins.groups[0].rows
+    assert [row.cells[0] for row in rows] == ["whole run", "low"]
+    assert rows[0].cells[2] == f"{float(measures.feet.slide_margin):.1f}"
+    assert [row.cells[0] for row in feet.groups[0].rows] == [
+        *("front left", "front right", "rear right", "rear left")
+    ]
+    assert "friction 0.4" in view.about
+    assert view.picture is not None
+
+
+def test_a_slippery_floor_is_warned_of(machine, reference, result):
+    assert floor_warnings(result) == []
+    slippery = spin_result(machine, with_value(reference, "cabinet.friction", "0.05"))
+    (warning,) = floor_warnings(slippery)
+    assert warning.startswith("Load counter (with gasket): the cabinet ")
+    assert "turns on the floor" in warning
+    assert floor_view(slippery).tables[1].groups[0].rows[0].kind == "alarm"
+    page = spin_report(slippery)
+    assert "Forces on the cabinet and the floor" in page
+    assert warning in page
+
+
+def test_without_cabinet_the_section_says_so(machine, reference):
+    bare = reference.model_copy(update={"cabinet": None})
+    view = floor_view(spin_result(machine, bare))
+    assert len(view.tables) == 1
+    assert "has no cabinet" in view.about
+    assert view.picture is None
+
+
+def test_figure_shows_the_smallest_values(result):
+    panels = floor_figure(list(result.results)).axes
+    feet = result.results[0].measures.feet
+    for axes, name in zip(
+        panels, ("smallest_foot_load", "slide_margin", "turn_margin"), strict=True
+    ):
+        drawn = axes.lines[0].get_ydata()
+        assert np.min(drawn) == pytest.approx(float(feet[name]), rel=1e-9)
+
+
+def test_windows_cover_all_samples():
+    time = 5e-3 * np.arange(120)
+    values = np.arange(120.0)[:, None]
+    middle, smallest = windows(time, values)
+    assert smallest[:, 0].tolist() == [0.0, 50.0]  # the rest of 20 samples joins the last window
+    middle, smallest = windows(time, values[::-1])
+    assert smallest[:, 0].tolist() == [70.0, 0.0]
+    assert pd.Series(middle).is_monotonic_increasing

@@ -1,0 +1,218 @@
+"""Section of a spin page about the forces on the cabinet and on the floor under its feet."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.report.figures import GRID, MARK, WIDTH, style_axes
+from wm_drake.report.formatting import number
+from wm_drake.report.page import Picture, picture
+from wm_drake.report.spin.cases import case_title
+from wm_drake.report.tables import Group, Row, Table
+from wm_drake.simulation.feet import MARGINS, FootLoads, foot_loads
+from wm_drake.simulation.measures import cabinet_in, wrenches_on_cabinet
+from wm_drake.simulation.mounts import POINT
+from wm_drake.studies.spin.study import CaseResult, SpinResult
+
+WINDOW = 0.25
+"""Time over which a figure shows the smallest value. [s]"""
+
+VERBS = ("lifts a foot", "slides", "turns on the floor", "tips over")
+"""What the cabinet does where a value of `MARGINS` is not positive."""
+
+HEADS = (
+    "smallest load of a foot, N",
+    "margin of sliding, N",
+    "margin of turning, N\u00a0m",
+    "margin of tilting, N\u00a0m",
+)
+"""Heads of the columns of `MARGINS`."""
+
+
+@dataclass(frozen=True)
+class FloorView:
+    """Section of the page.
+
+    Attributes:
+        about: Sentences about the model.
+        tables: Tables, the resultant on the cabinet first.
+        picture: Loads and margins over time; None without feet.
+    """
+
+    about: str
+    tables: tuple[Table, ...]
+    picture: Picture | None
+
+
+def floor_view(result: SpinResult) -> FloorView:
+    """Return the section; without cabinet in the machine file it has the resultant only."""
+    standing = [case for case in result.results if case.measures.feet is not None]
+    cabinet = result.parameters.cabinet
+    if not standing or cabinet is None:
+        about = (
+            "The machine file has no cabinet, so the loads of its feet are unknown. They are shown "
+            "if it has mass, centre of mass, floor, friction and feet under the key 'cabinet'."
+        )
+        return FloorView(about, (resultant_table(result),), None)
+    about = (
+        "Loads of the feet of a rigid cabinet that does not move, on a rigid level floor. Normal "
+        "loads: four feet of equal vertical stiffness that do not pull. Margins: what is missing "
+        f"until the cabinet slides or turns at friction {cabinet.friction:g}, or tips over; below "
+        "0 it does. The model does not let it move, so what happens after that is not computed."
+    )
+    tables = (resultant_table(result), margins_table(standing), feet_table(standing))
+    return FloorView(about, tables, _picture(standing))
+
+
+def floor_warnings(result: SpinResult) -> list[str]:
+    """Return a warning for each case in which the cabinet would move."""
+    found = []
+    for case in result.results:
+        feet = case.measures.feet
+        if feet is None or case.record.attrs["diverged"]:
+            continue
+        verbs = [verb for name, verb in zip(MARGINS, VERBS, strict=True) if feet[name] <= 0.0]
+        if verbs:
+            text = " and ".join([", ".join(verbs[:-1]), verbs[-1]] if verbs[1:] else verbs)
+            found.append(
+                f"Load {case_title(case)}: the cabinet {text}. The model keeps it in its place."
+            )
+    return found
+
+
+def resultant_table(result: SpinResult) -> Table:
+    """Return force and moment of all mounts on the cabinet."""
+    groups = []
+    for case in result.results:
+        rows = []
+        for name, text, decimals in (("force", "force, N", 0), ("moment", "moment, N m", 1)):
+            values = [
+                getattr(case.measures, f"cabinet_{name}_{kind}").values
+                for kind in ("peak", "dynamic_rms")
+            ]
+            cells = [number(float(value), decimals) for value in np.concatenate(values)]
+            rows.append(Row((text, *cells)))
+        groups.append(Group(case_title(case), tuple(rows)))
+    header = (
+        "load",
+        "on the cabinet",
+        *(f"largest {a}" for a in "xyz"),
+        *(f"RMS {a}" for a in "xyz"),
+    )
+    caption = (
+        f"Force and moment of all mounts on the cabinet, moment about {POINT}. Largest absolute "
+        "value, which includes the weight of the oscillating group, and RMS without the mean."
+    )
+    return Table(caption, header, tuple(groups), text_columns=2)
+
+
+def margins_table(cases: list[CaseResult]) -> Table:
+    """Return smallest loads and margins of cases with feet, over the run and in each region."""
+    groups = []
+    for case in cases:
+        feet = case.measures.feet
+        assert feet is not None
+        rows = [_margins_row("whole run", [float(feet[name]) for name in MARGINS])]
+        for index, region in enumerate(feet.region.values):
+            values = [float(feet[f"region_{name}"][index]) for name in MARGINS]
+            rows.append(_margins_row(str(region), values))
+        groups.append(Group(case_title(case), tuple(rows)))
+    caption = (
+        "Feet: smallest normal load of any foot, and smallest margins. Sliding: horizontal force "
+        "that friction can still take. Turning: vertical moment that friction can still take "
+        "beside the horizontal force. Tilting: moment that still keeps the cabinet down."
+    )
+    return Table(caption, ("load", "part of the run", *HEADS), tuple(groups), text_columns=2)
+
+
+def _margins_row(part: str, values: list[float]) -> Row:
+    is_alarm = any(value <= 0.0 for value in values)
+    return Row((part, *(number(value) for value in values)), "alarm" if is_alarm else "")
+
+
+def feet_table(cases: list[CaseResult]) -> Table:
+    """Return the loads of each foot of cases with feet."""
+    groups = []
+    for case in cases:
+        feet = case.measures.feet
+        assert feet is not None
+        rows = []
+        for index, foot in enumerate(feet.foot.values):
+            names = ("normal_smallest", "normal_largest", "tangential_largest")
+            cells = [number(float(feet[f"foot_{name}"][index]), 0) for name in names]
+            rows.append(Row((str(foot).replace("_", " "), *cells)))
+        groups.append(Group(case_title(case), tuple(rows)))
+    caption = (
+        "Loads of each foot over the run. Assumption for the horizontal loads: each foot resists "
+        "in proportion to its normal load."
+    )
+    header = ("load", "foot", "smallest, N", "largest, N", "largest horizontal, N")
+    return Table(caption, header, tuple(groups), text_columns=2)
+
+
+def _picture(cases: list[CaseResult]) -> Picture | None:
+    shown = [case for case in cases if case.record.sizes["time"] > 1]
+    if not shown:
+        return None
+    caption = (
+        "Smallest load of a foot and margins of sliding and turning over time: the smallest value "
+        f"in each {WINDOW:g} s. Where a line is at 0 or below, a foot lifts off or the cabinet "
+        "moves."
+    )
+    smallest = "; ".join(
+        f"{case_title(case)}: {number(float(case.measures.feet['turn_margin']))} N m"
+        for case in shown
+        if case.measures.feet is not None
+    )
+    return picture(
+        floor_figure(shown), f"Smallest margin of turning for each load. {smallest}.", caption
+    )
+
+
+def floor_figure(cases: list[CaseResult]) -> Figure:
+    """Draw smallest load of a foot, margin of sliding and margin of turning over time.
+
+    Args:
+        cases: Cases with feet and at least two samples.
+    """
+    figure = Figure(figsize=(WIDTH, 6.6))
+    panels = list(figure.subplots(3, 1, sharex=True))
+    for case in cases:
+        time, smallest = windows(case.record.time.values, _loads(case).margins)
+        for axes, column in zip(panels, smallest.T, strict=False):
+            axes.plot(time, column, linewidth=1.2, label=case_title(case))
+    for axes, head in zip(panels, HEADS, strict=False):
+        axes.set_ylabel(head, fontsize=9.5)
+        axes.axhline(0.0, color=MARK, linewidth=0.8)
+        axes.grid(color=GRID)
+        style_axes(axes)
+    panels[-1].set_xlabel("time, s", fontsize=9.5)
+    panels[-1].set_xlim(0.0, max(float(case.record.time[-1]) for case in cases))
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="lower center", ncols=4, frameon=False, fontsize=9.5)
+    rows = -(-len(cases) // 4)
+    figure.subplots_adjust(
+        left=0.075, right=0.985, top=0.98, bottom=0.09 + 0.035 * rows, hspace=0.12
+    )
+    return figure
+
+
+def windows(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return middle and smallest values of windows of length `WINDOW`.
+
+    Args:
+        time: (n,) evenly spaced, n > 1. [s]
+        values: (n, k)
+    """
+    length = max(1, round(WINDOW / float(time[1] - time[0])))
+    begins = np.arange(0, max(1, len(time) - length // 2), length)  # no short window at the end
+    ends = np.append(begins[1:], len(time)) - 1
+    return 0.5 * (time[begins] + time[ends]), np.minimum.reduceat(values, begins, axis=0)
+
+
+def _loads(case: CaseResult) -> FootLoads:
+    found = cabinet_in(case.record)
+    assert found is not None
+    return foot_loads(*found, wrenches_on_cabinet(case.record))

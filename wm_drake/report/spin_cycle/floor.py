@@ -1,0 +1,86 @@
+"""Section of a spin-cycle page about the loads of the feet of the cabinet."""
+
+import numpy as np
+import pandas as pd
+
+from wm_drake.report.formatting import MISSING, number
+from wm_drake.report.tables import Table, line
+from wm_drake.simulation.feet import MARGINS
+from wm_drake.studies.spin_cycle.study import SpinCycleResult
+
+COLUMNS = dict(
+    zip(
+        MARGINS,
+        ("smallest_normal_force_N", "slide_margin_N", "turn_margin_Nm", "tilt_margin_Nm"),
+        strict=True,
+    )
+)
+"""Columns of `feet_table` by measure."""
+
+
+def feet_table(result: SpinCycleResult) -> pd.DataFrame:
+    """Return a row for each case and region, and one for the whole run: loads and margins.
+
+    Args:
+        result: Result of a machine with a cabinet.
+    """
+    rows = []
+    for case in result.cases:
+        forces = result.forces.sel(case=case.name)
+        parts = {"run": {column: float(forces[name]) for name, column in COLUMNS.items()}}
+        for region in map(str, forces.region.values):
+            parts[region] = {
+                column: float(forces[f"region_{name}"].sel(region=region))
+                for name, column in COLUMNS.items()
+            }
+        rows += [{"case": case.name, "part": part, **values} for part, values in parts.items()]
+    return pd.DataFrame(rows)
+
+
+def floor_table(result: SpinCycleResult) -> Table | None:
+    """Return the smallest loads and margins of each case as text; None without a cabinet."""
+    if "turn_margin" not in result.forces:
+        return None
+    table = feet_table(result)
+    groups = []
+    for case in result.cases:
+        own = table[table["case"] == case.name].set_index("part")
+        values = [float(result.forces[name].sel(case=case.name)) for name in MARGINS]
+        turning = own["turn_margin_Nm"].drop("run")
+        where = MISSING if turning.isna().all() else str(turning.idxmin())
+        cells = [*(number(value) for value in values), where]
+        alarm = "alarm" if min(values) <= 0.0 else ""
+        groups.append(line(case.name, cells, alarm))
+    caption = (
+        "Feet of the rigid cabinet, which the model keeps in its place: smallest normal load of "
+        "any foot; horizontal force that friction can still take; vertical moment that friction "
+        "can still take beside it, and the region where this is smallest; moment that still keeps "
+        "the cabinet down. Below 0 the cabinet would slide, turn or tip. feet.csv has each region."
+    )
+    header = (
+        "case",
+        "smallest load of a foot, N",
+        "margin of sliding, N",
+        "margin of turning, N\u00a0m",
+        "margin of tilting, N\u00a0m",
+        "turning smallest in",
+    )
+    return Table(caption, header, tuple(groups))
+
+
+def floor_warnings(result: SpinCycleResult) -> list[str]:
+    """Return a warning that names the cases in which the cabinet would slide, turn or tip."""
+    if "turn_margin" not in result.forces:
+        return []
+    margins = np.min([result.forces[name].values for name in MARGINS[1:]], axis=0)
+    moving = [
+        case.name
+        for case, margin, diverged in zip(result.cases, margins, result.diverged, strict=True)
+        if margin <= 0.0 and not diverged
+    ]
+    if not moving:
+        return []
+    return [
+        f"The cabinet would slide, turn or tip over in case {', '.join(moving)}. The model keeps "
+        "it in its place."
+    ]
