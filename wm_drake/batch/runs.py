@@ -1,8 +1,9 @@
 """Work items -> results: several runs side by side, measured as they end."""
 
+import functools
 import threading
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -144,7 +145,7 @@ class Runner:
         )
         lengths = self._spring_lengths(key, p, samples, rows, size)
         return [
-            self._result(item, schedule, *(a[..., lane] for a in (*histories, lengths)))
+            self._result(item, schedule, _Run.of_lane(lane, *histories, lengths))
             for lane, item in enumerate(work_items)
         ]
 
@@ -167,49 +168,15 @@ class Runner:
             measure_mounts_lanes(samples, rows, size, bounds, p, mounts, count, cabinet, sums)
         return sums.reshape(-1, WIDTH), cabinet.reshape(-1, WRENCH_SIZE, WIDTH)
 
-    def _result(
-        self,
-        item: WorkItem,
-        schedule: Schedule,
-        samples: FloatArray,
-        moved: FloatArray,
-        extremes: FloatArray,
-        mounts: FloatArray,
-        cabinet: FloatArray,
-        spring_lengths: FloatArray,
-    ) -> RunResult:
-        # the last three points are the detergent point's
-        good, sensors = int(extremes[-1]), moved.shape[1] - 3
+    def _result(self, item: WorkItem, schedule: Schedule, run: "_Run") -> RunResult:
+        """Return the measures of a run; each group of measures is computed by its own method."""
         values: dict[str, FloatArray] = {}
-        feet: dict[str, FloatArray] = {}
-        if _FILTERED & set(self.measures):
-            displacement = filtered(moved[:good, :sensors], OUTPUT_PERIOD)
         for measure in self.measures:
-            if measure == "extremes":
-                arrays: Iterable[FloatArray] = extremes[sensors:-1].reshape(3, 3).copy()
-            elif measure == "gap":
-                arrays = [self._gap(schedule.time[:good], samples[:good, :6], item.begin[:6])]
-            elif measure == "regions":
-                arrays = self._regions(item, np.ascontiguousarray(samples[:good]))
-            elif measure == "spring tensions":
-                arrays = tensions_at(item.numbers.setup.springs.values(), spring_lengths)
-            elif measure == "power means":
-                arrays = [power_means(displacement)]
-            elif measure == "mounts":
-                arrays = mount_measures(mounts)
-            elif measure == "cabinet":
-                arrays = cabinet_measures(mounts)
-            elif measure in _OF_FEET:
-                feet = feet or self._feet(item, cabinet[:good])
-                arrays = [feet[name] for name in MEASURES[measure]]
-            else:
-                size, at = amplitudes(displacement)
-                arrays = size, np.where(np.isnan(size), np.nan, samples[at, DRUM_RATE])
+            arrays = _MEASURED[measure](self, item, schedule, run)
             values |= dict(zip(MEASURES[measure], arrays, strict=True))
-        record = self._record(item, schedule, samples.copy()) if self.histories else None
-        return RunResult(
-            item.number, item.case, values, _divergence(schedule.time, samples, good), record
-        )
+        record = self._record(item, schedule, run.samples.copy()) if self.histories else None
+        diverged = _divergence(schedule.time, run.samples, run.good)
+        return RunResult(item.number, item.case, values, diverged, record)
 
     def _spring_lengths(
         self, key: BatchKey, p: FloatArray, samples: FloatArray, rows: int, size: int
@@ -228,8 +195,8 @@ class Runner:
         record = as_record(item.numbers.setup, item.case, trajectory)
         return record.assign_attrs(engine="compiled", step_s=self.step)
 
-    def _regions(self, item: WorkItem, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
-        setup = item.numbers.setup
+    def _regions(self, item: WorkItem, _schedule: Schedule, run: "_Run") -> Iterable[FloatArray]:
+        setup, samples = item.numbers.setup, np.ascontiguousarray(run.samples[: run.good])
         points = np.stack(list(setup.accelerometer_points.values()))
         motion, acceleration = (
             samples[:, :STATE_SIZE],
@@ -239,22 +206,59 @@ class Runner:
             motion, acceleration, points, setup.rest_pose, OUTPUT_PERIOD, item.case.profile
         )
 
-    def _feet(self, item: WorkItem, wrenches: FloatArray) -> dict[str, FloatArray]:
-        parameters = item.numbers.setup.parameters
-        return foot_measures(
-            cabinet_of(parameters),
-            parameters.gravity,
-            wrenches,
-            item.case.profile,
-            OUTPUT_PERIOD,
-        )
+    def _feet(self, item: WorkItem, _schedule: Schedule, run: "_Run") -> Iterable[FloatArray]:
+        return self._of_feet(FOOT_VARIABLES, item, run)
 
-    def _gap(self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray) -> FloatArray:
+    def _feet_in_regions(
+        self, item: WorkItem, _schedule: Schedule, run: "_Run"
+    ) -> Iterable[FloatArray]:
+        return self._of_feet(REGION_VARIABLES, item, run)
+
+    def _of_feet(self, names: Iterable[str], item: WorkItem, run: "_Run") -> Iterable[FloatArray]:
+        if not run.feet:
+            parameters = item.numbers.setup.parameters
+            found = foot_measures(
+                cabinet_of(parameters),
+                parameters.gravity,
+                run.cabinet[: run.good],
+                item.case.profile,
+                OUTPUT_PERIOD,
+            )
+            run.feet.update(found)
+        return [run.feet[name] for name in names]
+
+    def _gap(self, item: WorkItem, schedule: Schedule, run: "_Run") -> Iterable[FloatArray]:
         kept = self._memory.__dict__
         if "scene" not in kept:  # one for each thread: a scene has one pose at a time
             kept["scene"] = Scene(self.parameters)
-        gap = kept["scene"].smallest_gap(time, poses, rest_pose)
-        return np.array(np.nan if gap is None else gap.distance)
+        time, poses = schedule.time[: run.good], run.samples[: run.good, :6]
+        gap = kept["scene"].smallest_gap(time, poses, item.begin[:6])
+        return [np.array(np.nan if gap is None else gap.distance)]
+
+    def _amplitudes(
+        self, _item: WorkItem, _schedule: Schedule, run: "_Run"
+    ) -> Iterable[FloatArray]:
+        size, at = amplitudes(run.displacement)
+        return size, np.where(np.isnan(size), np.nan, run.samples[at, DRUM_RATE])
+
+    def _power_means(
+        self, _item: WorkItem, _schedule: Schedule, run: "_Run"
+    ) -> Iterable[FloatArray]:
+        return [power_means(run.displacement)]
+
+    def _extremes(self, _item: WorkItem, _schedule: Schedule, run: "_Run") -> Iterable[FloatArray]:
+        return run.extremes[run.sensors : -1].reshape(3, 3).copy()
+
+    def _spring_tensions(
+        self, item: WorkItem, _schedule: Schedule, run: "_Run"
+    ) -> Iterable[FloatArray]:
+        return tensions_at(item.numbers.setup.springs.values(), run.spring_lengths)
+
+    def _mounts(self, _item: WorkItem, _schedule: Schedule, run: "_Run") -> Iterable[FloatArray]:
+        return mount_measures(run.mounts)
+
+    def _cabinet(self, _item: WorkItem, _schedule: Schedule, run: "_Run") -> Iterable[FloatArray]:
+        return cabinet_measures(run.mounts)
 
     def _lanes(self, name: str, runs: list[FloatArray]) -> FloatArray:
         """Return the arrays of several runs as one array of lanes."""
@@ -275,3 +279,62 @@ def _divergence(time: FloatArray, samples: FloatArray, good: int) -> str:
     reason = diverging_coordinate(samples[good])
     assert reason is not None  # this is the first sample out of bounds
     return divergence_text(Divergence(float(time[good]), *reason), time[:good], samples[:good])
+
+
+@dataclass(frozen=True)
+class _Run:
+    """The arrays of one run, one lane of the batch.
+
+    Attributes:
+        samples: (n, state and rates) samples.
+        moved: (n, points) displacements at the sensors and the detergent point. [m]
+        extremes: Largest values, then the number of good samples.
+        mounts: Sums of `measure_mounts_lanes`; empty if not needed.
+        cabinet: (n, 6) wrenches on the cabinet; empty if not needed.
+        spring_lengths: (springs) smallest lengths; empty if not needed. [m]
+        feet: Measures of the feet, filled when they are computed first.
+    """
+
+    samples: FloatArray
+    moved: FloatArray
+    extremes: FloatArray
+    mounts: FloatArray
+    cabinet: FloatArray
+    spring_lengths: FloatArray
+    feet: dict[str, FloatArray] = field(default_factory=dict)
+
+    @classmethod
+    def of_lane(cls, lane: int, *arrays: FloatArray) -> "_Run":
+        """Return the run in a lane of the arrays, which are in the order of the attributes."""
+        samples, moved, extremes, mounts, cabinet, lengths = (a[..., lane] for a in arrays)
+        return cls(samples, moved, extremes, mounts, cabinet, lengths)
+
+    @property
+    def good(self) -> int:
+        """Number of samples before the run diverged, or all."""
+        return int(self.extremes[-1])
+
+    @property
+    def sensors(self) -> int:
+        """Number of sensors; the last three points are the detergent point's."""
+        return self.moved.shape[1] - 3
+
+    @functools.cached_property
+    def displacement(self) -> FloatArray:
+        """Filtered displacements (n, sensors). [m]"""
+        return filtered(self.moved[: self.good, : self.sensors], OUTPUT_PERIOD)
+
+
+_MEASURED = {
+    "extremes": Runner._extremes,
+    "amplitudes": Runner._amplitudes,
+    "power means": Runner._power_means,
+    "gap": Runner._gap,
+    "regions": Runner._regions,
+    "mounts": Runner._mounts,
+    "cabinet": Runner._cabinet,
+    "feet": Runner._feet,
+    "feet regions": Runner._feet_in_regions,
+    "spring tensions": Runner._spring_tensions,
+}
+"""Method that computes each measure of `MEASURES`."""
