@@ -29,7 +29,8 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.histories import measure_samples_lanes
 from wm_drake.simulation.measures import amplitudes, filtered, power_means
 from wm_drake.simulation.records import Record, as_record
-from wm_drake.simulation.spring_tension import smallest_lengths_lanes, tensions_at
+from wm_drake.simulation.spring_lengths import smallest_lengths_lanes
+from wm_drake.simulation.spring_tension import tensions_at
 from wm_drake.simulation.vibration import region_displacements
 
 MEASURES = {

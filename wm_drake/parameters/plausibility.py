@@ -34,6 +34,7 @@ RANGES = (
     UsualRange("bodies.*.mass", 0.02, 80.0, "kg"),
     UsualRange("bodies.*.centre_of_mass", -600.0, 600.0, "mm"),
     UsualRange("frames.*.position", -1500.0, 1500.0, "mm"),
+    UsualRange("frames.*.angles", -180.0, 180.0, "deg"),
     UsualRange("spring_types.*.stiffness", 1.0, 60.0, "N/mm"),
     UsualRange("spring_types.*.free_length", 30.0, 600.0, "mm"),
     UsualRange("springs.*.preload", 0.0, 500.0, "N"),
