@@ -41,7 +41,8 @@ from wm_drake.simulation.mounts import (
     sums_size,
 )
 from wm_drake.simulation.records import Record, as_record
-from wm_drake.simulation.spring_tension import smallest_lengths_lanes, tensions_at
+from wm_drake.simulation.spring_lengths import smallest_lengths_lanes
+from wm_drake.simulation.spring_tension import tensions_at
 from wm_drake.simulation.vibration import region_displacements
 
 MEASURES = {

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
@@ -80,7 +80,8 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
         parameters: The machine.
 
     Raises:
-        InputError: there is no such file, it is not valid SDF, or it lacks a body or a joint.
+        InputError: there is no such file, it is not valid SDF, it lacks a body or a joint, or a new
+            frame cannot be added.
     """
     parser = Parser(plant)
     parser.SetStrictParsing()
@@ -124,6 +125,7 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
         actuator = _attach_drum_to_carrier(plant, actuator)
     actuator.set_default_rotor_inertia(REFLECTED_INERTIA)
     actuator.set_default_gear_ratio(1.0)
+    _add_frames(plant, parameters)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -parameters.gravity])
     plant.Finalize()
     _check_degrees_of_freedom(plant, parameters)
@@ -199,6 +201,33 @@ def _attach_drum_to_carrier(plant: MultibodyPlant, actuator: JointActuator) -> J
     return plant.AddJointActuator(
         name, plant.AddJoint(RevoluteJoint(name, frame, on_drum, axis, damping))
     )
+
+
+def _add_frames(plant: MultibodyPlant, parameters: MachineParameters) -> None:
+    """Add the frames that a machine attaches to links of its SDF.
+
+    Raises:
+        InputError: the SDF has such a frame already, or has no such link.
+    """
+    problems = []
+    instance = plant.GetBodyByName("tub").model_instance()
+    links = [plant.get_body(index).name() for index in plant.GetBodyIndices(instance)]
+    for name, frame in parameters.frames.items():
+        if frame.attached_to is None:
+            continue
+        if plant.HasFrameNamed(name):
+            message = "is a frame of the SDF; leave attached_to and angles out, or rename it"
+            problems.append(Problem("", f"frames.{name}", message))
+        elif frame.attached_to not in links:
+            message = f"no link '{frame.attached_to}' in the SDF"
+            message += nearest_names(frame.attached_to, links)
+            problems.append(Problem("", f"frames.{name}.attached_to", message))
+        else:
+            pose = RigidTransform(RollPitchYaw(frame.angles or np.zeros(3)), frame.position)
+            body = plant.GetBodyByName(frame.attached_to).body_frame()
+            plant.AddFrame(FixedOffsetFrame(name, body, pose, instance))
+    if problems:
+        raise InputError(problems)
 
 
 def _check_degrees_of_freedom(plant: MultibodyPlant, parameters: MachineParameters) -> None:
@@ -326,7 +355,8 @@ def _name_problems(
                 Problem(
                     "",
                     f"frames.{name}",
-                    f"no frame '{name}' in the SDF{nearest_names(name, movable)}",
+                    f"no frame '{name}' in the SDF{nearest_names(name, movable)}; attached_to: "
+                    "LINK makes it a new frame",
                 )
             )
     return tuple(problems)

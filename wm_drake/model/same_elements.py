@@ -14,6 +14,7 @@ def check_same_elements(built: MachineParameters, wanted: MachineParameters) -> 
                 key=key,
             )
     _check_names(built, wanted)
+    _check_frames(built, wanted)
     if (wanted.imperfections.bearing is None) != (built.imperfections.bearing is None):
         kinds = ("compliant", "rigid")
         now, before = kinds if wanted.imperfections.bearing else kinds[::-1]
@@ -35,6 +36,23 @@ def _check_names(built: MachineParameters, wanted: MachineParameters) -> None:
                 f"'{other}' is not in both machines{nearest_names(other, names[0])}; "
                 "rebuild the machine",
                 key=table.removeprefix("all_"),
+            )
+
+
+def _check_frames(built: MachineParameters, wanted: MachineParameters) -> None:
+    """Raise InputError if a new frame is on another link, turned, or in one machine only."""
+    if built.frames is wanted.frames:
+        return
+    added = [
+        {name: (f.attached_to, f.angles) for name, f in p.frames.items() if f.attached_to}
+        for p in (built, wanted)
+    ]
+    for name in {**added[0], **added[1]}:
+        if added[0].get(name) != added[1].get(name):
+            raise input_error(
+                "is not a new frame of the built machine, on the same link with the same angles; "
+                "rebuild the machine",
+                key=f"frames.{name}",
             )
 
 

@@ -3,7 +3,7 @@
 from typing import Any
 from xml.dom.minidom import Document, parseString
 
-from wm_drake.parameters import BodyOverride, MachineParameters, source_of
+from wm_drake.parameters import BodyOverride, FrameOverride, MachineParameters, source_of
 
 _DIGITS = 6
 """Decimals of metres and kilograms: drawings are not more accurate than 1e-6 m and 1e-6 kg."""
@@ -21,8 +21,11 @@ def sdf_with(text: str, parameters: MachineParameters) -> str:
     """
     document = parseString(text)
     for name, frame in parameters.frames.items():
-        element = _named(document, "frame", name)
-        _set_position(_only(element, "pose"), frame.position)
+        if frame.attached_to:
+            element = _new_frame(document, name, frame)
+        else:
+            element = _named(document, "frame", name)
+            _set_position(_only(element, "pose"), frame.position)
         _comment(document, element, source_of(parameters, f"frames.{name}.position"))
     for name, body in parameters.bodies.items():
         link = _named(document, "link", name)
@@ -35,6 +38,22 @@ def sdf_with(text: str, parameters: MachineParameters) -> str:
         texts = [text for key in given for text in _sources(parameters, key)]
         _comment(document, _only(link, "inertial"), "; ".join(dict.fromkeys(filter(None, texts))))
     return str(document.toxml()).replace('<?xml version="1.0" ?>', '<?xml version="1.0"?>\n') + "\n"
+
+
+def _new_frame(document: Document, name: str, frame: FrameOverride) -> Any:
+    """Add a frame that is fixed to a link, at the end of the model, and return it."""
+    element, pose = document.createElement("frame"), document.createElement("pose")
+    element.setAttribute("name", name)
+    element.setAttribute("attached_to", str(frame.attached_to))
+    pose.setAttribute("relative_to", str(frame.attached_to))
+    text = " ".join(map(_digits, (*frame.position, *(frame.angles or (0.0, 0.0, 0.0)))))
+    pose.appendChild(document.createTextNode(text))
+    element.appendChild(pose)
+    model = document.getElementsByTagName("model")[0]
+    model.appendChild(document.createTextNode("  "))
+    model.appendChild(element)
+    model.appendChild(document.createTextNode("\n  "))
+    return element
 
 
 def _sources(parameters: MachineParameters, key: str) -> list[str]:

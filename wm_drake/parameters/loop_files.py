@@ -75,7 +75,7 @@ def read_loop(path: Path, units: tuple[str, str, str] | None = None) -> Measured
         raise input_error("is empty; needs the columns time, displacement, force", where=str(path))
     line, head = rows[0]
     columns, factors, rotates = _columns(head, units, f"{path}:{line}")
-    table = np.array(
+    table: FloatArray = np.array(
         [_numbers(cells, head, columns, f"{path}:{at}") for at, cells in rows[1:]]
     ).reshape(-1, 3)
     lines = [at for at, _ in rows[1:]]

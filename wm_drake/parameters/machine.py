@@ -79,9 +79,26 @@ class BodyOverride(Frozen):
 
 
 class FrameOverride(Frozen):
-    """Position of a frame in the frame that the SDF attaches it to; it replaces that in the SDF."""
+    """A frame of the SDF at another position, or a new frame.
+
+    Attributes:
+        position: Position in the frame that the SDF attaches it to, or in the link frame of
+            `attached_to`.
+        attached_to: Link of the SDF to which a new frame is fixed; None for a frame of the SDF.
+        angles: Roll, pitch and yaw of a new frame in its link; None for zero. [rad]
+    """
 
     position: u.Position
+    attached_to: Name | None = None
+    angles: u.Angles | None = None
+
+    @model_validator(mode="after")
+    def _angles_are_of_a_new_frame(self) -> "FrameOverride":
+        if self.angles is not None and len(self.angles) != 3:
+            raise ValueError(f"angles: needs roll, pitch and yaw, has {len(self.angles)} values")
+        if self.angles is not None and self.attached_to is None:
+            raise ValueError("angles: only a new frame has them; name its link in attached_to")
+        return self
 
 
 class Sensor(Frozen):

@@ -39,6 +39,7 @@ RANGES = (
     UsualRange("cabinet.friction", 0.05, 1.2, ""),
     UsualRange("cabinet.feet.*", -800.0, 800.0, "mm"),
     UsualRange("frames.*.position", -1500.0, 1500.0, "mm"),
+    UsualRange("frames.*.angles", -180.0, 180.0, "deg"),
     UsualRange("spring_types.*.stiffness", 1.0, 60.0, "N/mm"),
     UsualRange("spring_types.*.free_length", 30.0, 600.0, "mm"),
     UsualRange("springs.*.preload", 0.0, 500.0, "N"),
