@@ -1,10 +1,9 @@
-"""Distances between tub and housing: against brute force, a closed form, and the replay page."""
+"""Distances between tub and housing: against brute force and a closed form."""
 
 import numpy as np
 import pytest
 
-from wm_drake.model import scene as scene_module
-from wm_drake.model.scene import Scene, replay_page
+from wm_drake.model.scene import Scene
 from wm_drake.parameters import load_machine
 
 REST = np.zeros(6)
@@ -79,27 +78,3 @@ def test_overlap_is_a_negative_gap_and_no_samples_are_no_gap(scene):
 def test_clearance_at_rest_is_that_of_a_real_machine(scene):
     gap = scene.smallest_gap(np.array([0.0]), REST[None, :], REST)
     assert 0.020 < gap.distance < 0.040  # m; [B] section 1: 20 to 40 mm
-
-
-def test_replay_is_one_page_that_needs_nothing_else():
-    positions = np.zeros((2, 7))
-    still = replay_page(load_machine("reference"), np.array([0.0, 0.1]), positions)
-    positions[1, 3] = 0.02
-    page = replay_page(load_machine("reference"), np.array([0.0, 0.1]), positions)
-    assert page.lstrip().lower().startswith("<!doctype html>")
-    assert len(page) > 1_000_000  # the viewer and the scene are inside
-    assert 'src="http' not in page
-    assert page != still
-
-
-def test_replay_is_served_to_this_computer_only(monkeypatch, reference):
-    hosts = []
-
-    def meshcat(params):
-        hosts.append(params.host)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(scene_module, "Meshcat", meshcat)
-    with pytest.raises(KeyboardInterrupt):
-        replay_page(reference, np.zeros(1), np.zeros((1, 7)))
-    assert hosts == ["localhost"]

@@ -66,13 +66,22 @@ def write_cases(
 
 
 def _replay(result: "SpinResult", case: "CaseResult") -> str:
-    from wm_drake.model.scene import replay_page
+    from wm_drake.model.replay import Motion, replay_page
     from wm_drake.simulation.measures import largest_motion
 
     # Meshcat would print the address of its server
     logging.getLogger("drake").setLevel(logging.WARNING)
     time, positions = largest_motion(case.record)
-    return replay_page(result.parameters, time, positions)
+    speed = case.record.drum_speed.sel(time=time).values
+    parameters, gasket = result.parameters, case.record.attrs["gasket"] == "yes"
+    words = "" if gasket or parameters.gasket is None else ", without gasket"
+    return replay_page(
+        parameters,
+        Motion(time, positions, speed),
+        title=f"Machine {parameters.name}, load {case.case.name}{words}",
+        load=case.case.load,
+        gasket=gasket,
+    )
 
 
 def amplitude_lines(title: str, amplitudes: "pd.DataFrame") -> "Table":

@@ -1,13 +1,15 @@
-"""Shapes of a machine: distances between tub and housing, and a 3D replay of a motion.
+"""Shapes of a machine: distances between tub and housing, and poses over a motion.
 
 The simulated plant has no shapes, so that no result of a run depends on them. Here the same SDF is
 read again with its shapes and set to the poses of a finished run.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import Cylinder, GeometryId, Meshcat, MeshcatParams, MeshcatVisualizer
+from pydrake.geometry import Cylinder, GeometryId, Meshcat, MeshcatVisualizer
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
@@ -301,7 +303,17 @@ class Scene:
             best = min(best, gap, key=lambda found: found.distance)
             bound[index] = np.inf  # this distance is known
 
-    def animate(self, meshcat: Meshcat, time: FloatArray, positions: FloatArray) -> None:
+    def pose_in_world(self, body: str) -> RigidTransform:
+        """Return the pose of a body in W at the pose that was set last."""
+        return self.plant.EvalBodyPoseInWorld(self._plant_context, self.plant.GetBodyByName(body))
+
+    def animate(
+        self,
+        meshcat: Meshcat,
+        time: FloatArray,
+        positions: FloatArray,
+        also: Callable[[float], None] = lambda moment: None,
+    ) -> None:
         """Record a motion into a Meshcat animation that begins at time 0.
 
         Args:
@@ -309,6 +321,8 @@ class Scene:
             time: (n,) [s]
             positions: Positions of the plant: roll, pitch, yaw, x, y, z, drum angle. (n, 7)
                 [rad, m]
+            also: Called with the time of each frame in the animation, with the poses set, to record
+                other shapes. [s]
         """
         meshcat.StartRecording(
             frames_per_second=REPLAY_RATE, set_visualizations_while_recording=False
@@ -317,21 +331,6 @@ class Scene:
             self._context.SetTime(float(moment - time[0]))
             self._set_positions(position)
             self._diagram.ForcedPublish(self._context)
+            also(float(moment - time[0]))
         meshcat.StopRecording()
         meshcat.PublishRecording()
-
-
-def replay_page(parameters: MachineParameters, time: FloatArray, positions: FloatArray) -> str:
-    """Return a self-contained HTML page that replays a motion in 3D.
-
-    Args:
-        parameters: The machine.
-        time: (n,) [s]
-        positions: Positions of the plant: roll, pitch, yaw, x, y, z, drum angle. (n, 7) [rad, m]
-    """
-    meshcat = Meshcat(MeshcatParams(host="localhost"))  # reachable from this computer only
-    meshcat.SetProperty("/Grid", "visible", False)
-    meshcat.SetCameraPose(camera_in_world=[0.7, -1.5, 0.6], target_in_world=[0.0, 0.0, 0.0])
-    scene = Scene(parameters, meshcat)
-    scene.animate(meshcat, time, positions)
-    return str(meshcat.StaticHtml())
