@@ -148,6 +148,13 @@ def test_the_example_of_a_compliant_bearing_runs(tmp_path):
     assert 1e-6 < float(abs(record.drum_displacement).max()) < 1e-4  # m
 
 
+def test_the_example_of_a_cabinet_is_a_machine(tmp_path):
+    standing = load_machine(written(tmp_path, page("floor")))
+    assert standing.cabinet.friction == 0.5
+    assert standing.cabinet.feet["rear_left"].x == -0.27
+    assert standing.cabinet.corners == ("front_left", "front_right", "rear_right", "rear_left")
+
+
 def test_every_yaml_block_is_one_of_those_above():
     counted = {name_of(path): len(blocks(path, "yaml")) for path in PAGES if blocks(path, "yaml")}
     assert counted == {
@@ -155,5 +162,6 @@ def test_every_yaml_block_is_one_of_those_above():
         "docs/how-to/bench-to-machine.md": 1,
         "docs/how-to/calibrate.md": 1,
         "docs/how-to/compliant-bearing.md": 1,
+        "docs/how-to/floor.md": 1,
         "docs/how-to/own-machine.md": 2,
     }

@@ -2,7 +2,9 @@
 
 Own derivations from statics and Coulomb friction. That a machine turns before it slides is the
 finding of Papadopoulos and Papadimitriou, Modeling, design and control of a portable washing
-machine during the spinning cycle, IEEE/ASME AIM 2001.
+machine during the spinning cycle, IEEE/ASME AIM 2001, pp. 899-904. The limit of force and
+moment together is the limit surface of Goyal, Ruina and Papadopoulos, Planar sliding with dry
+friction, Wear 143 (1991) 307-330.
 
 Positions are in a frame with its origin on the floor and z up. The load is the wrench on the
 cabinet, weight included: force (fx, fy, -down), moment (mx, my, mz) about the origin. The feet are

@@ -85,6 +85,7 @@ def describe(machine: Machine) -> dict[str, Any]:
             name: {"point_T": point.tolist()} for name, point in setup.accelerometer_points.items()
         },
         "detergent_point_T": setup.detergent_point.tolist(),
+        "cabinet": _cabinet(parameters),
         "loads": {name: load.model_dump() for name, load in parameters.loads.items()},
         "profile": parameters.profile.model_dump(),
         "numerics": _numerics(parameters),
@@ -96,6 +97,20 @@ def describe(machine: Machine) -> dict[str, Any]:
         },
         "natural_frequencies_hz": modes.frequency_hz.tolist(),
         "mode_damping_ratios": modes.damping_ratio.tolist(),
+    }
+
+
+def _cabinet(parameters: MachineParameters) -> dict[str, Any] | None:
+    """Return the cabinet and its feet; None for a machine without one."""
+    cabinet = parameters.cabinet
+    if cabinet is None:
+        return None
+    return {
+        "mass": cabinet.mass,
+        "centre_of_mass_W": list(cabinet.centre_of_mass),
+        "floor_z_W": cabinet.floor,
+        "friction": cabinet.friction,
+        "feet": {name: foot.model_dump() for name, foot in cabinet.feet.items()},
     }
 
 

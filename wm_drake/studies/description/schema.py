@@ -254,6 +254,23 @@ class Profile(_Part):
     regions: tuple[Region, ...] = ()
 
 
+class Foot(_Part):
+    """A foot of the cabinet on the floor."""
+
+    x: float = Field(description="In W. [m]")
+    y: float = Field(description="In W. [m]")
+
+
+class Cabinet(_Part):
+    """The rigid cabinet on four feet; it has no influence on the motion."""
+
+    mass: float = Field(description="Of all that does not hang on the mounts. [kg]")
+    centre_of_mass_W: Vector = Field(description="[m]")
+    floor_z_W: float = Field(description="Height of the floor. [m]")
+    friction: float = Field(description="Coefficient of Coulomb friction of the feet.")
+    feet: dict[str, Foot]
+
+
 class Residual(_Part):
     """What remains of moment about To and force on the tub at the rest pose."""
 
@@ -297,6 +314,7 @@ class Description(_Part):
     sensors: dict[str, Sensor]
     accelerometers: dict[str, Accelerometer]
     detergent_point_T: Vector = Field(description="[m]")
+    cabinet: Cabinet | None
     loads: dict[str, Load]
     profile: Profile
     numerics: Numerics
