@@ -1,7 +1,6 @@
 """Command `wm-drake spin`: simulate a spin run and report the motion of the tub."""
 
 import json
-import logging
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,7 +8,6 @@ import typer
 
 from wm_drake.cli.common import (
     JsonOption,
-    MachineOption,
     OutOption,
     OverwriteOption,
     SetOption,
@@ -22,28 +20,47 @@ from wm_drake.cli.common import (
 )
 from wm_drake.cli.progress import progress_bars
 from wm_drake.cli.result_folder import Run, result_folder
+from wm_drake.cli.spin_comparison import Choice, compare
+from wm_drake.cli.spin_results import (
+    amplitude_lines,
+    case_as_json,
+    compared_cases,
+    divergences,
+    end_with,
+    gap_text,
+    write_cases,
+)
 from wm_drake.cli.terminal import Console
 from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.parameters import MachineParameters
-    from wm_drake.simulation.cases import Case
-    from wm_drake.studies.spin.study import CaseResult, SpinResult
+    from wm_drake.studies.spin.study import SpinResult
 
 DEFAULT_OUT = Path("wm-drake-spin")
 
 
 def spin(
-    machine: MachineOption = "reference",
+    machine: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Name of a shipped machine, or machine file. Repeatable: several machines are "
+            "compared on one page. Default: reference.",
+            metavar="NAME|FILE",
+        ),
+    ] = None,
     load: Annotated[
         list[str] | None,
         typer.Option(
             help="Load of the machine, or load file. Repeatable. Default: all loads of the "
-            "machine.",
+            "machine; of several machines, those that all have.",
             metavar="NAME|FILE",
         ),
     ] = None,
     no_gasket: Annotated[bool, typer.Option("--no-gasket", help="Run without the gasket.")] = False,
+    compare_gasket: Annotated[
+        bool,
+        typer.Option("--compare-gasket", help="Compare with and without the gasket on one page."),
+    ] = False,
     profile: Annotated[
         Path | None,
         typer.Option(
@@ -80,98 +97,57 @@ def spin(
 ) -> None:
     """Simulate the run-up of the drum through the resonances, and report the motion of the tub."""
     from wm_drake.simulation.runs import DEFAULT_ENGINE, ENGINES
+    from wm_drake.studies.spin.study import run_spin
 
     engine = engine or DEFAULT_ENGINE
     if engine not in ENGINES:
         raise input_error(
             f"unknown engine '{engine}'{nearest_names(engine, ENGINES)}", where="--engine"
         )
-    parameters = with_measured(load_parameters(machine, sets), measured, "--measured")
+    machines = machine or ["reference"]
+    if len(machines) > 1 or compare_gasket:
+        choice = Choice(machines, load, no_gasket, compare_gasket, profile, measured, sets)
+        compare(choice, engine, out, overwrite, replay, as_json)
+        return
+    parameters = with_measured(load_parameters(machines[0], sets), measured, "--measured")
     cases = cases_of(parameters, load, not no_gasket, profile)
-    check_buildable(machine, parameters)
+    check_buildable(machines[0], parameters)
     with interruptible(), result_folder(out, Run("spin", overwrite)) as folder:
-        comparison = "all" if measured else "none" if sets else "as measured"
-        result = _run(parameters, cases, engine, comparison)
+        with progress_bars([case.name for case in cases]) as progress:
+            result = run_spin(
+                parameters,
+                cases,
+                engine,
+                progress=progress,
+                comparison=compared_cases(measured, sets),
+            )
         _write(result, folder, replay)
-    diverged = [
-        f"{r.case.name}: {r.record.attrs['diverged']}"
-        for r in result.results
-        if r.record.attrs["diverged"]
-    ]
+    diverged = divergences(result)
     if as_json:
         typer.echo(json.dumps(_as_json(result)))
     else:
         _print_tables(result, out, replay)
-    for message in diverged:
-        typer.echo(message, err=True)
-    if diverged:
-        raise typer.Exit(1)
-
-
-def _run(
-    parameters: "MachineParameters", cases: "list[Case]", engine: str, comparison: str
-) -> "SpinResult":
-    from wm_drake.studies.spin.study import Comparison, run_spin
-
-    with progress_bars([case.name for case in cases]) as progress:
-        return run_spin(
-            parameters, cases, engine, progress=progress, comparison=Comparison(comparison)
-        )
+    end_with(diverged)
 
 
 def _write(result: "SpinResult", folder: Path, replay: bool) -> None:
     from wm_drake.report.spin.report import amplitude_table, spin_report
-    from wm_drake.simulation.records import save_record
 
-    replays = {}
-    for case in result.results:
-        save_record(case.record, folder / f"record_{case.case.name}.nc")
-        if replay:
-            replays[case.case.name] = name = f"replay_{case.case.name}.html"
-            (folder / name).write_text(_replay(result, case), encoding="utf-8")
+    replays = write_cases(result, folder, replay)
     amplitude_table(result).to_csv(folder / "amplitudes.csv", index=False, float_format="%.4f")
     command = command_line()
     (folder / "report.html").write_text(spin_report(result, command, replays), encoding="utf-8")
 
 
-def _replay(result: "SpinResult", case: "CaseResult") -> str:
-    from wm_drake.model.scene import replay_page
-    from wm_drake.simulation.measures import largest_motion
-
-    # Meshcat would print the address of its server
-    logging.getLogger("drake").setLevel(logging.WARNING)
-    time, positions = largest_motion(case.record)
-    return replay_page(result.parameters, time, positions)
-
-
 def _print_tables(result: "SpinResult", out: Path, replay: bool) -> None:
-    from rich.table import Table
-
-    from wm_drake.parameters.units import Unit
     from wm_drake.report.spin.report import amplitude_table
 
-    table = Table(title=f"Displacement amplitudes of machine '{result.parameters.name}', in mm")
-    amplitudes = amplitude_table(result)
-    for name in amplitudes.columns:
-        table.add_column(
-            str(name),
-            justify="left" if name in ("load", "gasket", "source") else "right",
-            overflow="fold",
-        )
-    for row in amplitudes.itertuples(index=False):
-        table.add_row(
-            *(f"{value:.1f}" if isinstance(value, float) else str(value) for value in row)
-        )
-    millimetre = Unit("m", "mm")
+    title = f"Displacement amplitudes of machine '{result.parameters.name}', in mm"
     console = Console()
-    console.print(table)
+    console.print(amplitude_lines(title, amplitude_table(result)))
     for case in result.results:
-        gap = case.measures.smallest_gap
-        if gap:
-            console.print(
-                f"{case.case.name}: smallest gap {millimetre.from_si(gap.distance):.1f} mm between "
-                f"{gap.moving} and {gap.fixed}, at {gap.time:.2f} s"
-            )
+        if case.measures.smallest_gap:
+            console.print(f"{case.case.name}: {gap_text(case.measures.smallest_gap)}")
     replays = ", replay_<load>.html" if replay else ""
     console.print(f"Results in {out}: report.html, amplitudes.csv, record_<load>.nc{replays}")
 
@@ -180,33 +156,5 @@ def _as_json(result: "SpinResult") -> dict[str, Any]:
     return {
         "machine": result.parameters.name,
         "engine": result.engine,
-        "cases": [_case_as_json(case) for case in result.results],
-    }
-
-
-def _case_as_json(case: "CaseResult") -> dict[str, Any]:
-    from wm_drake.parameters.units import Unit
-
-    measures = case.measures
-    millimetre = Unit("m", "mm")
-
-    def numbers(values: Any, unit: Unit, prefix: str = "") -> dict[str, float | None]:
-        labels = [f"{prefix}{label}" for label in values[values.dims[0]].values]
-        # JSON has no NaN
-        shown = [unit.from_si(float(value)) if value == value else None for value in values.values]
-        return dict(zip(labels, shown, strict=True))
-
-    return {
-        "load": case.case.name,
-        "gasket": case.record.attrs["gasket"] == "yes",
-        "amplitudes_mm": numbers(measures.amplitude, millimetre),
-        "detergent_box_mm": numbers(measures.detergent_displacement, millimetre, "D"),
-        "gasket_force_N": numbers(measures.gasket_force, Unit("N", "N"), "F"),
-        "gasket_moment_Nm": numbers(measures.gasket_moment, Unit("N*m", "N*m"), "M"),
-        "smallest_gap_mm": millimetre.from_si(measures.smallest_gap.distance)
-        if measures.smallest_gap
-        else None,
-        "critical_rpm": numbers(measures.critical_speed, Unit("rad/s", "rpm")),
-        "diverged": case.record.attrs["diverged"] or None,
-        "wall_s": case.wall_s,
+        "cases": [case_as_json(case) for case in result.results],
     }

@@ -1,0 +1,212 @@
+"""Comparison of spin results: differences of planted values, remarks, and the page."""
+
+import html
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hand_made_records import case_result, spin_result
+
+from wm_drake.errors import InputError
+from wm_drake.parameters import SpinProfile, load_machine, with_value
+from wm_drake.report.spin.comparison import (
+    COLOURS,
+    comparison_report,
+    differences,
+    different_parameters,
+    overlaid_envelopes_figure,
+)
+from wm_drake.studies.spin.comparison import (
+    MOST_VARIANTS,
+    Variant,
+    check_comparable,
+    difference_table,
+    remarks,
+)
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return load_machine("reference")
+
+
+@pytest.fixture(scope="module")
+def variants(machine):
+    """With and without gasket; without, the tub moves half as far and the gap is wider."""
+    cases = [
+        [case_result(machine, "middle", True), case_result(machine, "back", True)],
+        [
+            case_result(machine, "middle", False, size=0.01, gap=0.018),
+            case_result(machine, "back", False, size=0.01, gap=0.018),
+        ],
+    ]
+    names = ("with gasket", "without gasket")
+    return [Variant(name, spin_result(machine, of)) for name, of in zip(names, cases, strict=True)]
+
+
+@pytest.fixture(scope="module")
+def table(variants):
+    return difference_table(variants)
+
+
+@pytest.fixture(scope="module")
+def page(variants):
+    return comparison_report(variants, "wm-drake spin --compare-gasket", {"with gasket": "w.html"})
+
+
+def test_differences_of_planted_values(table, variants):
+    of_middle = table[table["load"] == "middle"].set_index(["measure", "name"])
+    gap = of_middle.loc[("smallest gap", "")]
+    assert gap[["reference_value", "value", "difference", "percent"]].tolist() == pytest.approx(
+        [12.0, 18.0, 6.0, 50.0]
+    )
+    box = of_middle.loc["detergent box displacement"]
+    np.testing.assert_allclose(
+        box["reference_value"], [20.0, 6.0, 10.0], rtol=3e-3
+    )  # sampled sines
+    np.testing.assert_allclose(box["percent"], -50.0, atol=1e-9)
+    spring = of_middle.loc[("largest mount force", "spring left")]
+    assert spring[["reference_value", "value", "difference", "percent"]].tolist() == [
+        190.0,
+        190.0,
+        0.0,
+        0.0,
+    ]
+    amplitude = variants[1].result.results[0].measures.amplitude.sel(sensor="Zf")
+    assert of_middle.loc[("amplitude", "Zf"), "value"] == pytest.approx(1e3 * float(amplitude))
+
+
+def test_every_measure_has_a_row(table, machine):
+    counts = table[table["load"] == "back"].groupby("measure", sort=False).size().to_dict()
+    assert counts == {
+        "amplitude": len(machine.sensors),
+        "critical speed": len(machine.sensors),
+        "detergent box displacement": 3,
+        "smallest gap": 1,
+        "gasket force": 3,
+        "gasket moment": 3,
+        "largest mount force": 7,  # three springs, three dampers, the gasket
+    }
+
+
+def test_measure_that_a_variant_lacks_is_not_a_number(table):
+    gasket = table[table["measure"].str.startswith("gasket") | (table["name"] == "gasket")]
+    assert len(gasket) == 2 * 7
+    assert np.isfinite(gasket["reference_value"]).all()
+    assert gasket[["value", "difference", "percent"]].isna().all(axis=None)
+
+
+def test_percent_of_zero_is_not_a_number(table):
+    damper = table[table["name"] == "damper left"]
+    assert (damper["difference"] == 0.0).all()
+    assert damper["percent"].isna().all()
+
+
+def test_table_on_the_page_has_the_numbers_in_their_units(table):
+    shown = {
+        (group.heading, row.cells[0]): row.cells[1:]
+        for group in differences(table, "middle").groups
+        for row in group.rows
+    }
+    assert shown["smallest gap", ""] == ("mm", "12.0", "18.0", "+6.0", "+50")
+    assert shown["gasket force", "x"] == ("N", "20.0", "–", "–", "–")
+    assert shown["gasket moment", "x"] == ("N m", "2.00", "–", "–", "–")
+    assert shown["critical speed", "Xr"] == ("rpm", "240", "240", "0", "0")
+
+
+def test_page_names_variants_links_and_changes(page):
+    for text in (
+        "<h1>Comparison of machine reference: with gasket and without gasket</h1>",
+        "smallest gap 18.0 mm",
+        "without gasket vs. with gasket",
+        '<a href="w.html">Full report of with gasket</a>',
+        "wm-drake spin --compare-gasket",
+    ):
+        assert text in page
+    assert page.count("<img") == 2
+    assert "Different parameters" not in page  # it is one machine
+
+
+def test_figure_has_a_colour_per_variant_and_their_measurements(variants):
+    cases = {variant.name: variant.result.results[0] for variant in variants}
+    measured = {"with gasket": dict.fromkeys(variants[0].result.parameters.sensors, 29.0)}
+    figure = overlaid_envelopes_figure(cases, measured)
+    panels = [axes for axes in figure.axes if axes.get_visible()]
+    assert len(panels) == 6
+    lines = {line.get_color() for line in panels[0].lines}
+    assert {*COLOURS[:2]} <= lines
+    dashed = [line for line in panels[0].lines if line.is_dashed()]
+    assert [line.get_color() for line in dashed] == [COLOURS[0]] * 2
+    assert sorted(line.get_ydata()[0] for line in dashed) == [-29.0, 29.0]
+    assert panels[0].get_ylim()[1] > 29.0
+
+
+def test_sensor_that_only_one_machine_has_is_left_out_of_the_figure(variants):
+    other = variants[1].result.results[0]
+    fewer = replace(other, record=other.record.drop_sel(sensor=["Yr", "Yf"]))
+    figure = overlaid_envelopes_figure({"a": variants[0].result.results[0], "b": fewer})
+    names = [axes.texts[0].get_text() for axes in figure.axes if axes.get_visible()]
+    assert names == ["Xr", "Zr", "Xf", "Zf"]
+
+
+def test_there_is_a_colour_for_each_variant():
+    assert len(COLOURS) == len(set(COLOURS)) == MOST_VARIANTS
+
+
+def test_remarks_name_other_loads_profiles_and_sensors(machine, variants):
+    assert remarks(variants) == []
+    slow = SpinProfile(time=(0.0, 2.0), speed=(0.0, 10.0))
+    fewer = {name: s for name, s in machine.sensors.items() if name != "Yf"}
+    turned = fewer | {"Xr": machine.sensors["Xr"].model_copy(update={"axis": "z"})}
+    other = machine.model_copy(update={"name": "other", "sensors": turned})
+    results = [
+        replace(case, case=replace(case.case, load=machine.loads["front"], profile=slow))
+        for case in variants[0].result.results
+    ]
+    found = remarks([variants[0], Variant("other", spin_result(other, results))])
+    assert found == [
+        "Load middle is not the same in 'with gasket' and 'other'.",
+        "Load back is not the same in 'with gasket' and 'other'.",
+        "'with gasket' and 'other' follow different spin profiles.",
+        "Not all machines have the sensors Yf of 'reference'; the figures leave them out.",
+        "Sensor Xr measures along x in 'reference' and along z in 'other'.",
+    ]
+
+
+def test_parameters_that_differ_are_listed(machine, variants):
+    soft = with_value(machine, "spring_types.suspension.stiffness", 5000.0)
+    both = [variants[0], Variant("soft", replace(variants[1].result, parameters=soft))]
+    table = different_parameters(both)
+    assert [(g.heading, g.rows[0].cells) for g in table.groups] == [
+        ("spring_types.suspension.stiffness", ("9.008 N/mm", "5 N/mm"))
+    ]
+    assert different_parameters(variants) is None
+
+
+def test_machines_need_names_of_their_own_and_a_common_sensor(machine):
+    other = machine.model_copy(update={"name": "other"})
+    check_comparable([machine, other], "--machine")
+    with pytest.raises(InputError, match="2 machines have the name 'reference'"):
+        check_comparable([machine, other, machine], "--machine")
+    alone = other.model_copy(update={"sensors": {"A": machine.sensors["Xr"]}})
+    with pytest.raises(InputError, match="no sensor of the same name: 'reference' has Xr"):
+        check_comparable([machine, alone], "--machine")
+
+
+def test_names_cannot_inject_markup(machine, variants):
+    evil = "<script>alert('$x$')</script>"
+    named = [variants[0], Variant(evil, replace(variants[1].result, parameters=machine))]
+    page = comparison_report(named, evil)
+    assert "<script" not in page
+    assert html.escape(evil, quote=False).replace("'", "&#39;") in page
+
+
+def test_diverged_and_short_runs_still_give_a_page(machine, variants):
+    short = [case_result(machine, name, samples=12) for name in ("middle", "back")]
+    for case in short:
+        case.record.attrs["diverged"] = "the run diverged at 0.06 s"
+    page = comparison_report([variants[0], Variant("short", spin_result(machine, short))])
+    assert "short: Load middle (with gasket): the run diverged at 0.06 s" in page
+    assert "Every run of short diverged." in page
+    none = [Variant(name, spin_result(machine, short)) for name in ("a", "b")]
+    assert "<img" not in comparison_report(none)

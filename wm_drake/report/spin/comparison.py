@@ -1,0 +1,346 @@
+"""Comparison of spin results: overlaid envelopes, tables of differences, and a page of both."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from wm_drake.parameters import quantities
+from wm_drake.report.figures import MEASURED, OURS, QUIET
+from wm_drake.report.formatting import MISSING, MM_PER_M, number, percent, shape_name
+from wm_drake.report.page import Picture, picture, render, versions_of
+from wm_drake.report.spin import tables
+from wm_drake.report.spin.cases import speed_rpm
+from wm_drake.report.spin.panels import (
+    COLUMNS,
+    band_handle,
+    draw_band,
+    largest_handle,
+    legend_below,
+    mark_largest,
+    name_panel,
+    set_symmetric_limits,
+    time_panels,
+)
+from wm_drake.report.spin.report import warnings_of
+from wm_drake.report.tables import Group, Row, Table, line, readable
+from wm_drake.simulation.measures import envelopes
+from wm_drake.studies.spin.comparison import Variant, common_sensors, difference_table, remarks
+from wm_drake.studies.spin.study import CaseResult
+
+COLOURS = (OURS, MEASURED, "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""Colours of the variants: those of Okabe and Ito, which the colour-blind can tell apart."""
+
+MOST_MARKED = 3
+"""Largest number of variants whose largest values are written into each panel."""
+
+DASHED: dict[str, Any] = {"linewidth": 1.3, "linestyle": (0, (5, 2.5))}
+"""Line style of measured amplitudes."""
+
+DECIMALS = {"mm": 1, "rpm": 0, "N": 1, "N*m": 2}
+"""Decimals of a value in a table, by unit."""
+
+
+def overlaid_envelopes_figure(
+    cases: Mapping[str, CaseResult],
+    measured_mm: Mapping[str, Mapping[str, float]] | None = None,
+) -> Figure:
+    """Draw the envelopes of several runs over each other, one panel per sensor.
+
+    Sensors that not all runs have are left out. The drum speed along the top is that of the longest
+    run.
+
+    Args:
+        cases: By name of the variant, at most as many as there are colours; records that are long
+            enough for the filter.
+        measured_mm: By name of the variant, measured amplitude A by sensor, drawn as dashed lines
+            at +-A in the colour of the variant. [mm]
+    """
+    bands = {name: envelopes(case.record) * MM_PER_M for name, case in cases.items()}
+    longest = max((case.record for case in cases.values()), key=lambda record: record.time[-1])
+    sensors = [
+        str(name)
+        for name in longest.sensor.values
+        if all(name in band.sensor for band in bands.values())
+    ]
+    measured = measured_mm or {}
+    rows = -(-len(sensors) // COLUMNS)
+    figure, panels = time_panels(longest, len(sensors), ["displacement, mm"] * rows)
+    lines = len(cases) if len(cases) <= MOST_MARKED else 0
+    sizes = [float(abs(band.sel(sensor=sensors)).to_array().max()) for band in bands.values()]
+    sizes += [of_variant[sensor] for of_variant in measured.values() for sensor in sensors]
+    set_symmetric_limits(panels, max(sizes), max(1, lines))
+    for axes, sensor in zip(panels, sensors, strict=True):
+        name_panel(axes, sensor)
+        for index, (name, band) in enumerate(bands.items()):
+            color, record = COLOURS[index], cases[name].record
+            lower, upper = (b.sel(sensor=sensor).values for b in (band.lower, band.upper))
+            draw_band(axes, record.time.values, lower, upper, color)
+            if lines:
+                farther = np.where(np.abs(lower) > np.abs(upper), lower, upper)
+                mark_largest(axes, record, "", farther, "mm", color=color, line=index)
+            if name in measured:
+                for side in (-1.0, 1.0):
+                    axes.axhline(side * measured[name][sensor], color=color, **DASHED)
+    handles = [band_handle(name, color) for name, color in zip(cases, COLOURS, strict=False)]
+    if lines:
+        handles.append(largest_handle(QUIET))
+    if measured:
+        handles.append(Line2D([], [], color=QUIET, label="experiment, ± amplitude", **DASHED))
+    legend_below(figure, handles)
+    return figure
+
+
+def differences(table: pd.DataFrame, load: str) -> Table:
+    """Return the differences of all measures of one load as a table for a page.
+
+    Args:
+        table: Result of `difference_table`.
+        load: The load.
+    """
+    rows = table[table["load"] == load]
+    reference = rows["reference"].iloc[0]
+    names = list(dict.fromkeys(rows["variant"]))
+    header = ["measure", "where", "unit", reference]
+    for name in names:
+        header += [name, "difference", "%"]
+    groups = []
+    for measure, of_measure in rows.groupby("measure", sort=False):
+        lines = []
+        for (label, unit), of_label in of_measure.groupby(["name", "unit"], sort=False):
+            decimals = DECIMALS[str(unit)]
+            cells = [str(label), str(unit).replace("*", " ")]
+            cells.append(number(of_label["reference_value"].iloc[0], decimals))
+            for _, row in of_label.iterrows():
+                cells += [number(row["value"], decimals), signed(row["difference"], decimals)]
+                cells.append(percent(row["percent"]).removesuffix(" %"))
+            lines.append(Row(tuple(cells)))
+        groups.append(Group(str(measure), tuple(lines)))
+    caption = (
+        f"Every measure of load {load}. Difference: value − value of '{reference}', absolute and "
+        f"in percent of the latter. {MISSING}: this variant does not have the measure."
+    )
+    return Table(caption, tuple(header), tuple(groups), text_columns=3)
+
+
+def signed(value: float, decimals: int) -> str:
+    """Return a difference as text with its sign; zero has none."""
+    text = number(value, decimals)
+    return f"+{text}" if float(np.round(value, decimals)) > 0.0 else text
+
+
+def amplitudes(variants: Sequence[Variant], table: pd.DataFrame) -> Table:
+    """Return the amplitudes of all variants, load by load, with the differences in percent.
+
+    Args:
+        variants: The variants.
+        table: Result of `difference_table` for them.
+    """
+    sensors = common_sensors([variant.result.parameters for variant in variants])
+    groups = []
+    for index, case in enumerate(variants[0].result.results):
+        rows = []
+        for variant in variants:
+            sizes = variant.result.results[index].measures.amplitude.sel(sensor=sensors)
+            values = (number(MM_PER_M * float(size)) for size in sizes)
+            rows.append(Row((variant.name, *values), "ours"))
+        of_load = table[(table["load"] == case.case.name) & (table["measure"] == "amplitude")]
+        for variant in variants[1:]:
+            own = of_load[of_load["variant"] == variant.name].set_index("name")["percent"]
+            heading = f"{variant.name} vs. {variants[0].name}"
+            rows.append(Row((heading, *(percent(own[name]) for name in sensors)), "difference"))
+        groups.append(Group(case.case.name, tuple(rows)))
+    caption = (
+        "Amplitude of the displacement at each sensor: the largest absolute value of its envelopes "
+        f"in the band 0.5–20 Hz. Differences are in percent of '{variants[0].name}'."
+    )
+    header = ("load", "machine or variant", *(f"{name}, mm" for name in sensors))
+    return Table(caption, header, tuple(groups), text_columns=2)
+
+
+def different_parameters(variants: Sequence[Variant]) -> Table | None:
+    """Return the parameters that differ between the machines; None if there are none."""
+    of_machines = [
+        {key: readable(value, unit) for key, value, unit in quantities(variant.result.parameters)}
+        for variant in variants
+    ]
+    keys = dict.fromkeys(key for of_machine in of_machines for key in of_machine)
+    groups = []
+    for key in keys:
+        values = [of_machine.get(key, MISSING) for of_machine in of_machines]
+        if len(set(values)) > 1:
+            groups.append(line(key, values))
+    if not groups:
+        return None
+    caption = (
+        f"Parameters of the machine files that differ. {MISSING}: this machine does not have it."
+    )
+    header = ("key", *(variant.name for variant in variants))
+    return Table(caption, header, tuple(groups), text_columns=1 + len(variants))
+
+
+def envelopes_picture(variants: Sequence[Variant], index: int) -> Picture | None:
+    """Return the overlaid envelopes of the case with an index, or None if no run has any.
+
+    Runs that are too short for the filter are left out.
+    """
+    cases = {
+        variant.name: variant.result.results[index]
+        for variant in variants
+        if not variant.result.results[index].measures.amplitude.isnull().any()
+    }
+    if not cases:
+        return None
+    measured = _measured_mm([variant for variant in variants if variant.name in cases], index)
+    load = variants[0].result.results[index].case.name
+    caption = (
+        "Displacement at each sensor over time, in the band 0.5–20 Hz. Each shaded area extends "
+        "from the lower to the upper envelope."
+    )
+    if len(cases) <= MOST_MARKED:
+        caption += (
+            " Dots: the largest absolute values; the top of the panel gives them with their drum "
+            "speeds."
+        )
+    profiles = {name: case.case.profile for name, case in cases.items()}
+    if len(set(map(str, profiles.values()))) > 1:
+        longest = max(profiles, key=lambda name: profiles[name].duration)
+        caption += f" The drum speed along the top is that of {longest}."
+    if measured:
+        caption += (
+            " Dashed lines: measured amplitude, on both sides of zero, in the colour of the "
+            "machine or variant that was measured."
+        )
+    alternative = (
+        f"Overlaid envelopes of the displacement over time, load {load}: {', '.join(cases)}."
+    )
+    return picture(overlaid_envelopes_figure(cases, measured), alternative, caption)
+
+
+def _measured_mm(variants: Sequence[Variant], index: int) -> dict[str, dict[str, float]]:
+    """Return the measured amplitudes of a case by variant and sensor; equal ones only once. [mm]"""
+    found: dict[str, dict[str, float]] = {}
+    for variant in variants:
+        table = tables.amplitude_table(variant.result)
+        measured = tables.experiment_mm(table, variant.result.results[index])
+        if measured is not None and measured not in found.values():
+            found[variant.name] = measured
+    return found
+
+
+def comparison_report(
+    variants: Sequence[Variant], command: str = "", pages: Mapping[str, str] | None = None
+) -> str:
+    """Return the comparison as text of one self-contained HTML file.
+
+    Args:
+        variants: At least two, with the same loads.
+        command: Command line of the run, shown on the page.
+        pages: Names of the files with the page of each variant alone, by name of the variant.
+    """
+    table = difference_table(variants)
+    first = variants[0].result
+    views = []
+    for index, case in enumerate(first.results):
+        views.append(
+            {
+                "anchor": f"case-{index + 1}",
+                "title": case.case.name,
+                "facts": _gap_facts(variants, index),
+                "picture": envelopes_picture(variants, index),
+                "table": differences(table, case.case.name),
+            }
+        )
+    return render(
+        "spin/comparison.html",
+        title=title(variants),
+        about="",
+        summary=summary(variants, table),
+        warnings=[
+            f"{variant.name}: {text}"
+            for variant in variants
+            for text in warnings_of(variant.result)
+        ],
+        remarks=remarks(variants),
+        amplitudes=amplitudes(variants, table),
+        cases=views,
+        pages=[(variant.name, (pages or {}).get(variant.name, "")) for variant in variants],
+        parameters=different_parameters(variants),
+        facts=facts_of_comparison(variants, command),
+    )
+
+
+def title(variants: Sequence[Variant]) -> str:
+    """Return the title of the page: the machine, if there is only one, and the variants."""
+    names, machine = _listed([variant.name for variant in variants]), variants[0].result.parameters
+    if all(variant.result.parameters.name == machine.name for variant in variants):
+        return f"Comparison of machine {machine.name}: {names}"
+    return f"Comparison of machines {names}"
+
+
+def summary(variants: Sequence[Variant], table: pd.DataFrame) -> str:
+    """Return one paragraph: the largest amplitude and the smallest gap of each variant."""
+    count = len(variants[0].result.results)
+    loads = "1 load was" if count == 1 else f"{count} loads were"
+    opening = f"{loads} run for each of {len(variants)} machines or variants."
+    sentences = [opening, *(_of_variant(variant) for variant in variants)]
+    changes = table[(table["measure"] == "amplitude") & np.isfinite(table["percent"])]
+    if len(changes):
+        largest = changes.loc[changes["percent"].abs().idxmax()]
+        sentences.append(
+            f"The largest change of an amplitude is {percent(largest['percent'])}, at sensor "
+            f"{largest['name']} with load {largest['load']}: {number(largest['reference_value'])} "
+            f"mm ({largest['reference']}), {number(largest['value'])} mm ({largest['variant']})."
+        )
+    return " ".join(sentences)
+
+
+def _of_variant(variant: Variant) -> str:
+    ended = [case for case in variant.result.results if not case.record.attrs["diverged"]]
+    if not ended:
+        return f"Every run of {variant.name} diverged."
+    amplitude = max(float(case.measures.amplitude.fillna(0.0).max()) for case in ended)
+    text = f"{variant.name}: largest amplitude {number(MM_PER_M * amplitude)} mm"
+    gaps = [case.measures.smallest_gap for case in ended]
+    distances = [gap.distance for gap in gaps if gap is not None]
+    return (
+        f"{text}, smallest gap {number(MM_PER_M * min(distances))} mm." if distances else f"{text}."
+    )
+
+
+def _gap_facts(variants: Sequence[Variant], index: int) -> str:
+    """Return the smallest gaps of the case with an index, as one sentence; empty without gaps."""
+    found = []
+    for variant in variants:
+        case = variant.result.results[index]
+        gap = case.measures.smallest_gap
+        if gap is not None:
+            found.append(
+                f"{variant.name} {number(MM_PER_M * gap.distance)} mm between "
+                f"{shape_name(gap.moving)} and {shape_name(gap.fixed)}, at "
+                f"{number(speed_rpm(case, gap.time), 0)} rpm"
+            )
+    return f"Smallest gap to the housing: {'; '.join(found)}." if found else ""
+
+
+def facts_of_comparison(variants: Sequence[Variant], command: str) -> list[tuple[str, str]]:
+    """Return what was run and with which software, as pairs of heading and text."""
+    first = variants[0].result
+    facts = []
+    for variant in variants:
+        machine = variant.result.parameters
+        step = f"step {1e3 * variant.result.step:g} ms"
+        facts.append((variant.name, f"{machine.about} {step.capitalize()}.".strip()))
+    facts += [
+        ("Engine", first.engine),
+        ("Versions", versions_of(first.results[0].record.attrs)),
+        ("Command", command),
+    ]
+    return [(word, text) for word, text in facts if text]
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} and {names[-1]}"
