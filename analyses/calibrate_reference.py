@@ -24,15 +24,15 @@ from wm_drake.parameters import (
     machine_path,
 )
 from wm_drake.parameters.free import FreeFile, load_free
-from wm_drake.parameters.measured import measured_amplitudes, measured_responses
+from wm_drake.parameters.measured import DESIGN, NamedValue, measured_amplitudes
+from wm_drake.parameters.published import CONSTANT, published_results
 from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate, identity_of
 from wm_drake.studies.calibration.outcome import mean_and_largest, solved_machine
 from wm_drake.studies.calibration.prediction import Prediction, predict
 from wm_drake.studies.calibration.targets import Targets, targets_of
+from wm_drake.studies.gasket.responses import known_responses
 
 FREE = Path(__file__).with_name("reference_free.yaml")
-MEANS = machine_path("reference").with_name("sanchez_tabuenca_2020_table5_means.csv")
-"""[B] Table 5: grand means of D, F and M over the design of the gasket study."""
 HELD_OUT = (("back", "front"), ("middle",), ("counter",), ("back",), ("front",))
 """Loads that are held out together, one group per prediction."""
 WEIGHTS = {"middle:Yf": 1.3}
@@ -75,11 +75,22 @@ def main() -> None:
 
 
 def _targets(parameters: MachineParameters) -> Targets:
-    """Return the amplitudes and the means of [B]."""
-    means = parameters.model_copy(update={"measured": (str(MEANS),)})
-    return targets_of(
-        parameters, measured_amplitudes(parameters), responses=measured_responses(means)
-    )
+    """Return the amplitudes of [B], and the grand means of its gasket study (Table 5)."""
+    known = {r.name: r for r in known_responses(parameters, parameters.profile)}
+    means = [
+        NamedValue(
+            load,
+            True,
+            "Adams model of [B]",
+            DESIGN,
+            name,
+            terms[CONSTANT].effects[0],
+            known[name].unit.shown,
+            ", ".join(parameters.published),
+        )
+        for (load, name), terms in published_results(parameters.published).items()
+    ]
+    return targets_of(parameters, measured_amplitudes(parameters), responses=means)
 
 
 def _arguments() -> argparse.Namespace:

@@ -12,6 +12,7 @@ from wm_drake.simulation.measures import (
     moment_of_largest_amplitude,
     peak_line,
     percent_difference,
+    smooth_envelope,
 )
 
 RATE = 200.0  # Hz, as records are sampled
@@ -96,6 +97,33 @@ def test_envelopes_of_a_growing_and_decaying_oscillation_follow_its_size():
     both = envelopes(record_of(size * np.sin(2 * np.pi * 3.0 * time)))
     np.testing.assert_allclose(both.upper.isel(sensor=0), size, atol=1e-4)
     np.testing.assert_allclose(both.lower.isel(sensor=0), -size, atol=1e-4)
+
+
+def test_smooth_envelope_is_the_size_of_an_oscillation_and_of_a_beat():
+    time = np.arange(8000) / RATE
+    size = 0.01 * np.exp(-(((time - 20.0) / 6.0) ** 2))
+    first, second = np.sin(2 * np.pi * 3.0 * time), np.sin(2 * np.pi * 4.0 * time)
+    smooth = smooth_envelope(record_of(size * first)).isel(sensor=0)
+    np.testing.assert_allclose(smooth, size, atol=5e-5)
+    beat = smooth_envelope(record_of(size * (first + second))).isel(sensor=0)
+    np.testing.assert_allclose(beat, 2.0 * size * abs(np.cos(np.pi * time)), atol=2e-4)
+
+
+def test_small_peaks_do_not_make_the_smooth_envelope_jump():
+    """A second harmonic gets peaks of its own above half of the fundamental."""
+    time = np.arange(8000) / RATE
+    first, second = np.sin(2 * np.pi * 2.0 * time), np.sin(2 * np.pi * 4.0 * time)
+
+    def change(envelope, share, step=0.002):
+        both = (0.01 * (first + x * second) for x in (share, share + step))
+        before, after = (np.asarray(envelope(record_of(signal))) for signal in both)
+        return np.abs(after - before)[2000:6000].max()
+
+    shares = np.arange(0.4, 0.6, 0.002)
+    smooth = [change(smooth_envelope, share) for share in shares]
+    lines = [change(lambda record: envelopes(record).upper, share) for share in shares]
+    assert max(smooth) <= 0.01 * 0.002 * 1.01  # the size of the change itself
+    assert max(lines) > 1e-3
 
 
 def test_measures_read_amplitude_speed_and_forces():

@@ -20,7 +20,7 @@ from wm_drake.simulation.runs import checked_step
 _ROOMS_AFTER = ("cli", "batch/ledger.py", "report", "rigs", "studies")
 """Parts of the package that do not influence the result of a run."""
 
-_EXCLUDED = {"name", "about", "measured", "sources", "loads", "profile"}
+_EXCLUDED = {"name", "about", "measured", "published", "sources", "loads", "profile"}
 """Fields of a machine that do not influence a run, or that the case replaces by its own."""
 
 

@@ -194,11 +194,12 @@ def check_buildable(file: str, parameters: "MachineParameters") -> "tuple[Proble
     from wm_drake.model.build import build_machine
     from wm_drake.model.plausibility import unusual_values
     from wm_drake.model.scene import Scene
-    from wm_drake.parameters import located, machine_path, measured_amplitudes
+    from wm_drake.parameters import located, machine_path, measured_amplitudes, published_results
     from wm_drake.simulation.runs import checked_step
 
     with located_in(file):
         measured_amplitudes(parameters)
+        published_results(parameters.published)
         step = checked_step(parameters, None)
         setup = build_machine(parameters).set_up()
         check_step(setup, step)

@@ -117,7 +117,7 @@ def _template(path: Path, base: str) -> str:
     extends = base
     if base not in shipped_machines():
         extends = os.path.relpath(machine_path(base).resolve(), path.parent.resolve())
-    own = {"name", "about", "model", "measured"}
+    own = {"name", "about", "model", "measured", "published"}
     lines = machine_yaml(parameters.model_copy(update={"sources": {}})).splitlines()
     comments, skipped = [], False
     for line in lines:

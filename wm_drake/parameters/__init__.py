@@ -62,6 +62,7 @@ from wm_drake.parameters.machine import (
     Sensor,
 )
 from wm_drake.parameters.measured import measured_amplitudes
+from wm_drake.parameters.published import PublishedResults, PublishedTerm, published_results
 from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
 
 __all__ = [
@@ -90,6 +91,8 @@ __all__ = [
     "MachineParameters",
     "MeasuredLoop",
     "MstvDamper",
+    "PublishedResults",
+    "PublishedTerm",
     "Sensor",
     "SpinProfile",
     "Spring",
@@ -113,6 +116,7 @@ __all__ = [
     "machine_yaml",
     "measured_amplitudes",
     "nominal_stiffness",
+    "published_results",
     "quantities",
     "read_loop",
     "read_loops",

@@ -42,6 +42,9 @@ DEEPEST, MOST_VALUES = 40, 20_000
 LONGEST_CHAIN = 20
 """Largest number of machine files that extend each other."""
 
+OF_MEASURED_MACHINE = ("measured", "published")
+"""Keys with files about the machine that was measured; a machine that extends it has none."""
+
 
 def shipped_machines() -> dict[str, Path]:
     """Return the machine files that the package contains, by name."""
@@ -354,7 +357,8 @@ def _extended(path: Path, seen: tuple[Path, ...]) -> CommentedMap:
         message = f"more than {LONGEST_CHAIN} files extend each other; extend an earlier one"
         raise input_error(message, where=str(path), key="extends")
     base_tree = _extended(base_path, seen)
-    base_tree.pop("measured", None)  # another machine was measured
+    for key in OF_MEASURED_MACHINE:  # another machine was measured
+        base_tree.pop(key, None)
     if "model" in base_tree:  # paths are relative to the file that contains them
         base_tree["model"] = _with_absolute_paths({"model": base_tree["model"]}, base_path)["model"]
     _merge(base_tree, tree)
@@ -418,8 +422,9 @@ def _with_absolute_paths(tree: dict[str, Any], path: Path) -> dict[str, Any]:
     model = tree.get("model")
     if isinstance(model, str) and is_file(path.parent / model):
         changed["model"] = _absolute(path.parent / model)
-    if isinstance(tree.get("measured"), list):
-        changed["measured"] = [_absolute(path.parent / str(name)) for name in tree["measured"]]
+    for key in OF_MEASURED_MACHINE:
+        if isinstance(tree.get(key), list):
+            changed[key] = [_absolute(path.parent / str(name)) for name in tree[key]]
     return changed
 
 

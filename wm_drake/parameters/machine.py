@@ -187,6 +187,7 @@ class MachineParameters(Frozen):
     loads: dict[Name, Load]
     profile: SpinProfile
     measured: tuple[str, ...] = ()
+    published: tuple[str, ...] = ()
     sources: dict[str, str] = Field(default={}, repr=False)
 
     @field_validator("springs", "dampers", "telescopic_dampers")

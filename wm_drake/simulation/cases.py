@@ -31,6 +31,22 @@ class Case:
     parameters: MachineParameters | None = None
 
 
+def is_as_measured(parameters: MachineParameters, case: Case) -> bool:
+    """Return whether a case has numbers, load and spin profile of a machine file.
+
+    Only such a case may be compared with what the machine file says was measured or published.
+
+    Args:
+        parameters: The machine of the file.
+        case: The case.
+    """
+    return (
+        case.parameters in (None, parameters)
+        and case.load == parameters.loads.get(case.name)
+        and case.profile == parameters.profile
+    )
+
+
 def case_of(parameters: MachineParameters, load: str, *, gasket: bool = True) -> Case:
     """Return the case that runs one of a machine's loads over the machine's own profile.
 

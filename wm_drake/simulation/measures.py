@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from scipy.signal import butter, find_peaks, sosfiltfilt
+from scipy.signal import butter, find_peaks, hilbert, sosfiltfilt
 
 from wm_drake.model.scene import REPLAY_RATE, Gap, Scene
 from wm_drake.parameters import SpinProfile
@@ -197,6 +197,17 @@ def peak_line(time: FloatArray, signal: FloatArray) -> FloatArray:
     """
     peaks = find_peaks(signal)[0]
     return np.interp(time, time[peaks], signal[peaks]) if len(peaks) else signal
+
+
+def smooth_envelope(record: Record) -> xr.DataArray:
+    """Return the smooth envelope (time, sensor) of the filtered displacements. [m]
+
+    It is the magnitude of the analytic signal d + i H(d), with the Hilbert transform H; the lower
+    envelope is its negative. Unlike a line from peak to peak it is a smooth function of all
+    parameters: a line jumps where a small peak appears.
+    """
+    displacement = filtered_displacement(record)
+    return displacement.copy(data=np.abs(hilbert(displacement.values, axis=0)))
 
 
 def percent_difference(value: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:

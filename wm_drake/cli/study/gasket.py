@@ -43,7 +43,10 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.report.gasket.words import Words
     from wm_drake.simulation.cases import Case
     from wm_drake.studies.doe import Design
-    from wm_drake.studies.gasket.screening import Screening
+    from wm_drake.studies.doe.anova import AnovaTable
+    from wm_drake.studies.gasket.beside import Beside
+    from wm_drake.studies.gasket.published import Published
+    from wm_drake.studies.gasket.screening import Label, Screening
     from wm_drake.studies.gasket.study import GasketTrials
 
 WIDE = 100
@@ -112,10 +115,20 @@ def gasket(
     tables: Annotated[
         str,
         typer.Option(
-            help="Treatment of a stiffness that is given as a table. linear: replace it by its "
-            "slope at rest times the level. scaled: multiply its forces by the level."
+            help="Treatment of a stiffness that is given as a table. scaled: multiply its forces "
+            "by the level, so that level 0 is the machine. linear: replace it by its slope at rest "
+            "times the level, as in [B]. The page shows how much both differ at level 0."
         ),
-    ] = "linear",
+    ] = "scaled",
+    published: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Published results to compare with: load, response, term, percent, effects. "
+            "Repeatable. Default: those of the machine file, for its own numbers, loads and "
+            "profile and the factors of [B].",
+            metavar="CSV",
+        ),
+    ] = None,
     profile: ProfileOption = None,
     workers: WorkersOption = None,
     cluster: Annotated[
@@ -133,9 +146,12 @@ def gasket(
 ) -> None:
     """Find how stiffness and damping of the gasket affect displacement, force and moment."""
     begin = time.perf_counter()
+    from wm_drake.parameters import TABLES
+    from wm_drake.studies.gasket.beside import Beside
+    from wm_drake.studies.gasket.level_zero import run_level_zero
     from wm_drake.studies.gasket.screening import check_degrees_of_freedom
 
-    parameters = load_parameters(machine, sets)
+    parameters = _with_published(load_parameters(machine, sets), published)
     levels = _factors(parameters, factor, factors, tables)
     plan = _design(design, levels, trials, model, seed)
     check_degrees_of_freedom(plan)
@@ -143,17 +159,58 @@ def gasket(
     middle = _at_middle(parameters, levels)
     check_buildable(machine, parameters)
     work = _work(middle, levels, cases, response or [])
+    every = {name: _factors(parameters, factor, factors, name) for name in TABLES}
+    compared = [] if sets or factor or factors else _as_measured(parameters, cases)
+    known = _published(parameters, work, [c.name for c in cases] if published else compared)
     identity = _identity(work, plan)
     writer = Run("study gasket", overwrite, identity)
     with (
-        _runner(middle, workers, cluster) as run,
+        _runner(workers, cluster) as run,
         study_ledger(out, writer, identity, resume) as ledger,
     ):
-        screening = _run(work, plan, partial(run, ledger=ledger))
+        screening = _run(work, plan, partial(run, middle, ledger=ledger))
+        zero = run_level_zero(
+            parameters,
+            every,
+            tables,
+            cases,
+            work.chosen,
+            lambda built, some: run(built, some, measures=work.measures, ledger=ledger),
+        )
         ledger.mark_finished()
+        beside = Beside(known, zero)
         with result_folder(out, writer, RUNS_KEPT) as folder:
-            _write(screening, work, folder, time.perf_counter() - begin)
-    _print_result(screening, work, out, as_json, time.perf_counter() - begin)
+            _write(screening, work, beside, folder, time.perf_counter() - begin)
+    _print_result(screening, work, beside, out, as_json, time.perf_counter() - begin)
+
+
+def _with_published(
+    parameters: "MachineParameters", files: list[Path] | None
+) -> "MachineParameters":
+    """Return the machine with other files of published results, if any are given."""
+    if not files:
+        return parameters
+    paths = tuple(str(existing_file(path, "--published").resolve()) for path in files)
+    return parameters.model_copy(update={"published": paths})
+
+
+def _as_measured(parameters: "MachineParameters", cases: "list[Case]") -> list[str]:
+    """Return the names of the loads that a machine file may compare with published results."""
+    from wm_drake.simulation.cases import is_as_measured
+
+    return [case.name for case in cases if is_as_measured(parameters, case)]
+
+
+def _published(
+    parameters: "MachineParameters", work: "GasketTrials", loads: list[str]
+) -> "Published":
+    """Return the published results of some loads."""
+    from wm_drake.parameters import published_results
+    from wm_drake.studies.gasket.published import published_beside
+
+    labels = [(load, response.name) for load in loads for response in work.chosen]
+    names = ", ".join(Path(path).name for path in parameters.published)
+    return published_beside(published_results(parameters.published), labels, names)
 
 
 def _factors(
@@ -243,7 +300,9 @@ def _identity(work: "GasketTrials", plan: "Design") -> dict[str, str]:
     machine = work.parameters
     levels = key_of(levels=plan.levels, settings=[f.settings for f in work.factors])[:8]
     runs = key_of(
-        numbers=machine.model_dump_json(exclude={"name", "about", "sources", "measured"})
+        numbers=machine.model_dump_json(
+            exclude={"name", "about", "sources", "measured", "published"}
+        )
     )[:8]
     loads = key_of(loads=[(case.load, case.profile) for case in work.loads])[:8]
     return {
@@ -257,19 +316,21 @@ def _identity(work: "GasketTrials", plan: "Design") -> dict[str, str]:
 
 
 @contextmanager
-def _runner(
-    parameters: "MachineParameters", workers: int | None, cluster: str | None
-) -> "Iterator[Callable[..., xr.Dataset]]":
-    """Yield the function that runs cases: on the cores of this computer, or on a cluster."""
+def _runner(workers: int | None, cluster: str | None) -> "Iterator[Callable[..., xr.Dataset]]":
+    """Yield the function that builds a machine and runs cases: on this computer or a cluster."""
     from wm_drake.batch import simulate_remembered
     from wm_drake.batch.cluster import cluster_client, simulate_on_cluster
     from wm_drake.model.build import build_machine
 
     if cluster is None:
-        yield partial(simulate_remembered, build_machine(parameters), workers=workers)
+        yield lambda built, cases, **options: simulate_remembered(
+            build_machine(built), cases, workers=workers, **options
+        )
     else:
         with cluster_client(cluster) as client:
-            yield partial(simulate_on_cluster, build_machine(parameters), client=client)
+            yield lambda built, cases, **options: simulate_on_cluster(
+                build_machine(built), cases, client=client, **options
+            )
 
 
 def _run(work: "GasketTrials", plan: "Design", run: "Callable[..., xr.Dataset]") -> "Screening":
@@ -284,19 +345,26 @@ def _run(work: "GasketTrials", plan: "Design", run: "Callable[..., xr.Dataset]")
         )
 
 
-def _write(screening: "Screening", work: "GasketTrials", folder: Path, wall_s: float) -> None:
+def _write(
+    screening: "Screening", work: "GasketTrials", beside: "Beside", folder: Path, wall_s: float
+) -> None:
     from wm_drake.report.gasket.report import gasket_report
     from wm_drake.studies.gasket.tables import write_tables
 
-    write_tables(screening, folder, work.factors)
+    write_tables(screening, folder, work.factors, beside)
     command = command_line()
     (folder / "report.html").write_text(
-        gasket_report(screening, work, command, wall_s), encoding="utf-8"
+        gasket_report(screening, work, command, wall_s, beside), encoding="utf-8"
     )
 
 
 def _print_result(
-    screening: "Screening", work: "GasketTrials", out: Path, as_json: bool, wall_s: float
+    screening: "Screening",
+    work: "GasketTrials",
+    beside: "Beside",
+    out: Path,
+    as_json: bool,
+    wall_s: float,
 ) -> None:
     from wm_drake.report.gasket.findings import summary, warnings
     from wm_drake.report.gasket.words import Words
@@ -304,10 +372,10 @@ def _print_result(
 
     words = Words(work.factors, screening.responses.meanings)
     if as_json:
-        typer.echo(to_json(as_plain_data(screening) | {"wall_s": wall_s}))
+        typer.echo(to_json(as_plain_data(screening, beside) | {"wall_s": wall_s}))
     else:
-        _print_table(screening, words)
-        say("\n".join(summary(screening, words)))
+        _print_table(screening, words, beside.published)
+        say("\n".join(summary(screening, words, beside)))
         say(f"Results in {out}: report.html and CSV tables")
     for text in warnings(screening, words):
         say(f"warning: {text}", err=True)
@@ -317,30 +385,43 @@ def _print_result(
         raise typer.Exit(1)
 
 
-def _print_table(screening: "Screening", words: "Words") -> None:
+def _print_table(screening: "Screening", words: "Words", published: "Published") -> None:
     from rich.table import Table
 
-    from wm_drake.report.gasket.tables import r2_text
-    from wm_drake.studies.gasket.screening import leading_terms
+    from wm_drake.report.gasket.tables import published_cells, r2_text
 
-    design = screening.design
+    design, has_means = screening.design, published.has_means
     about = f"{design.kind}, {design.trials} trials, D-efficiency {design.efficiency():.2f} %"
     table = Table(title=f"Percent of the variance explained ({about})")
     for name in ("load", "response"):
         table.add_column(name)
-    for name in ("mean", "main", "inter-\nactions", "resid-\nual", "pre-\ndicted\nR2"):
+    means = ("mean", "pub-\nlished\nmean", "differ-\nence") if has_means else ("mean",)
+    for name in (*means, "main", "inter-\nactions", "resid-\nual", "pre-\ndicted\nR2"):
         table.add_column(name, justify="right")
     console = Console()
     is_wide = console.width >= WIDE
     if is_wide:
         table.add_column("leading terms, percent")
     for (load, name), found in screening.tables.items():
-        leading = ", ".join(
-            f"{term.name.replace(':', ' × ')} {term.percent:.0f}" for term in leading_terms(found)
-        )
+        leading = ", ".join(_leading_texts(found, published, (load, name)))
         percents = (found.main_percent, found.interaction_percent, found.residual_percent)
         mean = f"{found.constant:.3g} {screening.responses.units[name]}"
-        texts = (load, words.response(name), mean, *(f"{value:.1f}" for value in percents))
+        known = published_cells(screening, published, (load, name)) if has_means else ()
+        texts = (load, words.response(name), mean, *known, *(f"{v:.1f}" for v in percents))
         texts = (*texts, r2_text(found.predicted_r2), *([leading] if is_wide else []))
         table.add_row(*texts)
     console.print(table)
+    if published.has_terms:
+        console.print("In parentheses: the published percentage of a leading term.")
+
+
+def _leading_texts(table: "AnovaTable", published: "Published", label: "Label") -> list[str]:
+    """Return the leading terms of a response with their percentages, and the published ones."""
+    from wm_drake.studies.gasket.screening import leading_terms
+
+    texts = []
+    for term in leading_terms(table):
+        known = published.percent(label, term)
+        beside = "" if known is None else f" ({known:.0f})"
+        texts.append(f"{term.name.replace(':', ' × ')} {term.percent:.0f}{beside}")
+    return texts

@@ -6,11 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wm_drake.report.formatting import number
+from wm_drake.report.formatting import number, percent
 from wm_drake.report.gasket.tables import digits, r2_text
 from wm_drake.report.gasket.words import LEVELS, Words
 from wm_drake.report.springs import CONSEQUENCE
 from wm_drake.studies.doe.anova import Term
+from wm_drake.studies.gasket.beside import ALONE, Beside
+from wm_drake.studies.gasket.level_zero import LevelZero
+from wm_drake.studies.gasket.published import FAR, Published
 from wm_drake.studies.gasket.responses import GAP
 from wm_drake.studies.gasket.screening import (
     LEADING_INTERACTION_PERCENT,
@@ -25,12 +28,22 @@ from wm_drake.studies.gasket.screening import (
 ADVICE_PERCENT = 5.0
 """Smallest contribution to a response with which a factor counts in the advice."""
 
+MOST_NAMED = 6
+"""Largest number of results that a sentence names."""
+
+SAME_PERCENT = 0.01
+"""Difference below which level 0 is called the machine; rounding changes late digits. [%]"""
+
 MODEL_NAMES = {"main": "main effects", "main+2fi": "main effects and two-factor interactions"}
 """Names of the models of the analysis for reading."""
 
 
-def summary(screening: Screening, words: Words) -> list[str]:
-    """Return sentences on design, contact, most influential factors and quality of the model."""
+def summary(screening: Screening, words: Words, beside: Beside = ALONE) -> list[str]:
+    """Return sentences on the study and its results.
+
+    They are about the design, contact, the most influential factors, the quality of the model,
+    published results and level 0.
+    """
     design, runs = screening.design, screening.design.trials * len(screening.loads)
     sentences = [
         f"{runs} runs: {design.trials} trials of {len(design.factors)} factors ({design.kind}, "
@@ -40,7 +53,73 @@ def summary(screening: Screening, words: Words) -> list[str]:
     sentences += _contact(screening)
     sentences += _drivers(screening, words)
     sentences.append(_quality(screening, words))
+    if beside.published:
+        sentences += _against_published(screening, words, beside.published)
+    if beside.level_zero is not None:
+        sentences.append(level_zero_text(beside.level_zero, words))
     return sentences
+
+
+def _against_published(screening: Screening, words: Words, published: Published) -> list[str]:
+    """Return sentences on the published results that ours are far from."""
+    texts = []
+    means = [label for label in screening.tables if published.mean(label) is not None]
+    if means:
+        far = published.far_means(screening)
+        ranked = sorted(far, key=lambda label: -abs(far[label]))
+        named = [
+            f"{words.response(n)}, load {load} ({percent(far[load, n])})" for load, n in ranked
+        ]
+        texts.append(
+            f"Means beside the published ones: {len(far)} of {len(means)} differ by more than "
+            f"{FAR:g} %{_listed(named)}."
+        )
+    if published.has_terms:
+        points = published.far_contributions(screening)
+        terms = sorted(points, key=lambda key: -abs(points[key]))
+        named = [
+            f"{words.term(term)} on {words.response(name)}, load {load} "
+            f"({number(points[(load, name), term], 0)} points)"
+            for (load, name), term in terms
+        ]
+        texts.append(
+            f"Contributions beside the published ones: {len(points)} differ by more than "
+            f"{FAR:g} points of percent{_listed(named)}."
+        )
+    return texts
+
+
+def _listed(named: list[str]) -> str:
+    """Return the first texts of a list after a colon, and how many more there are."""
+    shown = named[:MOST_NAMED]
+    more = len(named) - len(shown)
+    shown += [f"{more} more"] if more else []
+    return f": {_joined(shown)}" if shown else ""
+
+
+def level_zero_text(zero: LevelZero, words: Words) -> str:
+    """Return a sentence on level 0 and the machine."""
+    (load, name), change = zero.largest("linear")
+    where = f"{words.response(name)}, load {load}"
+    size = f"up to {number(abs(change), 1)} % ({where})"
+    if zero.tables == "linear":
+        return (
+            "Level 0 of this study is not the machine: its stiffness tables are replaced by their "
+            f"slopes at rest, as in [B], so responses at level 0 differ by {size}. With --tables "
+            "scaled, level 0 is the machine."
+        )
+    (_, _), own = zero.largest("scaled")
+    is_machine = abs(own) < SAME_PERCENT
+    first = (
+        "Level 0 of the study is the machine."
+        if is_machine
+        else f"Level 0 of the study differs from the machine by up to {number(abs(own), 1)} %, "
+        "because of the bounds of the factors."
+    )
+    return (
+        f"{first} With the slopes at rest in place of stiffness tables (--tables linear, as in "
+        f"[B]), responses at level 0 differ from it by {size}."
+    )
 
 
 def _contact(screening: Screening) -> list[str]:

@@ -11,6 +11,8 @@ from wm_drake.report.gasket.words import Words
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.tables import Table, parameter_table
 from wm_drake.simulation.records import versions
+from wm_drake.studies.gasket.beside import ALONE, Beside
+from wm_drake.studies.gasket.published import Published
 from wm_drake.studies.gasket.screening import Screening
 from wm_drake.studies.gasket.study import GasketTrials
 
@@ -28,7 +30,11 @@ class LoadView:
 
 
 def gasket_report(
-    screening: Screening, trials: GasketTrials, command: str = "", wall_s: float = float("nan")
+    screening: Screening,
+    trials: GasketTrials,
+    command: str = "",
+    wall_s: float = float("nan"),
+    beside: Beside = ALONE,
 ) -> str:
     """Return the report as text of one self-contained HTML file.
 
@@ -37,6 +43,7 @@ def gasket_report(
         trials: Trials that were run.
         command: Command line of the study, shown on the page.
         wall_s: Computing time. [s]
+        beside: Published results and level 0, shown beside the results.
     """
     parameters = trials.parameters
     words = Words(trials.factors, screening.responses.meanings)
@@ -44,17 +51,19 @@ def gasket_report(
         "gasket/page.html",
         title=f"Gasket study of machine {parameters.name}",
         about=parameters.about,
-        summary=" ".join(summary(screening, words)),
+        summary=" ".join(summary(screening, words, beside)),
         advice=advice(screening, words),
         warnings=warnings(screening, words) + _warnings(screening, trials),
         heat_map=_heat_map(screening, words),
-        variance=tables.variance(screening, words),
+        variance=tables.variance(screening, words, beside.published),
         touching=tables.touching(screening, words) if screening.responses.touching else None,
         about_residual=about_residual(screening),
         spreads=_spreads(screening, words),
         loads=[
-            _load_view(screening, index, load, words) for index, load in enumerate(screening.loads)
+            _load_view(screening, index, load, words, beside.published)
+            for index, load in enumerate(screening.loads)
         ],
+        level_zero=beside.level_zero and tables.level_zero(beside.level_zero, words),
         design=tables.design(screening),
         factors=tables.factors(trials.factors, words),
         responses=_about_responses(screening, words),
@@ -147,12 +156,14 @@ def _spreads(screening: Screening, words: Words) -> list[Picture]:
     return shown
 
 
-def _load_view(screening: Screening, index: int, load: str, words: Words) -> LoadView:
+def _load_view(
+    screening: Screening, index: int, load: str, words: Words, published: Published
+) -> LoadView:
     return LoadView(
         anchor=f"load-{index + 1}",
         title=load,
         findings=tuple(load_findings(screening, load, words)),
-        leading=tables.leading(screening, load, words),
+        leading=tables.leading(screening, load, words, published),
         contributions=tables.contributions(screening, load, words),
         pictures=tuple(_pictures(screening, load, words)),
     )

@@ -3,14 +3,17 @@
 from collections.abc import Sequence
 
 from wm_drake.parameters import FactorLevels
-from wm_drake.report.formatting import MISSING, number, significant
+from wm_drake.report.formatting import MISSING, number, percent, significant
 from wm_drake.report.gasket.words import LEVELS, Words
 from wm_drake.report.tables import Group, Row, Table, line
 from wm_drake.studies.doe import MODELS
 from wm_drake.studies.doe.anova import Term
+from wm_drake.studies.gasket.level_zero import LevelZero
+from wm_drake.studies.gasket.published import FAR, NOTHING, Published
 from wm_drake.studies.gasket.screening import (
     LEADING_INTERACTION_PERCENT,
     LEADING_MAIN_PERCENT,
+    Label,
     Screening,
     leading_terms,
 )
@@ -35,14 +38,28 @@ def r2_text(r2: float) -> str:
     return "below 0" if r2 < 0.0 else number(r2, 3)
 
 
-def variance(screening: Screening, words: Words) -> Table:
-    """Return mean, range, explained variance and R2 of each response, as [B] Table 4."""
-    groups = []
+def published_cells(screening: Screening, published: Published, label: Label) -> tuple[str, str]:
+    """Return the published mean of a response and the difference of ours from it, as text."""
+    mean, difference = published.mean(label), published.mean_difference(screening, label)
+    return (
+        MISSING if mean is None else digits(mean),
+        MISSING if difference is None else percent(difference),
+    )
+
+
+def variance(screening: Screening, words: Words, published: Published = NOTHING) -> Table:
+    """Return mean, range, explained variance and R2 of each response, as [B] Table 4.
+
+    The published mean is beside ours if there is one.
+    """
+    groups, far = [], published.far_means(screening)
     for load in screening.loads:
         rows = []
         for name in screening.names:
             table, values = screening.tables[load, name], screening.responses.values[load][name]
-            cells = (digits(table.constant), digits(values.min()), digits(values.max()))
+            cells = [digits(table.constant), digits(values.min()), digits(values.max())]
+            if published.has_means:
+                cells[1:1] = published_cells(screening, published, (load, name))
             percents = (table.main_percent, table.interaction_percent, table.residual_percent)
             rows.append(
                 Row(
@@ -53,7 +70,8 @@ def variance(screening: Screening, words: Words) -> Table:
                         *(number(percent, 1) for percent in percents),
                         r2_text(table.adjusted_r2),
                         r2_text(table.predicted_r2),
-                    )
+                    ),
+                    "alarm" if (load, name) in far else "",
                 )
             )
         groups.append(Group(load, tuple(rows)))
@@ -62,6 +80,7 @@ def variance(screening: Screening, words: Words) -> Table:
         "response",
         "unit",
         "mean",
+        *(("published mean", "difference") if published.has_means else ()),
         "smallest",
         "largest",
         "main effects, %",
@@ -75,17 +94,31 @@ def variance(screening: Screening, words: Words) -> Table:
         "two-factor interactions, and by neither of them (residual). Predicted R²: explained part "
         "of the variance of trials that are left out of the fit."
     )
+    if published.has_means:
+        caption += (
+            f" Published mean: from {published.source}. Difference: 100 % × (ours − published) / "
+            f"published; rows in which it is above {FAR:g} % are marked."
+        )
     return Table(caption, header, tuple(groups), text_columns=3)
 
 
-def leading(screening: Screening, load: str, words: Words) -> Table:
-    """Return the leading terms of each response of a load with their effects, as [B] Table 5."""
+def leading(screening: Screening, load: str, words: Words, published: Published = NOTHING) -> Table:
+    """Return the leading terms of each response of a load with their effects, as [B] Table 5.
+
+    Published numbers are beside ours; a term that was published is in the table although it is not
+    among our leading terms.
+    """
     groups = []
     for name in screening.names:
-        table, unit = screening.tables[load, name], screening.responses.units[name]
-        rows = [Row(("constant", "", digits(table.constant), "", ""), "ours")]
-        for term in leading_terms(table):
-            rows += _effect_rows(term, words)
+        label, unit = (load, name), screening.responses.units[name]
+        table, mean = screening.tables[label], published.mean(label)
+        rows = [_row("constant", "", "", (digits(table.constant), "", ""), published, "ours")]
+        if mean is not None:
+            rows.append(_row("published constant", "", "", (digits(mean), "", ""), published))
+        shown = leading_terms(table)
+        shown += [t for t in table.terms if t not in shown and _is_published(published, label, t)]
+        for term in shown:
+            rows += _effect_rows(term, words, published, label)
         groups.append(Group(f"{words.response(name)}, {unit}", tuple(rows)))
     caption = (
         f"Load {load}: constant, main effects above {LEADING_MAIN_PERCENT:g} % and interactions "
@@ -94,27 +127,85 @@ def leading(screening: Screening, load: str, words: Words) -> Table:
         "response. The effects of a factor sum to zero. For an interaction, each line is a value "
         "of its first factor, and each column a value of its second factor."
     )
+    if published:
+        caption += f" Published numbers: from {published.source}; their levels are those of [B]."
+    beside = ("published percent",) if published.has_terms else ()
     return Table(
         caption,
-        ("response", "term", "percent", "low", "middle", "high"),
+        ("response", "term", "percent", *beside, "low", "middle", "high"),
         tuple(groups),
         text_columns=2,
     )
 
 
-def _effect_rows(term: Term, words: Words) -> list[Row]:
+def _row(
+    name: str,
+    ours: str,
+    theirs: str,
+    cells: Sequence[str],
+    published: Published,
+    kind: str = "",
+) -> Row:
+    """Return a row of the leading terms; it has a published percentage only if any is known."""
+    return Row((name, ours, *((theirs,) if published.has_terms else ()), *cells), kind)
+
+
+def _is_published(published: Published, label: Label, term: Term) -> bool:
+    known = published.percent(label, term) is not None
+    return known or bool(published.effects(label, term))
+
+
+def _effect_rows(term: Term, words: Words, published: Published, label: Label) -> list[Row]:
     """Return a line with the values of the last factor, and the lines with the effects there."""
     *first, last = term.factors
+    theirs, known = published.percent(label, term), published.effects(label, term)
+    beside = MISSING if theirs is None else number(theirs, 1)
     values = tuple(words.value(last, level) for level in LEVELS)
-    rows = [Row((words.term(term.name), number(term.percent, 1), *values), "other")]
-    if not first:
-        effects = (digits(term.effects[(level,)]) for level in LEVELS)
-        return [*rows, Row(("effect", "", *effects))]
-    for level in LEVELS:
-        effects = (digits(term.effects[level, other]) for other in LEVELS)
-        title = f"effect at {first[0]} = {words.value(first[0], level)}"
-        rows.append(Row((title, "", *effects)))
+    title = words.term(term.name)
+    rows = [_row(title, number(term.percent, 1), beside, values, published, "other")]
+    for level in LEVELS if first else (None,):
+        where = "" if level is None else f" at {first[0]} = {words.value(first[0], level)}"
+        for source, effects in (("effect", term.effects), ("published effect", known)):
+            if not effects:
+                continue
+            keys = [(x,) if level is None else (level, x) for x in LEVELS]
+            cells = [digits(effects[key]) for key in keys]
+            rows.append(_row(f"{source}{where}", "", "", cells, published))
     return rows
+
+
+def level_zero(zero: LevelZero, words: Words) -> Table:
+    """Return the responses of the machine and of level 0 with each treatment of tables."""
+    groups = []
+    for load in zero.responses.values:
+        rows = []
+        for name in zero.responses.units:
+            label = (load, name)
+            cells = [digits(zero.value(label, variant)) for variant in zero.variants]
+            changes = [_change(zero.difference(label, v)) for v in zero.variants[1:]]
+            unit = zero.responses.units[name]
+            rows.append(Row((words.response(name), unit, *cells, *changes)))
+        groups.append(Group(load, tuple(rows)))
+    titles = [f"tables {name}" for name in zero.variants[1:]]
+    header = (
+        "load",
+        "response",
+        "unit",
+        "machine",
+        *(f"level 0, {title}" for title in titles),
+        *(f"difference, {title}" for title in titles),
+    )
+    caption = (
+        "The machine itself and level 0 of all factors. Tables scaled: the forces of a stiffness "
+        "table are multiplied by the level. Tables linear: a table is replaced by its slope at "
+        "rest, as in [B]. Differences are from the machine."
+    )
+    return Table(caption, header, tuple(groups), text_columns=3)
+
+
+def _change(value: float) -> str:
+    """Return a difference in percent with one decimal; NaN becomes a dash."""
+    return MISSING if value != value else f"{number(value, 1)} %"
 
 
 def touching(screening: Screening, words: Words) -> Table:

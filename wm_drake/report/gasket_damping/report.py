@@ -190,8 +190,9 @@ def _optima(result: Damping) -> Table:
     caption = (
         "Distance: sum over the loads of the 2-norm of the differences of the upper and lower "
         f"envelopes at all sensors, every 5 ms from {WINDOW[0]:g} to {WINDOW[1]:g} s, [B] Eq. (2), "
-        f"(3). The grid of the search moves to its best point and is halved when it has no better "
-        f"point than its centre, until its spacing is at most {_mesh_text(result)}. "
+        "(3). These envelopes are smooth (magnitude of the analytic signal). The grid of the "
+        "search moves to its best point and is halved when it has no better point than its centre, "
+        f"until its spacing is at most {_mesh_text(result)}. "
         "The interval shows how much the optimum depends on single curves (one sensor with one "
         "load): each is left out once (jackknife). An error that all curves share, such as a "
         "wrong stiffness of a spring, is not in it."

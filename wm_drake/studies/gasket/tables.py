@@ -10,21 +10,30 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.parameters import FactorLevels
+from wm_drake.parameters.published import CONSTANT
 from wm_drake.studies.doe import Design, write_design
 from wm_drake.studies.doe.anova import Term
-from wm_drake.studies.gasket.screening import Screening, leading_terms
+from wm_drake.studies.gasket.beside import ALONE, Beside
+from wm_drake.studies.gasket.published import Published
+from wm_drake.studies.gasket.screening import Label, Screening, leading_terms
 
 DIGITS = "%.9g"
 """Format of numbers in CSV files; it has more digits than the results are accurate to."""
 
 
-def write_tables(screening: Screening, folder: Path, factors: Sequence[FactorLevels] = ()) -> None:
+def write_tables(
+    screening: Screening,
+    folder: Path,
+    factors: Sequence[FactorLevels] = (),
+    beside: Beside = ALONE,
+) -> None:
     """Write all tables as CSV files. One screening always results in the same bytes.
 
     Args:
         screening: Result of the study.
         folder: Where the files are written.
         factors: Levels of the factors, for their physical values in design.csv and runs.csv.
+        beside: What the results are compared with; published.csv and level_zero.csv show it.
     """
     values = physical_values(screening.design, factors)
     write_design(screening.design, folder / "design.csv", values)
@@ -35,6 +44,10 @@ def write_tables(screening: Screening, folder: Path, factors: Sequence[FactorLev
         "effects.csv": effects_table(screening),
         "leading_terms.csv": leading_table(screening),
     }
+    if beside.published:
+        tables["published.csv"] = published_table(screening, beside.published)
+    if beside.level_zero is not None:
+        tables["level_zero.csv"] = beside.level_zero.frame()
     for name, table in tables.items():
         table.to_csv(folder / name, index=False, float_format=DIGITS)
 
@@ -164,18 +177,51 @@ def leading_table(screening: Screening) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def published_table(screening: Screening, published: Published) -> pd.DataFrame:
+    """Return our numbers and the published ones of each term that was published.
+
+    Grand means are in the rows of the term `constant`; the columns are those of `leading_table`,
+    with the published percentage and effect.
+    """
+    rows: list[dict[str, Any]] = []
+    for (load, name), table in screening.tables.items():
+        label, unit = (load, name), screening.responses.units[name]
+        head = {"load": load, "response": name, "unit": unit}
+        mean = published.mean(label)
+        if mean is not None:
+            row = {"term": CONSTANT, "effect": table.constant, "published_effect": mean}
+            rows.append(head | row | {"levels": ""})
+        for term in table.terms:
+            percent, effects = published.percent(label, term), published.effects(label, term)
+            if percent is None and not effects:
+                continue
+            for levels, effect in term.effects.items():
+                row = {
+                    "term": term.name,
+                    "percent": term.percent,
+                    "published_percent": percent,
+                    "levels": ":".join(map(str, levels)),
+                    "effect": effect,
+                    "published_effect": effects.get(levels),
+                }
+                rows.append(head | row)
+    columns = ("percent", "published_percent", "levels", "effect", "published_effect")
+    return pd.DataFrame(rows, columns=["load", "response", "unit", "term", *columns])
+
+
 def effects_of(term: Term) -> dict[str, float]:
     """Return the effects of a term by levels as text: "-1", or "-1:0" for an interaction."""
     return {":".join(map(str, levels)): effect for levels, effect in term.effects.items()}
 
 
-def as_plain_data(screening: Screening) -> dict[str, Any]:
+def as_plain_data(screening: Screening, beside: Beside = ALONE) -> dict[str, Any]:
     """Return a screening as data for JSON.
 
     It has the design with its efficiency, the runs in which the tub touches the housing or a spring
     goes slack, and for each load and response the contributions, the effects at each level, and how
-    well the model predicts.
+    well the model predicts. Published numbers and level 0 are beside ours if there are any.
     """
+    published, zero = beside.published, beside.level_zero
     responses: dict[str, dict[str, Any]] = {load: {} for load in screening.loads}
     for (load, name), table in screening.tables.items():
         responses[load][name] = {
@@ -192,11 +238,24 @@ def as_plain_data(screening: Screening) -> dict[str, Any]:
                     "term": t.name,
                     "percent": finite(t.percent),
                     "effects": {k: finite(v) for k, v in effects_of(t).items()},
+                    **_published_term(published, (load, name), t),
                 }
                 for t in table.terms
             ],
+            **_published_mean(screening, published, (load, name)),
         }
     design = screening.design
+    compared: dict[str, Any] = {}
+    if published:
+        compared["published"] = published.source
+    if zero is not None:
+        compared["level_zero"] = {
+            "tables": zero.tables,
+            "responses": [
+                {k: finite(v) if isinstance(v, float) else v for k, v in row.items()}
+                for row in zero.frame().to_dict("records")
+            ],
+        }
     return {
         "design": design.kind,
         "model": design.model,
@@ -213,7 +272,28 @@ def as_plain_data(screening: Screening) -> dict[str, Any]:
             for (trial, load), springs in screening.responses.slack.items()
         ],
         "responses": responses,
+        **compared,
     }
+
+
+def _published_mean(screening: Screening, published: Published, label: Label) -> dict[str, Any]:
+    """Return the published grand mean of a response and the difference of ours from it."""
+    mean = published.mean(label)
+    if mean is None:
+        return {}
+    difference = published.mean_difference(screening, label)
+    return {"published_mean": mean, "mean_difference_percent": difference}
+
+
+def _published_term(published: Published, label: Label, term: Term) -> dict[str, Any]:
+    """Return the published contribution and effects of a term, if there are any."""
+    found: dict[str, Any] = {}
+    percent, effects = published.percent(label, term), published.effects(label, term)
+    if percent is not None:
+        found["published_percent"] = percent
+    if effects:
+        found["published_effects"] = {":".join(map(str, k)): v for k, v in effects.items()}
+    return found
 
 
 def finite(value: float) -> float | None:

@@ -21,7 +21,7 @@ from wm_drake.parameters import (
 from wm_drake.parameters.time_stamps import with_distinct_times
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.measures import envelopes
+from wm_drake.simulation.measures import smooth_envelope
 from wm_drake.simulation.records import Record
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.gasket_damping.grid_search import Search, bounded_search, grid_search
@@ -159,6 +159,7 @@ class EnvelopeDistance:
     """Objective [B] Eq. (2), (3): sum over the loads of the 2-norm of envelope differences. [mm]
 
     The norm includes the upper and lower envelopes of all sensors at all samples in the window.
+    They are those of the analytic signal (`smooth_envelope`).
     """
 
     def __init__(self, parameters: MachineParameters, measured: Measured) -> None:
@@ -239,10 +240,10 @@ class EnvelopeDistance:
 
 
 def _envelopes(displacement: xr.DataArray) -> FloatArray:
-    """Return the upper and lower envelopes (2, time, sensor) in the window. [m]"""
-    whole = envelopes(xr.Dataset({"displacement": displacement}))
-    window = whole.sel(time=slice(WINDOW[0] - 1e-9, WINDOW[1] + 1e-9))
-    return np.stack([window.upper.values, window.lower.values])
+    """Return the upper and lower smooth envelopes (2, time, sensor) in the window. [m]"""
+    whole = smooth_envelope(xr.Dataset({"displacement": displacement}))
+    upper = whole.sel(time=slice(WINDOW[0] - 1e-9, WINDOW[1] + 1e-9)).values
+    return np.stack([upper, -upper])
 
 
 def _run_up(profile: SpinProfile) -> SpinProfile:

@@ -16,7 +16,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
-from wm_drake.simulation.cases import Case
+from wm_drake.simulation.cases import Case, is_as_measured
 from wm_drake.simulation.measures import Measures, measure
 from wm_drake.simulation.records import Record
 from wm_drake.simulation.runs import DEFAULT_ENGINE, DivergenceWarning, checked_step, simulate
@@ -67,12 +67,7 @@ class SpinResult:
         """Return whether a case is compared with the measured amplitudes of the machine."""
         if self.comparison is not Comparison.AS_MEASURED:
             return self.comparison is Comparison.ALL
-        case = result.case
-        return (
-            case.parameters in (None, self.parameters)
-            and case.load == self.parameters.loads.get(case.name)
-            and case.profile == self.parameters.profile
-        )
+        return is_as_measured(self.parameters, result.case)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,110 @@
+"""Published results of a gasket study beside those of a screening."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from itertools import product
+
+from wm_drake.parameters import PublishedResults, PublishedTerm
+from wm_drake.parameters.published import CONSTANT
+from wm_drake.studies.doe.anova import Combination, Term
+from wm_drake.studies.gasket.screening import Label, Screening
+
+FAR = 30.0
+"""Difference above which a result is named in the summary: of a mean, in percent of the published
+one; of a contribution, in points of percent."""
+
+LEVELS = (-1, 0, 1)
+
+
+@dataclass(frozen=True)
+class Published:
+    """Published numbers that belong to a screening.
+
+    Attributes:
+        terms: Terms by label, as in `PublishedResults`. Empty if nothing is compared.
+        source: Where they are from, for reading.
+    """
+
+    terms: Mapping[Label, Mapping[str, PublishedTerm]] = field(default_factory=dict)
+    source: str = ""
+
+    def __bool__(self) -> bool:
+        """Return whether there is anything to compare with."""
+        return bool(self.terms)
+
+    @property
+    def has_means(self) -> bool:
+        """Whether any grand mean was published."""
+        return any(CONSTANT in terms for terms in self.terms.values())
+
+    @property
+    def has_terms(self) -> bool:
+        """Whether anything else than grand means was published."""
+        return any(set(terms) - {CONSTANT} for terms in self.terms.values())
+
+    def mean(self, label: Label) -> float | None:
+        """Return the published grand mean of a response. [unit of the response]"""
+        term = self.terms.get(label, {}).get(CONSTANT)
+        return None if term is None else term.effects[0]
+
+    def mean_difference(self, screening: Screening, label: Label) -> float | None:
+        """Return how much our grand mean is above the published one. [%]
+
+        It is None if there is no published one, or if that is zero.
+        """
+        mean = self.mean(label)
+        return 100.0 * (screening.tables[label].constant - mean) / mean if mean else None
+
+    def percent(self, label: Label, term: Term) -> float | None:
+        """Return the published contribution of a term. [%]"""
+        found, _ = self._found(label, term.factors)
+        return None if found is None else found.percent
+
+    def effects(self, label: Label, term: Term) -> dict[Combination, float]:
+        """Return the published effects of a term by level; empty without. [unit of the response]"""
+        found, is_turned = self._found(label, term.factors)
+        if found is None or not found.effects:
+            return {}
+        levels = product(LEVELS, repeat=len(term.factors))
+        turned = (combination[::-1] if is_turned else combination for combination in levels)
+        return dict(zip(turned, found.effects, strict=True))
+
+    def _found(self, label: Label, factors: tuple[str, ...]) -> tuple[PublishedTerm | None, bool]:
+        """Return a published term, and whether its factors are in the reverse order."""
+        terms = self.terms.get(label, {})
+        straight, turned = ":".join(factors), ":".join(factors[::-1])
+        return terms.get(straight, terms.get(turned)), straight not in terms
+
+    def far_means(self, screening: Screening) -> dict[Label, float]:
+        """Return the means that differ from the published ones by more than `FAR`. [%]"""
+        found = {label: self.mean_difference(screening, label) for label in screening.tables}
+        return {label: d for label, d in found.items() if d is not None and abs(d) > FAR}
+
+    def far_contributions(self, screening: Screening) -> dict[tuple[Label, str], float]:
+        """Return the contributions that differ by more than `FAR`, by label and term. [points]"""
+        found = {}
+        for label, table in screening.tables.items():
+            for term in table.terms:
+                published = self.percent(label, term)
+                if published is not None and abs(term.percent - published) > FAR:
+                    found[label, term.name] = term.percent - published
+        return found
+
+
+NOTHING = Published()
+"""No published results."""
+
+
+def published_beside(
+    results: PublishedResults, labels: Iterable[Label], source: str = ""
+) -> Published:
+    """Return those published results that belong to some loads and responses.
+
+    Args:
+        results: Published results of a study.
+        labels: Loads and responses that are compared.
+        source: Where the results are from, for reading.
+    """
+    wanted = set(labels)
+    kept = {label: terms for label, terms in results.items() if label in wanted}
+    return Published(kept, source if kept else "")
