@@ -208,5 +208,6 @@ def _print_table(result: "MachineModes", out: Path) -> None:
     console = Console()
     console.print(table)
     console.print(summary(result))
-    console.print(f"Results in {out}: report.html, modes.csv, amplitudes.csv, campbell.csv, "
-                  "sensitivities.csv")
+    console.print(
+        f"Results in {out}: report.html, modes.csv, amplitudes.csv, campbell.csv, sensitivities.csv"
+    )

@@ -69,9 +69,7 @@ def response(
             metavar="RATE",
         ),
     ] = None,
-    no_sweeps: Annotated[
-        bool, typer.Option("--no-sweeps", help="Leave the sweeps out.")
-    ] = False,
+    no_sweeps: Annotated[bool, typer.Option("--no-sweeps", help="Leave the sweeps out.")] = False,
     out: OutOption = DEFAULT_OUT,
     overwrite: OverwriteOption = False,
     workers: WorkersOption = None,
