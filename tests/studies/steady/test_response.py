@@ -56,6 +56,7 @@ def test_response_and_phase_of_one_mass_are_those_of_the_closed_form(stiff_in_ro
 def test_public_function_has_the_closed_form_at_the_sensors(stiff_in_rotation):
     speeds = np.array([90.0, 120.0, 200.0]) * RPM
     found = wm.steady_response(stiff_in_rotation, unbalance(EXCESS), speeds)
+    found = found.isel(point=found.on_grid.values)
     wanted = np.abs([jeffcott(speed) for speed in speeds])
     for sensor in ("Xr", "Zf"):
         # 128 samples of a circle miss its top by up to 3e-4
@@ -72,20 +73,30 @@ def swept_unbalance(time, rate, frequency, damping, ratio):
 
     F. M. Lewis, Vibration during acceleration through a critical speed, Trans. ASME 54 (1932). The
     convolution with exp(s t) is a Fresnel integral of complex argument, here by the Faddeeva
-    function w: with q = exp(-i pi / 4) sqrt(rate / 2), u = q t - s / (2 q), u0 = -s / (2 q),
+    function w: with q = exp(-i pi / 4) sqrt(rate / 2), u = q t + s / (2 q), u0 = s / (2 q),
 
         E = integral of exp(s (t - tau)) g(tau) d tau
           = sqrt(pi) / (2 q) (exp(s t) w(i u0) - g(t) w(i u))
+
+    In the lower half plane w(z) = 2 exp(-z^2) - w(-z); the first terms cancel if both are there.
     """
     root = np.sqrt(damping**2 - 1.0 + 0j)
     roots = frequency * (-damping + root), frequency * (-damping - root)
     g = np.exp(0.5j * rate * time**2)
     g_rate = 1j * rate * time * g
 
+    def upper_half(z):
+        lower = np.imag(z) < 0.0
+        return np.where(lower, -1.0, 1.0) * wofz(np.where(lower, -z, z)), lower.astype(float)
+
     def convolved(s):
         q = np.exp(-0.25j * np.pi) * np.sqrt(0.5 * rate)
         u, u0 = q * time + s / (2.0 * q), s / (2.0 * q)
-        e = np.sqrt(np.pi) / (2.0 * q) * (np.exp(s * time) * wofz(1j * u0) - g * wofz(1j * u))
+        first, begins = upper_half(1j * u0)
+        second, passed = upper_half(1j * u)
+        resonance = 2.0 * (begins - passed) * np.exp(s * time + u0 * u0)
+        resonance = np.where(begins == passed, 0.0, resonance)
+        e = np.sqrt(np.pi) / (2.0 * q) * (np.exp(s * time) * first - g * second + resonance)
         # two integrations by parts of the convolution with g''
         return g_rate + s * (g - np.exp(s * time)) + s * s * e
 
@@ -186,13 +197,14 @@ def test_harmonic_balance_has_the_amplitudes_of_the_engine_at_some_speeds(machin
 @pytest.fixture(scope="module")
 def hardening():
     """Return a machine whose bushing hardens along z and x: its response folds over."""
-    base = isotropic_machine(damping=12.0, rotational_stiffness=1e7)
+    base = isotropic_machine(damping=12.0)
     displacement = (-0.03, -0.02, -0.01, 0.0, 0.01, 0.02, 0.03)
     table = {
         "displacement": displacement,
         "force": tuple(STIFFNESS * (d + 700.0 * d**3) for d in displacement),
     }
     gasket = base.gasket.model_dump() | {"stiffness_x": table, "stiffness_z": table}
+    gasket |= {f"rotational_damping_{axis}": 10.0 for axis in "xyz"}
     return build_machine(type(base).model_validate(base.model_dump() | {"gasket": gasket}))
 
 
@@ -222,7 +234,7 @@ def test_branch_goes_around_folds_and_is_unstable_between(folded):
     assert stable[-1]
 
 
-def integrated(balance, start, speed, revolutions):
+def integrated(balance, start, speed, revolutions, tolerance=1e-6):
     """Return the states after each revolution, from a free state at drum angle 0."""
     derivative = balance.derivative
     state = derivative.rest.copy()
@@ -238,8 +250,8 @@ def integrated(balance, start, speed, revolutions):
         (0.0, revolutions * period),
         start,
         t_eval=period * np.arange(revolutions + 1),
-        rtol=1e-8,
-        atol=1e-11,
+        rtol=tolerance,
+        atol=1e-3 * tolerance,
         method="DOP853",
     )
     return solved.y.T
@@ -256,7 +268,7 @@ def test_time_integration_holds_stable_motions_and_leaves_unstable_ones(folded):
         start = balance.series.synthesis[0] @ point.coefficients
         size = balance.extent(point.coefficients[1:3] * 1.0)
         start[[3, 5]] += 0.01 * size
-        revolutions = integrated(balance, start, point.speed, 120)
+        revolutions = integrated(balance, start, point.speed, 60)
         begin = balance.series.synthesis[0] @ point.coefficients
         away = np.linalg.norm((revolutions - begin) * balance.scale, axis=1)
         assert (away[-1] < 0.5 * away[0]) == holds
@@ -269,11 +281,11 @@ def test_floquet_multipliers_are_those_of_the_map_of_a_revolution(folded):
     _, balance, points = folded
     point = points[10]
     begin = balance.series.synthesis[0] @ point.coefficients
-    step = 1e-6
+    step = 1e-5
     columns = [
         (
-            integrated(balance, begin + step * unit, point.speed, 1)[-1]
-            - integrated(balance, begin - step * unit, point.speed, 1)[-1]
+            integrated(balance, begin + step * unit, point.speed, 1, 1e-11)[-1]
+            - integrated(balance, begin - step * unit, point.speed, 1, 1e-11)[-1]
         )
         / (2.0 * step)
         for unit in np.eye(balance.size)
