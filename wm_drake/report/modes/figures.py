@@ -66,13 +66,28 @@ def campbell_figure(result: MachineModes) -> Figure:
     figure.colorbar(points, ax=panels, label="damping ratio", pad=0.015, fraction=0.035)
     handles = [
         Line2D([], [], color=MARK, linestyle="--", linewidth=1.0, label="order of the drum speed"),
-        Line2D([], [], marker="o", color=MEASURED, fillstyle="none", linestyle="", ms=7,
-               label="critical speed"),
+        Line2D(
+            [],
+            [],
+            marker="o",
+            color=MEASURED,
+            fillstyle="none",
+            linestyle="",
+            ms=7,
+            label="critical speed",
+        ),
     ]
     if result.run_up is not None:
         handles.append(
-            Line2D([], [], marker="v", color=OURS, linestyle="", ms=6,
-                   label="largest amplitude of a sensor in a run-up")
+            Line2D(
+                [],
+                [],
+                marker="v",
+                color=OURS,
+                linestyle="",
+                ms=6,
+                label="largest amplitude of a sensor in a run-up",
+            )
         )
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     return figure
@@ -166,7 +181,9 @@ def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> Figure:
         ends = _ends_of_motion(mode, lines, reach)
         for row, (view, across, up) in enumerate(views):
             axes = panels[row, column]
-            for pose, colour, width in zip(ends, (QUIET, OURS, MEASURED), (0.8, 1.2, 1.2), strict=True):
+            for pose, colour, width in zip(
+                ends, (QUIET, OURS, MEASURED), (0.8, 1.2, 1.2), strict=True
+            ):
                 for line in pose:
                     axes.plot(line[:, across], line[:, up], color=colour, linewidth=width)
             limit = 1.35 * reach
@@ -202,9 +219,7 @@ def tub_lines(outlines: Mapping[str, Outline]) -> list[FloatArray]:
     return [largest.centre + (line * largest.half) @ largest.axes for line in (*ends, *sides)]
 
 
-def _ends_of_motion(
-    mode: Mode, lines: list[FloatArray], reach: float
-) -> list[list[FloatArray]]:
+def _ends_of_motion(mode: Mode, lines: list[FloatArray], reach: float) -> list[list[FloatArray]]:
     """Return the lines at rest and at both ends of the motion, enlarged to be seen."""
     points = np.concatenate(lines)
     poses = np.outer([1e-3, 0.0], mode.real_shape)
@@ -229,8 +244,15 @@ def energy_figure(result: MachineModes) -> Figure:
             left = np.zeros(len(modes))
             for index, element in enumerate(elements):
                 shares = np.array([max(getattr(mode, kind)[index], 0.0) for mode in modes])
-                axes.barh(range(len(modes)), 100.0 * shares, left=left, color=shades[index],
-                          label=element, edgecolor="white", linewidth=0.4)
+                axes.barh(
+                    range(len(modes)),
+                    100.0 * shares,
+                    left=left,
+                    color=shades[index],
+                    label=element,
+                    edgecolor="white",
+                    linewidth=0.4,
+                )
                 left += 100.0 * shares
             axes.set_yticks(range(len(modes)), [mode.name for mode in modes], fontsize=9)
             axes.invert_yaxis()

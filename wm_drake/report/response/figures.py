@@ -77,8 +77,13 @@ def _draw_run_up(axes: Axes, case: SteadyCase, sensor: str, colour: str) -> None
 
 def _legend(figure: Figure, cases: list[SteadyCase]) -> None:
     handles = [
-        Line2D([], [], color=OURS if case.gasket else MEASURED, linewidth=1.8,
-               label=f"steady, {'with' if case.gasket else 'without'} gasket")
+        Line2D(
+            [],
+            [],
+            color=OURS if case.gasket else MEASURED,
+            linewidth=1.8,
+            label=f"steady, {'with' if case.gasket else 'without'} gasket",
+        )
         for case in cases
     ]
     if any(not case.response.stable.values.all() for case in cases):
@@ -87,8 +92,14 @@ def _legend(figure: Figure, cases: list[SteadyCase]) -> None:
         )
     if any(case.run_up is not None for case in cases):
         handles.append(
-            Line2D([], [], color=QUIET, linestyle=(0, (6, 1.5)), linewidth=1.0,
-                   label="spin profile of the machine")
+            Line2D(
+                [],
+                [],
+                color=QUIET,
+                linestyle=(0, (6, 1.5)),
+                linewidth=1.0,
+                label="spin profile of the machine",
+            )
         )
     figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
 
@@ -215,11 +226,23 @@ def sweep_figure(study: SteadyStudy) -> Figure:
         rate = RPM_PER_RAD_S * study.sweeps.rate.values
         for direction, style, mark in (("up", "-", "^"), ("down", (0, (5, 2)), "v")):
             one = chosen.sel(direction=direction)
-            left.plot(rate, RPM_PER_RAD_S * one.speed.values - speed, linestyle=style,
-                      marker=mark, color=colour, markersize=5)
-            right.plot(rate, 100.0 * one.amplitude.values / values.max(), linestyle=style,
-                       marker=mark, color=colour, markersize=5,
-                       label=f"{load}, {sensor}, {direction}")
+            left.plot(
+                rate,
+                RPM_PER_RAD_S * one.speed.values - speed,
+                linestyle=style,
+                marker=mark,
+                color=colour,
+                markersize=5,
+            )
+            right.plot(
+                rate,
+                100.0 * one.amplitude.values / values.max(),
+                linestyle=style,
+                marker=mark,
+                color=colour,
+                markersize=5,
+                label=f"{load}, {sensor}, {direction}",
+            )
     for axes, title in (
         (left, "speed of the peak less that of the steady peak, rpm"),
         (right, "peak in % of the steady peak"),

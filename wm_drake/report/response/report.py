@@ -91,14 +91,13 @@ def summary(study: SteadyStudy) -> str:
 
 
 def _warnings(study: SteadyStudy) -> list[str]:
-    short = [
+    return [
         f"Load {case.load}, {_gasket(case)}: the branch could be followed only up to "
         f"{number(RPM_PER_RAD_S * float(case.response.speed.values[-1]), 0)} rpm. More harmonics "
         "or samples may help."
         for case in study.cases
         if not bool(case.response.on_grid.values[-1])
     ]
-    return short
 
 
 def _peaks_table(study: SteadyStudy) -> Table:
@@ -201,5 +200,3 @@ def sweeps_table(study: SteadyStudy) -> pd.DataFrame:
             "rpm": RPM_PER_RAD_S * table["speed"],
         }
     )
-
-

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
+from threadpoolctl import threadpool_limits
 
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
@@ -86,10 +87,11 @@ def amplitude_modes(
         A mode each; it ends where it cannot be followed any further.
     """
     balance = HarmonicBalance(setup, Series(ORDER, SAMPLES))
-    return [
-        _follow(balance, stuck.values[index], stuck.right[:, index], mode.name, amplitudes)
-        for index, mode in enumerate(modes)
-    ]
+    with threadpool_limits(1, "blas"):  # the matrices are small: several threads would be slower
+        return [
+            _follow(balance, stuck.values[index], stuck.right[:, index], mode.name, amplitudes)
+            for index, mode in enumerate(modes)
+        ]
 
 
 class _Free:
@@ -131,9 +133,7 @@ class _Free:
         residual = balance.with_hold(residual, coefficients)
         matrix = balance.matrix(slopes, omega)
         size = len(matrix)
-        matrix[np.arange(size), np.arange(size)] -= 2.0 * beta * np.tile(
-            self.velocity, series.size
-        )
+        matrix[np.arange(size), np.arange(size)] -= 2.0 * beta * np.tile(self.velocity, series.size)
         bordered = np.zeros((size + 2, size + 2))
         bordered[:size, :size] = matrix
         bordered[:size, size] = moved.ravel()

@@ -10,6 +10,7 @@ their modes, because the shapes do not cross. If no joining is clear, the speed 
 first.
 """
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -76,9 +77,7 @@ def mac(before: Spectrum, after: Spectrum) -> FloatArray:
     return np.asarray(forth * back.T)
 
 
-def campbell(
-    spectrum_at: Callable[[float], Spectrum], speeds: FloatArray, count: int
-) -> Campbell:
+def campbell(spectrum_at: Callable[[float], Spectrum], speeds: FloatArray, count: int) -> Campbell:
     """Follow modes over the speed.
 
     Args:
@@ -87,8 +86,9 @@ def campbell(
         count: Number of modes to follow, the slowest at the first speed.
     """
     here = spectrum_at(float(speeds[0])).first(count)
-    values, macs = [here.values], [np.ones(len(here.values))]
-    for before, after in zip(speeds[:-1], speeds[1:], strict=True):
+    values: list[FloatArray] = [here.values]
+    macs: list[FloatArray] = [np.ones(len(here.values))]
+    for before, after in itertools.pairwise(speeds):
         here, least = _joined(spectrum_at, float(before), float(after), here, MOST_HALVINGS)
         values.append(here.values)
         macs.append(least)
@@ -144,7 +144,9 @@ def critical_speeds(
             speeds = diagram.speed[good]
             curve = CubicSpline(speeds, excess[good])
             ratio = CubicSpline(speeds, diagram.damping_ratio[good, mode])
-            for speed in curve.roots(extrapolate=False):
-                if speed > 0.0:
-                    found.append(CriticalSpeed(order, mode, float(speed), float(ratio(speed))))
+            found += [
+                CriticalSpeed(order, mode, float(speed), float(ratio(speed)))
+                for speed in curve.roots(extrapolate=False)
+                if speed > 0.0
+            ]
     return sorted(found, key=lambda critical: critical.speed)

@@ -8,6 +8,7 @@ With a load the right-hand side changes with the drum angle. A and the equilibri
 over a revolution: what remains is the part of the motion that does not follow the rotation.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,8 +30,10 @@ ANGLES = 12
 """Number of drum angles of a mean over a revolution: exact up to the eleventh harmonic."""
 
 MODES = 6
-"""Number of modes: the six motions of the suspended tub. Overdamped motions are not included; damper
-tubes on their bushings and a drum in a compliant bearing have faster modes."""
+"""Number of modes: the six motions of the suspended tub.
+
+Overdamped motions are not included; damper tubes on their bushings and a drum in a compliant
+bearing have faster modes."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,12 @@ class Linearisation:
             InputError: the machine has something that the compiled engine does not represent.
         """
         self.derivative = SlopedDerivative(setup)
-        kinds = (setup.springs, setup.dampers, setup.bushings, setup.telescopes)
+        kinds: tuple[Mapping[str, object], ...] = (
+            setup.springs,
+            setup.dampers,
+            setup.bushings,
+            setup.telescopes,
+        )
         words = ("spring", "damper", "bushing", "damper")
         self.names = [
             name if name == "gasket" else f"{word} {name}"

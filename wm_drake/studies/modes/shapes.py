@@ -17,8 +17,10 @@ NAMES = {
     "y": "fore-aft",
     "z": "bounce",
 }
-"""Name of a motion by its coordinate: angles about x, y, z as in records; sway to the sides, fore-aft
-along the drum axis, bounce up and down."""
+"""Name of a motion by its coordinate.
+
+Angles about x, y, z as in records; sway to the sides, fore-aft along the drum axis, bounce up and
+down."""
 
 ANGLE_ARM = 0.25
 """Length that converts angles to displacements in a mode shape: about the radius of the tub. [m]"""

@@ -104,9 +104,7 @@ class HarmonicBalance:
         rates = self.derivative(self.states(coefficients, speed))[:, self.derivative.free]
         return self._residual(coefficients, speed, rates)
 
-    def _residual(
-        self, coefficients: FloatArray, speed: float, rates: FloatArray
-    ) -> FloatArray:
+    def _residual(self, coefficients: FloatArray, speed: float, rates: FloatArray) -> FloatArray:
         series = self.series
         residual = speed * (series.slope @ coefficients) - series.analysis @ rates
         return self.with_hold(residual, coefficients)

@@ -23,7 +23,7 @@ LENGTH = 5e-3
 SPEEDS = 0.05
 """Part of the range of speeds that counts as much as `LENGTH`."""
 
-TOLERANCE = 1e-8
+TOLERANCE = 1e-10
 """Largest last correction of a motion. [m]"""
 
 MOST_CORRECTIONS, MOST_CHORDS = 12, 6
@@ -185,12 +185,12 @@ class _Metric:
         at = balance.linearised(coefficients, speed)
         if before is None:
             along = -np.linalg.solve(at.matrix, at.by_speed.ravel()).reshape(coefficients.shape)
-            return _Place(coefficients, speed, *self.unit(way * along, way))
+            return _Place(coefficients, speed, *self.unit(np.asarray(way * along, float), way))
         matrix = _bordered(at.matrix, at.by_speed, self.row(before.along, before.speed_along))
         right = np.zeros(len(matrix))
         right[-1] = 1.0
         solved = np.linalg.solve(matrix, right)
-        along = solved[:-1].reshape(coefficients.shape)
+        along = np.asarray(solved[:-1].reshape(coefficients.shape), float)
         return _Place(coefficients, speed, *self.unit(along, float(solved[-1])))
 
 
@@ -224,7 +224,9 @@ def _step(
     right = np.zeros((len(row), 2))
     right[-1, 1] = 1.0
     constraint = np.append(np.zeros(len(row) - 1), 1.0) if landing else row
-    for correction in range(MOST_CORRECTIONS):
+    corrections = 0
+    while corrections < MOST_CORRECTIONS:
+        corrections += 1
         if factors is None:
             at = balance.linearised(coefficients, speed)
             residual = at.residual
@@ -262,7 +264,8 @@ def _step(
         along, speed_along = -along, -speed_along
     if abs(forwards) < 0.6:  # the branch bends by more than 50 degrees
         return None
-    return _Place(coefficients, speed, along, speed_along), correction < 4 and abs(forwards) > 0.9
+    quick = corrections < 5 and bool(abs(forwards) > 0.9)
+    return _Place(coefficients, speed, along, speed_along), quick
 
 
 def _point(balance: HarmonicBalance, place: _Place, on_grid: bool, way: float) -> Point:
@@ -285,9 +288,10 @@ def _at_speed(balance: HarmonicBalance, guess: FloatArray, speed: float) -> Floa
     for _ in range(60):
         at = balance.linearised(coefficients, speed)
         try:
-            change = -np.linalg.solve(at.matrix, at.residual.ravel()).reshape(guess.shape)
+            step = -np.linalg.solve(at.matrix, at.residual.ravel())
         except np.linalg.LinAlgError:
             return None
+        change = np.asarray(step.reshape(guess.shape), float)
         size = balance.extent(change)
         if not np.isfinite(size):
             return None

@@ -93,9 +93,7 @@ def branch_of(
     return follow(balance, speeds, first_motion(balance, speeds[0], guesses()), progress)
 
 
-def _checked(
-    speeds: Sequence[float] | FloatArray, harmonics: int, samples: int
-) -> FloatArray:
+def _checked(speeds: Sequence[float] | FloatArray, harmonics: int, samples: int) -> FloatArray:
     """Return the speeds as an array.
 
     Raises:
@@ -120,7 +118,7 @@ def _checked(
 
 
 def trajectory_of_period(
-    setup: Setup, balance: HarmonicBalance, coefficients: FloatArray, speed: float, samples: int
+    balance: HarmonicBalance, coefficients: FloatArray, speed: float, samples: int
 ) -> Trajectory:
     """Return a revolution of a periodic motion; it has no torque and no accelerations (NaN)."""
     phase = 2.0 * np.pi * np.arange(samples) / samples
@@ -140,22 +138,20 @@ def trajectory_of_period(
 def _measured(setup: Setup, balance: HarmonicBalance, points: list[Point]) -> xr.Dataset:
     samples = balance.series.samples
     periods = [
-        trajectory_of_period(setup, balance, point.coefficients, point.speed, samples)
-        for point in points
+        trajectory_of_period(balance, point.coefficients, point.speed, samples) for point in points
     ]
+
+    def joined(name: str) -> FloatArray:
+        return np.concatenate([getattr(period, name) for period in periods])
+
     whole = Trajectory(
-        *(
-            np.concatenate([getattr(period, name) for period in periods])
-            for name in (
-                "time",
-                "state",
-                "deformation",
-                "motor_torque",
-                "acceleration",
-                "tubes",
-                "carrier",
-            )
-        )
+        joined("time"),
+        joined("state"),
+        joined("deformation"),
+        joined("motor_torque"),
+        joined("acceleration"),
+        joined("tubes"),
+        joined("carrier"),
     )
     variables = variables_of(setup, whole)
 
