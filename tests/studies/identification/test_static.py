@@ -18,7 +18,7 @@ def elastic(x):
     return 4e3 * x + 2e8 * x**3
 
 
-def test_of(ends, *, noise=0.0, offset=0.0, friction=FRICTION, samples=2000, rotates=False):
+def ramps(ends, *, noise=0.0, offset=0.0, friction=FRICTION, samples=2000, rotates=False):
     """At constant rate from end to end, with friction that turns round over a fifth of a millimetre (Dahl)."""
     ends = np.array(ends)
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(ends)))])
@@ -34,16 +34,13 @@ def test_of(ends, *, noise=0.0, offset=0.0, friction=FRICTION, samples=2000, rot
     return MeasuredLoop("test", "test.csv", place / 1.67e-3, x, force, rotates)
 
 
-test_of.__test__ = False
-
-
 @pytest.mark.parametrize(
     "ends",
     [(0.0, 20e-3, 0.0), (0.0, 20e-3, -20e-3, 20e-3, 0.0), (0.0, -20e-3, 0.0, 20e-3, 0.0)],
     ids=["one side", "both sides", "one side after the other"],
 )
 def test_table_and_hysteresis_come_back(ends):
-    curve = static_curve("x", [test_of(ends, noise=0.3, offset=2.0)])
+    curve = static_curve("x", [ramps(ends, noise=0.3, offset=2.0)])
     table = curve.table(5)
     places = np.array(table["displacement"])
     assert len(places) == (6 if ends == (0.0, 20e-3, 0.0) else 11)
@@ -62,13 +59,13 @@ def test_table_and_hysteresis_come_back(ends):
 
 
 def test_energy_of_a_whole_cycle_is_the_area_of_the_loop():
-    curve = static_curve("x", [test_of((0.0, 10e-3, -10e-3, 10e-3, -10e-3, 0.0), samples=8000)])
+    curve = static_curve("x", [ramps((0.0, 10e-3, -10e-3, 10e-3, -10e-3, 0.0), samples=8000)])
     full = 4.0 * FRICTION * 10e-3
     assert curve.energy == pytest.approx(full, rel=0.1)  # less what turning round saves
 
 
 def test_repeated_tests_are_averaged_and_purely_elastic_ones_have_no_hysteresis():
-    runs = [test_of((0.0, 20e-3, 0.0), friction=0.0, offset=o) for o in (0.0, 0.0, 0.0)]
+    runs = [ramps((0.0, 20e-3, 0.0), friction=0.0, offset=o) for o in (0.0, 0.0, 0.0)]
     curve = static_curve("about_y", runs)
     assert curve.field == "rotational_stiffness_y"
     assert curve.friction == pytest.approx(0.0, abs=1e-3)
@@ -85,7 +82,7 @@ def test_repeated_tests_are_averaged_and_purely_elastic_ones_have_no_hysteresis(
 )
 def test_tests_that_give_no_table_are_refused(ends, message):
     with pytest.raises(InputError, match=message):
-        static_curve("x", [test_of(ends)])
+        static_curve("x", [ramps(ends)])
 
 
 def write(name, loop, columns):
@@ -100,10 +97,10 @@ def test_command_gives_all_axes_in_one_plot_and_a_machine(wm_drake):
         ("time_s", "displacement_mm", "force_N"),
         ("time_s", "angle_deg", "moment_Nm"),
     )
-    write("r.csv", test_of((0.0, 20e-3, 0.0)), straight)
-    write("a.csv", test_of((0.0, 15e-3, -15e-3, 0.0)), straight)
-    write("t.csv", test_of((0.0, 0.1, 0.0), rotates=True), turned)
-    write("w.csv", test_of((0.0, 0.05, 0.0), rotates=True), turned)
+    write("r.csv", ramps((0.0, 20e-3, 0.0)), straight)
+    write("a.csv", ramps((0.0, 15e-3, -15e-3, 0.0)), straight)
+    write("t.csv", ramps((0.0, 0.1, 0.0), rotates=True), turned)
+    write("w.csv", ramps((0.0, 0.05, 0.0), rotates=True), turned)
     ended = wm_drake(
         "identify", "gasket", "--static", "radial=r.csv", "axial=a.csv", "tilt=t.csv", "twist=w.csv",
         "--out", "fit", "--json",
@@ -135,7 +132,7 @@ def test_command_gives_all_axes_in_one_plot_and_a_machine(wm_drake):
     ],
 )
 def test_bad_static_commands_get_one_message(wm_drake, arguments, message):
-    write("r.csv", test_of((0.0, 20e-3, 0.0)), ("time_s", "displacement_mm", "force_N"))
+    write("r.csv", ramps((0.0, 20e-3, 0.0)), ("time_s", "displacement_mm", "force_N"))
     ended = wm_drake("identify", "gasket", *arguments, "--out", "out")
     assert ended.code == 2
     assert ended.err.strip().splitlines()[0].startswith(message)
