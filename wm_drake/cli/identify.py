@@ -20,7 +20,6 @@ from wm_drake.cli.common import (
 )
 from wm_drake.cli.components import (
     ArmOption,
-    AxisOption,
     ComponentOption,
     NameOption,
     Target,
@@ -75,6 +74,22 @@ UnitsOption = Annotated[
         "--units",
         help="Of time, displacement, force, where files do not say: 's,mm,N'.",
         metavar="UNITS",
+    ),
+]
+OptionalAxisOption = Annotated[
+    str | None,
+    typer.Option(
+        "--axis",
+        help="radial, axial, tilt, twist; or x, y, z, about_x, about_y, about_z.",
+        metavar="AXIS",
+    ),
+]
+StaticOption = Annotated[
+    bool,
+    typer.Option(
+        "--static",
+        help="Quasi-static tests, to the end and back: table and hysteresis of each axis. Files "
+        "are AXIS=FILE, or all of one --axis.",
     ),
 ]
 ValidateOption = Annotated[
@@ -163,7 +178,8 @@ def _axis_command(kind: str) -> Callable[..., None]:
 
     def identify_axis(
         files: FilesArgument,
-        axis: AxisOption,
+        axis: OptionalAxisOption = None,
+        static: StaticOption = False,
         law: Annotated[
             str, typer.Option(help="voigt, table (monotone curve) or, about an axis, voigt_havsin.")
         ] = "voigt",
@@ -188,6 +204,13 @@ def _axis_command(kind: str) -> Callable[..., None]:
         from wm_drake.studies.identification import bushing_model
 
         target = target_of(kind, machine, name, component, sets)
+        if static:
+            from wm_drake.cli.static_tests import run_static
+
+            run_static(kind, files, axis, units, knots, target, out, overwrite, as_json, sets)
+            return
+        if axis is None:
+            raise input_error("is needed, for example --axis radial", where="--axis")
         asked = _Asked(
             files, units, method, seed, out, overwrite, as_json, sets, validate or [], cutoff
         )
@@ -325,14 +348,7 @@ def _motions(asked: _Asked, files: list[Path], *, rotates: bool) -> "list[Measur
         raise input_error(
             f"no method '{asked.method}'{nearest_names(asked.method, METHODS)}", where="--method"
         )
-    units = None
-    if asked.units is not None:
-        parts = [part.strip() for part in asked.units.split(",")]
-        if len(parts) != 3:
-            raise input_error(
-                f"'{asked.units}' is not three units; write for example 's,mm,N'", where="--units"
-            )
-        units = (parts[0], parts[1], parts[2])
+    units = units_of(asked.units)
     cutoff = None
     if asked.cutoff is not None:
         cutoff = quantities_of(asked.cutoff, Unit("Hz", "Hz"), "--cutoff")[0]
@@ -353,6 +369,18 @@ def _motions(asked: _Asked, files: list[Path], *, rotates: bool) -> "list[Measur
     if problems:
         raise InputError(problems)
     return sorted(motions, key=lambda measured: measured.order)
+
+
+def units_of(text: str | None) -> tuple[str, str, str] | None:
+    """Return the units of time, displacement and force of the option `--units`."""
+    if text is None:
+        return None
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 3:
+        raise input_error(
+            f"'{text}' is not three units; write for example 's,mm,N'", where="--units"
+        )
+    return (parts[0], parts[1], parts[2])
 
 
 def _kept_fields(

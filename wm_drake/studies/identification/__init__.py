@@ -7,7 +7,12 @@ from wm_drake.studies.identification.comparison import (
     compare_laws,
     fit_law,
 )
-from wm_drake.studies.identification.fragment import fragment, missing_numbers
+from wm_drake.studies.identification.fragment import (
+    fragment,
+    missing_numbers,
+    table_entry,
+    written_fragment,
+)
 from wm_drake.studies.identification.judgement import Judgement, LoopJudgement, judge
 from wm_drake.studies.identification.models import (
     BUSHING_LAWS,
@@ -17,6 +22,7 @@ from wm_drake.studies.identification.models import (
     fields_of_law,
 )
 from wm_drake.studies.identification.problem import fit_problem
+from wm_drake.studies.identification.static import StaticCurve, static_curve
 
 __all__ = [
     "BUSHING_LAWS",
@@ -25,6 +31,7 @@ __all__ = [
     "Judgement",
     "LawResult",
     "LoopJudgement",
+    "StaticCurve",
     "bushing_model",
     "check_blind",
     "compare_laws",
@@ -35,4 +42,7 @@ __all__ = [
     "fragment",
     "judge",
     "missing_numbers",
+    "static_curve",
+    "table_entry",
+    "written_fragment",
 ]

@@ -63,14 +63,35 @@ def fragment(
             entries[field] = dict(entries[source])
     tests = ", ".join(test.name for test in fit.tests)
     unit = "N m" if any(unknown.unit == TORQUE for unknown in fit.problem.unknowns) else "N"
-    written, left_out = _of_fragment(changes or {})
-    if left_out and machine:
-        comments.append(f"Not in this file: --set {', '.join(left_out)}.")
     head = [
-        f"# Identified by least RMSE, method {fit.method}, seed {fit.seed}, from {tests}.",
-        f"# RMSE {fit.rmse:.4g} {unit} over all tests.",
-        *(f"# {line}" for line in (*remarks, *comments)),
+        f"Identified by least RMSE, method {fit.method}, seed {fit.seed}, from {tests}.",
+        f"RMSE {fit.rmse:.4g} {unit} over all tests.",
+        *remarks,
+        *comments,
     ]
+    return written_fragment(entries, head, target, machine, key, out, changes)
+
+
+def written_fragment(
+    entries: dict[str, Any],
+    head: Sequence[str],
+    target: Component,
+    machine: str,
+    key: str,
+    out: Path,
+    changes: Mapping[str, str] | None = None,
+) -> str:
+    """Return the text of a YAML file with entries of one component.
+
+    Args:
+        entries: Values with sources by field.
+        head: Lines of the comment at the beginning.
+        target, machine, key, out, changes: As for `fragment`.
+    """
+    written, left_out = _of_fragment(changes or {})
+    lines = [f"# {line}" for line in head]
+    if left_out and machine:
+        lines.append(f"# Not in this file: --set {', '.join(left_out)}.")
     if not machine:
         body: Any = _whole(entries, target)
     else:
@@ -79,11 +100,11 @@ def fragment(
             *parents, name = path.split(".")
             _node(body, parents)[name] = YAML(typ="safe").load(text)
         _node(body, key.split(".")).update(_leaving(entries, target))
-    lines: list[str] = []
+    dumped: list[str] = []
     yaml = YAML()
     yaml.width = 4096
-    yaml.dump(body, _Lines(lines))
-    return "\n".join(head) + "\n" + "".join(lines)
+    yaml.dump(body, _Lines(dumped))
+    return "\n".join(lines) + "\n" + "".join(dumped)
 
 
 def _of_fragment(changes: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
@@ -192,17 +213,21 @@ def _fixed_rises(table: str, model: ComponentModel) -> str:
     return f"; {', '.join(names)} fixed" if names else ""
 
 
-def _table(value: Mapping[str, Any], fit: Fit, fixed: str) -> dict[str, str]:
+def table_entry(value: Mapping[str, Sequence[float]], source: str) -> dict[str, str]:
+    """Return a table in SI as an entry of a YAML file, with its source."""
     units = {"displacement": _LENGTH, "angle": _ANGLE, "force": FORCE, "torque": TORQUE}
     shown = {
         name: f"({', '.join(f'{units[name].from_si(x):.6g}' for x in given)}) {_plain(units[name])}"
         for name, given in value.items()
     }
-    return {
-        **shown,
-        "source": f"identified from {len(fit.tests)} loops, normalised RMSE {_normalised(fit):.3g}"
-        f"{fixed}",
-    }
+    return {**shown, "source": source}
+
+
+def _table(value: Mapping[str, Any], fit: Fit, fixed: str) -> dict[str, str]:
+    return table_entry(
+        value,
+        f"identified from {len(fit.tests)} loops, normalised RMSE {_normalised(fit):.3g}{fixed}",
+    )
 
 
 def _plain(unit: Unit) -> str:

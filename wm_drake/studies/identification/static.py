@@ -1,0 +1,251 @@
+"""Quasi-static tests of a bushing or gasket: force table and hysteresis by axis ([B] 3.1.1)."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wm_drake.errors import input_error
+from wm_drake.parameters import MeasuredLoop
+from wm_drake.parameters.types import FloatArray
+from wm_drake.rigs.smoothing import smoothed
+
+NODES = 40
+"""Places on each side of zero at which branches are averaged."""
+
+TURN = 0.02
+"""Least way back, by the range of the motion, that ends a branch."""
+
+DEVELOPED = 0.1
+"""Part of a branch after a reversal in which friction has not turned round: it does not count."""
+
+NOMINAL = 0.2
+"""Part of the curve whose linear fit gives the nominal stiffness, as in [B] section 4."""
+
+
+@dataclass(frozen=True, eq=False)
+class StaticCurve:
+    """Quasi-static behaviour along or about one axis.
+
+    Attributes:
+        axis: One of `wm_drake.rigs.AXES`.
+        loops: Recorded tests.
+        position: Places over the range, zero among them (m,). [m; rad]
+        loading, unloading: Mean force of the branches that rise and fall in displacement, where
+            friction has developed, without offset; NaN elsewhere (m,). [N; N m]
+        elastic: Their mean, zero at zero (m,). [N; N m]
+        half_width: Half the difference of loading and unloading (m,); NaN where one is missing. [N;
+            N m]
+        offset: What was taken off the force so that the elastic curve goes through zero. [N; N m]
+        stiffness: Slope of a line through zero, fitted to the first 20 % of the elastic curve.
+            [N/m; N m/rad]
+        energy: Mean work that a way through the whole range and back takes. [J]
+        fastest: Median absolute rate. [m/s; rad/s]
+        fallen: Largest fall of the elastic curve that the table cannot have. [N; N m]
+    """
+
+    axis: str
+    loops: tuple[MeasuredLoop, ...]
+    position: FloatArray
+    loading: FloatArray
+    unloading: FloatArray
+    elastic: FloatArray
+    half_width: FloatArray
+    offset: float
+    stiffness: float
+    energy: float
+    fastest: float
+    fallen: float
+
+    @property
+    def rotates(self) -> bool:
+        """Whether it is a curve of moment over angle."""
+        return self.axis.startswith("about")
+
+    @property
+    def friction(self) -> float:
+        """Median half width of the hysteresis. [N; N m]"""
+        return float(np.nanmedian(self.half_width))
+
+    @property
+    def field(self) -> str:
+        """Field of a bushing that holds the table."""
+        return f"{'rotational_' if self.rotates else ''}stiffness_{self.axis[-1]}"
+
+    def table(self, knots: int) -> dict[str, tuple[float, ...]]:
+        """Return the monotone table of the elastic curve.
+
+        Args:
+            knots: Points on each side of zero, where the range has that side.
+        """
+        low, high = float(self.position[0]), float(self.position[-1])
+        sides: list[FloatArray] = [
+            np.linspace(low, 0.0, knots + 1)[:-1] if low < 0.0 else np.zeros(0),
+            np.zeros(1),
+        ]
+        sides.append(np.linspace(0.0, high, knots + 1)[1:] if high > 0.0 else np.zeros(0))
+        places = np.concatenate(sides)
+        force = np.interp(places, self.position, _never_falling(self.position, self.elastic))
+        names = ("angle", "torque") if self.rotates else ("displacement", "force")
+        return dict(zip(names, (tuple(places.tolist()), tuple(force.tolist())), strict=True))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the measures for JSON, in SI."""
+        return {
+            "axis": self.axis,
+            "files": [loop.name for loop in self.loops],
+            "range": [float(self.position[0]), float(self.position[-1])],
+            "nominal_stiffness": self.stiffness,
+            "half_width_of_hysteresis": self.friction,
+            "energy_per_cycle_J": self.energy,
+            "offset": self.offset,
+            "median_rate": self.fastest,
+            "largest_fall": self.fallen,
+        }
+
+
+def static_curve(axis: str, loops: Sequence[MeasuredLoop]) -> StaticCurve:
+    """Return force table and hysteresis of quasi-static tests of one axis.
+
+    A test goes to one or both sides of the rest position and back, any number of times. It is split
+    at its reversals into branches. A branch counts where friction has turned round. The elastic
+    force is the mean of loading and unloading; where only one of them counts, near an end, it is
+    that one less or plus the half width next to it.
+
+    Args:
+        axis: One of `wm_drake.rigs.AXES`.
+        loops: Tests of this axis, at least one.
+
+    Raises:
+        InputError: The motion does not contain zero, or does not come back.
+    """
+    signals = [_signal(loop) for loop in loops]
+    low = min(float(np.min(position)) for position, _, _ in signals)
+    high = max(float(np.max(position)) for position, _, _ in signals)
+    size = high - low
+    if low > 0.05 * size or high < -0.05 * size:
+        raise input_error(
+            "displacement does not contain zero, which is the rest position of the component",
+            where=loops[0].path,
+        )
+    low, high = (0.0 if abs(end) < 0.05 * size else end for end in (low, high))
+    places = np.unique(
+        np.concatenate(
+            [
+                np.linspace(low, 0.0, NODES + 1) if low < 0.0 else [0.0],
+                np.linspace(0.0, high, NODES + 1) if high > 0.0 else [0.0],
+            ]
+        )
+    )
+    sides: dict[bool, list[FloatArray]] = {True: [], False: []}
+    energy, way = 0.0, 0.0
+    for position, force, _ in signals:
+        ends = _turning_points(position, TURN * size)
+        for begin, end in itertools.pairwise(ends):
+            branch = slice(begin, end + 1)
+            sides[bool(position[end] > position[begin])].append(
+                _branch(places, position[branch], force[branch])
+            )
+        energy += float(np.trapezoid(force, position))
+        way += float(np.sum(np.abs(np.diff(position[ends]))))
+    if not (sides[True] and sides[False]):
+        raise input_error(
+            "displacement goes one way only; a quasi-static test goes to its end and back",
+            where=loops[0].path,
+        )
+    loading, unloading = (_mean(sides[rises]) for rises in (True, False))
+    half = 0.5 * (loading - unloading)
+    known = np.isfinite(half)
+    if not np.any(known):
+        raise input_error(
+            "loading and unloading have no displacement in common where friction has developed",
+            where=loops[0].path,
+        )
+    nearest = np.interp(places, places[known], half[known])
+    raised = np.where(np.isfinite(loading), loading - nearest, unloading + nearest)
+    elastic = np.where(known, 0.5 * (loading + unloading), raised)
+    there = np.isfinite(elastic)
+    elastic = np.interp(places, places[there], elastic[there])
+    offset = float(np.interp(0.0, places, elastic))
+    elastic = elastic - offset
+    first = np.abs(places) <= NOMINAL * max(high, -low) * (1.0 + 1e-9)
+    return StaticCurve(
+        axis,
+        tuple(loops),
+        places,
+        loading - offset,
+        unloading - offset,
+        elastic,
+        half,
+        offset,
+        float(np.sum(places[first] * elastic[first]) / np.sum(np.square(places[first]))),
+        energy * 2.0 * (high - low) / way,
+        float(np.median(np.concatenate([np.abs(rate) for _, _, rate in signals]))),
+        float(np.max(np.abs(_never_falling(places, elastic) - elastic))),
+    )
+
+
+def _signal(loop: MeasuredLoop) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return smoothed displacement, force and rate of a test."""
+    time = loop.time - loop.time[0]
+    curve = smoothed(time, loop.displacement, None, loop.path)
+    return curve.position, loop.force, curve.rate(time)
+
+
+def _turning_points(position: FloatArray, threshold: float) -> list[int]:
+    """Return the indices of the ends of a motion and of its reversals by more than a threshold."""
+    found, extreme, rises = [0], 0, 0
+    for index in range(1, len(position)):
+        moved = position[index] - position[extreme]
+        if rises == 0:
+            if abs(moved) > threshold:
+                rises, extreme = (1 if moved > 0.0 else -1), index
+        elif moved * rises > 0.0:
+            extreme = index
+        elif -moved * rises > threshold:
+            found.append(extreme)
+            rises, extreme = -rises, index
+    return [*found, extreme] if extreme != found[-1] else found
+
+
+def _branch(places: FloatArray, position: FloatArray, force: FloatArray) -> FloatArray:
+    """Return the force of a branch at places, NaN where it has none or has just turned.
+
+    The force at a place is that of a straight line fitted to the samples nearest to it.
+    """
+    begin, end = float(position[0]), float(position[-1])
+    way = end - begin
+    order = np.argsort(position, kind="stable")
+    x, y = position[order], force[order]
+    step = float(np.min(np.diff(places))) if len(places) > 1 else abs(way)
+    found = np.full(len(places), np.nan)
+    for index, place in enumerate(places):
+        part = (place - begin) / way
+        if not DEVELOPED <= part <= 1.0 + 1e-6:
+            continue
+        near = slice(*np.searchsorted(x, [place - step, place + step]))
+        if len(x[near]) >= 4 and np.ptp(x[near]) > 0.5 * step:
+            slope, level = np.polyfit(x[near] - place, y[near], 1)
+            found[index] = level if np.isfinite(slope) else np.nan
+        else:
+            found[index] = float(np.interp(place, x, y))
+    return found
+
+
+def _mean(branches: list[FloatArray]) -> FloatArray:
+    """Return the mean of branches at each place; NaN where there is none."""
+    stacked = np.array(branches)
+    counts = np.sum(np.isfinite(stacked), axis=0)
+    total = np.sum(np.where(np.isfinite(stacked), stacked, 0.0), axis=0)
+    return np.where(counts > 0, total / np.maximum(counts, 1), np.nan)
+
+
+def _never_falling(places: FloatArray, force: FloatArray) -> FloatArray:
+    """Return a curve that does not fall on its way out from zero."""
+    found = force.copy()
+    zero = int(np.argmin(np.abs(places)))
+    found[zero:] = np.maximum.accumulate(force[zero:])
+    found[: zero + 1] = np.minimum.accumulate(force[: zero + 1][::-1])[::-1]
+    return found
