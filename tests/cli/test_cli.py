@@ -407,13 +407,17 @@ def test_spin_prints_one_json_object(plain):
             "gasket_force_N",
             "gasket_moment_Nm",
         ),
-        *("smallest_gap_mm", "critical_rpm", "diverged", "wall_s"),
+        *("mount_force_N", "smallest_gap_mm", "critical_rpm", "diverged", "wall_s"),
     }
     assert (case["load"], case["gasket"], case["diverged"]) == ("middle", True, None)
     assert list(case["amplitudes_mm"]) == list(case["critical_rpm"]) == SENSORS
     assert list(case["detergent_box_mm"]) == ["Dx", "Dy", "Dz"]
     assert list(case["gasket_force_N"]) == ["Fx", "Fy", "Fz"]
     assert list(case["gasket_moment_Nm"]) == ["Mx", "My", "Mz"]
+    assert next(iter(case["mount_force_N"])) == "springs.left"
+    assert list(case["mount_force_N"])[-1] == "gasket"
+    for force in case["mount_force_N"].values():
+        assert force["peak"] > force["rms"] >= force["dynamic_rms"] > 0.0
     assert 0.0 < case["smallest_gap_mm"] < 100.0
     assert all(0.0 <= rpm <= 100.0 + 1e-9 for rpm in case["critical_rpm"].values())
     assert all(size > 0.0 for size in case["amplitudes_mm"].values())

@@ -14,8 +14,12 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.mounts import KINDS, POINT, mount_names
 from wm_drake.simulation.outputs import AXES
 from wm_drake.simulation.runs import checked_step
+
+FORCE_KINDS = dict(zip(KINDS, ("largest size", "RMS", "RMS without the mean"), strict=True))
+"""Words for each of `KINDS`."""
 
 _VARIABLES = {
     "detergent_displacement": (
@@ -43,6 +47,15 @@ _VARIABLES = {
         "m",
         "RMS displacement in each region, from the acceleration integrated twice",
     ),
+    **{
+        f"{name}_{kind}": (dim, unit, f"{FORCE_KINDS[kind]} of the {about}")
+        for name, dim, unit, about in (
+            ("mount_force", "mount", "N", "force of each mount on the cabinet"),
+            ("cabinet_force", "axis", "N", "force of all mounts on the cabinet"),
+            ("cabinet_moment", "axis", "N m", f"moment of all mounts on the cabinet about {POINT}"),
+        )
+        for kind in KINDS
+    },
 }
 
 
@@ -81,7 +94,9 @@ def simulate_many(
             "power means": smooth substitutes for the amplitudes (`measures.power_means`);
             "gap": smallest distance between tub group and housing, NaN if the SDF has no shapes;
             "regions": RMS displacements of the accelerometers in the regions of the profile
-            (`wm_drake.simulation.vibration`).
+            (`wm_drake.simulation.vibration`);
+            "mounts": peak, RMS and dynamic RMS of the force of each mount on the cabinet;
+            "cabinet": the same of force and moment of all mounts on the cabinet, for each axis.
         step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
             step size of the machine is used. [s]
         histories: Whether each `RunResult` contains the record of the run, as from `simulate`.
@@ -143,6 +158,7 @@ def as_table(
         "case": ("run", [results[number][0] for number in numbers]),
         "axis": list(AXES),
         "sensor": list(parameters.sensors),
+        "mount": list(mount_names(parameters)),
     }
     if "regions" in measures:
         labels |= {

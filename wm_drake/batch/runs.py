@@ -28,6 +28,15 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.histories import measure_samples_lanes
 from wm_drake.simulation.measures import amplitudes, filtered, power_means
+from wm_drake.simulation.mount_histories import measure_mounts_lanes
+from wm_drake.simulation.mounts import (
+    KINDS,
+    cabinet_measures,
+    mount_measures,
+    mount_names,
+    mounts_of,
+    sums_size,
+)
 from wm_drake.simulation.records import Record, as_record
 from wm_drake.simulation.vibration import region_displacements
 
@@ -37,11 +46,16 @@ MEASURES = {
     "power means": ("power_mean",),
     "gap": ("smallest_gap",),
     "regions": ("region_displacement", "region_displacement_integrated"),
+    "mounts": tuple(f"mount_force_{kind}" for kind in KINDS),
+    "cabinet": tuple(f"cabinet_{of}_{kind}" for of in ("force", "moment") for kind in KINDS),
 }
 """What can be measured of each run, with the names of its variables."""
 
 _FILTERED = {"amplitudes", "power means"}
 """Measures that need the filtered displacements at the sensors."""
+
+_OF_MOUNTS = {"mounts", "cabinet"}
+"""Measures that need the forces of the mounts."""
 
 
 @dataclass(frozen=True)
@@ -117,11 +131,24 @@ class Runner:
             samples.reshape(rows, size, WIDTH),
             moved.reshape(rows, count, WIDTH),
             extremes.reshape(-1, WIDTH),
+            self._forces_of_mounts(key, samples, rows, size, p).reshape(-1, WIDTH),
         )
         return [
             self._result(item, schedule, *(a[..., lane] for a in histories))
             for lane, item in enumerate(work_items)
         ]
+
+    def _forces_of_mounts(
+        self, key: BatchKey, samples: FloatArray, rows: int, size: int, p: FloatArray
+    ) -> FloatArray:
+        """Return the sums of `measure_mounts_lanes`; an empty array if they are not needed."""
+        if not _OF_MOUNTS & set(self.measures):
+            return np.empty(0)
+        mounts, bounds = mounts_of(key.layout), (LARGEST_ANGLE, LARGEST_DISPLACEMENT)
+        count = len(mount_names(self.parameters))
+        sums, nothing = self._array("sums", sums_size(count)), np.empty(0)
+        measure_mounts_lanes(samples, rows, size, bounds, p, mounts, count, nothing, sums)
+        return sums
 
     def _result(
         self,
@@ -130,6 +157,7 @@ class Runner:
         samples: FloatArray,
         moved: FloatArray,
         extremes: FloatArray,
+        mounts: FloatArray,
     ) -> RunResult:
         # the last three points are the detergent point's
         good, sensors = int(extremes[-1]), moved.shape[1] - 3
@@ -145,6 +173,10 @@ class Runner:
                 arrays = self._regions(item, np.ascontiguousarray(samples[:good]))
             elif measure == "power means":
                 arrays = [power_means(displacement)]
+            elif measure == "mounts":
+                arrays = mount_measures(mounts)
+            elif measure == "cabinet":
+                arrays = cabinet_measures(mounts)
             else:
                 size, at = amplitudes(displacement)
                 arrays = size, np.where(np.isnan(size), np.nan, samples[at, DRUM_RATE])

@@ -28,6 +28,7 @@ from wm_drake.errors import input_error, nearest_names
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.parameters import MachineParameters
     from wm_drake.simulation.cases import Case
+    from wm_drake.simulation.measures import Measures
     from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 DEFAULT_OUT = Path("wm-drake-spin")
@@ -203,6 +204,7 @@ def _case_as_json(case: "CaseResult") -> dict[str, Any]:
         "detergent_box_mm": numbers(measures.detergent_displacement, millimetre, "D"),
         "gasket_force_N": numbers(measures.gasket_force, Unit("N", "N"), "F"),
         "gasket_moment_Nm": numbers(measures.gasket_moment, Unit("N*m", "N*m"), "M"),
+        "mount_force_N": _mount_forces(measures),
         "smallest_gap_mm": millimetre.from_si(measures.smallest_gap.distance)
         if measures.smallest_gap
         else None,
@@ -210,3 +212,13 @@ def _case_as_json(case: "CaseResult") -> dict[str, Any]:
         "diverged": case.record.attrs["diverged"] or None,
         "wall_s": case.wall_s,
     }
+
+
+def _mount_forces(measures: "Measures") -> dict[str, dict[str, float | None]]:
+    """Return peak and RMS values of the force of each mount on the cabinet, by mount. [N]"""
+    found: dict[str, dict[str, float | None]] = {}
+    for kind in ("peak", "rms", "dynamic_rms"):
+        values = getattr(measures, f"mount_force_{kind}")
+        for mount, value in zip(values.mount.values, map(float, values.values), strict=True):
+            found.setdefault(str(mount), {})[kind] = value if value == value else None
+    return found

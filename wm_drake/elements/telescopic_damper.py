@@ -119,12 +119,7 @@ def telescopic_damper_forces(tub, outer, extension, extension_rate, deformation,
         bushing on the outer tube (in its frame), of the second on the housing.
     """
     damper = read_telescopic_damper(p, at)
-    axis = rotate(outer.rotation, damper.axis)
-    moved = scale(extension, axis)
-    v_inner = add(
-        outer.velocity, add(cross(outer.angular_velocity, moved), scale(extension_rate, axis))
-    )
-    inner = TubMotion(outer.rotation, add(outer.position, moved), outer.angular_velocity, v_inner)
+    inner, axis, moved = inner_tube_motion(outer, extension, extension_rate, damper)
     on_tub, on_outer, first_force = six_component_bushing_between(tub, outer, *damper.tub_bushing)
     on_inner, second_force = six_component_bushing_wrench(inner, *damper.housing_bushing)
     tension, deformation_rate = damper_response(extension_rate, deformation, *damper.law)
@@ -148,6 +143,24 @@ def telescopic_damper_forces(tub, outer, extension, extension_rate, deformation,
         first_force,
         second_force,
     )
+
+
+@law
+def inner_tube_motion(outer, extension, extension_rate, damper):
+    """Return the motion of the inner tube, direction of the joint and shift of the tube, in W.
+
+    Args:
+        outer: `TubMotion` of the outer tube.
+        extension, extension_rate: Extension of the joint, > 0 longer, and its rate. [m, m/s]
+        damper: Numbers of `TELESCOPIC_DAMPER`, by name.
+    """
+    axis = rotate(outer.rotation, damper.axis)
+    moved = scale(extension, axis)
+    velocity = add(
+        outer.velocity, add(cross(outer.angular_velocity, moved), scale(extension_rate, axis))
+    )
+    position = add(outer.position, moved)
+    return TubMotion(outer.rotation, position, outer.angular_velocity, velocity), axis, moved
 
 
 @law

@@ -1,6 +1,7 @@
 """Measures of a record: filtered displacements, envelopes, amplitudes, largest forces, gap."""
 
 import functools
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.signal import butter, find_peaks, sosfiltfilt
 
 from wm_drake.model.scene import REPLAY_RATE, Gap, Scene
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.mounts import KINDS, force_measures
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record
 
@@ -44,6 +46,12 @@ class Measures:
         gasket_force, gasket_moment: (axis) largest absolute force and moment of the gasket on the
             housing; F and M of [B]. Zero without gasket. [N, N m]
         smallest_gap: Smallest gap between tub group and housing; None if it was not measured.
+        mount_force_peak, mount_force_rms, mount_force_dynamic_rms: (mount) largest size, RMS, and
+            RMS without the mean of the force of each mount on the cabinet. [N]
+        cabinet_force_peak, cabinet_force_rms, cabinet_force_dynamic_rms: (axis) the same of the
+            force of all mounts on the cabinet, in W. [N]
+        cabinet_moment_peak, cabinet_moment_rms, cabinet_moment_dynamic_rms: (axis) the same of
+            their moment about the origin of W. [N m]
     """
 
     amplitude: xr.DataArray
@@ -52,6 +60,15 @@ class Measures:
     gasket_force: xr.DataArray
     gasket_moment: xr.DataArray
     smallest_gap: Gap | None
+    mount_force_peak: xr.DataArray
+    mount_force_rms: xr.DataArray
+    mount_force_dynamic_rms: xr.DataArray
+    cabinet_force_peak: xr.DataArray
+    cabinet_force_rms: xr.DataArray
+    cabinet_force_dynamic_rms: xr.DataArray
+    cabinet_moment_peak: xr.DataArray
+    cabinet_moment_rms: xr.DataArray
+    cabinet_moment_dynamic_rms: xr.DataArray
 
 
 def filtered(displacement: FloatArray, period: float) -> FloatArray:
@@ -233,7 +250,20 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
         gasket_force=xr.DataArray(_largest(force), by_axis),
         gasket_moment=xr.DataArray(_largest(moment), by_axis),
         smallest_gap=gap,
+        **_forces_on_cabinet(values, by_axis, record.coords["mount"].coords),
     )
+
+
+def _forces_on_cabinet(
+    values: Mapping[Hashable, FloatArray], by_axis: xr.Coordinates, by_mount: xr.Coordinates
+) -> dict[str, xr.DataArray]:
+    """Return the measures of the forces of the mounts, by the names of the `Measures`."""
+    found = {}
+    for name in ("mount_force", "cabinet_force", "cabinet_moment"):
+        coordinates = by_mount if name == "mount_force" else by_axis
+        for kind, value in zip(KINDS, force_measures(values[name]), strict=True):
+            found[f"{name}_{kind}"] = xr.DataArray(value, coordinates)
+    return found
 
 
 def _largest(history: FloatArray) -> FloatArray:

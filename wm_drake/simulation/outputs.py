@@ -12,6 +12,7 @@ from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.histories import output_history, position_history
+from wm_drake.simulation.mounts import POINT, mount_wrenches
 
 AXES = ("x", "y", "z")
 
@@ -29,6 +30,7 @@ def variables_of(setup: Setup, trajectory: Trajectory) -> Variables:
         | _whirl(setup, trajectory)
         | _motion(setup, trajectory, displacements)
         | _forces(trajectory, *forces)
+        | _on_cabinet(mount_wrenches(setup, trajectory))
     )
 
 
@@ -200,6 +202,30 @@ def _forces(
             bushings[:, :, 3:],
             "N m",
             "moment of gasket and bushings on the housing",
+        ),
+    }
+
+
+def _on_cabinet(wrenches: FloatArray) -> Variables:
+    """Return the variables of the forces of the mounts on the cabinet.
+
+    Args:
+        wrenches: (n, mounts, 6) from `mount_wrenches`. [N m, N]
+    """
+    resultant, dims = wrenches.sum(axis=1), ("time", "axis")
+    return {
+        "mount_force": (
+            ("time", "mount", "axis"),
+            wrenches[:, :, 3:],
+            "N",
+            "force of each spring, damper and bushing on the cabinet",
+        ),
+        "cabinet_force": (dims, resultant[:, 3:], "N", "force of all mounts on the cabinet"),
+        "cabinet_moment": (
+            dims,
+            resultant[:, :3],
+            "N m",
+            f"moment of all mounts on the cabinet about {POINT}",
         ),
     }
 

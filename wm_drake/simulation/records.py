@@ -11,14 +11,15 @@ import xarray as xr
 from wm_drake.engines.trajectory import COORDINATES, Trajectory, divergence_text
 from wm_drake.model.machine import Setup
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.outputs import AXES, variables_of
 
 Record: TypeAlias = xr.Dataset
 """Outputs of one run over time, in SI units.
 
 The dimensions are time, axis (x, y, z), angle (roll, pitch, yaw), sensor, accelerometer, spring,
-damper and bushing; machines with telescopic dampers also have tube. Each variable has its unit in
-attrs["units"]. `as_record` makes it.
+damper, bushing and mount (key paths of all that connects tub and cabinet); machines with telescopic
+dampers also have tube. Each variable has its unit in attrs["units"]. `as_record` makes it.
 """
 
 
@@ -47,6 +48,7 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
             *setup.bushings,
             *(f"{name}_{end}" for name in setup.telescopes for end in ("tub", "housing")),
         ),
+        "mount": mount_names(setup.parameters),
         **({"tube": setup.telescopes} if setup.telescopes else {}),
     }
     label_coordinates = _label_coordinates(**{name: tuple(of) for name, of in labels.items()})

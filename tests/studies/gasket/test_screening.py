@@ -164,6 +164,7 @@ def test_any_measure_can_be_a_response(reference):
         time=(0.0, 2.0), speed=(5.0, 12.0), regions=(Region(name="R1", begin=0.5, end=1.5),)
     )
     names = ("gap", "amplitude_Xr", "critical_speed", "power means", "region_displacement_R1_S1_z")
+    names += ("mount_force_rms_springs.left", "cabinet_moment_peak")
     chosen = chosen_responses(reference, profile, names)
     case = Case("middle", reference.loads["middle"], profile)
     table = simulate_many(build_machine(reference), [case], measures=measures_of(reference, chosen))
@@ -175,7 +176,11 @@ def test_any_measure_can_be_a_response(reference):
     assert found["power_mean_Zr"] == pytest.approx(1e3 * table.power_mean.sel(sensor="Zr").item())
     rms = table.region_displacement.sel(accelerometer="S1", axis="z").item()
     assert found["region_displacement_R1_S1_z"] == pytest.approx(1e3 * rms)
-    assert len(found) == 1 + 1 + 2 * len(reference.sensors) + 1
+    rms = table.mount_force_rms.sel(mount="springs.left").item()
+    assert found["mount_force_rms_springs.left"] == pytest.approx(rms)
+    peak = table.cabinet_moment_peak.sel(axis="y").item()
+    assert found["cabinet_moment_peak_y"] == pytest.approx(peak)
+    assert len(found) == 1 + 1 + 2 * len(reference.sensors) + 1 + 1 + 3
 
 
 @pytest.mark.parametrize(

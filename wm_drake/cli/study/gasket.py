@@ -101,8 +101,10 @@ def gasket(
         list[str] | None,
         typer.Option(
             help="What is measured of each run: D, F, M, gap, amplitude, critical_speed, "
-            "power_mean, region_displacement, region_displacement_integrated, or one number such "
-            "as Dx or amplitude_Xr. Repeatable. Default: D, F, M and gap.",
+            "power_mean, region_displacement, region_displacement_integrated, mounts, cabinet, "
+            "mount_force_peak, mount_force_rms, mount_force_dynamic_rms, cabinet_force_peak, ..., "
+            "or one number such as Dx, amplitude_Xr or mount_force_rms_springs.left. Repeatable. "
+            "Default: D, F, M and gap.",
             metavar="NAME",
         ),
     ] = None,

@@ -7,15 +7,21 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.batch import MEASURES
+from wm_drake.batch.many import FORCE_KINDS
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
+from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.outputs import AXES
 from wm_drake.studies.gasket.screening import Meaning
 
 MM = Unit("m", "mm")
+NEWTON = Unit("N", "N")
+
+KIND_TITLES = {"peak": "peak", "rms": "RMS", "dynamic_rms": "dynamic RMS"}
+"""Title of each kind of measure of a force, `wm_drake.simulation.mounts.KINDS`."""
 
 GAP = "gap"
 """Name of the response that tells whether the tub touches the housing."""
@@ -62,7 +68,7 @@ class Response:
 def known_responses(parameters: MachineParameters, profile: SpinProfile) -> tuple[Response, ...]:
     """Return all responses that a machine has over a spin profile."""
     found = [*_extremes(), _gap(), *_by_sensor(parameters), *_by_region(parameters, profile)]
-    return tuple(found)
+    return (*found, *_on_cabinet(parameters))
 
 
 def chosen_responses(
@@ -185,6 +191,26 @@ def _by_sensor(parameters: MachineParameters) -> Iterator[Response]:
         ):
             name = f"{variable}_{sensor}"
             yield Response(name, variable, measure, variable, (index,), unit, meaning)
+
+
+def _on_cabinet(parameters: MachineParameters) -> Iterator[Response]:
+    """Yield peak and RMS of the force of each mount, and of force and moment of all of them."""
+    for kind, words in FORCE_KINDS.items():
+        for index, mount in enumerate(mount_names(parameters)):
+            variable = f"mount_force_{kind}"
+            title = f"{KIND_TITLES[kind]} force {mount}"
+            about = f"{words} of the force of this mount on the cabinet"
+            meaning = Meaning(title, about, f"{KIND_TITLES[kind]} force of a mount")
+            name = f"{variable}_{mount}"
+            yield Response(name, variable, "mounts", variable, (index,), NEWTON, meaning)
+        for quantity, unit in (("force", NEWTON), ("moment", Unit("N*m", "N*m"))):
+            for index, axis in enumerate(AXES):
+                variable = f"cabinet_{quantity}_{kind}"
+                title = f"{KIND_TITLES[kind]} {quantity} on the cabinet {axis}"
+                about = f"{words} of the {quantity} of all mounts on the cabinet"
+                meaning = Meaning(title, about, f"{KIND_TITLES[kind]} {quantity} on the cabinet")
+                name = f"{variable}_{axis}"
+                yield Response(name, variable, "cabinet", variable, (index,), unit, meaning)
 
 
 def _by_region(parameters: MachineParameters, profile: SpinProfile) -> Iterator[Response]:

@@ -1,0 +1,113 @@
+"""Forces of the mounts on the cabinet: of springs, dampers, bushings and telescopic dampers.
+
+A mount is everything that connects the oscillating group to the cabinet (the housing of the SDF).
+"""
+
+from collections import namedtuple
+
+from wm_drake.compiler.compilation import law
+from wm_drake.compiler.vectors import add, cross, scale
+from wm_drake.elements.bushing import six_component_bushing_wrench
+from wm_drake.elements.friction_damper import (
+    friction_damper_line,
+    friction_damper_tension,
+    friction_damper_wrench,
+)
+from wm_drake.elements.motion import motion_at, read_tree_state, tub_motion
+from wm_drake.elements.spring import spring_strut_wrench
+from wm_drake.elements.telescopic_damper import inner_tube_motion, read_telescopic_damper
+
+WRENCH_SIZE = 6
+"""Numbers of the wrench of a mount: moment about the origin of W, then force, in W. [N m, N]"""
+
+Mounts = namedtuple("Mounts", ("springs", "dampers", "bushings", "telescopes", "sponges", "tubes"))
+"""Indices at which the mounts of a machine begin.
+
+springs, dampers, bushings: arrays of indices of the elements in the packed numbers; telescopes: the
+same for the numbers of `TELESCOPIC_DAMPER`, None if there are none; sponges: index of the first
+deformation in the state; tubes: indices of the states of the tubes in the state, None if there are
+none.
+"""
+
+
+@law
+def reaction_on_cabinet(position, wrench):
+    """Return the wrench on the cabinet of a massless mount from its wrench on a moving body.
+
+    The forces at the two ends of a massless mount are in equilibrium, own derivation:
+
+        f_cabinet = -f,    m_cabinet about Wo = -(m + p x f)
+
+    Args:
+        position: p, position of the origin of the body in W. [m]
+        wrench: Moment m about that origin and force f on the body, in W (six numbers). [N m, N]
+
+    Returns:
+        Moment about the origin of W and force, in W (six numbers). [N m, N]
+    """
+    force = (wrench[3], wrench[4], wrench[5])
+    m = scale(-1.0, add((wrench[0], wrench[1], wrench[2]), cross(position, force)))
+    return (m[0], m[1], m[2], -force[0], -force[1], -force[2])
+
+
+@law
+def telescopic_damper_on_cabinet(x, k, p, at):
+    """Return the wrench of a telescopic damper on the cabinet, as `reaction_on_cabinet`.
+
+    Args:
+        x, k: State, and index in it where the `TREE_STATE` of the tubes begins.
+        p, at: Array that holds the numbers of `TELESCOPIC_DAMPER`, and where they begin.
+    """
+    damper, state = read_telescopic_damper(p, at), read_tree_state(x, k)
+    inner, _, _ = inner_tube_motion(motion_at(x, k), state.joint_position, state.joint_rate, damper)
+    on_inner, _ = six_component_bushing_wrench(inner, *damper.housing_bushing)
+    return reaction_on_cabinet(inner.position, on_inner)
+
+
+@law
+def write_wrench(wrenches, at, wrench):
+    """Write the six numbers of a wrench; return the index behind them."""
+    for k in range(WRENCH_SIZE):
+        wrenches[at + k] = wrench[k]
+    return at + WRENCH_SIZE
+
+
+@law
+def write_mount_wrenches(x, p, mounts, wrenches):
+    """Write the wrench of each mount on the cabinet, one after the other.
+
+    The order is that of `Mounts`: springs, dampers, bushings, telescopic dampers.
+
+    Args:
+        x: State: `TREE_STATE` of tub and drum, deformations of the dampers, states of the tubes.
+        p: Packed numbers.
+        mounts: `Mounts`.
+        wrenches: Written: `WRENCH_SIZE` numbers for each mount.
+    """
+    motion, column = tub_motion(x), 0
+    for at in mounts.springs:
+        wrench, _ = spring_strut_wrench(motion, p, at)
+        column = write_wrench(wrenches, column, reaction_on_cabinet(motion.position, wrench))
+    for i in range(len(mounts.dampers)):
+        at = mounts.dampers[i]
+        arm, line = friction_damper_line(motion, p, at)
+        tension, _ = friction_damper_tension(line[1], x[mounts.sponges + i], p, at)
+        wrench = friction_damper_wrench(motion, arm, line, tension, p, at)
+        column = write_wrench(wrenches, column, reaction_on_cabinet(motion.position, wrench))
+    for at in mounts.bushings:
+        wrench, _ = six_component_bushing_wrench(motion, p, at)
+        column = write_wrench(wrenches, column, reaction_on_cabinet(motion.position, wrench))
+    _write_telescopic_dampers(x, p, mounts.telescopes, mounts.tubes, wrenches, column)
+
+
+@law
+def _write_telescopic_dampers(x, p, telescopes, tubes, wrenches, column):
+    """Write the wrench of each telescopic damper; `telescopes` is None if there are none.
+
+    It is an argument of its own, so that the function is compiled without the branch that is not
+    taken.
+    """
+    if telescopes is not None:
+        for i in range(len(telescopes)):
+            wrench = telescopic_damper_on_cabinet(x, tubes[i], p, telescopes[i])
+            column = write_wrench(wrenches, column, wrench)
