@@ -103,3 +103,17 @@ def test_replay_is_served_to_this_computer_only(monkeypatch, reference):
     with pytest.raises(KeyboardInterrupt):
         replay_page(reference, np.zeros(1), np.zeros((1, 7)))
     assert hosts == ["localhost"]
+
+
+def test_contacts_are_those_of_brute_force(scene):
+    poses, time = 4.0 * random_poses(40, 5), np.arange(40.0)
+    every = np.array(
+        [min(scene.distance(pose, pair)[0] for pose in poses) for pair in scene._pairs]
+    )
+    touching = every <= 0.0
+    assert 3 < touching.sum() < len(every)
+    found = scene.contacts(time, poses, REST)
+    assert np.array_equal(np.isfinite(found), touching)
+    assert found[touching] == pytest.approx(every[touching], abs=1e-5)
+    assert len(set(scene.pair_names())) == len(found)
+    assert np.isnan(scene.contacts(time[:1], REST[None, :], REST)).all()

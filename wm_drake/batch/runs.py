@@ -45,6 +45,7 @@ MEASURES = {
     "amplitudes": ("amplitude", "critical_speed"),
     "power means": ("power_mean",),
     "gap": ("smallest_gap",),
+    "contacts": ("nearest_pair", "contact_gap"),
     "regions": ("region_displacement", "region_displacement_integrated"),
     "mounts": tuple(f"mount_force_{kind}" for kind in KINDS),
     "cabinet": tuple(f"cabinet_{of}_{kind}" for of in ("force", "moment") for kind in KINDS),
@@ -162,13 +163,15 @@ class Runner:
         # the last three points are the detergent point's
         good, sensors = int(extremes[-1]), moved.shape[1] - 3
         values: dict[str, FloatArray] = {}
+        gap: list[FloatArray] = []
         if _FILTERED & set(self.measures):
             displacement = filtered(moved[:good, :sensors], OUTPUT_PERIOD)
         for measure in self.measures:
             if measure == "extremes":
                 arrays: Iterable[FloatArray] = extremes[sensors:-1].reshape(3, 3).copy()
-            elif measure == "gap":
-                arrays = [self._gap(schedule.time[:good], samples[:good, :6], item.begin[:6])]
+            elif measure in ("gap", "contacts"):
+                gap = gap or self._gap(schedule.time[:good], samples[:good, :6], item.begin[:6])
+                arrays = gap[:1] if measure == "gap" else gap[1:]
             elif measure == "regions":
                 arrays = self._regions(item, np.ascontiguousarray(samples[:good]))
             elif measure == "power means":
@@ -202,12 +205,22 @@ class Runner:
             motion, acceleration, points, setup.rest_pose, OUTPUT_PERIOD, item.case.profile
         )
 
-    def _gap(self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray) -> FloatArray:
+    def _gap(self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray) -> list[FloatArray]:
+        """Return the smallest gap, and the values of the measure contacts if they are wanted."""
         kept = self._memory.__dict__
         if "scene" not in kept:  # one for each thread: a scene has one pose at a time
             kept["scene"] = Scene(self.parameters)
-        gap = kept["scene"].smallest_gap(time, poses, rest_pose)
-        return np.array(np.nan if gap is None else gap.distance)
+            kept["pairs"] = kept["scene"].pair_names()
+        scene, pairs = kept["scene"], kept["pairs"]
+        gap = scene.smallest_gap(time, poses, rest_pose)
+        found = [np.array(np.nan if gap is None else gap.distance)]
+        if "contacts" not in self.measures:
+            return found
+        place = np.nan if gap is None else float(pairs.index(f"{gap.moving}|{gap.fixed}"))
+        touching = np.full(len(pairs), np.nan)
+        if gap is not None and gap.distance <= 0.0:
+            touching = scene.contacts(time, poses, rest_pose)
+        return [*found, np.array(place), touching]
 
     def _lanes(self, name: str, runs: list[FloatArray]) -> FloatArray:
         """Return the arrays of several runs as one array of lanes."""
