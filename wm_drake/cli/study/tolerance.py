@@ -70,14 +70,14 @@ def tolerance(
         int, typer.Option(help="Number of samples, a power of two.", min=16, metavar="N")
     ] = 4096,
     sensitivity: Annotated[
-        int,
+        int | None,
         typer.Option(
             help="Samples of the Sobol indices, a power of two; each needs one run more than there "
-            "are quantities. 0 for none.",
+            "are quantities. 0 for none. Default: 512, or the samples if they are fewer.",
             min=0,
             metavar="N",
         ),
-    ] = 512,
+    ] = None,
     subset: Annotated[
         int,
         typer.Option(
@@ -116,7 +116,8 @@ def tolerance(
     begin = time.perf_counter()
     from wm_drake.studies.tolerance.study import Settings, limits_of
 
-    settings = Settings(samples, sensitivity, subset, seed)
+    several = min(512, samples) if sensitivity is None else sensitivity
+    settings = Settings(samples, several, subset, seed)
     parameters = load_parameters(machine, sets)
     tolerances, wanted = _tolerances(file), _limits_file(limits)
     check_buildable(machine, parameters)

@@ -57,6 +57,7 @@ def sobol_figure(found: list[tuple[Variable, Index]]) -> Figure:
         axes.barh(at + shift, np.maximum(value, 0.0), height=0.34, color=colour, label=label)
         axes.hlines(at + shift, low, high, color=MARK, linewidth=1.1)
     axes.set_yticks(at, [variable.name for variable, _ in found])
+    axes.set_xlim(-0.1, 1.1)
     axes.axvline(0.0, color=QUIET, linewidth=0.6)
     axes.set_xlabel("share of the variance", fontsize=9.5)
     axes.legend(loc="lower right", fontsize=9, frameon=False)

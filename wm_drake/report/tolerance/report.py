@@ -1,6 +1,7 @@
 """Report of the tolerance study: contact, limits, distributions, Sobol indices, quantities."""
 
 from wm_drake.batch import sources_version
+from wm_drake.parameters.tolerances import LAUNDRY
 from wm_drake.report.formatting import MISSING, number, shape_name
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.tables import Group, Row, Table, line
@@ -150,13 +151,13 @@ def _sobol_picture(result: ToleranceResult) -> Picture:
 def _sobol(result: ToleranceResult) -> Table:
     groups = []
     for name, indices in result.indices.items():
-        totals = [
-            f"{i.total:.2f} ({i.total_lower:.2f} to {i.total_upper:.2f})".replace("-", "−")
-            for i in indices
-        ]
-        groups.append(line(name, totals))
-    header = ("measure", *(variable.name for variable in result.machine.variables))
-    caption = "Total Sobol indices with 95 % bootstrap intervals. File sobol.csv has all indices."
+        groups.append(line(name, [number(index.total, 2) for index in indices]))
+    names = (variable.name.removeprefix(f"{LAUNDRY}.") for variable in result.machine.variables)
+    header = ("measure", *(shape_name(name) for name in names))
+    caption = (
+        "Total Sobol indices of all measures. First-order indices and 95 % intervals are in "
+        "sobol.csv."
+    )
     return Table(caption, header, tuple(groups))
 
 

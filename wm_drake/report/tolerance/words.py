@@ -35,8 +35,8 @@ def contact_sentences(contact: Contact) -> list[str]:
     """Return sentences about how often the tub touches, and where."""
     if contact.estimate == 0.0:
         first = (
-            f"No run touches: with 95 % confidence fewer than {in_a_million(contact.upper)} in a "
-            f"million do ({contact.method})."
+            f"No run touches; the upper end of the 95 % interval is {in_a_million(contact.upper)} "
+            f"in a million ({contact.method})."
         )
     else:
         ends = f"{in_a_million(contact.lower)} to {in_a_million(contact.upper)}"
@@ -137,9 +137,9 @@ def warnings(result: ToleranceResult) -> list[str]:
         if i.total_upper - i.total_lower > 2.0 * WIDE_INTERVAL
     ]
     if wide:
-        measures = ", ".join(dict.fromkeys(name for name, _ in wide))
+        count = len({name for name, _ in wide})
         found.append(
-            f"Some total indices of {measures} are uncertain by more than ±{WIDE_INTERVAL:g}; "
-            "more samples (--sensitivity) make them sharper."
+            f"Total indices of {count} of {len(result.indices)} measures are uncertain by more "
+            f"than ±{WIDE_INTERVAL:g}; more samples (--sensitivity) make them sharper."
         )
     return found

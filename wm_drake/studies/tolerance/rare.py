@@ -93,7 +93,7 @@ def subset_simulation(
             break
         thresholds.append(threshold)
         probability *= LEVEL
-        errors.append(_deviation(history <= threshold))
+        errors.append(_deviation((history <= threshold).astype(float)))
         begun(level)
         scores, history, step = _conditional(
             limit, scores[order[:chains]], values[order[:chains]], threshold, length, step, random
@@ -106,7 +106,7 @@ def subset_simulation(
     if share == 0.0:
         upper = probability * float(stats.beta.ppf(CONFIDENCE, 1, samples))
         return RareEvent(0.0, 0.0, upper, math.inf, tuple(thresholds), evaluations, found)
-    errors.append(_deviation(history <= 0.0))
+    errors.append(_deviation((history <= 0.0).astype(float)))
     variance = sum(error * error for error in errors)
     variance += 2.0 * NEIGHBOURS * sum(map(operator.mul, errors, errors[1:]))
     estimate, deviation = probability * share, math.sqrt(variance)
@@ -167,7 +167,7 @@ def _deviation(indicator: FloatArray) -> float:
     Samples of one chain are correlated, those of different chains are not ([Au 2001] Eq. (28)).
 
     Args:
-        indicator: Whether each sample fails. (length of the chains, chains)
+        indicator: 1 for each sample that fails, else 0. (length of the chains, chains)
     """
     length, chains = indicator.shape
     share = float(np.mean(indicator))
