@@ -78,3 +78,17 @@ def test_overlap_is_a_negative_gap_and_no_samples_are_no_gap(scene):
 def test_clearance_at_rest_is_that_of_a_real_machine(scene):
     gap = scene.smallest_gap(np.array([0.0]), REST[None, :], REST)
     assert 0.020 < gap.distance < 0.040  # m; [B] section 1: 20 to 40 mm
+
+
+def test_contacts_are_those_of_brute_force(scene):
+    poses, time = 4.0 * random_poses(40, 5), np.arange(40.0)
+    every = np.array(
+        [min(scene.distance(pose, pair)[0] for pose in poses) for pair in scene._pairs]
+    )
+    touching = every <= 0.0
+    assert 3 < touching.sum() < len(every)
+    found = scene.contacts(time, poses, REST)
+    assert np.array_equal(np.isfinite(found), touching)
+    assert found[touching] == pytest.approx(every[touching], abs=1e-5)
+    assert len(set(scene.pair_names())) == len(found)
+    assert np.isnan(scene.contacts(time[:1], REST[None, :], REST)).all()

@@ -11,6 +11,7 @@ from wm_drake.batch.runs import MEASURES, Runner, RunResult
 from wm_drake.batch.work_items import Preparation
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.machine import Machine
+from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
@@ -38,6 +39,12 @@ _VARIABLES = {
         "power mean of order 20 of the filtered displacement; a smooth substitute of the amplitude",
     ),
     "smallest_gap": ("", "m", "smallest distance between tub group and housing"),
+    "nearest_pair": ("", "", "number, along pair, of the two shapes with the smallest gap"),
+    "contact_gap": (
+        "pair",
+        "m",
+        "smallest distance of each pair of shapes that touches; NaN for the others",
+    ),
     "region_displacement": (
         "region accelerometer axis",
         "m",
@@ -106,6 +113,7 @@ def simulate_many(
             "amplitudes": amplitudes and critical speeds as in `Measures`;
             "power means": smooth substitutes for the amplitudes (`measures.power_means`);
             "gap": smallest distance between tub group and housing, NaN if the SDF has no shapes;
+            "contacts": number of the nearest pair of shapes; distance of each pair that touches;
             "regions": RMS displacements of the accelerometers in the regions of the profile
             (`wm_drake.simulation.vibration`);
             "mounts": peak, RMS and dynamic RMS of the force of each mount on the cabinet;
@@ -187,6 +195,8 @@ def as_table(
         labels["accelerometer"] = list(parameters.accelerometer_frames())
     if {"regions", "feet regions"} & set(measures):
         labels["region"] = range(_region_count(measures, results))
+    if "contacts" in measures:
+        labels["pair"] = Scene(parameters).pair_names()
     variables = {}
     for index, name in enumerate(name for measure in measures for name in MEASURES[measure]):
         dim, unit, text = _VARIABLES[name]

@@ -4,6 +4,7 @@ import functools
 import threading
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from wm_drake.engines.trajectory import (
     diverging_coordinate,
 )
 from wm_drake.model.machine import OUTPUT_PERIOD
-from wm_drake.model.scene import Scene
+from wm_drake.model.scene import Gap, Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
@@ -50,6 +51,7 @@ MEASURES = {
     "amplitudes": ("amplitude", "critical_speed"),
     "power means": ("power_mean",),
     "gap": ("smallest_gap",),
+    "contacts": ("nearest_pair", "contact_gap"),
     "regions": ("region_displacement", "region_displacement_integrated"),
     "mounts": tuple(f"mount_force_{kind}" for kind in KINDS),
     "feet": FOOT_VARIABLES,
@@ -229,12 +231,29 @@ class Runner:
         return [run.feet[name] for name in names]
 
     def _gap(self, item: WorkItem, schedule: Schedule, run: "_Run") -> Iterable[FloatArray]:
+        gap = self._smallest_gap(item, schedule, run)
+        return [np.array(np.nan if gap is None else gap.distance)]
+
+    def _contacts(self, item: WorkItem, schedule: Schedule, run: "_Run") -> Iterable[FloatArray]:
+        gap, scene = self._smallest_gap(item, schedule, run), self._scene()
+        pairs = scene.pair_names()
+        touching = np.full(len(pairs), np.nan)
+        if gap is None:
+            return [np.array(np.nan), touching]
+        if gap.distance <= 0.0:
+            touching = scene.contacts(*run.poses(schedule), item.begin[:6])
+        return [np.array(float(pairs.index(f"{gap.moving}|{gap.fixed}"))), touching]
+
+    def _smallest_gap(self, item: WorkItem, schedule: Schedule, run: "_Run") -> Gap | None:
+        if not run.gap:
+            run.gap.append(self._scene().smallest_gap(*run.poses(schedule), item.begin[:6]))
+        return run.gap[0]
+
+    def _scene(self) -> Scene:
         kept = self._memory.__dict__
         if "scene" not in kept:  # one for each thread: a scene has one pose at a time
             kept["scene"] = Scene(self.parameters)
-        time, poses = schedule.time[: run.good], run.samples[: run.good, :6]
-        gap = kept["scene"].smallest_gap(time, poses, item.begin[:6])
-        return [np.array(np.nan if gap is None else gap.distance)]
+        return cast(Scene, kept["scene"])
 
     def _amplitudes(
         self, _item: WorkItem, _schedule: Schedule, run: "_Run"
@@ -294,6 +313,7 @@ class _Run:
         cabinet: (n, 6) wrenches on the cabinet; empty if not needed.
         spring_lengths: (springs) smallest lengths; empty if not needed. [m]
         feet: Measures of the feet, filled when they are computed first.
+        gap: The smallest gap, filled when it is computed first.
     """
 
     samples: FloatArray
@@ -303,6 +323,11 @@ class _Run:
     cabinet: FloatArray
     spring_lengths: FloatArray
     feet: dict[str, FloatArray] = field(default_factory=dict)
+    gap: list[Gap | None] = field(default_factory=list)
+
+    def poses(self, schedule: Schedule) -> tuple[FloatArray, FloatArray]:
+        """Return the times (n,) [s] and the poses (n, 6) of the tub before the run diverged."""
+        return schedule.time[: self.good], self.samples[: self.good, :6]
 
     @classmethod
     def of_lane(cls, lane: int, *arrays: FloatArray) -> "_Run":
@@ -331,6 +356,7 @@ _MEASURED = {
     "amplitudes": Runner._amplitudes,
     "power means": Runner._power_means,
     "gap": Runner._gap,
+    "contacts": Runner._contacts,
     "regions": Runner._regions,
     "mounts": Runner._mounts,
     "cabinet": Runner._cabinet,

@@ -246,6 +246,37 @@ class Scene:
                 best = self._smallest_of_pair(pair, direction, best, time[near], poses[near])
         return best
 
+    def pair_names(self) -> list[str]:
+        """Return the names of the pairs of shapes: one of the tub group, one of the housing."""
+        return [f"{self._name(a)}|{self._name(b)}" for a, b in self._pairs]
+
+    def contacts(self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray) -> FloatArray:
+        """Return the smallest distance of each pair that touches over sampled poses.
+
+        Args:
+            time: (n,) [s]
+            poses: Poses of the tub: roll, pitch, yaw, x, y, z. (n, 6) [rad, m]
+            rest_pose: Pose of the tub at rest. (6,) [rad, m]
+
+        Returns:
+            By pair, in the order of `pair_names`; NaN for a pair that does not touch. [m]
+        """
+        found = np.full(len(self._pairs), np.nan)
+        if not len(time):
+            return found
+        moved = np.ascontiguousarray((poses - rest_pose).T)
+        turned = np.abs(moved[:3]).sum(axis=0) * self._reach
+        shift = float(np.max(np.linalg.norm(moved[3:], axis=0) + turned))
+        apart = Gap(float(np.nextafter(0.0, 1.0)), 0.0, "", "", (0.0, 0.0, 0.0))
+        for distance, direction, pair in self._at_rest(tuple(map(float, rest_pose))):
+            if distance - shift > 0.0:
+                break  # this pair and all that follow are apart at every pose
+            near = np.flatnonzero(distance + direction @ moved[3:] - turned <= 0.0)
+            nearest = self._smallest_of_pair(pair, direction, apart, time[near], poses[near])
+            if nearest.distance <= 0.0:
+                found[self._pairs.index(pair)] = nearest.distance
+        return found
+
     def _gap(
         self, pair: tuple[GeometryId, GeometryId], time: float, pose: FloatArray
     ) -> tuple[Gap, FloatArray]:

@@ -204,7 +204,7 @@ def _resolved(
     numbers: dict[str, tuple[float, ...]] = {}
     units: dict[str, str] = {}
     for key in factor.keys:
-        number, unit = _nominal(parameters, known, key)
+        number, unit = nominal_at(parameters, known, key)
         low, high = (_bound(parameters, key, text, number) for text in (factor.low, factor.high))
         middle = (
             0.5 * (low + high)
@@ -218,12 +218,12 @@ def _resolved(
                 f"levels {texts} do not rise{reason}; the low level must be below the high one",
                 key=key,
             )
-        original = known[key][0] if key in known else _value_at(parameters, key)
+        original = known[key][0] if key in known else value_at(parameters, key)
         for level, value in zip(settings, (low, middle, high), strict=True):
             scaled = isinstance(original, ForceTable | TorqueTable) and (
                 tables == "scaled" or not _takes_numbers(parameters, key)
             )
-            level[key] = _scaled(original, value / float(number or 1.0)) if scaled else value
+            level[key] = scaled_table(original, value / float(number or 1.0)) if scaled else value
             changed = with_value(parameters, key, level[key])  # raises if it is not allowed
             # a number that only the SDF has is a number of the machine once it is set
             unit = unit or next((u for k, _, u in quantities(changed) if k == key), None)
@@ -235,10 +235,19 @@ def _resolved(
     return FactorLevels(name, factor.about, settings, nominal, shown, numbers, units)
 
 
-def _nominal(
+def nominal_at(
     parameters: MachineParameters, known: Mapping[str, tuple[Any, Unit]], key: str
 ) -> tuple[float | None, Unit | None]:
-    """Return the machine's number and its unit; None for a number that only the SDF has."""
+    """Return a number of the machine by key path, with its unit; None if only the SDF has it.
+
+    Args:
+        parameters: The machine.
+        known: Value and unit of all its numbers, from `quantities`.
+        key: Key path. That of a table means its nominal stiffness.
+
+    Raises:
+        InputError: the machine has no such key, or it is not that of a number.
+    """
     if key in known:
         value, unit = known[key]
         if isinstance(value, tuple):
@@ -255,7 +264,7 @@ def _nominal(
         and int(last) < len(known[parent][0])
     ):
         return float(known[parent][0][int(last)]), known[parent][1]
-    value = _value_at(parameters, key)
+    value = value_at(parameters, key)
     if isinstance(value, ForceTable | TorqueTable):
         units = ("N/m", "N/mm") if isinstance(value, ForceTable) else ("N*m/rad", "N*mm/rad")
         return nominal_stiffness(value), Unit(*units)
@@ -264,7 +273,7 @@ def _nominal(
     return None, None
 
 
-def _value_at(parameters: MachineParameters, key: str) -> Any:
+def value_at(parameters: MachineParameters, key: str) -> Any:
     """Return the value at a key path; None if only the SDF has a value."""
     node: Any = parameters
     parts = key.split(".")
@@ -307,7 +316,7 @@ def _bound(parameters: MachineParameters, key: str, text: str, nominal: float | 
         raise input_error(
             f"'{text}' is not in percent; the bounds of one number of a list must be", key=key
         )
-    value = _value_at(with_value(parameters, key, text), key)
+    value = value_at(with_value(parameters, key, text), key)
     if not isinstance(value, float):
         raise input_error(f"'{text}' is not a number for this key", key=key)
     return value
@@ -316,11 +325,12 @@ def _bound(parameters: MachineParameters, key: str, text: str, nominal: float | 
 def _takes_numbers(parameters: MachineParameters, key: str) -> bool:
     """Return whether the field of a table accepts a number instead of a table."""
     parent, _, name = key.rpartition(".")
-    field = type(_value_at(parameters, parent)).model_fields[name]
+    field = type(value_at(parameters, parent)).model_fields[name]
     return unit_of(field.annotation, field.metadata) is not None
 
 
-def _scaled(table: ForceTable | TorqueTable, factor: float) -> ForceTable | TorqueTable:
+def scaled_table(table: ForceTable | TorqueTable, factor: float) -> ForceTable | TorqueTable:
+    """Return a table with its forces or torques times a factor."""
     ordinate = "force" if isinstance(table, ForceTable) else "torque"
     return table.model_copy(
         update={ordinate: tuple(factor * number for number in getattr(table, ordinate))}

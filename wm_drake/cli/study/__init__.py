@@ -9,6 +9,7 @@ from wm_drake.cli.study import (
     response,
     spin_cycle,
     spin_identify,
+    tolerance,
 )
 
 app = typer.Typer(help="Run a study of many runs and write a report.", no_args_is_help=True)
@@ -18,3 +19,4 @@ app.command("modes")(modes.modes)
 app.command("response")(response.response)
 app.command("spin-cycle")(spin_cycle.spin_cycle)
 app.command("spin-identify")(spin_identify.spin_identify)
+app.command("tolerance")(tolerance.tolerance)

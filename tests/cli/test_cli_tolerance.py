@@ -1,0 +1,76 @@
+"""Tests of `wm-drake study tolerance`: output, doubling, resuming, bad input."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+PROFILE = "time: (0, 1) s\nspeed: (0, 300) rpm\n"
+TOLERANCES = """load: middle
+quantities:
+  mass: {keys: [loads.middle.unbalances.0.mass], distribution: uniform, low: 1 kg, high: 12 kg}
+  radius: {keys: [loads.middle.unbalances.0.radius], distribution: uniform, low: 95 %, high: 105 %}
+"""
+LIMITS = "limits:\n- {quantity: gap, at_least: 0 mm, allowed_share: 0.1 %}\n"
+
+
+@pytest.fixture
+def study(wm_drake):
+    """Return a function that runs a small study of one second with extra arguments."""
+    for name, text in (("p", PROFILE), ("t", TOLERANCES), ("l", LIMITS)):
+        Path(f"{name}.yaml").write_text(text)
+    common = ("--profile", "p.yaml", "--out", "out", "--subset", "0")
+    return lambda *arguments: wm_drake("study", "tolerance", "t.yaml", *common, *arguments)
+
+
+def test_study_writes_tables_and_page_and_prints_json(study):
+    ended = study("--samples", "16", "--sensitivity", "16", "--limits", "l.yaml", "--json")
+    assert ended.code == 0
+    printed = json.loads(ended.out)
+    assert (printed["samples"], printed["runs"]) == (16, 16 + 48)
+    assert printed["contact_probability"]["method"] == "crude count"
+    assert {"p5", "p50", "p95"} <= set(printed["measures"]["smallest_gap_mm"])
+    assert printed["sobol"]["Dx_mm"]["mass"]["total"] > printed["sobol"]["Dx_mm"]["radius"]["total"]
+    assert len(printed["limits"]) == 1
+    samples = pd.read_csv("out/samples.csv")
+    touching = (samples["smallest_gap_mm"] <= 0.0).mean()
+    assert printed["contact_probability"]["estimate"] == pytest.approx(touching)
+    assert "in a million" in Path("out/report.html").read_text()
+
+
+def test_doubling_keeps_the_finished_runs(study, monkeypatch):
+    settings = ("--sensitivity", "0", "--response", "gap")
+    assert study("--samples", "16", *settings).code == 0
+    few = pd.read_csv("out/samples.csv")
+    assert study("--samples", "32", *settings).code == 0
+    many = pd.read_csv("out/samples.csv")
+    pd.testing.assert_frame_equal(few, many[:16])
+    monkeypatch.setattr("wm_drake.batch.runs.integrate_runs", None)  # whoever runs now, fails
+    assert study("--samples", "16", *settings, "--workers", "1").code == 0
+    pd.testing.assert_frame_equal(few, pd.read_csv("out/samples.csv"))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("high: 12 kg", "high: 0.5 kg"), "low must be below high"),
+        (("low: 1 kg", "low: -1 kg"), "lower end is not allowed"),
+        (("unbalances.0.mass", "unbalances.0.mas"), "mass"),
+        (("load: middle", "load: midle"), "did you mean 'middle'"),
+        (("distribution: uniform, low: 1 kg", "distribution: unifrom, low: 1 kg"), "uniform"),
+    ],
+)
+def test_wrong_file_is_refused_before_any_run(study, change, message):
+    Path("t.yaml").write_text(TOLERANCES.replace(*change, 1))
+    ended = study("--samples", "16")
+    assert ended.code == 2
+    assert "t.yaml" in ended.err
+    assert message in ended.err
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize("option", ["--samples", "--sensitivity"])
+def test_numbers_that_are_no_powers_of_two_are_refused(study, option):
+    ended = study(option, "100")
+    assert (ended.code, f"{option}: 100 is not a power of two" in ended.err) == (2, True)

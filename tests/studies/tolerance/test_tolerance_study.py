@@ -1,0 +1,275 @@
+"""Uncertain machines and the study, with a function of known answer in place of the runs."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+
+from wm_drake.errors import InputError
+from wm_drake.parameters import load_machine
+from wm_drake.parameters.tolerances import (
+    Limit,
+    Tolerances,
+    load_limits,
+    load_tolerances,
+    shipped_tolerances,
+)
+from wm_drake.report.tolerance.report import tolerance_report
+from wm_drake.report.tolerance.words import in_a_million, summary
+from wm_drake.simulation.cases import Case
+from wm_drake.studies.gasket.responses import MM, Response
+from wm_drake.studies.gasket.screening import Meaning
+from wm_drake.studies.tolerance.study import Settings, limits_of, run_tolerances
+from wm_drake.studies.tolerance.tables import as_plain_data, samples_table
+from wm_drake.studies.tolerance.variables import uncertain_machine
+
+SPRING = "spring_types.suspension.stiffness"
+GAP = Response("gap", "gap", "gap", "smallest_gap", (), MM, Meaning("smallest gap"))
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return load_machine("reference")
+
+
+def uncertain(machine, tree, load="middle"):
+    case = Case(load, machine.loads["middle"], machine.profile)
+    return uncertain_machine(machine, Tolerances.model_validate(tree), case)
+
+
+def normal(key, mean="100 %", deviation="5 %", **more):
+    return {"keys": (key,), "distribution": "normal", "mean": mean, "deviation": deviation, **more}
+
+
+def test_percent_value_and_distance_mean_the_same(machine):
+    k = machine.spring_types["suspension"].stiffness
+    forms = [("100 %", "5 %"), (f"{k} N/m", f"{0.05 * k} N/m"), ("nominal", f"{0.05 * k} N/m")]
+    for mean, deviation in forms:
+        found = uncertain(
+            machine, {"load": "middle", "quantities": {"k": normal(SPRING, mean, deviation)}}
+        )
+        (case,) = found.cases(np.array([[2.0]]))
+        assert case.parameters.spring_types["suspension"].stiffness == pytest.approx(1.1 * k)
+
+
+def test_one_draw_or_one_each(machine):
+    one = uncertain(machine, {"load": "middle", "quantities": {"k": normal(SPRING)}})
+    each = uncertain(machine, {"load": "middle", "quantities": {"k": normal(SPRING, draws="each")}})
+    assert [v.name for v in one.variables] == ["k"]
+    assert [v.name for v in each.variables] == ["k.left", "k.right", "k.rear"]
+    (case,) = each.cases(np.array([[0.0, 1.0, 0.0]]))
+    k = machine.spring_types["suspension"].stiffness
+    types = case.parameters.spring_types
+    found = {name: types[s.type].stiffness for name, s in case.parameters.springs.items()}
+    assert found == pytest.approx({"left": k, "right": 1.05 * k, "rear": k})
+
+
+def test_table_is_scaled(machine):
+    key = "gasket.stiffness_x"
+    found = uncertain(machine, {"load": "middle", "quantities": {"g": normal(key)}})
+    (case,) = found.cases(np.array([[-2.0]]))
+    before, after = machine.gasket.stiffness_x, case.parameters.gasket.stiffness_x
+    assert after.force == pytest.approx(0.9 * np.array(before.force))
+    assert after.displacement == before.displacement
+
+
+def test_load_by_key_path(machine):
+    key = "loads.middle.unbalances.0.mass"
+    found = uncertain(
+        machine, {"load": "middle", "quantities": {"m": normal(key, "0.5 kg", "20 g")}}
+    )
+    (case,) = found.cases(np.array([[1.0]]))
+    assert case.load.unbalances[0].mass == pytest.approx(0.52)
+
+
+def test_split_laundry_is_two_lumps(machine):
+    found = uncertain(machine, load_tolerances("laundry").model_dump())
+    cases = found.cases(np.random.default_rng(0).standard_normal((20, len(found.variables))))
+    values = found.joint.values(np.random.default_rng(0).standard_normal((20, 7)))
+    for case, (mass, angle, y, radius, share, lead, second_y) in zip(cases, values, strict=True):
+        first, second = case.load.unbalances
+        assert first.mass + second.mass == pytest.approx(mass)
+        assert second.mass == pytest.approx(share * mass)
+        assert (first.y, second.y) == pytest.approx((y, second_y))
+        assert first.radius == second.radius == pytest.approx(radius)
+        assert (first.phase, second.phase) == pytest.approx((angle, angle + lead))
+        assert 0.2 <= mass <= 0.6
+
+
+def test_shipped_files_fit_the_reference_machine(machine):
+    for name in shipped_tolerances():
+        found = uncertain(machine, load_tolerances(name).model_dump())
+        assert all(variable.source for variable in found.variables)
+        found.check(lambda case: None)
+    assert len(found.variables) == 12
+
+
+@pytest.mark.parametrize(
+    ("tree", "message"),
+    [
+        ({"quantities": {"k": normal("spring_types.suspension.stifness")}}, "stiffness"),
+        ({"quantities": {"k": normal(SPRING, "9 kg", "1 kg")}}, "kg"),
+        ({"quantities": {"k": normal(SPRING, "100 %", "1 N/mm")}}, "not in percent"),
+        ({"quantities": {"k": normal(SPRING, low="120 %", high="110 %")}}, "below"),
+        ({"quantities": {"k": normal(SPRING), "l": normal(SPRING)}}, "already"),
+        ({"quantities": {"g": normal("gasket.stiffness_x", "4 N/mm", "1 N/mm")}}, "percent"),
+        (
+            {
+                "quantities": {"k": normal(SPRING)},
+                "correlations": {"quantities": ("k", "q"), "matrix": ((1, 0.5), (0.5, 1))},
+            },
+            "no quantity 'q'",
+        ),
+    ],
+)
+def test_wrong_files_are_refused(machine, tree, message):
+    with pytest.raises(InputError, match=message):
+        uncertain(machine, {"load": "middle"} | tree)
+
+
+def test_negative_mass_is_refused_before_the_study(machine):
+    key = "loads.middle.unbalances.0.mass"
+    wide = {"load": "middle", "quantities": {"m": normal(key, "0.1 kg", "50 g")}}
+    with pytest.raises(InputError, match=r"lower end is not allowed.*truncate"):
+        uncertain(machine, wide).check(lambda case: None)
+    wide["quantities"]["m"] |= {"low": "0 kg"}
+    uncertain(machine, wide).check(lambda case: None)
+
+
+def test_matrix_that_no_quantities_have_is_refused():
+    quantities = {name: normal(f"{name}.x") for name in "abc"}
+    matrix = ((1, 0.9, -0.9), (0.9, 1, 0.9), (-0.9, 0.9, 1))
+    correlations = {"quantities": tuple("abc"), "matrix": matrix}
+    with pytest.raises(ValueError, match="not positive definite"):
+        Tolerances.model_validate(
+            {"load": "middle", "quantities": quantities, "correlations": correlations}
+        )
+
+
+def test_file_with_an_error_names_line_and_key(tmp_path):
+    path = tmp_path / "t.yaml"
+    path.write_text(
+        "load: middle\nquantities:\n  k: {keys: [a.b], distribution: uniform, low: 1 m}\n"
+    )
+    with pytest.raises(InputError, match=r"t\.yaml:3: quantities\.k: .*'high' is missing"):
+        load_tolerances(path)
+
+
+def gap_of(case, k):
+    """Return a gap that is linear in the scores: 30 mm less 10 mm for each deviation. [m]"""
+    score = (case.parameters.spring_types["suspension"].stiffness / k - 1.0) / 0.05
+    other = (case.parameters.damper_types["friction"].friction_force / 40.0 - 1.0) / 0.1
+    return 0.03 - 0.01 * score - 0.002 * other
+
+
+@pytest.fixture(scope="module")
+def study(machine):
+    """Return a function that runs a study of two quantities with gaps of closed form."""
+    key = "damper_types.friction.friction_force"
+    quantities = {"k": normal(SPRING), "f": normal(key, "40 N", "4 N")}
+    k = machine.spring_types["suspension"].stiffness
+
+    def run(cases, _):
+        gaps = np.array([gap_of(case, k) for case in cases])
+        touching = np.where(gaps <= 0.0, gaps, np.nan)
+        table = {
+            "smallest_gap": ("run", gaps),
+            "nearest_pair": ("run", np.ones(len(gaps))),
+            "contact_gap": (("run", "pair"), np.column_stack([gaps * np.nan, touching])),
+            "diverged": ("run", np.full(len(gaps), "", dtype=object)),
+        }
+        return xr.Dataset(table, {"pair": ["tub_shell|wall_left", "motor|wall_bottom"]})
+
+    def do(settings, correlations=None, limits=()):
+        tree = {"load": "middle", "quantities": quantities, "correlations": correlations}
+        found = uncertain(machine, tree)
+        return run_tolerances(found, (GAP,), run, settings, limits_of(limits, (GAP,)))
+
+    return do
+
+
+EXACT = stats.norm.cdf(-0.03 / np.hypot(0.01, 0.002))
+
+
+def test_study_finds_the_probability_of_contact(study):
+    result = study(Settings(2048, 256, 0))
+    contact = result.contact
+    assert contact.method == "crude count"
+    assert contact.lower < EXACT < contact.upper
+    assert list(contact.pairs) == ["motor|wall_bottom"]
+    # linear in independent normals: first and total indices are shares of the variance
+    for index, share in zip(result.indices["smallest_gap_mm"], (100 / 104, 4 / 104), strict=True):
+        assert (index.first, index.total) == pytest.approx((share, share), abs=0.02)
+    assert "k (total index" in " ".join(summary(result))
+
+
+def test_rare_contact_is_found_by_subset_simulation(study):
+    result = study(Settings(256, 0, 1000))
+    assert result.contact.method == "subset simulation"
+    assert result.contact.lower < EXACT < result.contact.upper
+    assert result.contact.rare.evaluations < 5000
+
+
+def test_doubling_keeps_the_old_samples(study):
+    few, many = study(Settings(64, 0, 0)), study(Settings(128, 0, 0))
+    assert samples_table(few).equals(samples_table(many)[:64])
+
+
+def test_correlated_quantities_have_no_sobol_indices(study):
+    result = study(Settings(64, 64, 0), {"quantities": ("k", "f"), "matrix": ((1, 0.5), (0.5, 1))})
+    assert not result.indices
+    assert "correlated" in result.refused
+
+
+@pytest.mark.parametrize(
+    ("limit", "allowed", "word"),
+    [("0 mm", "1 %", "pass"), ("3 cm", "10 %", "fail"), ("3 cm", "50 %", "undecided")],
+)
+def test_verdict_of_a_limit(study, limit, allowed, word):
+    wanted = Limit(quantity="gap", at_least=limit, allowed_share=allowed)
+    (verdict,) = study(Settings(512, 0, 0), limits=[wanted]).verdicts
+    assert verdict.word == word
+
+
+def test_limits_that_cannot_be_judged_are_refused(tmp_path):
+    for limit, message in (
+        (Limit(quantity="gpa", at_least="0 mm", allowed_share="1 %"), "not measured"),
+        (Limit(quantity="gap", at_least="0 N", allowed_share="1 %"), "'N'|dimension|fit"),
+    ):
+        with pytest.raises(InputError, match=message):
+            limits_of([limit], (GAP,))
+    path = tmp_path / "limits.yaml"
+    path.write_text("limits:\n- {quantity: gap, at_least: 0 mm, allowed_share: 3}\n")
+    with pytest.raises(InputError, match=r"limits\.yaml:2.*is not a share"):
+        load_limits(path)
+
+
+def test_json_and_page_have_what_they_must(study):
+    wanted = Limit(quantity="gap", at_least="0 mm", allowed_share="1 %")
+    result = study(Settings(256, 64, 1000), limits=[wanted])
+    data = as_plain_data(result)
+    assert {"p5", "p50", "p95"} <= set(data["measures"]["smallest_gap_mm"])
+    assert {"estimate", "lower", "upper", "method"} <= set(data["contact_probability"])
+    assert {"first", "total", "total_lower", "total_upper"} <= set(
+        data["sobol"]["smallest_gap_mm"]["k"]
+    )
+    assert data["limits"][0]["verdict"] in ("pass", "fail", "undecided")
+    assert data["measures"]["smallest_gap_mm"]["p50"] == pytest.approx(30.0, abs=1.0)
+    page = tolerance_report(result, "about")
+    assert "in a million runs touch" in page
+    assert "motor" in page
+
+
+def test_numbers_in_a_million():
+    assert [in_a_million(x) for x in (0.0, 1.25e-6, 1.2345e-2, 0.5)] == [
+        "0",
+        "1",
+        "12\u202f300",
+        "500\u202f000",
+    ]
+
+
+@pytest.mark.parametrize("name", ["samples", "sensitivity", "subset"])
+def test_wrong_numbers_of_samples_are_refused(name):
+    with pytest.raises(InputError, match=f"--{name}"):
+        Settings(**{name: 1001})

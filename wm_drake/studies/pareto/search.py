@@ -1,0 +1,166 @@
+"""Search for a Pareto front by NSGA-II or NSGA-III of pymoo. It is independent of machines."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from scipy import stats
+
+from wm_drake.errors import WmDrakeError, input_error
+from wm_drake.parameters.types import FloatArray
+
+Evaluate: TypeAlias = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+"""Function of designs (n, d) in [0, 1] with objectives (n, m), which are to be small, and
+constraints (n, k), which are met at 0 and below. NaN marks a design that cannot be evaluated."""
+
+UNUSABLE = 1e12
+"""Objective and violation of a design that cannot be evaluated."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found.
+
+    Attributes:
+        designs: Designs of the front. (n, d) in [0, 1]
+        objectives: Their objectives. (n, m)
+        constraints: Their constraints. (n, k)
+        evaluations: Number of designs that were evaluated.
+        first: Objectives of the first population. (population, m)
+        history: Number of evaluations, and hypervolume of the front, after each generation.
+    """
+
+    designs: FloatArray
+    objectives: FloatArray
+    constraints: FloatArray
+    evaluations: int
+    first: FloatArray
+    history: tuple[tuple[int, float], ...]
+
+    @property
+    def hypervolume(self) -> float:
+        """Hypervolume of the front."""
+        return self.history[-1][1]
+
+
+def hypervolume(objectives: FloatArray, first: FloatArray) -> float:
+    """Return the hypervolume of a front.
+
+    Objectives are scaled so that the first population reaches from 0 to 1; the reference point has
+    1 in each objective. A front beyond the best of the first population can exceed 1.
+
+    Args:
+        objectives: Of the front. (n, m)
+        first: Of the first population. (n, m)
+    """
+    from pymoo.indicators.hv import HV
+
+    usable = first[(first < UNUSABLE).all(axis=1)]
+    if not len(objectives) or not len(usable):
+        return 0.0
+    low, high = usable.min(axis=0), usable.max(axis=0)
+    scaled = (objectives - low) / np.where(high > low, high - low, 1.0)
+    return float(HV(ref_point=np.ones(scaled.shape[1]))(scaled))
+
+
+def search_front(
+    evaluate: Evaluate,
+    start: FloatArray,
+    objectives: int,
+    constraints: int,
+    *,
+    evaluations: int = 2000,
+    population: int = 64,
+    seed: int = 0,
+    generation: Callable[[int], None] = lambda done: None,
+) -> Found:
+    """Return the Pareto front of a problem.
+
+    With up to two objectives the search is NSGA-II, with more NSGA-III. The first population is the
+    start and points of a scrambled Sobol sequence.
+
+    Args:
+        evaluate: The problem.
+        start: A first design. (d,) in [0, 1]
+        objectives: Number of objectives.
+        constraints: Number of constraints.
+        evaluations: Number of designs to evaluate, at least one population.
+        population: Designs of a generation.
+        seed: Of all random numbers.
+        generation: Called with the number of evaluated designs after each generation.
+
+    Raises:
+        InputError: there are fewer evaluations than designs of a generation.
+        WmDrakeError: pymoo is missing.
+    """
+    try:
+        from pymoo.core.problem import Problem
+        from pymoo.optimize import minimize
+    except ImportError:
+        raise WmDrakeError("a design study needs pymoo: pip install 'wm-drake[design]'") from None
+    if evaluations < population:
+        raise input_error(
+            f"{evaluations} is less than a population of {population}", where="--evaluations"
+        )
+    size, done, first = len(start), 0, list[FloatArray]()
+    history: list[tuple[int, float]] = []
+
+    class Bounded(Problem):
+        """The problem in the form of pymoo."""
+
+        def __init__(self) -> None:
+            super().__init__(n_var=size, n_obj=objectives, n_ieq_constr=constraints, xl=0.0, xu=1.0)
+
+        def _evaluate(self, x: FloatArray, out: Any, *_: Any, **__: Any) -> None:
+            nonlocal done
+            f, g = evaluate(np.asarray(x, dtype=float))
+            bad = ~(np.isfinite(f).all(axis=1) & np.isfinite(g).all(axis=1))
+            out["F"] = np.where(bad[:, None], UNUSABLE, f)
+            if constraints:
+                out["G"] = np.where(bad[:, None], UNUSABLE, g)
+            if not first:
+                first.append(out["F"])
+            done += len(x)
+            generation(done)
+
+    def note(algorithm: Any) -> None:
+        optimum = algorithm.opt
+        kept = optimum.get("F")[optimum.get("feas").ravel()] if len(optimum) else np.empty((0, 1))
+        history.append((done, hypervolume(kept, first[0])))
+
+    sobol = stats.qmc.Sobol(size, scramble=True, seed=np.random.default_rng(seed))
+    points = sobol.random(1 << (population - 1).bit_length())[:population]
+    points[0] = start
+    result = minimize(
+        Bounded(),
+        _algorithm(objectives, population, points),
+        ("n_eval", evaluations),
+        seed=seed,
+        callback=note,
+    )
+    if result.F is None:
+        empty = np.empty((0, size)), np.empty((0, objectives)), np.empty((0, constraints))
+        return Found(*empty, done, first[0], tuple(history))
+    x, f = np.atleast_2d(result.X), np.reshape(result.F, (-1, objectives))
+    g = np.reshape(result.G, (len(f), -1)) if constraints else np.empty((len(f), 0))
+    usable = (f < UNUSABLE).all(axis=1)
+    x, f, g = x[usable], f[usable], g[usable]
+    order = np.lexsort(f.T[::-1])
+    return Found(x[order], f[order], g[order], done, first[0], tuple(history))
+
+
+def _algorithm(objectives: int, population: int, points: FloatArray) -> Any:
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.algorithms.moo.nsga3 import NSGA3
+    from pymoo.util.ref_dirs import get_reference_directions
+
+    if objectives <= 2:
+        return NSGA2(pop_size=population, sampling=points)
+    parts = 1
+    while len(get_reference_directions("das-dennis", objectives, n_partitions=parts + 1)) <= (
+        population
+    ):
+        parts += 1
+    directions = get_reference_directions("das-dennis", objectives, n_partitions=parts)
+    return NSGA3(directions, pop_size=population, sampling=points)

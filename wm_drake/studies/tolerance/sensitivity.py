@@ -1,0 +1,89 @@
+"""Sobol indices: which uncertain quantity causes how much of the variance of a measure.
+
+It is independent of machines. The samples are those of A. Saltelli et al., Variance based
+sensitivity analysis of model output, Computer Physics Communications 181 (2010) 259: matrices A and
+B, and A with one column of B for each quantity.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from wm_drake.parameters.types import FloatArray
+
+RESAMPLES = 400
+"""Number of bootstrap samples."""
+
+PERCENTILES = (2.5, 97.5)
+"""Ends of a 95 % interval."""
+
+
+@dataclass(frozen=True)
+class Index:
+    """Sobol indices of one quantity for one measure, with 95 % intervals.
+
+    Attributes:
+        first: Share of the variance that the quantity causes alone.
+        total: Share that it causes alone and together with others.
+        first_lower, first_upper, total_lower, total_upper: Ends of the intervals.
+    """
+
+    first: float
+    first_lower: float
+    first_upper: float
+    total: float
+    total_lower: float
+    total_upper: float
+
+
+def exchanged(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return all scores that Sobol indices need besides A: B, then A with each column of B.
+
+    Args:
+        a, b: Independent samples. (n, d)
+
+    Returns:
+        ((d + 1) n, d)
+    """
+    parts = [b]
+    for column in range(a.shape[1]):
+        mixed = a.copy()
+        mixed[:, column] = b[:, column]
+        parts.append(mixed)
+    return np.concatenate(parts)
+
+
+def sobol_indices(
+    at_a: FloatArray, at_exchanged: FloatArray, *, seed: int = 0
+) -> list[Index] | None:
+    """Return the Sobol indices of each quantity.
+
+    The intervals are percentiles of a bootstrap over the rows of the samples.
+
+    Args:
+        at_a: Measure at the rows of A. (n,) n is a power of two.
+        at_exchanged: Measure at the rows of `exchanged`. ((d + 1) n,)
+        seed: Of the bootstrap.
+
+    Returns:
+        An index for each quantity; None if the measure is not finite at a row or does not vary.
+    """
+    n = len(at_a)
+    parts = at_exchanged.reshape(-1, n)
+    if not (np.isfinite(at_a).all() and np.isfinite(parts).all()) or np.ptp(at_a) == 0.0:
+        return None
+    random = np.random.default_rng(seed)
+    rows = [np.arange(n), *(random.integers(n, size=n) for _ in range(RESAMPLES))]
+    found = []
+    for row in rows:
+        values = {"f_A": at_a[None, row], "f_B": parts[:1, row], "f_AB": parts[1:, None, row]}
+        result = stats.sobol_indices(func=values, n=n)
+        # scipy drops the dimension of a single quantity
+        found.append([np.reshape(r, -1) for r in (result.first_order, result.total_order)])
+    indices = np.array(found)  # (resample, first or total, quantity)
+    lower, upper = np.percentile(indices[1:], PERCENTILES, axis=0)
+    return [
+        Index(*map(float, (i[0], low[0], high[0], i[1], low[1], high[1])))
+        for i, low, high in zip(indices[0].T, lower.T, upper.T, strict=True)
+    ]

@@ -1,0 +1,354 @@
+"""The tolerance study: samples of an uncertain machine, contact, Sobol indices, limits."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from wm_drake.errors import InputError, Problem, input_error
+from wm_drake.parameters.tolerances import Limit, fraction
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import convert, split
+from wm_drake.simulation.cases import Case
+from wm_drake.studies.gasket.responses import GAP, Response
+from wm_drake.studies.tolerance.distributions import base_samples
+from wm_drake.studies.tolerance.rare import RareEvent, subset_simulation
+from wm_drake.studies.tolerance.sensitivity import Index, exchanged, sobol_indices
+from wm_drake.studies.tolerance.shares import Share, share_of
+from wm_drake.studies.tolerance.variables import UncertainMachine
+
+Run: TypeAlias = Callable[[Iterable[Case], str], xr.Dataset]
+"""Function that runs cases and returns their table, given a word for what they are."""
+
+RARE = 1e-3
+"""Share of runs with contact below which it is estimated by subset simulation."""
+
+CRUDE, SUBSET = "crude count", "subset simulation"
+"""Methods of the probability of contact."""
+
+DEFAULT = ("D", "F", "M", GAP, "amplitude", "mount_force_peak")
+"""Responses of a study that names none."""
+
+CONTACTS = "contacts"
+"""Measure of `simulate_many` that tells which shapes touch."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Numbers of samples.
+
+    Attributes:
+        samples: Samples of the machine, a power of two.
+        sensitivity: Samples of the Sobol indices, a power of two up to `samples`; 0 for none.
+        subset: Samples of each level of the subset simulation; 0 for none.
+        seed: Of all random numbers.
+    """
+
+    samples: int = 4096
+    sensitivity: int = 512
+    subset: int = 1000
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            InputError: a number is not allowed.
+        """
+        for name in ("samples", "sensitivity"):
+            value = getattr(self, name)
+            if value & (value - 1) or (name == "samples" and value < 16):
+                allowed = [16, 1024, 4096, 8192] if name == "samples" else [0, 256, 512, 1024]
+                raise input_error(
+                    f"{value} is not a power of two, which a Sobol sequence needs; write for "
+                    f"example {', '.join(map(str, allowed))}",
+                    where=f"--{name}",
+                )
+        if self.sensitivity > self.samples:
+            raise input_error(
+                f"{self.sensitivity} is more than the samples, {self.samples}",
+                where="--sensitivity",
+            )
+        if self.subset and (self.subset < 100 or self.subset % 10):
+            raise input_error(
+                f"{self.subset} is not allowed; allowed are 0 and multiples of 10 from 100",
+                where="--subset",
+            )
+
+
+@dataclass(frozen=True)
+class Contact:
+    """How often the tub group touches the housing.
+
+    Attributes:
+        estimate: Probability of contact.
+        lower, upper: Ends of its 95 % interval.
+        method: CRUDE or SUBSET.
+        crude: Share of the samples.
+        pairs: Share of the samples by pair of shapes, the most frequent first; pairs that never
+            touch are left out.
+        nearest: Number of samples in which each pair has the smallest gap.
+        rare: Subset simulation; None if there was none.
+    """
+
+    estimate: float
+    lower: float
+    upper: float
+    method: str
+    crude: Share
+    pairs: dict[str, Share]
+    nearest: dict[str, int]
+    rare: RareEvent | None
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Judgement of a limit.
+
+    Attributes:
+        limit: The limit.
+        key: Name of the measure with its unit.
+        number: The limit. [unit of the measure]
+        allowed: Allowed share. [0 to 1]
+        broken: Share of runs that break it.
+        word: "pass" if the whole interval is allowed, "fail" if none of it is, else "undecided".
+    """
+
+    limit: Limit
+    key: str
+    number: float
+    allowed: float
+    broken: Share
+    word: str
+
+
+@dataclass(frozen=True)
+class ToleranceResult:
+    """Result of a tolerance study.
+
+    Attributes:
+        machine: The uncertain machine.
+        settings: Numbers of samples.
+        chosen: What is measured of each run.
+        scores: Scores of the samples. (samples, variables)
+        values: Measures of the samples by the names of `measure_key`; NaN where a run failed.
+        failed: Reason of each failed run, by number of the sample from 0.
+        contact: Contact; None if the SDF has no shapes.
+        indices: Sobol indices of each variable, by measure.
+        refused: Why there are no Sobol indices of some or all measures; "" if there are all.
+        verdicts: Judgements of limits.
+        runs: Number of all runs.
+    """
+
+    machine: UncertainMachine
+    settings: Settings
+    chosen: tuple[Response, ...]
+    scores: FloatArray
+    values: pd.DataFrame
+    failed: dict[int, str]
+    contact: Contact | None
+    indices: dict[str, list[Index]]
+    refused: str
+    verdicts: tuple[Verdict, ...]
+    runs: int
+
+
+def measure_key(response: Response) -> str:
+    """Return the name of a measure with its unit, such as smallest_gap_mm."""
+    name = "smallest_gap" if response.name == GAP else response.name
+    return f"{name}_{response.unit.shown.replace('*', '')}"
+
+
+def limits_of(
+    limits: Iterable[Limit], chosen: Sequence[Response]
+) -> list[tuple[Limit, Response, float]]:
+    """Return each limit with its response and its number in the unit of the response.
+
+    Raises:
+        InputError: a limit names a response that is not measured, or has a wrong unit.
+    """
+    found, problems = [], []
+    names = {response.name: response for response in chosen}
+    names |= {"smallest_gap": names[GAP]} if GAP in names else {}
+    for place, limit in enumerate(limits):
+        key = f"limits.{place}"
+        response = names.get(limit.quantity)
+        if response is None:
+            known = ", ".join(list(names)[:12])
+            problems.append(
+                Problem(
+                    "",
+                    f"{key}.quantity",
+                    f"'{limit.quantity}' is not measured; add it with --response, or use one of "
+                    f"{known}, ...",
+                )
+            )
+            continue
+        try:
+            numbers, unit, _ = split(limit.text)
+            number = response.unit.from_si(convert(numbers[0], unit or None, response.unit))
+        except ValueError as error:
+            problems.append(Problem("", key, str(error)))
+            continue
+        found.append((limit, response, number))
+    if problems:
+        raise InputError(problems)
+    return found
+
+
+def run_tolerances(
+    machine: UncertainMachine,
+    chosen: tuple[Response, ...],
+    run: Run,
+    settings: Settings,
+    limits: Sequence[tuple[Limit, Response, float]] = (),
+) -> ToleranceResult:
+    """Run a tolerance study.
+
+    Args:
+        machine: The uncertain machine.
+        chosen: What is measured of each run.
+        run: Function that runs cases.
+        settings: Numbers of samples.
+        limits: From `limits_of`.
+    """
+    a, b = base_samples(machine.joint.size, settings.samples, settings.seed)
+    table = run(machine.cases(a), "samples")
+    values, failed = _measures(table, chosen), _failed(table)
+    indices, refused, more = _indices(machine, chosen, run, settings, (a, b), values)
+    contact = _contact(machine, run, settings, table)
+    rare = contact.rare.evaluations if contact and contact.rare else 0
+    return ToleranceResult(
+        machine,
+        settings,
+        chosen,
+        a,
+        values,
+        failed,
+        contact,
+        indices,
+        refused,
+        tuple(judged(values, *limit) for limit in limits),
+        settings.samples + more + rare,
+    )
+
+
+def judged(values: pd.DataFrame, limit: Limit, response: Response, number: float) -> Verdict:
+    """Return the verdict on a limit. A run that failed breaks every limit.
+
+    Args:
+        values: Measures of the samples.
+        limit: The limit.
+        response: Its response.
+        number: The limit. [unit of the response]
+    """
+    found = values[measure_key(response)].to_numpy()
+    kept = found >= number if limit.at_least is not None else found <= number
+    broken, allowed = share_of(~kept), fraction(limit.allowed_share, "allowed_share")
+    word = "pass" if broken.upper <= allowed else "fail" if broken.lower > allowed else "undecided"
+    return Verdict(limit, measure_key(response), number, allowed, broken, word)
+
+
+def _failed(table: xr.Dataset) -> dict[int, str]:
+    return {i: str(reason) for i, reason in enumerate(table.diverged.values) if reason}
+
+
+def _measures(table: xr.Dataset, chosen: Sequence[Response]) -> pd.DataFrame:
+    """Return the measures of runs; NaN where a run failed."""
+    frame = pd.DataFrame({measure_key(r): r.values(table) for r in chosen})
+    frame.loc[list(_failed(table))] = np.nan
+    return frame
+
+
+def _indices(
+    machine: UncertainMachine,
+    chosen: tuple[Response, ...],
+    run: Run,
+    settings: Settings,
+    scores: tuple[FloatArray, FloatArray],
+    values: pd.DataFrame,
+) -> tuple[dict[str, list[Index]], str, int]:
+    """Return the Sobol indices by measure, why some are missing, and the number of runs."""
+    count = settings.sensitivity
+    if not count:
+        return {}, "Sobol indices were not requested (--sensitivity 0).", 0
+    if machine.joint.factor is not None:
+        reason = (
+            "Sobol indices divide the variance among independent quantities. Here quantities are "
+            "correlated, so the shares would overlap and are not computed."
+        )
+        return {}, reason, 0
+    others = exchanged(scores[0][:count], scores[1][:count])
+    at_others = _measures(run(machine.cases(others, settings.samples + 1), "sensitivity"), chosen)
+    found: dict[str, list[Index]] = {}
+    missing = []
+    for name in values:
+        own = sobol_indices(
+            values[name].to_numpy()[:count], at_others[name].to_numpy(), seed=settings.seed
+        )
+        if own is None:
+            missing.append(str(name))
+        else:
+            found[str(name)] = own
+    reason = (
+        f"No Sobol indices of {', '.join(missing)}: a run failed, or the measure does not vary."
+        if missing
+        else ""
+    )
+    return found, reason, len(others)
+
+
+def _contact(
+    machine: UncertainMachine, run: Run, settings: Settings, table: xr.Dataset
+) -> Contact | None:
+    """Return how often the tub touches. A run that failed counts as contact."""
+    if CONTACTS not in _measured(table):
+        return None
+    has_failed = table.diverged.values != ""
+    touches = (table.smallest_gap.values <= 0.0) | has_failed
+    crude = share_of(touches)
+    names = [str(name) for name in table.pair.values]
+    shares = {
+        name: share_of(np.isfinite(column))
+        for name, column in zip(names, table.contact_gap.values.T, strict=True)
+    }
+    often = sorted((n for n in names if shares[n].count), key=lambda n: -shares[n].count)
+    nearest = pd.Series(table.nearest_pair.values).dropna().astype(int).value_counts()
+    rare = None
+    if crude.estimate < RARE and settings.subset:
+        rare = subset_simulation(
+            _limit_state(machine, run),
+            machine.joint.size,
+            samples=settings.subset,
+            seed=settings.seed,
+        )
+    ends = (rare.probability, rare.lower, rare.upper) if rare else None
+    estimate, lower, upper = ends or (crude.estimate, crude.lower, crude.upper)
+    return Contact(
+        estimate,
+        lower,
+        upper,
+        SUBSET if rare else CRUDE,
+        crude,
+        {name: shares[name] for name in often},
+        {names[i]: int(count) for i, count in nearest.items()},
+        rare,
+    )
+
+
+def _measured(table: xr.Dataset) -> set[str]:
+    return {CONTACTS} if "contact_gap" in table and table.sizes.get("pair", 0) else set()
+
+
+def _limit_state(machine: UncertainMachine, run: Run) -> Callable[[FloatArray], FloatArray]:
+    """Return the smallest gap as a function of scores; NaN where a run failed. [m]"""
+
+    def gaps(scores: FloatArray) -> FloatArray:
+        table = run(machine.cases(scores), "rare contact")
+        gap = np.asarray(table.smallest_gap.values)
+        return np.where(table.diverged.values != "", np.nan, gap)
+
+    return gaps
