@@ -15,7 +15,7 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.outputs import AXES
-from wm_drake.simulation.runs import checked_step
+from wm_drake.simulation.runs import checked_integrator, checked_step
 
 _VARIABLES = {
     "detergent_displacement": (
@@ -61,6 +61,7 @@ def simulate_many(
     *,
     measures: Iterable[str] = ("extremes", "amplitudes"),
     step: float | None = None,
+    integrator: str | None = None,
     histories: bool = False,
     workers: int | None = None,
     progress: Callable[[int], None] = lambda done: None,
@@ -84,6 +85,7 @@ def simulate_many(
             (`wm_drake.simulation.vibration`).
         step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
             step size of the machine is used. [s]
+        integrator: Integrator, as in `simulate`; None for that of the machine.
         histories: Whether each `RunResult` contains the record of the run, as from `simulate`.
         workers: Number of threads; None for the number of cores.
         progress: Called with the number of finished runs; `wm_drake.progress_bar` displays it.
@@ -104,6 +106,7 @@ def simulate_many(
         if name not in MEASURES:
             raise input_error(f"no measure '{name}'{nearest_names(name, MEASURES)}", key="measures")
     step = checked_step(machine.parameters, step)
+    chosen = checked_integrator(machine.parameters, integrator)
     results: dict[int, tuple[str, str, list[FloatArray]]] = {}
 
     def collect(runs: list[RunResult]) -> None:
@@ -114,8 +117,9 @@ def simulate_many(
         progress(len(results))
 
     try:
-        runner = Runner(machine.parameters, step, wanted, histories)
-        _run_all(Preparation(machine, step), runner, cases, workers or os.cpu_count() or 1, collect)
+        runner = Runner(machine.parameters, wanted, histories)
+        preparation = Preparation(machine, step, chosen)
+        _run_all(preparation, runner, cases, workers or os.cpu_count() or 1, collect)
     except KeyboardInterrupt:
         raise SimulationInterrupted(as_table(machine.parameters, wanted, results)) from None
     return as_table(machine.parameters, wanted, results)
