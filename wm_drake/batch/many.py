@@ -18,7 +18,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.feet import BY_FOOT, FOOT_VARIABLES, MARGINS, WORDS, cabinet_of
 from wm_drake.simulation.mounts import KINDS, POINT, mount_names
 from wm_drake.simulation.outputs import AXES
-from wm_drake.simulation.runs import checked_step
+from wm_drake.simulation.runs import checked_integrator, checked_step
 
 FORCE_KINDS = dict(zip(KINDS, ("largest size", "RMS", "RMS without the mean"), strict=True))
 """Words for each of `KINDS`."""
@@ -94,6 +94,7 @@ def simulate_many(
     *,
     measures: Iterable[str] = ("extremes", "amplitudes"),
     step: float | None = None,
+    integrator: str | None = None,
     histories: bool = False,
     workers: int | None = None,
     progress: Callable[[int], None] = lambda done: None,
@@ -124,6 +125,7 @@ def simulate_many(
             "feet regions": the smallest of them in each region of the profile.
         step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
             step size of the machine is used. [s]
+        integrator: Integrator, as in `simulate`; None for that of the machine.
         histories: Whether each `RunResult` contains the record of the run, as from `simulate`.
         workers: Number of threads; None for the number of cores.
         progress: Called with the number of finished runs; `wm_drake.progress_bar` displays it.
@@ -146,6 +148,7 @@ def simulate_many(
     if {"feet", "feet regions"} & set(wanted):
         cabinet_of(machine.parameters)
     step = checked_step(machine.parameters, step)
+    chosen = checked_integrator(machine.parameters, integrator)
     results: dict[int, tuple[str, str, list[FloatArray]]] = {}
 
     def collect(runs: list[RunResult]) -> None:
@@ -156,8 +159,9 @@ def simulate_many(
         progress(len(results))
 
     try:
-        runner = Runner(machine.parameters, step, wanted, histories)
-        _run_all(Preparation(machine, step), runner, cases, workers or os.cpu_count() or 1, collect)
+        runner = Runner(machine.parameters, wanted, histories)
+        preparation = Preparation(machine, step, chosen)
+        _run_all(preparation, runner, cases, workers or os.cpu_count() or 1, collect)
     except KeyboardInterrupt:
         raise SimulationInterrupted(as_table(machine.parameters, wanted, results)) from None
     return as_table(machine.parameters, wanted, results)

@@ -67,7 +67,7 @@ def run_keys(
         "sources": sources_version(),
         "engine": "compiled",
     }
-    common |= {"step": checked_step(parameters, step)}
+    common |= {"step": checked_step(parameters, step), "integrator": parameters.integrator}
     common |= {"measures": sorted(set(measures))}
     for case in cases:
         numbers = (case.parameters or parameters).model_dump_json(exclude=_EXCLUDED)

@@ -94,17 +94,16 @@ class Runner:
     """Runs work items in any thread. Each thread reuses memory of its own from batch to batch."""
 
     def __init__(
-        self, parameters: MachineParameters, step: float, measures: tuple[str, ...], histories: bool
+        self, parameters: MachineParameters, measures: tuple[str, ...], histories: bool
     ) -> None:
         """Prepare for a machine.
 
         Args:
             parameters: Of the machine.
-            step: Step size. [s]
             measures: Keys of `MEASURES`.
             histories: Whether results have records.
         """
-        self.parameters, self.step = parameters, step
+        self.parameters = parameters
         self.measures, self.histories = measures, histories
         self.stopped = threading.Event()
         self._memory = threading.local()
@@ -115,7 +114,8 @@ class Runner:
         Returns:
             A result for each work item; none if `stopped` was set meanwhile.
         """
-        schedule = schedule_of(key.profile, self.step, OUTPUT_PERIOD)
+        schedule = schedule_of(key.profile, key.stepping.step, OUTPUT_PERIOD)
+        one_derivative = key.stepping.one_derivative(schedule)
         # without amplitudes only the detergent point is followed, which comes last
         first = 0 if _FILTERED & set(self.measures) else -3 * POINT_SIZE
         points = [item.numbers.points[first:] for item in work_items]
@@ -124,7 +124,7 @@ class Runner:
         p = self._lanes("packed", [item.packed for item in work_items])
         x = self._lanes("begin", [item.begin for item in work_items])
         samples = self._array("samples", rows * size)
-        for _ in integrate_runs(schedule, key.layout, p, x, samples):
+        for _ in integrate_runs(schedule, one_derivative, key.layout, p, x, samples):
             if self.stopped.is_set():
                 return []
         moved, extremes = self._array("moved", rows * count), self._array("extremes", count + 7)
@@ -196,7 +196,10 @@ class Runner:
     def _record(self, item: WorkItem, schedule: Schedule, samples: FloatArray) -> Record:
         trajectory = trajectory_of(samples, schedule, item.packed, item.numbers.layout)
         record = as_record(item.numbers.setup, item.case, trajectory)
-        return record.assign_attrs(engine="compiled", step_s=self.step)
+        stepping = item.numbers.stepping
+        return record.assign_attrs(
+            engine="compiled", step_s=stepping.step, integrator=stepping.integrator
+        )
 
     def _regions(self, item: WorkItem, _schedule: Schedule, run: "_Run") -> Iterable[FloatArray]:
         setup, samples = item.numbers.setup, np.ascontiguousarray(run.samples[: run.good])

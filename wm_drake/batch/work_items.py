@@ -9,10 +9,11 @@ from pydrake.systems.framework import Context
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.engines.compiled.packing import Layout, initial_state, pack_bodies, pack_elements
-from wm_drake.engines.compiled.step_check import check_step
+from wm_drake.engines.compiled.stepping import Stepping, choose_stepping
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.model.machine import Machine, Setup
-from wm_drake.parameters import SpinProfile
+from wm_drake.parameters import Load, MachineParameters, SpinProfile
+from wm_drake.parameters.machine import Integrator
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 
@@ -29,6 +30,7 @@ class PackedParameters:
         elements, layout: From `pack_elements`.
         points: Measured points, from `outputs.measured_points`, one after the other.
         rest: State of rest.
+        stepping: How to integrate runs with these numbers.
     """
 
     setup: Setup
@@ -36,6 +38,7 @@ class PackedParameters:
     layout: Layout
     points: FloatArray
     rest: FloatArray
+    stepping: Stepping
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,7 @@ class BatchKey:
 
     profile: SpinProfile
     layout: Layout
+    stepping: Stepping
 
 
 class Preparation:
@@ -71,13 +75,13 @@ class Preparation:
     To set a machine up takes a good part of the time of a run, so its results are cached.
     """
 
-    def __init__(self, machine: Machine, step: float) -> None:
-        """Prepare for a built machine and a step size. [s]"""
-        self.machine, self.step = machine, step
+    def __init__(self, machine: Machine, step: float, integrator: Integrator) -> None:
+        """Prepare for a built machine, a largest step [s] and an integrator."""
+        self.machine, self.step, self.integrator = machine, step, integrator
         self.sensors = list(machine.parameters.sensors)
         self._context: Context | None = None
         self._known_bodies: list[tuple[object, FloatArray]] = []
-        self._known_numbers: dict[tuple[int, bool], PackedParameters] = {}
+        self._known_numbers: dict[tuple[int, bool, SpinProfile], PackedParameters] = {}
 
     def batches(self, cases: Iterable[Case]) -> Iterator[tuple[BatchKey, list[WorkItem]]]:
         """Yield batches of up to `WIDTH` work items that can run side by side.
@@ -90,7 +94,7 @@ class Preparation:
         waiting: dict[BatchKey, list[WorkItem]] = {}
         for number, case in enumerate(cases):
             item = self._work_item(number, case)
-            key = BatchKey(case.profile, item.numbers.layout)
+            key = BatchKey(case.profile, item.numbers.layout, item.numbers.stepping)
             work_items = waiting.setdefault(key, [])
             work_items.append(item)
             if len(work_items) == WIDTH:
@@ -99,7 +103,8 @@ class Preparation:
 
     def _work_item(self, number: int, case: Case) -> WorkItem:
         try:
-            bodies, numbers = self._bodies(case), self._numbers(case)
+            bodies = self._bodies(case.parameters or self.machine.parameters, case.load)
+            numbers = self._numbers(case)
         except InputError as error:
             raise InputError(
                 Problem(f"case {number} '{case.name}'", p.key, p.message) for p in error.problems
@@ -108,19 +113,18 @@ class Preparation:
         begin[DRUM_RATE] = case.profile.speed[0]
         return WorkItem(number, case, numbers, np.concatenate([bodies, numbers.elements]), begin)
 
-    def _bodies(self, case: Case) -> FloatArray:
+    def _bodies(self, parameters: MachineParameters, load: Load | None) -> FloatArray:
         """Return the packed bodies, which cases with the same bodies, frames and load share."""
-        parameters = case.parameters or self.machine.parameters
         key = (
             parameters.bodies,
             parameters.frames,
             parameters.imperfections.residual_imbalance,
-            case.load,
+            load,
         )
         for known, bodies in self._known_bodies:
             if known == key:
                 return bodies
-        self._context = self.machine.set_up_bodies(case.load, parameters, self._context)
+        self._context = self.machine.set_up_bodies(load, parameters, self._context)
         plant = self.machine.plant
         bodies = pack_bodies(
             plant, plant.GetMyContextFromRoot(self._context), parameters.drive.joint
@@ -131,14 +135,25 @@ class Preparation:
     def _numbers(self, case: Case) -> PackedParameters:
         """Return all other packed numbers of a case, which do not depend on its load."""
         # the cached setup holds the parameters, so that no others can get the same id
-        key = (id(case.parameters or self.machine.parameters), case.gasket)
+        key = (id(case.parameters or self.machine.parameters), case.gasket, case.profile)
         if key not in self._known_numbers:
             if len(self._known_numbers) >= KEPT_NUMBERS:
                 del self._known_numbers[next(iter(self._known_numbers))]
+            empty = self._bodies(case.parameters or self.machine.parameters, None)
             setup = self._set_up(case)
             elements, layout = pack_elements(setup)
+            stepping = choose_stepping(
+                setup,
+                np.concatenate([empty, elements]),
+                layout,
+                case.profile,
+                self.step,
+                self.integrator,
+            )
             points, rest = setup.measured_points.ravel(), initial_state(setup, case.profile)
-            self._known_numbers[key] = PackedParameters(setup, elements, layout, points, rest)
+            self._known_numbers[key] = PackedParameters(
+                setup, elements, layout, points, rest, stepping
+            )
         return self._known_numbers[key]
 
     def _set_up(self, case: Case) -> Setup:
@@ -150,5 +165,4 @@ class Preparation:
                 f"has sensors {', '.join(setup.sensors)}; the machine has {', '.join(self.sensors)}"
             )
         self._context = setup.context
-        check_step(setup, self.step)
         return setup

@@ -190,7 +190,8 @@ def check_buildable(file: str, parameters: "MachineParameters") -> "tuple[Proble
     Returns:
         Values of the machine that are legal but unusual, with file and line.
     """
-    from wm_drake.engines.compiled.step_check import check_step
+    from wm_drake.engines.compiled.packing import pack
+    from wm_drake.engines.compiled.stepping import choose_stepping
     from wm_drake.model.build import build_machine
     from wm_drake.model.plausibility import unusual_values
     from wm_drake.model.scene import Scene
@@ -202,7 +203,7 @@ def check_buildable(file: str, parameters: "MachineParameters") -> "tuple[Proble
         published_results(parameters.published)
         step = checked_step(parameters, None)
         setup = build_machine(parameters).set_up()
-        check_step(setup, step)
+        choose_stepping(setup, *pack(setup), parameters.profile, step, parameters.integrator)
         Scene(parameters)
     unusual = unusual_values(setup)
     return located(InputError(unusual), machine_path(file)).problems if unusual else ()

@@ -23,6 +23,7 @@ class Schedule:
             middle of each step and at the end of the last. [rad/s, 1, 1, rad]
         row: (n,) number of the sample at the start of each step, or -1.
         time: (rows,) times of the samples, from 0. [s]
+        alike: (n,) number of steps just before each one that have its length and its acceleration.
     """
 
     step: FloatArray
@@ -30,6 +31,7 @@ class Schedule:
     drum: FloatArray
     row: np.ndarray
     time: FloatArray
+    alike: np.ndarray
 
     @property
     def steps(self) -> tuple[FloatArray, FloatArray, FloatArray, np.ndarray]:
@@ -62,13 +64,25 @@ def schedule_of(profile: SpinProfile, step: float, period: float) -> Schedule:
     row[first[sampled]] = nearest[sampled]
     nodes = np.append(np.column_stack([begins, middles]).ravel(), marks[-1])
     speed, angle = drum_motion(profile, nodes)
+    acceleration = drum_acceleration(profile, np.minimum(middles, marks[-1]))
     return Schedule(
         step=lengths,
-        acceleration=drum_acceleration(profile, np.minimum(middles, marks[-1])),
+        acceleration=acceleration,
         drum=np.column_stack([speed, np.cos(angle), np.sin(angle), angle]),
         row=row,
         time=time,
+        alike=_alike(lengths, acceleration),
     )
+
+
+def _alike(lengths: FloatArray, acceleration: FloatArray) -> np.ndarray:
+    """Return how many steps just before each one have its length and its acceleration."""
+    # lengths that differ by rounding only are equal
+    change = np.abs(np.diff(lengths)) > 1e-9 * lengths[:-1]
+    change |= np.diff(acceleration) != 0.0
+    numbers = np.arange(len(lengths))
+    last_change = np.maximum.accumulate(np.where(np.append(True, change), numbers, 0))
+    return numbers - last_change
 
 
 def output_times(profile: SpinProfile, period: float) -> FloatArray:

@@ -33,6 +33,11 @@ and by less than 0.1 % in the Drake engine (tested). See docs/decisions/0007.
 """
 
 
+Integrator = Literal["auto", "multistep", "runge_kutta"]
+"""Integrator of the compiled engine: one derivative a step, or the Runge-Kutta scheme with four;
+"auto" takes the first where it suits the machine. See docs/decisions/0130."""
+
+
 class InertiaMatrix(Frozen):
     """Inertia matrix about the centre of mass, in the axes of T (or D).
 
@@ -167,6 +172,7 @@ class MachineParameters(Frozen):
     model: str = "oscillating_group.sdf"
     gravity: Annotated[u.Acceleration, Field(ge=0.0)]
     step: Annotated[u.Duration, Field(gt=0.0)] = DEFAULT_STEP
+    integrator: Integrator = "auto"
     drive: Drive = Drive()
     bodies: dict[Name, BodyOverride] = {}
     frames: dict[Name, FrameOverride] = {}

@@ -1,20 +1,23 @@
 """simulate(machine, case) -> Record: run one case with the engine of choice."""
 
+import functools
 import warnings
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import Any, TypeAlias, get_args
 
+from wm_drake.engines.compiled.packing import pack
 from wm_drake.engines.compiled.run import run_compiled
-from wm_drake.engines.compiled.step_check import check_step
+from wm_drake.engines.compiled.stepping import choose_stepping
 from wm_drake.engines.drake import run_drake
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.model.machine import OUTPUT_PERIOD, Machine, Setup
-from wm_drake.parameters import MachineParameters, SpinProfile
+from wm_drake.model.machine import OUTPUT_PERIOD, Machine
+from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.machine import Integrator
 from wm_drake.simulation.cases import Case, case_of
 from wm_drake.simulation.records import Record, as_record
 
-Engine: TypeAlias = Callable[[Setup, SpinProfile, float, Callable[[float], None]], Trajectory]
+Engine: TypeAlias = Callable[..., Trajectory]
 """Arguments: machine at rest, profile, step [s], progress called with the fraction done."""
 
 ENGINES: dict[str, Engine] = {"compiled": run_compiled, "drake": run_drake}
@@ -31,6 +34,7 @@ def simulate(
     engine: str = DEFAULT_ENGINE,
     *,
     step: float | None = None,
+    integrator: str | None = None,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> Record:
     """Simulate one case of a machine and return its record.
@@ -41,6 +45,8 @@ def simulate(
         engine: Name of an engine in `ENGINES`.
         step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
             step size of the machine is used. [s]
+        integrator: Integrator of the compiled engine, "auto", "multistep" or "runge_kutta"; None
+            for that of the machine. With "auto" the steps may be half as long.
         progress: Called from time to time with the fraction done.
 
     Returns:
@@ -57,15 +63,41 @@ def simulate(
     step = checked_step(machine.parameters, step)
     if isinstance(case, str):
         case = case_of(machine.parameters, case)
-    setup = machine.set_up(case.load, parameters=case.parameters, gasket=case.gasket)
-    if engine == "compiled":  # the other one controls its error
-        check_step(setup, step)
-    trajectory = ENGINES[engine](setup, case.profile, step, progress)
+    chosen = checked_integrator(machine.parameters, integrator)
+    run = ENGINES[engine]
+    how: dict[str, Any] = {"engine": engine, "step_s": step}
+    numbers: dict[str, Any] = {"parameters": case.parameters, "gasket": case.gasket}
+    setup = machine.set_up(**numbers)
+    if engine == DEFAULT_ENGINE:  # the other one controls its error
+        stepping = choose_stepping(setup, *pack(setup), case.profile, step, chosen)
+        step, run = stepping.step, functools.partial(run, integrator=stepping.integrator)
+        how |= {"step_s": step, "integrator": stepping.integrator}
+    setup = machine.set_up(case.load, context=setup.context, **numbers)
+    trajectory = run(setup, case.profile, step, progress)
     record = as_record(setup, case, trajectory)
-    record.attrs |= {"engine": engine, "step_s": step}
+    record.attrs |= how
     if trajectory.divergence:
         warnings.warn(record.attrs["diverged"], DivergenceWarning, stacklevel=2)
     return record
+
+
+def checked_integrator(parameters: MachineParameters, integrator: str | None) -> Integrator:
+    """Return the integrator of the compiled engine, after checking it.
+
+    Args:
+        parameters: Machine that supplies the default.
+        integrator: Name of the integrator; None for the default.
+
+    Raises:
+        InputError: there is no such integrator.
+    """
+    name = parameters.integrator if integrator is None else integrator
+    for known in get_args(Integrator):
+        if name == known:
+            return known
+    raise input_error(
+        f"no integrator '{name}'{nearest_names(name, get_args(Integrator))}", key="integrator"
+    )
 
 
 def checked_step(parameters: MachineParameters, step: float | None) -> float:

@@ -53,5 +53,6 @@ class StateDerivative:
         """
         state, rate = aligned(states.size), aligned(states.size)
         state[:] = states.T.ravel()
-        derivative_lanes(state, rate, acceleration, self._p, self._elements)
+        inputs = aligned(len(self.layout.dampers) * WIDTH)
+        derivative_lanes(state, rate, inputs, acceleration, self._p, self._elements)
         return rate.reshape(-1, WIDTH).T.copy()

@@ -1,17 +1,36 @@
-"""The classical fourth-order Runge-Kutta scheme at fixed steps, for `WIDTH` machines."""
+"""Integrate `WIDTH` machines at fixed steps, each with one derivative or with four.
 
-from wm_drake.compiler.compilation import long_running
+A step with four derivatives is one of the classical fourth-order Runge-Kutta scheme. A step with
+one uses the steps before it (`wm_drake.engines.compiled.multistep`).
+"""
+
+from collections import namedtuple
+
+from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import sine_cosine
-from wm_drake.compiler.lanes import align_stack, lane_array
+from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
+    inputs_size,
     mass_properties,
-    rates_size,
     state_derivative,
     state_size,
-    write_rates,
+    write_sample,
 )
+from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES, multistep_step, remember
+from wm_drake.engines.compiled.packing import aligned
+
+Work = namedtuple("Work", ("rate", "inputs", "stage", "total", "past_rates", "past_inputs"))
+"""Arrays to work in. The past of a step with one derivative must stay from call to call."""
+Past = namedtuple("Past", ("rates", "inputs"))
+"""Time derivatives and inputs at the start of the last steps, as arrays of lanes."""
+
+
+def work_arrays(size, inputs):
+    """Return the `Work` for states and inputs of these sizes."""
+    sizes = (size, inputs, size, size, PAST_RATES * size, PAST_INPUTS * inputs)
+    return Work(*(aligned(count * WIDTH) for count in sizes))
 
 
 @long_running
@@ -22,58 +41,84 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
     next one of every machine.
 
     Args:
-        steps: Length, drum acceleration, drum motion and sample number of each step: four fields
-            of a `Schedule`, no arrays of lanes.
+        steps: Length, drum acceleration, drum motion and sample number of each step, four fields
+            of a `Schedule`, and whether it takes one derivative; no arrays of lanes.
         begin, end: Numbers of steps.
         p: Packed numbers.
         elements: `Elements`, which all machines have in common.
         x: States; they are advanced.
-        work: Three arrays of the size of the state, to work in.
+        work: `Work`, the same from the first step to the last.
         history: Samples, one after the other: the state, then `rates_size` accelerations. A sample
             is written at the start of each step that has a sample number.
     """
     align_stack()
     numbers, state, samples = lane_array(p), lane_array(x), lane_array(history)
-    y, dx, total = lane_array(work[0]), lane_array(work[1]), lane_array(work[2])
-    length, acceleration, drum, row = steps
-    size = state_size(elements)
-    masses = mass_properties(numbers, drum[2 * begin, 1], drum[2 * begin, 2])
-    for k in range(size):
-        y[k] = total[k] = state[k]
+    rate, inputs = lane_array(work.rate), lane_array(work.inputs)
+    stage, total = lane_array(work.stage), lane_array(work.total)
+    past = Past(lane_array(work.past_rates), lane_array(work.past_inputs))
+    length, acceleration, drum, row, one_derivative = steps
+    zero = 0.0 * state[0]
     for i in range(begin, end):
-        h = length[i]
-        sample = row[i] * (size + rates_size(elements))  # below 0 for none
-        if sample >= 0:
-            for k in range(size):
-                samples[sample + k] = state[k]
-        for stage in range(4):
-            node = 2 * i + (stage + 1) // 2
-            if stage == 1 or stage == 3:
-                masses = mass_properties(numbers, drum[node, 1], drum[node, 2])
-            state_derivative(y, dx, masses, drum[node, 0], acceleration[i], numbers, elements)
-            if stage == 0 and sample >= 0:
-                write_rates(samples, sample + size, dx, elements)
-            inner = stage == 1 or stage == 2
-            weight = h / 3.0 if inner else h / 6.0
-            ahead = h if stage == 2 else 0.5 * h
-            for k in range(size):
-                total[k] = total[k] + weight * dx[k]
-                y[k] = state[k] + ahead * dx[k]
-        zero = 0.0 * state[0]
-        total[DRUM_ANGLE] = zero + drum[2 * i + 2, 3]
-        total[DRUM_RATE] = zero + drum[2 * i + 2, 0]
+        masses = mass_properties(numbers, drum[2 * i, 1], drum[2 * i, 2])
+        state_derivative(
+            state, rate, inputs, masses, drum[2 * i, 0], acceleration[i], numbers, elements
+        )
+        if row[i] >= 0:
+            write_sample(samples, row[i], state, rate, elements)
+        remember(past.rates, i, PAST_RATES, rate, state_size(elements))
+        remember(past.inputs, i, PAST_INPUTS, inputs, inputs_size(elements))
+        if one_derivative[i]:
+            multistep_step(state, rate, past, i, length[i], numbers, elements)
+        else:
+            runge_kutta_step(
+                state, rate, inputs, stage, total, drum, i, length[i], acceleration[i],
+                numbers, elements
+            )  # fmt: skip
+        state[DRUM_ANGLE] = zero + drum[2 * i + 2, 3]
+        state[DRUM_RATE] = zero + drum[2 * i + 2, 0]
+
+
+@law
+def runge_kutta_step(
+    state, rate, inputs, stage, total, drum, i, h, acceleration, numbers, elements
+):
+    """Advance the state by a step of the classical Runge-Kutta scheme of fourth order.
+
+    Args:
+        state, rate: State at the start of the step, advanced, and its time derivative there.
+        inputs, stage, total: Arrays to work in.
+        drum, i: Motion of the drum, a field of a `Schedule`, and number of the step.
+        h: Length of the step. [s]
+        acceleration, numbers, elements: See `state_derivative`.
+    """
+    size = state_size(elements)
+    masses = mass_properties(numbers, drum[2 * i + 1, 1], drum[2 * i + 1, 2])
+    for k in range(size):
+        total[k] = state[k] + h / 6.0 * rate[k]
+        stage[k] = state[k] + 0.5 * h * rate[k]
+    for number in range(1, 4):
+        node = 2 * i + (number + 1) // 2
+        if number == 3:
+            masses = mass_properties(numbers, drum[node, 1], drum[node, 2])
+        state_derivative(
+            stage, rate, inputs, masses, drum[node, 0], acceleration, numbers, elements
+        )
+        weight = h / 6.0 if number == 3 else h / 3.0
+        ahead = h if number == 2 else 0.5 * h
         for k in range(size):
-            state[k] = total[k]
-            y[k] = total[k]
+            total[k] = total[k] + weight * rate[k]
+            stage[k] = state[k] + ahead * rate[k]
+    for k in range(size):
+        state[k] = total[k]
 
 
 @long_running
-def derivative_lanes(x, dx, acceleration, p, elements):
+def derivative_lanes(x, dx, inputs, acceleration, p, elements):
     """Evaluate `state_derivative` for `lanes.WIDTH` machines.
 
     Args:
         x: States; the drum's angle and rate are read from them.
-        dx: Time derivatives, written.
+        dx, inputs: Time derivatives and inputs of internal states, written.
         acceleration: Acceleration of the drum, the same for all machines. [rad/s^2]
         p: Packed numbers.
         elements: `Elements`, which all machines have in common.
@@ -83,5 +128,12 @@ def derivative_lanes(x, dx, acceleration, p, elements):
     sine, cosine = sine_cosine(state[DRUM_ANGLE])
     masses = mass_properties(numbers, cosine, sine)
     state_derivative(
-        state, lane_array(dx), masses, state[DRUM_RATE], acceleration, numbers, elements
+        state,
+        lane_array(dx),
+        lane_array(inputs),
+        masses,
+        state[DRUM_RATE],
+        acceleration,
+        numbers,
+        elements,
     )

@@ -222,11 +222,13 @@ def drum_motion(w, rate, acceleration, a):
 
 
 @law
-def state_derivative(x, dx, masses, rate, acceleration, p, elements):
+def state_derivative(x, dx, inputs, masses, rate, acceleration, p, elements):
     """Write the time derivative of the state into `dx`.
 
     Args:
         x, dx: State and its derivative; the drum's angle and rate in x are not read.
+        inputs: Elongation rate of each strut damper, written. The deformation of its sponge
+            depends on the motion through this number only. [m/s]
         masses, rate, acceleration, p: See `accelerations`.
         elements: `Elements`.
     """
@@ -244,6 +246,7 @@ def state_derivative(x, dx, masses, rate, acceleration, p, elements):
     for i in range(len(elements.dampers)):
         at, k = elements.dampers[i], STATE_SIZE + i
         arm, line = friction_damper_line(motion, p, at)
+        inputs[i] = line[1]
         tension, dx[k] = friction_damper_tension(line[1], x[k], p, at)
         total = plus(total, friction_damper_wrench(motion, arm, line, tension, p, at))
     total = add_telescopic_dampers(
@@ -301,9 +304,25 @@ def state_size(elements):
 
 
 @law
+def inputs_size(elements):
+    """Return the number of inputs of internal states: one for each strut damper."""
+    return len(elements.dampers)
+
+
+@law
 def rates_size(elements):
     """Return the number of accelerations in a sample."""
     return RATES_SIZE if elements.bearing is None else 2 * RATES_SIZE
+
+
+@law
+def write_sample(history, number, x, dx, elements):
+    """Write a sample: the state, then the `RATES` of the tub and of the drum's carrier, if any."""
+    size = state_size(elements)
+    at = number * (size + rates_size(elements))
+    for k in range(size):
+        history[at + k] = x[k]
+    write_rates(history, at + size, dx, elements)
 
 
 @law

@@ -2,14 +2,18 @@
 
 from collections.abc import Callable, Iterator
 
+import numpy as np
+
 from wm_drake.compiler.lanes import WIDTH
-from wm_drake.engines.compiled.integration import integrate_lanes
+from wm_drake.engines.compiled.integration import integrate_lanes, work_arrays
 from wm_drake.engines.compiled.packing import Layout, aligned, fill_lanes, initial_state, pack
 from wm_drake.engines.compiled.samples import trajectory_of
+from wm_drake.engines.compiled.stepping import Stepping
 from wm_drake.engines.schedule import Schedule, schedule_of
 from wm_drake.engines.trajectory import Trajectory, diverging_coordinate
 from wm_drake.model.machine import OUTPUT_PERIOD, Setup
 from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.machine import Integrator
 from wm_drake.parameters.types import FloatArray
 
 PAUSE_STEPS = 2000
@@ -22,6 +26,7 @@ def run_compiled(
     step: float,
     progress: Callable[[float], None],
     period: float = OUTPUT_PERIOD,
+    integrator: Integrator = "runge_kutta",
 ) -> Trajectory:
     """Run a machine through a spin profile with the compiled engine.
 
@@ -34,6 +39,7 @@ def run_compiled(
         step: Step size. [s]
         progress: Called with the fraction done.
         period: Time between two samples. [s]
+        integrator: "multistep" or "runge_kutta".
 
     Returns:
         The sampled motion; up to the last good sample if it diverged.
@@ -48,13 +54,19 @@ def run_compiled(
     numbers, x = (aligned(len(values) * WIDTH) for values in (p, begin))
     fill_lanes(numbers, [p])
     fill_lanes(x, [begin])
-    for done in integrate_runs(schedule, layout, numbers, x, samples):
+    one_derivative = Stepping(integrator, step).one_derivative(schedule)
+    for done in integrate_runs(schedule, one_derivative, layout, numbers, x, samples):
         progress(done)
     return trajectory_of(samples.reshape(rows, size, WIDTH)[..., 0].copy(), schedule, p, layout)
 
 
 def integrate_runs(
-    schedule: Schedule, layout: Layout, p: FloatArray, x: FloatArray, samples: FloatArray
+    schedule: Schedule,
+    one_derivative: np.ndarray,
+    layout: Layout,
+    p: FloatArray,
+    x: FloatArray,
+    samples: FloatArray,
 ) -> Iterator[float]:
     """Integrate `WIDTH` runs side by side until the schedule ends or all of them have diverged.
 
@@ -63,6 +75,7 @@ def integrate_runs(
 
     Args:
         schedule: The steps.
+        one_derivative: Whether each step takes one derivative; see `Stepping`.
         layout: What the runs have in common.
         p, x: Packed numbers and states as flat arrays of lanes; x is advanced.
         samples: Flat array of lanes for the samples, as `integrate` writes them; NaN behind the
@@ -71,12 +84,13 @@ def integrate_runs(
     Yields:
         The fraction done, after each `PAUSE_STEPS` steps.
     """
-    work = (aligned(len(x)), aligned(len(x)), aligned(len(x)))
+    work = work_arrays(len(x) // WIDTH, len(layout.dampers))
+    steps_of = (*schedule.steps, one_derivative)
     by_sample = samples.reshape(len(schedule.time), -1, WIDTH)
     done, steps, last, diverged = 0, len(schedule.step), 0, False
     while done < steps and not diverged:
         begin, done = done, min(done + PAUSE_STEPS, steps)
-        integrate_lanes(schedule.steps, begin, done, p, layout.elements, x, work, samples)
+        integrate_lanes(steps_of, begin, done, p, layout.elements, x, work, samples)
         last = max(last, int(schedule.row[begin:done].max()))
         diverged = all(diverging_coordinate(positions) for positions in by_sample[last, :6].T)
         yield done / steps

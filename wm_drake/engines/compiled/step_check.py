@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from wm_drake.compiler.lanes import WIDTH
-from wm_drake.engines.compiled.derivative import StateDerivative
+from wm_drake.engines.compiled.linear import jacobians
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
-from wm_drake.engines.compiled.packing import initial_state
+from wm_drake.engines.compiled.packing import Layout, initial_state, pack
 from wm_drake.engines.compiled.tubes import TUBES_STATE_SIZE
 from wm_drake.errors import input_error
 from wm_drake.model.machine import OUTPUT_PERIOD, Setup
@@ -81,11 +81,11 @@ def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
         InputError: the machine has something that the compiled engine does not represent.
     """
     free, parts = _free_states(setup)
-    jacobians = _jacobians(setup, free)
-    if not np.all(np.isfinite(jacobians)):
+    matrices, _ = linearised(setup, *pack(setup), DIFFERENCE)
+    if not np.all(np.isfinite(matrices)):
         return {"the machine": FastestMotion(np.inf, False, "the machine")}
     moving = np.isin(free, _velocities(setup, len(free) + 2))
-    values, vectors = np.linalg.eig(jacobians)
+    values, vectors = np.linalg.eig(matrices)
     found: dict[str, FastestMotion] = {}
     for rates, modes in zip(values, vectors, strict=True):
         for rate, mode in zip(rates, modes.T, strict=True):
@@ -104,17 +104,22 @@ def fastest_motion(setup: Setup) -> FastestMotion:
     return min(fastest_motions(setup).values(), key=lambda motion: motion.longest_step)
 
 
-def _jacobians(setup: Setup, free: list[int]) -> FloatArray:
-    """Return the Jacobian of the free states at each of the states to look at. (WIDTH, n, n)"""
-    derivative, states = StateDerivative(setup), _states(setup, free)
-    jacobians = np.empty((WIDTH, len(free), len(free)))
-    for column, index in enumerate(free):
-        ahead, back = states.copy(), states.copy()
-        ahead[:, index] += DIFFERENCE
-        back[:, index] -= DIFFERENCE
-        change = derivative.at_states(ahead) - derivative.at_states(back)
-        jacobians[:, :, column] = change[:, free] / (2.0 * DIFFERENCE)
-    return jacobians
+def linearised(
+    setup: Setup, packed: FloatArray, layout: Layout, difference: float
+) -> tuple[FloatArray, np.ndarray]:
+    """Return the Jacobians of the free states, and which of these are internal to a damper strut.
+
+    Args:
+        setup: The machine.
+        packed, layout: From `pack`.
+        difference: Half a step of the central differences. [m, rad, m/s, rad/s]
+
+    Returns:
+        (WIDTH, n, n) at states with slow and fast motion [1/s], and (n,) bool.
+    """
+    free, _ = _free_states(setup)
+    struts = range(STATE_SIZE, STATE_SIZE + len(setup.dampers))
+    return jacobians(packed, layout, _states(setup, free), free, difference), np.isin(free, struts)
 
 
 def check_step(setup: Setup, step: float) -> None:

@@ -129,10 +129,20 @@ def _laws(parameters: MachineParameters) -> dict[str, str]:
     return found
 
 
+_RUNGE_KUTTA = "classical Runge-Kutta method of fourth order, fixed step"
+_MULTISTEP = "explicit multistep method of fourth order, one derivative a step, fixed step"
+INTEGRATORS = {
+    "auto": f"{_MULTISTEP}, where it suits the machine; else {_RUNGE_KUTTA}",
+    "multistep": _MULTISTEP,
+    "runge_kutta": _RUNGE_KUTTA,
+}
+"""Description of each integrator of the compiled engine."""
+
+
 def _numerics(parameters: MachineParameters) -> dict[str, Any]:
     both_ways = "forwards and backwards, so that no phase is shifted"
     return {
-        "integrator": "classical Runge-Kutta method of fourth order, fixed step",
+        "integrator": INTEGRATORS[parameters.integrator],
         "step_s": parameters.step,
         "output_period_s": OUTPUT_PERIOD,
         "displacement_filter": f"Butterworth band-pass of order {FILTER_ORDER}, {both_ways}; ends "
