@@ -211,6 +211,8 @@ def to_si(value: Any, info: ValidationInfo, unit: Unit) -> float:
     Raises:
         ValueError: the value is not a finite number with a fitting unit.
     """
+    if isinstance(unit, PureNumber):
+        return _pure_number(value)
     example = f"1 {unit.shown}"
     if isinstance(value, str):
         match = _SCALAR.fullmatch(value)
@@ -287,14 +289,6 @@ class PureNumber(Unit):
 
     si: str = ""
     shown: str = ""
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Return a schema that parses text before the other checks of the field."""
-        return with_info_before_validator_function(
-            lambda value, info: _pure_number(value), handler(source)
-        )
 
     def text(self, value: Any) -> str:
         """Return a number as text that reads back as the same number."""
