@@ -2,10 +2,17 @@
 
 import typer
 
-from wm_drake.cli.study import gasket, gasket_damping, spin_cycle, spin_identify
+from wm_drake.cli.study import (
+    gasket,
+    gasket_damping,
+    gasket_effect,
+    spin_cycle,
+    spin_identify,
+)
 
 app = typer.Typer(help="Run a study of many runs and write a report.", no_args_is_help=True)
 app.command("gasket")(gasket.gasket)
 app.command("gasket-damping")(gasket_damping.gasket_damping)
+app.command("gasket-effect")(gasket_effect.gasket_effect)
 app.command("spin-cycle")(spin_cycle.spin_cycle)
 app.command("spin-identify")(spin_identify.spin_identify)
