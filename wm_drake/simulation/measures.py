@@ -204,10 +204,16 @@ def smooth_envelope(record: Record) -> xr.DataArray:
 
     It is the magnitude of the analytic signal d + i H(d), with the Hilbert transform H; the lower
     envelope is its negative. Unlike a line from peak to peak it is a smooth function of all
-    parameters: a line jumps where a small peak appears.
+    parameters: a line jumps where a small peak appears. The record is mirrored at both ends,
+    because the transform continues it periodically.
     """
     displacement = filtered_displacement(record)
-    return displacement.copy(data=np.abs(hilbert(displacement.values, axis=0)))
+    values = displacement.values
+    padding = min(round(PADDING / _period(record)), len(values) - 1)
+    if padding < 1:
+        return displacement.copy(data=np.abs(values))
+    mirrored = np.pad(values, ((padding, padding), (0, 0)), mode="reflect")
+    return displacement.copy(data=np.abs(hilbert(mirrored, axis=0))[padding:-padding])
 
 
 def percent_difference(value: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:

@@ -5,6 +5,7 @@ import typer
 from wm_drake.cli.study import (
     gasket,
     gasket_damping,
+    gasket_effect,
     modes,
     response,
     spin_cycle,
@@ -15,6 +16,7 @@ from wm_drake.cli.study import (
 app = typer.Typer(help="Run a study of many runs and write a report.", no_args_is_help=True)
 app.command("gasket")(gasket.gasket)
 app.command("gasket-damping")(gasket_damping.gasket_damping)
+app.command("gasket-effect")(gasket_effect.gasket_effect)
 app.command("modes")(modes.modes)
 app.command("response")(response.response)
 app.command("spin-cycle")(spin_cycle.spin_cycle)

@@ -1,0 +1,117 @@
+"""What is fitted, what is predicted and what is missed, beside the published numbers?
+
+The script runs the shipped machines as they are: the machine `reference` over the run-up of [B]
+(amplitudes, effect of the gasket, steady state, grand means of the gasket study with linear tables
+as in [B]), the machine `free_stroke` over the spin cycle of [A], and Coulomb fits to loops of the
+MSTV damper of [C]. It writes one page in Markdown, which is docs/validation.md:
+
+    python analyses/write_validation.py --out docs/validation.md
+
+Explanations of results that are missed are in validation_reasons.yaml. It takes about two minutes.
+"""
+
+import argparse
+from functools import partial
+from pathlib import Path
+
+import pandas as pd
+from fit_coulomb_to_mstv import coulomb_fits
+
+from wm_drake import Case, build_machine, load_machine, load_profile, simulate_many
+from wm_drake.parameters import (
+    GASKET_FACTORS,
+    MachineParameters,
+    at_levels,
+    levels_of,
+    load_component,
+    load_factors,
+    published_results,
+)
+from wm_drake.parameters.components import COMPONENTS_FOLDER
+from wm_drake.parameters.files import read_yaml
+from wm_drake.parameters.unbalance_cases import load_unbalance_cases
+from wm_drake.report.spin.report import amplitude_table
+from wm_drake.report.validation.page import validation_page
+from wm_drake.studies.doe import make_design
+from wm_drake.studies.gasket.screening import Screening, run_screening
+from wm_drake.studies.gasket.study import GasketTrials
+from wm_drake.studies.gasket_effect.study import effect_table, run_gasket_effect
+from wm_drake.studies.spin_cycle.runs import compiled_runs
+from wm_drake.studies.spin_cycle.study import run_spin_cycle
+from wm_drake.studies.validation import rows
+
+REASONS = Path(__file__).with_name("validation_reasons.yaml")
+SHOWN_BY_A = ("2", "5", "29")  # cases of [A] Table 9 that [A] describes
+
+
+def grand_means(machine: MachineParameters, quick: bool) -> Screening:
+    """Return the gasket study of [B] with linear tables; with --quick, a design of 20 trials."""
+    levels = levels_of(machine, load_factors(GASKET_FACTORS), "linear")
+    names = tuple(level.name for level in levels)
+    design = (
+        make_design("d-optimal", names, trials=20, model="main", seed=0)
+        if quick
+        else make_design("orthogonal", names, trials=243)
+    )
+    loads = [Case(name, machine.loads[name], machine.profile) for name in ("middle", "counter")]
+    middle = at_levels(machine, levels, [0] * len(levels))
+    trials = GasketTrials(middle, levels, loads, ["D", "F", "M"])
+    run = partial(simulate_many, build_machine(middle), measures=trials.measures)
+    return run_screening(design, lambda plan: trials.responses(plan, run))
+
+
+def coulomb(quick: bool) -> pd.DataFrame:
+    """Return the Coulomb fits at the tests of [C] Table 2, for f_max of the shipped damper."""
+    table = pd.read_csv(COMPONENTS_FOLDER / "mstv_table2_coulomb.csv", comment="#")
+    if quick:
+        table = table[table.frequency_hz.isin([1.0, 10.0]) & (table.amplitude_mm == 1.0)]
+    damper = load_component("mstv_damper").parameters
+    return coulomb_fits(table, damper.friction_force)
+
+
+def main() -> None:
+    """Run the machines and write the page."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="20 trials, no spin cycle, two loops")
+    parser.add_argument(
+        "--fitted-means",
+        action="store_true",
+        help="the grand means of [B] Table 5 were targets of the calibration",
+    )
+    parser.add_argument("--out", type=Path, help="also write the page to this file")
+    arguments = parser.parse_args()
+    reference = load_machine("reference")
+    cases = [Case(name, load, reference.profile) for name, load in reference.loads.items()]
+    effect = run_gasket_effect(reference, cases)
+    both = [amplitude_table(result) for result in (effect.without, effect.with_gasket)]
+    means_kind = rows.FITTED if arguments.fitted_means else rows.PREDICTED
+    screening = grand_means(reference, arguments.quick)
+    found = rows.amplitude_rows(pd.concat(both))
+    found += rows.effect_rows(effect_table(effect))
+    found += rows.mean_rows(screening, published_results(reference.published), means_kind)
+    if not arguments.quick:
+        chosen = [case for case in load_unbalance_cases() if case.name in SHOWN_BY_A]
+        free = load_machine("free_stroke")
+        runs = compiled_runs(build_machine(free))
+        found += rows.spin_cycle_rows(
+            run_spin_cycle(free, chosen, load_profile("spin_cycle"), runs)
+        )
+    found += rows.coulomb_rows(coulomb(arguments.quick))
+    notes = [
+        f"Machine `{reference.name}` ({reference.about}), machine `free_stroke`, component "
+        "`mstv_damper`.",
+        f"Gasket study: {screening.design.trials} trials, {screening.design.kind}, tables linear.",
+    ]
+    command = "python analyses/write_validation.py --out docs/validation.md"
+    command += " --fitted-means" if arguments.fitted_means else ""
+    reasons = {str(key): str(text) for key, text in read_yaml(REASONS).items()}
+    page = validation_page(found, command, notes, reasons)
+    print(page)
+    if arguments.out:
+        arguments.out.write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

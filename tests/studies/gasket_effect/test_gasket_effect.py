@@ -1,0 +1,129 @@
+"""Effect of the gasket: percent differences and steady amplitudes on records of known answer."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+from wm_drake.errors import InputError
+from wm_drake.parameters import SpinProfile
+from wm_drake.report.gasket_effect.report import amplitudes, summary
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.measures import Measures
+from wm_drake.studies.gasket_effect.study import (
+    GasketEffect,
+    effect_table,
+    run_gasket_effect,
+    steady_amplitudes,
+    steady_window,
+)
+from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
+
+SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
+
+
+def profile(*points):
+    time, speed = zip(*points, strict=True)
+    return SpinProfile(time=time, speed=speed)
+
+
+def test_steady_state_is_the_last_half_of_the_fastest_stretch_of_constant_speed():
+    run_up = profile((0.0, 0.0), (57.0, 40.0), (70.0, 40.0))
+    assert steady_window(run_up) == (63.5, 70.0)
+    cycle = profile((0, 0), (5, 10), (20, 10), (25, 30), (45, 30), (50, 0), (90, 0))
+    assert steady_window(cycle) == (35.0, 45.0)
+    backwards = profile((0.0, 0.0), (5.0, -10.0), (20.0, -10.0), (25.0, 0.0))
+    assert steady_window(backwards) == (12.5, 20.0)
+    assert steady_window(profile((0.0, 0.0), (9.0, 9.0))) is None
+    assert steady_window(profile((0.0, 9.0), (5.0, 0.0), (9.0, 0.0))) is None  # at rest
+
+
+def sines(amplitude, frequency=5.0, duration=40.0):
+    """Return a record whose sensors move by sines; the first second is ten times as large."""
+    time = np.arange(0.0, duration, 0.005)
+    size = amplitude * np.where(time < 1.0, 10.0, 1.0)
+    values = size[:, None] * np.sin(2 * np.pi * frequency * time)[:, None] * np.ones(len(SENSORS))
+    return xr.Dataset(
+        {"displacement": (("time", "sensor"), values)}, {"time": time, "sensor": SENSORS}
+    )
+
+
+def test_steady_amplitude_is_that_of_the_sine():
+    found = steady_amplitudes(sines(0.002), (20.0, 40.0))
+    assert found.values == pytest.approx(np.full(6, 0.002), rel=5e-3)
+
+
+def result(parameters, gasket, transient, steady, comparison):
+    """Return a spin result of the middle load with planted amplitudes. [m]"""
+    case = Case("middle", parameters.loads["middle"], parameters.profile, gasket)
+    record = sines(steady, duration=70.0)
+    record.attrs |= {"gasket": "yes" if gasket else "no", "diverged": ""}
+    sizes = xr.DataArray(np.full(6, transient), {"sensor": SENSORS}, ["sensor"])
+    measures = Measures(sizes, sizes, None, None, None, None)
+    results = (CaseResult(case, record, measures, 0.0),)
+    return SpinResult(parameters, "compiled", 0.0025, results, comparison)
+
+
+@pytest.mark.parametrize("comparison", [Comparison.AS_MEASURED, Comparison.NONE])
+def test_differences_are_those_of_equation_1(reference, comparison):
+    effect = GasketEffect(
+        result(reference, False, 0.020, 0.0050, comparison),
+        result(reference, True, 0.025, 0.0048, comparison),
+    )
+    table = effect_table(effect).set_index("sensor")
+    assert list(table["percent"]) == pytest.approx([25.0] * 6)
+    assert (table["without_mm"].iloc[0], table["with_mm"].iloc[0]) == pytest.approx((20.0, 25.0))
+    assert list(table["steady_percent"]) == pytest.approx([-4.0] * 6, abs=0.05)
+    text = summary(effect_table(effect))
+    assert "In the steady state the gasket matters little: amplitudes differ by up to 4.0 %" in text
+    shown = amplitudes(effect_table(effect))
+    if comparison is Comparison.NONE:
+        assert table["experiment_percent"].isna().all()
+        assert "experiment" not in text
+        assert len(shown.groups[0].rows) == 3
+        return
+    # [B] Table 1, middle load: printed 23.2, 175.3, 3.3, -1.0, 604.5, 14.9 % from unrounded numbers
+    assert list(table["experiment_percent"]) == pytest.approx(
+        [23.3, 171.9, 3.3, -1.2, 627.3, 15.0], abs=0.1
+    )
+    assert "The sign of the difference is that of the experiment in 5 of 6 cases." in text
+    assert len(shown.groups[0].rows) == 6
+
+
+def test_machine_without_gasket_is_refused(reference):
+    without = reference.model_copy(update={"gasket": None})
+    with pytest.raises(InputError, match="has no gasket"):
+        run_gasket_effect(without, [])
+
+
+def test_command_writes_page_table_records_and_json(wm_drake):
+    Path("p.yaml").write_text("time: (0, 2, 6) s\nspeed: (0, 200, 200) rpm\n")
+    arguments = ("study", "gasket-effect", "--load", "middle", "--profile", "p.yaml")
+    ended = wm_drake(*arguments, "--out", "out", "--json")
+    assert (ended.code, ended.err.strip()) == (0, "")
+    printed = json.loads(ended.out)
+    assert printed["steady_window_s"] == [4.0, 6.0]
+    assert [row["sensor"] for row in printed["amplitudes"]] == SENSORS
+    for row in printed["amplitudes"]:
+        assert row["percent"] == pytest.approx(100 * (row["with_mm"] / row["without_mm"] - 1))
+        assert row["experiment_percent"] is None  # another profile than the measured one
+    assert abs(printed["amplitudes"][0]["percent"]) > 0.1
+    names = {path.name for path in Path("out").iterdir()}
+    assert {
+        "report.html",
+        "effect.csv",
+        "record_with_gasket_middle.nc",
+        "record_without_gasket_middle.nc",
+    } <= names
+    assert len(pd.read_csv("out/effect.csv")) == 6
+    page = Path("out/report.html").read_text()
+    assert "Effect of the gasket of machine reference" in page
+    assert "without gasket" in page
+
+
+def test_command_refuses_a_machine_without_gasket(wm_drake):
+    ended = wm_drake("study", "gasket-effect", "--machine", "reference", "--set", "gasket=null")
+    assert ended.code == 2

@@ -1,0 +1,137 @@
+"""Verdicts of the validation page on numbers of known answer."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+from wm_drake.parameters import PublishedTerm
+from wm_drake.report.validation.page import validation_page
+from wm_drake.studies.doe import make_design
+from wm_drake.studies.gasket.screening import Responses, run_screening
+from wm_drake.studies.spin_cycle.study import SpinCycleResult
+from wm_drake.studies.validation.rows import (
+    FITTED,
+    MET,
+    MISSED,
+    OPEN,
+    PREDICTED,
+    amplitude_rows,
+    coulomb_rows,
+    counts,
+    effect_rows,
+    mean_rows,
+    spin_cycle_rows,
+)
+
+
+@pytest.fixture
+def amplitude_table():
+    columns = ["load", "gasket", "source", "Xr", "Yr"]
+    return pd.DataFrame(
+        [
+            ("middle", "yes", "experiment", 10.0, 20.0),
+            ("middle", "yes", "Adams model of [B]", 11.0, 18.0),
+            ("middle", "yes", "wm_drake", 11.9, 25.0),
+            ("back", "yes", "wm_drake", 1.0, 1.0),  # nothing was measured
+        ],
+        columns=columns,
+    )
+
+
+def test_amplitudes_are_judged_by_their_difference(amplitude_table):
+    first, second, mean = amplitude_rows(amplitude_table)
+    assert (first.published, first.ours, first.difference) == ("10 mm", "11.9 mm", "+19.0 %")
+    assert (first.verdict, second.verdict) == (MET, MISSED)
+    assert second.reason == "above 20 %; Adams model of [B]: −10.0 %"
+    assert (mean.published, mean.ours, mean.verdict) == ("10.0 %", "22.0 %", MISSED)
+    assert {row.kind for row in (first, second, mean)} == {FITTED}
+
+
+def test_effects_are_judged_by_their_sign():
+    table = pd.DataFrame(
+        {
+            "load": ["middle"] * 5,
+            "sensor": list("abcde"),
+            "experiment_percent": [50.0, -20.0, 3.0, 3.0, np.nan],
+            "percent": [20.0, 5.0, -4.0, 15.0, 9.0],
+            "steady_percent": [1.0, -11.0, 0.0, np.nan, 2.0],
+        }
+    )
+    *effects, steady = effect_rows(table)
+    assert [row.verdict for row in effects] == [MET, MISSED, MET, MISSED]
+    assert (steady.ours, steady.verdict) == ("up to 11.0 %", MISSED)
+    assert steady.reason == "limit 10 %; worst: middle, b"
+    assert (effects[0].kind, steady.kind) == (FITTED, PREDICTED)
+
+
+def test_means_are_those_of_the_screening():
+    design = make_design("full", ("C_L", "C_T"))
+    frame = pd.DataFrame({"Dx": 13.0 + design.levels[:, 0], "Dy": 5.0 + design.levels[:, 1]})
+    screening = run_screening(
+        design, lambda _: Responses({"middle": frame}, {"Dx": "mm", "Dy": "mm"}, {})
+    )
+    known = {
+        ("middle", "Dx"): {"constant": PublishedTerm(None, (10.0,))},
+        ("middle", "Dy"): {"constant": PublishedTerm(None, (2.0,))},
+        ("middle", "Fx"): {"constant": PublishedTerm(None, (2.0,))},
+    }
+    dx, dy, mean = mean_rows(screening, known)
+    assert (dx.difference, dx.verdict) == ("+30.0 %", MET)
+    assert (dy.difference, dy.verdict) == ("+150.0 %", MISSED)
+    assert (mean.ours, mean.reason) == ("90.0 %", "1 of 2 within 30 %; largest 150 %")
+
+
+def test_spin_cycle_is_judged_by_what_the_paper_says():
+    regions = [f"R{number}" for number in range(1, 9)]
+    size = xr.DataArray(
+        np.full((3, 8, 3, 3), 0.1),
+        {
+            "case": ["2", "5", "29"],
+            "region": regions,
+            "accelerometer": list("abc"),
+            "axis": list("xyz"),
+        },
+        ["case", "region", "accelerometer", "axis"],
+    )
+    size.loc["2", "R7", "a", "y"] = 1.0
+    size.loc["2", "R5", :, "z"] = 1.0
+    size.loc["5", "R3", "b", "y"] = 1.0
+    size.loc["5", "R2", "b", "y"] = 0.8
+    size.loc["29", "R1", "c", "z"] = 0.4
+    result = SpinCycleResult(None, None, (), size, size, size, ())
+    y, z, rear, opposite, errors = spin_cycle_rows(result)
+    assert [row.verdict for row in (y, z, rear, opposite, errors)] == [MET, MET, MISSED, MET, OPEN]
+    assert (rear.published, rear.ours) == ("R2", "R3")
+    assert rear.reason == "R2 has 80 % of the vibration in R3"
+    assert opposite.ours == "0.40"
+
+
+def test_coulomb_fits_are_judged_by_difference_and_ratio():
+    fits = pd.DataFrame(
+        {
+            "frequency_hz": [1.0, 10.0],
+            "amplitude_mm": [0.3, 1.0],
+            "k1": [100.0, 100.0],
+            "c1": [10.0, 1.0],
+            "k1 fitted": [115.0, 130.0],
+            "c1 fitted": [4.0, 1.9],
+        }
+    )
+    assert [row.verdict for row in coulomb_rows(fits)] == [MET, MISSED, MISSED, MET]
+
+
+def test_page_counts_and_explains(amplitude_table):
+    rows = amplitude_rows(amplitude_table)
+    table = counts(rows)
+    assert table.iloc[0].tolist() == [1, 2, 0]
+    section = rows[0].section
+    reasons = {section: "About all.", f"{section} | {rows[1].quantity}": "the spring is soft"}
+    page = validation_page(rows, "python write.py", ["A note."], reasons)
+    assert "Of 3 fitted results, 2 are missed." in page
+    assert "Of 0 predicted results, 0 are missed." in page
+    assert f"## {section}\n\nAbout all.\n" in page
+    assert "| **missed** | above 20 %; Adams model of [B]: −10.0 %; the spring is soft |" in page
+    assert "python write.py" in page
+    assert "Written 20" in page
+    assert "wm_drake" in page

@@ -1,0 +1,1 @@
+"""Report page of `wm-drake study gasket-effect`."""

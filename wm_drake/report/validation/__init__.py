@@ -1,0 +1,1 @@
+"""Validation page in Markdown: docs/validation.md."""

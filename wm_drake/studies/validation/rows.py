@@ -1,0 +1,276 @@
+"""Rows of the validation page: published number, ours, and a verdict with its reason."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from wm_drake.parameters import PublishedResults
+from wm_drake.parameters.published import CONSTANT
+from wm_drake.studies.gasket.screening import Screening
+from wm_drake.studies.spin_cycle.study import SpinCycleResult
+
+FITTED, PREDICTED = "fitted", "predicted"
+"""Whether a published number was a target of the calibration."""
+
+MET, MISSED, OPEN = "met", "missed", "not comparable"
+
+AMPLITUDE_LIMIT = 20.0
+"""Largest difference of an amplitude that counts as met. [%] It is the limit of the calibration."""
+
+SMALL_EFFECT = 10.0
+"""Effect of the gasket that counts as none: its sign need not agree. [%]"""
+
+MEAN_LIMIT = 30.0
+"""Largest difference of a grand mean that counts as met. [%]"""
+
+STEADY_LIMIT = 10.0
+"""Largest difference of steady amplitudes for "negligible in the steady state" of [B]. [%]"""
+
+STIFFNESS_LIMIT = 20.0
+"""Largest difference of a fitted k1 of [C] that counts as met. [%]"""
+
+DAMPING_FACTOR = 2.0
+"""Largest ratio of a fitted c1 of [C] that counts as met; c1 spans a factor of 30 there."""
+
+REDUCED = 0.5
+"""Ratio below which a vibration is called significantly reduced; an assumption."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One published result beside ours.
+
+    Attributes:
+        section: Heading of the table to which the row belongs.
+        quantity: What is compared.
+        kind: `FITTED` or `PREDICTED`.
+        published, ours, difference: Numbers as text, with units.
+        verdict: `MET`, `MISSED` or `OPEN`.
+        reason: Why the verdict is so.
+    """
+
+    section: str
+    quantity: str
+    kind: str
+    published: str
+    ours: str
+    difference: str
+    verdict: str
+    reason: str
+
+
+def amplitude_rows(table: pd.DataFrame, kind: str = FITTED) -> list[Row]:
+    """Return a row for each measured amplitude, and one for their mean ([B] Tables 1 to 3).
+
+    Args:
+        table: Amplitudes with the columns load, gasket, source and one per sensor, in mm; the
+            sources are experiment, wm_drake, and perhaps a model of [B].
+        kind: Whether the amplitudes were fitted.
+    """
+    section, rows = "[B] Tables 1 to 3: amplitudes", list[Row]()
+    every: dict[str, list[float]] = {"wm_drake": [], "other": []}
+    sensors = [str(name) for name in table.columns[3:]]
+    for (load, gasket), group in table.groupby(["load", "gasket"], sort=False):
+        by_source = group.set_index("source")[sensors]
+        others = [name for name in by_source.index if name not in ("experiment", "wm_drake")]
+        if not {"experiment", "wm_drake"} <= set(by_source.index):
+            continue
+        for sensor in sensors:
+            measured, ours = by_source.loc[["experiment", "wm_drake"], sensor]
+            difference = 100.0 * (ours - measured) / measured
+            every["wm_drake"].append(abs(difference))
+            text = _limit_reason(difference, AMPLITUDE_LIMIT)
+            for other in others:
+                theirs = 100.0 * (by_source.loc[other, sensor] - measured) / measured
+                every["other"].append(abs(theirs))
+                text += f"; {other}: {_signed(theirs)} %"
+            what = f"{load}, {'with' if gasket == 'yes' else 'without'} gasket, {sensor}"
+            rows.append(
+                _number_row(section, what, kind, measured, ours, "mm", AMPLITUDE_LIMIT, text)
+            )
+    if every["wm_drake"]:
+        mean, most = np.mean(every["wm_drake"]), np.max(every["wm_drake"])
+        limit = float(np.mean(every["other"])) if every["other"] else math.nan
+        verdict = OPEN if math.isnan(limit) else MET if mean <= limit else MISSED
+        reason = f"over {len(every['wm_drake'])} amplitudes; largest {most:.1f} %"
+        if not math.isnan(limit):
+            reason += f"; [B]'s model: {limit:.1f} % over {len(every['other'])}"
+        published = "" if math.isnan(limit) else f"{limit:.1f} %"
+        rows.append(
+            Row(section, "mean difference", kind, published, f"{mean:.1f} %", "", verdict, reason)
+        )
+    return rows
+
+
+def effect_rows(table: pd.DataFrame, kind: str = FITTED) -> list[Row]:
+    """Return a row for each effect of the gasket on an amplitude, and one for the steady state.
+
+    Args:
+        table: Result of `effect_table` of the study of the gasket effect.
+        kind: Whether the amplitudes were fitted. The steady state is predicted always.
+    """
+    section, rows = "[B] Table 1 and section 2.2: effect of the gasket", list[Row]()
+    for row in table.to_dict("records"):
+        published, ours = row["experiment_percent"], row["percent"]
+        if not (math.isfinite(published) and math.isfinite(ours)):
+            continue
+        if abs(published) < SMALL_EFFECT:
+            is_met = abs(ours) < SMALL_EFFECT
+            reason = f"measured effect below {SMALL_EFFECT:g} %: ours must be so too"
+        else:
+            is_met = published * ours > 0.0
+            reason = "signs agree" if is_met else "signs differ"
+        texts = (f"{_signed(published)} %", f"{_signed(ours)} %")
+        points = f"{_signed(ours - published)} points"
+        what = f"{row['load']}, {row['sensor']}"
+        rows.append(Row(section, what, kind, *texts, points, MET if is_met else MISSED, reason))
+    steady = table["steady_percent"].abs()
+    if steady.notna().any():
+        worst = table.iloc[int(np.nanargmax(steady))]
+        is_met = steady.max() <= STEADY_LIMIT
+        reason = f"limit {STEADY_LIMIT:g} %; worst: {worst['load']}, {worst['sensor']}"
+        ours = f"up to {steady.max():.1f} %"
+        verdict = MET if is_met else MISSED
+        what = "difference of steady amplitudes"
+        rows.append(Row(section, what, PREDICTED, "negligible", ours, "", verdict, reason))
+    return rows
+
+
+def mean_rows(
+    screening: Screening, published: PublishedResults, kind: str = PREDICTED
+) -> list[Row]:
+    """Return a row for each published grand mean ([B] Table 5), and one for all."""
+    section, rows, every = (
+        "[B] Table 5: grand means of the gasket study",
+        list[Row](),
+        list[float](),
+    )
+    for (load, name), terms in published.items():
+        if CONSTANT not in terms or (load, name) not in screening.tables:
+            continue
+        theirs, ours = terms[CONSTANT].effects[0], screening.tables[load, name].constant
+        difference = 100.0 * (ours - theirs) / theirs
+        every.append(abs(difference))
+        unit = screening.responses.units[name]
+        reason = _limit_reason(difference, MEAN_LIMIT)
+        rows.append(
+            _number_row(section, f"{load}, {name}", kind, theirs, ours, unit, MEAN_LIMIT, reason)
+        )
+    if every:
+        good = sum(size <= MEAN_LIMIT for size in every)
+        reason = f"{good} of {len(every)} within {MEAN_LIMIT:g} %; largest {max(every):.0f} %"
+        verdict = MET if good == len(every) else MISSED
+        mean = f"{np.mean(every):.1f} %"
+        rows.append(Row(section, "mean difference", kind, "", mean, "", verdict, reason))
+    return rows
+
+
+def spin_cycle_rows(result: SpinCycleResult) -> list[Row]:
+    """Return what [A] section 4 says in words about its spin cycle, and whether ours agrees.
+
+    Args:
+        result: Spin cycle with the cases 2 (400 g at the front), 5 (400 g at the rear) and 29
+            (both, opposite) of [A] Table 9.
+    """
+    section = "[A] section 4: spin cycle"
+    size = result.displacement
+    second = str(size.accelerometer.values[1])
+    front, rear, opposite = (size.sel(case=name) for name in ("2", "5", "29"))
+    rows = []
+    for what, values, region in (
+        (
+            "400 g at the front: region of the largest y",
+            front.sel(axis="y").max("accelerometer"),
+            "R7",
+        ),
+        (
+            "400 g at the front: region of the largest z",
+            front.sel(axis="z").max("accelerometer"),
+            "R5",
+        ),
+        ("400 g at the rear: region of the largest y, second sensor", _of(rear, second, "y"), "R2"),
+    ):
+        ours = str(values.idxmax("region").item())
+        reason = "the region agrees" if ours == region else _runner_up(values, region, ours)
+        verdict = MET if ours == region else MISSED
+        rows.append(Row(section, what, PREDICTED, region, ours, "", verdict, reason))
+    ratio = (opposite.sel(axis="z").max("region") / front.sel(axis="z").max("region")).max()
+    verdict = MET if float(ratio) < REDUCED else MISSED
+    reason = f"largest ratio of all sensors; limit {REDUCED:g}, an assumption"
+    what = "400 g at both ends, opposite: z against 400 g at the front"
+    texts = ("significantly reduced", f"{float(ratio):.2f}")
+    rows.append(Row(section, what, PREDICTED, *texts, "", verdict, reason))
+    reason = "[A] prints errors against its own experiment, but no displacements"
+    what = "average error over 33 cases"
+    rows.append(Row(section, what, PREDICTED, "20.1 %", "", "", OPEN, reason))
+    return rows
+
+
+def _of(values: xr.DataArray, accelerometer: str, axis: str) -> xr.DataArray:
+    return values.sel(accelerometer=accelerometer, axis=axis)
+
+
+def _runner_up(values: xr.DataArray, region: str, ours: str) -> str:
+    share = 100.0 * float(values.sel(region=region) / values.sel(region=ours))
+    return f"{region} has {share:.0f} % of the vibration in {ours}"
+
+
+def coulomb_rows(fits: pd.DataFrame) -> list[Row]:
+    """Return rows for k1 and c1 of Coulomb fits to loops of the MSTV model ([C] Table 2).
+
+    Args:
+        fits: Columns frequency_hz, amplitude_mm, k1, c1, k1 fitted and c1 fitted, in N/mm and
+            N s/mm.
+    """
+    section, rows = "[C] Table 2: Coulomb fits to loops of the MSTV damper", list[Row]()
+    for row in fits.to_dict("records"):
+        test = f"{row['frequency_hz']:g} Hz, {row['amplitude_mm']:g} mm"
+        difference = 100.0 * (row["k1 fitted"] - row["k1"]) / row["k1"]
+        reason = _limit_reason(difference, STIFFNESS_LIMIT)
+        numbers = (row["k1"], row["k1 fitted"], "N/mm", STIFFNESS_LIMIT, reason)
+        rows.append(_number_row(section, f"{test}: k1", PREDICTED, *numbers))
+        ratio = row["c1 fitted"] / row["c1"]
+        is_met = 1.0 / DAMPING_FACTOR <= ratio <= DAMPING_FACTOR
+        texts = (f"{row['c1']:g} N s/mm", f"{row['c1 fitted']:.2g} N s/mm", f"× {ratio:.2f}")
+        reason = f"{'within' if is_met else 'not within'} a factor of {DAMPING_FACTOR:g}"
+        verdict = MET if is_met else MISSED
+        rows.append(Row(section, f"{test}: c1", PREDICTED, *texts, verdict, reason))
+    return rows
+
+
+def _number_row(
+    section: str,
+    what: str,
+    kind: str,
+    published: float,
+    ours: float,
+    unit: str,
+    limit: float,
+    reason: str,
+) -> Row:
+    difference = 100.0 * (ours - published) / published
+    verdict = MET if abs(difference) <= limit else MISSED  # a run that diverged gives NaN: missed
+    texts = (f"{published:g} {unit}", f"{ours:.3g} {unit}", f"{_signed(difference)} %")
+    return Row(section, what, kind, *texts, verdict, reason)
+
+
+def _limit_reason(difference: float, limit: float) -> str:
+    """Return how a difference compares with its limit, both in percent."""
+    if not math.isfinite(difference):
+        return "the run diverged"
+    return f"{'within' if abs(difference) <= limit else 'above'} {limit:g} %"
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.1f}".replace("-", "−")
+
+
+def counts(rows: Sequence[Row]) -> pd.DataFrame:
+    """Return the number of rows by section and kind: met, missed and not comparable."""
+    frame = pd.DataFrame([(r.section, r.kind, r.verdict) for r in rows])
+    table = frame.groupby([0, 1, 2], sort=False).size().unstack(fill_value=0)
+    return table.reindex(columns=[MET, MISSED, OPEN], fill_value=0)
