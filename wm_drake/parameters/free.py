@@ -149,15 +149,14 @@ class ExpectedPreload(Frozen):
 
     @model_validator(mode="after")
     def _force(self) -> "ExpectedPreload":
-        _check_force(self.prior, "a preload")
+        _check_pair(self.prior, "a preload", "N")
         return self
 
 
-def _check_force(pair: Measured, what: str) -> None:
-    if u.dimension(pair.unit) != u.dimension("N"):
+def _check_pair(pair: Measured, what: str, unit: str) -> None:
+    if u.dimension(pair.unit) != u.dimension(unit):
         raise ValueError(
-            f"the numbers are in {pair.unit or 'pure numbers'}; {what} needs a unit of force such "
-            "as N"
+            f"the numbers are in {pair.unit or 'pure numbers'}; {what} needs a unit such as {unit}"
         )
     if not pair.values[1] > 0.0:
         raise ValueError("the standard deviation must be above 0")
@@ -197,11 +196,13 @@ class Relation(Frozen):
         return self
 
 
-class LeastTension(Frozen):
-    """Smallest tension of a spring that hangs in hooks, over all runs with measured values.
+class LeastElongation(Frozen):
+    """Smallest elongation of a spring from its free length, over all runs with measured amplitudes.
+
+    A spring that hangs in hooks goes slack at zero.
 
     Attributes:
-        at_least: The tension, and the standard deviation by which it may be missed.
+        at_least: The elongation, and the standard deviation by which it may be missed.
         source: Reason.
     """
 
@@ -209,8 +210,8 @@ class LeastTension(Frozen):
     source: str
 
     @model_validator(mode="after")
-    def _force(self) -> "LeastTension":
-        _check_force(self.at_least, "a tension")
+    def _length(self) -> "LeastElongation":
+        _check_pair(self.at_least, "an elongation", "mm")
         return self
 
 
@@ -223,7 +224,7 @@ class FreeFile(Frozen):
 
     about: str = ""
     spring_preload: ExpectedPreload | None = None
-    spring_tension: LeastTension | None = None
+    spring_elongation: LeastElongation | None = None
     relations: dict[Name, Relation] = Field(default_factory=dict)
     known: dict[Name, KnownQuantity] = Field(default_factory=dict)
     quantities: dict[Name, FreeQuantity] = Field(min_length=1)

@@ -142,7 +142,7 @@ FAULTS = {
     "nothing free": ("quantities: {}\n", "quantities"),
     "preload that is no force": (
         PRELOAD.replace(") N", ") kg") + FREE,
-        "the numbers are in kg; a preload needs a unit of force",
+        "the numbers are in kg; a preload needs a unit such as N",
     ),
 }
 
@@ -257,8 +257,8 @@ def one_case(machine):
 
 
 def known_residuals(machine, parameter_map, points):
-    preload = Evaluation(machine, parameter_map, one_case(machine))(points).preload
-    return parameter_map.prior_residuals(points, preload)
+    found = Evaluation(machine, parameter_map, one_case(machine))(points)
+    return parameter_map.prior_residuals(points, found.preload, found.elongation)
 
 
 def test_expected_preload_is_prior_not_data(short, tmp_path):
@@ -486,3 +486,15 @@ def test_wrong_known_quantities_are_refused(short, tmp_path, text, message):
     with pytest.raises(InputError) as refused:
         parameter_map_of(short, free_file(tmp_path, text))
     assert message in str(refused.value)
+
+
+def test_slack_springs_are_residuals(short, tmp_path):
+    limits = "spring_elongation: {at_least: '(100, 2) mm', source: test}\n"
+    parameter_map = parameter_map_of(short, free_file(tmp_path, limits + FREE))
+    points = parameter_map.expected[None]
+    elongation = Evaluation(short, parameter_map, one_case(short))(points).elongation
+    assert ((elongation > -0.02) & (elongation < 0.05)).all()
+    residuals = known_residuals(short, parameter_map, points)
+    assert residuals == pytest.approx((0.1 - elongation) / 0.002)
+    enough = parameter_map_of(short, free_file(tmp_path, limits.replace("100", "-90") + FREE))
+    assert not known_residuals(short, enough, points).any()

@@ -175,7 +175,7 @@ def ratio_map(tmp_path, text=FREE):
 def test_relations_are_residuals_of_ratios(tmp_path):
     _, ratios = ratio_map(tmp_path)
     points = np.array([[3000.0, 150.0], [2000.0, 150.0]])
-    residuals = ratios.prior_residuals(points, np.empty((2, 0)))
+    residuals = ratios.prior_residuals(points, np.empty((2, 0)), np.empty((2, 0)))
     bound = [150.0 / (3000.0 * 0.0648), 150.0 / (2000.0 * 0.0648)]
     assert residuals[0] == pytest.approx([0.0, (150.0 / 30.0 - 4.0) / 2.0])
     assert residuals[1] == pytest.approx([(bound[1] - 0.9) / 0.05, (150.0 / 20.0 - 4.0) / 2.0])

@@ -170,7 +170,7 @@ def _search(
     def residuals(coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
         points = parameter_map.expected + coordinates * parameter_map.deviation
         found = values(points)
-        known = parameter_map.prior_residuals(points, found.preload)
+        known = parameter_map.prior_residuals(points, found.preload, found.elongation)
         exact, smooth = (
             targets.residuals(amplitude, found.responses, spread)
             for amplitude in (found.amplitude, found.power_mean)

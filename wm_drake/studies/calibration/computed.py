@@ -15,7 +15,7 @@ from wm_drake.studies.calibration.parameter_map import ParameterMap
 from wm_drake.studies.calibration.response_targets import ComputedResponses
 from wm_drake.studies.calibration.targets import Targets
 
-_KINDS = ("amplitude", "power_mean", "responses", "preload")
+_KINDS = ("amplitude", "power_mean", "responses", "preload", "elongation")
 
 
 @dataclass(frozen=True)
@@ -28,12 +28,14 @@ class Computed:
             (`wm_drake.simulation.measures.power_means`). [m]
         responses: (point, response) other responses. [unit for reading]
         preload: (point, spring) preloads. [N]
+        elongation: (point, spring) smallest elongation from the free length, over all cases. [m]
     """
 
     amplitude: FloatArray
     power_mean: FloatArray
     responses: FloatArray
     preload: FloatArray
+    elongation: FloatArray
 
 
 @dataclass
@@ -74,7 +76,10 @@ class Evaluation:
             for name, gasket in loads
         )
         table = simulate_many(
-            self.machine, cases, measures=("amplitudes", "power means"), workers=self.workers
+            self.machine,
+            cases,
+            measures=("amplitudes", "power means", "spring tensions"),
+            workers=self.workers,
         )
         ended = (table.diverged == "").values[:, None]
         for array, values in (
@@ -82,13 +87,16 @@ class Evaluation:
             (result.power_mean, table.power_mean.values),
         ):
             array[places] = np.where(ended, values, np.nan).reshape(-1, *array.shape[1:])
+        shortest = table.smallest_spring_elongation.values
+        result.elongation[places] = shortest.reshape(len(machines), len(loads), -1).min(axis=1)
         result.responses[places] = self._responses(machines)
         result.preload[places] = [preload for preload, _ in preloads.values()]
         return result
 
     def _nothing(self, points: int) -> Computed:
         amplitude = (points, *self.targets.amplitude.shape)
-        others = (points, len(self.targets.responses)), (points, len(self.machine.springs))
+        springs = (points, len(self.machine.springs))
+        others = (points, len(self.targets.responses)), springs, springs
         return Computed(*(np.full(shape, np.nan) for shape in (amplitude, amplitude, *others)))
 
     def _set_up(self, points: FloatArray) -> Iterator[tuple[int, Setup]]:

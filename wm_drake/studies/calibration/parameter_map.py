@@ -86,6 +86,8 @@ class ParameterMap:
         values: Values of the machine that depend on the quantities.
         preload: Expected preload of each spring and its standard deviation; None without a prior.
             [N]
+        elongation: Smallest elongation of the springs and its standard deviation; None if any is
+            as good. [m]
         relations: What is known of ratios of quantities.
     """
 
@@ -99,20 +101,28 @@ class ParameterMap:
     start: FloatArray
     values: tuple[Value, ...]
     preload: tuple[float, float] | None
+    elongation: tuple[float, float] | None
     relations: tuple[KnownRatio, ...]
     _tree: dict[str, Any]
 
-    def prior_residuals(self, points: FloatArray, preload: FloatArray) -> FloatArray:
+    def prior_residuals(
+        self, points: FloatArray, preload: FloatArray, elongation: FloatArray
+    ) -> FloatArray:
         """Return the residuals of what is known beside the priors of the quantities.
 
         Args:
             points: (point, quantity) in SI units.
             preload: (point, spring) preloads. [N]
+            elongation: (point, spring) smallest elongations from the free length. [m]
 
         Returns:
-            (point, n) in standard deviations: preloads, then relations.
+            (point, n) in standard deviations: preloads, relations, then elongations. An elongation
+            above the smallest one gives 0.
         """
         parts = [relation.residuals(points)[:, None] for relation in self.relations]
+        if self.elongation is not None:
+            least, deviation = self.elongation
+            parts.append(np.maximum(least - elongation, 0.0) / deviation)
         if self.preload is not None:
             expected, deviation = self.preload
             parts.insert(0, (preload - expected) / deviation)
@@ -165,7 +175,12 @@ def parameter_map_of(machine: Machine, free: FreeFile) -> ParameterMap:
     lower, upper, expected, deviation = pairs.T
     start = np.array([(q.start or q.prior).values[0] for q in entries])
     tree = base.model_dump(exclude_unset=True)
-    preload = None
+    preload = elongation = None
+    if free.spring_elongation is not None:
+        elongation = (
+            free.spring_elongation.at_least.values[0],
+            free.spring_elongation.at_least.values[1],
+        )
     if free.spring_preload is not None:
         preload = (free.spring_preload.prior.values[0], free.spring_preload.prior.values[1])
     return ParameterMap(
@@ -179,6 +194,7 @@ def parameter_map_of(machine: Machine, free: FreeFile) -> ParameterMap:
         start,
         tuple(values),
         preload,
+        elongation,
         tuple(_known_ratios(free)),
         tree,
     )
