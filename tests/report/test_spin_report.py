@@ -21,7 +21,14 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import number, percent
 from wm_drake.report.spin.panels import revolution_starts, simplified_indices
 from wm_drake.report.spin.report import amplitude_table, spin_report, warnings_of
-from wm_drake.report.spin.tables import differences, profiles, smallest_tensions
+from wm_drake.report.spin.tables import (
+    accelerations,
+    differences,
+    mount_force_tables,
+    profiles,
+    smallest_tensions,
+)
+from wm_drake.report.spin.vibration_pictures import vibration_pictures
 from wm_drake.report.tables import readable
 from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
 
@@ -123,7 +130,8 @@ def test_links_within_the_page_lead_somewhere(page: str) -> None:
 
 def test_every_figure_says_what_it_shows(page: str) -> None:
     images = Tags(page).all("img")
-    assert len(images) == 7  # three per case, and the gaps
+    # three per case, the gaps, and the mount forces and accelerations of the first load
+    assert len(images) == 9
     assert all(len(image["alt"] or "") > 20 for image in images)
 
 
@@ -163,6 +171,44 @@ def test_summary_is_made_from_the_numbers(result: SpinResult, page: str) -> None
     assert "at 240 rpm" in summary[1]
     assert "12.0 mm between tub shell and wall right" in summary[1]
     assert "12 amplitudes can be compared" in summary[1]
+
+
+def test_mount_forces_and_accelerations_of_planted_motion(
+    result: SpinResult, machine: MachineParameters
+) -> None:
+    (table,) = mount_force_tables(result)
+    assert table.header[-1] == "RMS 300 to 400 rpm, N"
+    of_middle = {row.cells[0]: row.cells[1:] for row in table.groups[0].rows}
+    assert next(iter(of_middle)) == "spring left"
+    assert of_middle["spring left"][:2] == ("190.0", "190.0")
+    # 20, 6 and 10 N in phase: length 23.2 N, RMS 16.4 N, all at 240 rpm
+    length = 1000.0 * 0.02 * np.sqrt(1.0 + 0.3**2 + 0.5**2)
+    assert of_middle["gasket"][1] == number(float(length), 1)
+    assert of_middle["gasket"][2:6] == ("240", "–", "–", number(length / np.sqrt(2.0), 1))
+    rows = accelerations(result).groups[0].rows
+    largest = dict(zip(machine.sensors, rows[0].cells[1:], strict=True))
+    omega = 8.0 * np.pi
+    # the tub's angles are small: a = omega^2 d, within a few percent
+    for name, text in largest.items():
+        displacement = float(abs(result.results[0].record.displacement.sel(sensor=name)).max())
+        assert float(text) == pytest.approx(omega**2 * displacement, rel=0.05)
+
+
+def test_detail_draws_the_vibration_of_every_load(result: SpinResult, page: str) -> None:
+    assert "drawn below for the load with the largest amplitude, middle (with gasket)" in page
+    detailed = spin_report(result, detail=True)
+    assert detailed.count("Mount forces over time, load") == len(result.results)
+    assert page.count("Mount forces over time, load") == 1
+    assert "with the option <code>--detail</code>" not in detailed
+
+
+def test_spectra_show_the_sensor_with_the_largest_amplitude(machine: MachineParameters) -> None:
+    case = case_result(machine, samples=4000)
+    figure = vibration_pictures(spin_result(machine, [case]), case)[-1]
+    assert figure is not None
+    sensor = str(case.measures.amplitude.idxmax("sensor").values)
+    assert f"at sensor {sensor}, load middle" in figure.alternative
+    assert figure.source.startswith("data:image/png")
 
 
 def test_no_warning_where_all_is_well(page: str) -> None:

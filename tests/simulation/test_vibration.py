@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from simple_machines import constant_speed, isotropic_machine
 
 from wm_drake.batch import simulate_many
 from wm_drake.model.build import build_machine
-from wm_drake.parameters import Load, SpinProfile, Unbalance, with_value
+from wm_drake.parameters import Load, Sensor, SpinProfile, Unbalance, with_value
 from wm_drake.parameters.spin import Region
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.outputs import point_positions
@@ -19,6 +20,7 @@ from wm_drake.simulation.vibration import (
     record_region_displacements,
     region_rms,
     relative_error,
+    sensor_accelerations,
 )
 
 PERIOD = 5e-3
@@ -95,6 +97,32 @@ def test_accelerations_of_points_are_the_second_differences_of_their_positions(m
     differences = np.diff(positions, 2, axis=0) / PERIOD**2
     largest = np.abs(computed).max()
     np.testing.assert_allclose(computed[201:-1], differences[200:], atol=0.02 * largest)
+
+
+def test_acceleration_at_a_sensor_of_a_spinning_tub():
+    """A tub that turns about z with 3 rad/s and speeds up: a = a_To + alpha r - w^2 r."""
+    sensors = {"A": Sensor(frame="f", axis="x"), "B": Sensor(frame="f", axis="y")}
+    vector, count = np.array([[0.0, 0.0, 1.0]]), 4
+    rows = dict.fromkeys(("tub_position", "tub_velocity"), np.zeros((count, 3)))
+    rows |= {
+        "tub_angular_velocity": np.repeat(3.0 * vector, count, axis=0),
+        "tub_angular_acceleration": np.repeat(5.0 * vector, count, axis=0),
+        "tub_acceleration": np.repeat([[0.5, 0.25, 0.0]], count, axis=0),
+    }
+    record = xr.Dataset(
+        {name: (("time", "axis"), values) for name, values in rows.items()}
+        | {
+            "tub_angle": (("time", "angle"), np.zeros((count, 3))),
+            "drum_angle": ("time", np.zeros(count)),
+            "displacement": (("time", "sensor"), np.zeros((count, 2))),
+            "sensor_point": (("sensor", "axis"), np.array([[0.2, 0.0, 0.7]] * 2)),
+        },
+        {"sensor": ["A", "B"]},
+    )
+    found = sensor_accelerations(record, sensors)
+    assert found.attrs["units"] == "m/s^2"
+    np.testing.assert_allclose(found.sel(sensor="A"), 0.5 - 9.0 * 0.2)
+    np.testing.assert_allclose(found.sel(sensor="B"), 0.25 + 5.0 * 0.2)
 
 
 def test_relative_error_by_hand():
