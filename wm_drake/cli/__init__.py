@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from wm_drake.cli import calibrate, identify, machine, rig, spin, study
+from wm_drake.cli import calibrate, identify, machine, record, rig, spin, study
 from wm_drake.cli.terminal import give_quiet
 from wm_drake.errors import Problem, WmDrakeError, reason_of
 
@@ -22,6 +22,7 @@ app = typer.Typer(
 )
 app.add_typer(identify.app, name="identify")
 app.add_typer(machine.app, name="machine")
+app.add_typer(record.app, name="record")
 app.add_typer(rig.app, name="rig")
 app.add_typer(study.app, name="study")
 app.command()(spin.spin)

@@ -1,0 +1,154 @@
+"""Report of the orders of a record: waterfall and order map of each signal."""
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.report.figures import GRID, MARK, WIDTH, style_axes
+from wm_drake.report.formatting import RPM_PER_RAD_S, number
+from wm_drake.report.page import picture, render
+from wm_drake.report.tables import Group, Row, Table
+from wm_drake.simulation.orders import REVOLUTIONS
+from wm_drake.simulation.records import versions
+from wm_drake.studies.steady.orders import Orders
+
+SHOWN_ORDERS = (0.5, 1.0, 2.0, 3.0)
+"""Orders of the table and of the CSV file."""
+
+WATERFALL_LINES = 40
+"""Largest number of spectra of a waterfall."""
+
+
+def orders_report(result: Orders, command: str = "") -> str:
+    """Return the report as text of one self-contained HTML file."""
+    signals = result.signals
+    return render(
+        "orders/page.html",
+        title=f"Orders of {signals.source}",
+        about="",
+        summary=summary(result),
+        warnings=[],
+        table=_table(result),
+        pictures=[
+            picture(
+                signal_figure(result, index),
+                f"Waterfall and order map of {name}.",
+                f"Signal {name}, {signals.unit}. Left: waterfall, one spectrum for each drum "
+                "speed, slow at the bottom; dashed: orders 1 and 2. Right: order map; amplitude of "
+                f"each order over the drum speed, in windows of {REVOLUTIONS} revolutions.",
+            )
+            for index, name in enumerate(signals.names)
+        ],
+        facts=[
+            ("Command", command),
+            ("File", signals.source),
+            ("Software", ", ".join(f"{name} {text}" for name, text in versions().items())),
+        ],
+    )
+
+
+def summary(result: Orders) -> str:
+    """Return one sentence about the largest component."""
+    values = result.orders.values
+    time, order, signal = np.unravel_index(int(np.nanargmax(values)), values.shape)
+    rpm = RPM_PER_RAD_S * float(result.orders.speed.values[time])
+    return (
+        f"The largest component of {len(result.signals.names)} signals is order "
+        f"{result.orders.order.values[order]:g} of {result.signals.names[signal]}: "
+        f"{number(float(values[time, order, signal]), 2)} {result.signals.unit} at "
+        f"{number(rpm, 0)} rpm."
+    )
+
+
+def _at_order(result: Orders, order: float) -> FloatArray:
+    """Return the amplitude of the nearest order of the map. (times, signals)"""
+    return np.asarray(result.orders.sel(order=order, method="nearest").values)
+
+
+def _orders(result: Orders) -> list[float]:
+    highest = float(result.orders.order.values[-1])
+    return [order for order in SHOWN_ORDERS if order <= highest]
+
+
+def _table(result: Orders) -> Table:
+    groups = []
+    for order in _orders(result):
+        values = _at_order(result, order)
+        rows = (
+            Row(tuple(["largest", *(number(float(v), 2) for v in np.nanmax(values, axis=0))])),
+            Row(
+                tuple(
+                    [
+                        "at, rpm",
+                        *(
+                            number(RPM_PER_RAD_S * float(result.orders.speed.values[at]), 0)
+                            for at in np.nanargmax(values, axis=0)
+                        ),
+                    ]
+                )
+            ),
+        )
+        groups.append(Group(f"order {order:g}", rows))
+    header = ("order", "", *(f"{name}, {result.signals.unit}" for name in result.signals.names))
+    return Table("Largest amplitude of some orders.", header, tuple(groups), text_columns=2)
+
+
+def signal_figure(result: Orders, index: int) -> Figure:
+    """Draw waterfall and order map of a signal."""
+    figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    _draw_waterfall(left, result, index)
+    orders = result.orders.values[:, :, index]
+    rpm = RPM_PER_RAD_S * np.abs(result.orders.speed.values)
+    at = np.argsort(rpm, kind="stable")
+    mesh = right.pcolormesh(
+        rpm[at], result.orders.order.values, orders[at].T, cmap="Blues", shading="nearest",
+        rasterized=True, vmin=0.0,
+    )
+    figure.colorbar(mesh, ax=right, label=f"amplitude, {result.signals.unit}", pad=0.02)
+    right.set_xlabel("drum speed, rpm", fontsize=9.5)
+    right.set_ylabel("order", fontsize=9.5)
+    style_axes(right)
+    return figure
+
+
+def _draw_waterfall(axes, result: Orders, index: int) -> None:  # type: ignore[no-untyped-def]
+    """Draw spectra above each other, at the height of their drum speed."""
+    signals = result.signals
+    speed = np.gradient(signals.angle, signals.time)
+    maps = result.frequencies
+    rpm = RPM_PER_RAD_S * np.abs(np.interp(maps.time.values, signals.time, speed))
+    top = 3.5 * max(float(rpm.max()) / 60.0, 0.5)
+    shown = maps.frequency.values <= top
+    frequency = maps.frequency.values[shown]
+    values = maps.values[:, shown, index]
+    levels = np.linspace(rpm.min(), rpm.max(), min(WATERFALL_LINES, len(rpm)))
+    rows = np.unique([int(np.argmin(np.abs(rpm - level))) for level in levels])
+    height = 5.0 * max(float(np.ptp(rpm)), 1.0) / max(len(rows), 1)
+    scale = height / max(float(np.nanmax(values[rows])), 1e-300)
+    for row in sorted(rows, key=lambda row: -rpm[row]):
+        line = rpm[row] + scale * values[row]
+        axes.fill_between(frequency, rpm[row], line, color="white", zorder=-rpm[row])
+        axes.plot(frequency, line, color=MARK, linewidth=0.7, zorder=-rpm[row])
+    ends = np.array([rpm.min(), rpm.max()])
+    for order in (1.0, 2.0):
+        axes.plot(order * ends / 60.0, ends, "--", color="#b34700", linewidth=0.9, zorder=1)
+    axes.set_xlim(0.0, top)
+    axes.set_xlabel("frequency, Hz", fontsize=9.5)
+    axes.set_ylabel("drum speed, rpm", fontsize=9.5)
+    axes.grid(axis="x", color=GRID)
+    style_axes(axes)
+
+
+def orders_table(result: Orders) -> pd.DataFrame:
+    """Return amplitudes of some orders over time, for a CSV file."""
+    columns: dict[str, FloatArray] = {
+        "time_s": result.orders.time.values,
+        "speed_rpm": RPM_PER_RAD_S * result.orders.speed.values,
+    }
+    for order in _orders(result):
+        values = _at_order(result, order)
+        for index, name in enumerate(result.signals.names):
+            columns[f"order {order:g} {name}, {result.signals.unit}"] = values[:, index]
+    return pd.DataFrame(columns)

@@ -1,0 +1,119 @@
+"""Orders of a record or of a measurement: signals with the angle of the drum."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from scipy.integrate import cumulative_trapezoid
+
+from wm_drake.errors import input_error
+from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header
+from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.orders import REVOLUTIONS, frequency_map, order_map
+from wm_drake.simulation.records import load_record
+
+RAD_S_PER_RPM = np.pi / 30.0
+TIME, SPEED = "time_s", "speed_rpm"
+"""Columns of a file of measurements, beside those of the signals."""
+
+SPACING = 1e-3
+"""Largest relative difference of two steps of time in a record that is equally sampled."""
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Signals with the angle of the drum.
+
+    Attributes:
+        source: Name of the file.
+        names: Names of the signals.
+        unit: Their unit, for reading.
+        time: (n,) [s]
+        angle: (n,) Angle of the drum. [rad]
+        values: (n, k) in `unit`.
+    """
+
+    source: str
+    names: list[str]
+    unit: str
+    time: FloatArray
+    angle: FloatArray
+    values: FloatArray
+
+
+@dataclass(frozen=True)
+class Orders:
+    """Order map and frequency map of signals, as `wm_drake.simulation.orders` returns them."""
+
+    signals: Signals
+    orders: xr.DataArray
+    frequencies: xr.DataArray
+
+
+def read_signals(path: Path, unit: str) -> Signals:
+    """Read signals from a record (netCDF) or from a file of measurements (CSV).
+
+    Args:
+        path: Record of the command spin, with the displacements at the sensors; or CSV with the
+            columns time_s, speed_rpm and a column for each signal.
+        unit: Unit of the signals of a CSV, for reading.
+
+    Raises:
+        InputError: the file cannot be read or has too few columns or rows.
+    """
+    if path.suffix.lower() == ".csv":
+        return _read_csv(path, unit)
+    try:
+        record = load_record(path)
+        time, angle = record.time.values, record.drum_angle.values
+        values = 1e3 * record.displacement.values
+    except (OSError, ValueError, AttributeError, KeyError) as error:
+        reason = " ".join(str(error).split())
+        raise input_error(f"cannot be read as a netCDF record ({reason})", where=str(path)) from None
+    names = [str(name) for name in record.sensor.values]
+    return _checked(Signals(path.name, names, "mm", time, angle, values), path)
+
+
+def _read_csv(path: Path, unit: str) -> Signals:
+    header = read_header(path)
+    names = [name for name in header if name not in (TIME, SPEED)]
+    if TIME not in header or SPEED not in header or not names:
+        raise input_error(
+            f"needs the columns {TIME}, {SPEED} and one for each signal", where=str(path)
+        )
+    numbers = finite_numbers(read_csv(path, [TIME, SPEED, *names]), path)
+    time = numbers[:, 0]
+    angle = cumulative_trapezoid(RAD_S_PER_RPM * numbers[:, 1], time, initial=0.0)
+    return _checked(Signals(path.name, names, unit, time, angle, numbers[:, 2:]), path)
+
+
+def _checked(signals: Signals, path: Path) -> Signals:
+    steps = np.diff(signals.time)
+    if len(steps) < 2 or not np.all(np.isfinite(signals.time)) or np.any(steps <= 0.0):
+        raise input_error("needs at least three samples in rising time", where=str(path))
+    if np.ptp(steps) > SPACING * np.mean(steps):
+        raise input_error(
+            f"the steps of time differ by more than {100 * SPACING:g} %; resample it",
+            where=str(path),
+        )
+    return signals
+
+
+def orders_of(signals: Signals, highest: float) -> Orders:
+    """Return order map and frequency map of signals.
+
+    Args:
+        signals: The signals.
+        highest: Highest order of the map.
+
+    Raises:
+        InputError: the record has fewer revolutions than a window.
+    """
+    orders = order_map(signals.values, signals.angle, signals.time, highest=highest)
+    if not orders.sizes["time"]:
+        turns = abs(signals.angle[-1] - signals.angle[0]) / (2.0 * np.pi)
+        raise input_error(
+            f"has {turns:.1f} drum revolutions; a window needs {REVOLUTIONS}", where=signals.source
+        )
+    return Orders(signals, orders, frequency_map(signals.values, signals.time))
