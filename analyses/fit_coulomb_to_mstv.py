@@ -16,43 +16,26 @@ import numpy as np
 import pandas as pd
 from scipy.stats import spearmanr
 
-from wm_drake.parameters import MeasuredLoop, load_component
-from wm_drake.parameters.components import COMPONENTS_FOLDER
-from wm_drake.rigs import Harmonic, damper_bench, force_loops
-from wm_drake.rigs.measured import measured_motion
-from wm_drake.studies.fitting import least_squares
-from wm_drake.studies.identification import damper_model, fit_problem
+from wm_drake.rigs import Harmonic
+from wm_drake.studies.identification.drift import (
+    coulomb_fits,
+    mstv_motions,
+    mstv_of_c,
+    printed_table,
+)
 
 F_MAX = (20.0, 30.0, 35.0, 40.0, 45.0, 50.0, 60.0, 80.0, 120.0)  # N
-BOUNDS = {
-    "sponge_stiffness": (50e3, 300e3),
-    "sponge_damping": (0.0, 10e3),
-}  # N/m, N s/m: [C] section 3.3
 MM = 1e-3
 
 
-def coulomb_fits(table: pd.DataFrame, f_max: float) -> pd.DataFrame:
-    """Return the table with the fitted k1 and c1 of the Coulomb model at each of its points.
-
-    Units are N/mm and N s/mm. A last column holds the RMSE of the fit, relative to the peak force.
-    """
-    mstv = load_component("mstv_damper").parameters.model_copy(update={"friction_force": f_max})
+def fits_of(table: pd.DataFrame, f_max: float) -> pd.DataFrame:
+    """Return the fits of the Coulomb model to MSTV loops at each point of a table."""
+    mstv = mstv_of_c().model_copy(update={"friction_force": f_max})
     motions = [Harmonic(row.frequency_hz, row.amplitude_mm * MM) for row in table.itertuples()]
-    known = {
-        "friction_force": f_max,
-        "transition_velocity": 0.0,
-        "slider_damping": mstv.slider_damping,
-    }
-    rows = []
-    for loop in force_loops(damper_bench(mstv), motions):
-        measured = measured_motion(
-            MeasuredLoop("mstv", "mstv", loop.time, loop.displacement, loop.force, False)
-        )
-        model = damper_model("stv_sponge", [measured], BOUNDS, known)
-        fit = least_squares(fit_problem(model, [measured]), starts=3, screened=16)
-        k1, c1 = (fit[name].value * MM for name in ("sponge_stiffness", "sponge_damping"))
-        rows.append({"k1 fitted": k1, "c1 fitted": c1, "RMSE/peak": fit.tests[0].normalised})
-    return pd.concat([table.reset_index(drop=True), pd.DataFrame(rows)], axis=1)
+    found = coulomb_fits(mstv_motions(mstv, motions), f_max, mstv.slider_damping)
+    return found.assign(
+        frequency_hz=table.frequency_hz.to_numpy(), amplitude_mm=table.amplitude_mm.to_numpy()
+    )
 
 
 def agreement(found: pd.DataFrame) -> dict[str, float]:
@@ -90,17 +73,15 @@ def main() -> None:
     )
     parser.add_argument("--out", type=Path, help="also write the result to this file")
     arguments = parser.parse_args()
-    table = pd.read_csv(COMPONENTS_FOLDER / "mstv_table2_coulomb.csv", comment="#")
+    table = printed_table()
     candidates = F_MAX
     if arguments.quick:
         table = table[table.frequency_hz.isin([1.0, 10.0]) & table.amplitude_mm.isin([0.3, 1.0])]
         candidates = (40.0, 80.0)
-    found = {f_max: coulomb_fits(table, f_max) for f_max in candidates}
+    found = {f_max: fits_of(table, f_max) for f_max in candidates}
     scores = pd.DataFrame({f"{f_max:g} N": agreement(fits) for f_max, fits in found.items()}).T
     best = candidates[int(np.argmax(scores["rank correlation c1"]))]
-    shown = found[best].assign(
-        k1_ratio=lambda t: t["k1 fitted"] / t["k1"], c1_ratio=lambda t: t["c1 fitted"] / t["c1"]
-    )
+    shown = found[best]
     text = [
         "agreement of Coulomb fits to MSTV loops with [C] Table 2, by f_max",
         scores.round(3).to_string(),

@@ -162,7 +162,7 @@ def test_a_law_added_in_three_places_runs_everywhere(with_new_law):
         dashpot = 2j * 3.141592653589793 * frequency * 300.0
         assert stiffness == pytest.approx(abs(4000.0 * dashpot / (4000.0 + dashpot)), rel=1e-5)
     assert found["mass"] == (
-        "sponge_mass: only the law mstv has a sponge that can have a mass on the bench"
+        "sponge_mass: only the law mstv or free_stroke has a sponge that can have a mass on the bench"
     )
     fit = found["fit"]
     assert fit["leak_damping"] == pytest.approx(300.0, rel=0.02)

@@ -31,6 +31,7 @@ from wm_drake.cli.components import (
 )
 from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import Run, result_folder
+from wm_drake.cli.table2 import identify_table2
 from wm_drake.cli.terminal import Console
 from wm_drake.errors import input_error, nearest_names
 
@@ -244,6 +245,9 @@ app.command("bushing", cls=ValidatingCommand, help="One axis of a six-component 
 app.command("gasket", cls=ValidatingCommand, help="One axis of the gasket.")(
     _axis_command("gasket")
 )
+
+
+app.command("table2")(identify_table2)
 
 
 def _copies(model: "ComponentModel", axes: tuple[str, ...]) -> dict[str, str]:

@@ -28,7 +28,7 @@ from wm_drake.cli.components import (
 )
 from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import Run, result_folder
-from wm_drake.cli.terminal import Console
+from wm_drake.cli.terminal import Console, say
 from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:
@@ -78,22 +78,46 @@ def rig_damper(
             metavar="MASS",
         ),
     ] = None,
+    outer_mass: Annotated[
+        str | None,
+        typer.Option(
+            help="Mass of the outer tube, at the driven end ([A] Eq. 6), e.g. '150 g'.",
+            metavar="MASS",
+        ),
+    ] = None,
+    jig_mass: Annotated[
+        str | None,
+        typer.Option(
+            help="Mass of the jig, at the driven end ([C] Eq. 2), e.g. '2 kg'.", metavar="MASS"
+        ),
+    ] = None,
     out: OutOption = DEFAULT_OUT,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
-    """Test a friction damper along its line."""
+    """Test a friction damper along its line.
+
+    With masses, their effect on the loops is printed and in masses.csv.
+    """
     from wm_drake.parameters.units import Unit
     from wm_drake.rigs import damper_bench
 
     chosen = target_of("damper", machine, name, component, sets).component
     mass = quantities_of(sponge_mass, Unit("kg", "kg"), "--sponge-mass")[0] if sponge_mass else 0.0
-    bench = damper_bench(chosen.parameters, mass)  # type: ignore[arg-type]
+    driven = sum(
+        quantities_of(text, Unit("kg", "kg"), option)[0]
+        for text, option in ((outer_mass, "--outer-mass"), (jig_mass, "--jig-mass"))
+        if text
+    )
+    damper: Any = chosen.parameters
+    bench = damper_bench(damper, mass, driven)
     motions = _motions("damper", bench, frequency, amplitude, matrix)
-    law = chosen.parameters.law  # type: ignore[union-attr]
-    title = f"damper {chosen.name}, law {law}{f', sponge of {1e3 * mass:g} g' if mass else ''}"
-    _run(title, bench, motions, chosen, out, Run("rig", overwrite), as_json)
+    parts = [f"damper {chosen.name}", f"law {damper.law}"]
+    parts += [f"sponge of {1e3 * mass:g} g"] if mass else []
+    parts += [f"{driven:g} kg at the driven end"] if driven else []
+    plain = damper_bench(damper) if mass or driven else None
+    _run(", ".join(parts), bench, motions, chosen, out, Run("rig", overwrite), as_json, plain)
 
 
 def _axis_command(kind: str) -> Callable[..., None]:
@@ -139,14 +163,17 @@ def _motions(
     kind: str, bench: "Bench", frequency: str | None, amplitude: str | None, matrix: str | None
 ) -> "list[Harmonic]":
     from wm_drake.parameters.units import Unit
-    from wm_drake.rigs import MATRICES, Harmonic
+    from wm_drake.rigs import MATRICES, BushingBench, Harmonic
 
     if matrix is not None:
         if frequency or amplitude:
             raise input_error(
                 "has its own frequencies and amplitudes; leave -f and -a out", where="--matrix"
             )
-        papers = MATRICES[kind]
+        rotates = isinstance(bench, BushingBench) and bench.axis.startswith("about")
+        if kind == "gasket" and rotates:
+            raise input_error("[A] does not rotate the gasket; give -f and -a", where="--matrix")
+        papers = MATRICES[f"{kind} about" if rotates else kind]
         if matrix not in papers:
             raise input_error(
                 f"no matrix '{matrix}' for a {kind}{nearest_names(matrix, papers)}",
@@ -173,9 +200,17 @@ def _run(
     out: Path,
     writer: Run,
     as_json: bool,
+    plain: "Bench | None" = None,
 ) -> None:
-    from wm_drake.report.rig.report import loop_file, loop_table, measures_table, rig_report
-    from wm_drake.rigs import run_rig
+    from wm_drake.report.rig.report import (
+        loop_file,
+        loop_table,
+        masses_sentence,
+        masses_table,
+        measures_table,
+        rig_report,
+    )
+    from wm_drake.rigs import beyond_tables, run_rig
 
     with interruptible(), result_folder(out, writer) as folder:
         with progress_bar(len(motions), "loops") as progress:
@@ -184,11 +219,23 @@ def _run(
             loop_table(loop).to_csv(folder / loop_file(loop), index=False, float_format="%.9g")
         measures_table(run).to_csv(folder / "measures.csv", index=False, float_format="%.9g")
         command = command_line()
-        (folder / "report.html").write_text(rig_report(run, command), encoding="utf-8")
+        told = beyond_tables(bench, motions)
+        effect = ""
+        if plain is not None:
+            massless = run_rig(title, plain, motions)
+            masses_table(run, massless).to_csv(
+                folder / "masses.csv", index=False, float_format="%.9g"
+            )
+            effect = masses_sentence(run, massless)
+        (folder / "report.html").write_text(
+            rig_report(run, command, told, effect), encoding="utf-8"
+        )
+    for sentence in told:
+        say(f"warning: {sentence}", err=True)
     if as_json:
         typer.echo(json.dumps(_as_json(run)))
     else:
-        _print(run, out)
+        _print(run, out, effect)
 
 
 def _numbers(chosen: "Component") -> tuple[tuple[str, str, str], ...]:
@@ -218,7 +265,7 @@ def _as_json(run: "RigRun") -> dict[str, Any]:
     )
 
 
-def _print(run: "RigRun", out: Path) -> None:
+def _print(run: "RigRun", out: Path, effect: str) -> None:
     from rich.table import Table
 
     from wm_drake.report.rig.report import measures_cells, measures_header
@@ -230,4 +277,9 @@ def _print(run: "RigRun", out: Path) -> None:
         table.add_row(*cells)
     console = Console()
     console.print(table)
-    console.print(f"Results in {out}: report.html, measures.csv, loop_<frequency>_<amplitude>.csv")
+    if effect:
+        console.print(effect, highlight=False)
+    console.print(
+        f"Results in {out}: report.html, measures.csv, {'masses.csv, ' if effect else ''}"
+        "loop_<frequency>_<amplitude>.csv"
+    )

@@ -14,6 +14,7 @@ Equation -> function -> test (below tests/laws):
                                                table.stiffness_force             test_table
     [C] (2), (3)   massless sponge             damper.mstv_damper, slider_rate   test_damper
     [C] (3), (7)   sponge with mass            damper.mstv_sponge_with_mass      test_damper
+    [A] (6)        sponge with mass            damper.free_stroke_sponge_with_mass  test_loops
     [C] (3), (6)   sponge, STV or Coulomb      damper.stv_sponge_damper          test_damper
     [C] (4)        Coulomb, corrected          friction.coulomb_friction         test_friction
     [C] (6)        STV friction                friction.stv_friction             test_friction

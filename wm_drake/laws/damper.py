@@ -284,3 +284,59 @@ def free_stroke_damper(
     w = slider_rate(f_d, rate, 0.0, friction_force, friction_damping, regularisation_velocity)
     basic = havsin_friction(rate, basic_full_friction_velocity, basic_friction_force)
     return f_d - basic, rate - w
+
+
+@law
+def free_stroke_sponge_with_mass(
+    deformation,
+    rate,
+    slider_velocity,
+    step,
+    mass,
+    friction_force,
+    friction_damping,
+    regularisation_velocity,
+    basic_friction_force,
+    basic_full_friction_velocity,
+    sponge,
+):
+    """Take a step of linearly implicit Euler of a free-stroke damper whose sponge has a mass.
+
+        tension = f_d + f_b,   m xs'' = f_d - f_m                  [A] Eq. (2)-(6)
+
+    Own derivation of the step: with xs = xs0 + h w, xs'' = (w - w0) / h and the sponge curve
+    replaced by its tangent k, the balance at the end of the step is that of a massless slider,
+    `slider_rate`:
+
+        (k h + m/h) w + f_m(w, Y' - w) = f_d(Y - xs0) + m/h w0
+
+    Args:
+        deformation: Y - xs0: displacement of the outer tube at the end of the step less that of the
+            sponge at its beginning. [m]
+        rate: Rate of elongation Y' at the end of the step. [m/s]
+        slider_velocity: Velocity w0 of the sponge at the beginning of the step. [m/s]
+        step: Time step h, > 0. [s]
+        mass: Mass of the sponge m, > 0. [kg]
+        friction_force, friction_damping, regularisation_velocity: As for `free_stroke_damper`. [N,
+            N s/m, m/s]
+        basic_friction_force, basic_full_friction_velocity, sponge: As for `free_stroke_damper`. [N,
+            m/s; m, N]
+
+    Returns:
+        Tension [N] and velocity w of the sponge [m/s], both at the end of the step.
+    """
+    f_d = stiffness_force(deformation, *sponge)
+    near = 1e-9  # m, within which the curve is its tangent
+    slope = (
+        stiffness_force(deformation + near, *sponge) - stiffness_force(deformation - near, *sponge)
+    ) / (2.0 * near)
+    w = slider_rate(
+        f_d + mass / step * slider_velocity,
+        rate,
+        slope * step + mass / step,
+        friction_force,
+        friction_damping,
+        regularisation_velocity,
+    )
+    basic = havsin_friction(rate, basic_full_friction_velocity, basic_friction_force)
+    return stiffness_force(deformation - step * w, *sponge) - basic, w

@@ -98,6 +98,15 @@ def pack_table(x, cubics, end_slope):
     return np.concatenate([[len(x)], *pieces, _END.pack(x=x[-1], slope=end_slope)])
 
 
+def table_range(packed, at):
+    """Return the first and last abscissa of a packed table; infinite for a number. [m or rad]"""
+    n = whole_number(packed[at])
+    if n == 0:
+        return -np.inf, np.inf
+    last = at + 1 + PIECE_SIZE * (n - 1)
+    return float(read_piece(packed, at + 1).begin), float(read_end(packed, last).x)
+
+
 def number_of_points(packed, at):
     """Return how many points a packed stiffness has, 0 for a number, in a list."""
     return [whole_number(packed[at])]

@@ -264,6 +264,7 @@ DAMPER_LAWS = _registry(
             "basic_friction_force": "force",
             "basic_full_friction_velocity": "speed",
         },
+        sponge_with_mass=damper.free_stroke_sponge_with_mass,
     ),
 )
 """All damper laws by name."""

@@ -53,10 +53,13 @@ class DamperBench:
         packed: Law number and parameters, from `packed_damper_law`.
         sponge_mass: Mass of the sponge, for a law that has one on the bench; 0 as in the machine.
             [kg]
+        driven_mass: Mass that moves with the driven end: the jig M of [C] Eq. (2) and the outer
+            tube m_o of [A] Eq. (6). Its inertia is part of the force. [kg]
     """
 
     packed: FloatArray
     sponge_mass: float = 0.0
+    driven_mass: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the mass.
@@ -64,8 +67,9 @@ class DamperBench:
         Raises:
             InputError: It is < 0, or the law has no sponge that can have a mass.
         """
-        if self.sponge_mass < 0.0:
-            raise input_error(f"is {self.sponge_mass:g} kg; allowed is >= 0", key="sponge_mass")
+        for name in ("sponge_mass", "driven_mass"):
+            if not 0.0 <= (value := getattr(self, name)) < np.inf:
+                raise input_error(f"is {value:g} kg; allowed is >= 0", key=name)
         if self.sponge_mass > 0.0 and law_of(self.packed).sponge_with_mass is None:
             names = [law.name for law in DAMPER_LAWS.values() if law.sponge_with_mass is not None]
             raise input_error(
@@ -123,9 +127,11 @@ class BushingBench:
 Bench: TypeAlias = DamperBench | BushingBench
 
 
-def damper_bench(damper: DamperNumbers, sponge_mass: float = 0.0) -> DamperBench:
+def damper_bench(
+    damper: DamperNumbers, sponge_mass: float = 0.0, driven_mass: float = 0.0
+) -> DamperBench:
     """Return the bench of a damper of a machine file; its end bushings have no effect there."""
-    return DamperBench(packed_damper_law(damper), sponge_mass)
+    return DamperBench(packed_damper_law(damper), sponge_mass, driven_mass)
 
 
 def bushing_bench(bushing: BushingType, axis: str, arm: float = 0.0) -> BushingBench:

@@ -141,4 +141,6 @@ def _driven(bench: Bench, motion: Harmonic, phase: FloatArray) -> tuple[FloatArr
 def _loop(bench: Bench, motion: Harmonic, force: FloatArray) -> ForceLoop:
     displacement, velocity = _driven(bench, motion, PHASE[:-1])
     time = PHASE[:-1] / motion.angular_frequency
+    if isinstance(bench, DamperBench) and bench.driven_mass > 0.0:
+        force = force - bench.driven_mass * motion.angular_frequency**2 * displacement
     return ForceLoop(motion, bench.rotates, time, displacement, velocity, np.asarray(force))

@@ -6,18 +6,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wm_drake.elements.bushing import BUSHING_LAW
 from wm_drake.elements.damper_law import law_numbers, law_of
+from wm_drake.laws.table import table_range
 from wm_drake.parameters.damper_laws import DamperLaw
 from wm_drake.parameters.types import FloatArray
-from wm_drake.rigs.bench import Bench, DamperBench, Harmonic
+from wm_drake.rigs.bench import Bench, BushingBench, DamperBench, Harmonic
 from wm_drake.rigs.loops import ForceLoop, LoopMeasures, force_loops, measures_of
 
 JIG_ARM = 0.1
 """Radius of the jig of [A] section 2.2. [m]"""
 
 _MM = 1e-3
-_A_DAMPER = tuple(itertools.product((1.0, 3.0, 5.0, 7.0), (1.0, 3.0, 5.0, 6.0, 8.0, 10.0)))
-_A_BUSHING = tuple(itertools.product((1.0, 3.0, 5.0, 7.0), (0.1, 0.2, 0.4, 2.0, 4.0)))
+_A_DAMPER = (
+    *itertools.product((1.0, 3.0), (6.0, 8.0, 10.0)),
+    *itertools.product((5.0, 7.0), (1.0, 3.0, 5.0)),
+)
+_A_BUSHING = tuple(itertools.product((1.0, 3.0, 5.0, 7.0), (0.1, 0.2, 0.4)))
+_A_BUSHING_ROTATION = tuple(itertools.product((1.0, 3.0, 5.0, 7.0), (2.0, 4.0)))
 _A_GASKET = tuple(itertools.product((1.0, 3.0, 5.0), (1.0, 5.0, 10.0)))
 _C_DAMPER = (
     *itertools.product((1.0,), (0.3, 0.5, 1.0, 5.0, 10.0)),
@@ -31,12 +37,13 @@ MATRICES: dict[str, dict[str, tuple[Harmonic, ...]]] = {
     for component, papers in {
         "damper": {"A": _A_DAMPER, "C": _C_DAMPER},
         "bushing": {"A": _A_BUSHING},
+        "bushing about": {"A": _A_BUSHING_ROTATION},
         "gasket": {"A": _A_GASKET},
     }.items()
 }
-"""Motions by component and paper: [C] Table 1; the frequencies and amplitudes of [A] Tables 2, 4, 5
-and 7, all with all. Rotations are driven through the jig arm, so these amplitudes are its
-displacements."""
+"""Motions by component and paper, as printed: [C] Table 1; [A] Tables 2, 4, 5 and 7. Rotations of a
+bushing are driven through the jig arm, so these amplitudes are its displacements. [A] does not
+rotate the gasket."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +79,30 @@ def run_rig(
         progress(len(found))
     loops = tuple(found[motion] for motion in motions)
     return RigRun(title, bench, numbers, loops, tuple(map(measures_of, loops)))
+
+
+def beyond_tables(bench: Bench, motions: Sequence[Harmonic]) -> list[str]:
+    """Return a sentence for a table of a bushing that motions leave, with how far they go.
+
+    A deformation of a sponge is not known before its loop, so dampers have none here.
+    """
+    if not isinstance(bench, BushingBench):
+        return []
+    about = bench.axis.startswith("about")
+    field = f"{'rotational_' if about else ''}stiffness_{bench.axis[-1]}"
+    low, high = table_range(  # type: ignore[no-untyped-call]
+        *getattr(BUSHING_LAW.unpack(bench.packed), field)
+    )
+    widest = max(motion.amplitude for motion in motions)
+    reach = float(np.arcsin(min(widest / bench.arm, 1.0))) if bench.arm else widest
+    if reach <= min(-low, high) * (1.0 + 1e-9):
+        return []
+    unit, factor = ("deg", 180.0 / np.pi) if about else ("mm", 1.0 / _MM)
+    return [
+        f"{field}: the motion reaches {factor * reach:.3g} {unit}, the table goes from "
+        f"{factor * low:.3g} to {factor * high:.3g} {unit}; beyond it the curve is continued by "
+        "straight lines"
+    ]
 
 
 def slider_friction_curves(

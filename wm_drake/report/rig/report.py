@@ -1,7 +1,9 @@
 """Report page and tables of a rig run."""
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from wm_drake.report.formatting import MM_PER_M, number
@@ -23,23 +25,64 @@ SAMPLES_KEPT = 4
 """Step between the samples of a loop that are written to its file."""
 
 
-def rig_report(run: RigRun, command: str = "") -> str:
+def rig_report(run: RigRun, command: str = "", told: Sequence[str] = (), effect: str = "") -> str:
     """Return the report as text of one self-contained HTML file.
 
     Args:
         run: Result of the rig with at least one loop.
         command: Command line of the run, shown on the page.
+        told: Warnings.
+        effect: Sentence on the effect of masses; "" without masses.
     """
     return render(
         "rig/page.html",
         title=f"Bench test: {run.title}",
         about="Steady-state force loops under harmonic motion, computed with the force laws.",
-        warnings=[],
-        summary=_summary(run),
+        warnings=list(told),
+        summary=f"{_summary(run)} {effect}".strip(),
         pictures=_pictures(run),
         measures=_measures(run),
         numbers=_numbers(run),
         facts=[("Component", run.title), ("Loops", str(len(run.loops))), ("Command", command)],
+    )
+
+
+def masses_table(run: RigRun, massless: RigRun) -> pd.DataFrame:
+    """Return the effect of masses on each loop: differences from the loop without masses. [N]"""
+    return pd.DataFrame(masses_rows(run, massless))
+
+
+def masses_rows(run: RigRun, massless: RigRun) -> list[dict[str, Any]]:
+    """Return the rows of `masses_table`."""
+    rows = []
+    for loop, bare in zip(run.loops, massless.loops, strict=True):
+        difference = loop.force - bare.force
+        peak = float(np.max(np.abs(bare.force)))
+        rows.append(
+            {
+                "frequency_hz": loop.motion.frequency,
+                "amplitude_mm": MM_PER_M * loop.motion.amplitude,
+                "peak_force_without_N": peak,
+                "peak_force_N": float(np.max(np.abs(loop.force))),
+                "rms_difference_N": float(np.sqrt(np.mean(np.square(difference)))),
+                "largest_difference_N": float(np.max(np.abs(difference))),
+                "largest_difference_by_peak": float(np.max(np.abs(difference))) / peak
+                if peak
+                else float("nan"),
+            }
+        )
+    return rows
+
+
+def masses_sentence(run: RigRun, massless: RigRun) -> str:
+    """Return a sentence on the loop that masses change most."""
+    rows: list[dict[str, Any]] = masses_rows(run, massless)
+    worst = max(rows, key=lambda row: row["largest_difference_N"])
+    return (
+        f"The masses change the force by up to {worst['largest_difference_N']:.3g} N, "
+        f"{100.0 * worst['largest_difference_by_peak']:.2g} % of the peak without them "
+        f"({worst['frequency_hz']:.3g} Hz, {worst['amplitude_mm']:.3g} mm; there "
+        f"{worst['rms_difference_N']:.2g} N root mean square)."
     )
 
 
