@@ -42,7 +42,15 @@ def harmonic_record(
         for n, axis in axes.items()
     ]
     force = 1000.0 * position[:, None, :] * float(gasket)
+    mounts = [*(f"springs.{n}" for n in parameters.springs)]
+    mounts += [*(f"dampers.{n}" for n in parameters.dampers), "gasket"]
+    on_cabinet = np.zeros((samples, len(mounts), 3))
+    on_cabinet[:, : len(parameters.springs), 2] = -190.0
+    on_cabinet[:, -1] = force[:, 0]
     variables = {
+        "mount_force": (("time", "mount", "axis"), on_cabinet),
+        "cabinet_force": (("time", "axis"), on_cabinet.sum(axis=1)),
+        "cabinet_moment": (("time", "axis"), 0.1 * on_cabinet.sum(axis=1)),
         "tub_angle": (("time", "angle"), angle),
         "tub_position": (("time", "axis"), position),
         "tub_angular_velocity": (("time", "axis"), np.zeros((samples, 3))),
@@ -69,6 +77,7 @@ def harmonic_record(
         "spring": list(parameters.springs),
         "damper": list(parameters.dampers),
         "bushing": ["gasket"],
+        "mount": mounts,
     }
     attrs = {
         "machine": parameters.name,

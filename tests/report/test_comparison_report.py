@@ -65,7 +65,7 @@ def test_differences_of_planted_values(table, variants):
         box["reference_value"], [20.0, 6.0, 10.0], rtol=3e-3
     )  # sampled sines
     np.testing.assert_allclose(box["percent"], -50.0, atol=1e-9)
-    spring = of_middle.loc[("largest mount force", "spring left")]
+    spring = of_middle.loc[("largest mount force", "springs.left")]
     assert spring[["reference_value", "value", "difference", "percent"]].tolist() == [
         190.0,
         190.0,
@@ -97,7 +97,7 @@ def test_measure_that_a_variant_lacks_is_not_a_number(table):
 
 
 def test_percent_of_zero_is_not_a_number(table):
-    damper = table[table["name"] == "damper left"]
+    damper = table[table["name"] == "dampers.left"]
     assert (damper["difference"] == 0.0).all()
     assert damper["percent"].isna().all()
 

@@ -58,11 +58,12 @@ class SpeedRange:
 
 
 def mount_forces(record: Record) -> list[MountForce]:
-    """Return the forces of all mounts of a record; none if the record has no samples.
+    """Return the forces of all mounts of a record.
 
-    A gasket that is taken out is left out.
+    There are none if the record has no samples or is of version 0.1. A gasket that is taken out is
+    left out.
     """
-    if not record.sizes["time"]:
+    if not record.sizes["time"] or "mount_force" not in record:
         return []
     missing = {"gasket"} if record.attrs["gasket"] != "yes" else set()
     return [
