@@ -192,6 +192,7 @@ def check_buildable(file: str, parameters: "MachineParameters") -> "tuple[Proble
     """
     from wm_drake.engines.compiled.step_check import check_step
     from wm_drake.model.build import build_machine
+    from wm_drake.model.expectations import unexpected
     from wm_drake.model.plausibility import unusual_values
     from wm_drake.model.scene import Scene
     from wm_drake.parameters import located, machine_path, measured_amplitudes
@@ -202,6 +203,6 @@ def check_buildable(file: str, parameters: "MachineParameters") -> "tuple[Proble
         step = checked_step(parameters, None)
         setup = build_machine(parameters).set_up()
         check_step(setup, step)
-        Scene(parameters)
-    unusual = unusual_values(setup)
+        scene = Scene(parameters)
+    unusual = [*unusual_values(setup), *unexpected(setup, scene)]
     return located(InputError(unusual), machine_path(file)).problems if unusual else ()
