@@ -53,8 +53,12 @@ def test_ends_of_a_range_are_usual(reference, key, inside, outside):
 
 MORE = """extends: reference
 bodies: {drum: {mass: 9 kg, centre_of_mass: "(0, 0, 0) mm"}}
-frames: {gasket_tub: {position: "(0, 0, 0) mm"}}
+frames:
+  gasket_tub: {position: "(0, 0, 0) mm"}
+  more: {attached_to: tub, position: "(0, 0, 0) mm", angles: "(0, 0, 0) deg"}
+springs: {left: {preload: 90 N}}
 spring_types:
+  free: {stiffness: 8 N/mm, free_length: 150 mm}
   table: {stiffness: {displacement: "(-20, 0, 20) mm", force: "(-160, 0, 160) N"}}
 """
 

@@ -193,6 +193,7 @@ def check_buildable(file: str, parameters: "MachineParameters") -> "tuple[Proble
     from wm_drake.engines.compiled.packing import pack
     from wm_drake.engines.compiled.stepping import choose_stepping
     from wm_drake.model.build import build_machine
+    from wm_drake.model.expectations import unexpected
     from wm_drake.model.plausibility import unusual_values
     from wm_drake.model.scene import Scene
     from wm_drake.parameters import located, machine_path, measured_amplitudes, published_results
@@ -204,6 +205,6 @@ def check_buildable(file: str, parameters: "MachineParameters") -> "tuple[Proble
         step = checked_step(parameters, None)
         setup = build_machine(parameters).set_up()
         choose_stepping(setup, *pack(setup), parameters.profile, step, parameters.integrator)
-        Scene(parameters)
-    unusual = unusual_values(setup)
+        scene = Scene(parameters)
+    unusual = [*unusual_values(setup), *unexpected(setup, scene)]
     return located(InputError(unusual), machine_path(file)).problems if unusual else ()

@@ -256,6 +256,11 @@ def tubes_of(plant: MultibodyPlant, joint: str) -> tuple[RigidBody, RigidBody]:
     return telescope.parent_body(), telescope.child_body()
 
 
+def oscillating_bodies(plant: MultibodyPlant) -> list[RigidBody]:
+    """Return the tub, the bodies welded to it, and the drum."""
+    return [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]
+
+
 def frame_names(plant: MultibodyPlant) -> list[str]:
     """Return the names of the frames and links of the model, to which elements attach."""
     frames = map(

@@ -174,11 +174,26 @@ def put_to_rest(
 
 def tensions_at(elements: PlacedElements, pose: FloatArray) -> dict[str, float]:
     """Return the tension of each spring at a pose of the tub: roll, pitch, yaw, x, y, z. [N]"""
+    return {
+        name: elements.springs[name].tension(float(np.linalg.norm(line)))
+        for name, line in _spring_lines(elements, pose).items()
+    }
+
+
+def spring_force(elements: PlacedElements, pose: FloatArray) -> FloatArray:
+    """Return the sum of the forces of the springs on the tub at a pose, in W. (3,) [N]"""
+    tensions = tensions_at(elements, pose)
+    lines = _spring_lines(elements, pose)
+    return np.asarray(
+        sum(-tensions[name] * line / np.linalg.norm(line) for name, line in lines.items())
+    )
+
+
+def _spring_lines(elements: PlacedElements, pose: FloatArray) -> dict[str, FloatArray]:
+    """Return the vector from the housing hook to the tub hook of each spring, in W. [m]"""
     rotation = RollPitchYaw(pose[:3]).ToRotationMatrix().matrix()
     return {
-        name: spring.tension(
-            float(np.linalg.norm(pose[3:] + rotation @ spring.p_ToA_T - spring.p_WH))
-        )
+        name: pose[3:] + rotation @ spring.p_ToA_T - spring.p_WH
         for name, spring in elements.springs.items()
     }
 

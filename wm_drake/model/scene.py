@@ -134,6 +134,11 @@ class Scene:
             shape for part in welded for shape in self.plant.GetCollisionGeometriesForBody(part)
         ]
 
+    def outlines(self, body: str) -> dict[str, Outline]:
+        """Return the outlines of the collision shapes of one body, by name: in W or T as drawn."""
+        shapes = self.plant.GetCollisionGeometriesForBody(self.plant.GetBodyByName(body))
+        return {self._name(shape): self._outline(shape) for shape in shapes}
+
     def _outline(self, shape: GeometryId) -> Outline:
         """Return the outline of a shape, in W if it is fixed to the housing, else in T."""
         inspector = self._scene_graph.model_inspector()

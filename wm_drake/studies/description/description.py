@@ -8,7 +8,7 @@ from wm_drake.compiler.compilation import generic
 from wm_drake.compiler.vectors import rotation_from_rpy
 from wm_drake.elements.spin_profile import drum_motion
 from wm_drake.engines.compiled.step_check import BEARING, fastest_motions
-from wm_drake.model.bodies import tubes_of
+from wm_drake.model.bodies import oscillating_bodies, tubes_of
 from wm_drake.model.equilibrium import tensions_at
 from wm_drake.model.machine import OUTPUT_PERIOD, Machine, Setup
 from wm_drake.model.state_layout import CARRIER
@@ -159,13 +159,8 @@ def _pose(values: FloatArray) -> dict[str, float]:
 
 def oscillating_mass(setup: Setup) -> float:
     """Return the mass of the tub, all bodies welded to it, the drum and its load. [kg]"""
-    return float(sum(body.get_mass(setup.plant_context) for body in _moving(setup)))
-
-
-def _moving(setup: Setup) -> list[Any]:
-    """Return the tub, the bodies welded to it, and the drum."""
-    plant = setup.machine.plant
-    return [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]
+    bodies = oscillating_bodies(setup.machine.plant)
+    return float(sum(body.get_mass(setup.plant_context) for body in bodies))
 
 
 def _sag(setup: Setup, bodies: dict[str, Any]) -> float:
@@ -176,7 +171,7 @@ def _sag(setup: Setup, bodies: dict[str, Any]) -> float:
         bodies: Its described bodies: T and W coincide as drawn.
     """
     context, lost = setup.plant_context, 0.0
-    for body in _moving(setup):
+    for body in oscillating_bodies(setup.machine.plant):
         centre = body.EvalPoseInWorld(context) @ body.CalcCenterOfMassInBodyFrame(context)
         drawn = bodies[body.name()]["centre_of_mass_T"][2]
         lost += body.get_mass(context) * (drawn - float(centre[2]))
@@ -187,7 +182,7 @@ def _bodies(setup: Setup) -> dict[str, Any]:
     plant, context = setup.machine.plant, setup.plant_context
     tub = plant.GetBodyByName("tub").body_frame()
     described = {}
-    moving = _moving(setup)
+    moving = oscillating_bodies(setup.machine.plant)
     groups = {part.name(): "drum" if part.name() == "drum" else "tub" for part in moving}
     # in a compliant bearing, describe the drum relative to its carrier, which is T in the SDF
     carriers = {"drum": plant.GetBodyByName(CARRIER).body_frame()} if setup.bearing else {}
