@@ -176,7 +176,8 @@ def test_mount_forces_and_accelerations_of_planted_motion(
     assert of_middle["spring left"][:2] == ("190.0", "190.0")
     # 20, 6 and 10 N in phase: length 23.2 N, RMS 16.4 N, all at 240 rpm
     length = 1000.0 * 0.02 * np.sqrt(1.0 + 0.3**2 + 0.5**2)
-    assert of_middle["gasket"][1] == number(float(length), 1)
+    sampled = np.cos(np.pi / 50.0)  # the sample next to the peak: 4 Hz in steps of 5 ms
+    assert of_middle["gasket"][1] == number(float(length * sampled), 1)
     assert of_middle["gasket"][2:6] == ("240", "–", "–", number(length / np.sqrt(2.0), 1))
     rows = accelerations(result).groups[0].rows
     largest = dict(zip(machine.sensors, rows[0].cells[1:], strict=True))
@@ -364,7 +365,7 @@ def test_percent_difference_row_by_hand(machine: MachineParameters) -> None:
 def test_case_without_gasket_has_no_gasket_figure(machine: MachineParameters) -> None:
     page = spin_report(spin_result(machine, [case_result(machine, gasket=False)]))
     alternatives = [image["alt"] or "" for image in Tags(page).all("img")]
-    assert len(alternatives) == 2
+    assert len(alternatives) == 4  # envelopes, orbits, mount forces, accelerations
     assert not any("Gasket" in text for text in alternatives)
     assert "middle (without gasket)" in page
 
