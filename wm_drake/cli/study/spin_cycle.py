@@ -270,7 +270,8 @@ def _print_table(result: "SpinCycleResult", out: Path) -> None:
         )
     console = Console()
     console.print(table)
-    console.print(f"Results in {out}: report.html, cases.csv, rms.csv")
+    feet = ", feet.csv" if "turn_margin" in result.forces else ""
+    console.print(f"Results in {out}: report.html, cases.csv, rms.csv{feet}")
 
 
 def _as_json(result: "SpinCycleResult", engine: str) -> dict[str, Any]:
