@@ -120,20 +120,26 @@ def one_run(machine: Machine, size: Size) -> Iterator[str]:
         Scene(machine.parameters),
     )
     run = {
-        engine: lambda engine=engine: simulate(machine, case, engine)
-        for engine in ("compiled", "drake")
+        "compiled": lambda: simulate(machine, case),
+        "runge_kutta": lambda: simulate(machine, case, integrator="runge_kutta"),
+        "drake": lambda: simulate(machine, case, "drake"),
     }
     record = run["compiled"]()
     measure(record, scene)
     measured = median_s(lambda: measure(run["compiled"](), scene), size.repeats)
-    compiled, drake = (
-        median_s(run["compiled"], size.repeats),
-        median_s(run["drake"], size.drake_repeats),
+    run["runge_kutta"]()
+    compiled, runge_kutta = (
+        median_s(run[name], size.repeats) for name in ("compiled", "runge_kutta")
     )
+    drake = median_s(run["drake"], size.drake_repeats)
     lsoda = median_s(lambda: by_lsoda(machine, case), size.drake_repeats)
     yield (
         f"one run of {case.profile.duration:g} s: {1e3 * compiled:.0f} ms compiled, "
         f"{1e3 * measured:.0f} ms with all measures"
+    )
+    yield (
+        f"the same with four derivatives a step: {1e3 * runge_kutta:.0f} ms, "
+        f"{runge_kutta / compiled:.2f} times as long"
     )
     yield f"the same, Drake engine: {drake:.2f} s, {drake / compiled:.0f} times as long"
     yield (
@@ -162,7 +168,10 @@ def by_lsoda(machine: Machine, case: Case) -> None:
 
 
 def many_runs(machine: Machine, size: Size) -> Iterator[str]:
-    """Time batches of different numbers of runs, and read the peak memory of the process."""
+    """Time batches of different numbers of runs, and read the peak memory of the process.
+
+    The largest batch of each kind but 10 000 runs is repeated with four derivatives a step.
+    """
     parameters = machine.parameters
     constant = build_machine(
         at_levels(parameters, levels_of(parameters, load_factors(GASKET_FACTORS)), [0] * 8)
@@ -182,6 +191,24 @@ def many_runs(machine: Machine, size: Size) -> Iterator[str]:
                 f"{count} runs with {what}: {wall:.2f} s, {1e3 * wall / count:.2f} ms each; "
                 f"{memory:.0f} MB at most so far"
             )
+        count = size.many[-2]
+        spent = {
+            name: cpu_s(kind, gasket_cases(kind, size.profile, count), measures, name)
+            for name in ("auto", "runge_kutta")
+        }
+        yield (
+            f"{count} runs with {what}, processor time: {1e3 * spent['auto'] / count:.2f} ms each; "
+            f"with four derivatives a step {spent['runge_kutta'] / spent['auto']:.2f} times as long"
+        )
+
+
+def cpu_s(
+    machine: Machine, cases: Iterator[Case], measures: tuple[str, ...], integrator: str
+) -> float:
+    """Return the processor time of a batch with an integrator. [s]"""
+    begin = time.process_time()
+    simulate_many(machine, cases, measures=measures, integrator=integrator)
+    return time.process_time() - begin
 
 
 def assembly() -> str:

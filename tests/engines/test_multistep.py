@@ -66,7 +66,7 @@ def stable(matrix):
 
 
 def test_numbers_that_are_not_finite_are_not_followed():
-    for entry in (np.nan, -1e12):
+    for entry in (np.nan, -1e12, -1e300):
         jacobians = np.full((WIDTH, 1, 1), entry)
         assert not is_followed(jacobians, np.array([False]), 1.0)
 

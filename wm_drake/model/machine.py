@@ -1,5 +1,6 @@
 """The machine in a Drake diagram: its systems and ports, and the numbers set in a Context."""
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -113,7 +114,7 @@ class Setup:
         """Return the points of the vibration sensors in T. [m]"""
         return self.points.accelerometers
 
-    @property
+    @functools.cached_property
     def measured_points(self) -> FloatArray:
         """Return the measured points, see `measured_points`."""
         return measured_points(self.parameters, self.points, self.rest_pose)

@@ -76,8 +76,9 @@ def is_followed(jacobians: FloatArray, internal: np.ndarray, step: float) -> boo
     largest = aligned(4 * WIDTH)
     growth_lanes(jacobian, internal, step, STEPS, numbers, largest)
     quarters = largest.reshape(4, WIDTH)
-    grows = quarters[3] > LARGEST_GROWTH * quarters[1]
-    return bool(np.all(np.isfinite(quarters)) and not np.any(grows))
+    if not np.all(np.isfinite(numbers)):  # also where no number was seen on the way to it
+        return False
+    return bool(np.all(quarters[3] <= LARGEST_GROWTH * quarters[1]))
 
 
 @long_running

@@ -45,6 +45,8 @@ DEFORMATION = 1e-4
 MOST_PIECES = 10**6
 """Number of steps in an output period from which on no decimal step is looked for."""
 
+_STANDSTILL = SpinProfile(time=(0.0, 1.0), speed=(0.0, 0.0))
+
 DIFFERENCE = 1e-9
 """Half a step of the central differences: below the slowest speed, so that friction that jumps at
 zero counts as constant on either side. [m, rad, m/s, rad/s]"""
@@ -167,7 +169,7 @@ def _free_states(setup: Setup) -> tuple[list[int], list[str]]:
     for name in setup.telescopes:
         parts += [f"the tubes of damper '{name}'"] * (TUBES_STATE_SIZE - 1)
         parts.append(f"the sponge of damper '{name}'")
-    size = len(initial_state(setup, _standstill()))
+    size = len(initial_state(setup, _STANDSTILL))
     parts += [BEARING] * (size - len(parts))
     free = [index for index in range(size) if index not in (DRUM_ANGLE, DRUM_RATE)]
     return free, [parts[index] for index in free]
@@ -175,7 +177,7 @@ def _free_states(setup: Setup) -> tuple[list[int], list[str]]:
 
 def _states(setup: Setup, free: list[int]) -> FloatArray:
     """Return the states to look at (WIDTH, size): the rest pose, with speeds of each size."""
-    rest = initial_state(setup, _standstill())
+    rest = initial_state(setup, _STANDSTILL)
     states = np.tile(rest, (WIDTH, 1))
     directions = np.random.default_rng(0).uniform(-1.0, 1.0, len(rest))
     speeds = np.resize(SPEEDS, WIDTH)
@@ -203,7 +205,3 @@ def _sponges(setup: Setup) -> list[int]:
     found = list(range(STATE_SIZE, STATE_SIZE + struts))
     first = STATE_SIZE + struts + TUBES_STATE_SIZE - 1
     return found + [first + TUBES_STATE_SIZE * number for number in range(len(setup.telescopes))]
-
-
-def _standstill() -> SpinProfile:
-    return SpinProfile(time=(0.0, 1.0), speed=(0.0, 0.0))
