@@ -13,7 +13,7 @@ from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile
 from wm_drake.simulation.outputs import tub_outputs
-from wm_drake.studies.steady.balance import HarmonicBalance
+from wm_drake.studies.steady.balance import HARMONICS, HarmonicBalance
 from wm_drake.studies.steady.continuation import first_motion
 from wm_drake.studies.steady.response import branch_of, trajectory_of_period
 from wm_drake.studies.steady.series import Series
@@ -179,10 +179,10 @@ def test_harmonic_balance_has_the_amplitudes_of_the_engine(machine, load):
     ]
     largest = {
         harmonics: deviation_from_engine(machine, load, harmonics, speeds, settled).max()
-        for harmonics in (3, 5, 9)
+        for harmonics in (3, 5, HARMONICS)
     }
-    assert largest[9] < 0.01, largest
-    assert largest[9] < largest[5] < largest[3], largest
+    assert largest[HARMONICS] < 0.01, largest
+    assert largest[HARMONICS] < largest[5] < largest[3], largest
 
 
 def test_harmonic_balance_has_the_amplitudes_of_the_engine_at_some_speeds(machine):
@@ -191,7 +191,7 @@ def test_harmonic_balance_has_the_amplitudes_of_the_engine_at_some_speeds(machin
     settled = [
         (amplitudes(setup, settled_trajectory(setup, speed, 128, 120)), speed) for speed in speeds
     ]
-    assert deviation_from_engine(machine, "front", 9, speeds, settled).max() < 0.01
+    assert deviation_from_engine(machine, "front", HARMONICS, speeds, settled).max() < 0.01
 
 
 @pytest.fixture(scope="module")

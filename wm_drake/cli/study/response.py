@@ -61,7 +61,7 @@ def response(
     ] = 121,
     harmonics: Annotated[
         int, typer.Option(help="Number of harmonics of the drum's rotation.", min=1, max=40)
-    ] = 9,
+    ] = 11,
     rate: Annotated[
         list[str] | None,
         typer.Option(

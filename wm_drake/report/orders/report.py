@@ -76,16 +76,14 @@ def _table(result: Orders) -> Table:
     for order in _orders(result):
         values = _at_order(result, order)
         rows = (
-            Row(tuple(["largest", *(number(float(v), 2) for v in np.nanmax(values, axis=0))])),
+            Row(("largest", *(number(float(v), 2) for v in np.nanmax(values, axis=0)))),
             Row(
-                tuple(
-                    [
-                        "at, rpm",
-                        *(
-                            number(RPM_PER_RAD_S * float(result.orders.speed.values[at]), 0)
-                            for at in np.nanargmax(values, axis=0)
-                        ),
-                    ]
+                (
+                    "at, rpm",
+                    *(
+                        number(RPM_PER_RAD_S * float(result.orders.speed.values[at]), 0)
+                        for at in np.nanargmax(values, axis=0)
+                    ),
                 )
             ),
         )
@@ -103,8 +101,13 @@ def signal_figure(result: Orders, index: int) -> Figure:
     rpm = RPM_PER_RAD_S * np.abs(result.orders.speed.values)
     at = np.argsort(rpm, kind="stable")
     mesh = right.pcolormesh(
-        rpm[at], result.orders.order.values, orders[at].T, cmap="Blues", shading="nearest",
-        rasterized=True, vmin=0.0,
+        rpm[at],
+        result.orders.order.values,
+        orders[at].T,
+        cmap="Blues",
+        shading="nearest",
+        rasterized=True,
+        vmin=0.0,
     )
     figure.colorbar(mesh, ax=right, label=f"amplitude, {result.signals.unit}", pad=0.02)
     right.set_xlabel("drum speed, rpm", fontsize=9.5)

@@ -22,8 +22,11 @@ from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.steady.series import Series
 
-HARMONICS = 9
-"""Default number of harmonics."""
+HARMONICS = 11
+"""Default number of harmonics.
+
+Against the compiled engine, amplitudes of the reference machine deviate at any sensor by up to 24 %
+with 3, 4 % with 5, 1.3 % with 9, and 0.3 % with 11 harmonics."""
 
 SAMPLES = 128
 """Default number of samples of a period."""

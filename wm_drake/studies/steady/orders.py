@@ -70,7 +70,9 @@ def read_signals(path: Path, unit: str) -> Signals:
         values = 1e3 * record.displacement.values
     except (OSError, ValueError, AttributeError, KeyError) as error:
         reason = " ".join(str(error).split())
-        raise input_error(f"cannot be read as a netCDF record ({reason})", where=str(path)) from None
+        raise input_error(
+            f"cannot be read as a netCDF record ({reason})", where=str(path)
+        ) from None
     names = [str(name) for name in record.sensor.values]
     return _checked(Signals(path.name, names, "mm", time, angle, values), path)
 

@@ -1,0 +1,115 @@
+"""Commands `study modes`, `study response` and `record orders`."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+
+def test_study_modes_prints_the_documented_json(wm_drake, tmp_path):
+    result = wm_drake("study", "modes", "--json", "--amplitude", "1 mm", "--out", "m")
+    assert result.code == 0, result.err
+    found = json.loads(result.out)
+    assert set(found["modes"]) == {"stuck", "sliding", "amplitude"}
+    for modes in found["modes"].values():
+        assert all(set(mode) == {"frequency_Hz", "damping_ratio", "name"} for mode in modes)
+        assert len({mode["name"] for mode in modes}) == 6
+    campbell = found["campbell"]
+    assert np.shape(campbell["frequency_Hz"]) == (6, len(campbell["rpm"]))
+    # at a critical speed, order 1 is the frequency of a mode
+    for rpm in found["critical_rpm"]:
+        columns = np.array(campbell["frequency_Hz"])
+        hertz = [np.interp(rpm, campbell["rpm"], column) for column in columns]
+        assert np.min(np.abs(np.array(hertz) - rpm / 60.0)) < 5e-3
+    page = (tmp_path / "m" / "report.html").read_text(encoding="utf-8")
+    assert "Campbell diagram" in page
+    table = pd.read_csv(tmp_path / "m" / "sensitivities.csv")
+    assert {"stuck", "sliding"} == set(table["linearisation"])
+
+
+def test_study_response_prints_the_documented_json(wm_drake, tmp_path):
+    result = wm_drake(
+        "study",
+        "response",
+        "--json",
+        "--load",
+        "front",
+        "--points",
+        "6",
+        "--harmonics",
+        "3",
+        "--from",
+        "150 rpm",
+        "--to",
+        "200 rpm",
+        "--rate",
+        "50 rpm/s",
+        "--out",
+        "r",
+    )
+    assert result.code == 0, result.err
+    found = json.loads(result.out)
+    assert [case["gasket"] for case in found["cases"]] == [True, False]
+    for case in found["cases"]:
+        assert case["load"] == "front"
+        assert case["rpm"][0] == pytest.approx(150.0)
+        assert case["rpm"][-1] == pytest.approx(200.0)
+        count = len(case["rpm"])
+        assert all(len(values) == count for values in case["amplitudes_mm"].values())
+        assert len(case["stable"]) == count
+        assert case["wall_s"] > 0.0
+    assert max(found["cases"][1]["gasket_force_N"]["x"]) == 0.0
+    assert found["wall_s"] > 0.0
+    sweeps = pd.read_csv(tmp_path / "r" / "sweeps.csv")
+    assert set(sweeps["direction"]) == {"up", "down"}
+    assert sweeps["amplitude_mm"].gt(0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (("modes", "--amplitude", "0 mm"), "no amplitude"),
+        (("modes", "--load", "midle"), "middle"),
+        (("response", "--from", "500 rpm"), "highest speed"),
+        (("response", "--rate", "0 rpm/s"), "between 0.1 and 1000"),
+        (("response", "--load", "nothing"), "nothing"),
+    ],
+)
+def test_wrong_options_are_refused(wm_drake, tmp_path, options, word):
+    result = wm_drake("study", *options, "--out", "x")
+    assert result.code == 2
+    assert word in result.err
+    assert not (tmp_path / "x").exists()
+
+
+def test_orders_of_measured_accelerations(wm_drake, tmp_path):
+    """A planted order 2 of 3 m/s^2 while the drum speeds up."""
+    time = np.arange(0.0, 40.0, 5e-3)
+    rpm = 100.0 + 5.0 * time
+    angle = (100.0 * time + 2.5 * time**2) * np.pi / 30.0
+    table = pd.DataFrame({"time_s": time, "speed_rpm": rpm, "A": 3.0 * np.cos(2.0 * angle + 0.4)})
+    table.to_csv(tmp_path / "a.csv", index=False)
+    result = wm_drake("record", "orders", "a.csv", "--json", "--out", "o")
+    assert result.code == 0, result.err
+    orders = json.loads(result.out)["orders"]
+    assert np.array(orders["order 2 A, m/s^2"]) == pytest.approx(3.0, rel=0.01)
+    assert np.max(orders["order 1 A, m/s^2"]) < 0.03
+    assert orders["speed_rpm"][0] < orders["speed_rpm"][-1]
+    assert (tmp_path / "o" / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("time_s,A\n0,1\n1,2\n", "speed_rpm"),
+        ("time_s,speed_rpm,A\n0,60,1\n0.1,60,2\n0.5,60,1\n", "differ"),
+        ("time_s,speed_rpm,A\n0,60,1\n0.1,60,2\n0.2,60,1\n", "revolutions"),
+    ],
+)
+def test_measurements_without_orders_are_refused(wm_drake, tmp_path, text, word):
+    (tmp_path / "a.csv").write_text(text)
+    result = wm_drake("record", "orders", "a.csv", "--out", "o")
+    assert result.code == 2
+    assert word in result.err
+    assert not (tmp_path / "o").exists()
