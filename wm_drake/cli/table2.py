@@ -1,6 +1,7 @@
 """`wm-drake identify table2`: the Coulomb model fitted to each test, as in [C] Table 2."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -63,7 +64,7 @@ def identify_table2(
     from wm_drake.studies.identification.drift import (
         MM,
         coulomb_fits,
-        frequency_trends,
+        frequency_trend,
         mstv_motions,
         mstv_of_c,
         printed_table,
@@ -100,16 +101,15 @@ def identify_table2(
     with interruptible(), result_folder(out, Run("identify table2", overwrite)) as folder:
         with progress_bar(len(motions), "fits") as progress:
             fits = coulomb_fits(motions, f_max, slider_damping, progress)
-        trends = frequency_trends(damper, FREQUENCIES, AMPLITUDE)
+        trend = frequency_trend(damper, FREQUENCIES, AMPLITUDE)
         fits.to_csv(folder / "table2.csv", index=False, float_format="%.6g")
-        page = table2_report(fits, trends, FREQUENCIES, source, command_line())
+        page = table2_report(fits, trend, source, command_line())
         (folder / "report.html").write_text(page, encoding="utf-8")
     if as_json:
         rows = json.loads(fits.to_json(orient="records", double_precision=15))
-        changes = {trend.text: trend.change for trend in trends}
-        typer.echo(json.dumps({"tests": rows, "change_of_peak_force": changes}))
+        typer.echo(json.dumps({"tests": rows, "peak_force_over_frequency": asdict(trend)}))
         return
-    _print(source, HEADER, fit_cells(fits), sentences(fits, trends), out)
+    _print(source, HEADER, fit_cells(fits), sentences(fits, trend), out)
 
 
 def _print(

@@ -1,7 +1,5 @@
 """Report page of [C] Table 2: fits of the Coulomb model to each test beside the printed ones."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -28,8 +26,7 @@ HEADER = (
 
 def table2_report(
     fits: pd.DataFrame,
-    trends: Sequence[FrequencyTrend],
-    frequencies: Sequence[float],
+    trend: FrequencyTrend,
     source: str,
     command: str = "",
 ) -> str:
@@ -37,8 +34,7 @@ def table2_report(
 
     Args:
         fits: From `coulomb_fits`.
-        trends: From `frequency_trends`, at 1 mm.
-        frequencies: Of the trends. [Hz]
+        trend: From `frequency_trend`, at 1 mm.
         source: What was fitted, in words.
         command: Command line, shown on the page.
     """
@@ -47,7 +43,7 @@ def table2_report(
         title="Coulomb model fitted to each test ([C] Table 2)",
         about=source,
         warnings=[],
-        summary=" ".join(sentences(fits, trends)),
+        summary=" ".join(sentences(fits, trend)),
         fits=_fits(fits),
         pictures=[
             picture(
@@ -57,12 +53,12 @@ def table2_report(
                 "Table 2 (crosses).",
             )
         ],
-        trends=_trends(trends, frequencies),
+        trends=_trends(trend),
         facts=[("Command", command)],
     )
 
 
-def sentences(fits: pd.DataFrame, trends: Sequence[FrequencyTrend]) -> list[str]:
+def sentences(fits: pd.DataFrame, trend: FrequencyTrend) -> list[str]:
     """Return what the fits and the trends say, in words."""
     found = []
     known = fits.dropna(subset=["k1", "c1"])
@@ -75,14 +71,15 @@ def sentences(fits: pd.DataFrame, trends: Sequence[FrequencyTrend]) -> list[str]
             f"Over {len(known)} printed tests the fitted k1 is {ratios['k1']:.3g} times and c1 "
             f"{ratios['c1']:.3g} times the printed one (geometric mean)."
         )
-    printed, free, falling = trends
+    rise, free = (peaks[-1] / peaks[0] - 1.0 for peaks in (trend.printed, trend.without_dashpots))
+    low, high = (f"{f:g} Hz" for f in (trend.frequencies[0], trend.frequencies[-1]))
     found.append(
         "[C] section 4.1 says that the friction force falls with frequency. With its printed "
-        f"numbers the peak force changes by {100 * printed.change:+.3g} % over these frequencies: "
-        f"c1 and c2 grow with velocity. Without them it changes by {100 * free.change:+.2g} %: the "
-        "MSTV friction depends on the quotient of two velocities only. It falls if the friction "
-        f"falls with the velocity of the sponge faster than c2 grows: {falling.text} gives "
-        f"{100 * falling.change:+.3g} %."
+        f"numbers the peak force grows by {100 * rise:.2g} % from {low} to {high} at 1 mm, because "
+        f"c1 and c2 do; without them it changes by {100 * free:.1g} %, because the MSTV friction "
+        "depends on a quotient of velocities only. Even a level peak needs a friction that falls "
+        f"with velocity: f_max from {trend.friction[0]:.3g} N at {low} to "
+        f"{trend.friction[-1]:.3g} N at {high}."
     )
     return found
 
@@ -114,13 +111,18 @@ def _fits(fits: pd.DataFrame) -> Table:
     )
 
 
-def _trends(trends: Sequence[FrequencyTrend], frequencies: Sequence[float]) -> Table:
-    heads = ("MSTV damper", *(f"{f:g} Hz" for f in frequencies), "change, %")
+def _trends(trend: FrequencyTrend) -> Table:
+    rows = {
+        "peak force, printed numbers": trend.printed,
+        "peak force, c1 and c2 nearly zero": trend.without_dashpots,
+        "f_max for the peak of the first": trend.friction,
+    }
+    heads = ("loops of 1 mm, N", *(f"{f:g} Hz" for f in trend.frequencies))
     groups = tuple(
-        Group(t.text, (Row((*(number(peak, 1) for peak in t.peaks), number(100 * t.change, 1))),))
-        for t in trends
+        Group(name, (Row(tuple(number(value, 1) for value in values)),))
+        for name, values in rows.items()
     )
-    return Table("Peak force of loops of 1 mm, in N.", heads, groups)
+    return Table("Peak force of the MSTV damper over frequency.", heads, groups)
 
 
 def drift_figure(fits: pd.DataFrame) -> Figure:

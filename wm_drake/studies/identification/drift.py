@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from scipy.optimize import brentq
 
-from wm_drake.elements.damper_law import law_of
 from wm_drake.parameters import MeasuredLoop, load_component
 from wm_drake.parameters.components import COMPONENTS_FOLDER
 from wm_drake.parameters.damper_laws import DamperNumbers
-from wm_drake.rigs import DamperBench, Harmonic, damper_bench, force_loops
+from wm_drake.rigs import Harmonic, damper_bench, force_loops
 from wm_drake.rigs.measured import HarmonicMotion, measured_motion
 from wm_drake.studies.fitting import least_squares
 from wm_drake.studies.identification.models import damper_model
@@ -90,55 +90,62 @@ def coulomb_fits(
 
 @dataclass(frozen=True)
 class FrequencyTrend:
-    """Peak force of loops of one amplitude over frequency, for [C] section 4.1.
+    """Peak force of MSTV loops of one amplitude over frequency, for [C] section 4.1.
 
     Attributes:
-        text: What is changed in the numbers of the damper.
-        peaks: Peak force at each frequency. [N]
+        frequencies: Rising. [Hz]
+        printed: Peak force with the numbers of the damper. [N]
+        without_dashpots: Peak force with c1 and c2 of nearly zero. [N]
+        friction: f_max at each frequency with which the peak would be that of the lowest. [N]
     """
 
-    text: str
-    peaks: tuple[float, ...]
-
-    @property
-    def change(self) -> float:
-        """Change of the peak from the lowest to the highest frequency, as a part of it."""
-        return self.peaks[-1] / self.peaks[0] - 1.0
+    frequencies: tuple[float, ...]
+    printed: tuple[float, ...]
+    without_dashpots: tuple[float, ...]
+    friction: tuple[float, ...]
 
 
-def frequency_trends(
+def frequency_trend(
     damper: DamperNumbers, frequencies: Sequence[float], amplitude: float
-) -> list[FrequencyTrend]:
-    """Return how the peak force goes with frequency: as printed, without dashpots, and falling.
+) -> FrequencyTrend:
+    """Return how the peak force goes with frequency, and the friction that would keep it level.
 
     Without c1 and c2 the law depends on quotients of rates only, so its loops do not depend on the
-    frequency; each dashpot makes the force grow. It falls only if the friction itself falls with
-    the velocity of the slider faster than c2 grows: friction_damping C_m below -c2, which no
-    machine file may have. Below -(c1 + c2) the slider would be unstable.
+    frequency; each dashpot makes the force grow. A force that falls with frequency, as [C] section
+    4.1 says, needs a friction that falls with velocity.
 
     Args:
         damper: MSTV damper.
         frequencies: Rising. [Hz]
         amplitude: Of the motion. [m]
     """
-    bench = damper_bench(damper)
-    names = law_of(bench.packed).fields
-    c1, c2 = (float(getattr(damper, name)) for name in ("sponge_damping", "slider_damping"))
-    falling = -(c2 + 0.5 * c1)
-    changes = {
-        "as printed": {},
-        "c1 and c2 nearly zero": {"sponge_damping": 1e-3, "slider_damping": 1e-3},
-        f"C_m = {falling * MM:.3g} N s/mm": {"friction_damping": falling},
-    }
-    found = []
-    for text, values in changes.items():
-        packed = bench.packed.copy()
-        for name, value in values.items():
-            packed[1 + names.index(name)] = value
+
+    def peaks(**changes: float) -> tuple[float, ...]:
+        bench = damper_bench(damper.model_copy(update=changes))
         motions = [Harmonic(f, amplitude) for f in frequencies]
-        loops = force_loops(DamperBench(packed), motions)
-        found.append(FrequencyTrend(text, tuple(float(np.max(np.abs(x.force))) for x in loops)))
-    return found
+        return tuple(float(np.max(np.abs(x.force))) for x in force_loops(bench, motions))
+
+    printed = peaks()
+    least = float(getattr(damper, "friction_force"))  # noqa: B009
+    friction = [
+        least
+        if index == 0
+        else float(
+            brentq(
+                lambda f, k=index: peaks(friction_force=f)[k] - printed[0],
+                1e-3 * least,
+                least,
+                rtol=1e-3,
+            )
+        )
+        for index in range(len(frequencies))
+    ]
+    return FrequencyTrend(
+        tuple(frequencies),
+        printed,
+        peaks(sponge_damping=1e-3, slider_damping=1e-3),
+        tuple(friction),
+    )
 
 
 def mstv_of_c() -> DamperNumbers:
