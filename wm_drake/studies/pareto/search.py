@@ -1,5 +1,6 @@
 """Search for a Pareto front by NSGA-II or NSGA-III of pymoo. It is independent of machines."""
 
+import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -64,6 +65,20 @@ def hypervolume(objectives: FloatArray, first: FloatArray) -> float:
     return float(HV(ref_point=np.ones(scaled.shape[1]))(scaled))
 
 
+def check_search(evaluations: int, population: int) -> None:
+    """Raise an InputError if there are fewer evaluations than designs of a generation.
+
+    Raises:
+        WmDrakeError: pymoo is missing.
+    """
+    if importlib.util.find_spec("pymoo") is None:
+        raise WmDrakeError("a design study needs pymoo: pip install 'wm-drake[design]'")
+    if evaluations < population:
+        raise input_error(
+            f"{evaluations} is less than the population, {population}", where="--evaluations"
+        )
+
+
 def search_front(
     evaluate: Evaluate,
     start: FloatArray,
@@ -94,15 +109,10 @@ def search_front(
         InputError: there are fewer evaluations than designs of a generation.
         WmDrakeError: pymoo is missing.
     """
-    try:
-        from pymoo.core.problem import Problem
-        from pymoo.optimize import minimize
-    except ImportError:
-        raise WmDrakeError("a design study needs pymoo: pip install 'wm-drake[design]'") from None
-    if evaluations < population:
-        raise input_error(
-            f"{evaluations} is less than a population of {population}", where="--evaluations"
-        )
+    check_search(evaluations, population)
+    from pymoo.core.problem import Problem
+    from pymoo.optimize import minimize
+
     size, done, first = len(start), 0, list[FloatArray]()
     history: list[tuple[int, float]] = []
 
