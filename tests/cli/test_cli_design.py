@@ -50,7 +50,7 @@ def test_study_writes_front_and_machines_and_continues(study, wm_drake, monkeypa
     [
         (("Dx", "Dq"), "no response 'Dq'"),
         (("stiffness]", "stifness]"), "stiffness"),
-        (("low: 90 %", "low: 9 N"), "forms"),
+        (("low: 90 %", "low: 9 kg"), "forms"),
         (("loads: [middle]", "loads: [midle]"), "did you mean 'middle'"),
     ],
 )

@@ -135,7 +135,8 @@ def _designs(
     keys += [
         k for choice in task.choices.values() for values in choice.options.values() for k in values
     ]
-    keys += [goal.quantity for goal in (*task.objectives, *task.constraints)]
+    keys += [goal.quantity for goal in task.objectives]
+    keys += [goal.quantity for goal in task.constraints]
     if tolerances:
         keys += [key for quantity in tolerances.quantities.values() for key in quantity.keys]
     try:

@@ -282,6 +282,6 @@ def _print_tables(result: "ToleranceResult") -> None:
             side = "≥" if v.limit.at_least is not None else "≤"
             ends = f"{100 * v.broken.lower:.3g} to {100 * v.broken.upper:.3g} %"
             share = f"{100 * v.broken.estimate:.3g} %"
-            row = (v.limit.quantity, f"{side} {v.limit.text}", f"{100 * v.allowed:g} %", share)
-            limits.add_row(*row, ends, v.word)
+            cells = (v.limit.quantity, f"{side} {v.limit.text}", f"{100 * v.allowed:g} %", share)
+            limits.add_row(*cells, ends, v.word)
         Console().print(limits)

@@ -117,7 +117,8 @@ def _rows(front: ParetoFront) -> list[list[tuple[str, str, str]]]:
             unit = goal.unit.shown.replace("*", " ")
             side = "at most" if goal.is_small_better else "at least"
             margin = abs(float(value) - goal.limit)
-            text = f"{_text(value)} {unit}, {side} {_text(goal.limit)} {unit}: margin {_text(margin)} {unit}"
+            text = f"{_text(value)} {unit}, {side} {_text(goal.limit)} {unit}"
+            text += f": margin {_text(margin)} {unit}"
             rows.append(("constraint", goal.given.quantity, text))
         for dimension, place in zip(designs.dimensions, design, strict=True):
             value, unit = dimension.shown(float(place))

@@ -57,7 +57,7 @@ def hypervolume(objectives: FloatArray, first: FloatArray) -> float:
     """
     from pymoo.indicators.hv import HV
 
-    usable = first[(first < UNUSABLE).all(axis=1)]
+    usable = first[np.all(first < UNUSABLE, axis=1)]
     if not len(objectives) or not len(usable):
         return 0.0
     low, high = usable.min(axis=0), usable.max(axis=0)
@@ -125,10 +125,10 @@ def search_front(
         def _evaluate(self, x: FloatArray, out: Any, *_: Any, **__: Any) -> None:
             nonlocal done
             f, g = evaluate(np.asarray(x, dtype=float))
-            bad = ~(np.isfinite(f).all(axis=1) & np.isfinite(g).all(axis=1))
-            out["F"] = np.where(bad[:, None], UNUSABLE, f)
+            usable = np.all(np.isfinite(np.hstack([f, g])), axis=1, keepdims=True)
+            out["F"] = np.where(usable, f, UNUSABLE)
             if constraints:
-                out["G"] = np.where(bad[:, None], UNUSABLE, g)
+                out["G"] = np.where(usable, g, UNUSABLE)
             if not first:
                 first.append(out["F"])
             done += len(x)
@@ -154,7 +154,7 @@ def search_front(
         return Found(*empty, done, first[0], tuple(history))
     x, f = np.atleast_2d(result.X), np.reshape(result.F, (-1, objectives))
     g = np.reshape(result.G, (len(f), -1)) if constraints else np.empty((len(f), 0))
-    usable = (f < UNUSABLE).all(axis=1)
+    usable = np.all(f < UNUSABLE, axis=1)
     x, f, g = x[usable], f[usable], g[usable]
     order = np.lexsort(f.T[::-1])
     return Found(x[order], f[order], g[order], done, first[0], tuple(history))

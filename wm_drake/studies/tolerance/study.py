@@ -259,7 +259,7 @@ def judged(values: pd.DataFrame, limit: Limit, response: Response, number: float
     """
     found = values[measure_key(response)].to_numpy()
     kept = found >= number if limit.at_least is not None else found <= number
-    broken, allowed = share_of(~kept), fraction(limit.allowed_share, "allowed_share")
+    broken, allowed = share_of(np.asarray(~kept)), fraction(limit.allowed_share, "allowed_share")
     word = "pass" if broken.upper <= allowed else "fail" if broken.lower > allowed else "undecided"
     return Verdict(limit, measure_key(response), number, allowed, broken, word)
 
@@ -346,7 +346,7 @@ def _contact(
         SUBSET if rare else CRUDE,
         crude,
         {name: shares[name] for name in often},
-        {names[i]: int(count) for i, count in nearest.items()},
+        {names[int(str(i))]: int(count) for i, count in nearest.items()},
         rare,
     )
 

@@ -438,4 +438,4 @@ def _correlation_factor(tolerances: Tolerances, names: list[str]) -> FloatArray 
     places = [names.index(name) for name in given.quantities]
     matrix = np.eye(len(names))
     matrix[np.ix_(places, places)] = np.array(given.matrix)
-    return np.linalg.cholesky(matrix)
+    return np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
