@@ -88,6 +88,7 @@ def test_wheel_holds_the_data_and_nothing_else(wheel):
         ("wm_drake", "data/cycles/*"),
         ("wm_drake", "data/components/*"),
         ("wm_drake", "data/tolerances/*"),
+        ("wm_drake", "data/designs/*"),
         ("wm_drake", "report/*"),
         ("wm_drake", "parameters/*"),
         ("wm_drake", "**/*.py"),

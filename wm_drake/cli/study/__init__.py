@@ -3,6 +3,7 @@
 import typer
 
 from wm_drake.cli.study import (
+    design,
     gasket,
     gasket_damping,
     gasket_effect,
@@ -14,6 +15,7 @@ from wm_drake.cli.study import (
 )
 
 app = typer.Typer(help="Run a study of many runs and write a report.", no_args_is_help=True)
+app.command("design")(design.design)
 app.command("gasket")(gasket.gasket)
 app.command("gasket-damping")(gasket_damping.gasket_damping)
 app.command("gasket-effect")(gasket_effect.gasket_effect)

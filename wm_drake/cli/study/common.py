@@ -1,7 +1,8 @@
 """Options that the studies share, and a result folder with a ledger of finished runs."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +11,11 @@ import typer
 from wm_drake.cli.result_folder import LEDGER, Run, check_is_folder, prepare_folder
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from wm_drake.batch.ledger import Ledger
+    from wm_drake.model.machine import Machine
+    from wm_drake.simulation.cases import Case
 
 RUNS_KEPT = (
     "all runs are kept, so repeat the command to write the results without running them again"
@@ -30,6 +35,43 @@ ProfileOption = Annotated[
         metavar="FILE",
     ),
 ]
+
+ClusterOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Run on a dask.distributed cluster with the scheduler at this address.",
+        metavar="ADDRESS",
+    ),
+]
+
+
+@contextmanager
+def batch_runner(
+    built: "Machine",
+    ledger: "Ledger",
+    measures: tuple[str, ...],
+    workers: int | None,
+    cluster: str | None,
+) -> "Iterator[Callable[[Iterable[Case], Callable[[int], None]], xr.Dataset]]":
+    """Yield the function that runs cases: on the cores of this computer, or on a cluster.
+
+    The function takes cases and what is called with the number of finished ones.
+    """
+    from wm_drake.batch import simulate_remembered
+    from wm_drake.batch.cluster import cluster_client, simulate_on_cluster
+
+    def run(
+        simulate: "Callable[..., xr.Dataset]",
+        cases: "Iterable[Case]",
+        progress: Callable[[int], None],
+    ) -> "xr.Dataset":
+        return simulate(built, cases, ledger, measures=measures, progress=progress)
+
+    if cluster is None:
+        yield partial(run, partial(simulate_remembered, workers=workers))
+    else:
+        with cluster_client(cluster) as client:
+            yield partial(run, partial(simulate_on_cluster, client=client))
 
 
 @contextmanager

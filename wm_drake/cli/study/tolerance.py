@@ -1,10 +1,8 @@
 """Command `wm-drake study tolerance`: how machine and laundry scatter, and whether it touches."""
 
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -25,9 +23,11 @@ from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.study.common import (
     RUNS_KEPT,
+    ClusterOption,
     ProfileOption,
     ResumeOption,
     WorkersOption,
+    batch_runner,
     study_ledger,
 )
 from wm_drake.cli.terminal import Console, say
@@ -36,7 +36,6 @@ from wm_drake.errors import InputError, Problem, input_error, nearest_names
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
 
-    from wm_drake.batch.ledger import Ledger
     from wm_drake.model.machine import Machine
     from wm_drake.parameters import MachineParameters
     from wm_drake.parameters.tolerances import Tolerances
@@ -46,14 +45,6 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.studies.tolerance.variables import UncertainMachine
 
 DEFAULT_OUT = Path("wm-drake-tolerance")
-
-ClusterOption = Annotated[
-    str | None,
-    typer.Option(
-        help="Run on a dask.distributed cluster with the scheduler at this address.",
-        metavar="ADDRESS",
-    ),
-]
 
 
 def tolerance(
@@ -114,7 +105,7 @@ def tolerance(
 ) -> None:
     """Find how often the tub touches, how far it moves, and which quantities decide that."""
     begin = time.perf_counter()
-    from wm_drake.studies.tolerance.study import Settings, limits_of
+    from wm_drake.studies.tolerance.study import Settings, limits_of, run_tolerances
 
     several = min(512, samples) if sensitivity is None else sensitivity
     settings = Settings(samples, several, subset, seed)
@@ -130,8 +121,12 @@ def tolerance(
     identity = _identity(uncertain, tolerances, measures, settings)
     writer = Run("study tolerance", overwrite, identity)
     with study_ledger(out, writer, identity, resume) as ledger:
-        with _runner(built, ledger, measures, workers, cluster) as run:
-            from wm_drake.studies.tolerance.study import run_tolerances
+        with batch_runner(built, ledger, measures, workers, cluster) as batch:
+
+            def run(cases: "Iterable[Case]", what: str) -> "xr.Dataset":
+                listed = list(cases)
+                with progress_bar(len(listed), what) as progress:
+                    return batch(listed, progress)
 
             result = run_tolerances(uncertain, chosen, run, settings, known)
         ledger.mark_finished()
@@ -240,32 +235,6 @@ def _identity(
     }
 
 
-@contextmanager
-def _runner(
-    built: "Machine",
-    ledger: "Ledger",
-    measures: tuple[str, ...],
-    workers: int | None,
-    cluster: str | None,
-) -> "Iterator[Callable[[Iterable[Case], str], xr.Dataset]]":
-    """Yield the function that runs cases: on the cores of this computer, or on a cluster."""
-    from wm_drake.batch import simulate_remembered
-    from wm_drake.batch.cluster import cluster_client, simulate_on_cluster
-
-    def run(
-        simulate: "Callable[..., xr.Dataset]", cases: "Iterable[Case]", what: str
-    ) -> "xr.Dataset":
-        known = list(cases)
-        with progress_bar(len(known), what) as progress:
-            return simulate(built, known, ledger, measures=measures, progress=progress)
-
-    if cluster is None:
-        yield partial(run, partial(simulate_remembered, workers=workers))
-    else:
-        with cluster_client(cluster) as client:
-            yield partial(run, partial(simulate_on_cluster, client=client))
-
-
 def _write(
     result: "ToleranceResult", tolerances: "Tolerances", folder: Path, wall_s: float
 ) -> None:
@@ -313,6 +282,6 @@ def _print_tables(result: "ToleranceResult") -> None:
             side = "≥" if v.limit.at_least is not None else "≤"
             ends = f"{100 * v.broken.lower:.3g} to {100 * v.broken.upper:.3g} %"
             share = f"{100 * v.broken.estimate:.3g} %"
-            row = (v.limit.quantity, f"{side} {v.limit.text}", f"{100 * v.allowed:g} %", share)
-            limits.add_row(*row, ends, v.word)
+            cells = (v.limit.quantity, f"{side} {v.limit.text}", f"{100 * v.allowed:g} %", share)
+            limits.add_row(*cells, ends, v.word)
         Console().print(limits)

@@ -1,5 +1,6 @@
 """Search for a Pareto front by NSGA-II or NSGA-III of pymoo. It is independent of machines."""
 
+import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -56,12 +57,26 @@ def hypervolume(objectives: FloatArray, first: FloatArray) -> float:
     """
     from pymoo.indicators.hv import HV
 
-    usable = first[(first < UNUSABLE).all(axis=1)]
+    usable = first[np.all(first < UNUSABLE, axis=1)]
     if not len(objectives) or not len(usable):
         return 0.0
     low, high = usable.min(axis=0), usable.max(axis=0)
     scaled = (objectives - low) / np.where(high > low, high - low, 1.0)
     return float(HV(ref_point=np.ones(scaled.shape[1]))(scaled))
+
+
+def check_search(evaluations: int, population: int) -> None:
+    """Raise an InputError if there are fewer evaluations than designs of a generation.
+
+    Raises:
+        WmDrakeError: pymoo is missing.
+    """
+    if importlib.util.find_spec("pymoo") is None:
+        raise WmDrakeError("a design study needs pymoo: pip install 'wm-drake[design]'")
+    if evaluations < population:
+        raise input_error(
+            f"{evaluations} is less than the population, {population}", where="--evaluations"
+        )
 
 
 def search_front(
@@ -94,15 +109,10 @@ def search_front(
         InputError: there are fewer evaluations than designs of a generation.
         WmDrakeError: pymoo is missing.
     """
-    try:
-        from pymoo.core.problem import Problem
-        from pymoo.optimize import minimize
-    except ImportError:
-        raise WmDrakeError("a design study needs pymoo: pip install 'wm-drake[design]'") from None
-    if evaluations < population:
-        raise input_error(
-            f"{evaluations} is less than a population of {population}", where="--evaluations"
-        )
+    check_search(evaluations, population)
+    from pymoo.core.problem import Problem
+    from pymoo.optimize import minimize
+
     size, done, first = len(start), 0, list[FloatArray]()
     history: list[tuple[int, float]] = []
 
@@ -115,10 +125,10 @@ def search_front(
         def _evaluate(self, x: FloatArray, out: Any, *_: Any, **__: Any) -> None:
             nonlocal done
             f, g = evaluate(np.asarray(x, dtype=float))
-            bad = ~(np.isfinite(f).all(axis=1) & np.isfinite(g).all(axis=1))
-            out["F"] = np.where(bad[:, None], UNUSABLE, f)
+            usable = np.all(np.isfinite(np.hstack([f, g])), axis=1, keepdims=True)
+            out["F"] = np.where(usable, f, UNUSABLE)
             if constraints:
-                out["G"] = np.where(bad[:, None], UNUSABLE, g)
+                out["G"] = np.where(usable, g, UNUSABLE)
             if not first:
                 first.append(out["F"])
             done += len(x)
@@ -144,7 +154,7 @@ def search_front(
         return Found(*empty, done, first[0], tuple(history))
     x, f = np.atleast_2d(result.X), np.reshape(result.F, (-1, objectives))
     g = np.reshape(result.G, (len(f), -1)) if constraints else np.empty((len(f), 0))
-    usable = (f < UNUSABLE).all(axis=1)
+    usable = np.all(f < UNUSABLE, axis=1)
     x, f, g = x[usable], f[usable], g[usable]
     order = np.lexsort(f.T[::-1])
     return Found(x[order], f[order], g[order], done, first[0], tuple(history))

@@ -22,8 +22,8 @@ from wm_drake.parameters.types import FloatArray
 LEVEL = 0.1
 """Conditional probability of each level."""
 
-MOST_LEVELS = 9
-"""Largest number of levels; a probability below 1e-9 is not followed."""
+MOST_LEVELS = 7
+"""Largest number of levels; a probability below about 1e-7 is not followed."""
 
 ACCEPTANCE = 0.44
 """Share of accepted moves to which the step adapts."""

@@ -1,8 +1,10 @@
 """Shares and percentiles of samples, with 95 % intervals. It is independent of machines."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
 from wm_drake.parameters.types import FloatArray
@@ -35,7 +37,7 @@ class Share:
         return self.count / self.samples
 
 
-def share_of(has_property: FloatArray) -> Share:
+def share_of(has_property: NDArray[Any]) -> Share:
     """Return the share of samples with a property, from whether each one has it. (n,)"""
     count, samples = int(np.sum(has_property)), len(has_property)
     ends = stats.binomtest(count, samples).proportion_ci(CONFIDENCE, method="exact")

@@ -11,7 +11,7 @@ import xarray as xr
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.parameters.tolerances import Limit, fraction
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import convert, split
+from wm_drake.parameters.units import Unit, convert, split
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.gasket.responses import GAP, Response
 from wm_drake.studies.tolerance.distributions import base_samples
@@ -188,15 +188,27 @@ def limits_of(
             )
             continue
         try:
-            numbers, unit, _ = split(limit.text)
-            number = response.unit.from_si(convert(numbers[0], unit or None, response.unit))
-        except ValueError as error:
-            problems.append(Problem("", key, str(error)))
-            continue
-        found.append((limit, response, number))
+            found.append((limit, response, in_unit_of(limit.text, response.unit)))
+        except InputError as error:
+            problems += [Problem("", key, p.message) for p in error.problems]
     if problems:
         raise InputError(problems)
     return found
+
+
+def in_unit_of(text: str, unit: Unit) -> float:
+    """Return a number with a unit as a number in the unit for reading.
+
+    Raises:
+        InputError: the text is not a number with a unit that fits.
+    """
+    try:
+        numbers, given, several = split(text)
+        if several:
+            raise ValueError(f"'{text}' is more than one number")
+        return unit.from_si(convert(numbers[0], given or None, unit))
+    except ValueError as error:
+        raise input_error(str(error)) from None
 
 
 def run_tolerances(
@@ -247,7 +259,7 @@ def judged(values: pd.DataFrame, limit: Limit, response: Response, number: float
     """
     found = values[measure_key(response)].to_numpy()
     kept = found >= number if limit.at_least is not None else found <= number
-    broken, allowed = share_of(~kept), fraction(limit.allowed_share, "allowed_share")
+    broken, allowed = share_of(np.asarray(~kept)), fraction(limit.allowed_share, "allowed_share")
     word = "pass" if broken.upper <= allowed else "fail" if broken.lower > allowed else "undecided"
     return Verdict(limit, measure_key(response), number, allowed, broken, word)
 
@@ -334,7 +346,7 @@ def _contact(
         SUBSET if rare else CRUDE,
         crude,
         {name: shares[name] for name in often},
-        {names[i]: int(count) for i, count in nearest.items()},
+        {names[int(str(i))]: int(count) for i, count in nearest.items()},
         rare,
     )
 

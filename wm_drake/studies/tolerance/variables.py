@@ -299,7 +299,7 @@ def _laundry_variables(laundry: Laundry) -> tuple[list[Variable], list[Problem]]
     for field, spread in laundry.spreads().items():
         name, unit = f"{LAUNDRY}.{field}", _LAUNDRY_UNITS[field]
         try:
-            form, marginal = _marginal(spread, unit, None)
+            form, marginal = marginal_of(spread, unit, None)
             if unit is not None and form != VALUE:
                 raise input_error(f"needs values with a unit, such as '1 {unit.shown}'", key=name)
         except InputError as error:
@@ -317,7 +317,7 @@ def _variable(
     units = []
     for key in keys:
         number, unit = nominal_at(parameters, known, key)
-        form, marginal = _marginal(spread, unit, number, key)
+        form, marginal = marginal_of(spread, unit, number, key)
         is_table = isinstance(value_at(parameters, key), ForceTable | TorqueTable)
         if is_table and form != PERCENT:
             raise input_error("is a table; give its distribution in percent", key=key)
@@ -325,7 +325,7 @@ def _variable(
     return Variable(name, keys, form, marginal, units[0], _text(spread), spread.source, about)
 
 
-def _marginal(
+def marginal_of(
     spread: Spread, unit: Unit | None, nominal: float | None, key: str = ""
 ) -> tuple[str, Marginal]:
     """Return form and distribution of a spread.
@@ -438,4 +438,4 @@ def _correlation_factor(tolerances: Tolerances, names: list[str]) -> FloatArray 
     places = [names.index(name) for name in given.quantities]
     matrix = np.eye(len(names))
     matrix[np.ix_(places, places)] = np.array(given.matrix)
-    return np.linalg.cholesky(matrix)
+    return np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)

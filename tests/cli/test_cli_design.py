@@ -1,0 +1,67 @@
+"""Tests of `wm-drake study design`: output, resuming, bad input."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+pytest.importorskip("pymoo")
+
+PROFILE = "time: (0, 1) s\nspeed: (0, 60) rpm\n"
+TASK = """loads: [middle]
+variables:
+  k: {keys: [spring_types.suspension.stiffness], low: 50 %, high: 150 %}
+  m: {keys: [bodies.motor.mass], low: 90 %, high: 110 %}
+objectives:
+- {quantity: Dx}
+- {quantity: bodies.motor.mass}
+constraints:
+- {quantity: gap, at_least: 1 mm}
+"""
+
+
+@pytest.fixture
+def study(wm_drake):
+    """Return a function that runs a small study of one second with extra arguments."""
+    Path("p.yaml").write_text(PROFILE)
+    Path("d.yaml").write_text(TASK)
+    common = ("--profile", "p.yaml", "--out", "out", "--population", "8")
+    return lambda *arguments: wm_drake("study", "design", "d.yaml", *common, *arguments)
+
+
+def test_study_writes_front_and_machines_and_continues(study, wm_drake, monkeypatch):
+    ended = study("--evaluations", "16", "--json")
+    assert ended.code == 0
+    printed = json.loads(ended.out)
+    assert printed["evaluations"] == 16
+    assert {"objectives", "variables"} <= set(printed["front"][0])
+    assert {"hypervolume", "wall_s"} <= set(printed)
+    front = pd.read_csv("out/front.csv")
+    assert list(front["Dx_mm"]) == sorted(front["Dx_mm"])
+    assert wm_drake("machine", "check", "out/machine_best_Dx.yaml").code == 0
+    monkeypatch.setattr("wm_drake.batch.runs.integrate_runs", None)  # whoever runs now, fails
+    again = json.loads(study("--evaluations", "16", "--json").out)
+    assert again["front"] == printed["front"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("Dx", "Dq"), "no response 'Dq'"),
+        (("stiffness]", "stifness]"), "stiffness"),
+        (("low: 90 %", "low: 9 kg"), "forms"),
+        (("loads: [middle]", "loads: [midle]"), "did you mean 'middle'"),
+    ],
+)
+def test_wrong_file_is_refused_before_any_run(study, change, message):
+    Path("d.yaml").write_text(TASK.replace(*change, 1))
+    ended = study()
+    assert ended.code == 2
+    assert message in ended.err
+    assert not Path("out").exists()
+
+
+def test_fewer_evaluations_than_a_population_are_refused(study):
+    ended = study("--evaluations", "4")
+    assert (ended.code, "--evaluations: 4 is less than the population" in ended.err) == (2, True)

@@ -1,0 +1,220 @@
+"""Designs of a machine, with functions of known answer in place of the runs."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+pytest.importorskip("pymoo")
+
+from wm_drake.errors import InputError
+from wm_drake.parameters import load_machine
+from wm_drake.parameters.designs import DesignTask, load_design, shipped_designs
+from wm_drake.parameters.tolerances import Tolerances
+from wm_drake.report.pareto.report import pareto_report
+from wm_drake.simulation.cases import Case, case_of
+from wm_drake.studies.pareto.problem import machine_designs
+from wm_drake.studies.pareto.study import run_designs
+from wm_drake.studies.pareto.tables import as_plain_data, front_table, write_tables
+from wm_drake.studies.tolerance.distributions import base_samples
+from wm_drake.studies.tolerance.variables import uncertain_machine
+
+SPRING = "spring_types.suspension.stiffness"
+FRICTION = "damper_types.friction.friction_force"
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return load_machine("reference")
+
+
+def task_of(**changes):
+    tree = {
+        "loads": ("middle", "counter"),
+        "variables": {"k": {"keys": (SPRING,), "low": "50 %", "high": "150 %"}},
+        "objectives": ({"quantity": "Dx"}, {"quantity": "Fx"}),
+    }
+    return DesignTask.model_validate(tree | changes)
+
+
+def designs_of(machine, task):
+    cases = [case_of(machine, load) for load in task.loads]
+    return machine_designs(machine, task, cases)
+
+
+def run_of(machine):
+    """Return a run whose displacement falls and whose force rises with the spring's stiffness.
+
+    The second load has twice the displacement and half the force of the first one.
+    """
+    nominal = machine.spring_types["suspension"].stiffness
+
+    def run(cases):
+        k = np.array([c.parameters.spring_types["suspension"].stiffness for c in cases]) / nominal
+        scale = np.array([2.0 if "counter" in c.name else 1.0 for c in cases])
+        d, f = 1e-3 * scale / k, 10.0 * k / scale
+        zeros = np.zeros((len(k), 3))
+        table = {
+            "detergent_displacement": (("run", "axis"), zeros + d[:, None]),
+            "gasket_force": (("run", "axis"), zeros + f[:, None]),
+            "gasket_moment": (("run", "axis"), zeros),
+            "diverged": ("run", np.full(len(k), "", dtype=object)),
+        }
+        return xr.Dataset(table)
+
+    return run
+
+
+def test_worst_mean_and_quantile_over_loads(machine):
+    goals = [{"quantity": "Dx", "over": over} for over in ("worst", "mean", "50 %")]
+    goals.append({"quantity": "Fx", "goal": "larger", "over": "worst"})
+    designs = designs_of(machine, task_of(objectives=tuple(goals)))
+    values, _ = designs.evaluate(np.array([[0.5], [1.0]]), run_of(machine))
+    assert values[0] == pytest.approx([2.0, 1.5, 1.5, 5.0])
+    assert values[1] == pytest.approx([2.0 / 1.5, 1.0, 1.0, 7.5])
+
+
+def test_bounds_in_percent_value_and_distance_give_the_same_machine(machine):
+    k = machine.spring_types["suspension"].stiffness
+    for low, high in (
+        ("90 %", "130 %"),
+        (f"{0.9 * k} N/m", f"{1.3 * k} N/m"),
+        (f"nominal - {0.1 * k} N/m", f"nominal + {0.3 * k} N/m"),
+    ):
+        variable = {"keys": (SPRING,), "low": low, "high": high}
+        designs = designs_of(machine, task_of(variables={"k": variable}))
+        assert designs.nominal() == pytest.approx([0.25])
+        found = designs.machine_at(np.array([0.5])).spring_types["suspension"].stiffness
+        assert found == pytest.approx(1.1 * k)
+
+
+def test_choice_sets_its_option(machine):
+    choices = {"damper": {"options": {"weak": {FRICTION: "20 N"}, "strong": {FRICTION: "60 N"}}}}
+    designs = designs_of(machine, task_of(choices=choices))
+    for place, force in ((0.0, 20.0), (0.49, 20.0), (0.51, 60.0), (1.0, 60.0)):
+        found = designs.machine_at(np.array([0.5, place]))
+        assert found.damper_types["friction"].friction_force == force
+
+
+def test_front_under_a_constraint_is_found(machine, tmp_path):
+    # Dx = 2 / k mm and Fx = 10 k N for k from 0.5 to 1.5; Dx at most 2.5 mm means k >= 0.8
+    task = task_of(constraints=({"quantity": "Dx", "at_most": "2.5 mm"},))
+    designs = designs_of(machine, task)
+    front = run_designs(designs, run_of(machine), evaluations=640, population=32, seed=0)
+    dx, fx = front.objectives.T
+    assert dx * fx == pytest.approx(20.0)  # 2/k mm times 10 k N
+    assert (dx.min(), dx.max()) == pytest.approx((2.0 / 1.5, 2.5), rel=0.01)
+    assert front.constraints[:, 0] == pytest.approx(dx)
+    assert front.nominal_objectives == pytest.approx([2.0, 10.0])
+    data = as_plain_data(front)
+    assert data["evaluations"] == 640
+    assert set(data["front"][0]) == {"objectives", "constraints", "variables"}
+    assert len(front_table(front)) == len(data["front"])
+    write_tables(front, tmp_path)
+    for name, number in front.chosen.items():
+        loaded = load_machine(tmp_path / f"machine_{name.replace(' ', '_')}.yaml")
+        wanted = front.machine(number).spring_types["suspension"].stiffness
+        assert loaded.spring_types["suspension"].stiffness == pytest.approx(wanted, rel=1e-12)
+    page = pareto_report(front, "about")
+    assert "compromise" in page
+    assert page.count("<circle") == len(front.objectives)
+
+
+def test_number_of_the_machine_is_an_objective(machine):
+    designs = designs_of(machine, task_of(objectives=({"quantity": SPRING, "goal": "smaller"},)))
+    values, _ = designs.evaluate(np.array([[0.0]]), run_of(machine))
+    k = machine.spring_types["suspension"].stiffness
+    assert values[0, 0] == pytest.approx(0.5e-3 * k)  # in N/mm
+
+
+def test_robust_front_keeps_its_promise_on_fresh_samples(machine):
+    tolerances = Tolerances.model_validate(
+        {
+            "load": "middle",
+            "quantities": {
+                "k": {
+                    "keys": (SPRING,),
+                    "distribution": "normal",
+                    "mean": "100 %",
+                    "deviation": "5 %",
+                }
+            },
+        }
+    )
+    case = Case("middle", machine.loads["middle"], machine.profile)
+    task = task_of(
+        loads=(),
+        robust={"tolerances": "mine", "samples": 256},
+        objectives=({"quantity": "Fx", "over": "95 %"}, {"quantity": "Dx", "over": "95 %"}),
+    )
+
+    def designs(seed):
+        return machine_designs(
+            machine,
+            task,
+            [case],
+            lambda changed: uncertain_machine(changed, tolerances, case),
+            base_samples(1, 256, seed)[0],
+        )
+
+    front = run_designs(designs(0), run_of(machine), evaluations=96, population=32, seed=0)
+    fresh, _ = designs(7).evaluate(front.found.designs, run_of(machine))
+    # Fx = 10 k N with k within 5 %: its 95 % quantile is 1 + 1.645 * 0.05 times the nominal one
+    k = front.designs.dimensions[0]
+    nominal = np.array([10.0 * k.number(float(x)) for (x,) in front.found.designs])
+    assert front.objectives[:, 0] == pytest.approx((1.0 + 1.645 * 0.05) * nominal, rel=2e-3)
+    assert fresh == pytest.approx(front.objectives, rel=5e-3)
+
+
+def test_failed_runs_are_not_on_the_front(machine):
+    plain = run_of(machine)
+
+    def run(cases):
+        cases = list(cases)
+        table = plain(cases)
+        k = np.array([c.parameters.spring_types["suspension"].stiffness for c in cases])
+        stiff = k > machine.spring_types["suspension"].stiffness
+        return table.assign(diverged=("run", np.where(stiff, "at 3 s", "").astype(object)))
+
+    front = run_designs(designs_of(machine, task_of()), run, evaluations=96, population=32, seed=0)
+    assert len(front.objectives)
+    assert (front.objectives[:, 1] <= 10.0 + 1e-9).all()
+
+
+def test_shipped_files_fit_the_reference_machine(machine):
+    for name in shipped_designs():
+        designs = designs_of(machine, load_design(name))
+        assert len(designs.dimensions) == 8
+        for corner in (0.0, 1.0):
+            designs.machine_at(np.full(8, corner))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"variables": {"k": {"keys": ("spring_types.x",), "low": "1 m", "high": "2 m"}}}, "x"),
+        ({"variables": {"k": {"keys": (SPRING,), "low": "90 %", "high": "1 N/mm"}}}, "forms"),
+        ({"variables": {"k": {"keys": (SPRING,), "low": "90 %", "high": "80 %"}}}, "below"),
+        ({"objectives": ({"quantity": "Dq"},)}, "no response 'Dq'"),
+        ({"objectives": ({"quantity": "D"},)}, "several responses"),
+        ({"constraints": ({"quantity": "Dx", "at_most": "2 N"},)}, "N"),
+        ({"choices": {"c": {"options": {"a": {FRICTION: "1 m"}, "b": {}}}}}, "option a"),
+    ],
+)
+def test_wrong_files_are_refused(machine, changes, message):
+    with pytest.raises(InputError, match=message):
+        designs_of(machine, task_of(**changes))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"variables": {}},
+        {"loads": ()},
+        {"objectives": ({"quantity": "Dx", "over": "often"},)},
+        {"constraints": ({"quantity": "Dx"},)},
+        {"loads": (), "robust": {"tolerances": "laundry", "samples": 100}},
+    ],
+)
+def test_incomplete_files_are_refused(changes):
+    with pytest.raises(ValueError, match=r"design|loads|over|at_least|power of two"):
+        task_of(**changes)

@@ -1,0 +1,226 @@
+"""Command `wm-drake study design`: search designs of a machine and print their Pareto front."""
+
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from wm_drake.cli.common import (
+    JsonOption,
+    MachineOption,
+    OutOption,
+    OverwriteOption,
+    SetOption,
+    cases_of,
+    check_buildable,
+    command_line,
+    load_parameters,
+)
+from wm_drake.cli.progress import progress_bar
+from wm_drake.cli.result_folder import Run, result_folder
+from wm_drake.cli.study.common import (
+    RUNS_KEPT,
+    ClusterOption,
+    ProfileOption,
+    ResumeOption,
+    WorkersOption,
+    batch_runner,
+    study_ledger,
+)
+from wm_drake.cli.terminal import Console, say
+from wm_drake.errors import InputError, Problem
+
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    import xarray as xr
+
+    from wm_drake.model.machine import Machine
+    from wm_drake.parameters import MachineParameters
+    from wm_drake.parameters.designs import DesignTask
+    from wm_drake.simulation.cases import Case
+    from wm_drake.studies.pareto.problem import MachineDesigns
+    from wm_drake.studies.pareto.study import ParetoFront
+
+DEFAULT_OUT = Path("wm-drake-design")
+
+
+def design(
+    file: Annotated[
+        str,
+        typer.Argument(help="Shipped design file (gasket), or a YAML file.", metavar="NAME|FILE"),
+    ] = "gasket",
+    machine: MachineOption = "reference",
+    evaluations: Annotated[
+        int, typer.Option(help="Number of designs to evaluate.", min=4, metavar="N")
+    ] = 2000,
+    population: Annotated[
+        int, typer.Option(help="Designs of a generation.", min=4, metavar="N")
+    ] = 64,
+    profile: ProfileOption = None,
+    seed: Annotated[int, typer.Option(help="Seed of all random numbers.", min=0)] = 0,
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
+    resume: ResumeOption = False,
+    out: OutOption = DEFAULT_OUT,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
+    sets: SetOption = None,
+) -> None:
+    """Find the designs of which no other is better in every objective."""
+    begin = time.perf_counter()
+    from wm_drake.parameters.designs import load_design
+    from wm_drake.studies.pareto.search import check_search
+    from wm_drake.studies.pareto.study import run_designs
+
+    check_search(evaluations, population)
+    parameters, task = load_parameters(machine, sets), load_design(file)
+    check_buildable(machine, parameters)
+    built, designs = _designs(file, parameters, task, profile, seed)
+    measures = _measures(designs)
+    identity = _identity(designs, task, measures, seed)
+    writer = Run("study design", overwrite, identity)
+    with study_ledger(out, writer, identity, resume) as ledger:
+        with (
+            batch_runner(built, ledger, measures, workers, cluster) as batch,
+            progress_bar(evaluations * designs.scenarios) as progress,
+        ):
+            front = run_designs(
+                designs,
+                _counted(batch, progress),
+                evaluations=evaluations,
+                population=population,
+                seed=seed,
+            )
+        ledger.mark_finished()
+        with result_folder(out, writer, RUNS_KEPT) as folder:
+            _write(front, task, folder, time.perf_counter() - begin)
+    _print_result(front, out, as_json, time.perf_counter() - begin)
+
+
+def _counted(
+    batch: "Callable[[Iterable[Case], Callable[[int], None]], xr.Dataset]",
+    progress: Callable[[int], None],
+) -> "Callable[[Iterable[Case]], xr.Dataset]":
+    """Return the function that runs cases, which counts the runs of all its calls."""
+    before = 0
+
+    def run(cases: "Iterable[Case]") -> "xr.Dataset":
+        nonlocal before
+        table = batch(cases, lambda done: progress(before + done))
+        before += table.sizes["run"]
+        return table
+
+    return run
+
+
+def _designs(
+    file: str,
+    parameters: "MachineParameters",
+    task: "DesignTask",
+    profile: Path | None,
+    seed: int,
+) -> "tuple[Machine, MachineDesigns]":
+    """Return the built machine and its designs."""
+    from wm_drake.model.bodies import with_sdf_values
+    from wm_drake.model.build import build_machine
+    from wm_drake.parameters.designs import design_path
+    from wm_drake.parameters.tolerances import load_tolerances
+    from wm_drake.studies.pareto.problem import machine_designs
+    from wm_drake.studies.tolerance.distributions import base_samples
+    from wm_drake.studies.tolerance.variables import uncertain_machine
+
+    tolerances = load_tolerances(task.robust.tolerances) if task.robust else None
+    keys = [key for variable in task.variables.values() for key in variable.keys]
+    keys += [
+        k for choice in task.choices.values() for values in choice.options.values() for k in values
+    ]
+    keys += [goal.quantity for goal in task.objectives]
+    keys += [goal.quantity for goal in task.constraints]
+    if tolerances:
+        keys += [key for quantity in tolerances.quantities.values() for key in quantity.keys]
+    try:
+        own = [key for key in keys if key.startswith(("frames.", "bodies."))]
+        full = with_sdf_values(build_machine(parameters).plant, parameters, own)
+        if tolerances is None:
+            cases = cases_of(full, list(task.loads), gasket=True, profile=profile)
+            return build_machine(full), machine_designs(full, task, cases)
+        load = tolerances.load or next(iter(full.loads))
+        (case,) = cases_of(full, [load], gasket=True, profile=profile)
+
+        def scattered(changed: "MachineParameters") -> "object":
+            return uncertain_machine(changed, tolerances, case)
+
+        uncertain = scattered(full)
+        assert task.robust is not None
+        scores, _ = base_samples(uncertain.joint.size, task.robust.samples, seed)  # type: ignore[attr-defined]
+        designs = machine_designs(full, task, [case], scattered, scores)  # type: ignore[arg-type]
+        return build_machine(uncertain.parameters), designs  # type: ignore[attr-defined]
+    except InputError as error:
+        path = str(design_path(file))
+        raise InputError(
+            Problem(": ".join(filter(None, [path, p.where])), p.key, p.message)
+            for p in error.problems
+        ) from None
+
+
+def _measures(designs: "MachineDesigns") -> tuple[str, ...]:
+    from wm_drake.batch import MEASURES
+
+    needed = {response.measure for response in designs.responses} or {"extremes"}
+    return tuple(name for name in MEASURES if name in needed)
+
+
+def _identity(
+    designs: "MachineDesigns", task: "DesignTask", measures: tuple[str, ...], seed: int
+) -> dict[str, str]:
+    """Return the properties that distinguish this study from others, for its ledger.
+
+    The number of evaluations is not among them: a longer search continues a shorter one.
+    """
+    from wm_drake.batch import sources_version
+    from wm_drake.batch.ledger import key_of
+
+    machine = designs.parameters
+    numbers = machine.model_dump_json(exclude={"name", "about", "sources", "measured"})
+    return {
+        "study": "design",
+        "machine": f"{machine.name} {key_of(numbers=numbers)[:8]}",
+        "design": key_of(task=task)[:8],
+        "measures": ", ".join(measures),
+        "seed": str(seed),
+        "sources": sources_version(),
+    }
+
+
+def _write(front: "ParetoFront", task: "DesignTask", folder: Path, wall_s: float) -> None:
+    from wm_drake.report.pareto.report import pareto_report
+    from wm_drake.studies.pareto.tables import write_tables
+
+    write_tables(front, folder)
+    page = pareto_report(front, task.about, command_line(), wall_s)
+    (folder / "report.html").write_text(page, encoding="utf-8")
+
+
+def _print_result(front: "ParetoFront", out: Path, as_json: bool, wall_s: float) -> None:
+    from rich.table import Table
+
+    from wm_drake.report.pareto.report import summary
+    from wm_drake.studies.gasket.tables import to_json
+    from wm_drake.studies.pareto.tables import as_plain_data, front_table
+
+    if as_json:
+        typer.echo(to_json(as_plain_data(front) | {"wall_s": wall_s}))
+        return
+    rows = front_table(front)
+    table = Table(title="Chosen designs of the front")
+    table.add_column("quantity")
+    for name in front.chosen:
+        table.add_column(name, justify="right")
+    for column in rows.columns:
+        cells = [rows[column].iloc[number] for number in front.chosen.values()]
+        texts = [f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells]
+        table.add_row(str(column), *texts)
+    Console().print(table)
+    say(summary(front))
+    say(f"Results in {out}: report.html, front.csv, machine files")

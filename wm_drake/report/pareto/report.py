@@ -1,0 +1,159 @@
+"""Report of the design study: front with designs to pick, chosen designs, history, run details."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, WIDTH, style_axes
+from wm_drake.report.formatting import MISSING, significant
+from wm_drake.report.page import Picture, picture, render
+from wm_drake.report.tables import Group, Table, line
+from wm_drake.studies.pareto.study import COMPROMISE, ParetoFront
+from wm_drake.studies.pareto.tables import machine_file_name
+
+DIGITS = 4
+"""Significant digits of a number on the page."""
+
+LEFT, RIGHT, TOP, BOTTOM = 80.0, 700.0, 20.0, 320.0
+"""Edges of the front that is drawn for picking. [px]"""
+
+
+def pareto_report(front: ParetoFront, about: str, command: str = "", wall_s: float = 0.0) -> str:
+    """Return the report as text of one self-contained HTML file.
+
+    Args:
+        front: Result of the study.
+        about: Description in the design file.
+        command: Command line of the study, shown on the page.
+        wall_s: Duration of the study. [s]
+    """
+    designs = front.designs
+    facts = [
+        ("Machine", designs.parameters.name),
+        ("Designs", f"{front.found.evaluations}, each {designs.scenarios} runs, {wall_s:.0f} s"),
+        ("Hypervolume", significant(front.found.hypervolume, DIGITS)),
+        ("Command", command),
+    ]
+    has_front = bool(len(front.objectives))
+    return render(
+        "pareto/page.html",
+        title=f"Designs of machine {designs.parameters.name}",
+        about=about,
+        summary=summary(front),
+        warnings=[] if has_front else ["No design meets all constraints."],
+        plot=_plot(front) if has_front and len(designs.objectives) > 1 else None,
+        rows=_rows(front),
+        chosen=_chosen(front) if has_front else None,
+        history=_history(front),
+        facts=[(word, text) for word, text in facts if text],
+    )
+
+
+def summary(front: ParetoFront) -> str:
+    """Return the findings as one paragraph."""
+    designs, count = front.designs, len(front.objectives)
+    if not count:
+        return f"None of {front.found.evaluations} designs meets all constraints."
+    goals = [g.given.quantity for g in designs.objectives]
+    text = f"{front.found.evaluations} designs give a front of {count} for {' and '.join(goals)}."
+    parts = []
+    number = front.chosen.get(COMPROMISE, next(iter(front.chosen.values())))
+    for goal, value, own in zip(
+        designs.objectives, front.objectives[number], front.nominal_objectives, strict=True
+    ):
+        unit = goal.unit.shown.replace("*", " ")
+        parts.append(f"{goal.given.quantity} {_text(value)} {unit} in place of {_text(own)} {unit}")
+    name = "The compromise" if COMPROMISE in front.chosen else "The best design"
+    return f"{text} {name} has {' and '.join(parts)} of the machine itself."
+
+
+def _text(value: float) -> str:
+    return significant(float(value), DIGITS) if np.isfinite(value) else MISSING
+
+
+def _plot(front: ParetoFront) -> dict[str, Any]:
+    """Return positions of the designs in a plot of the first two objectives, and its ticks."""
+    designs = front.designs
+    names = [f"{g.given.quantity}, {g.unit.shown.replace('*', ' ')}" for g in designs.objectives]
+    both = np.vstack([front.objectives[:, :2], front.nominal_objectives[None, :2]])
+    both = both[np.isfinite(both).all(axis=1)]
+    low, high = both.min(axis=0), both.max(axis=0)
+    margin = 0.05 * np.where(high > low, high - low, 1.0)
+    low, high = low - margin, high + margin
+
+    def at(point: Any) -> tuple[float, float]:
+        x, y = (np.asarray(point[:2]) - low) / (high - low)
+        return round(LEFT + x * (RIGHT - LEFT), 1), round(BOTTOM - y * (BOTTOM - TOP), 1)
+
+    fractions = np.linspace(0.0, 1.0, 5)
+    return {
+        "points": [at(point) for point in front.objectives],
+        "nominal": at(front.nominal_objectives)
+        if np.isfinite(front.nominal_objectives).all()
+        else None,
+        "chosen": sorted(set(front.chosen.values())),
+        "picked": front.chosen[COMPROMISE],
+        "x_ticks": [(at(p)[0], _text3(p[0])) for p in low + fractions[:, None] * (high - low)],
+        "y_ticks": [(at(p)[1], _text3(p[1])) for p in low + fractions[:, None] * (high - low)],
+        "names": names[:2],
+        "edges": (LEFT, RIGHT, TOP, BOTTOM),
+    }
+
+
+def _text3(value: float) -> str:
+    return significant(float(value), 3)
+
+
+def _rows(front: ParetoFront) -> list[list[tuple[str, str, str]]]:
+    """Return kind, name and value of each number of each design, for the picked one."""
+    designs, found = front.designs, []
+    for number, design in enumerate(front.found.designs):
+        rows = [
+            ("objective", g.given.quantity, f"{_text(v)} {g.unit.shown.replace('*', ' ')}")
+            for g, v in zip(designs.objectives, front.objectives[number], strict=True)
+        ]
+        for goal, value in zip(designs.constraints, front.constraints[number], strict=True):
+            unit = goal.unit.shown.replace("*", " ")
+            side = "at most" if goal.is_small_better else "at least"
+            margin = abs(float(value) - goal.limit)
+            text = f"{_text(value)} {unit}, {side} {_text(goal.limit)} {unit}"
+            text += f": margin {_text(margin)} {unit}"
+            rows.append(("constraint", goal.given.quantity, text))
+        for dimension, place in zip(designs.dimensions, design, strict=True):
+            value, unit = dimension.shown(float(place))
+            shown = value if isinstance(value, str) else _text(value)
+            rows.append(("variable", dimension.name, f"{shown} {unit.replace('*', ' ')}"))
+        found.append(rows)
+    return found
+
+
+def _chosen(front: ParetoFront) -> Table:
+    rows = _rows(front)
+    groups: list[Group] = []
+    for index, (kind, name, _) in enumerate(rows[0]):
+        cells = [rows[number][index][2].split(", at")[0] for number in front.chosen.values()]
+        groups.append(line(name, [kind, *cells]))
+    groups.append(line("machine file", ["", *map(machine_file_name, front.chosen)]))
+    caption = (
+        "Chosen designs. The compromise is nearest to the best of all objectives, each scaled to "
+        "the range of the front. Each has a machine file for --machine."
+    )
+    return Table(caption, ("name", "kind", *front.chosen), tuple(groups), text_columns=2)
+
+
+def _history(front: ParetoFront) -> Picture:
+    figure = Figure(figsize=(WIDTH, 3.0), layout="constrained")
+    axes = figure.add_subplot()
+    evaluations, volume = np.array(front.found.history).T
+    axes.plot(evaluations, volume, color=OURS, linewidth=1.6)
+    axes.plot(evaluations[-1], volume[-1], "o", color=MEASURED, markeredgecolor=MARK)
+    axes.set_xlabel("evaluated designs", fontsize=9.5)
+    axes.set_ylabel("hypervolume", fontsize=9.5)
+    axes.grid(color=GRID)
+    style_axes(axes)
+    caption = (
+        "Hypervolume of the front after each generation. Objectives are scaled so that the first "
+        "population reaches from 0 to 1. A level curve means that more evaluations find little."
+    )
+    return picture(figure, "Hypervolume over the number of evaluated designs.", caption)

@@ -1,0 +1,331 @@
+"""Designs of a machine as points of the unit cube, and their objectives and constraints."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+import xarray as xr
+
+from wm_drake.errors import InputError, Problem, input_error
+from wm_drake.parameters import ForceTable, MachineParameters, TorqueTable, quantities, with_values
+from wm_drake.parameters.designs import Constraint, DesignTask, DesignVariable, Objective
+from wm_drake.parameters.factors import nominal_at, scaled_table, value_at
+from wm_drake.parameters.tolerances import Spread, fraction
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
+from wm_drake.simulation.cases import Case
+from wm_drake.studies.gasket.responses import Response, chosen_responses
+from wm_drake.studies.tolerance.study import in_unit_of
+from wm_drake.studies.tolerance.variables import DISTANCE, PERCENT, UncertainMachine, marginal_of
+
+Run: TypeAlias = Callable[[Iterable[Case]], xr.Dataset]
+"""Function that runs cases and returns their table."""
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A variable, or a choice among options.
+
+    Attributes:
+        name: Name in the design file.
+        keys: Key paths that a variable sets.
+        form: PERCENT, VALUE or DISTANCE of a variable.
+        low, high: Bounds of a variable. [1 for PERCENT, else SI]
+        unit: Unit of a variable; None if it has none.
+        options: Values by key path, by name of the option; empty for a variable.
+    """
+
+    name: str
+    keys: tuple[str, ...]
+    form: str
+    low: float
+    high: float
+    unit: Unit | None
+    options: dict[str, dict[str, str]]
+
+    def option(self, place: float) -> str:
+        """Return the option at a place from 0 to 1."""
+        names = list(self.options)
+        return names[min(int(place * len(names)), len(names) - 1)]
+
+    def number(self, place: float) -> float:
+        """Return the number of a variable at a place from 0 to 1. [1 for PERCENT, else SI]"""
+        return self.low + place * (self.high - self.low)
+
+    def place(self, number: float) -> float:
+        """Return the place of a number, moved to the nearest bound if it is outside."""
+        return float(np.clip((number - self.low) / (self.high - self.low), 0.0, 1.0))
+
+    def shown(self, place: float) -> tuple[float | str, str]:
+        """Return value and unit for reading."""
+        if self.options:
+            return self.option(place), ""
+        if self.form == PERCENT:
+            return 100.0 * self.number(place), "%"
+        unit = self.unit
+        number = self.number(place)
+        return (number, "") if unit is None else (unit.from_si(number), unit.shown)
+
+
+@dataclass(frozen=True)
+class Goal:
+    """An objective or a constraint with what it is computed from.
+
+    Attributes:
+        given: As in the design file.
+        response: Response of the runs; None if it is a number of the machine.
+        unit: Unit for reading.
+        limit: Limit of a constraint. [unit for reading] NaN for an objective.
+    """
+
+    given: Objective | Constraint
+    response: Response | None
+    unit: Unit
+    limit: float = float("nan")
+
+    @property
+    def key(self) -> str:
+        """Name with unit, such as Dx_mm."""
+        return f"{self.given.quantity}_{self.unit.shown.replace('*', '')}"
+
+    @property
+    def is_small_better(self) -> bool:
+        """Whether smaller values are better."""
+        if isinstance(self.given, Objective):
+            return self.given.goal == "smaller"
+        return self.given.at_most is not None
+
+    def cost(self, value: FloatArray) -> FloatArray:
+        """Return what is to be small, or at most 0 for a constraint."""
+        if isinstance(self.given, Objective):
+            return value if self.is_small_better else -value
+        return value - self.limit if self.is_small_better else self.limit - value
+
+    def over(self, values: FloatArray) -> FloatArray:
+        """Return one value for each design from those of its scenarios. (designs, scenarios)"""
+        how = self.given.over
+        if how == "mean":
+            return np.asarray(values.mean(axis=1))
+        share = 1.0 if how == "worst" else fraction(how, "over")
+        return np.quantile(values, share if self.is_small_better else 1.0 - share, axis=1)
+
+
+@dataclass(frozen=True)
+class MachineDesigns:
+    """The designs of a machine.
+
+    Attributes:
+        parameters: The machine.
+        dimensions: What the search may change.
+        objectives, constraints: Goals.
+        cases: One case for each load, without parameters; empty for a robust design.
+        scattered: Returns the uncertain machine of some parameters; None for a nominal design.
+        scores: Samples of a robust design, the same for every design.
+    """
+
+    parameters: MachineParameters
+    dimensions: tuple[Dimension, ...]
+    objectives: tuple[Goal, ...]
+    constraints: tuple[Goal, ...]
+    cases: tuple[Case, ...]
+    scattered: Callable[[MachineParameters], UncertainMachine] | None = None
+    scores: FloatArray | None = None
+
+    @property
+    def responses(self) -> tuple[Response, ...]:
+        """Responses that the goals need."""
+        found = [g.response for g in (*self.objectives, *self.constraints) if g.response]
+        return tuple(dict.fromkeys(found))
+
+    @property
+    def scenarios(self) -> int:
+        """Number of runs of each design."""
+        return len(self.cases) if self.scores is None else len(self.scores)
+
+    def machine_at(self, design: FloatArray) -> MachineParameters:
+        """Return the machine of a design.
+
+        Raises:
+            InputError: the design is not a machine.
+        """
+        changes: dict[str, Any] = {}
+        for dimension, place in zip(self.dimensions, map(float, design), strict=True):
+            if dimension.options:
+                changes |= dimension.options[dimension.option(place)]
+                continue
+            for key in dimension.keys:
+                nominal, number = value_at(self.parameters, key), dimension.number(place)
+                if dimension.form == PERCENT and isinstance(nominal, ForceTable | TorqueTable):
+                    changes[key] = scaled_table(nominal, number)
+                elif dimension.form == PERCENT:
+                    changes[key] = nominal * number
+                else:
+                    changes[key] = nominal + number if dimension.form == DISTANCE else number
+        return with_values(self.parameters, changes)
+
+    def nominal(self) -> FloatArray:
+        """Return the design nearest to the machine itself; choices have their first option."""
+        places = []
+        for dimension in self.dimensions:
+            if dimension.options:
+                places.append(0.5 / len(dimension.options))
+            elif dimension.form == PERCENT:
+                places.append(dimension.place(1.0))
+            elif dimension.form == DISTANCE:
+                places.append(dimension.place(0.0))
+            else:
+                places.append(dimension.place(float(value_at(self.parameters, dimension.keys[0]))))
+        return np.array(places)
+
+    def runs_of(self, parameters: MachineParameters, name: str) -> list[Case]:
+        """Return the cases of a design."""
+        if self.scattered is not None and self.scores is not None:
+            cases = self.scattered(parameters).cases(self.scores)
+            return [replace(case, name=f"{name}, {case.name}") for case in cases]
+        found = []
+        for case in self.cases:
+            # a variable may be a mass of one of the machine's own loads
+            is_own = self.parameters.loads.get(case.name) == case.load
+            load = parameters.loads[case.name] if is_own else case.load
+            own = replace(case, name=f"{name}, {case.name}", load=load, parameters=parameters)
+            found.append(own)
+        return found
+
+    def evaluate(self, designs: FloatArray, run: Run) -> tuple[FloatArray, FloatArray]:
+        """Return values of all objectives, then of all constraints, in units for reading.
+
+        Args:
+            designs: (n, dimensions) in [0, 1]
+            run: Function that runs cases.
+
+        Returns:
+            (n, objectives) and (n, constraints); NaN for a design of which a run failed.
+        """
+        machines = [self.machine_at(design) for design in designs]
+        table = run(
+            [
+                case
+                for number, machine in enumerate(machines, start=1)
+                for case in self.runs_of(machine, f"design {number}")
+            ]
+        )
+        failed = (table.diverged.values != "").reshape(len(designs), -1).any(axis=1)
+        values = []
+        for goal in (*self.objectives, *self.constraints):
+            if goal.response is None:
+                own = [goal.unit.from_si(value_at(m, goal.given.quantity)) for m in machines]
+                values.append(np.array(own))
+            else:
+                values.append(goal.over(goal.response.values(table).reshape(len(designs), -1)))
+        columns = np.column_stack(values)
+        columns[failed] = np.nan
+        return columns[:, : len(self.objectives)], columns[:, len(self.objectives) :]
+
+    def costs(self, designs: FloatArray, run: Run) -> tuple[FloatArray, FloatArray]:
+        """Return what the search makes small, and constraints that are met at 0 and below."""
+        objectives, constraints = self.evaluate(designs, run)
+        f = [g.cost(column) for g, column in zip(self.objectives, objectives.T, strict=True)]
+        g = [c.cost(column) for c, column in zip(self.constraints, constraints.T, strict=True)]
+        return np.column_stack(f), np.column_stack(g) if g else np.empty((len(designs), 0))
+
+
+def machine_designs(
+    parameters: MachineParameters,
+    task: DesignTask,
+    cases: Sequence[Case],
+    scattered: Callable[[MachineParameters], UncertainMachine] | None = None,
+    scores: FloatArray | None = None,
+) -> MachineDesigns:
+    """Return the designs of a machine that a file describes.
+
+    Args:
+        parameters: The machine, with the numbers of the SDF that the file names
+            (`wm_drake.model.bodies.with_sdf_values`).
+        task: The file.
+        cases: One case for each load; one for the profile of a robust design.
+        scattered: As in `MachineDesigns`.
+        scores: As in `MachineDesigns`.
+
+    Raises:
+        InputError: the machine does not have a key or a response, or a bound is wrong.
+    """
+    dimensions, problems = _dimensions(parameters, task)
+    goals: dict[str, list[Goal]] = {"objectives": [], "constraints": []}
+    known = {key: (value, unit) for key, value, unit in quantities(parameters)}
+    for kind, found in goals.items():
+        for place, given in enumerate(getattr(task, kind)):
+            try:
+                found.append(_goal(parameters, cases[0], given, known))
+            except InputError as error:
+                problems += [Problem("", f"{kind}.{place}", p.message) for p in error.problems]
+    if problems:
+        raise InputError(problems)
+    return MachineDesigns(
+        parameters,
+        tuple(dimensions),
+        tuple(goals["objectives"]),
+        tuple(goals["constraints"]),
+        () if scattered else tuple(cases),
+        scattered,
+        scores,
+    )
+
+
+def _dimensions(
+    parameters: MachineParameters, task: DesignTask
+) -> tuple[list[Dimension], list[Problem]]:
+    """Return the variables and choices of a file, and what is wrong with them."""
+    dimensions, problems = list[Dimension](), list[Problem]()
+    for name, variable in task.variables.items():
+        try:
+            dimensions.append(_variable(parameters, name, variable))
+        except InputError as error:
+            problems += [Problem(f"variable {name}", p.key, p.message) for p in error.problems]
+    for name, choice in task.choices.items():
+        dimensions.append(Dimension(name, (), "", 0.0, 1.0, None, choice.options))
+        for option, values in choice.options.items():
+            try:
+                with_values(parameters, values)
+            except InputError as error:
+                where = f"choice {name}, option {option}"
+                problems += [Problem(where, p.key, p.message) for p in error.problems]
+    return dimensions, problems
+
+
+def _variable(parameters: MachineParameters, name: str, variable: DesignVariable) -> Dimension:
+    known = {key: (value, unit) for key, value, unit in quantities(parameters)}
+    spread = Spread(distribution="uniform", low=variable.low, high=variable.high)
+    units = []
+    for key in variable.keys:
+        number, unit = nominal_at(parameters, known, key)
+        form, marginal = marginal_of(spread, unit, number, key)
+        is_table = isinstance(value_at(parameters, key), ForceTable | TorqueTable)
+        if is_table and form != PERCENT:
+            raise input_error("is a table; give its bounds in percent", key=key)
+        units.append(unit)
+    low, high = (float(v) for v in marginal.frozen.support())
+    return Dimension(name, variable.keys, form, low, high, units[0], {})
+
+
+def _goal(
+    parameters: MachineParameters,
+    case: Case,
+    given: Objective | Constraint,
+    known: dict[str, tuple[Any, Unit]],
+) -> Goal:
+    limit_text = None if isinstance(given, Objective) else given.at_least or given.at_most
+    response, unit = None, Unit("", "")
+    if given.quantity in known:
+        value, unit = known[given.quantity]
+        if not isinstance(value, float):
+            raise input_error(f"'{given.quantity}' is not one number")
+    else:
+        chosen = chosen_responses(parameters, case.profile, [given.quantity])
+        if len(chosen) != 1:
+            names = ", ".join(r.name for r in chosen[:8])
+            raise input_error(f"'{given.quantity}' is several responses; name one of {names}")
+        (response,) = chosen
+        unit = response.unit
+    limit = in_unit_of(limit_text, unit) if limit_text is not None else float("nan")
+    return Goal(given, response, unit, limit)

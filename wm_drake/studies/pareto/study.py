@@ -1,0 +1,105 @@
+"""The design study: search, front in units for reading, chosen designs, check of robust designs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.pareto.problem import Goal, MachineDesigns, Run
+from wm_drake.studies.pareto.search import Found, search_front
+
+COMPROMISE = "compromise"
+"""Name of the chosen design that is nearest to the best of all objectives."""
+
+
+@dataclass(frozen=True)
+class ParetoFront:
+    """Result of a design study.
+
+    Attributes:
+        designs: The designs that were searched.
+        found: Result of the search.
+        objectives, constraints: Values of the front, in units for reading. (n, m) and (n, k)
+        nominal_objectives, nominal_constraints: Those of the machine itself, moved into the
+            bounds. (m,) and (k,)
+        chosen: Numbers of chosen designs, from 0, by name: best Dx, ..., compromise.
+    """
+
+    designs: MachineDesigns
+    found: Found
+    objectives: FloatArray
+    constraints: FloatArray
+    nominal_objectives: FloatArray
+    nominal_constraints: FloatArray
+    chosen: dict[str, int]
+
+    def machine(self, number: int) -> MachineParameters:
+        """Return the machine of a design of the front."""
+        return self.designs.machine_at(self.found.designs[number])
+
+
+def run_designs(
+    designs: MachineDesigns,
+    run: Run,
+    *,
+    evaluations: int,
+    population: int,
+    seed: int,
+    generation: Callable[[int], None] = lambda done: None,
+) -> ParetoFront:
+    """Search the Pareto front of the designs of a machine.
+
+    Args:
+        designs: The designs.
+        run: Function that runs cases.
+        evaluations, population, seed, generation: As of `search_front`.
+    """
+    found = search_front(
+        lambda x: designs.costs(x, run),
+        designs.nominal(),
+        len(designs.objectives),
+        len(designs.constraints),
+        evaluations=evaluations,
+        population=population,
+        seed=seed,
+        generation=generation,
+    )
+    own = designs.evaluate(designs.nominal()[None], run)
+    return ParetoFront(
+        designs,
+        found,
+        _values(designs.objectives, found.objectives),
+        _values(designs.constraints, found.constraints),
+        own[0][0],
+        own[1][0],
+        chosen_designs(designs.objectives, found.objectives),
+    )
+
+
+def chosen_designs(goals: tuple[Goal, ...], costs: FloatArray) -> dict[str, int]:
+    """Return the best design of each objective, and a compromise, by name.
+
+    The compromise has the smallest distance to the best of all objectives, which are scaled to the
+    range of the front.
+    """
+    if not len(costs):
+        return {}
+    found = {
+        f"best {g.given.quantity}": int(np.argmin(c)) for g, c in zip(goals, costs.T, strict=True)
+    }
+    if len(goals) > 1:
+        low, high = costs.min(axis=0), costs.max(axis=0)
+        scaled = (costs - low) / np.where(high > low, high - low, 1.0)
+        found[COMPROMISE] = int(np.argmin(np.linalg.norm(scaled, axis=1)))
+    return found
+
+
+def _values(goals: tuple[Goal, ...], costs: FloatArray) -> FloatArray:
+    """Return values in units for reading from what the search made small."""
+    columns = []
+    for goal, column in zip(goals, costs.T, strict=True):
+        signed = column if goal.is_small_better else -column
+        columns.append(signed if np.isnan(goal.limit) else signed + goal.limit)
+    return np.column_stack(columns) if columns else np.empty((len(costs), 0))
