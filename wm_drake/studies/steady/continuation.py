@@ -185,13 +185,15 @@ class _Metric:
         at = balance.linearised(coefficients, speed)
         if before is None:
             along = -np.linalg.solve(at.matrix, at.by_speed.ravel()).reshape(coefficients.shape)
-            return _Place(coefficients, speed, *self.unit(np.asarray(way * along, float), way))
+            return _Place(
+                coefficients, speed, *self.unit(np.asarray(way * along, dtype=np.float64), way)
+            )
         matrix = _bordered(at.matrix, at.by_speed, self.row(before.along, before.speed_along))
         right = np.zeros(len(matrix))
         right[-1] = 1.0
         solved = np.linalg.solve(matrix, right)
-        along = np.asarray(solved[:-1].reshape(coefficients.shape), float)
-        return _Place(coefficients, speed, *self.unit(along, float(solved[-1])))
+        ahead = np.asarray(solved[:-1].reshape(coefficients.shape), dtype=np.float64)
+        return _Place(coefficients, speed, *self.unit(ahead, float(solved[-1])))
 
 
 def _bordered(matrix: FloatArray, by_speed: FloatArray, row: FloatArray) -> FloatArray:
