@@ -240,7 +240,7 @@ class Runner:
     def _contacts(self, item: WorkItem, schedule: Schedule, run: "_Run") -> Iterable[FloatArray]:
         gap, scene = self._smallest_gap(item, schedule, run), self._scene()
         pairs = scene.pair_names()
-        touching = np.full(len(pairs), np.nan)
+        touching: FloatArray = np.full(len(pairs), np.nan)
         if gap is None:
             return [np.array(np.nan), touching]
         if gap.distance <= 0.0:

@@ -109,6 +109,14 @@ CutoffOption = Annotated[
         metavar="FREQUENCY",
     ),
 ]
+ChannelsOption = Annotated[
+    str | None,
+    typer.Option(
+        "--channels",
+        help="Names in the files: 'displacement=Pos 1,force=Load' (also time, angle, moment).",
+        metavar="WORD=NAME,...",
+    ),
+]
 KnotsOption = Annotated[
     int, typer.Option("--knots", help="Points of a table on each side of zero.", min=1, max=12)
 ]
@@ -129,6 +137,7 @@ class _Asked:
     sets: list[str] | None
     validate: list[Path] = field(default_factory=list)
     cutoff: str | None = None
+    channels: str | None = None
 
 
 @app.command("damper", cls=ValidatingCommand)
@@ -144,6 +153,7 @@ def identify_damper(
     fix: FixOption = None,
     units: UnitsOption = None,
     cutoff: CutoffOption = None,
+    channels: ChannelsOption = None,
     knots: KnotsOption = 5,
     seed: SeedOption = 0,
     machine: MachineOption = "reference",
@@ -163,7 +173,7 @@ def identify_damper(
     target = target_of("damper", machine, name, component, sets)
     own = str(target.component.parameters.law)  # type: ignore[union-attr]
     asked = _Asked(
-        files, units, method, seed, out, overwrite, as_json, sets, validate or [], cutoff
+        files, units, method, seed, out, overwrite, as_json, sets, validate or [], cutoff, channels
     )
     laws, ranges, fixed = _laws(law or own, ""), _ranges(bounds), _single(fix, "--fix")
     motions = _motions(asked, asked.files, rotates=False)
@@ -191,6 +201,7 @@ def _axis_command(kind: str) -> Callable[..., None]:
         fix: FixOption = None,
         units: UnitsOption = None,
         cutoff: CutoffOption = None,
+        channels: ChannelsOption = None,
         knots: KnotsOption = 5,
         seed: SeedOption = 0,
         machine: MachineOption = "reference",
@@ -208,12 +219,24 @@ def _axis_command(kind: str) -> Callable[..., None]:
         if static:
             from wm_drake.cli.static_tests import run_static
 
-            run_static(kind, files, axis, units, knots, target, out, overwrite, as_json, sets)
+            run_static(
+                kind, files, axis, units, channels, knots, target, out, overwrite, as_json, sets
+            )
             return
         if axis is None:
             raise input_error("is needed, for example --axis radial", where="--axis")
         asked = _Asked(
-            files, units, method, seed, out, overwrite, as_json, sets, validate or [], cutoff
+            files,
+            units,
+            method,
+            seed,
+            out,
+            overwrite,
+            as_json,
+            sets,
+            validate or [],
+            cutoff,
+            channels,
         )
         axes = axes_of(axis)
         radius = quantities_of(arm, Unit("m", "mm"), "--arm")[0] if arm else 0.0
@@ -358,7 +381,7 @@ def _motions(asked: _Asked, files: list[Path], *, rotates: bool) -> "list[Measur
         cutoff = quantities_of(asked.cutoff, Unit("Hz", "Hz"), "--cutoff")[0]
         if not cutoff > 0.0:
             raise input_error(f"is {cutoff:g} Hz; allowed is > 0", where="--cutoff")
-    loops = read_loops(existing_files(files), units)
+    loops = read_loops(existing_files(files), units, channels_of(asked.channels))
     if loops[0].rotates != rotates:
         holds, needs = ("angles and moments", "displacements and forces")[
             :: 1 if loops[0].rotates else -1
@@ -385,6 +408,23 @@ def units_of(text: str | None) -> tuple[str, str, str] | None:
             f"'{text}' is not three units; write for example 's,mm,N'", where="--units"
         )
     return (parts[0], parts[1], parts[2])
+
+
+CHANNEL_WORDS = ("time", "displacement", "angle", "force", "moment")
+
+
+def channels_of(text: str | None) -> dict[str, str]:
+    """Return the names of the channels of the option `--channels`, by word."""
+    found = {}
+    for part in text.split(",") if text else []:
+        word, separator, name = (piece.strip() for piece in part.partition("="))
+        if not (separator and name and word in CHANNEL_WORDS):
+            raise input_error(
+                f"'{part.strip()}' is not WORD=NAME; words are {', '.join(CHANNEL_WORDS)}",
+                where="--channels",
+            )
+        found[word] = name
+    return found
 
 
 def _kept_fields(

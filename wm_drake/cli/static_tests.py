@@ -21,6 +21,7 @@ def run_static(
     files: list[Path],
     axis: str | None,
     units: str | None,
+    channels: str | None,
     knots: int,
     target: Target,
     out: Path,
@@ -34,7 +35,7 @@ def run_static(
         kind: bushing or gasket.
         files: AXIS=FILE each, or all of one axis.
         axis: That axis.
-        units, knots, out, overwrite, as_json, sets: Options of the command.
+        units, channels, knots, out, overwrite, as_json, sets: Options of the command.
         target: Component whose tables are sought.
     """
     from wm_drake.report.identify.static import static_report, static_table
@@ -43,7 +44,8 @@ def run_static(
     by_axis = _files_by_axis(files, axis)
     with interruptible(), result_folder(out, Run("identify", overwrite)) as folder:
         curves = [
-            static_curve(axes[0], _loops(paths, units, axes[0])) for axes, paths in by_axis.items()
+            static_curve(axes[0], _loops(paths, units, channels, axes[0]))
+            for axes, paths in by_axis.items()
         ]
         entries = {}
         for axes, curve in zip(by_axis, curves, strict=True):
@@ -67,7 +69,11 @@ def run_static(
         found = {"component": target.component.name, "axes": [c.as_dict() for c in curves]}
         (folder / "static.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
         (folder / "report.html").write_text(
-            static_report(f"{kind} {target.component.name}", curves, command_line()),
+            static_report(
+                kind if target.component.name == kind else f"{kind} {target.component.name}",
+                curves,
+                command_line(),
+            ),
             encoding="utf-8",
         )
     if as_json:
@@ -94,11 +100,11 @@ def _files_by_axis(files: list[Path], axis: str | None) -> dict[tuple[str, ...],
     return found
 
 
-def _loops(paths: list[Path], units: str | None, axis: str):  # type: ignore[no-untyped-def]
-    from wm_drake.cli.identify import units_of
+def _loops(paths: list[Path], units: str | None, channels: str | None, axis: str):  # type: ignore[no-untyped-def]
+    from wm_drake.cli.identify import channels_of, units_of
     from wm_drake.parameters import read_loops
 
-    loops = read_loops(existing_files(paths), units_of(units))
+    loops = read_loops(existing_files(paths), units_of(units), channels_of(channels))
     if loops[0].rotates != axis.startswith("about"):
         needs = "angles and moments" if axis.startswith("about") else "displacements and forces"
         raise input_error(f"axis {axis} needs {needs}", where=loops[0].path)

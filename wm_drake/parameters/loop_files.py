@@ -2,13 +2,14 @@
 
 import csv
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from wm_drake.errors import InputError, Problem, input_error
+from wm_drake.errors import InputError, Problem, input_error, shortened
+from wm_drake.parameters.lab_files import Channel, chosen, is_lab_file, read_channels
 from wm_drake.parameters.text_files import read_text
 from wm_drake.parameters.time_stamps import with_distinct_times
 from wm_drake.parameters.types import FloatArray
@@ -54,31 +55,62 @@ class MeasuredLoop:
     rotates: bool
 
 
-def read_loop(path: Path, units: tuple[str, str, str] | None = None) -> MeasuredLoop:
+def read_loop(
+    path: Path,
+    units: tuple[str, str, str] | None = None,
+    channels: Mapping[str, str] | None = None,
+) -> MeasuredLoop:
     """Read a measured loop.
 
     The first line that is not a comment (#) names the columns, in any order: ``time [s],
     displacement [mm], force [N]`` or ``time_s,displacement_mm,force_N``; for rotations ``angle``
-    and ``moment``. Other columns are ignored. Samples with equal time stamps are averaged.
+    and ``moment``. Other columns are ignored. In MDF4, TDMS, UFF 58 and MAT files the channels have
+    such names, or `channels` names them; units are those of the file. Samples with equal time
+    stamps are averaged.
 
     Args:
-        path: CSV file with commas, semicolons or tabs.
+        path: CSV file with commas, semicolons or tabs, or file of `wm_drake.parameters.lab_files`.
         units: Units of time, displacement and force if the header has none.
+        channels: Name in the file of ``time``, ``displacement`` or ``angle``, ``force`` or
+            ``moment``.
 
     Raises:
         InputError: columns or units are wrong, a value is not a finite number, the time
             falls, a signal is constant, or there are too few samples. The message names file and
             line.
     """
+    if is_lab_file(path):
+        return _lab_loop(path, units, channels or {})
     rows = list(_rows(path))
     if not rows:
         raise input_error("is empty; needs the columns time, displacement, force", where=str(path))
     line, head = rows[0]
+    head = _renamed(head, channels or {}, f"{path}:{line}")
     columns, factors, rotates = _columns(head, units, f"{path}:{line}")
     table: FloatArray = np.array(
         [_numbers(cells, head, columns, f"{path}:{at}") for at, cells in rows[1:]]
     ).reshape(-1, 3)
     lines = [at for at, _ in rows[1:]]
+    return _checked_loop(path, table, lines, head, (columns, factors, rotates))
+
+
+def _checked_loop(
+    path: Path,
+    table: FloatArray,
+    lines: Sequence[int],
+    head: Sequence[str],
+    kind: tuple[tuple[int, int, int], tuple[float, float, float], bool],
+) -> MeasuredLoop:
+    """Return a loop from a table of time, displacement and force; check time and signals.
+
+    Args:
+        path: The file.
+        table: In the units of the file (n, 3).
+        lines: Line, or number of the sample, of each row.
+        head: Cells of the header.
+        kind: From `_columns`.
+    """
+    columns, factors, rotates = kind
     not_rising = np.flatnonzero(np.diff(table[:, 0]) < 0.0)
     if len(not_rising):
         at = int(not_rising[0]) + 1
@@ -100,12 +132,86 @@ def read_loop(path: Path, units: tuple[str, str, str] | None = None) -> Measured
     return MeasuredLoop(path.stem, str(path), time, displacement, force, rotates)
 
 
-def read_loops(paths: list[Path], units: tuple[str, str, str] | None = None) -> list[MeasuredLoop]:
+def _renamed(head: list[str], channels: Mapping[str, str], place: str) -> list[str]:
+    """Return a header in which the columns that the user names have the words of this module."""
+    found = list(head)
+    plain = [re.split(r"\s*[\[(]", cell)[0].strip() for cell in head]
+    for word, name in channels.items():
+        if name not in plain:
+            raise input_error(f"no column '{name}' among '{', '.join(head)}'", where=place)
+        index = plain.index(name)
+        found[index] = word + head[index].strip()[len(name) :]
+    return found
+
+
+def _lab_loop(
+    path: Path, units: tuple[str, str, str] | None, channels: Mapping[str, str]
+) -> MeasuredLoop:
+    """Return the loop of a file with named channels; a force sampled otherwise is interpolated."""
+    signals = _picked(path, channels)
+    moved = next((c.time for c in signals.values() if c.time is not None), None)
+    if moved is not None and not any(_is_time(word) for word in signals):
+        signals = {"time": Channel("time", "s", moved, None), **signals}
+    head = [f"{word} [{c.unit}]" if c.unit else word for word, c in signals.items()]
+    clock = next((c.values for word, c in signals.items() if _is_time(word)), None)
+    table = [
+        c.values if clock is None or c.time is None else np.interp(clock, c.time, c.values)
+        for c in signals.values()
+    ]
+    kind = _columns(head, units, str(path))
+    if len({len(values) for values in table}) > 1:
+        raise input_error("its channels have different numbers of samples", where=str(path))
+    samples = np.stack([table[index] for index in kind[0]], axis=1)
+    if len(samples) < FEWEST:
+        message = f"has {len(samples)} samples; a loop needs at least {FEWEST}"
+        raise input_error(message, where=str(path))
+    if not np.isfinite(samples).all():
+        raise input_error("has a sample that is not a finite number", where=str(path))
+    return _checked_loop(path, samples, range(1, len(samples) + 1), head, kind)
+
+
+def _picked(path: Path, channels: Mapping[str, str]) -> dict[str, Channel]:
+    """Return the channels of time, displacement and force by the words of a header."""
+    available = read_channels(path)
+    found: dict[str, Channel] = {}
+    for column, words in _COLUMNS.items():
+        named = {word: name for word, name in channels.items() if word in words}
+        if named:
+            found |= {word: chosen(available, name, path) for word, name in named.items()}
+            continue
+        fitting = [c for c in available if (m := _HEAD.match(c.name)) and m[1].lower() in words]
+        if len(fitting) > 1:
+            names = ", ".join(f"'{c.name}'" for c in fitting)
+            raise input_error(
+                f"has several channels of {column}: {names}; choose one by --channels",
+                where=str(path),
+            )
+        if not fitting and column != "time":
+            names = shortened(", ".join(c.name for c in available), 120)
+            raise input_error(
+                f"has no channel of {column}; its channels are {names}; choose one by --channels",
+                where=str(path),
+            )
+        found |= {c.name: c for c in fitting}
+    return found
+
+
+def _is_time(word: str) -> bool:
+    match = _HEAD.match(word)
+    return bool(match and match[1].lower() in _COLUMNS["time"])
+
+
+def read_loops(
+    paths: list[Path],
+    units: tuple[str, str, str] | None = None,
+    channels: Mapping[str, str] | None = None,
+) -> list[MeasuredLoop]:
     """Read several loops, either all of displacement and force or all of angle and moment.
 
     Args:
         paths: The files.
         units: Units of time, displacement and force if a header has none.
+        channels: As for `read_loop`.
 
     Raises:
         InputError: a file is wrong (the error has all problems of all files), or some files contain
@@ -115,7 +221,7 @@ def read_loops(paths: list[Path], units: tuple[str, str, str] | None = None) -> 
     problems: list[Problem] = []
     for path in paths:
         try:
-            loops.append(read_loop(path, units))
+            loops.append(read_loop(path, units, channels))
         except InputError as error:
             problems += error.problems
     if problems:

@@ -112,7 +112,7 @@ def _write(result: "MachineModes", folder: Path, replay: bool) -> None:
 
 
 def _write_replays(result: "MachineModes", folder: Path) -> dict[str, str]:
-    from wm_drake.model.scene import replay_page
+    from wm_drake.model.replay import replay_page
     from wm_drake.studies.modes.animation import mode_motion
     from wm_drake.studies.modes.study import SLIDING
 
@@ -121,7 +121,7 @@ def _write_replays(result: "MachineModes", folder: Path) -> dict[str, str]:
     names = {}
     for mode in result.modes[SLIDING]:
         name = f"replay_{re.sub('[^a-z]', '_', mode.name)}.html"
-        page = replay_page(result.parameters, *mode_motion(mode))
+        page = replay_page(result.parameters, mode_motion(mode), title=mode.name)
         (folder / name).write_text(page, encoding="utf-8")
         names[mode.name] = name
     return names

@@ -1,0 +1,163 @@
+"""Recorded channels in the formats of laboratories: MDF4, TDMS, UFF 58 and MAT files.
+
+The packages asammdf, npTDMS and pyuff are extras (`wm-drake[lab]`); MAT files need scipy only.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wm_drake.errors import InputError, input_error, shortened
+from wm_drake.parameters.text_files import check_regular
+from wm_drake.parameters.types import FloatArray
+
+LARGEST = 1 << 30
+"""Largest size of a file of recorded channels. [byte]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """A recorded channel.
+
+    Attributes:
+        name: As in the file.
+        unit: Text of its unit; "" if the file has none.
+        values: Samples (n,).
+        time: Time of each sample (n,), or None if the file has none for it. [s]
+    """
+
+    name: str
+    unit: str
+    values: FloatArray
+    time: FloatArray | None
+
+
+def is_lab_file(path: Path) -> bool:
+    """Return whether the suffix of a file is that of a format of this module."""
+    return path.suffix.lower() in _READERS
+
+
+def read_channels(path: Path) -> list[Channel]:
+    """Return the numeric channels of a file.
+
+    Raises:
+        InputError: The file is missing or damaged, or its package is not installed.
+    """
+    check_regular(path, largest=LARGEST)
+    read, package = _READERS[path.suffix.lower()]
+    try:
+        found = read(path)
+    except ImportError:
+        raise input_error(
+            f"needs the package {package}: pip install 'wm-drake[lab]'", where=str(path)
+        ) from None
+    except InputError:
+        raise
+    except Exception as error:  # each library raises errors of its own on a damaged file
+        reason = shortened(" ".join(str(error).split()) or type(error).__name__, 120)
+        raise input_error(f"cannot be read by {package} ({reason})", where=str(path)) from None
+    if not found:
+        raise input_error("has no numeric channel", where=str(path))
+    return found
+
+
+def chosen(channels: list[Channel], name: str, path: Path) -> Channel:
+    """Return the channel of a name.
+
+    Raises:
+        InputError: There is none, or more than one.
+    """
+    same = [channel for channel in channels if channel.name == name]
+    if len(same) == 1:
+        return same[0]
+    if same:
+        raise input_error(f"has {len(same)} channels '{name}'; one is needed", where=str(path))
+    names = shortened(", ".join(channel.name for channel in channels), 150)
+    raise input_error(f"has no channel '{name}'; its channels are {names}", where=str(path))
+
+
+def _numbers(values: Any) -> FloatArray | None:
+    """Return values as a row of floats; None if they are none."""
+    array = np.asarray(values)
+    if array.dtype.kind not in "fiub" or array.size < 2 or array.size != max(array.shape):
+        return None
+    return array.reshape(-1).astype(float)
+
+
+def _mdf(path: Path) -> list[Channel]:
+    from asammdf import MDF
+
+    found = []
+    with MDF(path) as mdf:
+        for group, content in enumerate(mdf.groups):
+            master = mdf.masters_db.get(group)
+            for index, described in enumerate(content.channels):
+                if index == master:
+                    continue
+                signal = mdf.get(group=group, index=index)
+                values = _numbers(signal.samples)
+                if values is not None:
+                    time = np.asarray(signal.timestamps, dtype=float)
+                    found.append(Channel(described.name, signal.unit or "", values, time))
+    return found
+
+
+def _tdms(path: Path) -> list[Channel]:
+    from nptdms import TdmsFile
+
+    found = []
+    for group in TdmsFile.read(path).groups():
+        for channel in group.channels():
+            values = _numbers(channel[:])
+            if values is None:
+                continue
+            step = float(channel.properties.get("wf_increment", math.nan))
+            begin = float(channel.properties.get("wf_start_offset", 0.0))
+            time: FloatArray | None = None
+            if step > 0.0:
+                time = np.asarray(begin + step * np.arange(len(values)), dtype=float)
+            unit = str(channel.properties.get("unit_string", ""))
+            found.append(Channel(channel.name, unit, values, time))
+    return found
+
+
+def _uff(path: Path) -> list[Channel]:
+    import pyuff
+
+    sets = pyuff.UFF(str(path)).read_sets()
+    found = []
+    for data in sets if isinstance(sets, list) else [sets]:
+        if data.get("type") != 58:
+            continue
+        values = _numbers(np.real(data["data"]))
+        if values is not None:
+            unit = str(data.get("ordinate_axis_units_lab", "")).strip()
+            unit = "" if unit.upper() == "NONE" else unit
+            time = np.asarray(data["x"], dtype=float)
+            found.append(Channel(str(data["id1"]).strip(), unit, values, time))
+    return found
+
+
+def _mat(path: Path) -> list[Channel]:
+    from scipy.io import loadmat
+
+    found = []
+    for name, content in loadmat(path).items():
+        values = None if name.startswith("__") else _numbers(content)
+        if values is not None:
+            found.append(Channel(name, "", values, None))
+    return found
+
+
+_READERS: dict[str, tuple[Callable[[Path], list[Channel]], str]] = {
+    ".mf4": (_mdf, "asammdf"),
+    ".mdf": (_mdf, "asammdf"),
+    ".tdms": (_tdms, "npTDMS"),
+    ".uff": (_uff, "pyuff"),
+    ".unv": (_uff, "pyuff"),
+    ".mat": (_mat, "scipy"),
+}
