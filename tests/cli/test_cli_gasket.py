@@ -388,3 +388,39 @@ def test_folder_without_permission_is_refused(study, tmp_path):
     ended = study("--out", "locked")
     assert ended.code == 2
     assert "locked/ledger.sqlite: cannot be written to" in ended.err
+
+
+def test_published_results_that_a_user_names_are_beside_ours(study_without_page):
+    Path("known.csv").write_text(
+        "load,response,term,percent,effects\nmiddle,Dx,constant,,1000\nmiddle,Dx,C_L,50,1 -1\n"
+    )
+    ended = study_without_page("--published", "known.csv", "--load", "middle", "--response", "Dx")
+    assert ended.code == 0
+    assert "Means beside the published ones: 1 of 1 differ by more than 30 %" in ended.out
+    assert "Level 0 of the study" in ended.out
+    table = pd.read_csv("out/published.csv")
+    assert list(table["term"]) == ["constant", "C_L", "C_L", "C_L"]
+    assert list(table["published_effect"]) == [1000.0, 1.0, -1.0, 0.0]
+    zero = pd.read_csv("out/level_zero.csv")
+    assert (zero["machine"] > 0.0).all()
+
+
+def test_another_profile_is_not_compared_with_published_results(study_without_page):
+    ended = study_without_page("--json", "--load", "middle", "--response", "Dx")
+    printed = json.loads(ended.out)
+    assert "published" not in printed
+    assert "published_mean" not in printed["responses"]["middle"]["Dx"]
+    assert printed["level_zero"]["tables"] == "scaled"
+    (row,) = printed["level_zero"]["responses"]
+    assert row["unit"] == "mm"
+
+
+def test_faulty_published_results_are_refused(study):
+    Path("known.csv").write_text("load,response,term,percent,effects\nmiddle,Dx,C_L,50,much\n")
+    ended = study("--published", "known.csv")
+    assert (ended.code, len(ended.messages)) == (2, 1)
+    assert "known.csv" in ended.err
+    assert "'much' is not a finite number" in ended.err
+    ended = study("--published", "nosuch.csv")
+    assert (ended.code, "no such file 'nosuch.csv'" in ended.err) == (2, True)
+    assert not Path("out").exists()

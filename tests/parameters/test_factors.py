@@ -124,6 +124,8 @@ def test_tables_become_numbers_or_are_scaled(reference):
     (absolute,) = one(parameters, "K_Lx=2 N/mm..6 N/mm", "scaled")
     assert nominal_stiffness(absolute.settings[0]["gasket.stiffness_x"]) == pytest.approx(2000.0)
     assert "gasket.stiffness_x" in scaled.nominal
+    with pytest.raises(InputError, match=r"stiffness_x: '-.*' is out of range"):
+        one(parameters, "K_Lx=-10 %..50 %", "scaled")
 
 
 def test_curve_that_cannot_be_a_number_is_scaled(reference):

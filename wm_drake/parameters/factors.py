@@ -223,6 +223,8 @@ def _resolved(
             scaled = isinstance(original, ForceTable | TorqueTable) and (
                 tables == "scaled" or not _takes_numbers(parameters, key)
             )
+            if scaled and _takes_numbers(parameters, key):
+                with_value(parameters, key, value)  # raises if a slope like this is not allowed
             level[key] = scaled_table(original, value / float(number or 1.0)) if scaled else value
             changed = with_value(parameters, key, level[key])  # raises if it is not allowed
             # a number that only the SDF has is a number of the machine once it is set
