@@ -51,10 +51,9 @@ def spectra_figure(record: Record, signals: Sequence[tuple[str, str, FloatArray]
         The figure; None if the record is too short for the windows of the maps.
     """
     time, angle = record.time.values, record.drum_angle.values
-    maps = [
-        (frequency_map(values, time), order_map(values, angle, time)) for _, _, values in signals
-    ]
-    if any(not one.sizes["time"] for pair in maps for one in pair):
+    columns = np.column_stack([values for _, _, values in signals])
+    by_frequency, by_order = frequency_map(columns, time), order_map(columns, angle, time)
+    if not by_frequency.sizes["time"] or not by_order.sizes["time"]:
         return None
     height = 2.45 * len(signals) + 0.75
     figure = Figure(figsize=(WIDTH, height))
@@ -70,7 +69,7 @@ def spectra_figure(record: Record, signals: Sequence[tuple[str, str, FloatArray]
         hspace=0.2,
     )
     for row, (name, unit, _) in enumerate(signals):
-        frequencies, orders = maps[row]
+        frequencies, orders = by_frequency.isel(signal=row), by_order.isel(signal=row)
         spectrum, lines, map_of_orders, scale = (
             figure.add_subplot(grid[row, column]) for column in range(4)
         )
