@@ -262,7 +262,7 @@ def test_failed_run_keeps_older_results(monkeypatch, tmp_path):
 def test_check_of_the_reference(wm_drake):
     ended = wm_drake("machine", "check", "reference")
     assert (ended.code, ended.out) == (0, "reference: machine 'reference' is valid\n")
-    # what an expert doubts of it is said (docs/decisions/0103), and nothing else
+    # what an expert doubts of it is said (docs/decisions/0080), and nothing else
     assert all(line.startswith("warning: ") and " unusual" in line for line in ended.messages)
 
 

@@ -32,7 +32,7 @@ SLACK_TRANSITION = 1e-3
 """Elongation over which a spring changes from slack to taut. [m]
 
 Assumption: a hook settles in its eye over about this distance. A run crosses it within a few steps;
-amplitudes do not depend on it (docs/decisions/0100).
+amplitudes do not depend on it (docs/decisions/0077).
 """
 
 _LARGEST_SHARE = 0.5

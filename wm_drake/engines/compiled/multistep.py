@@ -13,7 +13,7 @@ A step from t to t + h knows f_j = f(t - j h) and u_j = u(t - j h) of steps of t
 
 The first line is the Adams-Bashforth formula of fourth order plus 0.2 times the fourth and -0.15
 times the fifth backward difference of f: any such sum has order four. These two numbers are an own
-choice (docs/decisions/0130): the error constant is 0.15 in place of 0.35, and the formula is stable
+choice (docs/decisions/0087): the error constant is 0.15 in place of 0.35, and the formula is stable
 for h lambda from -0.38 to 0 and to 0.34 i, in place of -0.30 and 0.43 i.
 
 An internal part evaluates its own law only, a small part of f. With the decay of a sponge (320 1/s)
