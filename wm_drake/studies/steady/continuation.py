@@ -26,6 +26,10 @@ SPEEDS = 0.05
 TOLERANCE = 1e-10
 """Largest last correction of a motion. [m]"""
 
+STALLED = 1e-8
+"""Size of a correction that need not shrink any further: friction bends the forces, so that the
+corrections may stop to converge there. [m]"""
+
 MOST_CORRECTIONS, MOST_CHORDS = 12, 6
 """Largest number of corrections of a step, and of those with one matrix."""
 
@@ -247,7 +251,7 @@ def _step(
         speed += 0.0 if landing else float(change[-1])
         size = balance.extent(change[:-1].reshape(begin.shape))
         count += 1
-        if size < TOLERANCE:
+        if size < TOLERANCE or FAST * last < size < STALLED:
             break
         if size > FAST * last or count >= MOST_CHORDS:
             factors = None
@@ -286,7 +290,7 @@ def _point(balance: HarmonicBalance, place: _Place, on_grid: bool, way: float) -
 
 def _at_speed(balance: HarmonicBalance, guess: FloatArray, speed: float) -> FloatArray | None:
     """Return the motion at a speed by Newton's method with halved steps; None if it fails."""
-    coefficients = guess.copy()
+    coefficients, last = guess.copy(), np.inf
     for _ in range(60):
         at = balance.linearised(coefficients, speed)
         try:
@@ -304,6 +308,7 @@ def _at_speed(balance: HarmonicBalance, guess: FloatArray, speed: float) -> Floa
                 break
             share *= 0.5
         coefficients = coefficients + share * change
-        if size < TOLERANCE:
+        if size < TOLERANCE or FAST * last < size < STALLED:
             return coefficients
+        last = size
     return None
