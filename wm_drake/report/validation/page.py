@@ -2,9 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby
+from textwrap import fill
 
 from wm_drake.report.provenance import now, program
 from wm_drake.studies.validation.rows import FITTED, MISSED, PREDICTED, Row, counts
+
+WIDTH = 100
+"""Largest length of a line of prose. [characters]"""
 
 COLUMNS = ("quantity", "kind", "published", "ours", "difference", "verdict", "reason")
 
@@ -35,7 +39,7 @@ def validation_page(
         "Fitted: the number was a target of the calibration. Predicted: it was not. Sources:",
         "[A], [B] and [C] are the papers in the [README](../README.md).",
         "",
-        *(f"- {note}" for note in notes),
+        *(fill(f"- {note}", WIDTH, subsequent_indent="  ") for note in notes),
         "",
         "## Summary",
         "",
@@ -44,7 +48,7 @@ def validation_page(
     for section, group in groupby(rows, key=lambda row: row.section):
         text += ["", f"## {section}", ""]
         if section in reasons:
-            text += [reasons[section], ""]
+            text += [fill(reasons[section], WIDTH), ""]
         text += _line(COLUMNS), _line(["---"] * len(COLUMNS))
         for row in group:
             known = reasons.get(f"{section} | {row.quantity}", "")
