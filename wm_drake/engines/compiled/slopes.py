@@ -23,6 +23,7 @@ from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
     STATE_SIZE,
+    inputs_size,
     mass_properties,
     state_derivative,
 )
@@ -162,6 +163,8 @@ def derivatives_at(states, columns, steps, p, elements, rates, moved):
     x_numbers, dx_numbers = np.empty(size * WIDTH), np.empty(size * WIDTH)
     p_numbers = in_each_lane(p)
     x, dx, numbers = lane_array(x_numbers), lane_array(dx_numbers), lane_array(p_numbers)
+    inputs_numbers = np.empty(max(inputs_size(elements), 1) * WIDTH)
+    inputs = lane_array(inputs_numbers)
     total = count * (moves + 1)
     for begin in range(0, total, WIDTH):
         for lane in range(WIDTH):
@@ -173,7 +176,7 @@ def derivatives_at(states, columns, steps, p, elements, rates, moved):
                 x_numbers[columns[move - 1] * WIDTH + lane] += steps[move - 1]
         sine, cosine = sine_cosine(x[DRUM_ANGLE])
         masses = mass_properties(numbers, cosine, sine)
-        state_derivative(x, dx, masses, x[DRUM_RATE], 0.0, numbers, elements)
+        state_derivative(x, dx, inputs, masses, x[DRUM_RATE], 0.0, numbers, elements)
         for lane in range(min(WIDTH, total - begin)):
             at = begin + lane
             row, move = at // (moves + 1), at % (moves + 1)
