@@ -1,6 +1,7 @@
 """Effect of the gasket: percent differences and steady amplitudes on records of known answer."""
 
 import json
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +63,8 @@ def result(parameters, gasket, transient, steady, comparison):
     record = sines(steady, duration=70.0)
     record.attrs |= {"gasket": "yes" if gasket else "no", "diverged": ""}
     sizes = xr.DataArray(np.full(6, transient), {"sensor": SENSORS}, ["sensor"])
-    measures = Measures(sizes, sizes, None, None, None, None)
+    rest = {field.name: None for field in fields(Measures)}
+    measures = Measures(**rest | {"amplitude": sizes, "critical_speed": sizes})
     results = (CaseResult(case, record, measures, 0.0),)
     return SpinResult(parameters, "compiled", 0.0025, results, comparison)
 
