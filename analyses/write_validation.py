@@ -15,7 +15,6 @@ from functools import partial
 from pathlib import Path
 
 import pandas as pd
-from fit_coulomb_to_mstv import coulomb_fits
 
 from wm_drake import Case, build_machine, load_machine, load_profile, simulate_many
 from wm_drake.parameters import (
@@ -23,19 +22,24 @@ from wm_drake.parameters import (
     MachineParameters,
     at_levels,
     levels_of,
-    load_component,
     load_factors,
     published_results,
 )
-from wm_drake.parameters.components import COMPONENTS_FOLDER
 from wm_drake.parameters.files import read_yaml
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.report.spin.report import amplitude_table
 from wm_drake.report.validation.page import validation_page
+from wm_drake.rigs import Harmonic
 from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket.screening import Screening, run_screening
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket_effect.study import effect_table, run_gasket_effect
+from wm_drake.studies.identification.drift import (
+    coulomb_fits,
+    mstv_motions,
+    mstv_of_c,
+    printed_table,
+)
 from wm_drake.studies.spin_cycle.runs import compiled_runs
 from wm_drake.studies.spin_cycle.study import run_spin_cycle
 from wm_drake.studies.validation import rows
@@ -62,11 +66,13 @@ def grand_means(machine: MachineParameters, quick: bool) -> Screening:
 
 def coulomb(quick: bool) -> pd.DataFrame:
     """Return the Coulomb fits at the tests of [C] Table 2, for f_max of the shipped damper."""
-    table = pd.read_csv(COMPONENTS_FOLDER / "mstv_table2_coulomb.csv", comment="#")
+    table = printed_table()
     if quick:
         table = table[table.frequency_hz.isin([1.0, 10.0]) & (table.amplitude_mm == 1.0)]
-    damper = load_component("mstv_damper").parameters
-    return coulomb_fits(table, damper.friction_force)
+    damper = mstv_of_c()
+    tests = [Harmonic(row.frequency_hz, 1e-3 * row.amplitude_mm) for row in table.itertuples()]
+    motions = mstv_motions(damper, tests)
+    return coulomb_fits(motions, damper.friction_force, damper.slider_damping)
 
 
 def main() -> None:
