@@ -55,9 +55,9 @@ def campbell_figure(result: MachineModes) -> Figure:
             _label_order(axes, order, rpm[-1], 1.08 * last)
         _mark_critical(axes, result, name)
         _mark_run_up(axes, result)
-        _label_modes(axes, result, name, float(rpm[-1]))
         axes.set_xlim(0.0, 1.16 * rpm[-1])
         axes.set_ylim(0.0, 1.08 * last)
+        _label_modes(axes, result, name, float(rpm[-1]))
         axes.set_title(TITLES[name], loc="left", fontsize=10.5, fontweight="bold")
         axes.set_xlabel("drum speed, rpm", fontsize=9.5)
         axes.grid(color=GRID)
@@ -133,8 +133,7 @@ def _mark_run_up(axes: Axes, result: MachineModes) -> None:
 def _label_modes(axes: Axes, result: MachineModes, name: str, last_rpm: float) -> None:
     """Write the names of the modes at the right end, apart from each other."""
     ends = result.diagrams[name].frequency_hz[-1]
-    top = axes.get_ylim()[1] if axes.get_ylim()[1] > 1.0 else float(np.nanmax(ends))
-    least = 0.042 * max(top, float(np.nanmax(ends)))
+    least = 0.042 * axes.get_ylim()[1]
     order = np.argsort(ends)
     places = ends[order].copy()
     for index in range(1, len(places)):

@@ -219,7 +219,7 @@ def sweep_figure(study: SteadyStudy) -> Figure:
     for colour, load in zip(_cycle(len(loads)), loads, strict=True):
         case = next(case for case in study.cases if case.load == load)
         peak = case.response.amplitude.max("point")
-        sensor = str(peak.sensor.values[int(peak.argmax())])
+        sensor = str(peak.sensor.values[int(np.argmax(peak.values))])
         values = case.response.amplitude.sel(sensor=sensor).values
         speed = RPM_PER_RAD_S * float(case.response.speed.values[int(np.argmax(values))])
         chosen = study.sweeps.sel(load=load, gasket=case.gasket, sensor=sensor)
