@@ -314,6 +314,10 @@ def test_falling_speeds_give_the_same_motions(machine):
     up = wm.steady_response(machine, "front", speeds)
     down = wm.steady_response(machine, "front", speeds[::-1])
     up, down = (found.isel(point=found.on_grid.values) for found in (up, down))
+    # at 160 rpm a sample is at a reversal of friction, where whole corrections do not converge
+    assert [found.sizes["point"] for found in (up, down)] == [6, 6]
+    assert up.stable.values.all()
+    assert down.stable.values.all()
     np.testing.assert_allclose(down.amplitude.values[::-1], up.amplitude.values, rtol=1e-5)
 
 

@@ -30,6 +30,12 @@ STALLED = 1e-8
 """Size of a correction that need not shrink any further: friction bends the forces, so that the
 corrections may stop to converge there. [m]"""
 
+NEAR = 1e-6
+"""Size of a correction below which it is made in part if corrections do not shrink. [m]"""
+
+SMALLEST_SHARE = 0.01
+"""Smallest part of a correction that is tried."""
+
 MOST_CORRECTIONS, MOST_CHORDS = 12, 6
 """Largest number of corrections of a step, and of those with one matrix."""
 
@@ -247,9 +253,11 @@ def _step(
         change = lu_solve(factors, right[:, 0], check_finite=False)
         if not np.all(np.isfinite(change)):
             return None
+        size = balance.extent(change[:-1].reshape(begin.shape))
+        if count == 0 and FAST * last < size < NEAR:
+            change *= _share(balance, coefficients, speed, residual, change, landing)
         coefficients = coefficients + change[:-1].reshape(begin.shape)
         speed += 0.0 if landing else float(change[-1])
-        size = balance.extent(change[:-1].reshape(begin.shape))
         count += 1
         if size < TOLERANCE or FAST * last < size < STALLED:
             break
@@ -274,8 +282,40 @@ def _step(
     return _Place(coefficients, speed, along, speed_along), quick
 
 
+def _share(
+    balance: HarmonicBalance,
+    coefficients: FloatArray,
+    speed: float,
+    residual: FloatArray,
+    change: FloatArray,
+    landing: bool,
+) -> float:
+    """Return the part of a correction that makes the residual smaller.
+
+    Where a sample of the drum's turn is at a reversal of friction, the force bends so sharply
+    that whole corrections go to and fro across the bend for ever.
+
+    Args:
+        balance: The machine.
+        coefficients, speed, residual: The motion before the correction.
+        change: Correction of the coefficients and of the speed.
+        landing: Whether the speed is kept.
+    """
+    share, before = 1.0, float(np.linalg.norm(residual))
+    while share > SMALLEST_SHARE:
+        motion = coefficients + share * change[:-1].reshape(coefficients.shape)
+        ahead = speed if landing else speed + share * float(change[-1])
+        if np.linalg.norm(balance.residual(motion, ahead)) < (1.0 - 0.1 * share) * before:
+            break
+        share *= 0.5
+    return share
+
+
 def _point(balance: HarmonicBalance, place: _Place, on_grid: bool, way: float) -> Point:
-    states = balance.states(place.coefficients, place.speed)
+    # Between the samples of the balance: one of them may be exactly at a reversal of friction, and
+    # its steep slope would count for the whole distance to the next.
+    phase = balance.series.phase + np.pi / balance.series.samples
+    states = balance.states(place.coefficients, place.speed, phase)
     _, slopes = balance.derivative.with_slopes(states)
     multipliers = floquet_multipliers(slopes, 2.0 * np.pi / abs(place.speed))
     return Point(
@@ -302,7 +342,7 @@ def _at_speed(balance: HarmonicBalance, guess: FloatArray, speed: float) -> Floa
         if not np.isfinite(size):
             return None
         share, before = 1.0, float(np.linalg.norm(at.residual))
-        while share > 0.01:
+        while share > SMALLEST_SHARE:
             trial = coefficients + share * change
             if np.linalg.norm(balance.residual(trial, speed)) < (1.0 - 0.1 * share) * before:
                 break
