@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import pytest
 from hypothesis import settings
+from upright_springs import with_upright_springs
 
 from wm_drake.cli import main
 from wm_drake.model.build import build_machine
@@ -27,6 +28,12 @@ def reference():
 def machine(reference):
     """Build the reference machine once; every test sets up its own Context."""
     return build_machine(reference)
+
+
+@pytest.fixture(scope="session")
+def upright(machine):
+    """Return the reference machine with upright springs, which rests as drawn."""
+    return with_upright_springs(machine)
 
 
 @dataclass(frozen=True)

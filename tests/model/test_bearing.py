@@ -62,8 +62,8 @@ def drum_weight_and_depth(machine, setup):
     return drum.get_mass(setup.plant_context) * setup.parameters.gravity, depth
 
 
-def test_the_drum_sags_by_its_weight_over_the_stiffness(whirling):
-    setup = whirling.set_up()
+def test_the_drum_sags_by_its_weight_over_the_stiffness(whirling, upright):
+    setup = whirling.set_up(parameters=with_bearing(upright))
     weight, depth = drum_weight_and_depth(whirling, setup)
     own = own_outputs(whirling.bearing, whirling.bearing.GetMyContextFromRoot(setup.context))
     np.testing.assert_allclose(
@@ -76,8 +76,9 @@ def test_the_drum_sags_by_its_weight_over_the_stiffness(whirling):
     np.testing.assert_allclose(own[6:], [0.0, 0.0, -weight, moment, 0.0, 0.0], rtol=1e-6, atol=1e-9)
 
 
-def test_preloads_balance_the_machine_with_its_drum_sagged(whirling, machine):
-    setup, perfect = whirling.set_up(), machine.set_up()
+def test_preloads_balance_the_machine_with_its_drum_sagged(whirling, machine, upright):
+    setup = whirling.set_up(parameters=with_bearing(upright))
+    perfect = machine.set_up(parameters=upright)
     assert np.abs(setup.residual).max() < 1e-9
     assert np.abs(setup.rest_pose).max() < 1e-12
     for name, spring in setup.springs.items():

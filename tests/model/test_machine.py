@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from machine_with_bearing import with_bearing
 from scipy.linalg import eigh
+from simple_machines import with_gasket_tables
 
 from wm_drake.errors import InputError
 from wm_drake.model.bodies import sdf_path
@@ -14,18 +15,20 @@ from wm_drake.studies.description.modal import natural_modes
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
 
-def test_rest_pose_is_a_static_equilibrium(machine):
-    setup = machine.set_up()
+@pytest.mark.parametrize("springs", ["leaning", "upright"])
+def test_rest_pose_is_a_static_equilibrium(machine, reference, upright, springs):
+    setup = machine.set_up(parameters=upright if springs == "upright" else reference)
     machine.set_drum_acceleration(setup.context, 0.0)
     derivative = machine.diagram.EvalTimeDerivatives(setup.context).CopyToVector()
     assert EQUILIBRIUM_TOLERANCE == 1e-9
     assert np.max(np.abs(setup.residual)) < 1e-9  # N and N m
-    assert np.max(np.abs(setup.rest_pose)) < 1e-9  # T coincides with W
+    if springs == "upright":
+        assert np.max(np.abs(setup.rest_pose)) < 1e-9  # T coincides with W
     assert np.max(np.abs(derivative)) < 1e-9
 
 
-def test_preloads_carry_the_weight_and_its_moments(machine):
-    setup = machine.set_up()
+def test_preloads_carry_the_weight_and_its_moments(machine, upright):
+    setup = machine.set_up(parameters=upright)
     plant, context = machine.plant, setup.plant_context
     moving = [body for body in map(plant.get_body, plant.GetBodyIndices(plant.GetBodyByName("tub").model_instance()))
               if body.name() not in ("world", "housing")]  # fmt: skip
@@ -66,12 +69,21 @@ def test_only_a_spring_that_pushes_may_have_a_compressive_preload(machine, refer
         ("bodies.motor.centre_of_mass", (0.02, 0.13, -0.28)),
         ("frames.damper_left_tub.position", (-0.22, -0.05, -0.17)),
         ("frames.spring_left_housing.position", (-0.2, -0.1, 0.40)),
-        ("gasket.stiffness_x.force", (-90.0, -40.0, 0.0, 40.0, 90.0)),
+        ("gasket.stiffness_x", 4000.0),
         ("damper_types.friction.friction_force", 40.0),
     ],
 )
 def test_a_change_in_the_context_equals_a_rebuild_bit_for_bit(machine, reference, key, value):
-    changed = with_value(reference, key, value)
+    assert_change_equals_rebuild(machine, with_value(reference, key, value))
+
+
+def test_a_changed_table_in_the_context_equals_a_rebuild_bit_for_bit(reference):
+    tables = with_gasket_tables(reference)
+    changed = with_value(tables, "gasket.stiffness_x.force", (-90.0, -40.0, 0.0, 40.0, 90.0))
+    assert_change_equals_rebuild(build_machine(tables), changed)
+
+
+def assert_change_equals_rebuild(machine, changed):
     load = Load(unbalances=(Unbalance(mass=0.8, radius=0.24, y=0.05, phase=1.0),))
     rng = np.random.default_rng(7)
     states = rng.normal(
@@ -131,17 +143,21 @@ def test_gasket_out_means_no_gasket_force(machine):
 
 
 def mass_and_finite_difference_stiffness(machine, setup):
-    """6 x 6 mass matrix of the tub with the drum locked, and stiffness by central differences of the static force."""
+    """6 x 6 mass matrix of the tub with the drum locked, and stiffness by central differences of the static force.
+
+    Both are those of the velocities (angular velocity in W), not of the derivatives of roll, pitch and yaw.
+    """
     plant, context = machine.plant, setup.plant_context
     mass = plant.CalcMassMatrix(context)
     step = 1e-6
     stiffness = np.empty((6, 6))
-    for column in range(6):
+    rest = np.append(setup.rest_pose, 0.0)
+    plant.SetPositions(context, rest)
+    directions = [plant.MapVelocityToQDot(context, unit) for unit in np.eye(7)[:6]]
+    for column, direction in enumerate(directions):
         forces = []
         for sign in (1.0, -1.0):
-            pose = np.append(setup.rest_pose, 0.0)
-            pose[column] += sign * step
-            plant.SetPositions(context, pose)
+            plant.SetPositions(context, rest + sign * step * direction)
             forces.append(machine.elastic_and_gravity_force(setup))
         stiffness[:, column] = -(forces[0] - forces[1]) / (2 * step)
     return mass[:6, :6], stiffness

@@ -151,7 +151,8 @@ def test_springs_carry_the_weight(machine, built):
     assert lift == pytest.approx((oscillating_mass(setup) + tubes) * machine.gravity, rel=1e-3)
     assert all(spring.preload > 0.0 for spring in setup.springs.values())
     assert abs(setup.residual).max() <= EQUILIBRIUM_TOLERANCE
-    assert abs(rest).max() < 1e-3  # m: the drawn pose is the rest pose
+    # m: the drawn pose, but for a lateral force of 5 N of springs that lean over 4 N/mm
+    assert abs(rest).max() < 1.5e-3
 
 
 def test_tub_has_six_soft_modes(machine, built):

@@ -27,6 +27,7 @@ def record_of(displacement, drum_speed=None):
         "angle": ["roll", "pitch", "yaw"],
         "sensor": ["Xr"],
         "bushing": ["gasket", "other"],
+        "spring": ["left"],
     }
     force = np.zeros((n, 2, 3))
     force[n // 2, 0] = (-3.0, 2.0, 1.0)
@@ -44,6 +45,7 @@ def record_of(displacement, drum_speed=None):
             "drum_angle": (("time",), np.linspace(0.0, 9.0, n)),
             "tub_angle": (("time", "angle"), zeros),
             "tub_position": (("time", "axis"), zeros),
+            "spring_tension": (("time", "spring"), np.linspace(150.0, 60.0, n)[:, None]),
         },
         {"time": np.arange(n) / RATE, **axes},
         {"rest_pose": np.zeros(6)},
