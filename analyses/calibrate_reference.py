@@ -28,7 +28,8 @@ from wm_drake.parameters.measured import DESIGN, NamedValue, measured_amplitudes
 from wm_drake.parameters.published import CONSTANT, published_results
 from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate, identity_of
 from wm_drake.studies.calibration.outcome import mean_and_largest, solved_machine
-from wm_drake.studies.calibration.prediction import Prediction, predict
+from wm_drake.studies.calibration.prediction import DRAWS, Prediction, predict
+from wm_drake.studies.calibration.solutions import Solution
 from wm_drake.studies.calibration.targets import Targets, targets_of
 from wm_drake.studies.gasket.responses import known_responses
 
@@ -41,6 +42,9 @@ PREDICTION = replace(PLAN, starts=2)
 """Plan of a prediction: searches from and near the expected values. The starting values of the free
 file are not used, because they come from a fit to all loads."""
 
+QUICK_DRAWS = 8
+"""Machines drawn for the intervals of a prediction with --quick."""
+
 
 def main() -> None:
     """Run the calibration and the predictions, print the errors, and write the machine."""
@@ -51,7 +55,8 @@ def main() -> None:
         few = dict(list(free.quantities.items())[:3])
         free, held_out = FreeFile(quantities=few), HELD_OUT[:1]
         plan = prediction_plan = Plan(starts=1, iterations=1)
-    targets = _targets(machine.parameters)
+    targets = _targets(machine.parameters, with_means=not arguments.quick)
+    draws = QUICK_DRAWS if arguments.quick else DRAWS
     ledger_path = arguments.out.with_suffix(".sqlite")
     with open_ledger(ledger_path, identity_of(machine, free, targets, plan), resume=True) as ledger:
         with progress_bar(plan.starts, "searches") as done:
@@ -64,7 +69,7 @@ def main() -> None:
         with progress_bar(len(held_out), "predictions") as done:
             for number, group in enumerate(held_out, start=1):
                 predictions += predict(
-                    machine, free, calibration, [group], ledger, plan=prediction_plan
+                    machine, free, calibration, [group], ledger, plan=prediction_plan, draws=draws
                 )
                 done(number)
         ledger.mark_finished()
@@ -73,8 +78,10 @@ def main() -> None:
     arguments.out.write_text(text + "\n", encoding="utf-8")
 
 
-def _targets(parameters: MachineParameters) -> Targets:
-    """Return the amplitudes of [B], and the grand means of its gasket study (Table 5)."""
+def _targets(parameters: MachineParameters, *, with_means: bool) -> Targets:
+    """Return the amplitudes of [B] and, if asked for, the means of its gasket study (Table 5)."""
+    if not with_means:
+        return targets_of(parameters, measured_amplitudes(parameters))
     known = {r.name: r for r in known_responses(parameters, parameters.profile)}
     means = [
         NamedValue(
@@ -97,7 +104,9 @@ def _arguments() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "--quick", action="store_true", help="use three quantities and one step, to test the script"
+        "--quick",
+        action="store_true",
+        help="use three quantities, the amplitudes alone and one step, to test the script",
     )
     parser.add_argument(
         "--out",
@@ -128,12 +137,8 @@ def _lines(calibration: Calibration, predictions: list[Prediction]) -> list[str]
     for name, part in (("all", errors), ("with gasket", errors[with_gasket])):
         mean, largest = mean_and_largest(part)
         lines.append(f"{name}: mean {mean:.1f} %, largest {largest:.1f} %")
-    means = 100.0 * best.response_errors(targets)
-    lines += [
-        f"{target.load:8s} mean of {target.response.name}, difference in %: {error:+5.1f}"
-        for target, error in zip(targets.responses, means, strict=True)
-    ]
-    lines.append("means: mean {:.1f} %, largest {:.1f} %".format(*mean_and_largest(means)))
+    if targets.responses:
+        lines += _lines_of_means(targets, best)
     lines += [
         f"{relation.name}: ratio {float(relation.at(best.point[None])[0]):.2f}"
         for relation in calibration.parameter_map.relations
@@ -149,6 +154,17 @@ def _lines(calibration: Calibration, predictions: list[Prediction]) -> list[str]
             f"(other loads: {texts[2]}); 95 % intervals contain {100.0 * prediction.covered:.0f} %"
         )
     return lines
+
+
+def _lines_of_means(targets: Targets, best: Solution) -> list[str]:
+    means = 100.0 * best.response_errors(targets)
+    return [
+        *(
+            f"{target.load:8s} mean of {target.response.name}, difference in %: {error:+5.1f}"
+            for target, error in zip(targets.responses, means, strict=True)
+        ),
+        "means: mean {:.1f} %, largest {:.1f} %".format(*mean_and_largest(means)),
+    ]
 
 
 def _write(calibration: Calibration) -> None:

@@ -1,11 +1,16 @@
 """Machines with a closed-form solution: one isotropic bushing, no gravity and no friction."""
 
-from wm_drake.parameters import Load, SpinProfile, Unbalance, load_machine
+import numpy as np
+
+from wm_drake.parameters import Load, SpinProfile, Unbalance, load_machine, with_values
 from wm_drake.parameters.machine import BodyOverride, InertiaMatrix
 
 STIFFNESS = 7000.0  # N/m
 DAMPING = 55.0  # N s/m
 MASS = 6 * 7.0  # kg, six bodies
+
+STEPS = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])  # displacements of a gasket table, in its half range
+HARDENING = np.array([-3.0, -1.0, 0.0, 1.0, 3.0])  # forces there, in force of the half range
 
 
 def isotropic_machine(stiffness=STIFFNESS, damping=DAMPING, rotational_stiffness=4000.0):
@@ -41,6 +46,28 @@ def isotropic_machine(stiffness=STIFFNESS, damping=DAMPING, rotational_stiffness
         | rotational,
     }
     return type(reference).model_validate(tree)
+
+
+def with_gasket_tables(parameters):
+    """Return a machine whose gasket gets stiffer with displacement and angle.
+
+    Each stiffness becomes a table with the same slope up to half of its range, and twice as much
+    beyond.
+    """
+    displacement, angle = 15e-3 * STEPS, 0.05 * STEPS
+    tables = {}
+    for axis in "xyz":
+        force = getattr(parameters.gasket, f"stiffness_{axis}") * 15e-3 * HARDENING
+        torque = getattr(parameters.gasket, f"rotational_stiffness_{axis}") * 0.05 * HARDENING
+        tables[f"gasket.stiffness_{axis}"] = {
+            "displacement": displacement.tolist(),
+            "force": force.tolist(),
+        }
+        tables[f"gasket.rotational_stiffness_{axis}"] = {
+            "angle": angle.tolist(),
+            "torque": torque.tolist(),
+        }
+    return with_values(parameters, tables)
 
 
 def unbalance(mass, radius=0.25, y=0.0, phase=0.0):

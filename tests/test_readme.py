@@ -2,14 +2,16 @@
 
 import shlex
 
+import numpy as np
 import pytest
 import typer
+import yaml
 from documents import CHECKOUT, HOW_TO, README, blocks, commands, name_of
 
 from wm_drake.cli import app
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile, load_machine
-from wm_drake.parameters.free import load_free
+from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.report.diagram import mermaid
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
@@ -92,6 +94,10 @@ def test_the_python_snippets_run(path):
         assert names["displacement"].shape == (6, 51)
         assert names["linear"].C().shape[0] == 6
         return
+    if path == page("modes-and-response"):
+        assert all(mode.damping_ratio > 0.0 for mode in names["result"].modes["sliding"])
+        assert names["response"].amplitude.sel(sensor="Zf").size >= names["speeds"].size
+        return
     assert names["record"].sizes["time"] == round(SHORT.duration / 5e-3) + 1
     if path == page("batch"):
         table = names["table"]
@@ -113,8 +119,16 @@ def test_the_example_of_an_own_machine_is_in_order(path, tmp_path):
     assert max(abs(setup.residual)) < 1e-9
 
 
+def test_the_example_of_a_fourth_spring_hangs(tmp_path):
+    four = load_machine(written(tmp_path, page("own-machine"), 1))
+    setup = build_machine(four).set_up()
+    assert list(setup.springs) == ["left", "right", "rear", "front"]
+    assert all(spring.preload > 0.0 for spring in setup.springs.values())
+    assert max(abs(setup.residual)) < 1e-9
+
+
 def test_the_example_of_imperfections_is_in_order(tmp_path):
-    imperfections = load_machine(written(tmp_path, page("own-machine"), 1)).imperfections
+    imperfections = load_machine(written(tmp_path, page("own-machine"), 2)).imperfections
     assert imperfections.residual_imbalance.mass == pytest.approx(0.02)
     assert imperfections.phase_error == pytest.approx(0.0873, rel=1e-3)
 
@@ -134,6 +148,22 @@ def test_the_example_of_a_free_file_fits_the_reference_machine(tmp_path, machine
         == -frames["damper_right_rear_housing"].position[0]
         == -0.05
     )
+
+
+def test_the_example_of_a_relation_is_that_of_a_ring(machine):
+    free = load_free(CHECKOUT / "analyses" / "reference_free.yaml")
+    (text,) = blocks(page("calibrate"), "yaml")[1:]
+    names = ("gasket_torsion", "gasket_radial")
+    few = FreeFile.model_validate(
+        {
+            "quantities": {name: free.quantities[name] for name in names},
+            "relations": yaml.safe_load(text)["relations"],
+        }
+    )
+    parameter_map = parameter_map_of(machine, few)
+    (relation,) = parameter_map.relations
+    torsion, radial = 0.9 * 2.0 * 3000.0 * 0.18**2, 3000.0
+    assert relation.at(np.array([[torsion, radial]])) == pytest.approx([0.9])
 
 
 def test_the_example_of_a_compliant_bearing_runs(tmp_path):
@@ -160,8 +190,8 @@ def test_every_yaml_block_is_one_of_those_above():
     assert counted == {
         "README.md": 1,
         "docs/how-to/bench-to-machine.md": 1,
-        "docs/how-to/calibrate.md": 1,
+        "docs/how-to/calibrate.md": 2,
         "docs/how-to/compliant-bearing.md": 1,
         "docs/how-to/floor.md": 1,
-        "docs/how-to/own-machine.md": 2,
+        "docs/how-to/own-machine.md": 3,
     }

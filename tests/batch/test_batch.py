@@ -7,6 +7,7 @@ import warnings
 import numpy as np
 import pytest
 import xarray as xr
+from simple_machines import with_gasket_tables
 
 from wm_drake.batch import SimulationInterrupted, simulate_many
 from wm_drake.batch.work_items import KEPT_NUMBERS
@@ -29,6 +30,18 @@ VARIABLES = (
     "critical_speed",
 )
 VIOLENT = Load(unbalances=(Unbalance(mass=60.0, radius=0.3, y=0.1),))
+
+
+@pytest.fixture(scope="module")
+def reference(reference):
+    """Return the reference machine with tables for its gasket."""
+    return with_gasket_tables(reference)
+
+
+@pytest.fixture(scope="module")
+def machine(reference):
+    """Build the machine with tables once."""
+    return build_machine(reference)
 
 
 def radial_force(reference, stiffness):

@@ -108,7 +108,7 @@ def test_new_machine_is_valid_and_equals_its_base(wm_drake, base):
     assert ended.code == 0
     assert "wm-drake machine check mine.yaml" in ended.out
     assert wm_drake("machine", "check", "mine.yaml").code == 0
-    kept = {"name", "about", "measured"}
+    kept = {"name", "about", "measured", "published"}
     assert load_machine("mine.yaml").model_dump(exclude=kept) == load_machine(base).model_dump(
         exclude=kept
     )
@@ -120,7 +120,7 @@ def test_comments_of_a_new_machine_are_its_numbers(wm_drake):
     lines = Path("mine.yaml").read_text().splitlines()
     body = [line.removeprefix("# ") for line in lines[lines.index("") :]]
     Path("all.yaml").write_text("\n".join(["extends: reference", "name: all", *body]))
-    kept = {"name", "about", "measured", "sources"}
+    kept = {"name", "about", "measured", "published", "sources"}
     assert load_machine("all.yaml").model_dump(exclude=kept) == load_machine(
         "reference"
     ).model_dump(exclude=kept)

@@ -233,7 +233,10 @@ def test_spin_whose_files_cannot_grow_ends_with_a_message(tmp_path, size):
         ("--starts=0", "starts: 0 starts"),
         ("--iterations=-1", "--iterations"),
         ("--resolution=inf", "resolution: inf is not allowed"),
-        ("--deviation=nan", "deviation: nan is not allowed"),
+        (
+            "--deviation=nan",
+            "--deviation: amplitudes: 'nan' is not allowed; must be > 0 and finite",
+        ),
         ("--weight=middle=inf", "--weight: middle: 'inf' is not allowed"),
         ("--weight=middle=٣", "--weight: middle: '٣' is not a number"),
         ("--weight=middle", "--weight: 'middle' does not have the form KEY=VALUE"),

@@ -57,6 +57,7 @@ frames:
   gasket_tub: {position: "(0, 0, 0) mm"}
   more: {attached_to: tub, position: "(0, 0, 0) mm", angles: "(0, 0, 0) deg"}
 springs: {left: {preload: 90 N}}
+gasket: {rotational_stiffness_x: {angle: "(-3, 0, 3) deg", torque: "(-1, 0, 1) N m"}}
 spring_types:
   free: {stiffness: 8 N/mm, free_length: 150 mm}
   table: {stiffness: {displacement: "(-20, 0, 20) mm", force: "(-160, 0, 160) N"}}
@@ -74,9 +75,15 @@ def test_every_range_belongs_to_a_number_and_has_its_unit(tmp_path):
 def test_spring_too_soft_for_its_weight_has_no_free_length(reference):
     """Free length = length - preload / stiffness; the limit is stiffness = preload / length."""
     setup = build_machine(reference).set_up()
-    rear = setup.springs["rear"]
-    limit = rear.preload / rear.rest_length
-    for factor, found in ((1.001, []), (0.999, ["springs.rear"])):
+    limits = {
+        f"springs.{name}": spring.preload / spring.rest_length
+        for name, spring in setup.springs.items()
+    }
+    limit = max(limits.values())
+    assert min(limits.values()) < 0.99 * limit
+    for factor in (1.001, 0.999):
+        found = [name for name in limits if limits[name] > factor * limit]
+        assert bool(found) == (factor < 1.0)
         soft = with_values(reference, {"spring_types.suspension.stiffness": factor * limit})
         problems = unusual_springs(build_machine(soft).set_up())
         assert [problem.key for problem in problems] == found

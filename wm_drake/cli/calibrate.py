@@ -168,18 +168,14 @@ def _deviations(entries: list[str] | None) -> tuple[float, dict[str, float]]:
             "amplitudes",
             where="--deviation",
         )
-    numbers = _numbers(named, "--deviation")
-    numbers |= _numbers([f"amplitudes={entry}" for entry in plain], "--deviation")
-    for name, percent in numbers.items():
-        if not percent > 0.0:
-            message = f"{percent:g} is not allowed; must be > 0"
-            raise input_error(message, where="--deviation", key=name)
+    entries = [*named, *(f"amplitudes={entry}" for entry in plain)]
+    numbers = _numbers(entries, "--deviation", zero=False)
     responses = {name: percent / 100.0 for name, percent in numbers.items()}
     return responses.pop("amplitudes", RELATIVE_DEVIATION), responses
 
 
-def _numbers(entries: list[str] | None, option: str) -> dict[str, float]:
-    """Return the numbers of NAME=NUMBER entries, each finite and at least 0."""
+def _numbers(entries: list[str] | None, option: str, zero: bool = True) -> dict[str, float]:
+    """Return the numbers of NAME=NUMBER entries, each finite and above 0, or 0 where allowed."""
     from wm_drake.parameters.units import plain_number
 
     numbers: dict[str, float] = {}
@@ -188,9 +184,10 @@ def _numbers(entries: list[str] | None, option: str) -> dict[str, float]:
             number = plain_number(text)
         except ValueError as error:
             raise input_error(str(error), where=option, key=name) from None
-        if not 0.0 <= number < math.inf:
+        if not 0.0 <= number < math.inf or (number == 0.0 and not zero):
+            allowed = ">= 0" if zero else "> 0"
             raise input_error(
-                f"'{text}' is not allowed; must be >= 0 and finite", where=option, key=name
+                f"'{text}' is not allowed; must be {allowed} and finite", where=option, key=name
             )
         if name in numbers:
             raise input_error("is given twice", where=option, key=name)

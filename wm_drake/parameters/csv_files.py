@@ -76,17 +76,21 @@ def finite_numbers(table: pd.DataFrame, path: str | Path) -> FloatArray:
     return numbers
 
 
-def read_header(path: Path) -> list[str]:
+def read_header(path: Path, key: str = "") -> list[str]:
     """Return the names of the columns of a CSV file.
+
+    Args:
+        path: The file.
+        key: Key path for messages.
 
     Raises:
         InputError: the file cannot be read as CSV.
     """
     try:
-        return list(map(str, _table(read_text(path), nrows=0).columns))
+        return list(map(str, _table(read_text(path, key=key), nrows=0).columns))
     except ValueError as error:
         reason = " ".join(str(error).split())
-        raise input_error(f"cannot be read as CSV ({reason})", where=str(path)) from None
+        raise input_error(f"cannot be read as CSV ({reason})", where=str(path), key=key) from None
 
 
 MOST_COLUMNS = 1000

@@ -79,11 +79,11 @@ def measured_responses(parameters: MachineParameters) -> list[NamedValue]:
 
 
 def _has_responses(path: str) -> bool:
-    return OF in read_header(Path(path))
+    return OF in read_header(Path(path), key="measured")
 
 
 def _responses(path: str) -> list[NamedValue]:
-    head = read_header(Path(path))
+    head = read_header(Path(path), key="measured")
     columns = head[len(_KEYS) + 1 :]
     named = [_HEAD.fullmatch(column) for column in columns]
     table = read_csv(path, [*_KEYS, OF, *columns], key="measured")

@@ -52,7 +52,7 @@ class Prediction:
 
 
 DRAWS = 200
-"""Number of machines that are drawn from the posterior."""
+"""Usual number of machines that are drawn from the posterior."""
 
 LEVEL = 0.95
 """Probability of an interval."""
@@ -66,6 +66,7 @@ def predict(
     ledger: Ledger,
     *,
     plan: Plan | None = None,
+    draws: int = DRAWS,
     workers: int | None = None,
     report: Callable[[int, int, float], None] = lambda start, evaluations, best: None,
 ) -> list[Prediction]:
@@ -81,6 +82,7 @@ def predict(
         held_out: Groups of names of loads.
         ledger: The open ledger of this calibration.
         plan: Settings of these searches; None for those of the calibration.
+        draws: Number of machines that are drawn from the posterior for the intervals.
         workers: Number of threads; None for the number of cores.
         report: Called with the number of the start, the number of points it has evaluated and its
             lowest cost so far.
@@ -100,7 +102,7 @@ def predict(
         )
         cases, best = targets.of(*loads), others.solutions[0]
         evaluation = Evaluation(machine, others.parameter_map, targets, workers)
-        limits, scatter = _interval(others, StoredValues(evaluation, ledger))
+        limits, scatter = _interval(others, StoredValues(evaluation, ledger), draws)
         found.append(
             Prediction(
                 loads,
@@ -114,17 +116,19 @@ def predict(
     return found
 
 
-def _interval(calibration: Calibration, values: StoredValues) -> tuple[FloatArray, float]:
+def _interval(
+    calibration: Calibration, values: StoredValues, draws: int
+) -> tuple[FloatArray, float]:
     """Return the limits (2, case, sensor) of predicted amplitudes [m], and the scatter.
 
     Machines are drawn in equal numbers from the normal distributions around all distinct good
     solutions, because the data cannot tell these apart.
     """
     targets, plan, parameter_map = calibration.targets, calibration.plan, calibration.parameter_map
-    generator = np.random.default_rng([plan.seed, DRAWS])
+    generator = np.random.default_rng([plan.seed, draws])
     logarithms = np.log1p(calibration.solutions[0].errors(targets))
     scatter = max(plan.deviation, float(np.sqrt(np.nanmean(logarithms**2))))
-    each = -(-DRAWS // len(calibration.solutions))
+    each = -(-draws // len(calibration.solutions))
     drawn = np.concatenate(
         [
             generator.multivariate_normal(

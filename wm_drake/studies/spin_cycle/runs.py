@@ -14,7 +14,7 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.vibration import record_region_displacements
 from wm_drake.studies.spin.study import CaseResult, run_spin
-from wm_drake.studies.spin_cycle.study import FEET, MEASURES, Evaluate, measures_of
+from wm_drake.studies.spin_cycle.study import FEET, FORCES, Evaluate, measures_of
 
 
 def compiled_runs(
@@ -101,7 +101,7 @@ def _forces(results: Sequence[CaseResult]) -> dict[str, tuple[tuple[str, ...], n
     """Return the variables of the forces of the mounts and of the loads of the feet."""
     found: dict[str, list[xr.DataArray]] = {}
     for result in results:
-        for measure in (*MEASURES[3:], *(FEET if result.measures.feet is not None else ())):
+        for measure in (*FORCES, *(FEET if result.measures.feet is not None else ())):
             own = result.measures.feet if measure in FEET else result.measures
             for name in KNOWN_MEASURES[measure]:
                 found.setdefault(name, []).append(getattr(own, name))

@@ -16,7 +16,10 @@ from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.outputs import AXES
 from wm_drake.simulation.vibration import relative_error
 
-MEASURES = ("regions", "gap", "spring tensions", "mounts", "cabinet")
+FORCES = ("mounts", "cabinet")
+"""Measures of the forces on the cabinet."""
+
+MEASURES = ("regions", "gap", "spring tensions", *FORCES)
 """Measures of each run, as for `simulate_many`."""
 
 FEET = ("feet", "feet regions")
@@ -82,8 +85,7 @@ def forces_of(
         coordinates["foot"] = list(parameters.cabinet.corners)
     names = [
         name
-        for measure in measures_of(parameters)
-        if measure not in ("regions", "gap")
+        for measure in (*FORCES, *(FEET if parameters.cabinet else ()))
         for name in KNOWN_MEASURES[measure]
     ]
     variables = {name: (("case", *table[name].dims[1:]), table[name].values) for name in names}
