@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from simple_machines import with_gasket_tables
 
 from wm_drake.parameters import (
     GASKET_FACTORS,
@@ -154,16 +155,17 @@ def fake_run(parameters, cases):
 
 @pytest.mark.parametrize("tables", TABLES)
 def test_level_zero_is_the_machine_if_tables_are_scaled(reference, tables):
+    machine = with_gasket_tables(reference)
     known = {"K_Lx": load_factors(GASKET_FACTORS)["K_Lx"]}
-    every = {name: levels_of(reference, known, name) for name in TABLES}
-    loads = [Case("middle", reference.loads["middle"], reference.profile)]
-    chosen = chosen_responses(reference, reference.profile, ["D"])
-    zero = run_level_zero(reference, every, tables, loads, chosen, fake_run)
+    every = {name: levels_of(machine, known, name) for name in TABLES}
+    loads = [Case("middle", machine.loads["middle"], machine.profile)]
+    chosen = chosen_responses(machine, machine.profile, ["D"])
+    zero = run_level_zero(machine, every, tables, loads, chosen, fake_run)
     label = ("middle", "Dx")
-    assert zero.value(label, "machine") == pytest.approx(reference.gasket.stiffness_x.force[-1])
+    assert zero.value(label, "machine") == pytest.approx(machine.gasket.stiffness_x.force[-1])
     assert zero.difference(label, "scaled") == 0.0
-    slope = at_levels(reference, every["linear"], [0]).gasket.stiffness_x
-    hardening = 100.0 * (0.03 * slope / reference.gasket.stiffness_x.force[-1] - 1.0)
+    slope = at_levels(machine, every["linear"], [0]).gasket.stiffness_x
+    hardening = 100.0 * (0.03 * slope / machine.gasket.stiffness_x.force[-1] - 1.0)
     assert zero.difference(label, "linear") == pytest.approx(hardening)
     assert hardening < -10.0
     text = level_zero_text(zero, Words(every[tables], {}))
@@ -176,8 +178,9 @@ def test_level_zero_is_the_machine_if_tables_are_scaled(reference, tables):
     assert list(zero.frame()["scaled_difference_percent"]) == [0.0] * 3
 
 
-def test_level_zero_is_not_run_without_tables(reference):
-    known = {"C_L": load_factors(GASKET_FACTORS)["C_L"]}
+@pytest.mark.parametrize("factor", ["C_L", "K_Lx"])
+def test_level_zero_is_not_run_without_tables(reference, factor):
+    known = {factor: load_factors(GASKET_FACTORS)[factor]}
     every = {name: levels_of(reference, known, name) for name in TABLES}
     assert run_level_zero(reference, every, "scaled", [], [], None) is None
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy import stats
+from simple_machines import with_gasket_tables
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import load_machine
@@ -65,6 +66,7 @@ def test_one_draw_or_one_each(machine):
 
 
 def test_table_is_scaled(machine):
+    machine = with_gasket_tables(machine)
     key = "gasket.stiffness_x"
     found = uncertain(machine, {"load": "middle", "quantities": {"g": normal(key)}})
     (case,) = found.cases(np.array([[-2.0]]))
@@ -112,7 +114,6 @@ def test_shipped_files_fit_the_reference_machine(machine):
         ({"quantities": {"k": normal(SPRING, "100 %", "1 N/mm")}}, "not in percent"),
         ({"quantities": {"k": normal(SPRING, low="120 %", high="110 %")}}, "below"),
         ({"quantities": {"k": normal(SPRING), "l": normal(SPRING)}}, "already"),
-        ({"quantities": {"g": normal("gasket.stiffness_x", "4 N/mm", "1 N/mm")}}, "percent"),
         (
             {
                 "quantities": {"k": normal(SPRING)},
@@ -125,6 +126,12 @@ def test_shipped_files_fit_the_reference_machine(machine):
 def test_wrong_files_are_refused(machine, tree, message):
     with pytest.raises(InputError, match=message):
         uncertain(machine, {"load": "middle"} | tree)
+
+
+def test_table_by_value_is_refused(machine):
+    tree = {"load": "middle", "quantities": {"g": normal("gasket.stiffness_x", "4 N/mm", "1 N/mm")}}
+    with pytest.raises(InputError, match="is a table; give its distribution in percent"):
+        uncertain(with_gasket_tables(machine), tree)
 
 
 def test_negative_mass_is_refused_before_the_study(machine):
