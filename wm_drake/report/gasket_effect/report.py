@@ -29,7 +29,16 @@ ZOOM = 1.5
 """Half of the time interval of the detail of a record. [s]"""
 
 SMALL_STEADY = 10.0
-"""Largest difference of steady amplitudes for which the gasket is said to matter little. [%]"""
+"""Largest difference of steady amplitudes for which the gasket is said to matter little. [%]
+
+[B] section 2.2 says it is negligible, without a number; the limit is an assumption.
+"""
+
+LARGE_STEADY = 1.0
+"""Steady amplitude without gasket from which on its difference in percent is judged. [mm]
+
+An assumption: a part of a smaller one is below what can be seen on a tub.
+"""
 
 
 def gasket_effect_report(effect: GasketEffect, command: str = "") -> str:
@@ -96,18 +105,45 @@ def summary(table: pd.DataFrame) -> str:
             f"The sign of the difference is that of the experiment in {same} of {len(measured)} "
             "cases."
         )
-    calm = table[np.isfinite(table["steady_percent"])]
-    if len(calm):
-        worst = calm.loc[calm["steady_percent"].abs().idxmax()]
+    return " ".join(sentences + _steady_sentences(table))
+
+
+def _steady_sentences(table: pd.DataFrame) -> list[str]:
+    """Return what the gasket changes in the steady state; empty if the profile has none.
+
+    Large amplitudes decide whether it matters. Percents of small ones are large, so these are in
+    mm.
+    """
+    changed = table.assign(change_mm=(table["steady_with_mm"] - table["steady_without_mm"]).abs())
+    known = changed[np.isfinite(changed["change_mm"])]
+    is_large = known["steady_without_mm"] >= LARGE_STEADY
+    large, small = known[is_large], known[~is_large]
+    sentences = []
+    if len(large):
+        worst = large.loc[large["steady_percent"].abs().idxmax()]
         size = abs(worst["steady_percent"])
         matters = "matters little" if size <= SMALL_STEADY else "still matters"
         sentences.append(
-            f"In the steady state the gasket {matters}: amplitudes differ by up to "
-            f"{number(size, 1)} % ({worst['sensor']}, load {worst['load']}: "
-            f"{number(worst['steady_without_mm'], 1)} mm without, "
-            f"{number(worst['steady_with_mm'], 1)} mm with gasket)."
+            f"In the steady state the gasket {matters}: amplitudes of at least {LARGE_STEADY:g} mm "
+            f"without gasket differ by up to {number(size, 1)} % ({_both_steady(worst)})."
         )
-    return " ".join(sentences)
+    if len(small):
+        worst = small.loc[small["change_mm"].idxmax()]
+        which = "Smaller ones" if len(large) else "Steady amplitudes"
+        below = "" if len(large) else f", all below {LARGE_STEADY:g} mm without gasket,"
+        sentences.append(
+            f"{which}{below} differ by up to {number(worst['change_mm'], 2)} mm "
+            f"({_both_steady(worst)})."
+        )
+    return sentences
+
+
+def _both_steady(row: pd.Series) -> str:
+    """Return sensor, load and both steady amplitudes of a row as text."""
+    return (
+        f"{row['sensor']}, load {row['load']}: {number(row['steady_without_mm'], 2)} mm without, "
+        f"{number(row['steady_with_mm'], 2)} mm with gasket"
+    )
 
 
 def amplitudes(table: pd.DataFrame) -> Table:
