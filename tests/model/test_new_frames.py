@@ -14,6 +14,8 @@ NEW = """
 extends: reference
 name: four_springs
 frames:
+  spring_left_housing: {position: "(-213.67, -91.68, 399.28) mm"}
+  spring_right_housing: {position: "(213.67, -91.68, 399.28) mm"}
   spring_front_tub: {attached_to: tub, position: "(10, -180, 200) mm"}
   spring_front_housing: {attached_to: housing, position: "(10, -180, 400) mm"}
   gasket_ring: {attached_to: housing, position: "(0, -300, 0) mm", angles: "(0, 0, 30) deg"}
