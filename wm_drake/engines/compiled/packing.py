@@ -258,7 +258,8 @@ def pack_tub(setup: Setup) -> FloatArray:
 def pack_bodies(plant: MultibodyPlant, context: Context, drive: str) -> FloatArray:
     """Return the packed bodies (`BODIES`) of a plant Context with its load.
 
-    With a compliant bearing these are the carrier and the drum, without the tub.
+    With a compliant bearing these are the carrier and the drum, without the tub. They are computed
+    at the drawn pose, so that the last bits do not depend on the pose of the Context, which stays.
 
     Args:
         plant: The plant.
@@ -268,6 +269,15 @@ def pack_bodies(plant: MultibodyPlant, context: Context, drive: str) -> FloatArr
     Raises:
         InputError: the plant has something that the compiled engine does not represent.
     """
+    positions = plant.GetPositions(context)
+    plant.SetPositions(context, np.zeros(len(positions)))
+    try:
+        return _bodies_as_drawn(plant, context, drive)
+    finally:
+        plant.SetPositions(context, positions)
+
+
+def _bodies_as_drawn(plant: MultibodyPlant, context: Context, drive: str) -> FloatArray:
     joint = drum_joint(plant, drive)
     tub = plant.GetBodyByName(CARRIER if plant.HasBodyNamed(CARRIER) else "tub")
     X_TF = plant.CalcRelativeTransform(context, tub.body_frame(), joint.frame_on_parent())
