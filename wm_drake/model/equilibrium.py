@@ -66,7 +66,8 @@ def preloaded(
 ) -> PlacedElements:
     """Return the elements with the spring preloads that balance the empty machine as drawn (T = W).
 
-    The balance is a least-squares one: fewer than six springs cannot balance every moment. Given
+    The balance is a least-squares one of the force [N] and the moment about To [N m]: fewer than
+    six springs cannot balance both. What remains moves the machine to its rest pose. Given
     preloads stay; the others balance what these leave. If all are given, the machine sags
     (`put_to_rest`). Bodies attached to the tub (damper tubes, drum in a compliant bearing) are
     moved to their equilibrium.
