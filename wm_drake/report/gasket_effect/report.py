@@ -13,6 +13,8 @@ from wm_drake.report.spin.report import warnings_of
 from wm_drake.report.tables import Group, Row, Table, parameter_table
 from wm_drake.simulation.measures import envelopes, filtered_displacement
 from wm_drake.studies.gasket_effect.study import (
+    LARGE_STEADY,
+    SMALL_STEADY,
     WITH,
     WITHOUT,
     GasketEffect,
@@ -27,18 +29,6 @@ SHOWN = 3
 
 ZOOM = 1.5
 """Half of the time interval of the detail of a record. [s]"""
-
-SMALL_STEADY = 10.0
-"""Largest difference of steady amplitudes for which the gasket is said to matter little. [%]
-
-[B] section 2.2 says it is negligible, without a number; the limit is an assumption.
-"""
-
-LARGE_STEADY = 1.0
-"""Steady amplitude without gasket from which on its difference in percent is judged. [mm]
-
-An assumption: a part of a smaller one is below what can be seen on a tub.
-"""
 
 
 def gasket_effect_report(effect: GasketEffect, command: str = "") -> str:

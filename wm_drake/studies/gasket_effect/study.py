@@ -33,6 +33,18 @@ An assumption: in the first part the motion of the run-up decays. At 400 rpm in 
 6.4 of 12.9 s.
 """
 
+SMALL_STEADY = 10.0
+"""Largest difference of steady amplitudes for which the gasket is said to matter little. [%]
+
+[B] section 2.2 says it is negligible, without a number; the limit is an assumption.
+"""
+
+LARGE_STEADY = 1.0
+"""Steady amplitude without gasket from which on its difference in percent is judged. [mm]
+
+An assumption: a part of a smaller one is below what can be seen on a tub.
+"""
+
 MM = Unit("m", "mm")
 
 
