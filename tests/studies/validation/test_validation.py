@@ -55,7 +55,8 @@ def test_effects_are_judged_by_their_sign():
             "sensor": list("abcde"),
             "experiment_percent": [50.0, -20.0, 3.0, 3.0, np.nan],
             "percent": [20.0, 5.0, -4.0, 15.0, 9.0],
-            "steady_percent": [1.0, -11.0, 0.0, np.nan, 2.0],
+            "steady_percent": [1.0, -11.0, 90.0, np.nan, 2.0],
+            "steady_without_mm": [5.0, 1.0, 0.4, np.nan, 3.0],  # the third is too small to count
         }
     )
     *effects, steady = effect_rows(table)
