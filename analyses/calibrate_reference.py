@@ -117,7 +117,10 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--write", action="store_true", help="write the best machine to the shipped files"
     )
-    return parser.parse_args()
+    arguments = parser.parse_args()
+    if arguments.quick and arguments.write:
+        parser.error("--quick cannot be written to the shipped files; leave out --quick or --write")
+    return arguments
 
 
 def _lines(calibration: Calibration, predictions: list[Prediction]) -> list[str]:
