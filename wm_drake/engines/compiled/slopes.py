@@ -19,6 +19,7 @@ from wm_drake.elements.friction_damper import (
 from wm_drake.elements.motion import motion_at, read_tree_state, tub_motion
 from wm_drake.elements.spring import spring_strut_wrench
 from wm_drake.elements.telescopic_damper import telescopic_damper_forces
+from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, VELOCITIES
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
@@ -77,7 +78,10 @@ class SlopedDerivative:
         for _ in setup.telescopes:
             velocities[begin + 7 : begin + TUBES_STATE_SIZE - 1] = True
             begin += TUBES_STATE_SIZE
-        velocities[begin + (size - begin) // 2 :] = True
+        cabinet = size - CABINET_STATE_SIZE if setup.cabinet else size
+        velocities[begin + (cabinet - begin) // 2 : cabinet] = True
+        if setup.cabinet:
+            velocities[cabinet + np.array(VELOCITIES)] = True
         self.is_velocity = velocities[self.free]
         self._steps = np.where(velocities, VELOCITY_STEP, POSITION_STEP)
         self._steps[DRUM_RATE] = POSITION_STEP
