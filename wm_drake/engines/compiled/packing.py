@@ -85,13 +85,13 @@ class Layout:
         """Number of accelerations in a sample, behind the state."""
         return RATES_SIZE * (1 + (self.bearing >= 0) + (self.cabinet >= 0))
 
-    def parts(self, states: FloatArray) -> tuple[FloatArray, ...]:
+    def parts(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Split states (n, size) into their parts.
 
         Returns:
             State of tub and drum (n, 14); deformations of all dampers, those of telescopic ones
             last (n, d); states of the tubes (n, k, 14); state of the drum's carrier (n, 12), or
-            (n, 0) without one; state of the cabinet (n, `CABINET_STATE_SIZE`), or (n, 0) if fixed.
+            (n, 0) without one. The rest is the `cabinet_part`.
         """
         tubes_begin = STATE_SIZE + len(self.dampers)
         tubes_end = tubes_begin + TUBES_STATE_SIZE * len(self.telescopes)
@@ -100,9 +100,17 @@ class Layout:
         )
         own, deformation_of_tubes = tubes[:, :, :STATE_SIZE], tubes[:, :, DEFORMATION]
         deformation = np.hstack([states[:, STATE_SIZE:tubes_begin], deformation_of_tubes])
-        cabinet_begin = states.shape[1] - (CABINET_STATE_SIZE if self.cabinet >= 0 else 0)
-        attached = states[:, tubes_end:cabinet_begin], states[:, cabinet_begin:]
-        return states[:, :STATE_SIZE], deformation, own, *attached
+        carrier = states[:, tubes_end : states.shape[1] - self.cabinet_size]
+        return states[:, :STATE_SIZE], deformation, own, carrier
+
+    def cabinet_part(self, states: FloatArray) -> FloatArray | None:
+        """Return the states (n, `CABINET_STATE_SIZE`) of a cabinet that moves; None if fixed."""
+        return states[:, states.shape[1] - self.cabinet_size :] if self.cabinet >= 0 else None
+
+    @property
+    def cabinet_size(self) -> int:
+        """Size of the state of the cabinet, which is last; 0 for a fixed one."""
+        return CABINET_STATE_SIZE if self.cabinet >= 0 else 0
 
 
 def pack(setup: Setup) -> tuple[FloatArray, Layout]:

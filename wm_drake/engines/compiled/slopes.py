@@ -19,7 +19,6 @@ from wm_drake.elements.friction_damper import (
 from wm_drake.elements.motion import motion_at, read_tree_state, tub_motion
 from wm_drake.elements.spring import spring_strut_wrench
 from wm_drake.elements.telescopic_damper import telescopic_damper_forces
-from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, VELOCITIES
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
@@ -35,6 +34,7 @@ from wm_drake.engines.compiled.tubes import (
     read_tubes_state,
     telescopic_damper_count,
 )
+from wm_drake.errors import input_error
 from wm_drake.model.machine import Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
@@ -66,8 +66,15 @@ class SlopedDerivative:
         """Pack a machine.
 
         Raises:
-            InputError: the machine has something that the compiled engine does not represent.
+            InputError: the machine has something that the compiled engine does not represent, or
+                its cabinet moves.
         """
+        if setup.cabinet:
+            raise input_error(
+                "modes and steady states are those of a machine on a fixed cabinet; run with "
+                "cabinet.moves=false",
+                key="cabinet.moves",
+            )
         self.packed, self.layout = pack(setup)
         self.rest = initial_state(setup, SpinProfile(time=(0.0, 1.0), speed=(0.0, 0.0)))
         size = len(self.rest)
@@ -78,10 +85,7 @@ class SlopedDerivative:
         for _ in setup.telescopes:
             velocities[begin + 7 : begin + TUBES_STATE_SIZE - 1] = True
             begin += TUBES_STATE_SIZE
-        cabinet = size - CABINET_STATE_SIZE if setup.cabinet else size
-        velocities[begin + (cabinet - begin) // 2 : cabinet] = True
-        if setup.cabinet:
-            velocities[cabinet + np.array(VELOCITIES)] = True
+        velocities[begin + (size - begin) // 2 :] = True
         self.is_velocity = velocities[self.free]
         self._steps = np.where(velocities, VELOCITY_STEP, POSITION_STEP)
         self._steps[DRUM_RATE] = POSITION_STEP
