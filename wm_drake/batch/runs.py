@@ -29,6 +29,7 @@ from wm_drake.model.scene import Gap, Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.cabinet import floor_forces
 from wm_drake.simulation.feet import FOOT_VARIABLES, REGION_VARIABLES, cabinet_of, foot_measures
 from wm_drake.simulation.histories import measure_samples_lanes
 from wm_drake.simulation.measures import amplitudes, filtered, power_means
@@ -229,6 +230,7 @@ class Runner:
                 run.cabinet[: run.good],
                 item.case.profile,
                 OUTPUT_PERIOD,
+                floor_forces=_floor_forces(item, run),
             )
             run.feet.update(found)
         return [run.feet[name] for name in names]
@@ -293,6 +295,15 @@ class Runner:
         if name not in kept or len(kept[name]) != size * WIDTH:
             kept[name] = aligned(size * WIDTH)
         return kept[name]
+
+
+def _floor_forces(item: WorkItem, run: "_Run") -> FloatArray | None:
+    """Return the forces of the floor on the feet of a cabinet that moves; None if it is fixed."""
+    cabinet = item.numbers.layout.cabinet_part(run.samples[: run.good, : len(item.begin)])
+    if cabinet is None:
+        return None
+    assert item.numbers.setup.cabinet is not None
+    return floor_forces(cabinet, item.numbers.setup.cabinet.packed())
 
 
 def _divergence(time: FloatArray, samples: FloatArray, good: int) -> str:

@@ -54,7 +54,7 @@ FOOT = PackedLayout("FootNumbers", position=VECTOR, at_rest=SCALAR)
 FEET_SIZE = PADS.fixed_size + FEET_COUNT * FOOT.fixed_size
 """Packed numbers of the feet: `PADS`, then a `FOOT` for each."""
 SLIP_SIZE = 2 * FEET_COUNT
-"""States of the feet: for each, how far the end of its pad has slid since the start, x and y. [m]"""
+"""States of the feet: for each, how far the end of its pad has slid since the start, x, y. [m]"""
 FLOOR_FORCE_SIZE = 3 * FEET_COUNT
 """Own numbers of the feet: force of the floor on each, x, y, z in W. [N]"""
 _PADS_SIZE, _FOOT_SIZE = PADS.fixed_size, FOOT.fixed_size
@@ -67,8 +67,8 @@ Assumption: small motions about rest have the full damping, and a foot that is s
 read_pads, read_foot = PADS.read, FOOT.read
 
 FootForce = namedtuple("FootForce", ("arm", "force", "slip_rate"))
-"""Of a foot: its position from the origin of C in W [m], force of the floor on it in W [N], velocity
-of the end of its pad, x and y [m/s]."""
+"""Of a foot: its position from the origin of C in W [m], force of the floor on it in W [N],
+velocity of the end of its pad, x and y [m/s]."""
 
 
 @dataclass(frozen=True)
