@@ -28,8 +28,8 @@ from wm_drake.model.machine import OUTPUT_PERIOD
 from wm_drake.model.scene import Gap, Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.cases import Case
 from wm_drake.simulation.cabinet import floor_forces
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.feet import FOOT_VARIABLES, REGION_VARIABLES, cabinet_of, foot_measures
 from wm_drake.simulation.histories import measure_samples_lanes
 from wm_drake.simulation.measures import amplitudes, filtered, power_means

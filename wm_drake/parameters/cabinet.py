@@ -17,7 +17,12 @@ FootName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,
 
 
 class Foot(Frozen):
-    """Position of a foot on the floor, in W."""
+    """Position of a foot on the floor, in W.
+
+    Attributes:
+        x: To the right.
+        y: To the rear.
+    """
 
     x: u.Length
     y: u.Length
@@ -27,9 +32,11 @@ class FootType(Frozen):
     """The pad of a foot; all four are alike. Each is a spring with a damper in each direction.
 
     Attributes:
-        vertical_stiffness, vertical_damping: Of a pad that is pressed; it does not pull.
-        horizontal_stiffness, horizontal_damping: Of a pad in shear, the same in all directions. The
-            damping must be above 0: it limits the speed at which a sliding pad springs back.
+        vertical_stiffness: Stiffness of a pad that is pressed; it does not pull.
+        vertical_damping: Its damping.
+        horizontal_stiffness: Stiffness of a pad in shear, the same in all directions.
+        horizontal_damping: Its damping, above 0: it limits the speed at which a sliding pad springs
+            back.
     """
 
     vertical_stiffness: Annotated[u.LinearStiffness, Field(gt=0.0)]

@@ -13,6 +13,10 @@ class InertiaMatrix(Frozen):
     """Inertia matrix about the centre of mass, in the axes of T (or D).
 
     The products of inertia are elements of the matrix: xy = -sum(m x y).
+
+    Attributes:
+        xx, yy, zz: Moments of inertia.
+        xy, xz, yz: Elements of the matrix outside of its diagonal.
     """
 
     xx: Annotated[u.Inertia, Field(gt=0.0)]
