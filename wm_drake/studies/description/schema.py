@@ -270,17 +270,6 @@ class FootType(_Part):
     horizontal_damping: float = Field(description="[N s/m]")
 
 
-class InertiaMatrix(_Part):
-    """Inertia matrix about the centre of mass, in the axes of W; products are its elements."""
-
-    xx: float
-    yy: float
-    zz: float
-    xy: float
-    xz: float
-    yz: float
-
-
 class Cabinet(_Part):
     """The rigid cabinet on four feet; it has no influence on the motion unless it moves."""
 
@@ -290,7 +279,7 @@ class Cabinet(_Part):
     friction: float = Field(description="Coefficient of Coulomb friction of the feet.")
     feet: dict[str, Foot]
     moves: bool = Field(description="Whether it moves on its feet; else the housing is fixed.")
-    inertia_kgm2: InertiaMatrix | None = Field(description="None for a fixed cabinet. [kg m^2]")
+    inertia_kgm2: Inertia | None = Field(description="None for a fixed cabinet. [kg m^2]")
     foot_type: FootType | None = Field(description="None for a fixed cabinet.")
 
 
