@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from scipy.signal import butter, find_peaks, hilbert, sosfiltfilt
+from scipy.signal import butter, find_peaks, hilbert, sosfilt_zi
 
 from wm_drake.model.scene import REPLAY_RATE, Gap, Scene
 from wm_drake.parameters import SpinProfile
@@ -17,6 +17,7 @@ from wm_drake.simulation.mount_forces import speed_ranges
 from wm_drake.simulation.mounts import KINDS, force_measures
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record
+from wm_drake.simulation.signals import filter_both_ways, largest_peaks
 from wm_drake.simulation.spring_tension import smallest_tensions
 
 BAND_HZ = (0.5, 20.0)
@@ -95,19 +96,33 @@ def filtered(displacement: FloatArray, period: float) -> FloatArray:
         (n, k) filtered displacements. [m] NaN if there are fewer samples than the filter needs, for
         example because the run diverged at once.
     """
-    padding = min(round(PADDING / period), len(displacement) - 1)
+    return filtered_columns(np.ascontiguousarray(displacement), displacement.shape[1], period)
+
+
+def filtered_columns(signals: FloatArray, columns: int, period: float) -> FloatArray:
+    """Return the first columns of an array of signals, as from `filtered`.
+
+    Args:
+        signals: (n, >= columns), contiguous. [m]
+        columns: Number of columns to filter.
+        period: Time between samples. [s]
+    """
+    rows, stride = signals.shape
+    padding = min(round(PADDING / period), rows - 1)
     if padding <= 6 * FILTER_ORDER + 3:  # the padding that sosfiltfilt chooses by default
-        return np.full(displacement.shape, np.nan)
-    return np.asarray(
-        sosfiltfilt(_band_pass(period), displacement, axis=0, padtype="even", padlen=padding)
-    )
+        return np.full((rows, columns), np.nan)
+    answer, work = np.empty((rows, columns)), np.empty((rows + 2 * padding, columns))
+    sections, settled = _band_pass(period)
+    shape = (rows, columns, stride)
+    filter_both_ways(signals.ravel(), shape, sections, settled, padding, work, answer)
+    return answer
 
 
 @functools.cache
-def _band_pass(period: float) -> FloatArray:
-    return np.asarray(
-        butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=1.0 / period, output="sos")
-    )
+def _band_pass(period: float) -> tuple[FloatArray, FloatArray]:
+    """Return the sections of the filter (s, 6), and their states at a constant signal (s, 2)."""
+    sections = butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=1.0 / period, output="sos")
+    return np.ascontiguousarray(sections), np.ascontiguousarray(sosfilt_zi(sections))
 
 
 def filtered_displacement(record: Record) -> xr.DataArray:
@@ -151,16 +166,9 @@ def amplitudes(displacement: FloatArray) -> tuple[FloatArray, np.ndarray]:
         The largest value in the unit of the signals and the index of its sample, each (k,). A
         signal that is empty or starts with NaN gives NaN and 0.
     """
-    sizes = np.full(displacement.shape[1], np.nan)
-    samples = np.zeros(displacement.shape[1], dtype=np.int64)
-    for column, signal in enumerate(displacement.T):
-        signal = np.ascontiguousarray(signal)
-        if not len(signal) or np.isnan(signal[0]):
-            continue
-        sides = (find_peaks(signal)[0], find_peaks(-signal)[0])
-        nodes = np.concatenate([side if len(side) else np.arange(len(signal)) for side in sides])
-        samples[column] = nodes[np.argmax(np.abs(signal[nodes]))]
-        sizes[column] = abs(signal[samples[column]])
+    sizes = np.empty(displacement.shape[1])
+    samples = np.empty(displacement.shape[1], dtype=np.int64)
+    largest_peaks(np.ascontiguousarray(displacement), sizes, samples)
     return sizes, samples
 
 
