@@ -52,9 +52,7 @@ def _complete(app: Sphinx, docname: str, source: list[str]) -> None:
     source[0] = _relinked(text, Path(app.srcdir), Path(app.srcdir, docname).parent, docname)
 
 
-def _complete_included(
-    app: Sphinx, path: Path, docname: str, content: list[str]
-) -> None:
+def _complete_included(app: Sphinx, path: Path, docname: str, content: list[str]) -> None:
     """Lead the links of an included document to pages of the manual."""
     folder = Path(app.srcdir, path).resolve().parent
     content[0] = _relinked(content[0], Path(app.srcdir), folder, docname)
