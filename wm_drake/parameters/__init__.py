@@ -18,6 +18,7 @@ from wm_drake.parameters.damper_laws import (
     StvDamper,
     StvSpongeDamper,
 )
+from wm_drake.parameters.drive import Drive, MotorDrive
 from wm_drake.parameters.elements import (
     Bushing,
     BushingType,
@@ -55,7 +56,6 @@ from wm_drake.parameters.loop_files import MeasuredLoop, read_loop, read_loops
 from wm_drake.parameters.machine import (
     BodyOverride,
     Clearance,
-    Drive,
     FrameOverride,
     InertiaMatrix,
     MachineParameters,
@@ -90,6 +90,7 @@ __all__ = [
     "Load",
     "MachineParameters",
     "MeasuredLoop",
+    "MotorDrive",
     "MstvDamper",
     "PublishedResults",
     "PublishedTerm",

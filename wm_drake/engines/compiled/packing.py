@@ -9,7 +9,8 @@ from pydrake.systems.framework import Context
 
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.motion import POSE
-from wm_drake.engines.compiled.bearing import TUB, TUB_AND_BEARING
+from wm_drake.elements.motor import MOTOR_STATE_SIZE, motor_structure, packed_motor
+from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE, TUB, TUB_AND_BEARING
 from wm_drake.engines.compiled.mechanics import (
     BODIES,
     BODIES_SIZE,
@@ -43,6 +44,8 @@ class Layout:
         springs, dampers, bushings, telescopes: Index of each element.
         gasket: Index of the gasket, -1 without one.
         bearing: Index of the drum's compliant bearing, -1 for a rigid one.
+        motor: Index of the motor, -1 if the speed of the drum is prescribed.
+        control_period: Time between two samples of a sampled controller, else 0. [s]
         structure: Number of each damper's law and number of points of every table, in order.
     """
 
@@ -52,13 +55,15 @@ class Layout:
     telescopes: tuple[int, ...]
     gasket: int
     bearing: int
+    motor: int
+    control_period: float
     structure: tuple[int, ...]
 
     @property
     def elements(self) -> Elements:
         """The indices in the form that compiled functions use.
 
-        Without telescopic dampers or without a compliant bearing their index is None, and the
+        Without telescopic dampers, a compliant bearing or a motor their index is None, and the
         functions are compiled without them.
         """
         springs, dampers, bushings, telescopes = (
@@ -74,6 +79,7 @@ class Layout:
             telescopes if self.telescopes else None,
             bearing,
             tubes,
+            self.motor if self.motor >= 0 else None,
         )
 
     @property
@@ -96,7 +102,8 @@ class Layout:
         )
         own, deformation_of_tubes = tubes[:, :, :STATE_SIZE], tubes[:, :, DEFORMATION]
         deformation = np.hstack([states[:, STATE_SIZE:tubes_begin], deformation_of_tubes])
-        return states[:, :STATE_SIZE], deformation, own, states[:, tubes_end:]
+        carrier_end = tubes_end + (CARRIER_STATE_SIZE if self.bearing >= 0 else 0)
+        return states[:, :STATE_SIZE], deformation, own, states[:, tubes_end:carrier_end]
 
 
 def pack(setup: Setup) -> tuple[FloatArray, Layout]:
@@ -137,8 +144,19 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
         parts.append(TUB_AND_BEARING.pack(tub=pack_tub(setup), bearing=setup.bearing.packed()))
         structure += setup.bearing.structure
     bearing = size if setup.bearing else -1
+    motor, control_period = -1, 0.0
+    if drive := setup.motor:
+        motor = BODIES_SIZE + sum(map(len, parts))
+        parts.append(packed_motor(drive))
+        structure += motor_structure(drive)
+        control_period = drive.controller.sample_time or 0.0
     return np.concatenate(parts), Layout(
-        **indices, gasket=gasket, bearing=bearing, structure=tuple(structure)
+        **indices,
+        gasket=gasket,
+        bearing=bearing,
+        motor=motor,
+        control_period=control_period,
+        structure=tuple(structure),
     )
 
 
@@ -190,7 +208,8 @@ def fill_lanes(lanes: FloatArray, runs: list[FloatArray]) -> FloatArray:
 def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     """Return the state at the start of a run.
 
-    The machine is at rest at the rest pose, the drum at its first speed, sponges undeformed.
+    The machine is at rest at the rest pose, the drum at its first speed, sponges undeformed, a
+    motor without torque.
     """
     x = np.zeros(STATE_SIZE + len(setup.dampers))
     x[: POSE.fixed_size] = setup.rest_pose
@@ -198,7 +217,8 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     tubes = np.zeros((len(setup.telescopes), TUBES_STATE_SIZE))
     tubes[:, : setup.tube_rest.shape[1]] = setup.tube_rest
     carrier = np.append(setup.carrier_rest, np.zeros_like(setup.carrier_rest))
-    return np.concatenate([x, tubes.ravel(), carrier])
+    motor = np.zeros(MOTOR_STATE_SIZE if setup.motor else 0)
+    return np.concatenate([x, tubes.ravel(), carrier, motor])
 
 
 def pack_tubes(setup: Setup, name: str) -> FloatArray:

@@ -6,9 +6,9 @@ from wm_drake.compiler.compilation import long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.elements.motion import POSE, tub_motion
+from wm_drake.elements.motor import MOTOR_STATE_SIZE
+from wm_drake.engines.compiled.drum import DRUM_ANGLE, DRUM_RATE, motor_torque_history
 from wm_drake.engines.compiled.mechanics import (
-    DRUM_ANGLE,
-    DRUM_RATE,
     RATES_SIZE,
     STATE_SIZE,
     mass_properties,
@@ -35,18 +35,43 @@ def trajectory_of(
     states, rates = np.split(samples, [-layout.rates_size], axis=1)
     motion, deformation, tubes, carrier = layout.parts(states)
     torque = np.empty((len(samples), 1))
-    drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
-    torque_history(
-        _motion_of_drum_and_carrier(motion, carrier),
-        rates[:, -RATES_SIZE:],
-        drum_acceleration,
-        p,
-        torque,
-    )
+    if layout.motor >= 0:
+        torque = torque_of_motor(states, schedule, p, layout)
+    else:
+        torque_history(
+            _motion_of_drum_and_carrier(motion, carrier),
+            rates[:, -RATES_SIZE:],
+            schedule.acceleration[schedule.row >= 0, None],
+            p,
+            torque,
+        )
     of_tub = rates[:, :RATES_SIZE]
     return cut_at_divergence(
         Trajectory(schedule.time, motion, deformation, torque[:, 0], of_tub, tubes, carrier)
     )
+
+
+def torque_of_motor(
+    states: FloatArray, schedule: Schedule, p: FloatArray, layout: Layout
+) -> FloatArray:
+    """Return the torque of a motor on the drum at samples (n, 1). [N m]
+
+    Args:
+        states: (n, size)
+        schedule, p, layout: See `trajectory_of`.
+    """
+    torque = np.empty((len(states), 1))
+    reference = schedule.drum[:-1:2][schedule.row >= 0, :1]
+    first = states.shape[1] - MOTOR_STATE_SIZE
+    motor_torque_history(
+        np.ascontiguousarray(states),
+        np.ascontiguousarray(reference),
+        p,
+        layout.motor,
+        first,
+        torque,
+    )
+    return torque
 
 
 def _motion_of_drum_and_carrier(motion: FloatArray, carrier: FloatArray) -> FloatArray:
