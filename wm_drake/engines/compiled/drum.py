@@ -24,7 +24,7 @@ from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_la
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.compiler.matrices import times
 from wm_drake.compiler.vectors import add, cross, dot, rotate, scale, subtract
-from wm_drake.elements.motion import TREE_STATE
+from wm_drake.elements.motion import read_tree_state
 from wm_drake.elements.motor import (
     MOTOR_STATE_SIZE,
     motor_response,
@@ -35,9 +35,6 @@ from wm_drake.elements.motor import (
     write_motor_state,
 )
 from wm_drake.laws.motor import drum_friction
-
-DRUM_ANGLE, DRUM_RATE = TREE_STATE.offsets["joint_position"], TREE_STATE.offsets["joint_rate"]
-"""Indices of the drum's angle and rate in the state."""
 
 
 @law
@@ -58,11 +55,11 @@ def motor_torque_and_rates(x, dx, reference, p, motor, first):
         p: Packed numbers.
         motor, first: Indices in them and in the state where the drive begins.
     """
-    state = read_motor_state(x, first)
-    torque, growth = motor_response(state, x[DRUM_RATE], reference, p, motor)
+    state, rate = read_motor_state(x, first), read_tree_state(x, 0).joint_rate
+    torque, growth = motor_response(state, rate, reference, p, motor)
     write_motor_state(dx, first, growth, 0.0 * growth)
     friction = read_bearing_friction(*read_motor(p, motor).friction)
-    return torque + drum_friction(x[DRUM_RATE], friction)
+    return torque + drum_friction(rate, friction)
 
 
 @law
@@ -107,18 +104,9 @@ def sample_controller(x, reference, is_sample, p, motor, first):
     if motor is None:
         return
     if is_sample:
-        integral, demand = sampled_state(
-            read_motor_state(x, first), x[DRUM_RATE], reference, p, motor
-        )
+        state, rate = read_motor_state(x, first), read_tree_state(x, 0).joint_rate
+        integral, demand = sampled_state(state, rate, reference, p, motor)
         write_motor_state(x, first, integral, demand)
-
-
-@law
-def follow_profile(x, angle, rate, motor):
-    """Set angle and rate of a drum whose speed is prescribed; a motor turns it itself."""
-    if motor is None:
-        x[DRUM_ANGLE] = angle
-        x[DRUM_RATE] = rate
 
 
 @long_running
@@ -139,6 +127,6 @@ def motor_torque_history(states, reference, p, motor, first, torque):
     for begin in range(0, len(torque), WIDTH):
         rows_to_lanes(states, begin, x_numbers)
         rows_to_lanes(reference, begin, wanted_numbers)
-        state = read_motor_state(x, first)
-        answer[0], _ = motor_response(state, x[DRUM_RATE], wanted[0], q, motor)
+        state, rate = read_motor_state(x, first), read_tree_state(x, 0).joint_rate
+        answer[0], _ = motor_response(state, rate, wanted[0], q, motor)
         lanes_to_rows(numbers, begin, torque)

@@ -9,12 +9,10 @@ from collections import namedtuple
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
-from wm_drake.engines.compiled.drum import (
+from wm_drake.engines.compiled.drum import sample_controller
+from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     follow_profile,
-    sample_controller,
-)
-from wm_drake.engines.compiled.mechanics import (
     inputs_size,
     mass_properties,
     motor_begin,

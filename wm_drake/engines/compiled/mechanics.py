@@ -53,8 +53,6 @@ from wm_drake.engines.compiled.bearing import (
     write_carrier_state,
 )
 from wm_drake.engines.compiled.drum import (
-    DRUM_ANGLE,
-    DRUM_RATE,
     motor_size,
     motor_torque_and_rates,
     with_free_drum,
@@ -100,6 +98,8 @@ BODIES = PackedLayout(
 BODIES_SIZE = BODIES.fixed_size
 STATE_SIZE = TREE_STATE.fixed_size
 """Size of the part of the state that belongs to tub and drum."""
+DRUM_ANGLE, DRUM_RATE = TREE_STATE.offsets["joint_position"], TREE_STATE.offsets["joint_rate"]
+"""Indices of the drum's angle and rate in the state."""
 RATES = PackedLayout("Rates", angular_acceleration=VECTOR, acceleration=VECTOR)
 """Accelerations of a body in a sample: angular, and of its origin, in W. [rad/s^2, m/s^2]"""
 RATES_SIZE = RATES.fixed_size
@@ -350,6 +350,14 @@ def turned_by_motor(x, dx, motion, masses, rates, reference, p, motor, first):
     torque = motor_torque_and_rates(x, dx, reference, p, motor, first)
     missing = torque - motor_torque(motion, w_rate, v_rate, masses, x[DRUM_RATE], acceleration, p)
     return with_free_drum(motion, masses, bodies, w_rate, v_rate, acceleration, missing, reflected)
+
+
+@law
+def follow_profile(x, angle, rate, motor):
+    """Set angle and rate of a drum whose speed is prescribed; a motor turns it itself."""
+    if motor is None:
+        x[DRUM_ANGLE] = angle
+        x[DRUM_RATE] = rate
 
 
 @law

@@ -7,8 +7,10 @@ from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_la
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.elements.motion import POSE, tub_motion
 from wm_drake.elements.motor import MOTOR_STATE_SIZE
-from wm_drake.engines.compiled.drum import DRUM_ANGLE, DRUM_RATE, motor_torque_history
+from wm_drake.engines.compiled.drum import motor_torque_history
 from wm_drake.engines.compiled.mechanics import (
+    DRUM_ANGLE,
+    DRUM_RATE,
     RATES_SIZE,
     STATE_SIZE,
     mass_properties,
@@ -34,7 +36,7 @@ def trajectory_of(
     """
     states, rates = np.split(samples, [-layout.rates_size], axis=1)
     motion, deformation, tubes, carrier = layout.parts(states)
-    torque = np.empty((len(samples), 1))
+    torque: FloatArray = np.empty((len(samples), 1))
     if layout.motor >= 0:
         torque = torque_of_motor(states, schedule, p, layout)
     else:

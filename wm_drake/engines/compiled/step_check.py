@@ -168,15 +168,16 @@ def check_sample_time(setup: Setup) -> None:
     drive = setup.motor
     if drive is None or drive.controller.sample_time is None:
         return
-    control, n, inertia = drive.controller, drive.belt_ratio, drum_inertia(setup)
-    steps = control.sample_time * n * np.array([1.0 / inertia, 1.0])
+    period, control = drive.controller.sample_time, drive.controller
+    n, inertia = drive.belt_ratio, drum_inertia(setup)
+    steps = period * n * np.array([1.0 / inertia, 1.0])
     loop = np.eye(2) + steps[:, None] * np.array(
         [[-n * control.proportional_gain, 1.0], [-control.integral_gain, 0.0]]
     )
     if np.abs(np.linalg.eigvals(loop)).max() > 1.0 + 1e-12:
         bound = 2.0 * inertia / (n**2 * control.proportional_gain)
         raise input_error(
-            f"{1e3 * control.sample_time:g} ms is too long for the gains of the controller: its "
+            f"{1e3 * period:g} ms is too long for the gains of the controller: its "
             f"speed loop is unstable; allowed is less than {1e3 * bound:.3g} ms, or lower gains",
             key="drive.controller.sample_time",
         )
