@@ -13,7 +13,8 @@ class Drive(Frozen):
     """A drive that turns the drum exactly as the spin profile says, whatever torque it takes.
 
     Attributes:
-        joint: Name of the joint that it turns.
+        kind: prescribed; may be left out.
+        joint: Revolute joint of the SDF between tub and drum.
     """
 
     kind: Literal["prescribed"] = "prescribed"
@@ -118,7 +119,8 @@ class MotorDrive(Frozen):
     The motor is fixed to the tub and turns parallel to the drum, in the same sense.
 
     Attributes:
-        joint: Name of the joint that it turns.
+        kind: motor.
+        joint: Revolute joint of the SDF between tub and drum.
         belt_ratio: Speed of the motor over speed of the drum; 1 for a direct drive.
         rotor_inertia: Moment of inertia of rotor and pulley about the motor's axis. [kg m^2]
         torque_limit: Largest torque of the motor, at the motor's shaft.
