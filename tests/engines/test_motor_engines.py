@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from energy_book import EnergyBook
 from motor_machines import isotropic_motor
+from moving_cabinet import with_moving_cabinet
 from simple_machines import unbalance
 
 from wm_drake.engines.compiled.derivative import StateDerivative
@@ -25,6 +26,7 @@ LOAD = Load(
 )
 SIZES = np.array([1.0, 1.2, 1.0] + [0.15] * 3 + [30.0] + [8.0] * 3 + [3.0] * 3 + [60.0])
 VECTORS = (slice(0, 3), slice(3, 6), slice(6, 7), slice(7, 10), slice(10, 13), slice(13, 14))
+CABINET = (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12))
 RUN_UP = SpinProfile(time=(0.0, 0.501, 1.5), speed=(8.0, 10.0, 22.0))
 
 
@@ -183,3 +185,34 @@ def test_a_fast_controller_asks_for_a_shorter_step_and_an_unstable_sample_time_i
     )
     with pytest.raises(InputError, match=r"sample_time: 20 ms is too long .* unstable"):
         simulate(sampled, case)
+
+
+def test_derivatives_agree_with_a_cabinet_that_moves():
+    machine = build_machine(with_moving_cabinet(load_machine("motor")))
+    setup, rng = machine.set_up(LOAD), np.random.default_rng(7)
+    context, derivative = setup.context, StateDerivative(setup)
+    reference = machine.diagram.GetInputPort("drum_speed_reference")
+    tub, cabinet = machine.state_layout.states()
+    body = np.delete(np.arange(14), (6, 13))
+    worst = 0.0
+    for _ in range(200):
+        tree = rng.uniform(-1.0, 1.0, 14) * SIZES
+        moving = rng.uniform(-1.0, 1.0, 14) * np.repeat([2e-3, 0.05], 7)
+        sponges, slips = rng.uniform(-0.01, 0.01, 3), rng.uniform(-2e-3, 2e-3, 8)
+        integral, wanted = rng.uniform(-2.0, 2.0), rng.uniform(-60.0, 60.0)
+        state = np.zeros(context.num_continuous_states())
+        state[cabinet] = moving
+        state[tub] = tree
+        state[-12:] = np.concatenate([sponges, slips, [integral]])
+        context.SetContinuousState(state)
+        reference.FixValue(context, [wanted])
+        drake = machine.diagram.EvalTimeDerivatives(context).CopyToVector()
+        x = np.concatenate([tree, sponges, [integral, 0.0], moving[body], slips])
+        compiled = derivative(x, 3.0, reference=wanted)
+        pairs = [(drake[tub][part], compiled[:14][part]) for part in VECTORS]
+        pairs += [(drake[cabinet][body][part], compiled[19:31][part]) for part in CABINET]
+        pairs += [(drake[-12:-9], compiled[14:17]), (drake[-9:-1], compiled[31:])]
+        pairs.append((drake[-1:], compiled[17:18]))
+        for its, mine in pairs:
+            worst = max(worst, np.max(np.abs(its - mine)) / np.max(np.abs(its), initial=1e-3))
+    assert worst < 1e-10

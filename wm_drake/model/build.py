@@ -8,6 +8,7 @@ from pydrake.geometry import Meshcat
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
+from wm_drake.elements.cabinet import FEET_SIZE
 from wm_drake.elements.motor import packed_controller, packed_friction, packed_limit
 from wm_drake.model.bodies import add_bodies
 from wm_drake.model.frame_poses import FramePoses
@@ -19,6 +20,7 @@ from wm_drake.model.visualization import add_visualizer
 from wm_drake.model.wiring import Link, Wiring
 from wm_drake.parameters import MachineParameters, MotorDrive
 from wm_drake.parameters.drive import motor_of
+from wm_drake.systems.cabinet import Cabinet, Feet
 from wm_drake.systems.drum_bearing import DrumBearing
 from wm_drake.systems.friction_damper import FrictionDamper
 from wm_drake.systems.motor import Belt, DrumFriction, Motor, SpeedController
@@ -69,12 +71,18 @@ def add_washing_machine(
     on_tub, links = _labelled(springs, dampers, bushings, telescopes, bearing)
     drive = motor_of(parameters.drive)
     friction = DrumFriction(packed_friction(drive)) if drive else None
-    if friction:
-        on_tub.append(("drum_friction", friction))
     tub_force, sensors = TubForce(), Sensors(points)
+    others = [("tub_force", tub_force), *([("drum_friction", friction)] if friction else [])]
     tub_state = wiring.tub_state()
-    wiring.connect_elements(tub_state, [*on_tub, ("tub_force", tub_force)], links)
-    builder.Connect(tub_state, wiring.add("sensors", sensors).GetInputPort("plant_state"))
+    cabinet, feet, seen = None, None, tub_state
+    if parameters.cabinet_moves:
+        cabinet, feet = Cabinet(), Feet(np.zeros(FEET_SIZE))
+        on_cabinet = Link("cabinet", cabinet, len(layout.trees) - 1)
+        wiring.connect_elements(tub_state, others, [*links, on_cabinet])
+        seen = wiring.connect_cabinet(cabinet, on_tub, feet)
+    else:
+        wiring.connect_elements(tub_state, [*on_tub, *others], links)
+    builder.Connect(seen, wiring.add("sensors", sensors).GetInputPort("plant_state"))
     profile = wiring.add("spin_profile", SpinProfileSource(parameters.profile))
     source, motor = None, None
     if drive and friction:
@@ -88,10 +96,17 @@ def add_washing_machine(
     for port in ("displacement", "detergent_displacement", "drum_speed"):
         outputs[port] = sensors.GetOutputPort(port)
     outputs["motor_torque"] = torque
+    if friction:
+        outputs["drum_friction_torque"] = friction.GetOutputPort("torque")
+    if feet:
+        outputs["tub_in_cabinet"], outputs["feet_floor_force"] = (
+            seen,
+            feet.GetOutputPort("floor_force"),
+        )
     for label, system in [*on_tub, *((link.label, link.system) for link in links)]:
         for port in _own_outputs(system):
             outputs[f"{label}_{port}"] = system.GetOutputPort(port)
-    systems = springs, dampers, bushings, telescopes, bearing
+    systems = springs, dampers, bushings, telescopes, bearing, cabinet, feet
     return MachineSystems(
         parameters, plant, layout, profile, source, motor, sensors, *systems, inputs, outputs
     )

@@ -14,12 +14,13 @@ import numpy as np
 
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.motor import MOTOR_STATE_SIZE
+from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, VELOCITIES
 from wm_drake.engines.compiled.linear import jacobians
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
 from wm_drake.engines.compiled.packing import Layout, initial_state, pack
 from wm_drake.engines.compiled.tubes import TUBES_STATE_SIZE
 from wm_drake.errors import input_error
-from wm_drake.model.machine import OUTPUT_PERIOD, Setup, with_prescribed_speed
+from wm_drake.model.machine import OUTPUT_PERIOD, Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 
@@ -37,7 +38,8 @@ SPEEDS = (1e-6, 1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0)
 
 The slowest has every friction on its steepest part; in the fast ones the sponges slip."""
 
-TUB, BEARING, DRUM = "the tub", "the drum in its bearing", "the drum with its motor"
+TUB, BEARING, CABINET = "the tub", "the drum in its bearing", "the cabinet on its feet"
+DRUM = "the drum with its motor"
 """Names of parts that move."""
 
 DEFORMATION = 1e-4
@@ -77,8 +79,9 @@ class FastestMotion:
 def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
     """Return the motion of each part of a machine that needs the shortest step, by part.
 
-    The parts are `TUB`, `BEARING`, `DRUM`, and the sponge and the tubes of each damper, as far as
-    they have a fastest motion of their own. The drum's own angle is prescribed without a motor.
+    The parts are `TUB`, `BEARING`, `DRUM`, `CABINET`, and the sponge and the tubes of each damper,
+    as far as they have a fastest motion of their own. The drum's own angle is prescribed without a
+    motor.
 
     Raises:
         InputError: the machine has something that the compiled engine does not represent.
@@ -210,12 +213,15 @@ def _free_states(setup: Setup) -> tuple[list[int], list[str]]:
         parts.append(f"the sponge of damper '{name}'")
     size = len(initial_state(setup, _STANDSTILL))
     driven = MOTOR_STATE_SIZE if setup.motor else 0
-    parts += [BEARING] * (size - driven - len(parts)) + [DRUM] * driven
+    cabinet = CABINET_STATE_SIZE if setup.cabinet else 0
+    parts += [BEARING] * (size - driven - cabinet - len(parts))
+    parts += [DRUM] * driven + [CABINET] * cabinet
     fixed = [DRUM_ANGLE, DRUM_RATE]
     if setup.motor:
         parts[DRUM_ANGLE] = parts[DRUM_RATE] = DRUM
-        # a sampled controller changes its state at its samples only
-        fixed = [size - 1] if setup.motor.controller.sample_time is None else [size - 2, size - 1]
+        # a sampled controller changes its state at its samples only; a continuous one holds nothing
+        demand = size - cabinet - 1
+        fixed = [demand - 1, demand] if setup.motor.controller.sample_time else [demand]
     free = [index for index in range(size) if index not in fixed]
     return free, [parts[index] for index in free]
 
@@ -235,13 +241,17 @@ def _states(setup: Setup, free: list[int]) -> FloatArray:
 
 def _velocities(setup: Setup) -> list[int]:
     """Return the indices of all velocities in the state."""
-    size = len(initial_state(with_prescribed_speed(setup), _STANDSTILL))
+    size = len(initial_state(setup, _STANDSTILL))
     found = list(range(STATE_SIZE // 2, STATE_SIZE))
     begin = STATE_SIZE + len(setup.dampers)
     for _ in setup.telescopes:
         found += range(begin + 7, begin + TUBES_STATE_SIZE - 1)
         begin += TUBES_STATE_SIZE
-    found += range(begin + (size - begin) // 2, size)
+    cabinet = size - CABINET_STATE_SIZE if setup.cabinet else size
+    carrier = cabinet - (MOTOR_STATE_SIZE if setup.motor else 0)
+    found += range(begin + (carrier - begin) // 2, carrier)
+    if setup.cabinet:
+        found += [cabinet + index for index in VELOCITIES]
     return found
 
 
