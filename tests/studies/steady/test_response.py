@@ -349,7 +349,7 @@ def test_matrix_is_the_derivative_of_the_residual(machine):
     ahead, back = balance.residual(motion + change, speed), balance.residual(motion - change, speed)
     wanted = 0.5 * (ahead - back).ravel()
     np.testing.assert_allclose(
-        at.matrix @ change.ravel(), wanted, atol=2e-3 * np.max(np.abs(wanted))
+        np.tensordot(at.matrix, change, 2).ravel(), wanted, atol=2e-3 * np.max(np.abs(wanted))
     )
     faster, slower = balance.residual(motion, speed + 1e-5), balance.residual(motion, speed - 1e-5)
     by_speed = (faster - slower) / 2e-5
