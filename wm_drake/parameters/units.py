@@ -92,6 +92,23 @@ class Unit:
             lambda value, info: read(value, info, self), handler(source)
         )
 
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: Any) -> dict[str, Any]:
+        """Return the JSON schema of the field in a file: text with a unit, or value and source."""
+        handler(core)
+        is_list = core.get("schema", {}).get("type") == "tuple"
+        example = self.example(is_list=is_list)
+        text = {"type": ["string", "number"] if not self.si else "string", "examples": [example]}
+        value = {
+            "type": "object",
+            "properties": {"value": text, "source": {"type": "string"}},
+            "additionalProperties": False,
+        }
+        return {"anyOf": [text, value]}
+
+    def example(self, *, is_list: bool = False) -> str:
+        """Return an example of a value in a file, such as ``1 N/mm``."""
+        return f"(1, 2, 3) {self.shown}" if is_list else f"1 {self.shown}".strip()
+
     def from_si(self, value: float) -> float:
         """Return an SI value in the display unit."""
         return float(registry().Quantity(value, self.si).to(self.shown).magnitude)
@@ -213,7 +230,7 @@ def to_si(value: Any, info: ValidationInfo, unit: Unit) -> float:
     """
     if isinstance(unit, PureNumber):
         return _pure_number(value)
-    example = f"1 {unit.shown}"
+    example = unit.example()
     if isinstance(value, str):
         match = _SCALAR.fullmatch(value)
         if match is None or (match[2] or "").startswith(","):
@@ -234,7 +251,7 @@ def to_si_vector(value: Any, info: ValidationInfo, unit: Unit) -> tuple[float, .
     Raises:
         ValueError: the value is not a list of finite numbers with a fitting unit.
     """
-    example = f"(1, 2, 3) {unit.shown}"
+    example = unit.example(is_list=True)
     if isinstance(value, str):
         match = _VECTOR.fullmatch(value)
         parts = [] if match is None else [part.strip() for part in match[1].split(",")]
