@@ -44,6 +44,9 @@ FAST = 0.3
 SHORTEST_STEP = 1e-4
 """Shortest arc length of a step, in units of `LENGTH`."""
 
+LEAST_COSINE = 0.6
+"""Cosine of the largest bend of the branch in a step, about 50 degrees."""
+
 MOST_POINTS = 20
 """Largest number of points of a branch, as a multiple of the number of speeds."""
 
@@ -226,11 +229,10 @@ def _step(
     while corrections < MOST_CORRECTIONS:
         corrections += 1
         if solve is None:
-            at = balance.linearised(coefficients, speed)
-            try:
-                residual, solve, count = at.residual, Corrections(balance, at, *row), 0
-            except np.linalg.LinAlgError:
+            solve, count = _corrections(balance, coefficients, speed, row), 0
+            if solve is None:
                 return None
+            residual = solve.at.residual
         else:
             residual = balance.residual(coefficients, speed)
         change, faster = solve(residual, 0.0)
@@ -253,15 +255,50 @@ def _step(
     moved = balance.extent(coefficients - begin) / LENGTH
     if moved > 0.5 * max(length, 0.05) or solve is None:
         return None
+    ahead = _turned(metric, place, coefficients, speed, solve)
+    if ahead is None:
+        return None
+    beyond, forwards = ahead
+    return beyond, corrections < 5 and forwards > 0.9
+
+
+def _corrections(
+    balance: HarmonicBalance,
+    coefficients: FloatArray,
+    speed: float,
+    row: tuple[FloatArray, float],
+) -> Corrections | None:
+    """Return the corrections at a motion, for a last equation; None if there are none."""
+    at = balance.linearised(coefficients, speed)
+    try:
+        return Corrections(balance, at, *row)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def _turned(
+    metric: _Metric,
+    place: _Place,
+    coefficients: FloatArray,
+    speed: float,
+    solve: Corrections,
+) -> tuple[_Place, float] | None:
+    """Return the next place, and the cosine of the bend; None if the branch bends too much.
+
+    Args:
+        metric: Size of a step.
+        place: The place before.
+        coefficients, speed: The next motion.
+        solve: Factors near it.
+    """
     along, speed_along = metric.unit(*solve(None, 1.0))
-    forwards = np.sum(along * place.along * metric.weights)
+    forwards = float(np.sum(along * place.along * metric.weights))
     forwards += speed_along * place.speed_along * metric.speed_weight
     if forwards < 0.0:
         along, speed_along = -along, -speed_along
-    if abs(forwards) < 0.6:  # the branch bends by more than 50 degrees
+    if abs(forwards) < LEAST_COSINE:
         return None
-    quick = corrections < 5 and bool(abs(forwards) > 0.9)
-    return _Place(coefficients, speed, along, speed_along), quick
+    return _Place(coefficients, speed, along, speed_along), abs(forwards)
 
 
 def _share(
@@ -312,15 +349,15 @@ def _at_speed(balance: HarmonicBalance, guess: FloatArray, speed: float) -> Floa
     """Return the motion at a speed by Newton's method with halved steps; None if it fails."""
     coefficients, last = guess.copy(), np.inf
     for _ in range(60):
-        at = balance.linearised(coefficients, speed)
-        try:
-            change, _ = Corrections(balance, at, np.zeros(guess.shape), 1.0)(at.residual, 0.0)
-        except np.linalg.LinAlgError:
+        solve = _corrections(balance, coefficients, speed, (np.zeros(guess.shape), 1.0))
+        if solve is None:
             return None
+        residual = solve.at.residual
+        change, _ = solve(residual, 0.0)
         size = balance.extent(change)
         if not np.isfinite(size):
             return None
-        share, before = 1.0, float(np.linalg.norm(at.residual))
+        share, before = 1.0, float(np.linalg.norm(residual))
         while share > SMALLEST_SHARE:
             trial = coefficients + share * change
             if np.linalg.norm(balance.residual(trial, speed)) < (1.0 - 0.1 * share) * before:

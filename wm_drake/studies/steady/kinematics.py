@@ -7,7 +7,6 @@ import numpy as np
 from wm_drake.compiler.vectors import rotation_from_sines
 from wm_drake.elements.motion import TREE_STATE, rpy_rates
 from wm_drake.engines.compiled.bearing import CARRIER_STATE
-from wm_drake.engines.compiled.mechanics import STATE_SIZE
 from wm_drake.engines.compiled.slopes import SlopedDerivative
 from wm_drake.engines.compiled.tubes import TUBES_STATE, TUBES_STATE_SIZE
 from wm_drake.model.machine import Setup
@@ -77,9 +76,7 @@ def kinematics_of(derivative: SlopedDerivative, setup: Setup) -> Kinematics:
     bodies = [
         (at + tree["angles"] + three, at + tree["angular_velocity"] + three) for at in (0, *begins)
     ]
-    moves = [
-        (at + tree["position"] + three, at + tree["velocity"] + three) for at in (0, *begins)
-    ]
+    moves = [(at + tree["position"] + three, at + tree["velocity"] + three) for at in (0, *begins)]
     joints = [
         (np.array([at + tree["joint_position"]]), np.array([at + tree["joint_rate"]]))
         for at in begins

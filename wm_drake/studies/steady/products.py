@@ -3,10 +3,11 @@
 import numpy as np
 
 from wm_drake.compiler.compilation import long_running
+from wm_drake.parameters.types import FloatArray
 
 
 @long_running
-def subtract_products(harmonics, matrix):
+def subtract_products(harmonics: FloatArray, matrix: FloatArray) -> None:
     """Subtract the matrices that multiply Fourier series by factors, from a matrix of their sizes.
 
     A product of the factor g and a series X has the coefficients G X. With g = A_0 / 2 + sum of
