@@ -67,6 +67,11 @@ def plain_number(text: str) -> float:
     return float(text)
 
 
+@functools.lru_cache(maxsize=8192)  # pint takes 50 µs, and a page shows the same numbers again
+def _in_unit(value: float, unit: str, shown: str) -> float:
+    return float(registry().Quantity(value, unit).to(shown).magnitude)
+
+
 @dataclass(frozen=True)
 class Unit:
     """The SI unit in which a field is stored, and its display unit.
@@ -111,7 +116,7 @@ class Unit:
 
     def from_si(self, value: float) -> float:
         """Return an SI value in the display unit."""
-        return float(registry().Quantity(value, self.si).to(self.shown).magnitude)
+        return _in_unit(value, self.si, self.shown)
 
     def text(self, value: Any) -> str:
         """Return an SI value, or a tuple of them, as text such as ``3.2 N/mm``.
