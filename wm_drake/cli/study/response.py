@@ -212,8 +212,7 @@ def _mount_forces(response: "xr.Dataset") -> dict[str, dict[str, list[float]]]:
 
     return {
         str(mount): {
-            kind: response[f"mount_force_{kind}"].sel(mount=mount).values.tolist()
-            for kind in KINDS
+            kind: response[f"mount_force_{kind}"].sel(mount=mount).values.tolist() for kind in KINDS
         }
         for mount in response.mount.values
     }

@@ -224,6 +224,32 @@ def _step(
     row = metric.row(place.along, place.speed_along)
     if landing:
         row = np.zeros(begin.shape), 1.0
+    solved = _solved(balance, begin, speed, row)
+    if solved is None:
+        return None
+    coefficients, speed, solve, corrections = solved
+    if balance.extent(coefficients - begin) / LENGTH > 0.5 * max(length, 0.05):
+        return None
+    ahead = _turned(metric, place, coefficients, speed, solve)
+    if ahead is None:
+        return None
+    beyond, forwards = ahead
+    return beyond, corrections < 5 and forwards > 0.9
+
+
+def _solved(
+    balance: HarmonicBalance,
+    begin: FloatArray,
+    speed: float,
+    row: tuple[FloatArray, float],
+) -> tuple[FloatArray, float, Corrections, int] | None:
+    """Return a motion, its speed, factors near it, and the number of corrections; None if none.
+
+    Args:
+        balance: The machine.
+        begin, speed: First guess of the motion and its speed.
+        row: Last equation of the corrections.
+    """
     coefficients, solve, last, count = begin.copy(), None, np.inf, 0
     corrections = 0
     while corrections < MOST_CORRECTIONS:
@@ -236,14 +262,14 @@ def _step(
         else:
             residual = balance.residual(coefficients, speed)
         change, faster = solve(residual, 0.0)
+        size = balance.extent(change)
         if not np.all(np.isfinite(change)):
             return None
-        size = balance.extent(change)
         if count == 0 and FAST * last < size < NEAR:
             share = _share(balance, coefficients, speed, residual, change, faster)
             change, faster = share * change, share * faster
         coefficients = coefficients + change
-        speed += 0.0 if landing else faster
+        speed += faster
         count += 1
         if size < TOLERANCE or FAST * last < size < STALLED:
             break
@@ -252,14 +278,7 @@ def _step(
         last = size
     else:
         return None
-    moved = balance.extent(coefficients - begin) / LENGTH
-    if moved > 0.5 * max(length, 0.05) or solve is None:
-        return None
-    ahead = _turned(metric, place, coefficients, speed, solve)
-    if ahead is None:
-        return None
-    beyond, forwards = ahead
-    return beyond, corrections < 5 and forwards > 0.9
+    return None if solve is None else (coefficients, speed, solve, corrections)
 
 
 def _corrections(
