@@ -154,6 +154,14 @@ def simulate_many(
         InputError: a case or an argument is wrong. `finished` was called for the runs that had
             ended before.
         SimulationInterrupted: Ctrl-C was pressed.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> machine = wm.build_machine(wm.load_machine("reference"))
+        >>> cases = [wm.case_of(machine.parameters, load) for load in ("middle", "counter")]
+        >>> table = wm.simulate_many(machine, cases)
+        >>> dict(table.amplitude.sizes)
+        {'run': 2, 'sensor': 6}
     """
     wanted = tuple(dict.fromkeys(measures))
     for name in wanted:

@@ -60,6 +60,13 @@ def steady_response(
 
     Raises:
         InputError: an argument is wrong, or no periodic motion is found at the first speed.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> machine = wm.build_machine(wm.load_machine("reference"))
+        >>> response = wm.steady_response(machine, "middle", [38.0, 40.0], harmonics=3)
+        >>> bool(response.stable.all())
+        True
     """
     setup = machine.set_up(load, gasket=gasket)
     return response_of(setup, speeds, harmonics, samples, progress)
