@@ -48,6 +48,14 @@ def add_washing_machine(
 
     Raises:
         InputError: the SDF or the machine file has an error.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> from pydrake.systems.framework import DiagramBuilder
+        >>> builder = DiagramBuilder()
+        >>> washer = wm.add_washing_machine(builder, wm.load_machine("reference"))
+        >>> sorted(washer.inputs)
+        ['drum_acceleration', 'tub_force']
     """
     prefix = f"{name}_" if name else ""
     plant = builder.AddNamedSystem(f"{prefix}bodies", MultibodyPlant(time_step=0.0))
@@ -124,6 +132,12 @@ def build_machine(parameters: MachineParameters, *, meshcat: Meshcat | None = No
 
     Raises:
         InputError: the SDF or the machine file has an error.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> machine = wm.build_machine(wm.load_machine("reference"))
+        >>> sorted(machine.springs)
+        ['left', 'rear', 'right']
     """
     builder = DiagramBuilder()
     systems = add_washing_machine(builder, parameters)
