@@ -28,6 +28,7 @@ from wm_drake.model.machine import OUTPUT_PERIOD
 from wm_drake.model.scene import Gap, Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.cabinet import floor_forces
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.feet import FOOT_VARIABLES, REGION_VARIABLES, cabinet_of, foot_measures
 from wm_drake.simulation.histories import measure_samples_lanes
@@ -49,6 +50,7 @@ from wm_drake.simulation.vibration import region_displacements
 MEASURES = {
     "extremes": ("detergent_displacement", "gasket_force", "gasket_moment"),
     "amplitudes": ("amplitude", "critical_speed"),
+    "amplitudes in regions": ("region_amplitude", "region_critical_speed"),
     "power means": ("power_mean",),
     "gap": ("smallest_gap",),
     "contacts": ("nearest_pair", "contact_gap"),
@@ -61,7 +63,7 @@ MEASURES = {
 }
 """What can be measured of each run, with the names of its variables."""
 
-_FILTERED = {"amplitudes", "power means"}
+_FILTERED = {"amplitudes", "amplitudes in regions", "power means"}
 """Measures that need the filtered displacements at the sensors."""
 
 _OF_FEET = {"feet", "feet regions"}
@@ -254,6 +256,7 @@ class Runner:
                 run.cabinet[: run.good],
                 item.case.profile,
                 OUTPUT_PERIOD,
+                floor_forces=_floor_forces(item, run),
             )
             run.feet.update(found)
         return [run.feet[name] for name in names]
@@ -290,6 +293,20 @@ class Runner:
         size, at = amplitudes(run.displacement)
         return size, np.where(np.isnan(size), np.nan, run.samples[at, DRUM_RATE])
 
+    def _amplitudes_in_regions(
+        self, item: WorkItem, schedule: Schedule, run: "_Run"
+    ) -> Iterable[FloatArray]:
+        time = schedule.time[: run.good]
+        shape = len(item.case.profile.regions), run.sensors
+        sizes, speeds = np.full(shape, np.nan), np.full(shape, np.nan)
+        for row, region in enumerate(item.case.profile.regions):
+            inside = np.flatnonzero((time >= region.begin) & (time < region.end))
+            size, at = amplitudes(run.displacement[inside])
+            known = ~np.isnan(size)
+            sizes[row, known] = size[known]
+            speeds[row, known] = run.samples[inside[at[known]], DRUM_RATE]
+        return sizes, speeds
+
     def _power_means(
         self, _item: WorkItem, _schedule: Schedule, run: "_Run"
     ) -> Iterable[FloatArray]:
@@ -319,6 +336,15 @@ class Runner:
         if name not in kept or len(kept[name]) != size * WIDTH:
             kept[name] = aligned(size * WIDTH)
         return kept[name]
+
+
+def _floor_forces(item: WorkItem, run: "_Run") -> FloatArray | None:
+    """Return the forces of the floor on the feet of a cabinet that moves; None if it is fixed."""
+    cabinet = item.numbers.layout.cabinet_part(run.samples[: run.good, : len(item.begin)])
+    if cabinet is None:
+        return None
+    assert item.numbers.setup.cabinet is not None
+    return floor_forces(cabinet, item.numbers.setup.cabinet.packed())
 
 
 def _divergence(time: FloatArray, samples: FloatArray, good: int) -> str:
@@ -390,6 +416,7 @@ class _Run:
 _MEASURED = {
     "extremes": Runner._extremes,
     "amplitudes": Runner._amplitudes,
+    "amplitudes in regions": Runner._amplitudes_in_regions,
     "power means": Runner._power_means,
     "gap": Runner._gap,
     "contacts": Runner._contacts,

@@ -12,7 +12,8 @@ from wm_drake.model.scene import REPLAY_RATE, Gap, Scene
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.feet import BY_FOOT, REGION_VARIABLES, foot_measures
+from wm_drake.simulation.feet import BY_FOOT, REGION_VARIABLES, FootLoads, foot_loads, foot_measures
+from wm_drake.simulation.mount_forces import speed_ranges
 from wm_drake.simulation.mounts import KINDS, force_measures
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record
@@ -125,7 +126,14 @@ def _band_pass(period: float) -> tuple[FloatArray, FloatArray]:
 
 
 def filtered_displacement(record: Record) -> xr.DataArray:
-    """Return the displacements (time, sensor) of a record, filtered to 0.5-20 Hz. [m]"""
+    """Return the displacements (time, sensor) of a record, filtered to 0.5-20 Hz. [m]
+
+    Example:
+        >>> import wm_drake as wm
+        >>> record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
+        >>> wm.filtered_displacement(record).dims
+        ('time', 'sensor')
+    """
     raw = record.displacement
     return raw.copy(data=filtered(raw.values, _period(record)))
 
@@ -187,6 +195,13 @@ def envelopes(record: Record) -> xr.Dataset:
     """Return the upper and lower envelope (time, sensor) of the filtered displacements. [m]
 
     An envelope consists of straight lines from peak to peak.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
+        >>> envelope = wm.envelopes(record)
+        >>> bool((envelope.upper >= envelope.lower).all())
+        True
     """
     displacement = filtered_displacement(record)
     time = displacement.time.values
@@ -267,6 +282,13 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
     Args:
         record: Record of a run, from `wm_drake.simulation.runs.simulate`.
         scene: Shapes of the machine. If None, the smallest gap is not computed.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
+        >>> amplitude = wm.measure(record).amplitude  # m
+        >>> round(1e3 * float(amplitude.sel(sensor="Xr")))
+        24
     """
     # a dictionary of arrays is faster than attribute access of a dataset
     values = {name: variable.values for name, variable in record.variables.items()}
@@ -312,15 +334,38 @@ def wrenches_on_cabinet(record: Record) -> FloatArray:
 
 
 def feet_of(record: Record) -> xr.Dataset | None:
-    """Return the measures of the feet of the cabinet; None if the machine has no cabinet."""
+    """Return the measures of the feet of the cabinet; None if the machine has no cabinet.
+
+    For a profile without regions, ranges of drum speed take their place.
+    """
     found = cabinet_in(record)
     if found is None or "cabinet_force" not in record:
         return None
     profile = SpinProfile.model_validate_json(record.attrs["profile"])
-    values = foot_measures(*found, wrenches_on_cabinet(record), profile, _period(record))
-    labels = {"foot": list(found[0].corners), "region": [r.name for r in profile.regions]}
+    parts = speed_ranges(record, profile)
+    values = foot_measures(
+        *found,
+        wrenches_on_cabinet(record),
+        profile,
+        _period(record),
+        floor_forces=_floor_forces(record),
+        ranges=[part.samples for part in parts],
+    )
+    labels = {"foot": list(found[0].corners), "region": [part.name for part in parts]}
     dims = dict.fromkeys(REGION_VARIABLES, "region") | dict.fromkeys(BY_FOOT, "foot")
     return xr.Dataset({n: ([dims[n]] if n in dims else [], v) for n, v in values.items()}, labels)
+
+
+def foot_loads_of(record: Record) -> FootLoads:
+    """Return loads and margins of the feet over time; the machine of the record has a cabinet."""
+    found = cabinet_in(record)
+    assert found is not None
+    return foot_loads(*found, wrenches_on_cabinet(record), floor_forces=_floor_forces(record))
+
+
+def _floor_forces(record: Record) -> FloatArray | None:
+    """Return the forces of the floor on the feet (n, 4, 3) of a cabinet that moves, else None."""
+    return record.floor_force.values if "floor_force" in record else None
 
 
 def _forces_on_cabinet(record: Record) -> dict[str, xr.DataArray]:
