@@ -392,7 +392,10 @@ class _Run:
     @classmethod
     def of_lane(cls, lane: int, *arrays: FloatArray) -> "_Run":
         """Return the run in a lane of the arrays, which are in the order of the attributes."""
-        return cls(*(array[..., lane] for array in arrays))
+        samples, moved, extremes, mounts, cabinet, lengths, of_batch = (
+            array[..., lane] for array in arrays
+        )
+        return cls(samples, moved, extremes, mounts, cabinet, lengths, of_batch)
 
     @property
     def good(self) -> int:
