@@ -18,6 +18,7 @@ from wm_drake.parameters.damper_laws import (
     StvDamper,
     StvSpongeDamper,
 )
+from wm_drake.parameters.drive import Drive, MotorDrive
 from wm_drake.parameters.elements import (
     Bushing,
     BushingType,
@@ -52,14 +53,13 @@ from wm_drake.parameters.files import (
     machine_yaml,
     shipped_machines,
 )
+from wm_drake.parameters.inertia import InertiaMatrix
 from wm_drake.parameters.keys import quantities, source_of, with_value, with_values
 from wm_drake.parameters.loop_files import MeasuredLoop, read_loop, read_loops
 from wm_drake.parameters.machine import (
     BodyOverride,
     Clearance,
-    Drive,
     FrameOverride,
-    InertiaMatrix,
     MachineParameters,
     Sensor,
 )
@@ -92,6 +92,7 @@ __all__ = [
     "Load",
     "MachineParameters",
     "MeasuredLoop",
+    "MotorDrive",
     "MstvDamper",
     "PublishedResults",
     "PublishedTerm",
