@@ -3,8 +3,8 @@
 Peaks are the amplitudes and the largest displacements, forces and moments of each case. They are
 compared with those of the Runge-Kutta scheme at a step of 0.125 ms, for every damper law, with and
 without gasket, for a run-up to 400 rpm and for one to 1400 rpm. The script prints a table of errors
-for each law and run-up. Laws in telescopic dampers, whose tubes are bodies, follow at shorter steps,
-compared with the Runge-Kutta scheme at 0.0625 ms. The script takes about fifteen minutes.
+for each law and run-up. Laws in telescopic dampers, with tubes as bodies, follow at shorter steps
+and are compared with the Runge-Kutta scheme at 0.0625 ms. It takes about fifteen minutes.
 """
 
 import argparse
