@@ -1,7 +1,7 @@
 """Command `wm-drake study design`: search designs of a machine and print their Pareto front."""
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -33,6 +33,7 @@ from wm_drake.cli.study.common import (
     study_ledger,
 )
 from wm_drake.cli.terminal import Console, say
+from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
@@ -41,6 +42,8 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.parameters import MachineParameters
     from wm_drake.parameters.designs import DesignTask
     from wm_drake.simulation.cases import Case
+    from wm_drake.simulation.records import Record
+    from wm_drake.studies.pareto.envelopes import Envelopes
     from wm_drake.studies.pareto.problem import MachineDesigns
     from wm_drake.studies.pareto.study import ParetoFront
 
@@ -59,6 +62,14 @@ def design(
     population: Annotated[
         int, typer.Option(help="Designs of a generation.", min=4, metavar="N")
     ] = 64,
+    search: Annotated[
+        str,
+        typer.Option(
+            help="genetic: NSGA-II, or NSGA-III for more than two objectives. surfaces: NSGA on "
+            "response surfaces of the designs so far, which needs fewer designs.",
+            metavar="NAME",
+        ),
+    ] = "genetic",
     profile: ProfileOption = None,
     seed: SeedOption = 0,
     workers: WorkersOption = None,
@@ -73,8 +84,12 @@ def design(
     begin = time.perf_counter()
     from wm_drake.parameters.designs import load_design
     from wm_drake.studies.pareto.search import check_search
-    from wm_drake.studies.pareto.study import run_designs
+    from wm_drake.studies.pareto.study import SEARCHES, run_designs
 
+    if search not in SEARCHES:
+        raise input_error(
+            f"no search '{search}'{nearest_names(search, SEARCHES)}", where="--search"
+        )
     check_search(evaluations, population)
     parameters, task = load_parameters(machine, sets), load_design(file)
     check_buildable(machine, parameters)
@@ -93,11 +108,40 @@ def design(
                 evaluations=evaluations,
                 population=population,
                 seed=seed,
+                search=search,
             )
         ledger.mark_finished()
+        shown = _envelopes(front, built, workers)
         with result_folder(out, writer, RUNS_KEPT) as folder:
-            _write(front, task, folder, time.perf_counter() - begin)
+            _write(front, shown, task, folder, time.perf_counter() - begin)
     _print_result(front, out, as_json, time.perf_counter() - begin)
+
+
+def _envelopes(front: "ParetoFront", built: "Machine", workers: int | None) -> "Envelopes | None":
+    """Return the envelopes of the designs of a front, run again with their histories."""
+    from wm_drake.batch import RunResult, simulate_many
+    from wm_drake.studies.pareto.envelopes import front_envelopes
+
+    if not len(front.objectives):
+        return None
+
+    def histories(cases: "Sequence[Case]", found: "Callable[[int, Record], None]") -> None:
+        def collect(run: RunResult) -> None:
+            assert run.record is not None
+            found(run.number, run.record)
+
+        with progress_bar(len(cases), "envelopes of the front") as progress:
+            simulate_many(
+                built,
+                cases,
+                measures=("extremes",),
+                histories=True,
+                workers=workers,
+                progress=progress,
+                finished=collect,
+            )
+
+    return front_envelopes(front, histories)
 
 
 def _counted(
@@ -167,12 +211,18 @@ def _measures(designs: "MachineDesigns") -> tuple[str, ...]:
     return tuple(name for name in MEASURES if name in needed)
 
 
-def _write(front: "ParetoFront", task: "DesignTask", folder: Path, wall_s: float) -> None:
+def _write(
+    front: "ParetoFront",
+    shown: "Envelopes | None",
+    task: "DesignTask",
+    folder: Path,
+    wall_s: float,
+) -> None:
     from wm_drake.report.pareto.report import pareto_report
     from wm_drake.studies.pareto.tables import write_tables
 
     write_tables(front, folder)
-    page = pareto_report(front, task.about, command_line(), wall_s)
+    page = pareto_report(front, shown, task.about, command_line(), wall_s)
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 
