@@ -1,9 +1,15 @@
 """How a run is integrated: the integrator and its step, chosen from the machine and its profile.
 
 The multistep integrator (`wm_drake.engines.compiled.multistep`) takes one derivative a step, the
+<<<<<<< HEAD
 Runge-Kutta scheme four. The midpoint rule (`wm_drake.engines.compiled.midpoint`) takes one, and
 follows the tubes of telescopic dampers. A choice depends on the parameters and the profile of a run
 only, never on other runs or on its load.
+=======
+Runge-Kutta scheme four. A sampled controller needs the Runge-Kutta scheme: its torque jumps.
+A choice depends on the parameters and the profile of a run only, never on
+other runs or on its load.
+>>>>>>> next
 """
 
 from dataclasses import dataclass, field
@@ -14,7 +20,7 @@ from wm_drake.engines.compiled.linear import is_followed
 from wm_drake.engines.compiled.midpoint_check import midpoint_follows, relaxation_matrices
 from wm_drake.engines.compiled.multistep import STEPS_BEFORE
 from wm_drake.engines.compiled.packing import Layout
-from wm_drake.engines.compiled.step_check import check_step, linearised
+from wm_drake.engines.compiled.step_check import check_sample_time, check_step, linearised
 from wm_drake.engines.schedule import Schedule
 from wm_drake.errors import input_error
 from wm_drake.model.machine import Setup
@@ -93,18 +99,20 @@ def choose_stepping(
             Runge-Kutta scheme.
 
     Raises:
-        InputError: the step is too long for the integrator.
+        InputError: the step is too long for the integrator, or the sample time of a controller for
+            the drum.
     """
-    if integrator == "midpoint" and not setup.telescopes:
+    only_tubes = bool(setup.telescopes) and not setup.cabinet and not setup.motor
+    if integrator == "midpoint" and not only_tubes:
         raise input_error(
-            "'midpoint' is for machines with telescopic dampers; "
-            "allowed are 'auto', 'multistep' or 'runge_kutta'",
+            "'midpoint' is for machines with telescopic dampers, a cabinet at rest and a "
+            "prescribed drum speed; allowed are 'auto', 'multistep' or 'runge_kutta'",
             key="integrator",
         )
-    if integrator != "runge_kutta":
+    if integrator != "runge_kutta" and not layout.control_period:
         jacobians, internal = linearised(setup, packed, layout, ACROSS_JUMPS)
         fastest = max(abs(speed) for speed in profile.speed)
-        if setup.telescopes and integrator != "multistep":
+        if only_tubes and integrator != "multistep":
             found = _midpoint(setup, layout, jacobians, fastest, step, integrator)
             if found:
                 return found
@@ -114,6 +122,7 @@ def choose_stepping(
                 if turn <= LARGEST_TURN and is_followed(jacobians, internal, MARGIN * length):
                     return Stepping("multistep", length)
     check_step(setup, step)
+    check_sample_time(setup)
     if integrator in ("multistep", "midpoint"):
         raise input_error(
             f"'{integrator}' does not follow this machine at {1e3 * step:g} ms; "
