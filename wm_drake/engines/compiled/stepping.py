@@ -1,15 +1,10 @@
 """How a run is integrated: the integrator and its step, chosen from the machine and its profile.
 
 The multistep integrator (`wm_drake.engines.compiled.multistep`) takes one derivative a step, the
-<<<<<<< HEAD
 Runge-Kutta scheme four. The midpoint rule (`wm_drake.engines.compiled.midpoint`) takes one, and
-follows the tubes of telescopic dampers. A choice depends on the parameters and the profile of a run
-only, never on other runs or on its load.
-=======
-Runge-Kutta scheme four. A sampled controller needs the Runge-Kutta scheme: its torque jumps.
-A choice depends on the parameters and the profile of a run only, never on
-other runs or on its load.
->>>>>>> next
+follows the tubes of telescopic dampers. A sampled controller needs the Runge-Kutta scheme: its
+torque jumps. A choice depends on the parameters and the profile of a run only, never on other runs
+or on its load.
 """
 
 from dataclasses import dataclass, field
