@@ -281,13 +281,16 @@ def _orbits(record: Record, largest: int) -> list[dict[str, Any]]:
 def _forces(record: Record) -> dict[str, Any]:
     """Return smallest and largest value in each time bin of gasket and mount forces. [N, N m]"""
     forces = {}
-    if "gasket" in record.bushing.values:
+    has_gasket = record.attrs["gasket"] == "yes"
+    if has_gasket:
         gasket = record.sel(bushing="gasket")
         for kind, letter in (("force", "F"), ("moment", "M")):
             for index, axis in enumerate("xyz"):
                 forces[f"gasket {letter}{axis}"] = gasket[f"bushing_{kind}"].values[:, index]
     size = np.linalg.norm(record.mount_force.values, axis=2)
     for index, name in enumerate(record.mount.values):
+        if name == "gasket" and not has_gasket:
+            continue
         forces[f"mount {name}"] = size[:, index]
     count = record.sizes["time"]
     begins = np.unique(np.linspace(0, count, min(BINS, count), endpoint=False).astype(int))

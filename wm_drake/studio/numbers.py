@@ -20,6 +20,9 @@ NOT_MOVED = ("gravity",)
 ABOUT = {"mm": 50.0, "deg": 45.0}
 """Half width of the slider of a place or an angle, by display unit."""
 
+LAST = ("bodies.", "frames.", "cabinet.", "imperfections.", "step")
+"""Numbers that are listed behind all others."""
+
 VECTORS = ("position", "centre_of_mass", "angles")
 """Quantities whose three entries have the names x, y and z."""
 
@@ -66,7 +69,7 @@ class Number:
             raise InputError(Problem("", self.key, p.message) for p in found) from None
 
     def for_page(self) -> dict[str, Any]:
-        """Return the number as the page shows it."""
+        """Return the number as the page shows it; `short` is unique enough for a narrow column."""
         parents, _, name = self.key.rpartition(".")
         if self.is_entry:
             parents, _, vector = parents.rpartition(".")
@@ -75,6 +78,7 @@ class Number:
             "key": self.key,
             "group": parents.replace(".", " · ").replace("_", " ") or "machine",
             "label": name.replace("_", " "),
+            "short": f"{parents.rpartition('.')[2]} {name}".strip().replace("_", " "),
             "unit": _plain(self.unit),
             "value": self.unit.from_si(self.value),
             "low": self.low,
@@ -101,7 +105,8 @@ def numbers_of(parameters: MachineParameters) -> dict[str, Number]:
     Args:
         parameters: The machine, with the values of the SDF that are to be moved too.
     """
-    return {number.key: number for number in _numbers(parameters)}
+    found = sorted(_numbers(parameters), key=lambda number: number.key.startswith(LAST))
+    return {number.key: number for number in found}
 
 
 def _numbers(parameters: MachineParameters) -> Iterator[Number]:
