@@ -4,7 +4,7 @@ import {byId, make} from './dom.js';
 import {get, post} from './server.js';
 
 const HINTS = {
-  '--trials': 'all', '--design': 'd-optimal', '--load': 'middle and counter', '--samples': '4096',
+  '--trials': 'all', '--design': 'd-optimal', '--model': 'main+2fi', '--load': 'middle and counter', '--samples': '4096',
   '--sensitivity': '512', '--subset': '1000', '--case': 'all',
 };
 const PERIOD = 1000;
