@@ -10,6 +10,7 @@ from pydrake.systems.framework import Context
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.motion import POSE
 from wm_drake.engines.compiled.bearing import TUB, TUB_AND_BEARING
+from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE
 from wm_drake.engines.compiled.mechanics import (
     BODIES,
     BODIES_SIZE,
@@ -28,7 +29,7 @@ from wm_drake.engines.compiled.tubes import (
 )
 from wm_drake.errors import InputError, input_error
 from wm_drake.model.machine import Setup
-from wm_drake.model.state_layout import CARRIER
+from wm_drake.model.state_layout import CABINET, CARRIER
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 
@@ -43,6 +44,7 @@ class Layout:
         springs, dampers, bushings, telescopes: Index of each element.
         gasket: Index of the gasket, -1 without one.
         bearing: Index of the drum's compliant bearing, -1 for a rigid one.
+        cabinet: Index of the cabinet, -1 for a fixed one.
         structure: Number of each damper's law and number of points of every table, in order.
     """
 
@@ -52,6 +54,7 @@ class Layout:
     telescopes: tuple[int, ...]
     gasket: int
     bearing: int
+    cabinet: int
     structure: tuple[int, ...]
 
     @property
@@ -74,12 +77,13 @@ class Layout:
             telescopes if self.telescopes else None,
             bearing,
             tubes,
+            self.cabinet if self.cabinet >= 0 else None,
         )
 
     @property
     def rates_size(self) -> int:
         """Number of accelerations in a sample, behind the state."""
-        return RATES_SIZE if self.bearing < 0 else 2 * RATES_SIZE
+        return RATES_SIZE * (1 + (self.bearing >= 0) + (self.cabinet >= 0))
 
     def parts(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Split states (n, size) into their parts.
@@ -87,7 +91,7 @@ class Layout:
         Returns:
             State of tub and drum (n, 14); deformations of all dampers, those of telescopic ones
             last (n, d); states of the tubes (n, k, 14); state of the drum's carrier (n, 12), or
-            (n, 0) without one.
+            (n, 0) without one. The rest is the `cabinet_part`.
         """
         tubes_begin = STATE_SIZE + len(self.dampers)
         tubes_end = tubes_begin + TUBES_STATE_SIZE * len(self.telescopes)
@@ -96,7 +100,17 @@ class Layout:
         )
         own, deformation_of_tubes = tubes[:, :, :STATE_SIZE], tubes[:, :, DEFORMATION]
         deformation = np.hstack([states[:, STATE_SIZE:tubes_begin], deformation_of_tubes])
-        return states[:, :STATE_SIZE], deformation, own, states[:, tubes_end:]
+        carrier = states[:, tubes_end : states.shape[1] - self.cabinet_size]
+        return states[:, :STATE_SIZE], deformation, own, carrier
+
+    def cabinet_part(self, states: FloatArray) -> FloatArray | None:
+        """Return the states (n, `CABINET_STATE_SIZE`) of a cabinet that moves; None if fixed."""
+        return states[:, states.shape[1] - self.cabinet_size :] if self.cabinet >= 0 else None
+
+    @property
+    def cabinet_size(self) -> int:
+        """Size of the state of the cabinet, which is last; 0 for a fixed one."""
+        return CABINET_STATE_SIZE if self.cabinet >= 0 else 0
 
 
 def pack(setup: Setup) -> tuple[FloatArray, Layout]:
@@ -133,12 +147,17 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
     indices["telescopes"] = tuple(begins)
     names = list(setup.bushings)
     gasket = indices["bushings"][names.index("gasket")] if "gasket" in names else -1
-    if setup.bearing:
-        parts.append(TUB_AND_BEARING.pack(tub=pack_tub(setup), bearing=setup.bearing.packed()))
-        structure += setup.bearing.structure
     bearing = size if setup.bearing else -1
+    if setup.bearing:
+        tub = pack_rigid(setup, "tub")
+        parts.append(TUB_AND_BEARING.pack(tub=tub, bearing=setup.bearing.packed()))
+        structure += setup.bearing.structure
+    cabinet = -1
+    if setup.cabinet:
+        cabinet = BODIES_SIZE + sum(map(len, parts))
+        parts += [pack_rigid(setup, CABINET), setup.cabinet.packed()]
     return np.concatenate(parts), Layout(
-        **indices, gasket=gasket, bearing=bearing, structure=tuple(structure)
+        **indices, gasket=gasket, bearing=bearing, cabinet=cabinet, structure=tuple(structure)
     )
 
 
@@ -198,7 +217,8 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     tubes = np.zeros((len(setup.telescopes), TUBES_STATE_SIZE))
     tubes[:, : setup.tube_rest.shape[1]] = setup.tube_rest
     carrier = np.append(setup.carrier_rest, np.zeros_like(setup.carrier_rest))
-    return np.concatenate([x, tubes.ravel(), carrier])
+    cabinet = np.zeros(CABINET_STATE_SIZE if setup.cabinet else 0)
+    return np.concatenate([x, tubes.ravel(), carrier, cabinet])
 
 
 def pack_tubes(setup: Setup, name: str) -> FloatArray:
@@ -242,12 +262,12 @@ def pack_tubes(setup: Setup, name: str) -> FloatArray:
     )
 
 
-def pack_tub(setup: Setup) -> FloatArray:
-    """Return the packed tub without the drum (`TUB`)."""
+def pack_rigid(setup: Setup, name: str) -> FloatArray:
+    """Return the packed tub without the drum, or another body, with all that is welded to it."""
     plant, context = setup.machine.plant, setup.plant_context
-    tub = plant.GetBodyByName("tub")
-    group = [body.index() for body in plant.GetBodiesWeldedTo(tub)]
-    inertia = plant.CalcSpatialInertia(context, tub.body_frame(), group)
+    body = plant.GetBodyByName(name)
+    group = [other.index() for other in plant.GetBodiesWeldedTo(body)]
+    inertia = plant.CalcSpatialInertia(context, body.body_frame(), group)
     return TUB.pack(
         inverse_mass=1.0 / inertia.get_mass(),
         moment=_moment(inertia),

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wm_drake.compiler.lanes import WIDTH
+from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, VELOCITIES
 from wm_drake.engines.compiled.linear import jacobians
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
 from wm_drake.engines.compiled.packing import Layout, initial_state, pack
@@ -36,7 +37,7 @@ SPEEDS = (1e-6, 1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0)
 
 The slowest has every friction on its steepest part; in the fast ones the sponges slip."""
 
-TUB, BEARING = "the tub", "the drum in its bearing"
+TUB, BEARING, CABINET = "the tub", "the drum in its bearing", "the cabinet on its feet"
 """Names of parts that move."""
 
 DEFORMATION = 1e-4
@@ -76,8 +77,8 @@ class FastestMotion:
 def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
     """Return the motion of each part of a machine that needs the shortest step, by part.
 
-    The parts are `TUB`, `BEARING`, and the sponge and the tubes of each damper, as far as they have
-    a fastest motion of their own. The drum's own angle is prescribed.
+    The parts are `TUB`, `BEARING`, `CABINET`, and the sponge and the tubes of each damper, as far
+    as they have a fastest motion of their own. The drum's own angle is prescribed.
 
     Raises:
         InputError: the machine has something that the compiled engine does not represent.
@@ -170,7 +171,8 @@ def _free_states(setup: Setup) -> tuple[list[int], list[str]]:
         parts += [f"the tubes of damper '{name}'"] * (TUBES_STATE_SIZE - 1)
         parts.append(f"the sponge of damper '{name}'")
     size = len(initial_state(setup, _STANDSTILL))
-    parts += [BEARING] * (size - len(parts))
+    cabinet = CABINET_STATE_SIZE if setup.cabinet else 0
+    parts += [BEARING] * (size - cabinet - len(parts)) + [CABINET] * cabinet
     free = [index for index in range(size) if index not in (DRUM_ANGLE, DRUM_RATE)]
     return free, [parts[index] for index in free]
 
@@ -195,7 +197,10 @@ def _velocities(setup: Setup, size: int) -> list[int]:
     for _ in setup.telescopes:
         found += range(begin + 7, begin + TUBES_STATE_SIZE - 1)
         begin += TUBES_STATE_SIZE
-    found += range(begin + (size - begin) // 2, size)
+    cabinet = size - CABINET_STATE_SIZE if setup.cabinet else size
+    found += range(begin + (cabinet - begin) // 2, cabinet)
+    if setup.cabinet:
+        found += [cabinet + index for index in VELOCITIES]
     return found
 
 
