@@ -165,7 +165,7 @@ def test_smallest_gap_is_drawn_and_the_tub_moves(page):
     page.find("#play").click()
 
 
-def test_reload_link_and_save_lose_nothing(page, folder, server):
+def test_reload_link_and_save_lose_nothing(page, folder):
     before = page.run(CURVE)
     typed(page, UNBALANCE, "800 g")
     curve = changed_from(page, CURVE, before)
@@ -202,7 +202,7 @@ def test_reload_link_and_save_lose_nothing(page, folder, server):
         other.end()
 
 
-def test_hostile_machine_name_is_text(page, folder, server):
+def test_hostile_machine_name_is_text(page, folder):
     name = "<script>document.title='broken'</script><img src=x onerror=\"document.title='broken'\">"
     (folder / "hostile.yaml").write_text(
         f"extends: reference\nname: {json.dumps(name)}\nabout: {json.dumps(name)}\n"
