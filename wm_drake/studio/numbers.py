@@ -10,6 +10,7 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from wm_drake.errors import InputError, Problem
 from wm_drake.parameters import MachineParameters, quantities, source_of
 from wm_drake.parameters.allowed import AllowedRange, allowed_range
+from wm_drake.parameters.keys import is_index
 from wm_drake.parameters.plausibility import UsualRange, usual_range
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.units import Unit
@@ -70,15 +71,19 @@ class Number:
 
     def for_page(self) -> dict[str, Any]:
         """Return the number as the page shows it; `short` is unique enough for a narrow column."""
-        parents, _, name = self.key.rpartition(".")
+        *parents, name = self.key.split(".")
         if self.is_entry:
-            parents, _, vector = parents.rpartition(".")
+            vector = parents.pop()
             name = f"{vector} {'xyz'[int(name)] if vector in VECTORS else int(name) + 1}"
+        parents = [f"no. {int(part) + 1}" if is_index(part) else part for part in parents]
+        label, last = name.replace("_", " "), " ".join(parents[-1:]).replace("_", " ")
+        if last.startswith("no. "):
+            last = f"{parents[-2].rstrip('s')} {last.removeprefix('no. ')}"
         return {
             "key": self.key,
-            "group": parents.replace(".", " · ").replace("_", " ") or "machine",
-            "label": name.replace("_", " "),
-            "short": f"{parents.rpartition('.')[2]} {name}".strip().replace("_", " "),
+            "group": " · ".join(parents).replace("_", " ") or "machine",
+            "label": label,
+            "short": f"{last} {label}".strip(),
             "unit": _plain(self.unit),
             "value": self.unit.from_si(self.value),
             "low": self.low,

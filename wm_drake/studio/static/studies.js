@@ -24,7 +24,7 @@ export class Studies {
   choose() {
     const names = this.options[byId('study').value];
     byId('study-options').replaceChildren(...names.map((name) =>
-      make('label', {}, ` ${name.slice(2)} `, make('input', {size: 9, placeholder: HINTS[name] ?? '', 'data-option': name, autocomplete: 'off'}))));
+      make('label', {}, ` ${name.slice(2)} `, make('input', {size: Math.max(8, (HINTS[name] ?? '').length), placeholder: HINTS[name] ?? '', 'data-option': name, autocomplete: 'off'}))));
   }
 
   async start() {
