@@ -121,7 +121,9 @@ class Runner:
         Returns:
             A result for each work item; none if `stopped` was set meanwhile.
         """
-        schedule = schedule_of(key.profile, key.stepping.step, OUTPUT_PERIOD)
+        schedule = schedule_of(
+            key.profile, key.stepping.step, OUTPUT_PERIOD, key.layout.control_period
+        )
         one_derivative = key.stepping.one_derivative(schedule)
         # without amplitudes only the detergent point is followed, which comes last
         first = 0 if _FILTERED & set(self.measures) else -3 * POINT_SIZE

@@ -90,6 +90,7 @@ def run_drake(
     try:
         for row, time in enumerate(samples.time):
             advance_to(simulator, time, profile)
+            simulator.AdvancePendingEvents()  # a sampled controller acts before the sample is taken
             samples.take(row)
             if row % SAMPLES_BETWEEN_CHECKS == 0:
                 if diverging_coordinate(samples.tub_pose()) is not None:
