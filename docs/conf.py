@@ -32,6 +32,7 @@ nb_execution_cache_path = str(HERE / "_build" / ".notebooks")
 nb_execution_in_temp = True
 nb_execution_timeout = 120
 nb_execution_raise_on_error = True
+nb_execution_show_tb = True
 nb_merge_streams = True
 os.environ |= {"COLUMNS": "100", "TTY_COMPATIBLE": "0"}  # width of tables; no progress bars
 os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
