@@ -86,7 +86,7 @@ def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
     Raises:
         InputError: the machine has something that the compiled engine does not represent.
     """
-    free, parts = _free_states(setup)
+    free, parts = free_states(setup)
     matrices, _ = linearised(setup, *pack(setup), DIFFERENCE)
     if not np.all(np.isfinite(matrices)):
         return {"the machine": FastestMotion(np.inf, False, "the machine")}
@@ -123,7 +123,7 @@ def linearised(
     Returns:
         (WIDTH, n, n) at states with slow and fast motion [1/s], and (n,) bool.
     """
-    free, _ = _free_states(setup)
+    free, _ = free_states(setup)
     struts = range(STATE_SIZE, STATE_SIZE + len(setup.dampers))
     return jacobians(packed, layout, _states(setup, free), free, difference), np.isin(free, struts)
 
@@ -204,7 +204,7 @@ def _allowed(longest: float) -> str:
     return text
 
 
-def _free_states(setup: Setup) -> tuple[list[int], list[str]]:
+def free_states(setup: Setup) -> tuple[list[int], list[str]]:
     """Return the indices of the states that are not prescribed, and what each belongs to."""
     parts = [TUB] * STATE_SIZE
     parts += [f"the sponge of damper '{name}'" for name in setup.dampers]
