@@ -36,11 +36,13 @@ def both_derivatives(machine, setup, compiled, state, acceleration):
     by_drake = machine.diagram.EvalTimeDerivatives(context).CopyToVector()
     # sponges of laws that have one are Drake's states; the compiled machine keeps a number for each damper
     sponges = [index for index, damper in enumerate(setup.dampers.values()) if damper.has_sponge]
-    x = np.concatenate([state[:14], np.zeros(len(setup.dampers))])
-    x[14 + np.array(sponges, dtype=int)] = state[14:]
+    # the stretches of rubber bushings come last in both
+    end = 14 + len(setup.dampers)
+    x = np.concatenate([state[:14], np.zeros(len(setup.dampers)), state[14 + len(sponges) :]])
+    x[14 + np.array(sponges, dtype=int)] = state[14 : 14 + len(sponges)]
     dx = compiled(x, by_drake[DRUM_RATE])
-    assert not dx[14:][~np.isin(np.arange(len(setup.dampers)), sponges)].any()
-    return by_drake, np.concatenate([dx[:14], dx[14 + np.array(sponges, dtype=int)]])
+    assert not dx[14:end][~np.isin(np.arange(len(setup.dampers)), sponges)].any()
+    return by_drake, np.concatenate([dx[:14], dx[14 + np.array(sponges, dtype=int)], dx[end:]])
 
 
 def worst_difference(machine, setup, count=1000, seed=5):

@@ -119,6 +119,13 @@ class _Samples:
             for column, damper in enumerate(dampers.values())
             if damper.state_size
         ]
+        self._branches = [
+            (bushing, bushing.GetMyContextFromRoot(setup.context))
+            for bushing in self._machine.bushings.values()
+            if bushing.state_size
+        ]
+        stretches = sum(bushing.state_size for bushing, _ in self._branches)
+        self._stretches = np.zeros((len(time), stretches))
         self._plant_context = setup.plant_context
         self._torque = self._machine.outputs["motor_torque"]
         self._torque_context = self._torque.get_system().GetMyContextFromRoot(setup.context)
@@ -139,6 +146,10 @@ class _Samples:
         self._rate[row] = plant.get_generalized_acceleration_output_port().Eval(self._plant_context)
         for column, damper, context in self._sponges:
             self._deformation[row, column] = damper.GetOutputPort("state").Eval(context)[0]
+        if self._branches:
+            self._stretches[row] = np.concatenate(
+                [bush.GetOutputPort("state").Eval(context) for bush, context in self._branches]
+            )
         self._motor_torque[row] = self._torque.Eval(self._torque_context)[0]
 
     def trajectory(self, failure: str) -> Trajectory:
@@ -161,5 +172,6 @@ class _Samples:
             self._rate[:, layout.tub],
             tubes,
             self._state[:, carrier],
+            self._stretches,
         )
         return cut_at_divergence(trajectory, failure)

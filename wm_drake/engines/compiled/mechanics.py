@@ -15,7 +15,8 @@ harmonic of the angle and no other.
 The packed numbers of the bodies are those of `BODIES`, from index 0.
 
 State: tub and drum (`TREE_STATE`); the deformation of each strut damper; the `TUBES_STATE` of each
-telescopic damper; the `CARRIER_STATE` of the drum's carrier in a compliant bearing.
+telescopic damper; the `CARRIER_STATE` of the drum's carrier in a compliant bearing; the stretches
+of the branches of rubber bushings.
 """
 
 from collections import namedtuple
@@ -26,7 +27,6 @@ from wm_drake.compiler.matrices import about_centre, inverse, plus, times
 from wm_drake.compiler.packed import LAYOUT, SCALAR, SYMMETRIC, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import add, cross, dot, rotate, rotate_back, scale, subtract
 from wm_drake.elements.bearing import drum_bearing_forces
-from wm_drake.elements.bushing import six_component_bushing_wrench
 from wm_drake.elements.friction_damper import (
     friction_damper_line,
     friction_damper_tension,
@@ -39,6 +39,7 @@ from wm_drake.elements.motion import (
     rpy_rates,
     write_tree_state,
 )
+from wm_drake.elements.rubber import bushing_wrench
 from wm_drake.elements.spring import spring_strut_wrench
 from wm_drake.engines.compiled.bearing import (
     carrier_motion,
@@ -47,6 +48,11 @@ from wm_drake.engines.compiled.bearing import (
     read_tub_and_bearing,
     tub_accelerations,
     write_carrier_state,
+)
+from wm_drake.engines.compiled.rubber import (
+    branch_count,
+    branch_input_count,
+    write_branches,
 )
 from wm_drake.engines.compiled.tubes import (
     TUBES_STATE_SIZE,
@@ -99,13 +105,15 @@ read_first_harmonic, read_second_harmonic = FIRST_HARMONIC.read, SECOND_HARMONIC
 read_bodies, read_rates, write_rates_of = BODIES.read, RATES.read, RATES.write
 
 Elements = namedtuple(
-    "Elements", ("springs", "dampers", "bushings", "telescopes", "bearing", "tubes")
+    "Elements",
+    ("springs", "dampers", "bushings", "telescopes", "bearing", "tubes", "branches"),
 )
 """Indices at which the parts of a machine begin.
 
 springs, dampers, bushings: arrays of indices of the elements in the packed numbers; telescopes: the
 same for telescopic dampers, None if there are none; bearing: index of the drum's bearing in the
-packed numbers, None if the bearing is rigid; tubes: index of the telescopic dampers in the state.
+packed numbers, None if the bearing is rigid; tubes: index of the telescopic dampers in the state;
+branches: `Branches` of rubber bushings, None if there are none.
 """
 
 MassProperties = namedtuple(
@@ -227,8 +235,9 @@ def state_derivative(x, dx, inputs, masses, rate, acceleration, p, elements):
 
     Args:
         x, dx: State and its derivative; the drum's angle and rate in x are not read.
-        inputs: Elongation rate of each strut damper, written. The deformation of its sponge
-            depends on the motion through this number only. [m/s]
+        inputs: Elongation rate of each strut damper, then the rates of the six axes of each
+            bushing of rubber, written. The deformation of a sponge and the stretches of branches
+            depend on the motion through these numbers only. [m/s, rad/s]
         masses, rate, acceleration, p: See `accelerations`.
         elements: `Elements`.
     """
@@ -241,8 +250,9 @@ def state_derivative(x, dx, inputs, masses, rate, acceleration, p, elements):
         wrench, _ = spring_strut_wrench(motion, p, at)
         total = plus(total, wrench)
     for at in elements.bushings:
-        wrench, _ = six_component_bushing_wrench(motion, p, at)
+        wrench, _ = bushing_wrench(motion, p, at, x, elements.branches)
         total = plus(total, wrench)
+    write_branches(x, dx, inputs, len(elements.dampers), motion, p, elements.branches)
     for i in range(len(elements.dampers)):
         at, k = elements.dampers[i], STATE_SIZE + i
         arm, line = friction_damper_line(motion, p, at)
@@ -300,13 +310,19 @@ def tub_and_carrier_accelerations(
 @law
 def state_size(elements):
     """Return the size of the state of a machine with these elements."""
+    return branches_begin(elements) + branch_count(elements.branches)
+
+
+@law
+def branches_begin(elements):
+    """Return the index in the state where the stretches of rubber bushings begin."""
     return carrier_begin(elements) + carrier_size(elements.bearing)
 
 
 @law
 def inputs_size(elements):
-    """Return the number of inputs of internal states: one for each strut damper."""
-    return len(elements.dampers)
+    """Return the number of inputs of internal states: see `state_derivative`."""
+    return len(elements.dampers) + branch_input_count(elements.branches)
 
 
 @law

@@ -9,7 +9,8 @@ from pydrake.systems.framework import Context
 
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.motion import POSE
-from wm_drake.engines.compiled.bearing import TUB, TUB_AND_BEARING
+from wm_drake.elements.rubber import AXIS_COUNT, Branches, RubberBushingParameters
+from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE, TUB, TUB_AND_BEARING
 from wm_drake.engines.compiled.mechanics import (
     BODIES,
     BODIES_SIZE,
@@ -44,6 +45,7 @@ class Layout:
         gasket: Index of the gasket, -1 without one.
         bearing: Index of the drum's compliant bearing, -1 for a rigid one.
         structure: Number of each damper's law and number of points of every table, in order.
+        rubber: Index of each bushing of rubber, and number of its stretches.
     """
 
     springs: tuple[int, ...]
@@ -53,6 +55,7 @@ class Layout:
     gasket: int
     bearing: int
     structure: tuple[int, ...]
+    rubber: tuple[tuple[int, int], ...] = ()
 
     @property
     def elements(self) -> Elements:
@@ -74,20 +77,39 @@ class Layout:
             telescopes if self.telescopes else None,
             bearing,
             tubes,
+            self.branches(self.branches_begin),
         )
+
+    @property
+    def branches_begin(self) -> int:
+        """Index in the state where the stretches of rubber bushings begin."""
+        begin = STATE_SIZE + len(self.dampers) + TUBES_STATE_SIZE * len(self.telescopes)
+        return begin + (CARRIER_STATE_SIZE if self.bearing >= 0 else 0)
+
+    def branches(self, first: int) -> Branches | None:
+        """Return the bushings of rubber, of which the first stretch has an index in the state."""
+        if not self.rubber:
+            return None
+        at, counts = np.array(self.rubber, dtype=np.int64).T
+        return Branches(at.copy(), first + np.cumsum(counts) - counts, int(counts.sum()))
+
+    @property
+    def inputs_size(self) -> int:
+        """Number of inputs of internal states."""
+        return len(self.dampers) + AXIS_COUNT * len(self.rubber)
 
     @property
     def rates_size(self) -> int:
         """Number of accelerations in a sample, behind the state."""
         return RATES_SIZE if self.bearing < 0 else 2 * RATES_SIZE
 
-    def parts(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def parts(self, states: FloatArray) -> tuple[FloatArray, ...]:
         """Split states (n, size) into their parts.
 
         Returns:
             State of tub and drum (n, 14); deformations of all dampers, those of telescopic ones
             last (n, d); states of the tubes (n, k, 14); state of the drum's carrier (n, 12), or
-            (n, 0) without one.
+            (n, 0) without one; stretches of rubber bushings (n, s).
         """
         tubes_begin = STATE_SIZE + len(self.dampers)
         tubes_end = tubes_begin + TUBES_STATE_SIZE * len(self.telescopes)
@@ -96,7 +118,8 @@ class Layout:
         )
         own, deformation_of_tubes = tubes[:, :, :STATE_SIZE], tubes[:, :, DEFORMATION]
         deformation = np.hstack([states[:, STATE_SIZE:tubes_begin], deformation_of_tubes])
-        return states[:, :STATE_SIZE], deformation, own, states[:, tubes_end:]
+        carrier, stretches = np.split(states[:, tubes_end:], [self.branches_begin - tubes_end], 1)
+        return states[:, :STATE_SIZE], deformation, own, carrier, stretches
 
 
 def pack(setup: Setup) -> tuple[FloatArray, Layout]:
@@ -137,8 +160,13 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
         parts.append(TUB_AND_BEARING.pack(tub=pack_tub(setup), bearing=setup.bearing.packed()))
         structure += setup.bearing.structure
     bearing = size if setup.bearing else -1
+    rubber = tuple(
+        (at, bushing.state_size)
+        for at, bushing in zip(indices["bushings"], setup.bushings.values(), strict=True)
+        if isinstance(bushing, RubberBushingParameters)
+    )
     return np.concatenate(parts), Layout(
-        **indices, gasket=gasket, bearing=bearing, structure=tuple(structure)
+        **indices, gasket=gasket, bearing=bearing, structure=tuple(structure), rubber=rubber
     )
 
 
@@ -190,7 +218,8 @@ def fill_lanes(lanes: FloatArray, runs: list[FloatArray]) -> FloatArray:
 def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     """Return the state at the start of a run.
 
-    The machine is at rest at the rest pose, the drum at its first speed, sponges undeformed.
+    The machine is at rest at the rest pose, the drum at its first speed; sponges and branches of
+    rubber are relaxed.
     """
     x = np.zeros(STATE_SIZE + len(setup.dampers))
     x[: POSE.fixed_size] = setup.rest_pose
@@ -198,7 +227,8 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     tubes = np.zeros((len(setup.telescopes), TUBES_STATE_SIZE))
     tubes[:, : setup.tube_rest.shape[1]] = setup.tube_rest
     carrier = np.append(setup.carrier_rest, np.zeros_like(setup.carrier_rest))
-    return np.concatenate([x, tubes.ravel(), carrier])
+    stretches = np.zeros(sum(bushing.state_size for bushing in setup.bushings.values()))
+    return np.concatenate([x, tubes.ravel(), carrier, stretches])
 
 
 def pack_tubes(setup: Setup, name: str) -> FloatArray:

@@ -84,7 +84,7 @@ def integrate_runs(
     Yields:
         The fraction done, after each `PAUSE_STEPS` steps.
     """
-    work = work_arrays(len(x) // WIDTH, len(layout.dampers))
+    work = work_arrays(len(x) // WIDTH, layout.inputs_size)
     steps_of = (*schedule.steps, one_derivative)
     by_sample = samples.reshape(len(schedule.time), -1, WIDTH)
     done, steps, last, diverged = 0, len(schedule.step), 0, False

@@ -33,7 +33,7 @@ def trajectory_of(
         p, layout: From `pack`.
     """
     states, rates = np.split(samples, [-layout.rates_size], axis=1)
-    motion, deformation, tubes, carrier = layout.parts(states)
+    motion, deformation, tubes, carrier, stretches = layout.parts(states)
     torque = np.empty((len(samples), 1))
     drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
     torque_history(
@@ -45,7 +45,9 @@ def trajectory_of(
     )
     of_tub = rates[:, :RATES_SIZE]
     return cut_at_divergence(
-        Trajectory(schedule.time, motion, deformation, torque[:, 0], of_tub, tubes, carrier)
+        Trajectory(
+            schedule.time, motion, deformation, torque[:, 0], of_tub, tubes, carrier, stretches
+        )
     )
 
 

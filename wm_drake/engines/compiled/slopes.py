@@ -10,13 +10,13 @@ import numpy as np
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
-from wm_drake.elements.bushing import six_component_bushing_wrench
 from wm_drake.elements.friction_damper import (
     friction_damper_line,
     friction_damper_tension,
     friction_damper_wrench,
 )
 from wm_drake.elements.motion import motion_at, read_tree_state, tub_motion
+from wm_drake.elements.rubber import bushing_wrench
 from wm_drake.elements.spring import spring_strut_wrench
 from wm_drake.elements.telescopic_damper import telescopic_damper_forces
 from wm_drake.engines.compiled.mechanics import (
@@ -77,7 +77,8 @@ class SlopedDerivative:
         for _ in setup.telescopes:
             velocities[begin + 7 : begin + TUBES_STATE_SIZE - 1] = True
             begin += TUBES_STATE_SIZE
-        velocities[begin + (size - begin) // 2 :] = True
+        end = self.layout.branches_begin
+        velocities[begin + (end - begin) // 2 : end] = True
         self.is_velocity = velocities[self.free]
         self._steps = np.where(velocities, VELOCITY_STEP, POSITION_STEP)
         self._steps[DRUM_RATE] = POSITION_STEP
@@ -229,7 +230,7 @@ def tub_wrenches_at(states, columns, steps, p, elements, wrenches):
             )
             at_row += 6
         for at in elements.bushings:
-            wrench, _ = six_component_bushing_wrench(motion, numbers, at)
+            wrench, _ = bushing_wrench(motion, numbers, at, x, elements.branches)
             write_six(answer, at_row, wrench)
             at_row += 6
         for i in range(telescopic_damper_count(elements.telescopes)):

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wm_drake.compiler.lanes import WIDTH
-from wm_drake.engines.compiled.linear import jacobians
+from wm_drake.elements.rubber import FRICTION, RubberBushingParameters
+from wm_drake.engines.compiled.linear import PATH, SMOOTH, SPONGE, jacobians
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
 from wm_drake.engines.compiled.packing import Layout, initial_state, pack
 from wm_drake.engines.compiled.tubes import TUBES_STATE_SIZE
@@ -77,12 +78,15 @@ def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
     """Return the motion of each part of a machine that needs the shortest step, by part.
 
     The parts are `TUB`, `BEARING`, and the sponge and the tubes of each damper, as far as they have
-    a fastest motion of their own. The drum's own angle is prescribed.
+    a fastest motion of their own, and the Maxwell branches of each bushing. The drum's own angle is
+    prescribed. The friction of a bushing of rubber is left out: every step follows its path in
+    closed form. Its stiffness counts in the motion of the tub.
 
     Raises:
         InputError: the machine has something that the compiled engine does not represent.
     """
     free, parts = _free_states(setup)
+    followed = {parts[k] for k, kind in enumerate(_treatment(setup, free)) if kind == PATH}
     matrices, _ = linearised(setup, *pack(setup), DIFFERENCE)
     if not np.all(np.isfinite(matrices)):
         return {"the machine": FastestMotion(np.inf, False, "the machine")}
@@ -95,6 +99,8 @@ def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
             # velocities as the displacements that they make within 1 / |lambda|
             amplitude = np.abs(mode) / np.where(moving, max(size, 1e-9), 1.0)
             part = parts[int(np.argmax(amplitude))]
+            if part in followed:
+                continue
             motion = FastestMotion(size, bool(abs(rate.imag) > abs(rate.real)), part)
             if part not in found or motion.longest_step < found[part].longest_step:
                 found[part] = motion
@@ -109,7 +115,7 @@ def fastest_motion(setup: Setup) -> FastestMotion:
 def linearised(
     setup: Setup, packed: FloatArray, layout: Layout, difference: float
 ) -> tuple[FloatArray, np.ndarray]:
-    """Return the Jacobians of the free states, and which of these are internal to a damper strut.
+    """Return the Jacobians of the free states, and how the multistep integrator treats each.
 
     Args:
         setup: The machine.
@@ -117,11 +123,31 @@ def linearised(
         difference: Half a step of the central differences. [m, rad, m/s, rad/s]
 
     Returns:
-        (WIDTH, n, n) at states with slow and fast motion [1/s], and (n,) bool.
+        (WIDTH, n, n) at states with slow and fast motion [1/s], and (n,) `SMOOTH`, `SPONGE` or
+        `PATH` of `wm_drake.engines.compiled.linear`.
     """
     free, _ = _free_states(setup)
-    struts = range(STATE_SIZE, STATE_SIZE + len(setup.dampers))
-    return jacobians(packed, layout, _states(setup, free), free, difference), np.isin(free, struts)
+    matrices = jacobians(packed, layout, _states(setup, free), free, difference)
+    return matrices, _treatment(setup, free)
+
+
+def _treatment(setup: Setup, free: list[int]) -> np.ndarray:
+    """Return how the multistep integrator treats the free states. (n,)"""
+    kinds = np.full(free[-1] + 1, SMOOTH)
+    kinds[STATE_SIZE : STATE_SIZE + len(setup.dampers)] = SPONGE
+    for index, (_, kind) in zip(reversed(free), reversed(_branches(setup)), strict=False):
+        kinds[index] = PATH if kind == FRICTION else SPONGE
+    return kinds[free]
+
+
+def _branches(setup: Setup) -> list[tuple[str, str]]:
+    """Return the bushing and the kind of each stretch of rubber, the last states of a machine."""
+    return [
+        (name, kind)
+        for name, bushing in setup.bushings.items()
+        if isinstance(bushing, RubberBushingParameters)
+        for kind in bushing.state_kinds
+    ]
 
 
 def check_step(setup: Setup, step: float) -> None:
@@ -170,7 +196,8 @@ def _free_states(setup: Setup) -> tuple[list[int], list[str]]:
         parts += [f"the tubes of damper '{name}'"] * (TUBES_STATE_SIZE - 1)
         parts.append(f"the sponge of damper '{name}'")
     size = len(initial_state(setup, _STANDSTILL))
-    parts += [BEARING] * (size - len(parts))
+    branches = [f"the {kind} of bushing '{name}'" for name, kind in _branches(setup)]
+    parts += [*[BEARING] * (size - len(parts) - len(branches)), *branches]
     free = [index for index in range(size) if index not in (DRUM_ANGLE, DRUM_RATE)]
     return free, [parts[index] for index in free]
 
@@ -195,7 +222,8 @@ def _velocities(setup: Setup, size: int) -> list[int]:
     for _ in setup.telescopes:
         found += range(begin + 7, begin + TUBES_STATE_SIZE - 1)
         begin += TUBES_STATE_SIZE
-    found += range(begin + (size - begin) // 2, size)
+    end = size - len(_branches(setup))
+    found += range(begin + (end - begin) // 2, end)
     return found
 
 
