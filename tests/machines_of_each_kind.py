@@ -1,5 +1,7 @@
 """Variants of the reference machine with each kind of element, for comparisons of both engines."""
 
+import pytest
+
 from wm_drake.parameters import MachineParameters, load_machine
 
 END_BUSHING = {
@@ -71,6 +73,14 @@ TABLES = {f"stiffness_{axis}": LINEAR_TABLE for axis in "xyz"} | {
 def changed(**parts):
     """Return the reference machine with some of its top-level parts replaced."""
     return MachineParameters.model_validate(load_machine("reference").model_dump() | parts)
+
+
+def names_of_each_kind():
+    """Return the names of all variants; those with code of their own to compile are slow."""
+    return [
+        pytest.param(name, marks=pytest.mark.slow) if "rubber" in name else name
+        for name in machines_of_each_kind()
+    ]
 
 
 def machines_of_each_kind():

@@ -113,7 +113,7 @@ def runge_kutta_step(
         for k in range(size):
             total[k] = total[k] + weight * rate[k]
             stage[k] = state[k] + ahead * rate[k]
-    end_paths(total, state, inputs, h, first, numbers, branches)
+    end_paths(total, state, inputs, first, h, numbers, branches)
     for k in range(size):
         state[k] = total[k]
 
