@@ -27,6 +27,7 @@ from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.measured import DESIGN, NamedValue, measured_amplitudes
 from wm_drake.parameters.published import CONSTANT, published_results
 from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate, identity_of
+from wm_drake.studies.calibration.fewer import fewer_table, fit_with_fewer
 from wm_drake.studies.calibration.outcome import mean_and_largest, solved_machine
 from wm_drake.studies.calibration.prediction import DRAWS, Prediction, predict
 from wm_drake.studies.calibration.solutions import Solution
@@ -41,6 +42,9 @@ PLAN = Plan(method="least-squares", starts=1)
 PREDICTION = replace(PLAN, starts=2)
 """Plan of a prediction: searches from and near the expected values. The starting values of the free
 file are not used, because they come from a fit to all loads."""
+
+FEWER = (40, 30, 20, 12, 6)
+"""Numbers of free quantities that --fewer tries."""
 
 QUICK_DRAWS = 8
 """Machines drawn for the intervals of a prediction with --quick."""
@@ -58,6 +62,8 @@ def main() -> None:
     targets = _targets(machine.parameters, with_means=not arguments.quick)
     draws = QUICK_DRAWS if arguments.quick else DRAWS
     ledger_path = arguments.out.with_suffix(".sqlite")
+    if arguments.fewer:
+        held_out = ()
     with open_ledger(ledger_path, identity_of(machine, free, targets, plan), resume=True) as ledger:
         with progress_bar(plan.starts, "searches") as done:
             calibration = calibrate(
@@ -72,8 +78,13 @@ def main() -> None:
                     machine, free, calibration, [group], ledger, plan=prediction_plan, draws=draws
                 )
                 done(number)
+        fits = []
+        if arguments.fewer:
+            fits = fit_with_fewer(machine, calibration, FEWER, ledger)
         ledger.mark_finished()
     text = "\n".join(_lines(calibration, predictions))
+    if fits:
+        text += "\n" + fewer_table(fits).to_string(index=False, float_format="%.2f")
     print(text)
     arguments.out.write_text(text + "\n", encoding="utf-8")
 
@@ -115,9 +126,16 @@ def _arguments() -> argparse.Namespace:
         help="file for the result; the ledger of evaluations is written beside it",
     )
     parser.add_argument(
+        "--fewer",
+        action="store_true",
+        help="fit with fewer free quantities too, in place of the predictions",
+    )
+    parser.add_argument(
         "--write", action="store_true", help="write the best machine to the shipped files"
     )
     arguments = parser.parse_args()
+    if arguments.quick and arguments.fewer:
+        parser.error("--quick leaves three quantities; leave out --quick or --fewer")
     if arguments.quick and arguments.write:
         parser.error("--quick cannot be written to the shipped files; leave out --quick or --write")
     return arguments

@@ -26,6 +26,7 @@ ORDER = (
     {"rigs"},
     {"studies"},
     {"report"},
+    {"studio"},
     {"cli"},
     {"__main__"},
 )

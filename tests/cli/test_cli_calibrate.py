@@ -62,9 +62,8 @@ ARGUMENTS = (
 
 @pytest.mark.usefixtures("folder")
 def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
-    ended = wm_drake(
-        *ARGUMENTS, "--deviation", "1", "--leave-out", "back", "--json", "--out", "out"
-    )
+    arguments = (*ARGUMENTS, "--deviation", "1", "--leave-out", "back", "--fewer", "1")
+    ended = wm_drake(*arguments, "--json", "--out", "out")
     assert ended.code == 0, ended.err
     result = json.loads(ended.out)
     friction, radius = result["quantities"]
@@ -79,6 +78,7 @@ def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
         "machine_1.yaml",
         "quantities.csv",
         "amplitudes.csv",
+        "fewer.csv",
         "ledger.sqlite",
         "run.json",
     }
@@ -93,11 +93,16 @@ def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
         *(table[table.source == source][SENSORS] for source in ("experiment", "solution 1")),
         rtol=0.03,
     )
-    again = wm_drake(
-        *ARGUMENTS, "--deviation", "1", "--leave-out", "back", "--json", "--out", "out"
-    )
+    both, one = result["fewer"]
+    assert [both["free_quantities"], one["free_quantities"]] == [2, 1]
+    assert one["set_to_expected"] == "radius"  # its expected value is the planted one
+    assert one["cost"] < both["cost"] + 0.5
+    page = Path("out/report.html").read_text()
+    assert "Fewer free quantities" in page
+    again = wm_drake(*arguments, "--json", "--out", "out")
     assert json.loads(again.out) == result  # a finished calibration is read back
-    shown = wm_drake(*ARGUMENTS, "--deviation", "1", "--leave-out", "back", "--out", "out").out
+    shown = wm_drake(*arguments, "--out", "out").out
+    assert "Cost against number of free quantities" in shown
     value = next(line for line in shown.splitlines() if "friction" in line)
     assert f"{friction['value_1']:.4g}" in value
     assert " N " in value
@@ -116,6 +121,8 @@ FAULTS = {
         "no measured load 'bck' (did you mean 'back'?",
     ),
     "all loads left out": (["--leave-out", "back,middle"], "leaves no load"),
+    "as many as are free": (["--fewer", "2"], "--fewer: 2: needs falling numbers"),
+    "fewer that is no number": (["--fewer", "one"], "--fewer: 'one' is not a whole number"),
     "weight of nothing": (["--weight", "Q=2"], "'Q' is no load, sensor"),
     "weight that is no number": (
         ["--weight", "Xr=much"],

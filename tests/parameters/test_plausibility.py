@@ -6,7 +6,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.model.plausibility import unusual_springs, unusual_values
 from wm_drake.parameters import load_machine, quantities, with_values
 from wm_drake.parameters.files import shipped_machines
-from wm_drake.parameters.plausibility import RANGES, _range_of, unusual_numbers
+from wm_drake.parameters.plausibility import RANGES, usual_range, unusual_numbers
 
 
 @pytest.mark.parametrize("name", shipped_machines())
@@ -68,7 +68,7 @@ def test_every_range_belongs_to_a_number_and_has_its_unit(tmp_path):
     (tmp_path / "more.yaml").write_text(MORE)
     machines = map(load_machine, [*shipped_machines(), tmp_path / "more.yaml"])
     units = {key: unit.shown for machine in machines for key, _, unit in quantities(machine)}
-    used = {usual: key for key in units if (usual := _range_of(key)) and usual.unit == units[key]}
+    used = {usual: key for key in units if (usual := usual_range(key)) and usual.unit == units[key]}
     assert [usual.pattern for usual in RANGES if usual not in used] == []
 
 

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
+from pages import without_scripts
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors
@@ -158,7 +159,7 @@ def test_full_saturated_design_says_that_nothing_shows_its_fit(trials, words):
     screening = run_screening(make_design("full", NAMES[:2]), lambda _: responses)
     assert "nothing shows how well the model fits between them" in warnings(screening, words)[0]
     page = gasket_report(screening, trials)
-    assert not re.search(r"[>( ](nan|NaN)[<) ]", page)
+    assert not re.search(r"[>( ](nan|NaN)[<) ]", without_scripts(page))
 
 
 def test_contact_is_said_first_and_listed(trials, words):
@@ -214,10 +215,8 @@ def test_factor_table_has_every_level_and_its_unit(trials, words):
 def test_page_is_whole(screening, trials):
     page = gasket_report(screening, trials, "wm-drake study gasket", 12.0)
     assert "load towel &amp; co" in page
-    assert page.count("<figure>") == 1 + 3 + 2 * 4
-    sources = re.findall(r'<img src="([^"]{0,20})', page)
-    assert len(sources) == 12
-    assert all(source.startswith("data:image/") for source in sources)
+    assert page.count("<figure data-picture>") == 1 + 3 + 2 * 4
+    assert "<img" not in page
     for text in (
         "0.0095 N s/mm",
         "gasket.damping_z",
@@ -227,7 +226,7 @@ def test_page_is_whole(screening, trials):
         "linear stiffness along x K_Lx × linear stiffness along y K_Ly",
     ):
         assert text in page
-    assert not re.search(r"[>( ](nan|NaN)[<) ]", page)
+    assert not re.search(r"[>( ](nan|NaN)[<) ]", without_scripts(page))
 
 
 @pytest.mark.parametrize("model", ["main", "main+2fi"])

@@ -2,7 +2,7 @@
 
 import functools
 import threading
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -81,6 +81,7 @@ class RunResult:
         values: Measures by name. SI.
         diverged: When and why the run stopped early; "" if it did not.
         record: Its history; None if histories were not requested.
+        gap: Where the smallest gap is; None if it was not measured.
     """
 
     number: int
@@ -88,20 +89,24 @@ class RunResult:
     values: dict[str, FloatArray]
     diverged: str
     record: Record | None
+    gap: Gap | None = None
 
 
 class Runner:
     """Runs work items in any thread. Each thread reuses memory of its own from batch to batch."""
 
     def __init__(
-        self, parameters: MachineParameters, measures: tuple[str, ...], histories: bool
+        self,
+        parameters: MachineParameters,
+        measures: tuple[str, ...],
+        histories: bool | Container[int],
     ) -> None:
         """Prepare for a machine.
 
         Args:
             parameters: Of the machine.
             measures: Keys of `MEASURES`.
-            histories: Whether results have records.
+            histories: Whether results have records, or the numbers of the cases that have one.
         """
         self.parameters = parameters
         self.measures, self.histories = measures, histories
@@ -178,9 +183,12 @@ class Runner:
         for measure in self.measures:
             arrays = _MEASURED[measure](self, item, schedule, run)
             values |= dict(zip(MEASURES[measure], arrays, strict=True))
-        record = self._record(item, schedule, run.samples.copy()) if self.histories else None
+        keeps = self.histories
+        keeps = keeps if isinstance(keeps, bool) else item.number in keeps
+        record = self._record(item, schedule, run.samples.copy()) if keeps else None
         diverged = _divergence(schedule.time, run.samples, run.good)
-        return RunResult(item.number, item.case, values, diverged, record)
+        gap = run.gap[0] if run.gap else None
+        return RunResult(item.number, item.case, values, diverged, record, gap)
 
     def _spring_lengths(
         self, key: BatchKey, p: FloatArray, samples: FloatArray, rows: int, size: int
@@ -239,7 +247,7 @@ class Runner:
         return [np.array(np.nan if gap is None else gap.distance)]
 
     def _contacts(self, item: WorkItem, schedule: Schedule, run: "_Run") -> Iterable[FloatArray]:
-        gap, scene = self._smallest_gap(item, schedule, run), self._scene()
+        gap, scene = self._smallest_gap(item, schedule, run), self.scene()
         pairs = scene.pair_names()
         touching: FloatArray = np.full(len(pairs), np.nan)
         if gap is None:
@@ -250,10 +258,11 @@ class Runner:
 
     def _smallest_gap(self, item: WorkItem, schedule: Schedule, run: "_Run") -> Gap | None:
         if not run.gap:
-            run.gap.append(self._scene().smallest_gap(*run.poses(schedule), item.begin[:6]))
+            run.gap.append(self.scene().smallest_gap(*run.poses(schedule), item.begin[:6]))
         return run.gap[0]
 
-    def _scene(self) -> Scene:
+    def scene(self) -> Scene:
+        """Return the shapes of the machine, those of the thread that calls."""
         kept = self._memory.__dict__
         if "scene" not in kept:  # one for each thread: a scene has one pose at a time
             kept["scene"] = Scene(self.parameters)

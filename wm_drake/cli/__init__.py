@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from wm_drake.cli import calibrate, identify, machine, record, rig, spin, study
+from wm_drake.cli import calibrate, identify, machine, record, rig, spin, studio, study
 from wm_drake.cli.terminal import give_quiet
 from wm_drake.errors import Problem, WmDrakeError, reason_of
 
@@ -27,6 +27,7 @@ app.add_typer(rig.app, name="rig")
 app.add_typer(study.app, name="study")
 app.command()(spin.spin)
 app.command()(calibrate.calibrate)
+app.command()(studio.studio)
 give_quiet(app)
 
 

@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -34,12 +34,22 @@ from wm_drake.errors import InputError, input_error
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.parameters import MachineParameters
     from wm_drake.studies.calibration.calibration import Calibration, Plan
+    from wm_drake.studies.calibration.fewer import Simpler
     from wm_drake.studies.calibration.prediction import Prediction
     from wm_drake.studies.calibration.targets import Targets
     from wm_drake.studies.description.modal import Modes
     from wm_drake.studies.spin.study import SpinResult
 
 DEFAULT_OUT = Path("wm-drake-calibrate")
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the command has found: a calibration, predictions, and fits with fewer quantities."""
+
+    calibration: "Calibration"
+    predictions: "list[Prediction]"
+    fewer: "list[Simpler]"
 
 
 def calibrate(
@@ -100,6 +110,14 @@ def calibrate(
             metavar="LOAD[,LOAD]",
         ),
     ] = None,
+    fewer: Annotated[
+        str | None,
+        typer.Option(
+            help="Fit again with fewer free quantities and show what that costs, such as 30,20,10. "
+            "The others keep their expected values.",
+            metavar="COUNT[,COUNT]",
+        ),
+    ] = None,
     workers: Annotated[
         int | None, typer.Option(help="Number of threads. Default: number of cores.", min=1)
     ] = None,
@@ -114,7 +132,7 @@ def calibrate(
     """Fit unknown numbers of a machine to measured amplitudes, within bounds and with priors."""
     from wm_drake.studies.calibration.calibration import Plan
 
-    groups = _groups(leave_out)
+    groups, counts = _groups(leave_out), _counts(fewer)
     parameters = with_measured(load_parameters(machine, sets), targets, "--targets")
     amplitudes, responses = _deviations(deviation)
     wanted = _targets(parameters, responses).weighted(_weights(weight))
@@ -122,15 +140,15 @@ def calibrate(
     warn_of_phase_error(parameters)
     plan = Plan(method, starts, seed, iterations, amplitudes, 1e-3 * resolution)
     with interruptible(f"finished evaluations are kept in {out}; continue with --resume"):
-        calibration, predictions, writer = _run(
-            parameters, free, wanted, plan, groups, out, workers, resume, overwrite
+        found, writer = _run(
+            parameters, free, wanted, plan, groups, counts, out, workers, resume, overwrite
         )
     with result_folder(out, writer, RUNS_KEPT) as folder:
-        _write(parameters, calibration, predictions, folder)
+        _write(parameters, found, folder)
     if as_json:
-        typer.echo(json.dumps(_as_json(calibration, predictions)))
+        typer.echo(json.dumps(_as_json(found)))
     else:
-        _print(calibration, predictions, out)
+        _print(found, out)
 
 
 def _targets(parameters: "MachineParameters", deviations: dict[str, float]) -> "Targets":
@@ -209,37 +227,50 @@ def _groups(entries: list[str] | None) -> list[list[str]]:
     return groups
 
 
+def _counts(entry: str | None) -> list[int]:
+    """Return the numbers of free quantities that `--fewer` names."""
+    texts = [text.strip() for text in entry.split(",")] if entry is not None else []
+    for text in texts:
+        if not (text.isascii() and text.isdigit() and len(text) < 6):
+            raise input_error(
+                f"'{text[:20]}' is not a whole number; write for example 30,20,10", where="--fewer"
+            )
+    return [int(text) for text in texts]
+
+
 def _run(
     parameters: "MachineParameters",
     free: Path,
     targets: "Targets",
     plan: "Plan",
     held_out: list[list[str]],
+    counts: list[int],
     out: Path,
     workers: int | None,
     resume: bool,
     overwrite: bool,
-) -> "tuple[Calibration, list[Prediction], Run]":
-    """Run the calibration and the predictions, with a ledger of evaluations in the folder `out`."""
+) -> "tuple[Found, Run]":
+    """Run the calibration and what follows, with a ledger of evaluations in the folder `out`."""
     from wm_drake.batch.ledger import open_ledger
     from wm_drake.model.build import build_machine
     from wm_drake.parameters import located
     from wm_drake.parameters.free import load_free
     from wm_drake.studies.calibration.calibration import calibrate, identity_of
+    from wm_drake.studies.calibration.fewer import check_counts, fit_with_fewer
     from wm_drake.studies.calibration.parameter_map import parameter_map_of
     from wm_drake.studies.calibration.prediction import check_held_out, predict
 
     free_file, built = load_free(existing_file(free, "--free")), build_machine(parameters)
     plan.check()
     check_held_out(targets, held_out)
+    check_counts(counts, len(free_file.quantities))
     try:
         parameter_map_of(built, free_file)
     except InputError as error:
         raise located(error, free) from None
     identity = identity_of(built, free_file, targets, plan)
-    writer = Run(
-        "calibrate", overwrite, {**identity, "leave_out": "; ".join(map(",".join, held_out))}
-    )
+    asked = {"leave_out": "; ".join(map(",".join, held_out)), "fewer": ",".join(map(str, counts))}
+    writer = Run("calibrate", overwrite, {**identity, **asked})
     prepare_folder(out, writer)
     with open_ledger(out / LEDGER, identity, resume=resume, replace=overwrite) as ledger:
         with _progress(plan.starts) as report:
@@ -250,8 +281,14 @@ def _run(
             predictions = predict(
                 built, free_file, calibration, held_out, ledger, workers=workers, report=report
             )
+        fits = []
+        if counts:
+            with _progress(len(counts)) as report:
+                fits = fit_with_fewer(
+                    built, calibration, counts, ledger, workers=workers, report=report
+                )
         ledger.mark_finished()
-    return calibration, predictions, writer
+    return Found(calibration, predictions, fits), writer
 
 
 @contextmanager
@@ -299,14 +336,10 @@ def _progress(searches: int) -> Iterator[Callable[[int, int, float], None]]:
         yield report
 
 
-def _write(
-    parameters: "MachineParameters",
-    calibration: "Calibration",
-    predictions: "list[Prediction]",
-    folder: Path,
-) -> None:
+def _write(parameters: "MachineParameters", found: Found, folder: Path) -> None:
     from wm_drake.parameters import machine_yaml
     from wm_drake.report.calibration.report import calibration_report
+    from wm_drake.studies.calibration.fewer import fewer_table
     from wm_drake.studies.calibration.outcome import (
         amplitude_rows,
         quantity_table,
@@ -314,6 +347,7 @@ def _write(
         solved_machine,
     )
 
+    calibration = found.calibration
     for number, solution in enumerate(calibration.solutions, start=1):
         text = machine_yaml(solved_machine(calibration.parameter_map, solution, number))
         (folder / f"machine_{number}.yaml").write_text(text, encoding="utf-8")
@@ -322,8 +356,12 @@ def _write(
     if calibration.targets.responses:
         table = response_table(calibration)
         table.to_csv(folder / "responses.csv", index=False, float_format="%.6g")
+    if found.fewer:
+        fewer_table(found.fewer).to_csv(folder / "fewer.csv", index=False, float_format="%.6g")
     best, modes = _shown(parameters, calibration)
-    page = calibration_report(calibration, predictions, best, modes, command_line())
+    page = calibration_report(
+        calibration, found.predictions, best, modes, command_line(), fewer=found.fewer
+    )
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 
@@ -348,9 +386,10 @@ def _shown(
     ]
 
 
-def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Path) -> None:
+def _print(found: Found, out: Path) -> None:
     from wm_drake.studies.calibration.outcome import mean_and_largest
 
+    calibration, predictions = found.calibration, found.predictions
     _print_values(calibration)
     best = calibration.solutions[0]
     mean, largest = mean_and_largest(best.errors(calibration.targets))
@@ -378,6 +417,8 @@ def _print(calibration: "Calibration", predictions: "list[Prediction]", out: Pat
         say(f"    other loads in that calibration: {others}")
         covered = f"{100 * prediction.covered:.0f} %"
         say(f"    95 % intervals contain {covered} of the held-out amplitudes")
+    if found.fewer:
+        _print_fewer(found.fewer)
     say(f"Results in {out}: report.html, machine_<n>.yaml, quantities.csv, amplitudes.csv")
 
 
@@ -399,8 +440,25 @@ def _print_values(calibration: "Calibration") -> None:
     Console().print(table)
 
 
-def _as_json(calibration: "Calibration", predictions: "list[Prediction]") -> dict[str, Any]:
+def _print_fewer(fits: "list[Simpler]") -> None:
+    from rich.table import Table
+
+    from wm_drake.studies.calibration.fewer import fewer_table
+
+    table = Table(title="Cost against number of free quantities")
+    frame = fewer_table(fits).drop(columns="set_to_expected")
+    for head in frame.columns:
+        table.add_column(head.replace("_", " "), justify="right")
+    for row in frame.itertuples(index=False):
+        table.add_row(str(row[0]), *("–" if math.isnan(x) else f"{x:.3g}" for x in row[1:]))
+    Console().print(table)
+
+
+def _as_json(found: Found) -> dict[str, Any]:
+    from wm_drake.studies.calibration.fewer import fewer_table
     from wm_drake.studies.calibration.outcome import mean_and_largest, quantity_table
+
+    calibration, predictions = found.calibration, found.predictions
 
     def errors(values: Any) -> dict[str, float]:
         mean, largest = mean_and_largest(values)
@@ -427,4 +485,5 @@ def _as_json(calibration: "Calibration", predictions: "list[Prediction]") -> dic
             | {"covered_percent": 100 * p.covered}
             for p in predictions
         ],
+        "fewer": json.loads(fewer_table(found.fewer).to_json(orient="records")),
     }

@@ -10,7 +10,7 @@ import typer
 
 from wm_drake.cli.common import JsonOption, SetOption, check_buildable, load_parameters, located_in
 from wm_drake.cli.terminal import say
-from wm_drake.errors import InputError, input_error
+from wm_drake.errors import InputError, input_error, shortened
 
 app = typer.Typer(help="List, start, check and show machine files.", no_args_is_help=True)
 
@@ -57,11 +57,27 @@ def machine_show(
 
 
 @app.command("schema")
-def machine_schema() -> None:
-    """Print the JSON schema of the output of `machine show --json`."""
-    from wm_drake.studies.description.schema import description_schema
-
-    typer.echo(json.dumps(description_schema(), indent=1))
+def machine_schema(
+    of: Annotated[
+        str,
+        typer.Argument(
+            help="'file': machine files, for the completion of an editor. 'description': the "
+            "output of `machine show --json`.",
+            metavar="[file|description]",
+        ),
+    ] = "file",
+) -> None:
+    """Print the JSON schema of machine files, or of the output of `machine show --json`."""
+    if of == "file":
+        from wm_drake.parameters.file_keys import file_schema as schema
+    elif of == "description":
+        from wm_drake.studies.description.schema import description_schema as schema
+    else:
+        raise input_error(
+            f"no schema of '{shortened(of, 40)}'; allowed are file, description",
+            where="machine schema",
+        )
+    typer.echo(json.dumps(schema(), indent=1))
 
 
 @app.command("list")

@@ -206,6 +206,20 @@ class Scene:
         )
         return nearest.distance, query.GetPoseInWorld(pair[0]) @ witness, away
 
+    def nearest_points(self, pose: FloatArray, moving: str, fixed: str) -> FloatArray:
+        """Return the points in W of two shapes that are nearest to each other.
+
+        Args:
+            pose: Pose of the tub: roll, pitch, yaw, x, y, z. (6,) [rad, m]
+            moving, fixed: Names of a shape of the tub group and of a shape of the housing.
+
+        Returns:
+            (2, 3) The point of the first shape, then that of the second. [m]
+        """
+        pair = self._pairs[self.pair_names().index(f"{moving}|{fixed}")]
+        distance, point, away = self._nearest(pose, pair)
+        return np.stack([point, point - distance * away])
+
     def _set_positions(self, positions: FloatArray) -> None:
         """Set the first positions of the plant; the others, of damper tubes, are 0 as drawn."""
         drawn = np.zeros(self.plant.num_positions() - len(positions))

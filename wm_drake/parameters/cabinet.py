@@ -16,7 +16,12 @@ FootName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,
 
 
 class Foot(Frozen):
-    """Position of a foot on the floor, in W."""
+    """Position of a foot on the floor, in W.
+
+    Attributes:
+        x: To the right.
+        y: To the rear.
+    """
 
     x: u.Length
     y: u.Length

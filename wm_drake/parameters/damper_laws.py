@@ -33,14 +33,24 @@ measured loops, or between two bounds in SI."""
 
 
 class DamperNumbers(Frozen):
-    """Numbers of a damper of any law."""
+    """Numbers of a damper of any law.
+
+    Attributes:
+        end_bushing: Bushing at each end.
+        law: Name of the law.
+    """
 
     end_bushing: EndBushing = EndBushing()
     law: str
 
 
 class CoulombDamper(DamperNumbers):
-    """Coulomb friction [C] Eq. (4), and a dashpot in parallel."""
+    """Coulomb friction [C] Eq. (4), and a dashpot in parallel.
+
+    Attributes:
+        friction_force: Friction while sliding [f_max].
+        damping: Dashpot in parallel [c].
+    """
 
     law: Literal["coulomb"]
     friction_force: NonNegativeForce
@@ -48,7 +58,13 @@ class CoulombDamper(DamperNumbers):
 
 
 class StvDamper(DamperNumbers):
-    """Friction with a stick transition velocity [C] Eq. (6), and a dashpot in parallel."""
+    """Friction with a stick transition velocity [C] Eq. (6), and a dashpot in parallel.
+
+    Attributes:
+        friction_force: Friction while sliding [f_max].
+        transition_velocity: Velocity from which on the friction is complete.
+        damping: Dashpot in parallel [c].
+    """
 
     law: Literal["stv"]
     friction_force: NonNegativeForce
@@ -57,7 +73,13 @@ class StvDamper(DamperNumbers):
 
 
 class HavsinDamper(DamperNumbers):
-    """Smoothed Coulomb friction [A] Eq. (2), and a dashpot in parallel."""
+    """Smoothed Coulomb friction [A] Eq. (2), and a dashpot in parallel.
+
+    Attributes:
+        friction_force: Friction while sliding [f_max].
+        full_friction_velocity: Velocity from which on the friction is complete.
+        damping: Dashpot in parallel [c].
+    """
 
     law: Literal["havsin"]
     friction_force: NonNegativeForce
@@ -66,7 +88,16 @@ class HavsinDamper(DamperNumbers):
 
 
 class MstvDamper(DamperNumbers):
-    """Massless sponge with MSTV friction [C] Eq. (2), (3), (7)."""
+    """Massless sponge with MSTV friction [C] Eq. (2), (3), (7).
+
+    Attributes:
+        friction_force: Friction while sliding [f_max].
+        friction_damping: Growth of the friction with the velocity of the slider [c_m].
+        regularisation_velocity: Small velocity that keeps the law finite at rest [epsilon].
+        sponge_stiffness: Stiffness of the sponge [k1].
+        sponge_damping: Damping of the sponge [c1].
+        slider_damping: Air resistance of the slider [c2].
+    """
 
     law: Literal["mstv"]
     friction_force: NonNegativeForce
@@ -87,7 +118,15 @@ class MstvDamper(DamperNumbers):
 
 
 class StvSpongeDamper(DamperNumbers):
-    """Massless sponge with STV friction [C] Eq. (2), (3), (6); Coulomb's (4) at velocity 0."""
+    """Massless sponge with STV friction [C] Eq. (2), (3), (6); Coulomb's (4) at velocity 0.
+
+    Attributes:
+        friction_force: Friction while sliding [f_max].
+        transition_velocity: Velocity from which on the friction is complete.
+        sponge_stiffness: Stiffness of the sponge [k1].
+        sponge_damping: Damping of the sponge [c1].
+        slider_damping: Air resistance of the slider [c2].
+    """
 
     law: Literal["stv_sponge"]
     friction_force: NonNegativeForce
@@ -106,7 +145,16 @@ class StvSpongeDamper(DamperNumbers):
 
 
 class FreeStrokeDamper(DamperNumbers):
-    """Free-stroke damper [A] Eq. (2)-(6), massless sponge; its curve is zero in the free stroke."""
+    """Free-stroke damper [A] Eq. (2)-(6), massless sponge; its curve is zero in the free stroke.
+
+    Attributes:
+        friction_force: Friction while sliding [f_max].
+        friction_damping: Growth of the friction with the velocity of the slider [c_m].
+        regularisation_velocity: Small velocity that keeps the law finite at rest [epsilon].
+        basic_friction_force: Friction of the tubes on each other, also in the free stroke.
+        basic_full_friction_velocity: Velocity from which on it is complete.
+        sponge: Force of the sponge over its deformation; zero in the free stroke.
+    """
 
     law: Literal["free_stroke"]
     friction_force: NonNegativeForce

@@ -19,7 +19,12 @@ class Frozen(BaseModel):
 
 
 class ForceTable(Frozen):
-    """Force over displacement: a monotone cubic through the points, straight lines beyond them."""
+    """Force over displacement: a monotone cubic through the points, straight lines beyond them.
+
+    Attributes:
+        displacement: Rising displacements, at least two.
+        force: Force at each of them, never falling.
+    """
 
     displacement: u.Lengths
     force: u.Forces
@@ -40,7 +45,12 @@ class ForceTable(Frozen):
 
 
 class TorqueTable(Frozen):
-    """Torque over angle: a monotone cubic through the points, straight lines beyond them."""
+    """Torque over angle: a monotone cubic through the points, straight lines beyond them.
+
+    Attributes:
+        angle: Rising angles, at least two.
+        torque: Torque at each of them, never falling.
+    """
 
     angle: u.Angles
     torque: u.Torques
@@ -125,8 +135,11 @@ class SpringType(Frozen):
 class Spring(Frozen):
     """A suspension spring in its place.
 
-    `preload` is its tension as drawn. None: it follows from the free length of its type, or else
-    from static equilibrium at the drawn pose.
+    Attributes:
+        type: Name in spring_types.
+        tub_frame, housing_frame: Frames at whose origins the spring hangs.
+        preload: Tension as drawn. None: it follows from the free length of the type, or else from
+            static equilibrium at the drawn pose.
     """
 
     type: str
@@ -136,7 +149,14 @@ class Spring(Frozen):
 
 
 class EndBushing(Frozen):
-    """Bushing at each end of a damper (Hooke joints of [B]). Zero is legal."""
+    """Bushing at each end of a damper (Hooke joints of [B]). Zero is legal.
+
+    Attributes:
+        stiffness: Torque against bending, per angle from the drawn pose.
+        damping: Torque against bending, per rate.
+        friction_torque: Friction against bending, [A] Eq. (7).
+        full_friction_rate: Rate from which on the friction is complete.
+    """
 
     stiffness: Annotated[u.RotationalStiffness, Field(ge=0.0)] = 0.0
     damping: NonNegativeRotationalDamping = 0.0
@@ -145,7 +165,12 @@ class EndBushing(Frozen):
 
 
 class Damper(Frozen):
-    """A damper in its place."""
+    """A damper in its place.
+
+    Attributes:
+        type: Name in damper_types.
+        tub_frame, housing_frame: Frames at whose origins the damper acts.
+    """
 
     type: str
     tub_frame: str
@@ -153,7 +178,19 @@ class Damper(Frozen):
 
 
 class BushingType(Frozen):
-    """Six-component bushing [A] Eq. (7), (8)."""
+    """Six-component bushing [A] Eq. (7), (8).
+
+    Attributes:
+        stiffness_x, stiffness_y, stiffness_z: Force over displacement along each axis.
+        rotational_stiffness_x, rotational_stiffness_y, rotational_stiffness_z: Torque over each
+            component of the rotation vector.
+        damping_x, damping_y, damping_z: Force per velocity along each axis.
+        rotational_damping_x, rotational_damping_y, rotational_damping_z: Torque per rate about each
+            axis.
+        friction_torque_x, friction_torque_y, friction_torque_z: Friction about each axis.
+        full_friction_rate_x, full_friction_rate_y, full_friction_rate_z: Rate from which on that
+            friction is complete.
+    """
 
     stiffness_x: Stiffness
     stiffness_y: Stiffness
@@ -183,6 +220,10 @@ class Bushing(RubberBushingType):
     """A six-component bushing in its place, such as the gasket of [B] Fig. 4.
 
     Its stiffness acts along the axes of the housing-side frame.
+
+    Attributes:
+        tub_frame, housing_frame: The two frames that the bushing connects, at the same place as
+            drawn.
     """
 
     tub_frame: str

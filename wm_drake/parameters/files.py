@@ -187,6 +187,11 @@ def _regions(times: list[float], names: list[str]) -> list[dict[str, str]]:
 
 def machine_yaml(parameters: MachineParameters) -> str:
     """Return a machine as the text of a machine file, with display units and sources of numbers."""
+    return yaml_text(machine_tree(parameters))
+
+
+def machine_tree(parameters: MachineParameters) -> dict[str, Any]:
+    """Return a machine as the tree of a machine file, with display units and sources of numbers."""
     tree = parameters.model_dump(mode="json", exclude={"sources"}, exclude_unset=True)
     for key, value, unit in list(quantities(parameters)):
         *parents, name = key.split(".")
@@ -199,9 +204,52 @@ def machine_yaml(parameters: MachineParameters) -> str:
             continue
         source = source_of(parameters, key)
         node[name] = {"value": unit.text(value), "source": source} if source else unit.text(value)
+    return tree
+
+
+def yaml_text(tree: Mapping[str, Any]) -> str:
+    """Return a tree of texts as the text of a YAML file."""
     text = _TextStream()
     _yaml().dump(tree, text)
     return text.text
+
+
+def machine_changes(base: MachineParameters, changed: MachineParameters) -> dict[str, Any]:
+    """Return the tree of a machine file that extends a machine and has only what differs.
+
+    Name, text and measurements of the base are left out: they belong to its own file.
+    """
+    trees = [machine_tree(parameters) for parameters in (base, changed)]
+    for tree in trees:
+        for key in ("name", "about", *OF_MEASURED_MACHINE):
+            tree.pop(key, None)
+    return _changes(*trees)
+
+
+def _changes(base: Mapping[str, Any], changed: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what `_merge` must merge into `base` to get `changed`."""
+    found: dict[str, Any] = dict.fromkeys(name for name in base if name not in changed)
+    for name, value in changed.items():
+        old = base.get(name)
+        if isinstance(old, Mapping) and isinstance(value, Mapping) and not _is_whole(value):
+            inner = _changes(old, value)
+            if inner:
+                found[name] = inner
+        elif old != value:
+            found[name] = value
+    return found
+
+
+def extended_files(path: Path) -> list[Path]:
+    """Return a machine file and all files that it extends, one after the other.
+
+    Raises:
+        InputError: one of them cannot be read.
+    """
+    found = [path]
+    while len(found) <= LONGEST_CHAIN and "extends" in (tree := read_yaml(found[-1])):
+        found.append(_base_path(tree, found[-1]))
+    return found
 
 
 def machine_file_with(path: Path, parameters: MachineParameters, keys: Iterable[str]) -> str:

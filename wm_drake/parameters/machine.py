@@ -42,6 +42,10 @@ class InertiaMatrix(Frozen):
     """Inertia matrix about the centre of mass, in the axes of T (or D).
 
     The products of inertia are elements of the matrix: xy = -sum(m x y).
+
+    Attributes:
+        xx, yy, zz: Moments of inertia.
+        xy, xz, yz: Elements of the matrix outside of its diagonal.
     """
 
     xx: Annotated[u.Inertia, Field(gt=0.0)]
@@ -76,6 +80,11 @@ class BodyOverride(Frozen):
     """Mass properties that replace those of the SDF.
 
     If only the mass is given, the inertia is scaled with it.
+
+    Attributes:
+        mass: Mass of the body.
+        centre_of_mass: Its position in the body's frame.
+        inertia: Inertia about the centre of mass.
     """
 
     mass: Annotated[u.Mass, Field(gt=0.0)] | None = None
@@ -107,20 +116,33 @@ class FrameOverride(Frozen):
 
 
 class Sensor(Frozen):
-    """A sensor of the displacement of one point of the tub along one world axis."""
+    """A sensor of the displacement of one point of the tub along one world axis.
+
+    Attributes:
+        frame: Frame of the tub whose origin is the point.
+        axis: Axis of W.
+    """
 
     frame: str
     axis: Literal["x", "y", "z"]
 
 
 class Drive(Frozen):
-    """The motor, with the name of the joint that it drives."""
+    """The motor, with the name of the joint that it drives.
+
+    Attributes:
+        joint: Revolute joint of the SDF between tub and drum.
+    """
 
     joint: str = "drum_axis"
 
 
 class Clearance(Frozen):
-    """Data for the clearance: the tub point nearest to the detergent box ([B] section 4)."""
+    """Data for the clearance: the tub point nearest to the detergent box ([B] section 4).
+
+    Attributes:
+        detergent_frame: Frame of the tub whose origin is that point.
+    """
 
     detergent_frame: str
 
@@ -129,20 +151,32 @@ class Accelerometer(Frozen):
     """A vibration sensor at one point of the tub ([A] section 4.1).
 
     It has three axes, which are parallel to those of W at rest.
+
+    Attributes:
+        frame: Frame of the tub at whose origin the sensor is fixed.
     """
 
     frame: str
 
 
 class UnbalancePlace(Frozen):
-    """Position of an unbalance mass in the drum: its radius and its coordinate y in D."""
+    """Position of an unbalance mass in the drum.
+
+    Attributes:
+        radius: Distance from the drum axis.
+        y: Coordinate in D, along the drum axis.
+    """
 
     radius: Annotated[u.Length, Field(gt=0.0)]
     y: u.Length
 
 
 class UnbalancePlanes(Frozen):
-    """The two positions of unbalance masses in [A] section 4.1."""
+    """The two positions of unbalance masses in [A] section 4.1.
+
+    Attributes:
+        front, rear: The positions.
+    """
 
     front: UnbalancePlace
     rear: UnbalancePlace
@@ -165,7 +199,34 @@ class Imperfections(Frozen):
 
 
 class MachineParameters(Frozen):
-    """A machine: the name of its SDF model and all other parameters, in SI units."""
+    """A machine: the name of its SDF model and all other parameters, in SI units.
+
+    Attributes:
+        name: Name of the machine, on pages and in results.
+        about: One sentence about the machine.
+        model: SDF file with bodies, frames, joints and shapes: a shipped one, or a path from the
+            folder of the machine file.
+        gravity: Acceleration of free fall.
+        step: Largest step of the integrator.
+        integrator: `multistep` takes one derivative a step, `runge_kutta` four; `auto` takes the
+            first where it suits the machine.
+        drive: The motor.
+        bodies: Changes of the bodies of the SDF, by name.
+        frames: Changes of frames of the SDF, and new frames, by name.
+        spring_types, damper_types, bushing_types: Elements as bought, by name.
+        springs, dampers, telescopic_dampers, bushings: Elements in their places, by name.
+        gasket: The gasket; null for none.
+        sensors: Displacement sensors, by name.
+        accelerometers: Vibration sensors, by name.
+        clearance: The point whose distance to the detergent box counts.
+        cabinet: The cabinet on its feet; null if foot loads are not asked for.
+        unbalance_planes: Positions of the masses of a spin cycle.
+        imperfections: Imperfections of the drum and its bearing.
+        loads: The loads, by name.
+        profile: Spin profile, or the name of a shipped one.
+        measured: CSV files with measured amplitudes of this very machine.
+        published: CSV files with published results of a gasket study of this very machine.
+    """
 
     name: str
     about: str = ""

@@ -84,7 +84,7 @@ def unusual_numbers(parameters: MachineParameters) -> list[Problem]:
     """
     found = []
     for key, value, unit in quantities(parameters):
-        usual = _range_of(key)
+        usual = usual_range(key)
         values = value if isinstance(value, tuple) else (value,)
         # rounding of a converted number must not count as outside
         shown = [float(f"{unit.from_si(number):.9g}") for number in values]
@@ -104,7 +104,8 @@ def unusual_numbers(parameters: MachineParameters) -> list[Problem]:
     return _first_of_each_value(found)
 
 
-def _range_of(key: str) -> UsualRange | None:
+def usual_range(key: str) -> UsualRange | None:
+    """Return the usual range of the number with a key path; None if there is none."""
     return next((usual for usual in RANGES if fnmatchcase(key, usual.pattern)), None)
 
 

@@ -14,6 +14,12 @@ class Unbalance(Frozen):
     """A point mass that is fixed to the drum at (r sin(phase), y, r cos(phase)) in D.
 
     At phase 0 and drum angle 0 the mass is at the top.
+
+    Attributes:
+        mass: Its mass.
+        radius: Distance r from the drum axis.
+        y: Position along the drum axis, to the rear, from mid-depth of the drum.
+        phase: Angle from the top, positive as the drum turns.
     """
 
     mass: Annotated[u.Mass, Field(ge=0.0)]
@@ -27,7 +33,11 @@ class Unbalance(Frozen):
 
 
 class Load(Frozen):
-    """The laundry, modelled as point masses in the drum."""
+    """The laundry, modelled as point masses in the drum.
+
+    Attributes:
+        unbalances: The masses.
+    """
 
     unbalances: tuple[Unbalance, ...]
 
@@ -61,6 +71,10 @@ class Region(Frozen):
     """A named time interval of a spin profile, such as R1 to R8 in [A] section 4.1.
 
     The RMS of vibrations is computed over each region.
+
+    Attributes:
+        name: Name in tables and pictures.
+        begin, end: Times at which it begins and ends.
     """
 
     name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
@@ -73,6 +87,12 @@ class SpinProfile(Frozen):
 
     A file may give it as `steps` that start from standstill. The drum follows the profile exactly;
     the motor torque has no limit ([B] section 3).
+
+    Attributes:
+        time: Rising times from 0 on. In place of time and speed a file may have
+            `steps: [{ramp_to: 400 rpm, rate: 7 rpm/s}, {hold_until: 70 s}]`.
+        speed: Drum speed at each of them.
+        regions: Time intervals for RMS values.
     """
 
     time: u.Times

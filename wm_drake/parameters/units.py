@@ -67,6 +67,11 @@ def plain_number(text: str) -> float:
     return float(text)
 
 
+@functools.lru_cache(maxsize=8192)  # pint takes 50 µs, and a page shows the same numbers again
+def _in_unit(value: float, unit: str, shown: str) -> float:
+    return float(registry().Quantity(value, unit).to(shown).magnitude)
+
+
 @dataclass(frozen=True)
 class Unit:
     """The SI unit in which a field is stored, and its display unit.
@@ -92,9 +97,26 @@ class Unit:
             lambda value, info: read(value, info, self), handler(source)
         )
 
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: Any) -> dict[str, Any]:
+        """Return the JSON schema of the field in a file: text with a unit, or value and source."""
+        handler(core)
+        is_list = core.get("schema", {}).get("type") == "tuple"
+        example = self.example(is_list=is_list)
+        text = {"type": ["string", "number"] if not self.si else "string", "examples": [example]}
+        value = {
+            "type": "object",
+            "properties": {"value": text, "source": {"type": "string"}},
+            "additionalProperties": False,
+        }
+        return {"anyOf": [text, value]}
+
+    def example(self, *, is_list: bool = False) -> str:
+        """Return an example of a value in a file, such as ``1 N/mm``."""
+        return f"(1, 2, 3) {self.shown}" if is_list else f"1 {self.shown}".strip()
+
     def from_si(self, value: float) -> float:
         """Return an SI value in the display unit."""
-        return float(registry().Quantity(value, self.si).to(self.shown).magnitude)
+        return _in_unit(value, self.si, self.shown)
 
     def text(self, value: Any) -> str:
         """Return an SI value, or a tuple of them, as text such as ``3.2 N/mm``.
@@ -213,7 +235,7 @@ def to_si(value: Any, info: ValidationInfo, unit: Unit) -> float:
     """
     if isinstance(unit, PureNumber):
         return _pure_number(value)
-    example = f"1 {unit.shown}"
+    example = unit.example()
     if isinstance(value, str):
         match = _SCALAR.fullmatch(value)
         if match is None or (match[2] or "").startswith(","):
@@ -234,7 +256,7 @@ def to_si_vector(value: Any, info: ValidationInfo, unit: Unit) -> tuple[float, .
     Raises:
         ValueError: the value is not a list of finite numbers with a fitting unit.
     """
-    example = f"(1, 2, 3) {unit.shown}"
+    example = unit.example(is_list=True)
     if isinstance(value, str):
         match = _VECTOR.fullmatch(value)
         parts = [] if match is None else [part.strip() for part in match[1].split(",")]

@@ -227,15 +227,20 @@ def axis_motion(record: Record, y: float) -> FloatArray:
     return point_positions(pose, np.array([[0.0, y, 0.0]]))[:, 0]
 
 
-def largest_motion(record: Record) -> tuple[FloatArray, FloatArray]:
+def largest_motion(record: Record, largest: int | None = None) -> tuple[FloatArray, FloatArray]:
     """Return the motion around the largest amplitude of a record, sampled for a replay.
+
+    Args:
+        record: The record.
+        largest: `moment_of_largest_amplitude` if it is known already.
 
     Returns:
         Times (n,) and positions of the plant (n, >= 7): roll, pitch, yaw, x, y, z of the tub and
         the drum angle; then, for each damper tube that is a body, roll, pitch, yaw, x, y, z of the
         outer tube and the extension of the damper. [s; rad, m]
     """
-    middle = float(record.time[moment_of_largest_amplitude(record)])
+    largest = moment_of_largest_amplitude(record) if largest is None else largest
+    middle = float(record.time[largest])
     stretch = record.sel(time=slice(middle - REPLAY_SPAN / 2, middle + REPLAY_SPAN / 2))
     period = (
         float(record.time[1] - record.time[0]) if record.sizes["time"] > 1 else 1.0 / REPLAY_RATE

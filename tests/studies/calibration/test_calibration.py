@@ -14,6 +14,7 @@ from wm_drake.parameters import SpinProfile, load_machine
 from wm_drake.parameters.free import Measured, load_free
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
 from wm_drake.studies.calibration.computed import Evaluation
+from wm_drake.studies.calibration.fewer import fewer_table, fit_with_fewer
 from wm_drake.studies.calibration.outcome import amplitude_rows, quantity_table, solved_machine
 from wm_drake.studies.calibration.parameter_map import parameter_map_of
 from wm_drake.studies.calibration.prediction import check_held_out, predict
@@ -351,6 +352,21 @@ def test_held_out_loads_are_predicted_from_the_others(recovered):
     assert prediction.predicted.shape == (1, 6)
     assert np.abs(prediction.predicted).max() < 0.05
     assert not np.array_equal(prediction.predicted, prediction.calibrated)
+
+
+def test_fewer_quantities_cost_more_and_the_least_determined_goes_first(recovered, short, tmp_path):
+    _, free, targets, plan, calibration, _, _ = recovered
+    identity = identity_of(short, free, targets, plan)
+    with open_ledger(tmp_path / "ledger.sqlite", identity) as ledger:
+        fits = fit_with_fewer(short, calibration, [2, 1], ledger)
+    assert [fit.count for fit in fits] == [3, 2, 1]
+    assert fits[0].cost == pytest.approx(calibration.solutions[0].cost, rel=1e-9)
+    assert fits[1].fixed == ("motor",)  # its mass hardly changes an amplitude
+    assert fits[0].cost <= fits[1].cost < 0.5 * fits[2].cost
+    assert fits[2].amplitudes[0] > 2.0 * fits[1].amplitudes[0]
+    table = fewer_table(fits)
+    assert list(table.free_quantities) == [3, 2, 1]
+    assert table.set_to_expected[0] == ""
 
 
 def test_finished_calibration_is_read_back_without_a_run(recovered, short, monkeypatch):

@@ -37,7 +37,7 @@ def test_description_follows_its_schema(described):
 
 
 def test_schema_is_printed(wm_drake):
-    assert json.loads(wm_drake("machine", "schema").out) == json.loads(
+    assert json.loads(wm_drake("machine", "schema", "description").out) == json.loads(
         json.dumps(description_schema())
     )
 

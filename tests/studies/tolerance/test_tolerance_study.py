@@ -176,8 +176,8 @@ def study(machine):
     quantities = {"k": normal(SPRING), "f": normal(key, "40 N", "4 N")}
     k = machine.spring_types["suspension"].stiffness
 
-    def run(cases, _):
-        gaps = np.array([gap_of(case, k) for case in cases])
+    def run(cases, shift):
+        gaps = np.array([gap_of(case, k) for case in cases]) + shift
         touching = np.where(gaps <= 0.0, gaps, np.nan)
         table = {
             "smallest_gap": ("run", gaps),
@@ -187,10 +187,12 @@ def study(machine):
         }
         return xr.Dataset(table, {"pair": ["tub_shell|wall_left", "motor|wall_bottom"]})
 
-    def do(settings, correlations=None, limits=()):
+    def do(settings, correlations=None, limits=(), shift=0.0):
         tree = {"load": "middle", "quantities": quantities, "correlations": correlations}
         found = uncertain(machine, tree)
-        return run_tolerances(found, (GAP,), run, settings, limits_of(limits, (GAP,)))
+        return run_tolerances(
+            found, (GAP,), lambda cases, _: run(cases, shift), settings, limits_of(limits, (GAP,))
+        )
 
     return do
 
@@ -207,7 +209,7 @@ def test_study_finds_the_probability_of_contact(study):
     # linear in independent normals: first and total indices are shares of the variance
     for index, share in zip(result.indices["smallest_gap_mm"], (100 / 104, 4 / 104), strict=True):
         assert (index.first, index.total) == pytest.approx((share, share), abs=0.02)
-    assert "k (total index" in " ".join(summary(result))
+    assert "To tighten: k (96 %), f (4 %)." in " ".join(summary(result))
 
 
 def test_rare_contact_is_found_by_subset_simulation(study):
@@ -215,6 +217,19 @@ def test_rare_contact_is_found_by_subset_simulation(study):
     assert result.contact.method == "subset simulation"
     assert result.contact.lower < EXACT < result.contact.upper
     assert result.contact.rare.evaluations < 5000
+    assert result.contact.rare_pairs == {"motor|wall_bottom": 1.0}
+    assert "100 % of the runs that touch do so at motor and wall bottom" in " ".join(
+        summary(result)
+    )
+
+
+def test_words_claim_no_more_than_the_samples_support(study):
+    result = study(Settings(16, 0, 100), shift=1.0)
+    assert (result.contact.method, result.contact.estimate) == ("crude count", 0.0)
+    assert result.contact.upper == pytest.approx(1.0 - 0.05 ** (1 / 16))
+    words = " ".join(summary(result))
+    assert "None of 16 runs touches, so with 95 % confidence at most 171\u202f000 in a" in words
+    assert "in 7 levels and 640 runs, and ended without contact; it gives no probability" in words
 
 
 def test_doubling_keeps_the_old_samples(study):

@@ -4,17 +4,19 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from wm_drake.cli.result_folder import LEDGER, Run, check_is_folder, prepare_folder
+from wm_drake.errors import InputError, Problem
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from wm_drake.batch.ledger import Ledger
     from wm_drake.model.machine import Machine
+    from wm_drake.parameters import MachineParameters
     from wm_drake.simulation.cases import Case
 
 RUNS_KEPT = (
@@ -43,6 +45,48 @@ ClusterOption = Annotated[
         metavar="ADDRESS",
     ),
 ]
+
+SeedOption = Annotated[int, typer.Option(help="Seed of all random numbers.", min=0, metavar="N")]
+
+
+@contextmanager
+def problems_of_file(path: Path) -> Iterator[None]:
+    """Add the path of a tolerance or design file to the problems that the block raises."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(
+            Problem(": ".join(filter(None, [str(path), p.where])), p.key, p.message)
+            for p in error.problems
+        ) from None
+
+
+def study_identity(
+    study: str, machine: "MachineParameters", measures: tuple[str, ...], seed: int, **parts: Any
+) -> dict[str, str]:
+    """Return the properties that distinguish a study from others, for its ledger.
+
+    The number of runs is not among them: a larger study continues a smaller one.
+
+    Args:
+        study: Kind of study.
+        machine: The machine.
+        measures: Measures of `simulate_many`.
+        seed: Of all random numbers.
+        parts: What else determines the runs, by name.
+    """
+    from wm_drake.batch import sources_version
+    from wm_drake.batch.ledger import key_of
+
+    numbers = machine.model_dump_json(exclude={"name", "about", "sources", "measured"})
+    return {
+        "study": study,
+        "machine": f"{machine.name} {key_of(numbers=numbers)[:8]}",
+        **{name: key_of(part=part)[:8] for name, part in parts.items()},
+        "measures": ", ".join(measures),
+        "seed": str(seed),
+        "sources": sources_version(),
+    }
 
 
 @contextmanager

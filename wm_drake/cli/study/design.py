@@ -25,12 +25,14 @@ from wm_drake.cli.study.common import (
     ClusterOption,
     ProfileOption,
     ResumeOption,
+    SeedOption,
     WorkersOption,
     batch_runner,
+    problems_of_file,
+    study_identity,
     study_ledger,
 )
 from wm_drake.cli.terminal import Console, say
-from wm_drake.errors import InputError, Problem
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
@@ -58,7 +60,7 @@ def design(
         int, typer.Option(help="Designs of a generation.", min=4, metavar="N")
     ] = 64,
     profile: ProfileOption = None,
-    seed: Annotated[int, typer.Option(help="Seed of all random numbers.", min=0)] = 0,
+    seed: SeedOption = 0,
     workers: WorkersOption = None,
     cluster: ClusterOption = None,
     resume: ResumeOption = False,
@@ -78,7 +80,7 @@ def design(
     check_buildable(machine, parameters)
     built, designs = _designs(file, parameters, task, profile, seed)
     measures = _measures(designs)
-    identity = _identity(designs, task, measures, seed)
+    identity = study_identity("design", designs.parameters, measures, seed, design=task)
     writer = Run("study design", overwrite, identity)
     with study_ledger(out, writer, identity, resume) as ledger:
         with (
@@ -139,7 +141,7 @@ def _designs(
     keys += [goal.quantity for goal in task.constraints]
     if tolerances:
         keys += [key for quantity in tolerances.quantities.values() for key in quantity.keys]
-    try:
+    with problems_of_file(design_path(file)):
         own = [key for key in keys if key.startswith(("frames.", "bodies."))]
         full = with_sdf_values(build_machine(parameters).plant, parameters, own)
         if tolerances is None:
@@ -156,12 +158,6 @@ def _designs(
         scores, _ = base_samples(uncertain.joint.size, task.robust.samples, seed)  # type: ignore[attr-defined]
         designs = machine_designs(full, task, [case], scattered, scores)  # type: ignore[arg-type]
         return build_machine(uncertain.parameters), designs  # type: ignore[attr-defined]
-    except InputError as error:
-        path = str(design_path(file))
-        raise InputError(
-            Problem(": ".join(filter(None, [path, p.where])), p.key, p.message)
-            for p in error.problems
-        ) from None
 
 
 def _measures(designs: "MachineDesigns") -> tuple[str, ...]:
@@ -169,28 +165,6 @@ def _measures(designs: "MachineDesigns") -> tuple[str, ...]:
 
     needed = {response.measure for response in designs.responses} or {"extremes"}
     return tuple(name for name in MEASURES if name in needed)
-
-
-def _identity(
-    designs: "MachineDesigns", task: "DesignTask", measures: tuple[str, ...], seed: int
-) -> dict[str, str]:
-    """Return the properties that distinguish this study from others, for its ledger.
-
-    The number of evaluations is not among them: a longer search continues a shorter one.
-    """
-    from wm_drake.batch import sources_version
-    from wm_drake.batch.ledger import key_of
-
-    machine = designs.parameters
-    numbers = machine.model_dump_json(exclude={"name", "about", "sources", "measured"})
-    return {
-        "study": "design",
-        "machine": f"{machine.name} {key_of(numbers=numbers)[:8]}",
-        "design": key_of(task=task)[:8],
-        "measures": ", ".join(measures),
-        "seed": str(seed),
-        "sources": sources_version(),
-    }
 
 
 def _write(front: "ParetoFront", task: "DesignTask", folder: Path, wall_s: float) -> None:

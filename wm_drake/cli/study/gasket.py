@@ -26,6 +26,7 @@ from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.study.common import (
     RUNS_KEPT,
+    ClusterOption,
     ProfileOption,
     ResumeOption,
     WorkersOption,
@@ -131,13 +132,7 @@ def gasket(
     ] = None,
     profile: ProfileOption = None,
     workers: WorkersOption = None,
-    cluster: Annotated[
-        str | None,
-        typer.Option(
-            help="Run on a dask.distributed cluster with the scheduler at this address.",
-            metavar="ADDRESS",
-        ),
-    ] = None,
+    cluster: ClusterOption = None,
     resume: ResumeOption = False,
     out: OutOption = DEFAULT_OUT,
     overwrite: OverwriteOption = False,

@@ -26,12 +26,15 @@ from wm_drake.cli.study.common import (
     ClusterOption,
     ProfileOption,
     ResumeOption,
+    SeedOption,
     WorkersOption,
     batch_runner,
+    problems_of_file,
+    study_identity,
     study_ledger,
 )
 from wm_drake.cli.terminal import Console, say
-from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.errors import InputError, input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
@@ -41,7 +44,7 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.parameters.tolerances import Tolerances
     from wm_drake.simulation.cases import Case
     from wm_drake.studies.gasket.responses import Response
-    from wm_drake.studies.tolerance.study import Settings, ToleranceResult
+    from wm_drake.studies.tolerance.study import ToleranceResult
     from wm_drake.studies.tolerance.variables import UncertainMachine
 
 DEFAULT_OUT = Path("wm-drake-tolerance")
@@ -94,7 +97,7 @@ def tolerance(
         ),
     ] = None,
     profile: ProfileOption = None,
-    seed: Annotated[int, typer.Option(help="Seed of all random numbers.", min=0)] = 0,
+    seed: SeedOption = 0,
     workers: WorkersOption = None,
     cluster: ClusterOption = None,
     resume: ResumeOption = False,
@@ -118,7 +121,14 @@ def tolerance(
         known = limits_of(wanted, chosen)
     except InputError as error:
         raise InputError(replace(p, where=str(limits)) for p in error.problems) from None
-    identity = _identity(uncertain, tolerances, measures, settings)
+    identity = study_identity(
+        "tolerance",
+        uncertain.parameters,
+        measures,
+        seed,
+        tolerances=tolerances,
+        profile=uncertain.case.profile,
+    )
     writer = Run("study tolerance", overwrite, identity)
     with study_ledger(out, writer, identity, resume) as ledger:
         with batch_runner(built, ledger, measures, workers, cluster) as batch:
@@ -173,18 +183,12 @@ def _uncertain(
         )
     load = parameters.loads[name] if tolerances.load else next(iter(parameters.loads.values()))
     keys = [key for quantity in tolerances.quantities.values() for key in quantity.keys]
-    try:
+    with problems_of_file(tolerances_path(file)):
         full = with_sdf_values(build_machine(parameters).plant, parameters, keys)
         uncertain = uncertain_machine(full, tolerances, Case(name, load, spin))
         built = build_machine(uncertain.parameters)
         step = checked_step(uncertain.parameters, None)
         uncertain.check(lambda case: check_step(built.set_up(parameters=case.parameters), step))
-    except InputError as error:
-        path = str(tolerances_path(file))
-        raise InputError(
-            Problem(": ".join(filter(None, [path, p.where])), p.key, p.message)
-            for p in error.problems
-        ) from None
     return built, uncertain
 
 
@@ -207,32 +211,6 @@ def _measures(
     measures = set(measures_of(parameters, chosen))
     measures |= {CONTACTS} if "gap" in measures else set()
     return chosen, tuple(name for name in MEASURES if name in measures)
-
-
-def _identity(
-    uncertain: "UncertainMachine",
-    tolerances: "Tolerances",
-    measures: tuple[str, ...],
-    settings: "Settings",
-) -> dict[str, str]:
-    """Return the properties that distinguish this study from others, for its ledger.
-
-    The numbers of samples are not among them: a larger study continues a smaller one.
-    """
-    from wm_drake.batch import sources_version
-    from wm_drake.batch.ledger import key_of
-
-    machine = uncertain.parameters
-    numbers = machine.model_dump_json(exclude={"name", "about", "sources", "measured"})
-    return {
-        "study": "tolerance",
-        "machine": f"{machine.name} {key_of(numbers=numbers)[:8]}",
-        "tolerances": key_of(tolerances=tolerances)[:8],
-        "profile": key_of(profile=uncertain.case.profile)[:8],
-        "measures": ", ".join(measures),
-        "seed": str(settings.seed),
-        "sources": sources_version(),
-    }
 
 
 def _write(
@@ -266,13 +244,17 @@ def _print_result(result: "ToleranceResult", out: Path, as_json: bool, wall_s: f
 def _print_tables(result: "ToleranceResult") -> None:
     from rich.table import Table
 
+    from wm_drake.report.tolerance.words import measure_titles
     from wm_drake.studies.tolerance.tables import measures_table
 
+    titles = measure_titles(result)
     table = Table(title=f"Measures of {result.settings.samples} samples")
-    for name in ("measure", "5 %", "median", "95 %"):
-        table.add_column(name, justify="left" if name == "measure" else "right")
+    for name in ("measure", "unit", "5 %", "median", "95 %"):
+        table.add_column(name, justify="left" if name in ("measure", "unit") else "right")
     for row in measures_table(result).to_dict("records"):
-        table.add_row(str(row["measure"]), *(f"{row[p]:.4g}" for p in ("p5", "p50", "p95")))
+        table.add_row(
+            *titles[str(row["measure"])], *(f"{row[p]:.4g}" for p in ("p5", "p50", "p95"))
+        )
     Console().print(table)
     if result.verdicts:
         limits = Table(title="Limits")

@@ -14,6 +14,7 @@ from wm_drake.report.spin.cases import case_title
 from wm_drake.report.spin.figures import envelopes_figure
 from wm_drake.report.tables import Group, Row, Table, line
 from wm_drake.studies.calibration.calibration import Calibration
+from wm_drake.studies.calibration.fewer import Simpler
 from wm_drake.studies.calibration.outcome import mean_and_largest, quantity_table
 from wm_drake.studies.calibration.prediction import Prediction
 from wm_drake.studies.calibration.response_targets import TRIALS
@@ -27,6 +28,7 @@ def calibration_report(
     best: SpinResult,
     modes: Sequence[tuple[str, Modes]],
     command: str = "",
+    fewer: Sequence[Simpler] = (),
 ) -> str:
     """Return the report as text of one self-contained HTML file.
 
@@ -36,6 +38,7 @@ def calibration_report(
         best: Spin runs of the machine of the best solution, for the measured cases.
         modes: Titles and natural modes of that machine, for each state that is shown.
         command: Command line of the calibration, shown on the page.
+        fewer: Fits with fewer free quantities; may be empty.
     """
     best = replace(best, comparison=Comparison.ALL)  # the targets were named
     table = tables.amplitude_table(best)
@@ -57,6 +60,7 @@ def calibration_report(
         quantities_picture=_quantities_picture(calibration),
         quantities=quantities_of(calibration),
         searches=searches_table(calibration),
+        fewer=simpler_table(fewer) if fewer else None,
         modes_picture=_modes_picture(modes),
         critical_speeds=tables.critical_speeds(best),
         smallest_gaps=tables.smallest_gaps(best),
@@ -302,6 +306,32 @@ def quantities_of(calibration: Calibration) -> Table:
         tuple(groups),
         text_columns=3,
     )
+
+
+def simpler_table(fits: Sequence[Simpler]) -> Table:
+    """Return what the fit loses with fewer free quantities."""
+    groups = []
+    for fit in fits:
+        percents = (100 * x for x in (*fit.amplitudes, *fit.responses))
+        cells = [number(fit.cost), number(fit.data_cost)]
+        cells += [MISSING if np.isnan(x) else number(x) for x in percents]
+        names = ", ".join(name.replace("_", " ") for name in fit.fixed) or MISSING
+        groups.append(line(str(fit.count), [*cells, names]))
+    header = (
+        "free quantities",
+        "cost",
+        "cost of the data",
+        "amplitudes: mean error, %",
+        "largest, %",
+        "other responses: mean error, %",
+        "largest, %",
+        "set to expected values here",
+    )
+    caption = (
+        "Best fit with fewer free quantities. Each row frees those of the row above but for the "
+        "named ones, whose loss raises the cost least in the linearised fit."
+    )
+    return Table(caption, header, tuple(groups))
 
 
 def searches_table(calibration: Calibration) -> Table:

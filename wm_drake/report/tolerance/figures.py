@@ -7,14 +7,18 @@ from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH, st
 from wm_drake.studies.tolerance.sensitivity import Index
 from wm_drake.studies.tolerance.shares import band_of
 from wm_drake.studies.tolerance.study import ToleranceResult
-from wm_drake.studies.tolerance.variables import Variable
 
 MOST_POINTS = 400
 """Largest number of points of a curve."""
 
 
-def distributions_figure(result: ToleranceResult, names: list[str]) -> Figure:
-    """Draw the distribution function of each measure with its 95 % band and its limits."""
+def distributions_figure(result: ToleranceResult, names: dict[str, str]) -> Figure:
+    """Draw the distribution function of each measure with its 95 % band and its limits.
+
+    Args:
+        result: Result of the study.
+        names: Titles of the measures by their keys.
+    """
     rows = -(-len(names) // 3)
     figure = Figure(figsize=(WIDTH, 2.3 * rows + 0.3), layout="constrained")
     panels = figure.subplots(rows, 3, squeeze=False, sharey=True)
@@ -31,8 +35,7 @@ def distributions_figure(result: ToleranceResult, names: list[str]) -> Figure:
             axes.axvline(verdict.number, color=MEASURED, linewidth=1.3, linestyle="--")
         if name.startswith("smallest_gap") and values[0] < 0.0:
             axes.axvline(0.0, color=MARK, linewidth=1.0)
-        quantity, _, unit = name.rpartition("_")
-        axes.set_title(f"{quantity}, {unit}", fontsize=9.5, loc="left", parse_math=False)
+        axes.set_title(names[name], fontsize=9.5, loc="left", parse_math=False)
         axes.grid(color=GRID)
         style_axes(axes)
     for axes in panels[:, 0]:
@@ -42,7 +45,7 @@ def distributions_figure(result: ToleranceResult, names: list[str]) -> Figure:
     return figure
 
 
-def sobol_figure(found: list[tuple[Variable, Index]]) -> Figure:
+def sobol_figure(found: list[tuple[str, Index]]) -> Figure:
     """Draw first-order and total index of each quantity with their intervals."""
     figure = Figure(figsize=(WIDTH, 0.42 * len(found) + 1.1), layout="constrained")
     axes = figure.add_subplot()
@@ -56,7 +59,7 @@ def sobol_figure(found: list[tuple[Variable, Index]]) -> Figure:
         high = np.array([getattr(index, f"{kind}_upper") for _, index in found])
         axes.barh(at + shift, np.maximum(value, 0.0), height=0.34, color=colour, label=label)
         axes.hlines(at + shift, low, high, color=MARK, linewidth=1.1)
-    axes.set_yticks(at, [variable.name for variable, _ in found])
+    axes.set_yticks(at, [name for name, _ in found])
     axes.set_xlim(-0.1, 1.1)
     axes.axvline(0.0, color=QUIET, linewidth=0.6)
     axes.set_xlabel("share of the variance", fontsize=9.5)

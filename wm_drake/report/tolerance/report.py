@@ -1,12 +1,19 @@
 """Report of the tolerance study: contact, limits, distributions, Sobol indices, quantities."""
 
 from wm_drake.batch import sources_version
-from wm_drake.parameters.tolerances import LAUNDRY
 from wm_drake.report.formatting import MISSING, number, shape_name
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.tables import Group, Row, Table, line
 from wm_drake.report.tolerance.figures import distributions_figure, sobol_figure
-from wm_drake.report.tolerance.words import in_a_million, leading, summary, warnings
+from wm_drake.report.tolerance.words import (
+    in_a_million,
+    leading,
+    measure_titles,
+    pair_words,
+    quantity_words,
+    summary,
+    warnings,
+)
 from wm_drake.studies.tolerance.study import Contact, ToleranceResult
 from wm_drake.studies.tolerance.tables import measures_table
 
@@ -26,7 +33,7 @@ def tolerance_report(
         wall_s: Duration of the study. [s]
     """
     machine, settings = result.machine.parameters, result.settings
-    name, found = leading(result)
+    _, found = leading(result)
     facts = [
         ("Machine", machine.name),
         ("Samples", f"{settings.samples}, scrambled Sobol sequence, seed {settings.seed}"),
@@ -46,7 +53,6 @@ def tolerance_report(
         limits=_limits(result) if result.verdicts else None,
         distributions=_distributions(result),
         measures=_measures(result),
-        measure=name,
         sobol_picture=_sobol_picture(result) if found else None,
         sobol=_sobol(result) if found else None,
         refused=result.refused,
@@ -82,11 +88,20 @@ def _rare(contact: Contact) -> str:
     rare = contact.rare
     assert rare is not None
     steps = ", ".join(f"{1000.0 * value:.1f}" for value in rare.thresholds)
-    spread = f"{100 * rare.deviation:.0f} %" if rare.failures.size else "unknown"
-    return (
+    text = (
         f"Of {contact.crude.samples} samples {contact.crude.count} touch, too few to count. Subset "
-        f"simulation took {rare.evaluations} runs in {len(rare.thresholds) + 1} levels (gaps at "
-        f"most {steps} mm, then 0); coefficient of variation {spread}."
+        f"simulation took {rare.evaluations} runs in {len(rare.thresholds) + 1} levels. Each level "
+        f"holds the tenth of the runs with the smallest gaps of the level before: at most {steps} "
+        "mm"
+    )
+    if not rare.probability:
+        return f"{text}. The smallest gap of the last level is {1000.0 * rare.smallest:.1f} mm."
+    places = ", ".join(
+        f"{pair_words(name)} {100.0 * share:.0f} %" for name, share in contact.rare_pairs.items()
+    )
+    return (
+        f"{text}, then contact. Coefficient of variation: {100 * rare.deviation:.0f} %. Contacts "
+        f"of the last level: {places}."
     )
 
 
@@ -99,7 +114,8 @@ def _limits(result: ToleranceResult) -> Table:
             f"{100.0 * x:.3g}" for x in (v.broken.estimate, v.broken.lower, v.broken.upper)
         )
         cells = (f"{side} {v.limit.text}", f"{100.0 * v.allowed:g}", share, f"{lower} to {upper}")
-        groups.append(Group(v.limit.quantity, (Row((*cells, v.word), kinds[v.word]),)))
+        title, _ = measure_titles(result)[v.key]
+        groups.append(Group(title, (Row((*cells, v.word), kinds[v.word]),)))
     caption = (
         "Limits: share of the runs that break each one. The verdict is pass if the whole 95 % "
         "interval is allowed, fail if none of it is, else undecided: more samples decide it."
@@ -110,50 +126,58 @@ def _limits(result: ToleranceResult) -> Table:
 
 def _distributions(result: ToleranceResult) -> list[Picture]:
     names = [str(name) for name in result.values]
+    titles = {name: ", ".join(text) for name, text in measure_titles(result).items()}
     caption = (
         "Distribution functions of the measures: share of the runs below a value. Shaded: 95 % "
         "band for the whole curve (Dvoretzky, Kiefer, Wolfowitz). Dashed: limits."
     )
+    shown = [
+        {name: titles[name] for name in names[i : i + MOST_PANELS]}
+        for i in range(0, len(names), MOST_PANELS)
+    ]
     return [
         picture(
-            distributions_figure(result, names[i : i + MOST_PANELS]),
-            f"Distribution functions of {', '.join(names[i : i + MOST_PANELS])}.",
+            distributions_figure(result, panels),
+            f"Distribution functions of {'; '.join(panels.values())}.",
             caption,
         )
-        for i in range(0, len(names), MOST_PANELS)
+        for panels in shown
     ]
 
 
 def _measures(result: ToleranceResult) -> Table:
-    groups = []
+    groups, titles = [], measure_titles(result)
     for row in measures_table(result).to_dict("records"):
-        cells = [f"{row['mean']:.4g}", f"{row['deviation']:.3g}"]
+        title, unit = titles[str(row["measure"])]
+        cells = [unit, f"{row['mean']:.4g}", f"{row['deviation']:.3g}"]
         cells += [
             f"{row[p]:.4g} ({row[f'{p}_lower']:.4g} to {row[f'{p}_upper']:.4g})"
             for p in ("p5", "p50", "p95")
         ]
-        groups.append(line(str(row["measure"]), [c.replace("-", "−") for c in cells]))
+        groups.append(line(title, [c.replace("-", "−") for c in cells]))
     caption = "Measures over all samples; percentiles with 95 % intervals of order statistics."
-    header = ("measure", "mean", "deviation", "5 %", "median", "95 %")
-    return Table(caption, header, tuple(groups))
+    header = ("measure", "unit", "mean", "deviation", "5 %", "median", "95 %")
+    return Table(caption, header, tuple(groups), text_columns=2)
 
 
 def _sobol_picture(result: ToleranceResult) -> Picture:
-    name, found = leading(result)
+    key, found = leading(result)
+    title, _ = measure_titles(result)[key]
     caption = (
-        f"Sobol indices of {name}. Bars: estimates, lines: 95 % bootstrap intervals. A total index "
-        "above the first-order index is an effect together with other quantities."
+        f"Sobol indices of the {title}. Bars: estimates, lines: 95 % bootstrap intervals. A total "
+        "index above the first-order index is an effect together with other quantities."
     )
-    listed = ", ".join(f"{v.name} {i.total:.2f}" for v, i in found)
-    return picture(sobol_figure(found), f"Total indices: {listed}.", caption)
+    named = [(quantity_words(v.name), i) for v, i in found]
+    listed = ", ".join(f"{name} {i.total:.2f}" for name, i in named)
+    return picture(sobol_figure(named), f"Total indices: {listed}.", caption)
 
 
 def _sobol(result: ToleranceResult) -> Table:
-    groups = []
+    groups, titles = [], measure_titles(result)
     for name, indices in result.indices.items():
-        groups.append(line(name, [number(index.total, 2) for index in indices]))
-    names = (variable.name.removeprefix(f"{LAUNDRY}.") for variable in result.machine.variables)
-    header = ("measure", *(shape_name(name) for name in names))
+        groups.append(line(titles[name][0], [number(index.total, 2) for index in indices]))
+    names = (quantity_words(variable.name) for variable in result.machine.variables)
+    header = ("measure", *names)
     caption = (
         "Total Sobol indices of all measures. First-order indices and 95 % intervals are in "
         "sobol.csv."
@@ -163,7 +187,7 @@ def _sobol(result: ToleranceResult) -> Table:
 
 def _quantities(result: ToleranceResult) -> Table:
     groups = [
-        line(v.name, (", ".join(v.keys) or "load", v.text, v.source or MISSING))
+        line(quantity_words(v.name), (", ".join(v.keys) or "load", v.text, v.source or MISSING))
         for v in result.machine.variables
     ]
     caption = "What scatters. Percents are of the machine's number."

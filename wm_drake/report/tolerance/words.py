@@ -1,10 +1,12 @@
 """Findings of a tolerance study in words."""
 
-from wm_drake.report.formatting import shape_name
+from wm_drake.parameters.tolerances import LAUNDRY
+from wm_drake.report.formatting import number, shape_name
 from wm_drake.studies.gasket.responses import GAP
 from wm_drake.studies.tolerance.sensitivity import Index
 from wm_drake.studies.tolerance.study import (
     CRUDE,
+    SUBSET,
     Contact,
     ToleranceResult,
     Verdict,
@@ -21,6 +23,16 @@ LEAST_TOTAL = 0.01
 WIDE_INTERVAL = 0.2
 """Half width of the interval of a total index above which it is called uncertain."""
 
+_LAUNDRY_WORDS = {
+    "mass": "mass of the laundry",
+    "angle": "angle of the laundry",
+    "y": "axial place of the laundry",
+    "radius": "radius of the laundry",
+    "second_share": "share of the second lump",
+    "second_angle": "angle of the second lump",
+    "second_y": "axial place of the second lump",
+}
+
 
 def summary(result: ToleranceResult) -> list[str]:
     """Return the findings, one sentence each."""
@@ -34,42 +46,78 @@ def summary(result: ToleranceResult) -> list[str]:
 def contact_sentences(contact: Contact) -> list[str]:
     """Return sentences about how often the tub touches, and where."""
     if contact.estimate == 0.0:
-        first = (
-            f"No run touches; the upper end of the 95 % interval is {in_a_million(contact.upper)} "
-            f"in a million ({contact.method})."
-        )
+        found = [
+            f"None of {contact.crude.samples} runs touches, so with 95 % confidence at most "
+            f"{in_a_million(contact.upper)} in a million do (rule of three).",
+            *_unreached(contact),
+        ]
     else:
         ends = f"{in_a_million(contact.lower)} to {in_a_million(contact.upper)}"
-        first = (
-            f"{in_a_million(contact.estimate)} in a million runs touch (95 % interval {ends}; "
-            f"{contact.method})."
+        how = (
+            f"{contact.crude.count} of {contact.crude.samples} runs"
+            if contact.method == CRUDE
+            else contact.method
         )
+        found = [
+            f"{in_a_million(contact.estimate)} in a million runs touch (95 % interval {ends}; "
+            f"{how})."
+        ]
+    return found + _where(contact)
+
+
+def _unreached(contact: Contact) -> list[str]:
+    """Return what a subset simulation that ended without contact reached."""
+    rare = contact.rare
+    if rare is None:
+        return []
+    return [
+        f"Subset simulation followed the smallest gap down to {1e3 * rare.smallest:.1f} mm in "
+        f"{len(rare.thresholds) + 1} levels and {rare.evaluations} runs, and ended without "
+        "contact; it gives no probability."
+    ]
+
+
+def _where(contact: Contact) -> list[str]:
+    if contact.method == SUBSET and contact.rare_pairs:
+        name, share = next(iter(contact.rare_pairs.items()))
+        return [f"{100.0 * share:.0f} % of the runs that touch do so at {pair_words(name)}."]
     if contact.pairs:
-        name, share = next(iter(contact.pairs.items()))
-        percent = 100.0 * share.count / max(1, contact.crude.count)
-        where = f"{percent:.0f} % of the runs that touch do so at {pair_words(name)}."
-    elif contact.nearest:
+        name, counted = next(iter(contact.pairs.items()))
+        percent = 100.0 * counted.count / max(1, contact.crude.count)
+        return [f"{percent:.0f} % of the runs that touch do so at {pair_words(name)}."]
+    if contact.nearest:
         name = next(iter(contact.nearest))
         percent = 100.0 * contact.nearest[name] / contact.crude.samples
-        where = f"The smallest gap is at {pair_words(name)} in {percent:.0f} % of the runs."
-    else:
-        return [first]
-    return [first, where]
+        return [f"The smallest gap is at {pair_words(name)} in {percent:.0f} % of the runs."]
+    return []
 
 
 def in_a_million(share: float) -> str:
     """Return a share as number in a million, with two or three digits and thin spaces."""
-    number = 1e6 * share
-    if number < 1.0:
-        return f"{number:.2g}"
-    digits = len(str(int(number)))
-    rounded = round(number, 3 - digits) if digits > 3 else round(number)
+    parts = 1e6 * share
+    if parts < 1.0:
+        return f"{parts:.2g}"
+    digits = len(str(int(parts)))
+    rounded = round(parts, 3 - digits) if digits > 3 else round(parts)
     return f"{int(rounded):,}".replace(",", "\u202f")
 
 
 def pair_words(pair: str) -> str:
     """Return a pair of shapes in words: tub shell and wall left."""
     return " and ".join(shape_name(name) for name in pair.split("|"))
+
+
+def quantity_words(name: str) -> str:
+    """Return the name of an uncertain quantity in words."""
+    kind, _, field = name.partition(".")
+    if kind == LAUNDRY and field in _LAUNDRY_WORDS:
+        return _LAUNDRY_WORDS[field]
+    return shape_name(name.replace(".", " "))
+
+
+def measure_titles(result: ToleranceResult) -> dict[str, tuple[str, str]]:
+    """Return name in words and unit of each measure, by its key such as smallest_gap_mm."""
+    return {measure_key(r): (r.meaning.title.replace("_", " "), r.unit_text) for r in result.chosen}
 
 
 def _limit_sentences(verdicts: tuple[Verdict, ...]) -> list[str]:
@@ -94,23 +142,27 @@ def leading(result: ToleranceResult) -> tuple[str, list[tuple[Variable, Index]]]
 
 
 def _sensitivity_sentences(result: ToleranceResult) -> list[str]:
-    name, found = leading(result)
+    key, found = leading(result)
     if not found:
         return [result.refused] if result.refused else []
-    parts = [(v.name, i) for v, i in found if not v.is_laundry and i.total >= LEAST_TOTAL][
-        :MOST_NAMED
+    title, _ = measure_titles(result)[key]
+    named = [(v.name, i) for v, i in found if i.total >= LEAST_TOTAL][:MOST_NAMED]
+    sentences = [
+        f"Shares of the variance of the {title}, alone and together with others: {_listed(named)}."
     ]
-    all_named = [(v.name, i) for v, i in found if i.total >= LEAST_TOTAL][:MOST_NAMED]
-    sentences = [f"Most of the scatter of {name} comes from {_listed(all_named)}."]
-    if parts:
-        sentences.append(f"To tighten: {_listed(parts)}.")
-    elif any(not v.is_laundry for v, _ in found):
-        sentences.append("No tolerance of a part matters as much as 1 % of this scatter.")
+    parts = [(v, i) for v, i in found if not v.is_laundry]
+    strong = [(v.name, i) for v, i in parts if i.total >= LEAST_TOTAL][:MOST_NAMED]
+    if strong:
+        sentences.append(f"To tighten: {_listed(strong)}.")
+    elif parts:
+        sentences.append("To tighten: nothing; no part causes as much as 1 % of this variance.")
+    else:
+        sentences.append("To tighten: nothing; only the laundry scatters in this file.")
     return sentences
 
 
 def _listed(named: list[tuple[str, Index]]) -> str:
-    return ", ".join(f"{name} (total index {index.total:.2f})" for name, index in named)
+    return ", ".join(f"{quantity_words(name)} ({number(100 * i.total, 0)} %)" for name, i in named)
 
 
 def warnings(result: ToleranceResult) -> list[str]:

@@ -13,7 +13,7 @@ from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibration.computed import Evaluation, StoredValues
 from wm_drake.studies.calibration.parameter_map import ParameterMap, parameter_map_of
-from wm_drake.studies.calibration.search import METHODS, SearchProblem
+from wm_drake.studies.calibration.search import METHODS, Residuals, SearchProblem
 from wm_drake.studies.calibration.solutions import Solution, distinct
 from wm_drake.studies.calibration.targets import Targets
 
@@ -157,14 +157,14 @@ def calibrate(
     return Calibration(parameter_map, targets, plan, tuple(distinct(ended, targets)), tuple(ended))
 
 
-def _search(
-    number: int,
-    parameter_map: ParameterMap,
-    targets: Targets,
-    plan: Plan,
-    values: StoredValues,
-    report: Callable[[int, int, float], None],
-) -> Solution:
+def residuals_of(
+    parameter_map: ParameterMap, targets: Targets, plan: Plan, values: StoredValues
+) -> Residuals:
+    """Return the residuals as a function of points in units of the prior.
+
+    The first `targets.count` residuals are those of the data; the others belong to what is known
+    beside the priors of the quantities.
+    """
     spread = plan.spread(targets.amplitude)
 
     def residuals(coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -177,6 +177,18 @@ def _search(
         )
         return np.hstack([exact, known]), np.hstack([smooth, known])
 
+    return residuals
+
+
+def _search(
+    number: int,
+    parameter_map: ParameterMap,
+    targets: Targets,
+    plan: Plan,
+    values: StoredValues,
+    report: Callable[[int, int, float], None],
+) -> Solution:
+    residuals = residuals_of(parameter_map, targets, plan, values)
     lower, upper = (
         (bound - parameter_map.expected) / parameter_map.deviation
         for bound in (parameter_map.lower, parameter_map.upper)

@@ -18,6 +18,7 @@ import numpy as np
 from scipy import stats
 
 from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.tolerance.shares import CONFIDENCE, bound_if_none
 
 LEVEL = 0.1
 """Conditional probability of each level."""
@@ -27,8 +28,6 @@ MOST_LEVELS = 7
 
 ACCEPTANCE = 0.44
 """Share of accepted moves to which the step adapts."""
-
-CONFIDENCE = 0.95
 
 NEIGHBOURS = 0.3
 """Correlation of the errors of neighbouring levels, whose samples share their seeds.
@@ -44,11 +43,13 @@ class RareEvent:
 
     Attributes:
         probability: Estimate; 0 if no level reached the failure.
-        lower, upper: Ends of the 95 % interval.
-        deviation: Coefficient of variation of the estimate.
+        lower, upper: Ends of the 95 % interval. If no level reached the failure, upper is the bound
+            of the rule of three for the first level: only its samples are independent.
+        deviation: Coefficient of variation of the estimate; infinite if it is 0.
         thresholds: Values of the limit-state function that separate the levels.
         evaluations: Number of evaluations of the limit-state function.
         failures: Scores of the samples of the last level that fail. (n, d)
+        smallest: Smallest value of the limit-state function in the last level.
     """
 
     probability: float
@@ -58,6 +59,7 @@ class RareEvent:
     thresholds: tuple[float, ...]
     evaluations: int
     failures: FloatArray
+    smallest: float
 
 
 def subset_simulation(
@@ -101,11 +103,11 @@ def subset_simulation(
         values = history.ravel()
     evaluations = samples + len(thresholds) * (samples - chains)
     failed = values <= 0.0
-    share = float(np.mean(failed))
+    share, smallest = float(np.mean(failed)), float(np.min(values))
     found = scores[failed]
     if share == 0.0:
-        upper = probability * float(stats.beta.ppf(CONFIDENCE, 1, samples))
-        return RareEvent(0.0, 0.0, upper, math.inf, tuple(thresholds), evaluations, found)
+        ends = 0.0, bound_if_none(samples)
+        return RareEvent(0.0, *ends, math.inf, tuple(thresholds), evaluations, found, smallest)
     errors.append(_deviation((history <= 0.0).astype(float)))
     variance = sum(error * error for error in errors)
     variance += 2.0 * NEIGHBOURS * sum(map(operator.mul, errors, errors[1:]))
@@ -113,7 +115,7 @@ def subset_simulation(
     # the estimate is a product, so its logarithm is about normal
     width = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE)) * math.sqrt(math.log1p(variance))
     ends = estimate * math.exp(-width), min(1.0, estimate * math.exp(width))
-    return RareEvent(estimate, *ends, deviation, tuple(thresholds), evaluations, found)
+    return RareEvent(estimate, *ends, deviation, tuple(thresholds), evaluations, found, smallest)
 
 
 def _evaluated(limit: Callable[[FloatArray], FloatArray], scores: FloatArray) -> FloatArray:

@@ -44,6 +44,14 @@ def share_of(has_property: NDArray[Any]) -> Share:
     return Share(count, samples, float(ends.low), float(ends.high))
 
 
+def bound_if_none(samples: int) -> float:
+    """Return the largest share that `samples` runs without an event leave possible.
+
+    With 95 % confidence the share is at most 1 - 0.05^(1/n), about 3/n (rule of three).
+    """
+    return float(-np.expm1(np.log(1.0 - CONFIDENCE) / samples))
+
+
 @dataclass(frozen=True)
 class Percentile:
     """Percentile of a measure with the ends of its 95 % interval."""

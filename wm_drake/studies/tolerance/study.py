@@ -17,7 +17,7 @@ from wm_drake.studies.gasket.responses import GAP, Response
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.rare import RareEvent, subset_simulation
 from wm_drake.studies.tolerance.sensitivity import Index, exchanged, sobol_indices
-from wm_drake.studies.tolerance.shares import Share, share_of
+from wm_drake.studies.tolerance.shares import Share, bound_if_none, share_of
 from wm_drake.studies.tolerance.variables import UncertainMachine
 
 Run: TypeAlias = Callable[[Iterable[Case], str], xr.Dataset]
@@ -85,13 +85,15 @@ class Contact:
 
     Attributes:
         estimate: Probability of contact.
-        lower, upper: Ends of its 95 % interval.
-        method: CRUDE or SUBSET.
+        lower, upper: Ends of its 95 % interval. If nothing touches, upper is the bound of the rule
+            of three.
+        method: CRUDE or SUBSET; CRUDE if the subset simulation ended without contact.
         crude: Share of the samples.
         pairs: Share of the samples by pair of shapes, the most frequent first; pairs that never
             touch are left out.
         nearest: Number of samples in which each pair has the smallest gap.
         rare: Subset simulation; None if there was none.
+        rare_pairs: Share of the contacts that it found by pair, the most frequent first.
     """
 
     estimate: float
@@ -102,6 +104,7 @@ class Contact:
     pairs: dict[str, Share]
     nearest: dict[str, int]
     rare: RareEvent | None
+    rare_pairs: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -323,11 +326,6 @@ def _contact(
     touches = (table.smallest_gap.values <= 0.0) | has_failed
     crude = share_of(touches)
     names = [str(name) for name in table.pair.values]
-    shares = {
-        name: share_of(np.isfinite(column))
-        for name, column in zip(names, table.contact_gap.values.T, strict=True)
-    }
-    often = sorted((n for n in names if shares[n].count), key=lambda n: -shares[n].count)
     nearest = pd.Series(table.nearest_pair.values).dropna().astype(int).value_counts()
     rare = None
     if crude.estimate < RARE and settings.subset:
@@ -337,18 +335,44 @@ def _contact(
             samples=settings.subset,
             seed=settings.seed,
         )
-    ends = (rare.probability, rare.lower, rare.upper) if rare else None
-    estimate, lower, upper = ends or (crude.estimate, crude.lower, crude.upper)
+    if rare and rare.probability:
+        ends, method = (rare.probability, rare.lower, rare.upper), SUBSET
+    else:
+        upper = crude.upper if crude.count else bound_if_none(crude.samples)
+        ends, method = (crude.estimate, crude.lower, upper), CRUDE
     return Contact(
-        estimate,
-        lower,
-        upper,
-        SUBSET if rare else CRUDE,
+        *ends,
+        method,
         crude,
-        {name: shares[name] for name in often},
+        touching_pairs(table),
         {names[int(str(i))]: int(count) for i, count in nearest.items()},
         rare,
+        _rare_pairs(machine, run, rare),
     )
+
+
+def touching_pairs(table: xr.Dataset) -> dict[str, Share]:
+    """Return the share of runs in which each pair touches, the most frequent first.
+
+    Pairs that never touch are left out.
+    """
+    shares = {
+        str(name): share_of(np.isfinite(column))
+        for name, column in zip(table.pair.values, table.contact_gap.values.T, strict=True)
+    }
+    often = sorted((n for n in shares if shares[n].count), key=lambda n: -shares[n].count)
+    return {name: shares[name] for name in often}
+
+
+def _rare_pairs(machine: UncertainMachine, run: Run, rare: RareEvent | None) -> dict[str, float]:
+    """Return the share of the contacts of the subset simulation by pair; its runs are repeated.
+
+    A ledger has these runs, so that they cost nothing.
+    """
+    if rare is None or not len(rare.failures):
+        return {}
+    table = run(machine.cases(rare.failures), "places of contact")
+    return {name: share.estimate for name, share in touching_pairs(table).items()}
 
 
 def _measured(table: xr.Dataset) -> set[str]:

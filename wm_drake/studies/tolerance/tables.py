@@ -150,6 +150,8 @@ def as_plain_data(result: ToleranceResult) -> dict[str, Any]:
             "lower": contact.lower,
             "upper": contact.upper,
             "method": contact.method,
+            "runs": contact.crude.samples,
+            "touching": contact.crude.count,
             "pairs": {
                 name: {"estimate": s.estimate, "lower": s.lower, "upper": s.upper}
                 for name, s in contact.pairs.items()

@@ -1,0 +1,89 @@
+"""Command `wm-drake studio`: a page on this computer that runs a machine while a slider moves."""
+
+import secrets
+import socket
+import webbrowser
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wm_drake.cli.common import MachineOption
+from wm_drake.cli.terminal import say
+from wm_drake.errors import input_error, reason_of
+
+DEFAULT_FOLDER = Path("wm-drake-studio")
+
+
+def studio(
+    machine: MachineOption = "reference",
+    folder: Annotated[
+        Path,
+        typer.Option(help="Folder for saved machine files and studies.", metavar="DIR"),
+    ] = DEFAULT_FOLDER,
+    no_browser: Annotated[
+        bool, typer.Option("--no-browser", help="Print the address and open no browser.")
+    ] = False,
+    port: Annotated[
+        int, typer.Option(help="Port of the server. Default: a free one.", min=0, max=65535)
+    ] = 0,
+    link: Annotated[
+        str,
+        typer.Option(
+            help="Permanent link of an earlier page: all after its '#' is opened again.",
+            metavar="URL",
+        ),
+    ] = "",
+) -> None:
+    """Open a page on this computer that runs a machine again at each move of a slider."""
+    missing = [name for name in ("starlette", "uvicorn") if find_spec(name) is None]
+    if missing:
+        raise input_error(
+            f"needs {' and '.join(missing)}: pip install 'wm-drake[studio]'", where="studio"
+        )
+    import uvicorn
+
+    from wm_drake.parameters import machine_path, shipped_machines
+    from wm_drake.studio.server import Studio, application
+
+    given = machine if machine in shipped_machines() else str(machine_path(machine).resolve())
+    _make(folder)
+    served = Studio(given, folder.resolve())
+    served.machines.open(served.machines.first)  # an error of the file is shown here
+    token = secrets.token_urlsafe(24)
+    with _loopback(port) as listening:
+        number = listening.getsockname()[1]
+        fragment = link.partition("#")[2]
+        address = f"http://127.0.0.1:{number}/{token}/" + (f"#{fragment}" if fragment else "")
+        typer.echo(f"wm-drake studio: {address}")
+        say(f"machine files are saved in {folder}; Ctrl-C ends the server")
+        if not no_browser:
+            webbrowser.open(address)
+        config = uvicorn.Config(
+            application(served, token, number),
+            log_level="warning",
+            access_log=False,  # it would have the token
+            ws="none",
+            timeout_graceful_shutdown=3,
+        )
+        uvicorn.Server(config).run(sockets=[listening])
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = f"cannot be written to: {reason_of(error)}"
+        raise input_error(reason, where=str(folder)) from None
+
+
+def _loopback(port: int) -> socket.socket:
+    """Return a socket that listens on this computer only."""
+    listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        listening.bind(("127.0.0.1", port))
+    except OSError as error:
+        listening.close()
+        raise input_error(f"{port}: {reason_of(error)}", where="--port") from None
+    return listening

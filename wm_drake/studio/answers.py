@@ -1,0 +1,334 @@
+"""Run what a page has chosen, and return what it draws, as plain numbers for JSON.
+
+One run has eight lanes: the first has the chosen numbers and its history, the others have one
+number turned by a hundredth of its slider. They cost little, and give the sensitivity arrows.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from wm_drake.batch.runs import Runner, RunResult
+from wm_drake.batch.work_items import BatchKey, WorkItem
+from wm_drake.compiler.lanes import WIDTH
+from wm_drake.errors import InputError
+from wm_drake.model.plausibility import unusual_values
+from wm_drake.model.scene import Gap
+from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
+from wm_drake.report.spin.figures import ORBIT_REVOLUTIONS, axis_path_mm, orbit_window
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.measures import (
+    amplitudes,
+    filtered_displacement,
+    largest_motion,
+    moment_of_largest_amplitude,
+)
+from wm_drake.simulation.mounts import mount_names
+from wm_drake.simulation.records import Record
+from wm_drake.studio.machines import OpenMachine
+from wm_drake.studio.state import State
+
+MEASURES = ("extremes", "amplitudes", "gap", "mounts")
+"""What is measured of each lane."""
+
+LANES = WIDTH - 1
+"""How many numbers one run turns."""
+
+BINS = 350
+"""Number of time bins of a force; each is drawn from its smallest to its largest value."""
+
+_MM, _RPM = Unit("m", "mm"), Unit("rad/s", "rpm")
+MM_PER_M, RPM_PER_RAD_S = _MM.from_si(1.0), _RPM.from_si(1.0)
+MS_PER_S = 1e3
+"""Times are sent in whole milliseconds, displacements in whole micrometres."""
+
+MICRO = 1e6
+
+
+def runner_of(machine: OpenMachine) -> Runner:
+    """Return the runner of the pages of a machine: the first run of a batch has a history."""
+    return Runner(machine.parameters, MEASURES, histories={0})
+
+
+def answer(
+    machine: OpenMachine, runner: Runner, state: State, keys: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Run what a page has chosen and return all that it draws.
+
+    Args:
+        machine: The open machine.
+        runner: From `runner_of`.
+        state: What the page has chosen.
+        keys: Key paths of up to `LANES` numbers to turn slightly.
+
+    Raises:
+        InputError: a number, the load or a key is wrong.
+    """
+    with machine.lock:
+        case = machine.case(state)
+        turned = _turned(machine, case, keys[:LANES])
+        batch_key, items = _batch(machine, [case, *(other for _, _, other in turned)])
+        warnings = unusual_values(items[0].numbers.setup)
+    results = {run.number: run for run in runner.run(batch_key, items)}
+    main = results[0]
+    return {
+        **_measures(machine, main),
+        **_histories(main),
+        "values": machine.shown_values(case, state),
+        "gap_points": _gap_points(runner, main),
+        "arrows": _arrows(machine, turned, results),
+        "warnings": [{"key": p.key, "message": p.message} for p in warnings],
+        "diverged": main.diverged,
+        "stepping": {
+            "integrator": batch_key.stepping.integrator,
+            "step_ms": MS_PER_S * batch_key.stepping.step,
+        },
+    }
+
+
+def arrows(
+    machine: OpenMachine, runner: Runner, state: State, keys: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Return the arrow of each of up to `LANES` numbers, without the answer itself.
+
+    Args:
+        machine: The open machine.
+        runner: From `runner_of`.
+        state: What the page has chosen.
+        keys: Key paths of the numbers.
+
+    Raises:
+        InputError: a number or the load is wrong.
+    """
+    with machine.lock:
+        case = machine.case(state)
+        turned = _turned(machine, case, keys[:LANES])
+        batch_key, items = _batch(machine, [case, *(other for _, _, other in turned)])
+    return _arrows(machine, turned, {run.number: run for run in runner.run(batch_key, items)})
+
+
+def influential_keys(machine: OpenMachine, state: State) -> list[str]:
+    """Return the numbers that can change a run of a state: not the cabinet, no other load."""
+    own = f"loads.{state.load}."
+    return [
+        key
+        for key in machine.numbers
+        if not key.startswith(("cabinet.", "step", "profile.", "imperfections.phase_error"))
+        and (not key.startswith("loads.") or key.startswith(own))
+        and (state.gasket or not key.startswith("gasket."))
+    ]
+
+
+def _turned(machine: OpenMachine, case: Case, keys: Iterable[str]) -> list[tuple[str, float, Case]]:
+    """Return key, step and case of each number that is turned by a hundredth of its slider.
+
+    A step beyond the allowed range is taken to the other side. A number that can be turned to
+    neither side is left out.
+    """
+    found = []
+    assert case.parameters is not None  # a page's case has parameters of its own
+    for key in keys:
+        number = machine.numbers.get(key)
+        for step in (number.step, -number.step) if number is not None else ():
+            try:
+                parameters = machine.moved_by(case.parameters, key, step)
+            except InputError:
+                continue
+            load = parameters.loads.get(case.name, case.load)
+            other = replace(case, parameters=parameters, profile=parameters.profile, load=load)
+            found.append((key, step, other))
+            break
+    return found
+
+
+def _batch(machine: OpenMachine, cases: list[Case]) -> tuple[BatchKey, list[WorkItem]]:
+    """Return the batch of the first case, with all others that can run side by side with it."""
+    parameters = cases[0].parameters
+    assert parameters is not None  # see _turned
+    for key, items in machine.preparation(parameters).batches(cases):
+        if items[0].number == 0:
+            return key, items
+    raise AssertionError("the first case is in some batch")
+
+
+def _measures(machine: OpenMachine, run: RunResult) -> dict[str, Any]:
+    """Return the numbers of a run: mm, rpm, N, N m."""
+    values = run.values
+    gap = run.gap
+    return {
+        "amplitude": _plain(values["amplitude"] * MM_PER_M),
+        "critical_speed": _plain(values["critical_speed"] * RPM_PER_RAD_S),
+        "detergent": _plain(values["detergent_displacement"] * MM_PER_M),
+        "gasket_force": _plain(values["gasket_force"]),
+        "gasket_moment": _plain(values["gasket_moment"]),
+        "mount_peak": _plain(values["mount_force_peak"]),
+        "gap": None if gap is None else _gap(gap, run.case.profile),
+        "mounts": list(mount_names(machine.parameters)),
+    }
+
+
+def _gap(gap: Gap, profile: SpinProfile) -> dict[str, Any]:
+    return {
+        "distance": gap.distance * MM_PER_M,
+        "time": gap.time,
+        "rpm": float(profile.speed_at(gap.time)) * RPM_PER_RAD_S,
+        "moving": gap.moving,
+        "fixed": gap.fixed,
+    }
+
+
+def _arrows(
+    machine: OpenMachine, turned: list[tuple[str, float, Case]], results: dict[int, RunResult]
+) -> list[dict[str, Any]]:
+    """Return the arrow of each turned number that ran side by side with the first case."""
+    return [
+        _arrow(machine, results[0], key, step, results[number])
+        for number, (key, step, _) in enumerate(turned, start=1)
+        if number in results
+    ]
+
+
+def _arrow(
+    machine: OpenMachine, main: RunResult, key: str, step: float, run: RunResult
+) -> dict[str, Any]:
+    """Return what a number does when it is moved up by a hundredth of its slider."""
+    up = math.copysign(1.0, step)
+    unit = machine.numbers[key].unit
+    before, after = _measures(machine, main), _measures(machine, run)
+    changes = {
+        name: [_difference(a, b, up) for a, b in zip(after[name], before[name], strict=True)]
+        for name in ("amplitude", "detergent", "gasket_force", "gasket_moment", "mount_peak")
+    }
+    wider, gap = (of["gap"]["distance"] if of["gap"] else None for of in (after, before))
+    changes["gap"] = [_difference(wider, gap, up)]
+    return {"key": key, "step": unit.from_si(abs(step)), **changes}
+
+
+def _difference(after: float | None, before: float | None, up: float) -> float | None:
+    return None if after is None or before is None else up * (after - before)
+
+
+def _histories(run: RunResult) -> dict[str, Any]:
+    """Return the curves of a run: envelopes, orbits, forces, and the motion around its largest."""
+    record = run.record
+    assert record is not None  # the runner keeps that of the first run
+    if record.sizes["time"] < 2:
+        return {"envelopes": [], "orbits": [], "forces": None, "motion": None, "duration": 0.0}
+    displacement = filtered_displacement(record).values
+    largest = _moment_of_largest(record, displacement)
+    profile = run.case.profile
+    return {
+        "envelopes": _envelopes(record, displacement),
+        "orbits": _orbits(record, largest),
+        "forces": _forces(record),
+        "motion": _motion(record, largest),
+        "largest": {
+            "time": float(record.time.values[largest]),
+            "rpm": float(record.drum_speed.values[largest]) * RPM_PER_RAD_S,
+        },
+        "duration": profile.duration,
+        "profile": {
+            "time": list(profile.time),
+            "rpm": [speed * RPM_PER_RAD_S for speed in profile.speed],
+        },
+    }
+
+
+def _moment_of_largest(record: Record, displacement: FloatArray) -> int:
+    """Return `measures.moment_of_largest_amplitude`, from displacements filtered already."""
+    size, samples = amplitudes(displacement)
+    if np.isnan(size).all():
+        return moment_of_largest_amplitude(record)
+    return int(samples[np.nanargmax(size)])
+
+
+def _envelopes(record: Record, displacement: FloatArray) -> list[dict[str, Any]]:
+    """Return the corners of the upper and lower envelope of each sensor: straight lines between.
+
+    They are `measures.envelopes`, which are lines from peak to peak, without the samples between.
+    """
+    time = np.rint(record.time.values * MS_PER_S).astype(int)
+    found: list[dict[str, Any]] = []
+    for column in displacement.T:
+        sides: dict[str, Any] = {}
+        if np.isnan(column[0]):  # too short to be filtered
+            found.append({"upper": [[], []], "lower": [[], []]})
+            continue
+        for name, sign in (("upper", 1.0), ("lower", -1.0)):
+            at = find_peaks(sign * column)[0]
+            at = at if len(at) else np.arange(len(column))
+            sides[name] = [time[at].tolist(), _whole(column[at])]
+        found.append(sides)
+    return found
+
+
+def _orbits(record: Record, largest: int) -> list[dict[str, Any]]:
+    depths = record.sensor_point.values[:, 1]
+    window = orbit_window(record, largest, ORBIT_REVOLUTIONS)
+    found = []
+    for y in (float(depths.min()), float(depths.max())):
+        path = axis_path_mm(record, y)[window] / MM_PER_M
+        found.append({"y": y * MM_PER_M, "x": _whole(path[:, 0]), "z": _whole(path[:, 2])})
+    return found
+
+
+def _forces(record: Record) -> dict[str, Any]:
+    """Return smallest and largest value in each time bin of gasket and mount forces. [N, N m]"""
+    forces = {}
+    if "gasket" in record.bushing.values:
+        gasket = record.sel(bushing="gasket")
+        for kind, letter in (("force", "F"), ("moment", "M")):
+            for index, axis in enumerate("xyz"):
+                forces[f"gasket {letter}{axis}"] = gasket[f"bushing_{kind}"].values[:, index]
+    size = np.linalg.norm(record.mount_force.values, axis=2)
+    for index, name in enumerate(record.mount.values):
+        forces[f"mount {name}"] = size[:, index]
+    count = record.sizes["time"]
+    begins = np.unique(np.linspace(0, count, min(BINS, count), endpoint=False).astype(int))
+    return {
+        "time": np.rint(record.time.values[begins] * MS_PER_S).astype(int).tolist(),
+        "bands": {
+            name: [
+                np.round(reduce.reduceat(values, begins), 3).tolist()
+                for reduce in (np.minimum, np.maximum)
+            ]
+            for name, values in forces.items()
+        },
+    }
+
+
+def _motion(record: Record, largest: int) -> dict[str, Any]:
+    """Return times [s] and poses of the tub (roll, pitch, yaw, x, y, z) around the largest."""
+    time, positions = largest_motion(record, largest)
+    return {
+        "time": np.round(time, 4).tolist(),
+        "poses": np.round(positions[:, :6], 6).tolist(),
+        "rest": np.round(np.asarray(record.attrs["rest_pose"]), 6).tolist(),
+    }
+
+
+def _gap_points(runner: Runner, run: RunResult) -> dict[str, Any] | None:
+    """Return the two nearest points in W [m] and the pose of the tub at the smallest gap."""
+    gap, record = run.gap, run.record
+    if gap is None or record is None:
+        return None
+    at = int(np.argmin(np.abs(record.time.values - gap.time)))
+    pose = np.concatenate([record.tub_angle.values[at], record.tub_position.values[at]])
+    points = runner.scene().nearest_points(pose, gap.moving, gap.fixed)
+    return {"points": points.tolist(), "pose": pose.tolist()}
+
+
+def _whole(values: FloatArray) -> list[int]:
+    """Return displacements in whole micrometres."""
+    return np.rint(values * MICRO).astype(int).tolist()
+
+
+def _plain(values: FloatArray) -> list[float | None]:
+    """Return numbers for JSON: None for one that is not finite."""
+    return [float(value) if math.isfinite(value) else None for value in np.ravel(values)]

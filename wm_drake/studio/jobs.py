@@ -1,0 +1,233 @@
+"""Studies that a page starts: the very command as a process, its output, its report.
+
+Each study has a folder of its own with the machine file, the output and the results. A server that
+starts finds the studies of earlier ones there.
+"""
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from wm_drake.errors import input_error, reason_of
+from wm_drake.report.provenance import now
+from wm_drake.studio.machines import Machines, OpenMachine
+from wm_drake.studio.saving import chosen, write_machine
+from wm_drake.studio.state import State
+
+OPTIONS = {
+    "gasket": {"--trials": "[0-9]{1,6}", "--design": "d-optimal|orthogonal", "--load": "[\\w-]+"},
+    "tolerance": {"--samples": "[0-9]{1,6}", "--sensitivity": "[0-9]{1,6}", "--subset": "[0-9]+"},
+    "spin-cycle": {"--case": "[\\w-]+"},
+}
+"""Studies that a page may start, with the options that it may give and their form."""
+
+MOST_RUNNING = 4
+"""Largest number of studies that run at a time."""
+
+LONGEST_OUTPUT = 20_000
+"""Number of characters at the end of the output that a page gets."""
+
+_IDENTIFIER = re.compile(r"[a-z-]{1,20}-[0-9]{1,6}")
+_PROGRESS = re.compile(r"([0-9]+) of ([0-9]+)")
+
+
+@dataclass
+class Jobs:
+    """Studies of a folder.
+
+    Attributes:
+        folder: Where each study has its folder.
+    """
+
+    folder: Path
+    _running: dict[str, "subprocess.Popen[bytes]"] = field(default_factory=dict)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def start(
+        self,
+        machines: Machines,
+        machine: OpenMachine,
+        state: State,
+        study: str,
+        options: dict[str, str],
+    ) -> str:
+        """Start a study of what a page has chosen, and return its identifier.
+
+        Raises:
+            InputError: there is no such study or option, a number is wrong, too many studies run,
+                or the folder cannot be written.
+        """
+        arguments = _arguments(study, options)
+        if sum(self._runs(identifier) for identifier in self._running) >= MOST_RUNNING:
+            raise input_error(f"{MOST_RUNNING} studies run already; wait or cancel one", key=study)
+        parameters = chosen(machine, state)
+        base = machines.name_or_path(state.machine)
+        try:
+            identifier = self._new_folder(study)
+            folder = self.folder / identifier
+            write_machine(folder / "machine.yaml", base, parameters, machine)
+            command = ["study", study, "--machine", "machine.yaml", "--out", "results", *arguments]
+            about = {"study": study, "command": command, "started": now(), "machine": state.machine}
+            (folder / "job.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
+            self._launch(identifier, command)
+        except OSError as error:
+            raise input_error(
+                f"cannot be written to: {reason_of(error)}", where=str(self.folder)
+            ) from None
+        return identifier
+
+    def resume(self, identifier: str) -> None:
+        """Continue a study that was cancelled or whose server was killed.
+
+        Raises:
+            InputError: there is no such study, or it runs.
+        """
+        about = self._about(identifier)
+        if self._runs(identifier):
+            raise input_error("runs already", key=identifier)
+        again = [] if about["study"] == "spin-cycle" else ["--resume"]
+        self._launch(identifier, [*about["command"], *again])
+
+    def cancel(self, identifier: str) -> None:
+        """Interrupt a study as Ctrl-C does; what it has finished is kept.
+
+        Raises:
+            InputError: there is no such study.
+        """
+        self._about(identifier)
+        process = self._running.get(identifier)
+        if process is not None and process.poll() is None:
+            process.send_signal(signal.SIGINT)
+
+    def listed(self) -> list[dict[str, Any]]:
+        """Return all studies of the folder, the latest first."""
+        found = [p.parent.name for p in self.folder.glob("*/job.json")]
+        known = [name for name in found if _IDENTIFIER.fullmatch(name)]
+        shown = [self.shown(identifier) for identifier in known]
+        return sorted(shown, key=lambda job: (job["started"], job["number"]), reverse=True)
+
+    def shown(self, identifier: str) -> dict[str, Any]:
+        """Return what a page shows of a study: its state, progress, and the end of its output.
+
+        Raises:
+            InputError: there is no such study.
+        """
+        about = self._about(identifier)
+        folder = self.folder / identifier
+        output = _end_of(folder / "output.txt")
+        progress = [(int(done), int(of)) for done, of in _PROGRESS.findall(output)]
+        runs = self._runs(identifier)
+        has_report = (folder / "results" / "report.html").is_file()
+        return {
+            "id": identifier,
+            "number": int(identifier.rpartition("-")[2]),
+            "study": about["study"],
+            "machine": about["machine"],
+            "started": about["started"],
+            "command": " ".join(["wm-drake", *about["command"]]),
+            "state": "running" if runs else "finished" if has_report else "not finished",
+            "progress": progress[-1] if progress else None,
+            "output": output,
+            "report": has_report and not runs,
+        }
+
+    def report_file(self, identifier: str, name: str) -> Path:
+        """Return a file of the results of a study.
+
+        Raises:
+            InputError: there is no such study or file, or it is outside of the results.
+        """
+        self._about(identifier)
+        results = (self.folder / identifier / "results").resolve()
+        try:
+            path = (results / name).resolve()
+            is_inside = path.is_relative_to(results) and path.is_file()
+        except (OSError, ValueError):
+            is_inside = False
+        if not is_inside:
+            raise input_error(f"has no file '{name}'", key=identifier)
+        return path
+
+    def end(self, timeout: float = 10.0) -> None:
+        """Interrupt all studies and wait for them; those that do not end in time are killed."""
+        running = [process for process in self._running.values() if process.poll() is None]
+        for process in running:
+            process.send_signal(signal.SIGINT)
+        for process in running:
+            try:
+                process.wait(timeout)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+    def _new_folder(self, study: str) -> str:
+        with self._lock:
+            number = 1
+            while (self.folder / f"{study}-{number}").exists():
+                number += 1
+            (self.folder / f"{study}-{number}").mkdir(parents=True)
+            return f"{study}-{number}"
+
+    def _launch(self, identifier: str, command: Sequence[str]) -> None:
+        folder = self.folder / identifier
+        with (folder / "output.txt").open("wb") as output:
+            self._running[identifier] = subprocess.Popen(
+                [sys.executable, "-m", "wm_drake", *command],
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,  # Ctrl-C at the server reaches a study through `end` only
+            )
+
+    def _runs(self, identifier: str) -> bool:
+        process = self._running.get(identifier)
+        return process is not None and process.poll() is None
+
+    def _about(self, identifier: str) -> dict[str, Any]:
+        try:
+            if _IDENTIFIER.fullmatch(identifier):
+                text = (self.folder / identifier / "job.json").read_text(encoding="utf-8")
+                about = json.loads(text)
+                if about["study"] in OPTIONS and {"command", "started", "machine"} <= set(about):
+                    return dict(about)
+        except (OSError, ValueError, KeyError, TypeError):
+            pass
+        raise input_error(f"no study '{identifier}'", key="study")
+
+
+def _arguments(study: str, options: dict[str, str]) -> list[str]:
+    """Return options of a study as arguments, after checking their form.
+
+    Raises:
+        InputError: there is no such study or option, or a value has another form.
+    """
+    if study not in OPTIONS:
+        raise input_error(f"no study '{study}'; allowed are {', '.join(OPTIONS)}", key="study")
+    found = []
+    for name, text in options.items():
+        form = OPTIONS[study].get(name)
+        if form is None:
+            allowed = ", ".join(OPTIONS[study])
+            raise input_error(f"no option of 'study {study}' here; allowed are {allowed}", key=name)
+        if not re.fullmatch(form, text):
+            raise input_error(f"'{text}' is not allowed", key=name)
+        found.append(f"{name}={text}")
+    return found
+
+
+def _end_of(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            file.seek(0, 2)
+            file.seek(max(0, file.tell() - LONGEST_OUTPUT))
+            return file.read().decode("utf-8", errors="replace")
+    except OSError:
+        return ""

@@ -1,0 +1,318 @@
+"""Machines that a page can open, and machines that are open: built once, moved many times."""
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame
+
+from wm_drake.batch.work_items import Preparation
+from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.model.bodies import frame_names, with_sdf_values
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
+from wm_drake.model.same_elements import check_same_elements
+from wm_drake.model.scene import Outline, Scene
+from wm_drake.parameters import (
+    MachineParameters,
+    load_machine,
+    measured_amplitudes,
+    shipped_machines,
+    with_values,
+)
+from wm_drake.simulation.cases import Case, case_of
+from wm_drake.simulation.mounts import mount_names
+from wm_drake.simulation.runs import checked_integrator, checked_step
+from wm_drake.studio.numbers import Number, numbers_of
+from wm_drake.studio.state import DESCRIBED, State
+
+GIVEN = "given"
+"""Identifier of the machine of the command line, if it is a file."""
+
+LONGEST_RUN = 300.0
+"""Longest spin profile that a page may run. [s]"""
+
+MOST_STEPS = 300_000
+"""Largest number of steps of a run of a page."""
+
+_SUFFIXES = (".yaml", ".yml")
+
+
+@dataclass(frozen=True)
+class Machines:
+    """Machines that a page can open: the given one, those of the folder, and the shipped ones.
+
+    Attributes:
+        given: Name or path of the machine of the command line.
+        folder: Folder for saved machine files.
+    """
+
+    given: str
+    folder: Path
+    _open: dict[tuple[Path, int], "OpenMachine"] = field(default_factory=dict)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def listed(self) -> dict[str, str]:
+        """Return the kind of each machine that can be opened, by identifier: given first."""
+        saved = sorted(p.name for p in self.folder.glob("*") if p.suffix in _SUFFIXES)
+        first = [] if self.given in shipped_machines() else [GIVEN]
+        return {
+            **dict.fromkeys(first, "given"),
+            **dict.fromkeys((name for name in saved if (self.folder / name).is_file()), "saved"),
+            **dict.fromkeys(shipped_machines(), "shipped"),
+        }
+
+    @property
+    def first(self) -> str:
+        """Identifier of the machine that a page opens first."""
+        return self.given if self.given in shipped_machines() else GIVEN
+
+    def name_or_path(self, identifier: str) -> str | Path:
+        """Return what `load_machine` reads for an identifier.
+
+        Raises:
+            InputError: no such machine can be opened.
+        """
+        listed = self.listed()
+        if identifier not in listed:
+            raise input_error(
+                f"no machine '{identifier}'{nearest_names(identifier, listed)}", key="machine"
+            )
+        if identifier == GIVEN:
+            return Path(self.given)
+        return identifier if listed[identifier] == "shipped" else self.folder / identifier
+
+    def open(self, identifier: str) -> "OpenMachine":
+        """Return an open machine; a file that has changed is read again.
+
+        Raises:
+            InputError: there is no such machine, or its file has an error.
+        """
+        name = self.name_or_path(identifier)
+        path = shipped_machines().get(str(name), Path(name))
+        with self._lock:
+            try:
+                key = path.resolve(), path.stat().st_mtime_ns
+            except OSError:
+                raise input_error("this file is gone", where=identifier, key="machine") from None
+            if key not in self._open:
+                self._open[key] = self._opened(load_machine(name))
+            return self._open[key]
+
+    def _opened(self, parameters: MachineParameters) -> "OpenMachine":
+        """Return a machine, built anew only if no open one has the same elements."""
+        checked_step(parameters, None)
+        for other in self._open.values():
+            try:
+                check_same_elements(other.machine.parameters, parameters)
+            except InputError:
+                continue
+            if list(other.parameters.sensors) == list(parameters.sensors):
+                return OpenMachine(parameters, other.machine, Scene(parameters), other.lock)
+        return OpenMachine(parameters, build_machine(parameters), Scene(parameters))
+
+
+@dataclass(frozen=True)
+class OpenMachine:
+    """A machine that pages move.
+
+    Attributes:
+        parameters: The machine as its file has it.
+        machine: A built machine with the same elements.
+        scene: Its shapes. One thread at a time may use it.
+        lock: Held while `machine` or `scene` are used.
+    """
+
+    parameters: MachineParameters
+    machine: Machine
+    scene: Scene
+    lock: threading.Lock = field(default_factory=threading.Lock)
+    _preparations: dict[tuple[float, str], Preparation] = field(default_factory=dict)
+    _numbers: dict[str, Number] = field(default_factory=dict)
+
+    @property
+    def numbers(self) -> Mapping[str, Number]:
+        """Return all numbers that can be moved, by key path; those of the SDF among them."""
+        if not self._numbers:
+            plant, parts = self.machine.plant, ("mass", "centre_of_mass")
+            keys = [f"bodies.{body}.{part}" for body in _moving_links(plant) for part in parts]
+            keys += [f"frames.{name}" for name in _movable_frames(plant)]
+            self._numbers.update(numbers_of(with_sdf_values(plant, self.parameters, keys)))
+        return self._numbers
+
+    def preparation(self, parameters: MachineParameters) -> Preparation:
+        """Return the preparation of runs with the step and the integrator of some parameters."""
+        step = checked_step(parameters, None)
+        integrator = checked_integrator(parameters, None)
+        key = step, integrator
+        if key not in self._preparations:
+            self._preparations[key] = Preparation(self.machine, step, integrator)
+        return self._preparations[key]
+
+    def moved(self, values: Mapping[str, str]) -> MachineParameters:
+        """Return the machine with other numbers.
+
+        Args:
+            values: Texts with units by key path, those of `numbers` or of whole vectors.
+
+        Raises:
+            InputError: one problem for each number that is wrong, in the words of `machine check`.
+        """
+        try:
+            return self._with(self.parameters, values)
+        except InputError:
+            problems: list[Problem] = []
+            parameters = self.parameters
+            for key, text in values.items():
+                try:
+                    parameters = self._with(parameters, {key: text})
+                except InputError as error:
+                    problems += error.problems
+            if problems:
+                raise InputError(problems) from None
+            raise
+
+    def moved_by(self, parameters: MachineParameters, key: str, step: float) -> MachineParameters:
+        """Return parameters with one number changed by a step in SI units.
+
+        Raises:
+            InputError: the new value is not allowed.
+        """
+        with_sdf = with_sdf_values(self.machine.plant, parameters, [key])
+        value = _value_at(with_sdf, key)
+        return with_values(with_sdf, {key: value + step})
+
+    def _with(self, parameters: MachineParameters, values: Mapping[str, str]) -> MachineParameters:
+        for key in values:
+            if not any(key in (known, known.rpartition(".")[0]) for known in self.numbers):
+                raise input_error(
+                    f"'{key}' is not a number of the machine{nearest_names(key, self.numbers)}",
+                    key=key,
+                )
+        given: dict[str, str | float] = {
+            key: number.in_si(text)
+            if (number := self.numbers.get(key)) is not None and number.is_entry
+            else text
+            for key, text in values.items()
+        }
+        return with_values(with_sdf_values(self.machine.plant, parameters, given), given)
+
+    def case(self, state: State) -> Case:
+        """Return the case that a page has chosen.
+
+        Raises:
+            InputError: a number or the load is wrong, or the run would be too long.
+        """
+        parameters = self.moved(state.values)
+        if state.masses:
+            load = state.described_load()
+            case = Case(DESCRIBED, load, parameters.profile, state.gasket, parameters)
+        else:
+            case = case_of(parameters, state.load, gasket=state.gasket)
+            case = replace(case, parameters=parameters)
+        check_length(case)
+        return case
+
+    def shown_values(self, case: Case, state: State) -> dict[str, float]:
+        """Return the moved numbers of a case in their display units, by key path."""
+        assert case.parameters is not None  # a page's case has parameters of its own
+        return {
+            key: self.numbers[key].unit.from_si(_value_at(case.parameters, key))
+            for key in state.values
+            if key in self.numbers
+        }
+
+    def measured(self, state: State) -> list[dict[str, object]]:
+        """Return what was measured of the machine with a load: source and amplitudes [mm]."""
+        table = measured_amplitudes(self.parameters)
+        gasket = "yes" if state.gasket and self.parameters.gasket else "no"
+        rows = table[(table.load == state.load) & (table.gasket == gasket)]
+        return [
+            {"source": str(row.pop("source")), "amplitude": _by_sensor(row, self.parameters)}
+            for row in rows.to_dict("records")
+        ]
+
+    def for_page(self) -> dict[str, object]:
+        """Return all that a page needs to know of the machine before the first run."""
+        parameters = self.parameters
+        with self.lock:
+            numbers = [number.for_page() for number in self.numbers.values()]
+            shapes = {
+                body: [_shape(name, of) for name, of in outlines.items()]
+                for body, outlines in (
+                    ("tub", self.scene.tub_outlines()),
+                    ("housing", self.scene.outlines("housing")),
+                )
+            }
+        return {
+            "name": parameters.name,
+            "about": parameters.about,
+            "numbers": numbers,
+            "loads": list(parameters.loads),
+            "gasket": parameters.gasket is not None,
+            "sensors": {name: sensor.axis for name, sensor in parameters.sensors.items()},
+            "mounts": list(mount_names(parameters)),
+            "shapes": shapes,
+        }
+
+
+def _shape(name: str, outline: Outline) -> dict[str, object]:
+    return {
+        "name": name,
+        "centre": outline.centre.tolist(),
+        "axes": outline.axes.tolist(),
+        "half": outline.half.tolist(),
+        "round": outline.is_round,
+    }
+
+
+def _by_sensor(row: Mapping[Any, Any], parameters: MachineParameters) -> dict[str, float]:
+    return {name: float(row[name]) for name in parameters.sensors}
+
+
+def _moving_links(plant: MultibodyPlant) -> list[str]:
+    """Return the links whose mass can be changed: those that are not fixed to the world."""
+    fixed = {body.index() for body in plant.GetBodiesWeldedTo(plant.world_body())}
+    model = plant.GetBodyByName("tub").model_instance()
+    bodies = [plant.get_body(index) for index in plant.GetBodyIndices(model)]
+    return [body.name() for body in bodies if body.index() not in fixed]
+
+
+def _movable_frames(plant: MultibodyPlant) -> list[str]:
+    """Return the frames of the SDF whose position can be changed."""
+    return [
+        name
+        for name in frame_names(plant)
+        if isinstance(plant.GetFrameByName(name), FixedOffsetFrame)
+    ]
+
+
+def _value_at(parameters: MachineParameters, key: str) -> float:
+    """Return the number at a key path, an entry of a vector or table too. SI."""
+    node: Any = parameters
+    for part in key.split("."):
+        if isinstance(node, tuple):
+            node = node[int(part)]
+        else:
+            node = node[part] if isinstance(node, dict) else getattr(node, part)
+    return float(node)
+
+
+def check_length(case: Case) -> None:
+    """Raise an InputError for a run that is too long for a page."""
+    step = checked_step(case.parameters, None) if case.parameters else 1.0
+    if case.profile.duration > LONGEST_RUN:
+        raise input_error(
+            f"a run of {case.profile.duration:g} s is too long for this page; allowed are "
+            f"{LONGEST_RUN:g} s; the command 'spin' has no limit",
+            key="profile.time",
+        )
+    if case.profile.duration / step > MOST_STEPS:
+        raise input_error(
+            f"a run of {case.profile.duration / step:.0f} steps is too long for this page; allowed "
+            f"are {MOST_STEPS}; the command 'spin' has no limit",
+            key="step",
+        )

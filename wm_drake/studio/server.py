@@ -1,0 +1,270 @@
+"""The web server of the studio: pages, runs, saved machines, studies."""
+
+import asyncio
+import contextlib
+import json
+import os
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+
+from wm_drake.batch.runs import Runner
+from wm_drake.errors import InputError, input_error
+from wm_drake.report.provenance import program
+from wm_drake.studio.answers import LANES, answer, arrows, influential_keys, runner_of
+from wm_drake.studio.guard import Guard
+from wm_drake.studio.jobs import OPTIONS, Jobs
+from wm_drake.studio.machines import Machines, OpenMachine
+from wm_drake.studio.saving import ExistsAlreadyError, save_machine
+from wm_drake.studio.state import State, Text
+from wm_drake.studio.turns import OvertakenError, Turns
+
+STATIC = Path(__file__).parent / "static"
+
+KEPT_RANKINGS = 32
+"""Number of rankings of the influential numbers that are kept."""
+
+_REPORT_POLICY = (
+    "sandbox allow-scripts allow-popups allow-downloads; default-src 'none'; img-src 'self' data: "
+    "blob:; style-src 'unsafe-inline'; script-src 'unsafe-inline' 'unsafe-eval'; font-src data:"
+)
+"""Policy of a report: it may draw itself, but it has no origin and reaches nothing."""
+
+
+class _Body(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class RunRequest(_Body):
+    """A run of what a page has chosen; `page` names the page."""
+
+    page: Text
+    state: State
+    keys: Annotated[list[Text], Field(max_length=LANES)] = []
+
+
+class SaveRequest(_Body):
+    """A machine to save."""
+
+    state: State
+    name: Text
+    overwrite: bool = False
+
+
+class StudyRequest(_Body):
+    """A study to start."""
+
+    state: State
+    study: Text
+    options: Annotated[dict[Text, Text], Field(max_length=8)] = {}
+
+
+class Studio:
+    """What all pages share: open machines, the threads that run them, studies."""
+
+    def __init__(self, given: str, folder: Path) -> None:
+        """Serve a machine, and save into a folder."""
+        self.machines = Machines(given, folder)
+        self.jobs = Jobs(folder / "studies")
+        self._workers = os.cpu_count() or 1
+        self._executor = ThreadPoolExecutor(self._workers, thread_name_prefix="studio")
+        self.turns = Turns(self._executor, self._workers)
+        self._runners: dict[int, Runner] = {}
+        self._rankings: dict[str, asyncio.Task[list[dict[str, Any]]]] = {}
+
+    def opened(self, identifier: str) -> tuple[OpenMachine, Runner]:
+        """Return an open machine and its runner."""
+        machine = self.machines.open(identifier)
+        return machine, self._runners.setdefault(id(machine), runner_of(machine))
+
+    def run(self, state: State, keys: list[str]) -> dict[str, Any]:
+        """Return the answer to a page."""
+        machine, runner = self.opened(state.machine)
+        found = answer(machine, runner, state, keys)
+        return found | {"measured": machine.measured(state)}
+
+    async def ranking(self, state: State) -> list[dict[str, Any]]:
+        """Return the arrows of all numbers that influence a run; pages share the work."""
+        key = state.model_dump_json()
+        task = self._rankings.get(key)
+        if task is None or (task.done() and (task.cancelled() or task.exception())):
+            task = asyncio.ensure_future(self._rank(key, state))
+            self._rankings[key] = task
+            while len(self._rankings) > KEPT_RANKINGS:
+                del self._rankings[next(iter(self._rankings))]
+        return await asyncio.shield(task)
+
+    async def _rank(self, key: str, state: State) -> list[dict[str, Any]]:
+        take = partial(self.turns.take, f"ranking {key}", background=True)
+        machine, runner = await take(lambda: self.opened(state.machine))
+        keys, found = influential_keys(machine, state), []
+        for begin in range(0, len(keys), LANES):
+            part = keys[begin : begin + LANES]
+            found += await take(partial(arrows, machine, runner, state, part))
+        return found
+
+    def end(self) -> None:
+        """End all studies and threads."""
+        self.jobs.end()
+        self._executor.shutdown(wait=False, cancel_futures=True)
+
+
+def application(studio: Studio, token: str, port: int) -> Guard:
+    """Return the guarded web application of a studio."""
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_app: Starlette) -> AsyncIterator[None]:
+        yield
+        studio.end()
+
+    routes = _Routes(studio)
+    app = Starlette(
+        routes=[
+            Route("/", routes.page),
+            Mount("/static", StaticFiles(directory=STATIC)),
+            Route("/api/machines", routes.machines),
+            Route("/api/machine", routes.machine),
+            Route("/api/run", routes.run, methods=["POST"]),
+            Route("/api/ranking", routes.ranking, methods=["POST"]),
+            Route("/api/save", routes.save, methods=["POST"]),
+            Route("/api/studies", routes.studies),
+            Route("/api/studies", routes.start, methods=["POST"]),
+            Route("/api/studies/{id}/{act}", routes.act, methods=["POST"]),
+            Route("/reports/{id}/{name:path}", routes.report),
+        ],
+        exception_handlers={InputError: _wrong, ValidationError: _malformed},
+        lifespan=lifespan,
+    )
+    return Guard(app, token, port)
+
+
+class _Routes:
+    """What the server answers, by address."""
+
+    def __init__(self, studio: Studio) -> None:
+        self.studio = studio
+
+    async def page(self, _request: Request) -> Response:
+        """Return the page."""
+        return FileResponse(STATIC / "index.html")
+
+    async def machines(self, _request: Request) -> Response:
+        """Return the machines that can be opened."""
+        machines = self.studio.machines
+        listed = await _in_thread(machines.listed)
+        return _json(
+            {
+                "machines": [{"id": name, "kind": kind} for name, kind in listed.items()],
+                "first": machines.first,
+                "folder": str(machines.folder),
+                "studies": {study: list(options) for study, options in OPTIONS.items()},
+                "program": program(),
+            }
+        )
+
+    async def machine(self, request: Request) -> Response:
+        """Return one machine: its numbers, loads, shapes."""
+        identifier = request.query_params.get("id", "")
+
+        def opened() -> dict[str, object]:
+            return self.studio.opened(identifier)[0].for_page()
+
+        return _json(await _in_thread(opened))
+
+    async def run(self, request: Request) -> Response:
+        """Run what a page has chosen; a request that is overtaken is dropped."""
+        asked = RunRequest.model_validate_json(await request.body())
+        try:
+            run = partial(self.studio.run, asked.state, asked.keys)
+            return _json(await self.studio.turns.take(f"page {asked.page}", run))
+        except OvertakenError:
+            return _json({"overtaken": True})
+
+    async def ranking(self, request: Request) -> Response:
+        """Return the arrows of all numbers that influence a run."""
+        asked = RunRequest.model_validate_json(await request.body())
+        return _json({"arrows": await self.studio.ranking(asked.state)})
+
+    async def save(self, request: Request) -> Response:
+        """Save a machine file."""
+        asked = SaveRequest.model_validate_json(await request.body())
+
+        def save() -> str:
+            machine, _ = self.studio.opened(asked.state.machine)
+            with machine.lock:
+                return save_machine(
+                    self.studio.machines, machine, asked.state, asked.name, asked.overwrite
+                ).name
+
+        return _json({"saved": await _in_thread(save)})
+
+    async def studies(self, _request: Request) -> Response:
+        """Return all studies."""
+        return _json({"studies": await _in_thread(self.studio.jobs.listed)})
+
+    async def start(self, request: Request) -> Response:
+        """Start a study."""
+        asked = StudyRequest.model_validate_json(await request.body())
+
+        def start() -> str:
+            machine, _ = self.studio.opened(asked.state.machine)
+            with machine.lock:
+                return self.studio.jobs.start(
+                    self.studio.machines, machine, asked.state, asked.study, asked.options
+                )
+
+        return _json({"id": await _in_thread(start)})
+
+    async def act(self, request: Request) -> Response:
+        """Cancel or continue a study."""
+        identifier, act = request.path_params["id"], request.path_params["act"]
+        acts = {"cancel": self.studio.jobs.cancel, "resume": self.studio.jobs.resume}
+        if act not in acts:
+            raise input_error(f"no such act; allowed are {', '.join(acts)}", key="study")
+        await _in_thread(partial(acts[act], identifier))
+        return _json({"id": identifier})
+
+    async def report(self, request: Request) -> Response:
+        """Return a file of the results of a study."""
+        find = self.studio.jobs.report_file
+        path = await _in_thread(
+            partial(find, request.path_params["id"], request.path_params["name"])
+        )
+        return FileResponse(path, headers={"content-security-policy": _REPORT_POLICY})
+
+
+async def _in_thread(calculate: Callable[[], Any]) -> Any:
+    return await asyncio.get_running_loop().run_in_executor(None, calculate)
+
+
+def _json(content: Any, status: int = 200) -> Response:
+    text = json.dumps(content, allow_nan=False, separators=(",", ":"))
+    return Response(text, status, media_type="application/json")
+
+
+def _words(where: str, message: str) -> str:
+    """Return a message with the place of the problem, if that is a file."""
+    return message if not where or where.startswith("case ") else f"{where}: {message}"
+
+
+async def _wrong(_request: Request, error: Exception) -> Response:
+    """Return the problems of an input, each with the key of its value."""
+    assert isinstance(error, InputError)  # the handler of this type
+    problems = [{"key": p.key, "message": _words(p.where, p.message)} for p in error.problems]
+    exists = isinstance(error, ExistsAlreadyError)
+    return _json({"problems": problems, "exists": exists}, 409 if exists else 422)
+
+
+async def _malformed(_request: Request, error: Exception) -> Response:
+    """Refuse a body that no page sends."""
+    assert isinstance(error, ValidationError)  # the handler of this type
+    return _json({"problems": [{"key": "", "message": "the request is malformed"}]}, 400)

@@ -1,0 +1,472 @@
+// The page: one state, one answer drawn, the machine as it was behind it.
+
+import {BandPanel, OrbitPanel, TimeRange, roundUp} from './curves.js';
+import {byId, digits, fixed, make} from './dom.js';
+import {History, copyOf, fromLink, intoLink} from './history.js';
+import {showMeasures} from './measures.js';
+import {NumberList} from './numbers.js';
+import {SceneView} from './scene.js';
+import {Problems, get, post} from './server.js';
+import {Studies} from './studies.js';
+
+const PAGE = crypto.randomUUID();
+const MASS = {mass: '0.5 kg', radius: '235 mm', y: '0 mm', phase: '0 deg'};
+const MOST_VARIANTS = 4;
+const DESCRIBED = '— described —';
+
+const history_ = new History();
+const list = new NumberList(byId('numbers'), move);
+const scene = new SceneView(byId('scene'));
+const times = {envelopes: new TimeRange(), forces: new TimeRange()};
+const panels = {envelopes: new Map(), forces: new Map(), orbits: []};
+
+let state = null;      // what is chosen, as the server reads it
+let machine = null;    // the opened machine
+let answer = null;     // the answer that is drawn
+let ghost = null;      // the answer of the machine as it was, with the same load
+let variants = [];     // {name, state, answer}
+let turned = [];       // keys of the seven numbers
+let ranking = [];      // arrows of all numbers
+let asked = 0;         // number of the latest request
+let drawn = 0;         // number of the request that is drawn
+
+/* ---- what is chosen ---- */
+
+function move(key, text, final) {
+  if (text === null) delete state.values[key];
+  else state.values[key] = text;
+  changed(final ? (text === null ? `${nameOf(key)} as it was` : `${nameOf(key)} ${text}`) : null);
+}
+
+/** Run the new state; `what` names it in the history, null while a slider moves. */
+function changed(what) {
+  if (what !== null) {
+    history_.add(what, state);
+    intoLink(state, variants);
+    showHistory();
+  }
+  list.show(state.values, answer?.values);
+  showLoad();
+  run();
+}
+
+async function setState(wanted) {
+  const other = !state || wanted.machine !== state.machine;
+  const loads = JSON.stringify([wanted.load, wanted.masses, wanted.gasket]);
+  const before = state && JSON.stringify([state.load, state.masses, state.gasket]);
+  state = copyOf(wanted);
+  if (other) await openMachine();
+  intoLink(state, variants);
+  showHistory();
+  list.show(state.values, answer?.values);
+  showLoad();
+  if (other || loads !== before) { runGhost(); rank(); }
+  await run();
+}
+
+async function openMachine() {
+  status('opening …');
+  machine = await get(`machine?id=${encodeURIComponent(state.machine)}`);
+  if (!state.masses.length && !machine.loads.includes(state.load)) [state.load] = machine.loads;
+  list.fill(machine.numbers);
+  scene.shapes(machine.shapes);
+  turned = [];
+  byId('machine').value = state.machine;
+  byId('about').textContent = `${machine.name}: ${machine.about}`;
+  byId('load').replaceChildren(...[...machine.loads, DESCRIBED].map((name) => make('option', {value: name}, name)));
+  byId('gasket').disabled = !machine.gasket;
+  document.title = `${machine.name} – wm-drake studio`;
+  makePanels();
+  search();
+}
+
+function showLoad() {
+  byId('load').value = state.masses.length ? DESCRIBED : state.load;
+  byId('gasket').checked = state.gasket && machine.gasket;
+  byId('described').hidden = !state.masses.length;
+  const shown = JSON.stringify(state.masses);
+  if (byId('masses').dataset.shown !== shown) {
+    byId('masses').dataset.shown = shown;
+    byId('masses').replaceChildren(...state.masses.map(massRow));
+  }
+  byId('undo').disabled = history_.place <= 0;
+  byId('redo').disabled = history_.place >= history_.entries.length - 1;
+}
+
+function massRow(mass, index) {
+  const fields = Object.keys(MASS).flatMap((name) => [
+    make('span', {}, name),
+    make('input', {value: mass[name], 'data-mass': `${index}.${name}`, spellcheck: 'false', 'aria-label': `${name} of mass ${index + 1}`, onchange: (event) => {
+      state.masses[index][name] = event.target.value;
+      chooseLoad(`mass ${index + 1}: ${name} ${event.target.value}`);
+    }}),
+  ]);
+  const remove = make('button', {onclick: () => {
+    state.masses.splice(index, 1);
+    chooseLoad('a mass less');
+  }}, 'remove');
+  return make('div', {class: 'mass'}, ...fields, remove, make('div', {class: 'problem', role: 'alert', 'data-problem': `masses.${index}`}));
+}
+
+function chooseLoad(what) {
+  changed(what);
+  runGhost();
+  rank();
+}
+
+/* ---- running ---- */
+
+async function run() {
+  const number = ++asked;
+  const begin = performance.now();
+  try {
+    const found = await post('run', {page: PAGE, state, keys: turned});
+    if (found.overtaken || number < drawn) return;
+    drawn = number;
+    answer = found;
+    showAnswer();
+    showProblems([], found.warnings);
+    status(`${fixed(performance.now() - begin, 0)} ms · ${found.stepping.integrator}, ${digits(found.stepping.step_ms, 3)} ms steps`);
+  } catch (error) {
+    if (number !== asked) return;
+    showProblems(error instanceof Problems ? error.problems : [{key: '', message: error.message}]);
+    status('not run');
+  }
+}
+
+async function runGhost() {
+  const as = {...state, values: {}, gasket: true};
+  const wanted = JSON.stringify(as);
+  runGhost.wanted = wanted;
+  try {
+    const found = await post('run', {page: `${PAGE} ghost`, state: as, keys: []});
+    if (found.overtaken || runGhost.wanted !== wanted) return;
+    ghost = found;
+    if (answer) showAnswer();
+  } catch { ghost = null; } // the problem is shown by the run itself
+}
+
+async function rank() {
+  const as = copyOf(state);
+  byId('rank').disabled = true;
+  try {
+    const found = await post('ranking', {page: PAGE, state: as});
+    if (as.machine === state.machine) ranking = found.arrows;
+    chooseTurned();
+  } catch { /* a wrong number is shown by the run itself */ }
+  byId('rank').disabled = false;
+}
+
+/** Take the seven numbers that change the chosen measure most. */
+function chooseTurned() {
+  const name = byId('rank-by').value;
+  const size = (of) => Math.max(0, ...of[name].map((value) => Math.abs(value ?? 0)));
+  const wanted = ranking.map((of) => ({key: of.key, size: size(of)})).filter((of) => of.size > 0);
+  wanted.sort((a, b) => b.size - a.size);
+  turned = wanted.slice(0, 7).map((of) => of.key);
+  run();
+}
+
+/* ---- drawing ---- */
+
+function makePanels() {
+  for (const kind of ['envelopes', 'forces', 'orbits']) byId(kind).replaceChildren();
+  for (const range of Object.values(times)) { range.panels.clear(); range.range = null; }
+  panels.envelopes = new Map(Object.keys(machine.sensors).map((name) => [name, new BandPanel(byId('envelopes'), name, 'mm', times.envelopes)]));
+  panels.forces = new Map();
+  panels.orbits = ['front', 'rear'].map((name) => new OrbitPanel(byId('orbits'), name));
+  answer = ghost = null;
+}
+
+const envelopeBand = (sides) => ({
+  upper: [sides.upper[0].map((t) => t / 1000), sides.upper[1].map((v) => v / 1000)],
+  lower: [sides.lower[0].map((t) => t / 1000), sides.lower[1].map((v) => v / 1000)],
+});
+
+const sizeOf = (bands) => Math.max(0, ...bands.map((band) => band
+  ? Math.max(...band.upper[1].map(Math.abs), ...band.lower[1].map(Math.abs), 0) : 0));
+
+function showAnswer() {
+  if (!answer) return;
+  showMeasures(byId('measures'), answer, ghost, machine, labelOf);
+  list.show(state.values, answer.values);
+  showEnvelopes();
+  showForces();
+  showOrbits();
+  showMotion();
+  showVariants();
+}
+
+function showEnvelopes() {
+  const names = [...panels.envelopes.keys()];
+  const bands = (of) => (of?.envelopes?.length ? of.envelopes.map(envelopeBand) : []);
+  const now = bands(answer);
+  const was = bands(ghost);
+  const others = variants.map((variant, index) => ({index, bands: bands(variant.answer)})).filter((of) => of.bands.length);
+  const experiments = answer.measured.filter(({source}) => source === 'experiment');
+  const measured = (name) => experiments.map((of) => of.amplitude[name]);
+  const size = sizeOf([...now, ...was, ...others.flatMap((of) => of.bands)]);
+  const limit = roundUp(Math.max(size, ...names.flatMap(measured)));
+  times.envelopes.end = answer.duration || 1;
+  names.forEach((name, index) => {
+    const panel = panels.envelopes.get(name);
+    panel.show({
+      now: now[index] ?? {upper: [[], []], lower: [[], []]},
+      ghost: was[index],
+      variants: others.map((of) => ({index: of.index, band: of.bands[index]})),
+      measured: measured(name), low: -limit, high: limit,
+      rpm: [answer.profile.time, answer.profile.rpm],
+    });
+  });
+}
+
+function showForces() {
+  if (!answer.forces) return;
+  times.forces.end = answer.duration || 1;
+  const names = Object.keys(answer.forces.bands);
+  if (names.join() !== [...panels.forces.keys()].join()) {
+    byId('forces').replaceChildren();
+    times.forces.panels.clear();
+    panels.forces = new Map(names.map((name) => [name, new BandPanel(byId('forces'), name, name.startsWith('gasket M') ? 'N m' : 'N', times.forces)]));
+  }
+  const band = (of, name) => {
+    const found = of?.forces?.bands[name];
+    const time = found && of.forces.time.map((t) => t / 1000);
+    return found ? {lower: [time, found[0]], upper: [time, found[1]]} : null;
+  };
+  for (const name of names) {
+    const now = band(answer, name);
+    const was = band(ghost, name);
+    const limit = roundUp(sizeOf([now, was]));
+    const isSize = name.startsWith('mount');
+    panels.forces.get(name).show({now, ghost: was, low: isSize ? 0 : -limit, high: limit, rpm: [answer.profile.time, answer.profile.rpm]});
+  }
+}
+
+function showOrbits() {
+  const both = [...answer.orbits, ...(ghost?.orbits ?? [])];
+  const limit = roundUp(Math.max(0.1, ...both.flatMap((of) => [...of.x, ...of.z]).map((v) => Math.abs(v) / 1000)));
+  panels.orbits.forEach((panel, index) => {
+    if (answer.orbits[index]) panel.show(answer.orbits[index], ghost?.orbits?.[index], limit);
+  });
+}
+
+/* ---- the view of the tub ---- */
+
+let frame = -1; // -1: the pose of the smallest gap
+let player = null;
+
+function showMotion() {
+  const {motion} = answer;
+  if (!motion) return;
+  byId('frame').max = String(motion.time.length - 1);
+  byId('at-gap').disabled = !answer.gap_points;
+  const gap = answer.gap_points && {...answer.gap_points, distance: answer.gap.distance};
+  if (frame < 0 && gap) {
+    scene.show(gap.pose, gap);
+    byId('frame-time').textContent = `${fixed(answer.gap.time, 2)} s, ${fixed(answer.gap.rpm, 0)} rpm: ${answer.gap.moving.replaceAll('_', ' ')} to ${answer.gap.fixed.replaceAll('_', ' ')}`;
+    return;
+  }
+  const at = Math.min(Math.max(frame, 0), motion.time.length - 1);
+  byId('frame').value = String(at);
+  scene.show(motion.poses[at], null);
+  byId('frame-time').textContent = `${fixed(motion.time[at], 2)} s`;
+}
+
+function play() {
+  if (player) {
+    clearInterval(player);
+    player = null;
+  } else {
+    player = setInterval(() => {
+      if (!answer?.motion) return;
+      frame = (Math.max(frame, 0) + 1) % answer.motion.time.length;
+      showMotion();
+    }, 1000 / 32);
+  }
+  byId('play').textContent = player ? 'stop' : 'play';
+}
+
+/* ---- problems, names ---- */
+
+function showProblems(problems, warnings = []) {
+  for (const element of byId('masses').querySelectorAll('.problem')) element.textContent = '';
+  const left = list.problems(problems, warnings).filter(({key, message}) => {
+    const place = byId('masses').querySelector(`[data-problem="${CSS.escape(key.split('.').slice(0, 2).join('.'))}"]`);
+    if (!place) return true;
+    place.textContent = `${key.split('.').slice(2).join('.')}: ${message}`;
+    return false;
+  });
+  const texts = left.map(({key, message}) => (key ? `${key}: ${message}` : message));
+  if (answer?.diverged) texts.push(answer.diverged);
+  byId('problems').replaceChildren(...texts.map((text) => make('div', {}, text)));
+  byId('problems').hidden = texts.length === 0;
+}
+
+function labelOf(key) {
+  const number = list.rows.get(key)?.number;
+  return number ? {name: `${number.group} · ${number.label}`, unit: number.unit} : {name: key, unit: ''};
+}
+
+const nameOf = (key) => list.rows.get(key)?.number.label ?? key;
+const status = (text) => { byId('status').textContent = text; };
+const search = () => list.search(byId('search').value, byId('only-moved').checked);
+
+/* ---- history, variants, saving ---- */
+
+function showHistory() {
+  byId('history').replaceChildren(...history_.entries.map(({what}, index) =>
+    make('li', {class: index === history_.place ? 'here' : ''},
+      make('button', {onclick: () => setState(history_.go(index))}, what))));
+}
+
+function showVariants() {
+  const columns = [{name: 'now', state, answer}, ...variants];
+  const gap = (of) => (of.answer?.gap ? fixed(of.answer.gap.distance, 2) : '–');
+  const largest = (of, name, decimals) => (of.answer ? fixed(Math.max(...of.answer[name].filter((v) => v !== null)), decimals) : '–');
+  const rows = [
+    ...Object.keys(machine.sensors).map((name, index) => [`${name}, mm`, (of) => (of.answer ? fixed(of.answer.amplitude[index], 2) : '–')]),
+    ['smallest gap, mm', gap],
+    ['largest gasket force, N', (of) => largest(of, 'gasket_force', 1)],
+    ['largest gasket moment, N m', (of) => largest(of, 'gasket_moment', 2)],
+    ['largest mount force, N', (of) => largest(of, 'mount_peak', 1)],
+  ];
+  const what = (of) => [of.state.machine, of.state.masses.length ? 'described load' : of.state.load, of.state.gasket ? '' : 'no gasket',
+    ...Object.entries(of.state.values).map(([key, text]) => `${key} = ${text}`)].filter(Boolean).join('; ');
+  const head = columns.map((of, index) => (index === 0 ? make('th', {}, 'now') : make('th', {title: what(of)},
+    make('span', {class: `dot v${index - 1}`}), of.name,
+    make('button', {title: 'go back to this variant', onclick: () => goTo(of)}, 'open'),
+    make('button', {'aria-label': `remove ${of.name}`, onclick: () => removeVariant(of)}, '×'))));
+  byId('variants').replaceChildren(
+    make('thead', {}, make('tr', {}, make('th', {}), ...head)),
+    make('tbody', {}, ...rows.map(([title, value]) => make('tr', {}, make('th', {}, title), ...columns.map((of) => make('td', {}, value(of)))))));
+  byId('keep').disabled = variants.length >= MOST_VARIANTS || !answer;
+}
+
+function goTo(variant) {
+  history_.add(`variant ${variant.name}`, variant.state);
+  setState(variant.state);
+}
+
+function keepVariant() {
+  const names = new Set(variants.map((of) => of.name));
+  const name = [...'ABCD'].find((letter) => !names.has(letter));
+  variants.push({name, state: copyOf(state), answer});
+  intoLink(state, variants);
+  showAnswer();
+}
+
+function removeVariant(variant) {
+  variants = variants.filter((of) => of !== variant);
+  intoLink(state, variants);
+  showAnswer();
+}
+
+async function runVariants() {
+  for (const variant of variants.filter((of) => !of.answer)) {
+    try {
+      variant.answer = await post('run', {page: `${PAGE} ${variant.name}`, state: variant.state, keys: []});
+    } catch { variant.answer = null; } // its machine is gone: the table shows dashes
+  }
+  showAnswer();
+}
+
+async function save(overwrite) {
+  byId('replace').hidden = true;
+  try {
+    const {saved} = await post('save', {state, name: byId('save-name').value.trim(), overwrite});
+    byId('save-result').textContent = `saved as ${saved}`;
+    await listMachines();
+  } catch (error) {
+    byId('save-result').textContent = error.message;
+    byId('replace').hidden = error.exists !== true;
+  }
+}
+
+async function listMachines() {
+  const found = await get('machines');
+  byId('machine').replaceChildren(...found.machines.map(({id, kind}) =>
+    make('option', {value: id}, id === 'given' ? 'the given file' : `${id} (${kind})`)));
+  if (state) byId('machine').value = state.machine;
+  byId('folder').textContent = found.folder;
+  byId('program').textContent = found.program;
+  return found;
+}
+
+/* ---- beginning ---- */
+
+function listen() {
+  byId('machine').addEventListener('change', (event) => {
+    const next = {machine: event.target.value, values: {}, load: state.load, masses: state.masses, gasket: true};
+    setState(next).then(() => { history_.add(`open ${state.machine}`, state); showHistory(); showLoad(); }, fail);
+  });
+  byId('load').addEventListener('change', (event) => {
+    const described = event.target.value === DESCRIBED;
+    state.masses = described ? [{...MASS}] : [];
+    if (!described) state.load = event.target.value;
+    chooseLoad(described ? 'a described load' : `load ${state.load}`);
+  });
+  byId('gasket').addEventListener('change', (event) => {
+    state.gasket = event.target.checked;
+    chooseLoad(state.gasket ? 'gasket in' : 'gasket out');
+  });
+  byId('add-mass').addEventListener('click', () => {
+    state.masses.push({...MASS});
+    chooseLoad('one more mass');
+  });
+  byId('undo').addEventListener('click', () => setState(history_.go(history_.place - 1)));
+  byId('redo').addEventListener('click', () => setState(history_.go(history_.place + 1)));
+  byId('reset').addEventListener('click', () => { state.values = {}; changed('all as it was'); });
+  byId('copy').addEventListener('click', async () => {
+    intoLink(state, variants);
+    try {
+      await navigator.clipboard.writeText(location.href);
+      status('the link is copied');
+    } catch { status('copy the address of this page: it is the link'); }
+  });
+  document.addEventListener('keydown', (event) => {
+    if (!(event.ctrlKey || event.metaKey) || event.target.matches('input:not([type=range])')) return;
+    if (event.key === 'z' && !event.shiftKey) { event.preventDefault(); byId('undo').click(); }
+    if (event.key === 'y' || (event.key.toLowerCase() === 'z' && event.shiftKey)) { event.preventDefault(); byId('redo').click(); }
+  });
+  byId('search').addEventListener('input', search);
+  byId('only-moved').addEventListener('change', search);
+  byId('rank-by').addEventListener('change', chooseTurned);
+  byId('rank').addEventListener('click', rank);
+  byId('keep').addEventListener('click', keepVariant);
+  byId('save').addEventListener('click', () => save(false));
+  byId('replace').addEventListener('click', () => save(true));
+  byId('play').addEventListener('click', play);
+  byId('frame').addEventListener('input', (event) => { frame = Number(event.target.value); showMotion(); });
+  byId('at-gap').addEventListener('click', () => { if (player) play(); frame = -1; showMotion(); });
+  window.addEventListener('hashchange', () => {
+    const linked = fromLink();
+    if (linked) { variants = linked.variants; history_.add('a link', linked.state); setState(linked.state).then(runVariants, fail); }
+  });
+}
+
+const fail = (error) => {
+  showProblems(error instanceof Problems ? error.problems : [{key: '', message: error.message}]);
+  status('not opened');
+};
+
+async function begin() {
+  listen();
+  const found = await listMachines();
+  const linked = fromLink();
+  const fresh = {machine: found.first, values: {}, load: '', masses: [], gasket: true};
+  variants = linked?.variants ?? [];
+  const wanted = {...fresh, ...linked?.state};
+  if (!found.machines.some(({id}) => id === wanted.machine)) {
+    fail(new Error(`the machine '${wanted.machine}' of the link is not here; '${found.first}' is opened`));
+    wanted.machine = found.first;
+  }
+  await setState(wanted);
+  history_.add('begin', state);
+  showHistory();
+  showLoad();
+  await runVariants();
+  new Studies(found.studies, () => state);
+}
+
+begin().catch(fail);

@@ -1,0 +1,124 @@
+// The list of all numbers: search, groups, a slider and a text for each, problems at the value.
+
+import {digits, make} from './dom.js';
+
+const STEPS = 1000;
+
+export class NumberList {
+  /** `moved(key, text, final)` is called with a text, or null for "as it was". */
+  constructor(parent, moved) {
+    this.parent = parent;
+    this.moved = moved;
+    this.rows = new Map();
+  }
+
+  /** List the numbers of a machine. */
+  fill(numbers) {
+    this.rows.clear();
+    const groups = new Map();
+    for (const number of numbers) {
+      if (!groups.has(number.group)) groups.set(number.group, []);
+      groups.get(number.group).push(this.row(number));
+    }
+    this.parent.replaceChildren(...[...groups].map(([name, rows]) =>
+      make('details', {open: false}, make('summary', {}, name), ...rows)));
+    this.groups = [...this.parent.children];
+  }
+
+  row(number) {
+    const text = make('input', {class: 'text', spellcheck: 'false', autocomplete: 'off', 'aria-label': `${number.group} ${number.label}`});
+    const slider = make('input', {type: 'range', min: '0', max: String(STEPS), 'aria-label': `slider of ${number.group} ${number.label}`});
+    const back = make('button', {class: 'back', title: 'as it was', 'aria-label': `${number.label} as it was`}, '↺');
+    const ranges = [
+      `slider ${digits(number.low, 3)} to ${digits(number.high, 3)}`,
+      number.allowed && `allowed ${number.allowed}`,
+      number.usual && `usual ${number.usual}`,
+    ].filter(Boolean).join(' · ');
+    const problem = make('div', {class: 'problem', role: 'alert', hidden: true});
+    const warning = make('div', {class: 'warning', hidden: true});
+    const element = make('div', {class: 'number', 'data-key': number.key},
+      make('span', {class: 'label', title: number.source ? `${number.key}\n${number.source}` : number.key}, number.label),
+      text, back, slider, make('div', {class: 'range'}, `${number.unit ? `${number.unit} · ` : ''}${ranges}`), problem, warning);
+    const row = {number, element, text, slider, problem, warning, low: number.low, high: number.high};
+    const sliderText = () => {
+      const value = row.low + ((row.high - row.low) * Number(slider.value)) / STEPS;
+      return `${Number(value.toPrecision(5))} ${number.unit}`.trim();
+    };
+    slider.addEventListener('input', () => {
+      text.value = sliderText();
+      this.moved(number.key, text.value, false);
+    });
+    slider.addEventListener('change', () => this.moved(number.key, sliderText(), true));
+    text.addEventListener('change', () => this.moved(number.key, text.value.trim() || null, true));
+    back.addEventListener('click', () => this.moved(number.key, null, true));
+    this.rows.set(number.key, row);
+    return element;
+  }
+
+  /** Show the chosen texts; `shown` has the values in display units that the server read. */
+  show(values, shown = {}) {
+    for (const [key, row] of this.rows) {
+      const isMoved = key in values;
+      row.element.classList.toggle('moved', isMoved);
+      const value = key in shown ? shown[key] : row.number.value;
+      if (document.activeElement !== row.text || isMoved) {
+        row.text.value = isMoved ? values[key] : `${digits(row.number.value, 6).replace('−', '-')} ${row.number.unit}`.trim();
+      }
+      if (document.activeElement !== row.slider && (key in shown || !isMoved)) {
+        row.low = Math.min(row.number.low, value);
+        row.high = Math.max(row.number.high, value);
+        row.slider.value = String((STEPS * (value - row.low)) / (row.high - row.low));
+      }
+    }
+  }
+
+  /** Show problems and warnings at their values; return those that have no row. */
+  problems(problems, warnings = []) {
+    for (const row of this.rows.values()) {
+      row.problem.hidden = row.warning.hidden = true;
+      row.element.classList.remove('wrong');
+    }
+    const left = problems.filter(({key, message}) => {
+      const row = this.nearest(key);
+      if (!row) return true;
+      row.problem.textContent = message;
+      row.problem.hidden = false;
+      row.element.classList.add('wrong');
+      row.element.closest('details').open = true;
+      return false;
+    });
+    for (const {key, message} of warnings) {
+      const row = this.nearest(key);
+      if (!row) continue;
+      row.warning.textContent = message;
+      row.warning.hidden = false;
+    }
+    return left;
+  }
+
+  nearest(key) {
+    return this.rows.get(key) ?? this.rows.get(`${key}.0`);
+  }
+
+  /** Show only numbers whose key path has all words, and only moved ones if wanted. */
+  search(words, onlyMoved) {
+    const wanted = words.toLowerCase().split(/\s+/).filter(Boolean);
+    for (const group of this.groups) {
+      let found = 0;
+      for (const element of group.querySelectorAll('.number')) {
+        const name = `${element.dataset.key} ${group.firstChild.textContent} ${element.firstChild.textContent}`.toLowerCase();
+        const fits = wanted.every((word) => name.includes(word)) && (!onlyMoved || element.classList.contains('moved'));
+        element.hidden = !fits;
+        element.style.display = fits ? '' : 'none';
+        found += fits ? 1 : 0;
+      }
+      group.hidden = found === 0;
+      if (wanted.length || onlyMoved) group.open = found > 0;
+    }
+  }
+
+  /** Open the groups of some numbers. */
+  open(keys) {
+    for (const key of keys) this.rows.get(key)?.element.closest('details').setAttribute('open', '');
+  }
+}

@@ -1,0 +1,112 @@
+// The tub in the housing: outlines of the shapes in parallel projection, to scale.
+
+import {draw, fixed} from './dom.js';
+
+const SIZE = 460;
+const ROUND = 36;
+
+const times = (matrix, p) => matrix.map((row) => row[0] * p[0] + row[1] * p[1] + row[2] * p[2]);
+const plus = (a, b) => a.map((value, index) => value + b[index]);
+const along = (axis, length) => axis.map((value) => value * length);
+
+/** Return the rotation of roll, pitch, yaw: Rz(yaw) Ry(pitch) Rx(roll). */
+export function rotation(roll, pitch, yaw) {
+  const [a, b, c] = [Math.cos(roll), Math.cos(pitch), Math.cos(yaw)];
+  const [d, e, f] = [Math.sin(roll), Math.sin(pitch), Math.sin(yaw)];
+  return [
+    [c * b, c * e * d - f * a, c * e * a + f * d],
+    [f * b, f * e * d + c * a, f * e * a - c * d],
+    [-e, b * d, b * a],
+  ];
+}
+
+/** Return faces (closed lines of points) of a shape in the frame of its body. */
+function faces(shape) {
+  const [u, v, w] = shape.axes;
+  const [a, b, c] = shape.half;
+  const point = (x, y, z) => plus(shape.centre, plus(along(u, x), plus(along(v, y), along(w, z))));
+  if (shape.round) {
+    const circle = (z) => Array.from({length: ROUND}, (_, k) => {
+      const angle = (2 * Math.PI * k) / ROUND;
+      return point(a * Math.cos(angle), a * Math.sin(angle), z);
+    });
+    const [front, rear] = [circle(-c), circle(c)];
+    const sides = [];
+    for (let k = 0; k < ROUND; k += 6) sides.push([front[k], rear[k]]);
+    return [front, rear, ...sides];
+  }
+  const corner = (i, j, k) => point(i * a, j * b, k * c);
+  const found = [];
+  for (const s of [-1, 1]) {
+    found.push([[s, -1, -1], [s, 1, -1], [s, 1, 1], [s, -1, 1]].map((k) => corner(...k)));
+    found.push([[-1, s, -1], [1, s, -1], [1, s, 1], [-1, s, 1]].map((k) => corner(...k)));
+  }
+  return found;
+}
+
+export class SceneView {
+  constructor(parent) {
+    this.turn = -0.55;
+    this.tilt = 0.3;
+    this.svg = draw('svg', {viewBox: `0 0 ${SIZE} ${SIZE}`, role: 'img', 'aria-label': 'tub in the housing'});
+    parent.append(this.svg);
+    let last = null;
+    this.svg.addEventListener('pointerdown', (event) => {
+      last = [event.clientX, event.clientY];
+      this.svg.setPointerCapture(event.pointerId);
+    });
+    this.svg.addEventListener('pointermove', (event) => {
+      if (!last) return;
+      this.turn += (event.clientX - last[0]) * 0.01;
+      this.tilt = Math.min(1.57, Math.max(-1.57, this.tilt + (event.clientY - last[1]) * 0.01));
+      last = [event.clientX, event.clientY];
+      this.redraw();
+    });
+    this.svg.addEventListener('pointerup', () => { last = null; });
+  }
+
+  /** Show shapes of tub and housing; the faces are computed once. */
+  shapes({tub, housing}) {
+    this.tub = tub.map(faces);
+    this.housing = housing.map(faces);
+    const points = this.housing.length ? this.housing.flat(2) : this.tub.flat(2);
+    this.reach = Math.max(0.1, ...points.map((p) => Math.hypot(...p)));
+  }
+
+  /** Show a pose of the tub (roll, pitch, yaw, x, y, z), and the nearest points [m] if given. */
+  show(pose, gap) {
+    this.pose = pose;
+    this.gap = gap;
+    this.redraw();
+  }
+
+  redraw() {
+    if (!this.pose || !this.tub) return;
+    const [cosine, sine] = [Math.cos(this.turn), Math.sin(this.turn)];
+    const [up, down] = [Math.cos(this.tilt), Math.sin(this.tilt)];
+    const scale = (0.5 * SIZE - 8) / this.reach;
+    const seen = (p) => {
+      const right = cosine * p[0] - sine * p[1];
+      const away = sine * p[0] + cosine * p[1];
+      return [0.5 * SIZE + scale * right, 0.5 * SIZE - scale * (up * p[2] + down * away)];
+    };
+    const path = (points) => points.map((p, k) => {
+      const [x, y] = seen(p);
+      return `${k ? 'L' : 'M'}${x.toFixed(1)} ${y.toFixed(1)}`;
+    }).join('');
+    const matrix = rotation(...this.pose.slice(0, 3));
+    const moved = (p) => plus(this.pose.slice(3), times(matrix, p));
+    const closed = (face) => `${path(face)}${face.length > 2 ? 'Z' : ''}`;
+    const parts = [
+      draw('path', {class: 'housing', d: this.housing.flat().map(closed).join('')}),
+      ...this.tub.map((shape) => draw('path', {class: 'tub', d: shape.map((face) => closed(face.map(moved))).join('')})),
+    ];
+    if (this.gap) {
+      const [x, y] = seen(this.gap.points[0]);
+      const left = x > 0.6 * SIZE;
+      parts.push(draw('path', {class: 'gap-line', d: path(this.gap.points)}));
+      parts.push(draw('text', {class: 'gap-text', x: String(x + (left ? -8 : 8)), y: String(Math.max(14, y - 6)), 'text-anchor': left ? 'end' : 'start'}, `${fixed(this.gap.distance)} mm`));
+    }
+    this.svg.replaceChildren(...parts);
+  }
+}

@@ -1,0 +1,80 @@
+"""Who runs next: one calculation at a time for each page, and the latest wish of a page wins."""
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import Executor
+from typing import Any
+
+
+class OvertakenError(Exception):
+    """A later request of the same page has taken the place of this one."""
+
+
+class Turns:
+    """Calculations of several pages on the threads of an executor.
+
+    Of each page one calculation runs and one waits. A new one replaces the one that waits and keeps
+    its place, so a page that asks often does not delay the others. Background work starts only if
+    nothing else waits.
+    """
+
+    def __init__(self, executor: Executor, workers: int) -> None:
+        """Use an executor with some workers."""
+        self._executor, self._workers = executor, workers
+        self._waiting: dict[str, tuple[Callable[[], Any], asyncio.Future[Any], bool]] = {}
+        self._running: set[str] = set()
+        self._tasks: set[asyncio.Task[None]] = set()  # the loop itself keeps no task alive
+
+    async def take(
+        self, page: str, calculate: Callable[[], Any], *, background: bool = False
+    ) -> Any:
+        """Return the result of a calculation when it is the turn of its page.
+
+        Args:
+            page: Identifier of the page.
+            calculate: Called in a thread.
+            background: Whether it starts only if no other calculation waits.
+
+        Raises:
+            OvertakenError: a later calculation of the page came before this one began.
+        """
+        future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+        earlier = self._waiting.get(page)
+        if earlier is not None and not earlier[1].done():
+            earlier[1].set_exception(OvertakenError())
+        self._waiting[page] = calculate, future, background
+        self._start()
+        return await future
+
+    def _start(self) -> None:
+        while len(self._running) < self._workers:
+            page = self._next()
+            if page is None:
+                return
+            calculate, future, _ = self._waiting.pop(page)
+            self._running.add(page)
+            task = asyncio.ensure_future(self._run(page, calculate, future))
+            self._tasks.add(task)
+            task.add_done_callback(self._tasks.discard)
+
+    def _next(self) -> str | None:
+        """Return the page whose turn it is: in order, urgent work first; None if none waits."""
+        ready = [page for page in self._waiting if page not in self._running]
+        urgent = [page for page in ready if not self._waiting[page][2]]
+        return next(iter(urgent or ready), None)
+
+    async def _run(
+        self, page: str, calculate: Callable[[], Any], future: "asyncio.Future[Any]"
+    ) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            result = await loop.run_in_executor(self._executor, calculate)
+        except Exception as error:
+            if not future.done():
+                future.set_exception(error)
+        else:
+            if not future.done():
+                future.set_result(result)
+        finally:
+            self._running.discard(page)
+            self._start()
