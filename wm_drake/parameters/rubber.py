@@ -54,13 +54,33 @@ class RubberBranches(BaseModel):
     """Options of a bushing, each per axis and in parallel with its spring and dashpot.
 
     Attributes:
-        dahl_force_x, ...: Full force of rate-independent friction; 0 for none.
-        dahl_displacement_x, ...: Displacement over which it builds up: from rest the force is
-            dahl_force (1 - exp(-x / dahl_displacement)).
-        maxwell_stiffness_x, maxwell_damping_x, ...: Spring and dashpot in series; 0 for none.
-        cross_stiffness_x_y, ...: Force along the first axis from the displacement along (or the
-            rotation about) the second one, and the reverse. The whole stiffness matrix must not be
-            negative in any direction.
+        dahl_force_x, dahl_force_y, dahl_force_z: Full force of rate-independent friction along each
+            axis; 0 for none.
+        dahl_displacement_x, dahl_displacement_y, dahl_displacement_z: Displacement over which that
+            friction builds up: from rest it is dahl_force (1 - exp(-x / dahl_displacement)).
+        dahl_torque_x, dahl_torque_y, dahl_torque_z: Full torque of rate-independent friction about
+            each axis; 0 for none.
+        dahl_angle_x, dahl_angle_y, dahl_angle_z: Angle over which that friction builds up.
+        maxwell_stiffness_x, maxwell_stiffness_y, maxwell_stiffness_z: Spring of a Maxwell branch
+            along each axis, in series with its dashpot; 0 for none.
+        maxwell_damping_x, maxwell_damping_y, maxwell_damping_z: Dashpot of that branch.
+        rotational_maxwell_stiffness_x, rotational_maxwell_stiffness_y:
+            Spring of a Maxwell branch about each axis, in series with its dashpot; 0 for none.
+        rotational_maxwell_stiffness_z: The same about z.
+        rotational_maxwell_damping_x, rotational_maxwell_damping_y, rotational_maxwell_damping_z:
+            Dashpot of that branch.
+        cross_stiffness_x_y, cross_stiffness_x_z, cross_stiffness_y_z: Force along the first axis
+            from the displacement along the second one, and the reverse. The stiffness of all six
+            axes together must not be negative in any direction.
+        cross_stiffness_x_about_x, cross_stiffness_x_about_y, cross_stiffness_x_about_z:
+            Force along x from the rotation about an axis, and the reverse.
+        cross_stiffness_y_about_x, cross_stiffness_y_about_y, cross_stiffness_y_about_z:
+            Force along y from the rotation about an axis, and the reverse.
+        cross_stiffness_z_about_x, cross_stiffness_z_about_y, cross_stiffness_z_about_z:
+            Force along z from the rotation about an axis, and the reverse.
+        rotational_cross_stiffness_x_y, rotational_cross_stiffness_x_z:
+            Torque about the first axis from the rotation about the second one, and the reverse.
+        rotational_cross_stiffness_y_z: The same for y and z.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")

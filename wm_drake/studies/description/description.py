@@ -133,7 +133,7 @@ def _laws(parameters: MachineParameters) -> dict[str, str]:
         found["bushing"] = "[A] (7), (8), [B] Fig. 4; wm_drake.laws.bushing.bushing_force"
     if any(bushing.branches_in_use for bushing in parameters.all_bushings().values()):
         found["rubber"] = (
-            "friction F = F_max z / x_c with z' = v - |v| z / x_c (Dahl 1968; F_max dahl_force, x_c "
+            "friction F_max z / x_c with z' = v - |v| z / x_c (Dahl 1968; F_max dahl_force, x_c "
             "dahl_displacement), Maxwell spring k z with z' = v - k z / c, cross-stiffness K: "
             "F_i = -K_ij q_j over position and rotation vector; wm_drake.laws.rubber"
         )
