@@ -28,10 +28,11 @@ from wm_drake.model.machine import OUTPUT_PERIOD
 from wm_drake.model.scene import Gap, Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.cabinet import floor_forces
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.feet import FOOT_VARIABLES, REGION_VARIABLES, cabinet_of, foot_measures
 from wm_drake.simulation.histories import measure_samples_lanes
-from wm_drake.simulation.measures import amplitudes, filtered, power_means
+from wm_drake.simulation.measures import amplitudes, filtered, filtered_columns, power_means
 from wm_drake.simulation.mount_histories import measure_mounts_lanes
 from wm_drake.simulation.mounts import (
     KINDS,
@@ -153,10 +154,27 @@ class Runner:
             *self._forces_of_mounts(key, samples, rows, size, p),
         )
         lengths = self._spring_lengths(key, p, samples, rows, size)
+        filtered = self._filtered(moved.reshape(rows, count, WIDTH), extremes[-WIDTH:])
         return [
-            self._result(item, schedule, _Run.of_lane(lane, *histories, lengths))
+            self._result(item, schedule, _Run.of_lane(lane, *histories, lengths, filtered))
             for lane, item in enumerate(work_items)
         ]
+
+    def _filtered(self, moved: FloatArray, good: FloatArray) -> FloatArray:
+        """Return the filtered displacements at the sensors of runs side by side, if needed.
+
+        Args:
+            moved: Displacements at the measured points. (rows, points, lanes) [m]
+            good: Number of samples of each run before it diverged. (lanes,)
+
+        Returns:
+            (rows, sensors, lanes); of no rows if no measure needs them or no run is complete. [m]
+        """
+        rows, sensors = len(moved), moved.shape[1] - 3
+        if not _FILTERED & set(self.measures) or not np.any(good == rows):
+            return np.empty((0, 0, WIDTH))
+        flat = filtered_columns(moved.reshape(rows, -1), sensors * WIDTH, OUTPUT_PERIOD)
+        return flat.reshape(rows, sensors, WIDTH)
 
     def _forces_of_mounts(
         self, key: BatchKey, samples: FloatArray, rows: int, size: int, p: FloatArray
@@ -238,6 +256,7 @@ class Runner:
                 run.cabinet[: run.good],
                 item.case.profile,
                 OUTPUT_PERIOD,
+                floor_forces=_floor_forces(item, run),
             )
             run.feet.update(found)
         return [run.feet[name] for name in names]
@@ -305,6 +324,15 @@ class Runner:
         return kept[name]
 
 
+def _floor_forces(item: WorkItem, run: "_Run") -> FloatArray | None:
+    """Return the forces of the floor on the feet of a cabinet that moves; None if it is fixed."""
+    cabinet = item.numbers.layout.cabinet_part(run.samples[: run.good, : len(item.begin)])
+    if cabinet is None:
+        return None
+    assert item.numbers.setup.cabinet is not None
+    return floor_forces(cabinet, item.numbers.setup.cabinet.packed())
+
+
 def _divergence(time: FloatArray, samples: FloatArray, good: int) -> str:
     """Return why and when a run diverged, as its record has it; "" if it did not."""
     if good == len(time):
@@ -325,6 +353,8 @@ class _Run:
         mounts: Sums of `measure_mounts_lanes`; empty if not needed.
         cabinet: (n, 6) wrenches on the cabinet; empty if not needed.
         spring_lengths: (springs) smallest lengths; empty if not needed. [m]
+        of_batch: (n, sensors) filtered displacements, computed for all runs of the batch at once;
+            empty if not needed. [m]
         feet: Measures of the feet, filled when they are computed first.
         gap: The smallest gap, filled when it is computed first.
     """
@@ -335,6 +365,7 @@ class _Run:
     mounts: FloatArray
     cabinet: FloatArray
     spring_lengths: FloatArray
+    of_batch: FloatArray
     feet: dict[str, FloatArray] = field(default_factory=dict)
     gap: list[Gap | None] = field(default_factory=list)
 
@@ -345,8 +376,7 @@ class _Run:
     @classmethod
     def of_lane(cls, lane: int, *arrays: FloatArray) -> "_Run":
         """Return the run in a lane of the arrays, which are in the order of the attributes."""
-        samples, moved, extremes, mounts, cabinet, lengths = (a[..., lane] for a in arrays)
-        return cls(samples, moved, extremes, mounts, cabinet, lengths)
+        return cls(*(array[..., lane] for array in arrays))
 
     @property
     def good(self) -> int:
@@ -361,6 +391,8 @@ class _Run:
     @functools.cached_property
     def displacement(self) -> FloatArray:
         """Filtered displacements (n, sensors). [m]"""
+        if self.good == len(self.of_batch):
+            return self.of_batch
         return filtered(self.moved[: self.good, : self.sensors], OUTPUT_PERIOD)
 
 

@@ -2,7 +2,6 @@
 
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.packed import ARRAY, SCALAR, VECTOR, PackedLayout
-from wm_drake.laws.feet import normal_loads
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.types import FloatArray
 
@@ -56,16 +55,3 @@ def load_on_feet(wrench, feet):
     moment_x = wrench[0] + feet.floor * f_y - centre[1] * weight
     moment_y = wrench[1] - feet.floor * f_x + centre[0] * weight
     return weight - wrench[5], f_x, f_y, moment_x, moment_y, wrench[2]
-
-
-@law
-def normal_and_holding(load, feet):
-    """Return the normal load of each foot and the friction force that it can hold. [N]
-
-    Args:
-        load: From `load_on_feet`.
-        feet: Numbers of `FEET`, by name.
-    """
-    n = normal_loads(load[0], load[3], load[4], feet.x, feet.y)
-    mu = feet.friction
-    return n, (mu * n[0], mu * n[1], mu * n[2], mu * n[3])

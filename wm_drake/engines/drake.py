@@ -5,6 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from pydrake.systems.analysis import InitializeParams, ResetIntegratorFromFlags, Simulator
 
+from wm_drake.elements.cabinet import SLIP_SIZE
+from wm_drake.engines.cabinet_frame import seen_from_cabinet
 from wm_drake.engines.schedule import output_times
 from wm_drake.engines.trajectory import Trajectory, cut_at_divergence, diverging_coordinate
 from wm_drake.errors import shortened
@@ -133,9 +135,14 @@ class _Samples:
         self._rate = np.full((len(time), size), np.nan)
         self._deformation = np.zeros((len(time), len(dampers)))
         self._motor_torque = np.full(len(time), np.nan)
+        self._slips = np.full((len(time), SLIP_SIZE), np.nan)
 
     def tub_pose(self) -> FloatArray:
-        """Return roll, pitch, yaw, x, y, z of the tub now. [rad, m]"""
+        """Return roll, pitch, yaw, x, y, z of the tub now, seen from the cabinet. [rad, m]"""
+        cabinet = self._machine.cabinet
+        if cabinet is not None:
+            seen = self._machine.outputs["tub_in_cabinet"]
+            return np.asarray(seen.Eval(cabinet.GetMyContextFromRoot(self._setup.context))[:6])
         tub = self._machine.state_layout.tub
         return np.asarray(self._machine.plant.GetPositions(self._plant_context)[tub])
 
@@ -151,6 +158,10 @@ class _Samples:
                 [bush.GetOutputPort("state").Eval(context) for bush, context in self._branches]
             )
         self._motor_torque[row] = self._torque.Eval(self._torque_context)[0]
+        feet = self._machine.feet
+        if feet is not None:
+            context = feet.GetMyContextFromRoot(self._setup.context)
+            self._slips[row] = feet.GetOutputPort("state").Eval(context)
 
     def trajectory(self, failure: str) -> Trajectory:
         """Return the motion up to the last good sample.
@@ -163,15 +174,18 @@ class _Samples:
         tubes = np.empty((len(self.time), 0, trees[0].shape[1]))
         if telescopes:
             tubes = np.stack(trees[1 : 1 + telescopes], axis=1)
-        carrier = [*layout.carrier, *(layout.size + layout.carrier)]
-        trajectory = Trajectory(
-            self.time,
-            trees[0],
-            self._deformation,
-            self._motor_torque,
-            self._rate[:, layout.tub],
-            tubes,
-            self._state[:, carrier],
-            self._stretches,
+        tub, carrier, cabinet = (
+            self._state[:, [*body, *(layout.size + body)]]
+            for body in (layout.tub, layout.carrier, layout.cabinet)
         )
+        state, of_tub, moving = trees[0], self._rate[:, layout.tub], None
+        if layout.cabinet.size:
+            in_world = cabinet, self._rate[:, layout.cabinet]
+            tub, of_tub = seen_from_cabinet(*in_world, tub, of_tub)
+            state = np.column_stack([tub[:, :6], state[:, 6], tub[:, 6:], state[:, 13]])
+            if carrier.shape[1]:
+                carrier, _ = seen_from_cabinet(*in_world, carrier, self._rate[:, layout.carrier])
+            moving = np.column_stack([cabinet, self._slips])
+        found = self.time, state, self._deformation, self._motor_torque, of_tub, tubes, carrier
+        trajectory = Trajectory(*found, self._stretches, cabinet=moving)
         return cut_at_divergence(trajectory, failure)

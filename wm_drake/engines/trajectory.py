@@ -40,8 +40,8 @@ class Trajectory:
         time: (n,) [s]
         state: (n, 14) Positions and velocities of the plant: roll, pitch, yaw, x, y, z of T in W,
             drum angle; angular velocity and velocity of To in W, drum speed. Drum angle and speed
-            are against the tub, with a compliant bearing against the drum carrier.
-            [rad, m, rad/s, m/s]
+            are against the tub, with a compliant bearing against the drum carrier. Of a cabinet
+            that moves, W is here and below its frame. [rad, m, rad/s, m/s]
         deformation: (n, dampers) Deformation of the sponge of each damper, telescopic dampers last;
             0 for a damper without a sponge. [m]
         motor_torque: (n,) Torque of the motor on the drum; its reaction acts on the tub. [N m]
@@ -54,6 +54,9 @@ class Trajectory:
         stretches: (n, branches) Stretch of each branch of rubber bushings in use, (n, 0) without
             them. [m or rad]
         divergence: None if the run reached the end of its profile.
+        cabinet: (n, 20) Positions and velocities in W of a cabinet that moves, in the order of
+            those of the tub in `state`, then how far each foot has slid, x and y [m]; None for a
+            fixed one.
     """
 
     time: FloatArray
@@ -65,6 +68,7 @@ class Trajectory:
     carrier: FloatArray
     stretches: FloatArray
     divergence: Divergence | None = None
+    cabinet: FloatArray | None = None
 
 
 def cut_at_divergence(trajectory: Trajectory, failure: str = "") -> Trajectory:
@@ -99,6 +103,7 @@ def _cut(trajectory: Trajectory, length: int, divergence: Divergence) -> Traject
         trajectory.carrier[:length],
         trajectory.stretches[:length],
         divergence,
+        None if trajectory.cabinet is None else trajectory.cabinet[:length],
     )
 
 

@@ -23,8 +23,15 @@ from pydrake.multibody.tree import (
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names, shortened
 from wm_drake.model.sdf_shapes import check_shapes
-from wm_drake.model.state_layout import CARRIER
-from wm_drake.parameters import BodyOverride, Load, MachineParameters, with_value
+from wm_drake.model.state_layout import CABINET, CARRIER
+from wm_drake.parameters import (
+    BodyOverride,
+    InertiaMatrix,
+    Load,
+    MachineParameters,
+    with_value,
+)
+from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.text_files import check_regular, is_file
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
@@ -73,7 +80,9 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
     positions and 7 velocities. The outer tubes of telescopic dampers get one too. The reflected
     inertia of the drive makes the drum follow its speed source (`wm_drake.systems.speed_source`).
     With a compliant bearing the drum turns in a massless floating body, the drum carrier
-    (`wm_drake.model.state_layout.CARRIER`). Its frame coincides with T in the drawn pose.
+    (`wm_drake.model.state_layout.CARRIER`). Its frame coincides with T in the drawn pose. A cabinet
+    that moves is a floating body too; the housing of the SDF stays where it is drawn, and gives the
+    mounting points in the frame of the cabinet.
 
     Args:
         plant: Empty plant.
@@ -123,6 +132,8 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
     actuator = _drive_actuator(plant, parameters.drive.joint)
     if parameters.imperfections.bearing:
         actuator = _attach_drum_to_carrier(plant, actuator)
+    if parameters.cabinet_moves:
+        _add_cabinet(plant)
     actuator.set_default_rotor_inertia(REFLECTED_INERTIA)
     actuator.set_default_gear_ratio(1.0)
     _add_frames(plant, parameters)
@@ -203,6 +214,24 @@ def _attach_drum_to_carrier(plant: MultibodyPlant, actuator: JointActuator) -> J
     )
 
 
+def _add_cabinet(plant: MultibodyPlant) -> None:
+    """Add the body of a cabinet that moves; `set_bodies` sets its mass properties.
+
+    Args:
+        plant: Plant before `Finalize`.
+    """
+    body = plant.AddRigidBody(CABINET, plant.AddModelInstance(CABINET), SpatialInertia.Zero())
+    plant.AddJoint(RpyFloatingJoint(f"{CABINET}_floating", plant.world_frame(), body.body_frame()))
+
+
+def cabinet_inertia(cabinet: Cabinet) -> SpatialInertia:
+    """Return the spatial inertia of a cabinet about the origin of its frame."""
+    assert cabinet.inertia is not None  # a cabinet that moves has it
+    return SpatialInertia.MakeFromCentralInertia(
+        cabinet.mass, np.array(cabinet.centre_of_mass), rotational_inertia(cabinet.inertia)
+    )
+
+
 def _add_frames(plant: MultibodyPlant, parameters: MachineParameters) -> None:
     """Add the frames that a machine attaches to links of its SDF.
 
@@ -232,16 +261,18 @@ def _add_frames(plant: MultibodyPlant, parameters: MachineParameters) -> None:
 
 def _check_degrees_of_freedom(plant: MultibodyPlant, parameters: MachineParameters) -> None:
     """Raise InputError if the plant has other degrees of freedom than its floating trees."""
-    dampers, carriers = (
+    dampers, carriers, cabinets = (
         len(parameters.telescopic_dampers),
         1 if parameters.imperfections.bearing else 0,
+        1 if parameters.cabinet_moves else 0,
     )
     if (
-        plant.num_velocities() != 7 + 7 * dampers + 6 * carriers
+        plant.num_velocities() != 7 + 7 * dampers + 6 * (carriers + cabinets)
         or plant.num_positions() != plant.num_velocities()
     ):
         more = ", 7 for each telescopic damper" if dampers else ""
         more += ", 6 for the drum carrier" if carriers else ""
+        more += ", 6 for the cabinet" if cabinets else ""
         size = plant.num_velocities()
         raise input_error(
             f"SDF '{parameters.model}' has {size} degrees of freedom; allowed are 6 for the tub, "
@@ -390,6 +421,9 @@ def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameter
         body.SetSpatialInertiaInBodyFrame(
             context, _overridden(body.default_spatial_inertia(), override)
         )
+    if parameters.cabinet is not None and parameters.cabinet.moves:
+        body = plant.GetBodyByName(CABINET)
+        body.SetSpatialInertiaInBodyFrame(context, cabinet_inertia(parameters.cabinet))
     for name, frame_override in parameters.frames.items():
         frame = plant.GetFrameByName(name)
         rotation = frame.GetFixedPoseInBodyFrame().rotation()
@@ -416,11 +450,13 @@ def _overridden(inertia: SpatialInertia, override: BodyOverride) -> SpatialInert
         central = inertia.Shift(inertia.get_com()).CalcRotationalInertia()
         about_centre = central * (mass / inertia.get_mass())
     else:
-        matrix = override.inertia
-        about_centre = RotationalInertia(
-            matrix.xx, matrix.yy, matrix.zz, matrix.xy, matrix.xz, matrix.yz
-        )
+        about_centre = rotational_inertia(override.inertia)
     return SpatialInertia.MakeFromCentralInertia(mass, centre, about_centre)
+
+
+def rotational_inertia(matrix: InertiaMatrix) -> RotationalInertia:
+    """Return an inertia matrix in the form of Drake."""
+    return RotationalInertia(matrix.xx, matrix.yy, matrix.zz, matrix.xy, matrix.xz, matrix.yz)
 
 
 def with_sdf_values(

@@ -8,6 +8,7 @@ from pydrake.geometry import Meshcat
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
+from wm_drake.elements.cabinet import FEET_SIZE
 from wm_drake.elements.rubber import RubberBushingParameters
 from wm_drake.model.bodies import add_bodies
 from wm_drake.model.frame_poses import FramePoses
@@ -18,6 +19,7 @@ from wm_drake.model.tub_points import measured_points, tub_points
 from wm_drake.model.visualization import add_visualizer
 from wm_drake.model.wiring import Link, Wiring
 from wm_drake.parameters import MachineParameters
+from wm_drake.systems.cabinet import Cabinet, Feet
 from wm_drake.systems.drum_bearing import DrumBearing
 from wm_drake.systems.friction_damper import FrictionDamper
 from wm_drake.systems.sensors import Sensors
@@ -73,18 +75,30 @@ def add_washing_machine(
     profile, source, torque = _add_drive(wiring, parameters)
     tub_force, sensors = TubForce(), Sensors(points)
     tub_state = wiring.tub_state()
-    wiring.connect_elements(tub_state, [*on_tub, ("tub_force", tub_force)], links)
-    builder.Connect(tub_state, wiring.add("sensors", sensors).GetInputPort("plant_state"))
+    cabinet, feet, seen = None, None, tub_state
+    if parameters.cabinet_moves:
+        cabinet, feet = Cabinet(), Feet(np.zeros(FEET_SIZE))
+        on_cabinet = Link("cabinet", cabinet, len(layout.trees) - 1)
+        wiring.connect_elements(tub_state, [("tub_force", tub_force)], [*links, on_cabinet])
+        seen = wiring.connect_cabinet(cabinet, on_tub, feet)
+    else:
+        wiring.connect_elements(tub_state, [*on_tub, ("tub_force", tub_force)], links)
+    builder.Connect(seen, wiring.add("sensors", sensors).GetInputPort("plant_state"))
     inputs = {"drum_acceleration": source.GetInputPort("drum_acceleration")}
     inputs["tub_force"] = tub_force.GetInputPort("tub_force")
     outputs = {"state": plant.get_state_output_port()}
     for port in ("displacement", "detergent_displacement", "drum_speed"):
         outputs[port] = sensors.GetOutputPort(port)
     outputs["motor_torque"] = torque.GetOutputPort("torque")
+    if feet:
+        outputs["tub_in_cabinet"], outputs["feet_floor_force"] = (
+            seen,
+            feet.GetOutputPort("floor_force"),
+        )
     for label, system in [*on_tub, *((link.label, link.system) for link in links)]:
         for port in _own_outputs(system):
             outputs[f"{label}_{port}"] = system.GetOutputPort(port)
-    systems = springs, dampers, bushings, telescopes, bearing
+    systems = springs, dampers, bushings, telescopes, bearing, cabinet, feet
     return MachineSystems(
         parameters, plant, layout, profile, source, sensors, *systems, inputs, outputs
     )

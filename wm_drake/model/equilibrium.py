@@ -129,7 +129,7 @@ def put_to_rest(
     sags = any(spring.is_given for spring in elements.springs.values())
     tolerance = EQUILIBRIUM_TOLERANCE
     if state_layout.attached.size:
-        every = np.setdiff1d(np.arange(state_layout.size), state_layout.drum)
+        every = np.union1d(state_layout.tub, state_layout.attached)
         tolerance = max(tolerance, _balance(statics, every))
     q = plant.GetPositions(context)
 
@@ -171,6 +171,27 @@ def put_to_rest(
             "remain; move spring frames or masses"
         )
     return remaining
+
+
+def weight_on_cabinet(
+    plant: MultibodyPlant, context: Context, state_layout: StateLayout
+) -> FloatArray:
+    """Return the wrench of the mounts on the cabinet at rest: the weight of all that hangs on them.
+
+    Args:
+        plant, context: The plant and its Context, at rest.
+        state_layout: State layout of the plant.
+
+    Returns:
+        Moment about the origin of W and force, in W. (6,) [N m, N]
+    """
+    weight, q = plant.CalcGravityGeneralizedForces(context), plant.GetPositions(context)
+    total = np.zeros(6)
+    for body in (state_layout.tub, state_layout.carrier):
+        if body.size:
+            moment, force = np.split(weight[body], 2)
+            total += [*(moment + np.cross(q[body][3:], force)), *force]
+    return total
 
 
 def tensions_at(elements: PlacedElements, pose: FloatArray) -> dict[str, float]:

@@ -10,11 +10,13 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, InputPort, OutputPort
 
 from wm_drake.elements.bushing import SixComponentBushingParameters
+from wm_drake.elements.cabinet import CabinetOnFeet
 from wm_drake.elements.friction_damper import FrictionDamperParameters
 from wm_drake.elements.spring import SpringStrutParameters
 from wm_drake.elements.telescopic_damper import TelescopicDamperParameters
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.bodies import add_load, set_bodies
+from wm_drake.model.cabinet import cabinet_at_rest
 from wm_drake.model.equilibrium import preloaded, put_to_rest
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.placed_elements import AppliedForce, PlacedElements, placed_elements
@@ -23,6 +25,7 @@ from wm_drake.model.state_layout import StateLayout
 from wm_drake.model.tub_points import TubPoints, measured_points, tub_points
 from wm_drake.parameters import Load, MachineParameters, Sensor, SpinProfile
 from wm_drake.parameters.types import FloatArray
+from wm_drake.systems.cabinet import Cabinet, Feet
 from wm_drake.systems.drum_bearing import DrumBearing
 from wm_drake.systems.friction_damper import FrictionDamper
 from wm_drake.systems.sensors import Sensors
@@ -52,6 +55,8 @@ class Setup:
             (telescopic dampers, 7) [rad, m]
         carrier_rest: Angles and position of the drum carrier at rest with a compliant bearing, else
             empty. (6,) [rad, m]
+        cabinet: The cabinet on its feet if it moves, else None. Its frame then takes the place of W
+            for the tub; at rest they coincide.
     """
 
     machine: "MachineSystems"
@@ -63,6 +68,7 @@ class Setup:
     residual: FloatArray
     tube_rest: FloatArray
     carrier_rest: FloatArray
+    cabinet: CabinetOnFeet | None
 
     @property
     def plant_context(self) -> Context:
@@ -133,13 +139,14 @@ class MachineSystems:
         spin_profile, speed_source, sensors: Systems that drive the drum and measure the tub.
         springs, dampers, bushings, telescopes: Element systems by name.
         bearing: System of the compliant bearing; None for a rigid one.
+        cabinet, feet: Systems of a cabinet that moves; None if it is fixed.
         inputs: By name. "drum_acceleration" (1) [rad/s^2] replaces the acceleration of the spin
             profile if a value is connected or fixed. "tub_force" (6) is moment about To and force
             on the tub in W [N m, N], zero if nothing is connected.
         outputs: By name: "state" of the plant; "displacement" of the sensors,
             "detergent_displacement", "drum_speed"; "motor_torque"; and for each element its own
             outputs, such as "spring_left_force", "damper_left_force", "gasket_force" and
-            "gasket_moment".
+            "gasket_moment"; of a cabinet that moves "feet_floor_force".
     """
 
     parameters: MachineParameters
@@ -153,6 +160,8 @@ class MachineSystems:
     bushings: dict[str, SixComponentBushing]
     telescopes: dict[str, TelescopicDamper]
     bearing: DrumBearing | None
+    cabinet: Cabinet | None
+    feet: Feet | None
     inputs: dict[str, InputPort]
     outputs: dict[str, OutputPort]
     _poses: list[FramePoses] = field(default_factory=list, repr=False, compare=False, kw_only=True)
@@ -202,14 +211,16 @@ class MachineSystems:
         elements = elements if dampers else elements.without_dampers()
         elements = elements if friction else elements.without_friction()
         residual = put_to_rest(self.plant, plant_context, layout, elements)
+        cabinet = cabinet_at_rest(self.plant, plant_context, layout, parameters)
         self._add_load(plant_context, parameters, load)
         q = self.plant.GetPositions(plant_context)
         points = tub_points(poses, parameters)
         profile = profile or parameters.profile
         self._set_systems(context, elements, measured_points(parameters, points, q[layout.tub]))
+        self._set_feet(context, cabinet)
         self.set_profile(context, profile)
         rest = q[layout.tub], residual, q[layout.tubes], q[layout.carrier]
-        return Setup(self, parameters, context, elements, points, *rest)
+        return Setup(self, parameters, context, elements, points, *rest, cabinet)
 
     def set_up_bodies(
         self, load: Load | None, parameters: MachineParameters, context: Context
@@ -301,6 +312,13 @@ class MachineSystems:
                 if system.state_size:
                     own.SetContinuousState(np.zeros(system.state_size))
         self.sensors.set_points(self.sensors.GetMyContextFromRoot(context), points)
+
+    def _set_feet(self, context: Context, cabinet: CabinetOnFeet | None) -> None:
+        """Set the parameters of the feet of a cabinet that moves; no foot has slid."""
+        if self.feet is not None and cabinet is not None:
+            own = self.feet.GetMyContextFromRoot(context)
+            self.feet.set_parameters(own, cabinet.packed())
+            own.SetContinuousState(np.zeros(self.feet.state_size))
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,13 @@ def check_same_elements(built: MachineParameters, wanted: MachineParameters) -> 
             f"{now}",
             key="imperfections.bearing",
         )
+    if wanted.cabinet_moves != built.cabinet_moves:
+        kinds = ("moves", "does not")
+        now, before = kinds if wanted.cabinet_moves else kinds[::-1]
+        raise input_error(
+            f"this cabinet {now}, that of the built machine {before}; rebuild the machine",
+            key="cabinet.moves",
+        )
     _check_laws(built, wanted)
     _check_branches(built, wanted)
 

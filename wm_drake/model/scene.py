@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.geometry import Cylinder, GeometryId, Meshcat, MeshcatVisualizer
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
@@ -20,6 +21,12 @@ from wm_drake.parameters.types import FloatArray
 
 _COARSE_STRIDE = 16
 """Stride of the poses that the first pass of the search for the smallest gap uses."""
+
+_REFERENCE_GRID = 0.001
+"""Grid of the reference poses that bounds of distances start from. [rad, m]"""
+
+_REFERENCES_KEPT = 64
+"""Number of reference poses whose distances are cached."""
 
 _AT_ORIGIN = np.zeros((1, 6))
 """Pose of the housing."""
@@ -79,6 +86,59 @@ class Outline:
         return nearest[:, 0]
 
 
+def _reference(rest_pose: FloatArray) -> tuple[float, ...]:
+    """Return a pose near a rest pose that machines with similar rest poses share. [rad, m]"""
+    return tuple(map(float, _REFERENCE_GRID * np.round(rest_pose / _REFERENCE_GRID)))
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """How far the tub moves from a reference pose; bounds of the distance of a pair of shapes.
+
+    Attributes:
+        moved: Translation. (3, n) [m]
+        turned: Largest displacement of a point of the tub group by its rotation. (n,) [m]
+        farthest: Pose with the largest displacement of any point.
+        shift: This displacement. [m]
+    """
+
+    moved: FloatArray
+    turned: FloatArray
+    farthest: int
+    shift: float
+
+    @classmethod
+    def of(cls, poses: FloatArray, reference: tuple[float, ...], reach: float) -> "_Motion":
+        """Return the motion of poses of the tub.
+
+        Args:
+            poses: Roll, pitch, yaw, x, y, z. (n, 6) [rad, m]
+            reference: The same of the reference pose.
+            reach: Largest distance of a point of the tub group from To. [m]
+        """
+        moved = poses.T.copy()
+        moved -= np.array(reference)[:, None]
+        roll, pitch, yaw, x, y, z = moved
+        turned = (np.abs(roll) + np.abs(pitch) + np.abs(yaw)) * reach
+        shift = np.sqrt(x * x + y * y + z * z) + turned
+        farthest = int(np.argmax(shift))
+        return cls(moved[3:], turned, farthest, float(shift[farthest]))
+
+    def nearer_than(
+        self, limit: float, distance: float, direction: FloatArray, stride: int
+    ) -> NDArray[np.int64]:
+        """Return the poses at which the lower bound of the distance of a pair is below a limit.
+
+        Args:
+            limit: The limit. [m]
+            distance: Distance of the pair at the reference. [m]
+            direction: Direction at the reference in which the shape of the tub moves away. (3,)
+            stride: Only every pose of this stride is looked at, from the first one.
+        """
+        least = direction @ self.moved[:, ::stride] - self.turned[::stride]
+        return np.asarray(stride * np.flatnonzero(least < limit - distance))
+
+
 class Scene:
     """Shapes of a machine, which can be set to any pose.
 
@@ -117,9 +177,10 @@ class Scene:
         except (RuntimeError, SystemExit) as error:  # Drake turns failed assertions into exits
             raise unusable(sdf_path(parameters.model), error) from None
         self._outlines = {shape: self._outline(shape) for pair in self._pairs for shape in pair}
-        self._rest_cache: dict[
+        self._references: dict[
             tuple[float, ...], list[tuple[float, FloatArray, tuple[GeometryId, GeometryId]]]
         ] = {}
+        self._names = tuple(f"{self._name(a)}|{self._name(b)}" for a, b in self._pairs)
         outlines = [self._outlines[shape] for shape, _ in self._pairs]
         # largest distance of a point of the tub group from To
         self._reach = max(
@@ -232,7 +293,7 @@ class Scene:
 
         The gap between the support functions of two convex shapes along any direction is a lower
         bound of their distance. The largest bound over all directions is the distance itself. For
-        each pair of shapes, the direction at the rest pose gives a bound at all poses. The distance
+        each pair of shapes, the direction near rest gives a bound at all poses. The distance
         is computed at the pose with the lowest bound, and its direction raises the bounds of all
         poses. This repeats until no bound is below the smallest distance found. The result is
         exact over the samples, after a few dozen distances.
@@ -247,27 +308,22 @@ class Scene:
         """
         if not self._pairs or not len(time):
             return None
-        moved = np.ascontiguousarray((poses - rest_pose).T)
-        roll, pitch, yaw, x, y, z = moved
-        turned = (np.abs(roll) + np.abs(pitch) + np.abs(yaw)) * self._reach
-        shift = np.sqrt(x * x + y * y + z * z) + turned
-        at_rest = self._at_rest(tuple(map(float, rest_pose)))
-        farthest = int(np.argmax(shift))
-        best = self._gap(at_rest[0][2], time[farthest], poses[farthest])[0]
+        poses = np.ascontiguousarray(poses)
+        reference = _reference(rest_pose)
+        near_rest, motion = self._at(reference), _Motion.of(poses, reference, self._reach)
+        best = self._gap(near_rest[0][2], time[motion.farthest], poses[motion.farthest])[0]
         # the coarse pass finds a small gap, which excludes most poses of the fine pass
         for stride in (_COARSE_STRIDE, 1):
-            for distance, direction, pair in at_rest:
-                if distance - shift[farthest] >= best.distance:
+            for distance, direction, pair in near_rest:
+                if distance - motion.shift >= best.distance:
                     break  # this pair and all that follow are farther apart at every pose
-                # lower bound of the distance
-                least = distance + direction @ moved[3:, ::stride] - turned[::stride]
-                near = stride * np.flatnonzero(least < best.distance)
+                near = motion.nearer_than(best.distance, distance, direction, stride)
                 best = self._smallest_of_pair(pair, direction, best, time[near], poses[near])
         return best
 
-    def pair_names(self) -> list[str]:
+    def pair_names(self) -> tuple[str, ...]:
         """Return the names of the pairs of shapes: one of the tub group, one of the housing."""
-        return [f"{self._name(a)}|{self._name(b)}" for a, b in self._pairs]
+        return self._names
 
     def contacts(self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray) -> FloatArray:
         """Return the smallest distance of each pair that touches over sampled poses.
@@ -283,14 +339,14 @@ class Scene:
         found = np.full(len(self._pairs), np.nan)
         if not len(time):
             return found
-        moved = np.ascontiguousarray((poses - rest_pose).T)
-        turned = np.abs(moved[:3]).sum(axis=0) * self._reach
-        shift = float(np.max(np.linalg.norm(moved[3:], axis=0) + turned))
+        poses = np.ascontiguousarray(poses)
+        reference = _reference(rest_pose)
+        near_rest, motion = self._at(reference), _Motion.of(poses, reference, self._reach)
         apart = Gap(float(np.nextafter(0.0, 1.0)), 0.0, "", "", (0.0, 0.0, 0.0))
-        for distance, direction, pair in self._at_rest(tuple(map(float, rest_pose))):
-            if distance - shift > 0.0:
+        for distance, direction, pair in near_rest:
+            if distance - motion.shift > 0.0:
                 break  # this pair and all that follow are apart at every pose
-            near = np.flatnonzero(distance + direction @ moved[3:] - turned <= 0.0)
+            near = motion.nearer_than(apart.distance, distance, direction, 1)
             nearest = self._smallest_of_pair(pair, direction, apart, time[near], poses[near])
             if nearest.distance <= 0.0:
                 found[self._pairs.index(pair)] = nearest.distance
@@ -306,20 +362,19 @@ class Scene:
             float(distance), float(time), self._name(pair[0]), self._name(pair[1]), (x, y, z)
         ), direction
 
-    def _at_rest(
-        self, rest_pose: tuple[float, ...]
+    def _at(
+        self, reference: tuple[float, ...]
     ) -> list[tuple[float, FloatArray, tuple[GeometryId, GeometryId]]]:
-        """Return distance, direction and pair of all pairs at a rest pose, nearest first.
-
-        The last rest pose is cached, because runs of a machine begin at the same pose.
-        """
-        if rest_pose not in self._rest_cache:
-            found = [(*self._nearest(np.array(rest_pose), pair), pair) for pair in self._pairs]
+        """Return distance, direction and pair of all pairs at a pose, nearest first."""
+        if reference not in self._references:
+            found = [(*self._nearest(np.array(reference), pair), pair) for pair in self._pairs]
             nearest_first = sorted(found, key=lambda entry: entry[0])
-            self._rest_cache = {
-                rest_pose: [(distance, away, pair) for distance, _, away, pair in nearest_first]
-            }
-        return self._rest_cache[rest_pose]
+            if len(self._references) == _REFERENCES_KEPT:
+                del self._references[next(iter(self._references))]
+            self._references[reference] = [
+                (distance, away, pair) for distance, _, away, pair in nearest_first
+            ]
+        return self._references[reference]
 
     def _smallest_of_pair(
         self,

@@ -16,6 +16,9 @@ Indices = np.ndarray
 CARRIER = "drum_carrier"
 """Name of the massless body that the drum turns in if its bearing is compliant."""
 
+CABINET = "cabinet"
+"""Name of the body of a cabinet that moves on its feet. Its frame coincides with W at rest."""
+
 
 @dataclass(frozen=True)
 class StateLayout:
@@ -24,7 +27,8 @@ class StateLayout:
     A tree is a floating body and a second body on one of its joints: tub and drum, or outer and
     inner tube of a damper. It has seven positions: roll, pitch, yaw, x, y, z and that of the joint.
     With a compliant bearing the drum turns in a floating carrier. The drum then belongs to two
-    trees: tub and drum for all elements on the tub, carrier and drum for the bearing.
+    trees: tub and drum for all elements on the tub, carrier and drum for the bearing. In the same
+    way the drum is added to a cabinet that moves, so that all trees are of one form.
 
     Attributes:
         size: Number of positions.
@@ -33,6 +37,7 @@ class StateLayout:
         tubes: Indices of the outer tube and of the extension. (telescopic dampers, 7)
         carrier: Indices of roll, pitch, yaw, x, y, z of the drum carrier with a compliant bearing,
             else empty. (6,)
+        cabinet: Indices of roll, pitch, yaw, x, y, z of a cabinet that moves, else empty. (6,)
     """
 
     size: int
@@ -40,21 +45,23 @@ class StateLayout:
     drum: int
     tubes: Indices
     carrier: Indices
+    cabinet: Indices
 
     @property
     def trees(self) -> list[Indices]:
         """Return the seven indices of each tree.
 
         The order is tub and drum, tubes of each telescopic damper, carrier and drum if there is a
-        carrier.
+        carrier, cabinet and drum if the cabinet moves.
         """
-        carriers = [np.append(self.carrier, self.drum)] if self.carrier.size else []
-        return [np.append(self.tub, self.drum), *self.tubes, *carriers]
+        others = [body for body in (self.carrier, self.cabinet) if body.size]
+        with_drum = [np.append(body, self.drum) for body in (self.tub, *others)]
+        return [with_drum[0], *self.tubes, *with_drum[1:]]
 
     @functools.cached_property
     def attached(self) -> Indices:
-        """Return the indices of the bodies attached to the tub: all but tub and drum angle."""
-        return np.setdiff1d(np.arange(self.size), [*self.tub, self.drum])
+        """Return the indices of the bodies attached to the tub: tubes of dampers, drum carrier."""
+        return np.setdiff1d(np.arange(self.size), [*self.tub, self.drum, *self.cabinet])
 
     def states(self) -> list[Indices]:
         """Return the indices in the state of each tree: 7 positions, then 7 velocities."""
@@ -78,4 +85,5 @@ def state_layout_of(plant: MultibodyPlant, parameters: MachineParameters) -> Sta
         row[:] = *floating(joint.parent_body().name()), joint.position_start()
     drum = plant.GetJointByName(parameters.drive.joint).position_start()
     carrier = floating(CARRIER) if parameters.imperfections.bearing else np.zeros(0, dtype=int)
-    return StateLayout(plant.num_positions(), floating("tub"), drum, tubes, carrier)
+    cabinet = floating(CABINET) if parameters.cabinet_moves else np.zeros(0, dtype=int)
+    return StateLayout(plant.num_positions(), floating("tub"), drum, tubes, carrier, cabinet)

@@ -10,6 +10,7 @@ from pydrake.systems.primitives import Adder, Demultiplexer, MatrixGain, Multipl
 
 from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE
 from wm_drake.model.state_layout import StateLayout
+from wm_drake.systems.cabinet import Cabinet, Feet
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,34 @@ class Wiring:
         if links:
             forces = self._with_links(forces, total, len(elements), links)
         self.builder.Connect(forces, self.plant.get_applied_generalized_force_input_port())
+
+    def connect_cabinet(
+        self, cabinet: Cabinet, mounts: list[tuple[str, Any]], feet: Feet
+    ) -> OutputPort:
+        """Add the mounts of tub and drum on a cabinet that moves, and its feet.
+
+        Args:
+            cabinet: System of the cabinet, which is in the diagram as a link.
+            mounts: Elements by label, as for `connect_elements`.
+            feet: System of the feet.
+
+        Returns:
+            The port of the state of tub and drum seen from the cabinet.
+        """
+        seen = cabinet.GetOutputPort("tub_in_cabinet")
+        total = self.add("mounts_force", Adder(len(mounts), GENERALIZED_FORCE_SIZE))
+        for index, (label, system) in enumerate(mounts):
+            self.add(label, system)
+            self.builder.Connect(seen, system.GetInputPort("plant_state"))
+            force = system.GetOutputPort("generalized_force")
+            self.builder.Connect(force, total.get_input_port(index))
+        self.builder.Connect(total.get_output_port(), cabinet.GetInputPort("mounts_force"))
+        self.add("feet", feet)
+        state = self._part_of_state("state_of_feet", [len(self.layout.trees) - 1])
+        self.builder.Connect(state, feet.GetInputPort("plant_state"))
+        force = feet.GetOutputPort("generalized_force")
+        self.builder.Connect(force, cabinet.GetInputPort("feet_force"))
+        return seen
 
     def _with_links(
         self, on_tub: OutputPort, total: Adder, first: int, links: list[Link]

@@ -50,6 +50,7 @@ from wm_drake.parameters.files import (
     machine_yaml,
     shipped_machines,
 )
+from wm_drake.parameters.inertia import InertiaMatrix
 from wm_drake.parameters.keys import quantities, source_of, with_value, with_values
 from wm_drake.parameters.loop_files import MeasuredLoop, read_loop, read_loops
 from wm_drake.parameters.machine import (
@@ -57,7 +58,6 @@ from wm_drake.parameters.machine import (
     Clearance,
     Drive,
     FrameOverride,
-    InertiaMatrix,
     MachineParameters,
     Sensor,
 )

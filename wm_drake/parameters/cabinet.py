@@ -8,6 +8,7 @@ from pydantic import Field, StringConstraints, model_validator
 
 from wm_drake.parameters import units as u
 from wm_drake.parameters.elements import Frozen
+from wm_drake.parameters.inertia import InertiaMatrix
 
 SMALLEST_SINE = 0.02
 """Smallest sine of the angle at a foot between its neighbours; below it, three feet are in line."""
@@ -27,6 +28,23 @@ class Foot(Frozen):
     y: u.Length
 
 
+class FootType(Frozen):
+    """The pad of a foot; all four are alike. Each is a spring with a damper in each direction.
+
+    Attributes:
+        vertical_stiffness: Stiffness of a pad that is pressed; it does not pull.
+        vertical_damping: Its damping.
+        horizontal_stiffness: Stiffness of a pad in shear, the same in all directions.
+        horizontal_damping: Its damping, above 0: it limits the speed at which a sliding pad springs
+            back.
+    """
+
+    vertical_stiffness: Annotated[u.LinearStiffness, Field(gt=0.0)]
+    vertical_damping: Annotated[u.LinearDamping, Field(ge=0.0)]
+    horizontal_stiffness: Annotated[u.LinearStiffness, Field(gt=0.0)]
+    horizontal_damping: Annotated[u.LinearDamping, Field(gt=0.0)]
+
+
 class Cabinet(Frozen):
     """A rigid cabinet that stands on four feet on a rigid level floor.
 
@@ -38,6 +56,10 @@ class Cabinet(Frozen):
         floor: z of the floor in W. [m]
         friction: Coefficient of Coulomb friction between feet and floor.
         feet: The four feet by name, corners of a convex quadrilateral, in any order.
+        moves: Whether it moves on its feet. It then needs `inertia` and `foot_type`. Otherwise it
+            is fixed, and the loads of its feet follow from statics.
+        inertia: Inertia about the centre of mass, in the axes of W.
+        foot_type: The pads of the feet.
     """
 
     mass: Annotated[u.Mass, Field(gt=0.0)]
@@ -45,6 +67,18 @@ class Cabinet(Frozen):
     floor: u.Length
     friction: Annotated[u.Ratio, Field(gt=0.0)]
     feet: dict[FootName, Foot]
+    moves: bool = False
+    inertia: InertiaMatrix | None = None
+    foot_type: FootType | None = None
+
+    @model_validator(mode="after")
+    def _can_move(self) -> "Cabinet":
+        missing = [name for name in ("inertia", "foot_type") if getattr(self, name) is None]
+        if self.moves and missing:
+            raise ValueError(
+                f"moves: needs {' and '.join(missing)} of the cabinet; add them or leave moves out"
+            )
+        return self
 
     @model_validator(mode="after")
     def _stands(self) -> "Cabinet":

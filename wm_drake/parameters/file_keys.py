@@ -203,7 +203,7 @@ def _attributes(docstring: str) -> dict[str, str]:
     found: dict[str, str] = {}
     names: list[str] = []
     for line in section.splitlines():
-        entry = re.match(r"^ {8}([\w, ]+?):( .*)?$", line)
+        entry = re.match(r"^ {8}(\w[\w, ]*?):( .*)?$", line)
         if entry:
             names = [name.strip() for name in entry[1].split(",")]
             found |= dict.fromkeys(names, (entry[2] or "").strip())

@@ -2,7 +2,6 @@
 
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import Field, StringConstraints, ValidationInfo, field_validator, model_validator
 
 from wm_drake.errors import nearest_names
@@ -19,6 +18,7 @@ from wm_drake.parameters.elements import (
     SpringType,
     TelescopicDamper,
 )
+from wm_drake.parameters.inertia import InertiaMatrix
 from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$")]
@@ -36,44 +36,6 @@ and by less than 0.1 % in the Drake engine (tested). See docs/decisions/0007.
 Integrator = Literal["auto", "multistep", "runge_kutta"]
 """Integrator of the compiled engine: one derivative a step, or the Runge-Kutta scheme with four;
 "auto" takes the first where it suits the machine. See docs/decisions/0087."""
-
-
-class InertiaMatrix(Frozen):
-    """Inertia matrix about the centre of mass, in the axes of T (or D).
-
-    The products of inertia are elements of the matrix: xy = -sum(m x y).
-
-    Attributes:
-        xx, yy, zz: Moments of inertia.
-        xy, xz, yz: Elements of the matrix outside of its diagonal.
-    """
-
-    xx: Annotated[u.Inertia, Field(gt=0.0)]
-    yy: Annotated[u.Inertia, Field(gt=0.0)]
-    zz: Annotated[u.Inertia, Field(gt=0.0)]
-    xy: u.Inertia = 0.0
-    xz: u.Inertia = 0.0
-    yz: u.Inertia = 0.0
-
-    @model_validator(mode="after")
-    def _physical(self) -> "InertiaMatrix":
-        matrix = [
-            [self.xx, self.xy, self.xz],
-            [self.xy, self.yy, self.yz],
-            [self.xz, self.yz, self.zz],
-        ]
-        smallest, middle, largest = np.linalg.eigvalsh(matrix)
-        moments = f"{smallest:g}, {middle:g}, {largest:g} kg m^2"
-        if smallest <= 0.0:
-            raise ValueError(
-                f"is not positive definite: the principal moments {moments} must be above 0"
-            )
-        if smallest + middle < largest * (1.0 - 1e-12):
-            raise ValueError(
-                f"belongs to no body: of the principal moments {moments} the largest must not "
-                "exceed the sum of the others"
-            )
-        return self
 
 
 class BodyOverride(Frozen):
@@ -312,6 +274,22 @@ class MachineParameters(Frozen):
                 "bushings: the name 'gasket' is reserved for the key 'gasket'; use another name"
             )
         return self
+
+    @model_validator(mode="after")
+    def _cabinet_can_move(self) -> "MachineParameters":
+        if self.cabinet and self.cabinet.moves and self.telescopic_dampers:
+            raise ValueError(
+                "cabinet.moves: not possible with telescopic_dampers, whose tubes stand on a fixed "
+                "housing; use dampers without tubes, or leave moves out"
+            )
+        if self.cabinet and self.cabinet.moves and not self.gravity > 0.0:
+            raise ValueError("cabinet.moves: needs gravity above 0, which presses the feet down")
+        return self
+
+    @property
+    def cabinet_moves(self) -> bool:
+        """Whether the cabinet moves on its feet; else the housing is fixed."""
+        return self.cabinet is not None and self.cabinet.moves
 
     def accelerometer_frames(self) -> dict[str, str]:
         """Return the frame of each vibration sensor, by name.

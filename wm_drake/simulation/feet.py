@@ -1,5 +1,6 @@
 """Loads of the feet of the cabinet and margins against lift-off, sliding, turning and tilting."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +15,10 @@ from wm_drake.simulation.foot_histories import (
     NORMAL_LARGEST,
     NORMAL_SMALLEST,
     TANGENTIAL_LARGEST,
+    fixed_feet_history,
     foot_extremes,
     foot_history,
+    moving_feet_history,
 )
 from wm_drake.simulation.vibration import region_limits
 
@@ -81,7 +84,13 @@ class FootLoads:
     margins: FloatArray
 
 
-def foot_loads(cabinet: Cabinet, gravity: float, wrenches: FloatArray) -> FootLoads:
+def foot_loads(
+    cabinet: Cabinet,
+    gravity: float,
+    wrenches: FloatArray,
+    *,
+    floor_forces: FloatArray | None = None,
+) -> FootLoads:
     """Return loads and margins of the feet over time.
 
     Args:
@@ -89,11 +98,26 @@ def foot_loads(cabinet: Cabinet, gravity: float, wrenches: FloatArray) -> FootLo
         gravity: [m/s^2]
         wrenches: (n, 6) moment about the origin of W and force of all mounts on the cabinet, in W.
             [N m, N]
+        floor_forces: (n, 4, 3) force of the floor on each foot of a cabinet that moves, in its
+            frame [N]; None for a fixed one, whose loads follow from statics.
     """
-    loads, margins = np.empty((len(wrenches), 2, FEET_COUNT)), np.empty((len(wrenches), 4))
     p = packed_feet(cabinet, gravity)
-    foot_history(np.ascontiguousarray(wrenches), p, loads, margins)
-    return FootLoads(cabinet.corners, loads[:, 0], loads[:, 1], margins)
+    loads, of_feet = _loads(p, wrenches, floor_forces)
+    margins = np.empty((len(loads), len(MARGINS)))
+    foot_history(loads, of_feet, p, margins)
+    return FootLoads(cabinet.corners, of_feet[:, 0], of_feet[:, 1], margins)
+
+
+def _loads(
+    p: FloatArray, wrenches: FloatArray, floor_forces: FloatArray | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return load on all feet (n, 6), and normal and tangential load of each (n, 2, 4)."""
+    loads, of_feet = np.empty((len(wrenches), 6)), np.empty((len(wrenches), 2, FEET_COUNT))
+    if floor_forces is None:
+        fixed_feet_history(np.ascontiguousarray(wrenches), p, loads, of_feet)
+    else:
+        moving_feet_history(np.ascontiguousarray(floor_forces), p, loads, of_feet)
+    return loads, of_feet
 
 
 def foot_measures(
@@ -102,6 +126,9 @@ def foot_measures(
     wrenches: FloatArray,
     profile: SpinProfile,
     period: float,
+    *,
+    floor_forces: FloatArray | None = None,
+    ranges: Sequence[np.ndarray] = (),
 ) -> dict[str, FloatArray]:
     """Return the measures of the feet of a run.
 
@@ -112,6 +139,9 @@ def foot_measures(
             [N m, N]
         profile: Spin profile of the run.
         period: Time between samples. [s]
+        floor_forces: As for `foot_loads`.
+        ranges: Which samples (n,) belong to each part of the run, in place of the regions of a
+            profile that has none.
 
     Returns:
         By the names of `FOOT_VARIABLES` and `REGION_VARIABLES`: smallest and largest normal load
@@ -120,13 +150,15 @@ def foot_measures(
         region (regions,). NaN without samples, and where the run ended before the region did.
     """
     p, regions = packed_feet(cabinet, gravity), region_limits(profile, period)
-    extremes, smallest = np.empty((3, FEET_COUNT)), np.empty((1 + len(regions), len(MARGINS)))
+    parts = [slice(*limits) for limits in regions] or list(ranges)
+    extremes, smallest = np.empty((3, FEET_COUNT)), np.empty((1 + len(parts), len(MARGINS)))
     region_of = np.full(len(wrenches), -1, dtype=np.int64)
-    for number, (first, last) in enumerate(regions):
-        region_of[first:last] = number
-    foot_extremes(np.ascontiguousarray(wrenches), p, region_of, extremes, smallest)
-    complete = [first < last <= len(wrenches) for first, last in regions]
-    smallest[1:][~np.array(complete, dtype=bool)] = np.nan
+    for number, part in enumerate(parts):
+        region_of[part] = number
+    foot_extremes(*_loads(p, wrenches, floor_forces), p, region_of, extremes, smallest)
+    for number, (first, last) in enumerate(regions, start=1):
+        if not first < last <= len(wrenches):
+            smallest[number] = np.nan
     smallest[~np.isfinite(smallest)] = np.nan
     rows = (NORMAL_SMALLEST, NORMAL_LARGEST, TANGENTIAL_LARGEST)
     of_feet = dict(zip(BY_FOOT, (extremes[row] for row in rows), strict=True))

@@ -6,16 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from scipy.signal import butter, find_peaks, hilbert, sosfiltfilt
+from scipy.signal import butter, find_peaks, hilbert, sosfilt_zi
 
 from wm_drake.model.scene import REPLAY_RATE, Gap, Scene
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.feet import BY_FOOT, REGION_VARIABLES, foot_measures
+from wm_drake.simulation.feet import BY_FOOT, REGION_VARIABLES, FootLoads, foot_loads, foot_measures
+from wm_drake.simulation.mount_forces import speed_ranges
 from wm_drake.simulation.mounts import KINDS, force_measures
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record
+from wm_drake.simulation.signals import filter_both_ways, largest_peaks
 from wm_drake.simulation.spring_tension import smallest_tensions
 
 BAND_HZ = (0.5, 20.0)
@@ -94,19 +96,33 @@ def filtered(displacement: FloatArray, period: float) -> FloatArray:
         (n, k) filtered displacements. [m] NaN if there are fewer samples than the filter needs, for
         example because the run diverged at once.
     """
-    padding = min(round(PADDING / period), len(displacement) - 1)
+    return filtered_columns(np.ascontiguousarray(displacement), displacement.shape[1], period)
+
+
+def filtered_columns(signals: FloatArray, columns: int, period: float) -> FloatArray:
+    """Return the first columns of an array of signals, as from `filtered`.
+
+    Args:
+        signals: (n, >= columns), contiguous. [m]
+        columns: Number of columns to filter.
+        period: Time between samples. [s]
+    """
+    rows, stride = signals.shape
+    padding = min(round(PADDING / period), rows - 1)
     if padding <= 6 * FILTER_ORDER + 3:  # the padding that sosfiltfilt chooses by default
-        return np.full(displacement.shape, np.nan)
-    return np.asarray(
-        sosfiltfilt(_band_pass(period), displacement, axis=0, padtype="even", padlen=padding)
-    )
+        return np.full((rows, columns), np.nan)
+    answer, work = np.empty((rows, columns)), np.empty((rows + 2 * padding, columns))
+    sections, settled = _band_pass(period)
+    shape = (rows, columns, stride)
+    filter_both_ways(signals.ravel(), shape, sections, settled, padding, work, answer)
+    return answer
 
 
 @functools.cache
-def _band_pass(period: float) -> FloatArray:
-    return np.asarray(
-        butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=1.0 / period, output="sos")
-    )
+def _band_pass(period: float) -> tuple[FloatArray, FloatArray]:
+    """Return the sections of the filter (s, 6), and their states at a constant signal (s, 2)."""
+    sections = butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=1.0 / period, output="sos")
+    return np.ascontiguousarray(sections), np.ascontiguousarray(sosfilt_zi(sections))
 
 
 def filtered_displacement(record: Record) -> xr.DataArray:
@@ -150,16 +166,9 @@ def amplitudes(displacement: FloatArray) -> tuple[FloatArray, np.ndarray]:
         The largest value in the unit of the signals and the index of its sample, each (k,). A
         signal that is empty or starts with NaN gives NaN and 0.
     """
-    sizes = np.full(displacement.shape[1], np.nan)
-    samples = np.zeros(displacement.shape[1], dtype=np.int64)
-    for column, signal in enumerate(displacement.T):
-        signal = np.ascontiguousarray(signal)
-        if not len(signal) or np.isnan(signal[0]):
-            continue
-        sides = (find_peaks(signal)[0], find_peaks(-signal)[0])
-        nodes = np.concatenate([side if len(side) else np.arange(len(signal)) for side in sides])
-        samples[column] = nodes[np.argmax(np.abs(signal[nodes]))]
-        sizes[column] = abs(signal[samples[column]])
+    sizes = np.empty(displacement.shape[1])
+    samples = np.empty(displacement.shape[1], dtype=np.int64)
+    largest_peaks(np.ascontiguousarray(displacement), sizes, samples)
     return sizes, samples
 
 
@@ -304,15 +313,38 @@ def wrenches_on_cabinet(record: Record) -> FloatArray:
 
 
 def feet_of(record: Record) -> xr.Dataset | None:
-    """Return the measures of the feet of the cabinet; None if the machine has no cabinet."""
+    """Return the measures of the feet of the cabinet; None if the machine has no cabinet.
+
+    For a profile without regions, ranges of drum speed take their place.
+    """
     found = cabinet_in(record)
     if found is None or "cabinet_force" not in record:
         return None
     profile = SpinProfile.model_validate_json(record.attrs["profile"])
-    values = foot_measures(*found, wrenches_on_cabinet(record), profile, _period(record))
-    labels = {"foot": list(found[0].corners), "region": [r.name for r in profile.regions]}
+    parts = speed_ranges(record, profile)
+    values = foot_measures(
+        *found,
+        wrenches_on_cabinet(record),
+        profile,
+        _period(record),
+        floor_forces=_floor_forces(record),
+        ranges=[part.samples for part in parts],
+    )
+    labels = {"foot": list(found[0].corners), "region": [part.name for part in parts]}
     dims = dict.fromkeys(REGION_VARIABLES, "region") | dict.fromkeys(BY_FOOT, "foot")
     return xr.Dataset({n: ([dims[n]] if n in dims else [], v) for n, v in values.items()}, labels)
+
+
+def foot_loads_of(record: Record) -> FootLoads:
+    """Return loads and margins of the feet over time; the machine of the record has a cabinet."""
+    found = cabinet_in(record)
+    assert found is not None
+    return foot_loads(*found, wrenches_on_cabinet(record), floor_forces=_floor_forces(record))
+
+
+def _floor_forces(record: Record) -> FloatArray | None:
+    """Return the forces of the floor on the feet (n, 4, 3) of a cabinet that moves, else None."""
+    return record.floor_force.values if "floor_force" in record else None
 
 
 def _forces_on_cabinet(record: Record) -> dict[str, xr.DataArray]:

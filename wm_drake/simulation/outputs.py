@@ -1,7 +1,5 @@
 """Outputs of a trajectory: motion of bodies and points and forces of elements, with units."""
 
-from typing import TypeAlias
-
 import numpy as np
 
 from wm_drake.elements.bearing import FORCE_SIZE as BEARING_FORCE_SIZE
@@ -12,13 +10,12 @@ from wm_drake.engines.compiled.packing import pack_on_tub
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.cabinet import cabinet_variables
 from wm_drake.simulation.histories import output_history, position_history
 from wm_drake.simulation.mounts import POINT, mount_wrenches
+from wm_drake.simulation.variables import Variables
 
 AXES = ("x", "y", "z")
-
-Variables: TypeAlias = dict[str, tuple[tuple[str, ...], FloatArray, str, str]]
-"""For each variable name: dimensions, values, unit and description."""
 
 
 def variables_of(setup: Setup, trajectory: Trajectory) -> Variables:
@@ -29,6 +26,7 @@ def variables_of(setup: Setup, trajectory: Trajectory) -> Variables:
     return (
         _tubes(trajectory)
         | _branches(setup, trajectory)
+        | cabinet_variables(setup, trajectory)
         | _whirl(setup, trajectory)
         | _motion(setup, trajectory, displacements)
         | _forces(trajectory, *forces)

@@ -19,14 +19,16 @@ Record: TypeAlias = xr.Dataset
 
 The dimensions are time, axis (x, y, z), angle (roll, pitch, yaw), sensor, accelerometer, spring,
 damper, bushing and mount (key paths of all that connects tub and cabinet); machines with telescopic
-dampers also have tube. Each variable has its unit in attrs["units"]. `as_record` makes it.
+dampers also have tube, those with a cabinet that moves foot. Each variable has its unit in
+attrs["units"]. `as_record` makes it.
 """
 
 
 def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
     """Return a trajectory as a record: labelled, with the outputs that follow from the motion.
 
-    All displacements are in W and count from the rest pose of the empty machine.
+    All displacements are in W and count from the rest pose of the empty machine. If the cabinet
+    moves, all but `cabinet_angle` to `foot_slip` are seen from it, in its frame in place of W.
 
     Args:
         setup: Machine as it was set up for the run.
@@ -51,6 +53,7 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
         "mount": mount_names(setup.parameters),
         **({"tube": setup.telescopes} if setup.telescopes else {}),
         **({"branch": branches} if (branches := branch_names(setup)) else {}),
+        **({"foot": setup.cabinet.cabinet.corners} if setup.cabinet else {}),
     }
     label_coordinates = _label_coordinates(**{name: tuple(of) for name, of in labels.items()})
     variables["time"] = "time", trajectory.time, {"units": "s"}

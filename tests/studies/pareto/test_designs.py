@@ -12,6 +12,7 @@ from wm_drake.parameters.designs import DesignTask, load_design, shipped_designs
 from wm_drake.parameters.tolerances import Tolerances
 from wm_drake.report.pareto.report import pareto_report
 from wm_drake.simulation.cases import Case, case_of
+from wm_drake.studies.pareto.envelopes import front_envelopes
 from wm_drake.studies.pareto.problem import machine_designs
 from wm_drake.studies.pareto.study import run_designs
 from wm_drake.studies.pareto.tables import as_plain_data, front_table, write_tables
@@ -114,9 +115,47 @@ def test_front_under_a_constraint_is_found(machine, tmp_path):
         loaded = load_machine(tmp_path / f"machine_{name.replace(' ', '_')}.yaml")
         wanted = front.machine(number).spring_types["suspension"].stiffness
         assert loaded.spring_types["suspension"].stiffness == pytest.approx(wanted, rel=1e-12)
-    page = pareto_report(front, "about")
+    page = pareto_report(front, front_envelopes(front, histories_of(machine)), "about")
     assert "compromise" in page
+    assert "loads middle, counter" in page
     assert page.count("<circle") == len(front.objectives)
+
+
+def histories_of(machine):
+    """Return a function whose records oscillate at 2 Hz, with amplitudes that rise with 1 / k."""
+    nominal = machine.spring_types["suspension"].stiffness
+    time = np.arange(0.0, machine.profile.duration, 0.005)
+
+    def histories(cases, found):
+        for number, case in enumerate(cases):
+            k = case.parameters.spring_types["suspension"].stiffness / nominal
+            size = 1e-3 * (2.0 if "counter" in case.name else 1.0) / k
+            motion = size * np.sin(4.0 * np.pi * time)[:, None] * np.ones(len(machine.sensors))
+            sensors = list(machine.sensors)
+            found(
+                number,
+                xr.Dataset(
+                    {"displacement": (("time", "sensor"), motion)},
+                    {"time": time, "sensor": sensors},
+                ),
+            )
+
+    return histories
+
+
+def test_envelopes_are_the_largest_over_the_loads(machine):
+    front = run_designs(
+        designs_of(machine, task_of()), run_of(machine), evaluations=32, population=16, seed=0
+    )
+    shown = front_envelopes(front, histories_of(machine))
+    assert shown.sensors == tuple(machine.sensors)
+    # 2 mm / k of the counterweight's load; far from the ends, where the filter has settled
+    middle = slice(30, 90)
+    assert shown.nominal[:, middle] == pytest.approx(2e-3, rel=0.01)
+    assert shown.designs.shape == (len(front.objectives), len(machine.sensors), len(shown.time))
+    for (x,), lines in zip(front.found.designs, shown.designs, strict=True):
+        k = front.designs.dimensions[0].number(float(x))
+        assert lines[:, middle] == pytest.approx(2e-3 / k, rel=0.01)
 
 
 def test_number_of_the_machine_is_an_objective(machine):

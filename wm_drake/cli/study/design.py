@@ -1,7 +1,7 @@
 """Command `wm-drake study design`: search designs of a machine and print their Pareto front."""
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -41,6 +41,8 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.parameters import MachineParameters
     from wm_drake.parameters.designs import DesignTask
     from wm_drake.simulation.cases import Case
+    from wm_drake.simulation.records import Record
+    from wm_drake.studies.pareto.envelopes import Envelopes
     from wm_drake.studies.pareto.problem import MachineDesigns
     from wm_drake.studies.pareto.study import ParetoFront
 
@@ -95,9 +97,37 @@ def design(
                 seed=seed,
             )
         ledger.mark_finished()
+        shown = _envelopes(front, built, workers)
         with result_folder(out, writer, RUNS_KEPT) as folder:
-            _write(front, task, folder, time.perf_counter() - begin)
+            _write(front, shown, task, folder, time.perf_counter() - begin)
     _print_result(front, out, as_json, time.perf_counter() - begin)
+
+
+def _envelopes(front: "ParetoFront", built: "Machine", workers: int | None) -> "Envelopes | None":
+    """Return the envelopes of the designs of a front, run again with their histories."""
+    from wm_drake.batch import RunResult, simulate_many
+    from wm_drake.studies.pareto.envelopes import front_envelopes
+
+    if not len(front.objectives):
+        return None
+
+    def histories(cases: "Sequence[Case]", found: "Callable[[int, Record], None]") -> None:
+        def collect(run: RunResult) -> None:
+            assert run.record is not None
+            found(run.number, run.record)
+
+        with progress_bar(len(cases), "envelopes of the front") as progress:
+            simulate_many(
+                built,
+                cases,
+                measures=("extremes",),
+                histories=True,
+                workers=workers,
+                progress=progress,
+                finished=collect,
+            )
+
+    return front_envelopes(front, histories)
 
 
 def _counted(
@@ -167,12 +197,18 @@ def _measures(designs: "MachineDesigns") -> tuple[str, ...]:
     return tuple(name for name in MEASURES if name in needed)
 
 
-def _write(front: "ParetoFront", task: "DesignTask", folder: Path, wall_s: float) -> None:
+def _write(
+    front: "ParetoFront",
+    shown: "Envelopes | None",
+    task: "DesignTask",
+    folder: Path,
+    wall_s: float,
+) -> None:
     from wm_drake.report.pareto.report import pareto_report
     from wm_drake.studies.pareto.tables import write_tables
 
     write_tables(front, folder)
-    page = pareto_report(front, task.about, command_line(), wall_s)
+    page = pareto_report(front, shown, task.about, command_line(), wall_s)
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 

@@ -15,8 +15,9 @@ harmonic of the angle and no other.
 The packed numbers of the bodies are those of `BODIES`, from index 0.
 
 State: tub and drum (`TREE_STATE`); the deformation of each strut damper; the `TUBES_STATE` of each
-telescopic damper; the `CARRIER_STATE` of the drum's carrier in a compliant bearing; the stretches
-of the branches of rubber bushings.
+telescopic damper; the `CARRIER_STATE` of the drum's carrier in a compliant bearing; the state of a
+cabinet that moves (`wm_drake.engines.compiled.cabinet`); the stretches of the branches of rubber
+bushings.
 """
 
 from collections import namedtuple
@@ -48,6 +49,12 @@ from wm_drake.engines.compiled.bearing import (
     read_tub_and_bearing,
     tub_accelerations,
     write_carrier_state,
+)
+from wm_drake.engines.compiled.cabinet import (
+    cabinet_size,
+    seen_from_cabinet,
+    with_cabinet,
+    write_seen_sample,
 )
 from wm_drake.engines.compiled.rubber import (
     branch_count,
@@ -106,14 +113,15 @@ read_bodies, read_rates, write_rates_of = BODIES.read, RATES.read, RATES.write
 
 Elements = namedtuple(
     "Elements",
-    ("springs", "dampers", "bushings", "telescopes", "bearing", "tubes", "branches"),
+    ("springs", "dampers", "bushings", "telescopes", "bearing", "tubes", "cabinet", "branches"),
 )
 """Indices at which the parts of a machine begin.
 
 springs, dampers, bushings: arrays of indices of the elements in the packed numbers; telescopes: the
 same for telescopic dampers, None if there are none; bearing: index of the drum's bearing in the
 packed numbers, None if the bearing is rigid; tubes: index of the telescopic dampers in the state;
-branches: `Branches` of rubber bushings, None if there are none.
+cabinet: index of the cabinet in the packed numbers, None if it is fixed; branches: `Branches` of
+rubber bushings, None if there are none.
 """
 
 MassProperties = namedtuple(
@@ -243,7 +251,9 @@ def state_derivative(x, dx, inputs, masses, rate, acceleration, p, elements):
     """
     angles = read_tree_state(x, 0).angles
     roll, pitch, yaw = sine_cosine(angles[0]), sine_cosine(angles[1]), sine_cosine(angles[2])
-    motion = motion_from_sines(x, 0, roll, pitch, yaw)
+    in_world = motion_from_sines(x, 0, roll, pitch, yaw)
+    cabinet, first = elements.cabinet, cabinet_begin(elements)
+    motion = seen_from_cabinet(x, in_world, cabinet, first)
     zero = 0.0 * angles[0]
     total = (zero, zero, zero, zero, zero, zero)
     for at in elements.springs:
@@ -259,18 +269,20 @@ def state_derivative(x, dx, inputs, masses, rate, acceleration, p, elements):
         inputs[i] = line[1]
         tension, dx[k] = friction_damper_tension(line[1], x[k], p, at)
         total = plus(total, friction_damper_wrench(motion, arm, line, tension, p, at))
+    gravity = read_bodies(p, 0).gravity
     total = add_telescopic_dampers(
-        x, dx, motion, read_bodies(p, 0).gravity, p, elements.telescopes, elements.tubes, total
+        x, dx, motion, gravity, p, elements.telescopes, elements.tubes, total
     )
-    bodies = motion, masses, rate, acceleration, total, p
+    total = with_cabinet(x, dx, in_world, total, gravity, p, cabinet, first)
+    bodies = in_world, masses, rate, acceleration, total, p
     w_rate, v_rate = tub_and_carrier_accelerations(
         x, dx, *bodies, elements.bearing, carrier_begin(elements)
     )
     write_tree_state(
         dx,
         0,
-        angles=rpy_rates(motion.angular_velocity, pitch, yaw),
-        position=motion.velocity,
+        angles=rpy_rates(in_world.angular_velocity, pitch, yaw),
+        position=in_world.velocity,
         joint_position=zero + rate,
         angular_velocity=w_rate,
         velocity=v_rate,
@@ -316,7 +328,7 @@ def state_size(elements):
 @law
 def branches_begin(elements):
     """Return the index in the state where the stretches of rubber bushings begin."""
-    return carrier_begin(elements) + carrier_size(elements.bearing)
+    return cabinet_begin(elements) + cabinet_size(elements.cabinet)
 
 
 @law
@@ -328,17 +340,23 @@ def inputs_size(elements):
 @law
 def rates_size(elements):
     """Return the number of accelerations in a sample."""
-    return RATES_SIZE if elements.bearing is None else 2 * RATES_SIZE
+    carrier = 0 if elements.bearing is None else RATES_SIZE
+    return RATES_SIZE + carrier + (0 if elements.cabinet is None else RATES_SIZE)
 
 
 @law
 def write_sample(history, number, x, dx, elements):
-    """Write a sample: the state, then the `RATES` of the tub and of the drum's carrier, if any."""
+    """Write a sample: the state, then the `RATES` of tub, drum's carrier and cabinet, if any.
+
+    The tub is that seen from the cabinet, so that displacements and forces follow from it alone.
+    """
     size = state_size(elements)
     at = number * (size + rates_size(elements))
     for k in range(size):
         history[at + k] = x[k]
     write_rates(history, at + size, dx, elements)
+    rates = at + size, at + size + rates_size(elements) - RATES_SIZE
+    write_seen_sample(history, at, x, dx, elements.cabinet, cabinet_begin(elements), rates)
 
 
 @law
@@ -355,3 +373,9 @@ def write_rates(history, at, dx, elements):
 def carrier_begin(elements):
     """Return the index in the state where the drum's carrier begins, if there is one."""
     return elements.tubes + TUBES_STATE_SIZE * telescopic_damper_count(elements.telescopes)
+
+
+@law
+def cabinet_begin(elements):
+    """Return the index in the state where the cabinet begins, if it moves."""
+    return carrier_begin(elements) + carrier_size(elements.bearing)

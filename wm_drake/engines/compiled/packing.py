@@ -11,6 +11,7 @@ from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.motion import POSE
 from wm_drake.elements.rubber import AXIS_COUNT, Branches, RubberBushingParameters
 from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE, TUB, TUB_AND_BEARING
+from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE
 from wm_drake.engines.compiled.mechanics import (
     BODIES,
     BODIES_SIZE,
@@ -29,7 +30,7 @@ from wm_drake.engines.compiled.tubes import (
 )
 from wm_drake.errors import InputError, input_error
 from wm_drake.model.machine import Setup
-from wm_drake.model.state_layout import CARRIER
+from wm_drake.model.state_layout import CABINET, CARRIER
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 
@@ -44,6 +45,7 @@ class Layout:
         springs, dampers, bushings, telescopes: Index of each element.
         gasket: Index of the gasket, -1 without one.
         bearing: Index of the drum's compliant bearing, -1 for a rigid one.
+        cabinet: Index of the cabinet, -1 for a fixed one.
         structure: Number of each damper's law and number of points of every table, in order.
         rubber: Index of each bushing of rubber, and number of its stretches.
     """
@@ -54,6 +56,7 @@ class Layout:
     telescopes: tuple[int, ...]
     gasket: int
     bearing: int
+    cabinet: int
     structure: tuple[int, ...]
     rubber: tuple[tuple[int, int], ...] = ()
 
@@ -77,6 +80,7 @@ class Layout:
             telescopes if self.telescopes else None,
             bearing,
             tubes,
+            self.cabinet if self.cabinet >= 0 else None,
             self.branches(self.branches_begin),
         )
 
@@ -84,7 +88,7 @@ class Layout:
     def branches_begin(self) -> int:
         """Index in the state where the stretches of rubber bushings begin."""
         begin = STATE_SIZE + len(self.dampers) + TUBES_STATE_SIZE * len(self.telescopes)
-        return begin + (CARRIER_STATE_SIZE if self.bearing >= 0 else 0)
+        return begin + (CARRIER_STATE_SIZE if self.bearing >= 0 else 0) + self.cabinet_size
 
     def branches(self, first: int) -> Branches | None:
         """Return the bushings of rubber, of which the first stretch has an index in the state."""
@@ -101,7 +105,7 @@ class Layout:
     @property
     def rates_size(self) -> int:
         """Number of accelerations in a sample, behind the state."""
-        return RATES_SIZE if self.bearing < 0 else 2 * RATES_SIZE
+        return RATES_SIZE * (1 + (self.bearing >= 0) + (self.cabinet >= 0))
 
     def parts(self, states: FloatArray) -> tuple[FloatArray, ...]:
         """Split states (n, size) into their parts.
@@ -109,7 +113,7 @@ class Layout:
         Returns:
             State of tub and drum (n, 14); deformations of all dampers, those of telescopic ones
             last (n, d); states of the tubes (n, k, 14); state of the drum's carrier (n, 12), or
-            (n, 0) without one; stretches of rubber bushings (n, s).
+            (n, 0) without one; stretches of rubber bushings (n, s). The rest is the `cabinet_part`.
         """
         tubes_begin = STATE_SIZE + len(self.dampers)
         tubes_end = tubes_begin + TUBES_STATE_SIZE * len(self.telescopes)
@@ -118,8 +122,19 @@ class Layout:
         )
         own, deformation_of_tubes = tubes[:, :, :STATE_SIZE], tubes[:, :, DEFORMATION]
         deformation = np.hstack([states[:, STATE_SIZE:tubes_begin], deformation_of_tubes])
-        carrier, stretches = np.split(states[:, tubes_end:], [self.branches_begin - tubes_end], 1)
+        carrier = states[:, tubes_end : self.branches_begin - self.cabinet_size]
+        stretches = states[:, self.branches_begin :]
         return states[:, :STATE_SIZE], deformation, own, carrier, stretches
+
+    def cabinet_part(self, states: FloatArray) -> FloatArray | None:
+        """Return the states (n, `CABINET_STATE_SIZE`) of a cabinet that moves; None if fixed."""
+        end = self.branches_begin
+        return states[:, end - self.cabinet_size : end] if self.cabinet >= 0 else None
+
+    @property
+    def cabinet_size(self) -> int:
+        """Size of the state of the cabinet; 0 for a fixed one."""
+        return CABINET_STATE_SIZE if self.cabinet >= 0 else 0
 
 
 def pack(setup: Setup) -> tuple[FloatArray, Layout]:
@@ -156,17 +171,27 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
     indices["telescopes"] = tuple(begins)
     names = list(setup.bushings)
     gasket = indices["bushings"][names.index("gasket")] if "gasket" in names else -1
-    if setup.bearing:
-        parts.append(TUB_AND_BEARING.pack(tub=pack_tub(setup), bearing=setup.bearing.packed()))
-        structure += setup.bearing.structure
     bearing = size if setup.bearing else -1
+    if setup.bearing:
+        tub = pack_rigid(setup, "tub")
+        parts.append(TUB_AND_BEARING.pack(tub=tub, bearing=setup.bearing.packed()))
+        structure += setup.bearing.structure
+    cabinet = -1
+    if setup.cabinet:
+        cabinet = BODIES_SIZE + sum(map(len, parts))
+        parts += [pack_rigid(setup, CABINET), setup.cabinet.packed()]
     rubber = tuple(
         (at, bushing.state_size)
         for at, bushing in zip(indices["bushings"], setup.bushings.values(), strict=True)
         if isinstance(bushing, RubberBushingParameters)
     )
     return np.concatenate(parts), Layout(
-        **indices, gasket=gasket, bearing=bearing, structure=tuple(structure), rubber=rubber
+        **indices,
+        gasket=gasket,
+        bearing=bearing,
+        cabinet=cabinet,
+        structure=tuple(structure),
+        rubber=rubber,
     )
 
 
@@ -227,8 +252,9 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     tubes = np.zeros((len(setup.telescopes), TUBES_STATE_SIZE))
     tubes[:, : setup.tube_rest.shape[1]] = setup.tube_rest
     carrier = np.append(setup.carrier_rest, np.zeros_like(setup.carrier_rest))
+    cabinet = np.zeros(CABINET_STATE_SIZE if setup.cabinet else 0)
     stretches = np.zeros(sum(bushing.state_size for bushing in setup.bushings.values()))
-    return np.concatenate([x, tubes.ravel(), carrier, stretches])
+    return np.concatenate([x, tubes.ravel(), carrier, cabinet, stretches])
 
 
 def pack_tubes(setup: Setup, name: str) -> FloatArray:
@@ -272,12 +298,12 @@ def pack_tubes(setup: Setup, name: str) -> FloatArray:
     )
 
 
-def pack_tub(setup: Setup) -> FloatArray:
-    """Return the packed tub without the drum (`TUB`)."""
+def pack_rigid(setup: Setup, name: str) -> FloatArray:
+    """Return the packed tub without the drum, or another body, with all that is welded to it."""
     plant, context = setup.machine.plant, setup.plant_context
-    tub = plant.GetBodyByName("tub")
-    group = [body.index() for body in plant.GetBodiesWeldedTo(tub)]
-    inertia = plant.CalcSpatialInertia(context, tub.body_frame(), group)
+    body = plant.GetBodyByName(name)
+    group = [other.index() for other in plant.GetBodiesWeldedTo(body)]
+    inertia = plant.CalcSpatialInertia(context, body.body_frame(), group)
     return TUB.pack(
         inverse_mass=1.0 / inertia.get_mass(),
         moment=_moment(inertia),

@@ -6,6 +6,8 @@ from wm_drake.compiler.compilation import long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.elements.motion import POSE, tub_motion
+from wm_drake.engines.cabinet_frame import seen_from_cabinet, seen_from_world
+from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
@@ -34,21 +36,26 @@ def trajectory_of(
     """
     states, rates = np.split(samples, [-layout.rates_size], axis=1)
     motion, deformation, tubes, carrier, stretches = layout.parts(states)
+    cabinet, of_tub = layout.cabinet_part(states), rates[:, :RATES_SIZE]
+    with_drum = _motion_of_drum_and_carrier(motion, carrier)
+    of_carrier = rates[:, RATES_SIZE : 2 * RATES_SIZE] if carrier.shape[1] else of_tub
+    if cabinet is not None:
+        in_world = cabinet[:, :CARRIER_STATE_SIZE], rates[:, -RATES_SIZE:]
+        if carrier.shape[1]:
+            carrier, _ = seen_from_cabinet(*in_world, carrier, of_carrier)
+        else:
+            tub, of_carrier = seen_from_world(*in_world, without_drum(motion), of_tub)
+            with_drum = _motion_of_drum_and_carrier(motion, tub)
     torque = np.empty((len(samples), 1))
     drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
-    torque_history(
-        _motion_of_drum_and_carrier(motion, carrier),
-        rates[:, -RATES_SIZE:],
-        drum_acceleration,
-        p,
-        torque,
-    )
-    of_tub = rates[:, :RATES_SIZE]
-    return cut_at_divergence(
-        Trajectory(
-            schedule.time, motion, deformation, torque[:, 0], of_tub, tubes, carrier, stretches
-        )
-    )
+    torque_history(with_drum, of_carrier, drum_acceleration, p, torque)
+    found = schedule.time, motion, deformation, torque[:, 0], of_tub, tubes, carrier, stretches
+    return cut_at_divergence(Trajectory(*found, cabinet=cabinet))
+
+
+def without_drum(motion: FloatArray) -> FloatArray:
+    """Return the motion of the tub (n, 12) without that of the drum (n, 14)."""
+    return np.delete(motion, (DRUM_ANGLE, DRUM_RATE), axis=1)
 
 
 def _motion_of_drum_and_carrier(motion: FloatArray, carrier: FloatArray) -> FloatArray:

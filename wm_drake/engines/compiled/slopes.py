@@ -10,6 +10,7 @@ import numpy as np
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.elements.cabinet import SLIP_SIZE
 from wm_drake.elements.friction_damper import (
     friction_damper_line,
     friction_damper_tension,
@@ -19,6 +20,7 @@ from wm_drake.elements.motion import motion_at, read_tree_state, tub_motion
 from wm_drake.elements.rubber import bushing_wrench
 from wm_drake.elements.spring import spring_strut_wrench
 from wm_drake.elements.telescopic_damper import telescopic_damper_forces
+from wm_drake.engines.compiled.cabinet import VELOCITIES
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
@@ -51,7 +53,8 @@ class SlopedDerivative:
     """The time derivative of the state of a machine as it is set up, and its slopes.
 
     A state has the layout of `wm_drake.engines.compiled.mechanics`. Free are all its numbers but
-    angle and rate of the drum, which are prescribed.
+    angle and rate of the drum, which are prescribed, and the slips of the feet of a cabinet that
+    moves: the feet stick.
 
     Attributes:
         layout: Indices of the parts of the machine in packed numbers and states.
@@ -70,15 +73,19 @@ class SlopedDerivative:
         self.packed, self.layout = pack(setup)
         self.rest = initial_state(setup, SpinProfile(time=(0.0, 1.0), speed=(0.0, 0.0)))
         size = len(self.rest)
-        self.free = np.setdiff1d(np.arange(size), (DRUM_ANGLE, DRUM_RATE))
+        end = self.layout.branches_begin
+        slips = np.arange(end - SLIP_SIZE if setup.cabinet else end, end)
+        self.free = np.setdiff1d(np.arange(size), (DRUM_ANGLE, DRUM_RATE, *slips))
         velocities = np.zeros(size, dtype=bool)
         velocities[STATE_SIZE // 2 : STATE_SIZE] = True
         begin = STATE_SIZE + len(setup.dampers)
         for _ in setup.telescopes:
             velocities[begin + 7 : begin + TUBES_STATE_SIZE - 1] = True
             begin += TUBES_STATE_SIZE
-        end = self.layout.branches_begin
-        velocities[begin + (end - begin) // 2 : end] = True
+        cabinet = end - self.layout.cabinet_size
+        velocities[begin + (cabinet - begin) // 2 : cabinet] = True
+        if setup.cabinet:
+            velocities[cabinet + np.array(VELOCITIES)] = True
         self.is_velocity = velocities[self.free]
         self._steps = np.where(velocities, VELOCITY_STEP, POSITION_STEP)
         self._steps[DRUM_RATE] = POSITION_STEP

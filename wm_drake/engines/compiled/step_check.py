@@ -14,6 +14,7 @@ import numpy as np
 
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.rubber import FRICTION, RubberBushingParameters
+from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, VELOCITIES
 from wm_drake.engines.compiled.linear import PATH, SMOOTH, SPONGE, jacobians
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
 from wm_drake.engines.compiled.packing import Layout, initial_state, pack
@@ -37,7 +38,7 @@ SPEEDS = (1e-6, 1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0)
 
 The slowest has every friction on its steepest part; in the fast ones the sponges slip."""
 
-TUB, BEARING = "the tub", "the drum in its bearing"
+TUB, BEARING, CABINET = "the tub", "the drum in its bearing", "the cabinet on its feet"
 """Names of parts that move."""
 
 DEFORMATION = 1e-4
@@ -77,10 +78,10 @@ class FastestMotion:
 def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
     """Return the motion of each part of a machine that needs the shortest step, by part.
 
-    The parts are `TUB`, `BEARING`, and the sponge and the tubes of each damper, as far as they have
-    a fastest motion of their own, and the Maxwell branches of each bushing. The drum's own angle is
-    prescribed. The friction of a bushing of rubber is left out: every step follows its path in
-    closed form. Its stiffness counts in the motion of the tub.
+    The parts are `TUB`, `BEARING`, `CABINET`, the sponge and the tubes of each damper, and the
+    Maxwell branches of each bushing, as far as they have a fastest motion of their own. The drum's
+    own angle is prescribed. The friction of a bushing of rubber is left out: every step follows its
+    path in closed form. Its stiffness counts in the motion of the tub.
 
     Raises:
         InputError: the machine has something that the compiled engine does not represent.
@@ -197,7 +198,9 @@ def _free_states(setup: Setup) -> tuple[list[int], list[str]]:
         parts.append(f"the sponge of damper '{name}'")
     size = len(initial_state(setup, _STANDSTILL))
     branches = [f"the {kind} of bushing '{name}'" for name, kind in _branches(setup)]
-    parts += [*[BEARING] * (size - len(parts) - len(branches)), *branches]
+    cabinet = CABINET_STATE_SIZE if setup.cabinet else 0
+    parts += [BEARING] * (size - len(branches) - cabinet - len(parts))
+    parts += [*[CABINET] * cabinet, *branches]
     free = [index for index in range(size) if index not in (DRUM_ANGLE, DRUM_RATE)]
     return free, [parts[index] for index in free]
 
@@ -223,7 +226,10 @@ def _velocities(setup: Setup, size: int) -> list[int]:
         found += range(begin + 7, begin + TUBES_STATE_SIZE - 1)
         begin += TUBES_STATE_SIZE
     end = size - len(_branches(setup))
-    found += range(begin + (end - begin) // 2, end)
+    cabinet = end - CABINET_STATE_SIZE if setup.cabinet else end
+    found += range(begin + (cabinet - begin) // 2, cabinet)
+    if setup.cabinet:
+        found += [cabinet + index for index in VELOCITIES]
     return found
 
 

@@ -5,10 +5,12 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, WIDTH, style_axes
-from wm_drake.report.formatting import MISSING, significant
+from wm_drake.report.formatting import MISSING, MM_PER_M, significant
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.tables import Group, Table, line
+from wm_drake.studies.pareto.envelopes import Envelopes
 from wm_drake.studies.pareto.study import COMPROMISE, ParetoFront
 from wm_drake.studies.pareto.tables import machine_file_name
 
@@ -19,11 +21,18 @@ LEFT, RIGHT, TOP, BOTTOM = 80.0, 700.0, 20.0, 320.0
 """Edges of the front that is drawn for picking. [px]"""
 
 
-def pareto_report(front: ParetoFront, about: str, command: str = "", wall_s: float = 0.0) -> str:
+def pareto_report(
+    front: ParetoFront,
+    shown: Envelopes | None,
+    about: str,
+    command: str = "",
+    wall_s: float = 0.0,
+) -> str:
     """Return the report as text of one self-contained HTML file.
 
     Args:
         front: Result of the study.
+        shown: Envelopes of its designs; None without a front.
         about: Description in the design file.
         command: Command line of the study, shown on the page.
         wall_s: Duration of the study. [s]
@@ -43,7 +52,8 @@ def pareto_report(front: ParetoFront, about: str, command: str = "", wall_s: flo
         summary=summary(front),
         warnings=[] if has_front else ["No design meets all constraints."],
         plot=_plot(front) if has_front and len(designs.objectives) > 1 else None,
-        rows=_rows(front),
+        picked=_picked(front, shown) if has_front and shown else None,
+        envelopes_of=shown.of if shown else "",
         chosen=_chosen(front) if has_front else None,
         history=_history(front),
         facts=[(word, text) for word, text in facts if text],
@@ -93,12 +103,31 @@ def _plot(front: ParetoFront) -> dict[str, Any]:
         if np.isfinite(front.nominal_objectives).all()
         else None,
         "chosen": sorted(set(front.chosen.values())),
-        "picked": front.chosen[COMPROMISE],
         "x_ticks": [(at(p)[0], _text3(p[0])) for p in low + fractions[:, None] * (high - low)],
         "y_ticks": [(at(p)[1], _text3(p[1])) for p in low + fractions[:, None] * (high - low)],
         "names": names[:2],
         "edges": (LEFT, RIGHT, TOP, BOTTOM),
     }
+
+
+def _picked(front: ParetoFront, shown: Envelopes) -> dict[str, Any]:
+    """Return the numbers that the page shows of the picked design."""
+    both = np.concatenate([shown.designs.ravel(), shown.nominal.ravel(), [0.0]])
+    scale = MM_PER_M * float(np.nanmax(both))
+    return {
+        "rows": _rows(front),
+        "picked": front.chosen.get(COMPROMISE, next(iter(front.chosen.values()))),
+        "time": [round(float(t), 2) for t in shown.time],
+        "sensors": list(shown.sensors),
+        "designs": [[_in_mm(line) for line in design] for design in shown.designs],
+        "nominal": [_in_mm(line) for line in shown.nominal],
+        "largest": scale or 1.0,
+    }
+
+
+def _in_mm(line: FloatArray) -> list[float | None]:
+    """Return an envelope in mm, rounded; None where there is none."""
+    return [round(MM_PER_M * float(v), 2) if np.isfinite(v) else None for v in line]
 
 
 def _text3(value: float) -> str:

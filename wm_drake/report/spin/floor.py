@@ -11,8 +11,8 @@ from wm_drake.report.formatting import number
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.spin.cases import case_title
 from wm_drake.report.tables import Group, Row, Table
-from wm_drake.simulation.feet import MARGINS, FootLoads, foot_loads
-from wm_drake.simulation.measures import cabinet_in, wrenches_on_cabinet
+from wm_drake.simulation.feet import MARGINS
+from wm_drake.simulation.measures import foot_loads_of
 from wm_drake.simulation.mounts import POINT
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
@@ -180,7 +180,7 @@ def floor_figure(cases: list[CaseResult]) -> Figure:
     figure = Figure(figsize=(WIDTH, 6.6))
     panels = list(figure.subplots(3, 1, sharex=True))
     for case in cases:
-        time, smallest = windows(case.record.time.values, _loads(case).margins)
+        time, smallest = windows(case.record.time.values, foot_loads_of(case.record).margins)
         for axes, column in zip(panels, smallest.T, strict=False):
             axes.plot(time, column, linewidth=1.2, label=case_title(case))
     for axes, head in zip(panels, HEADS, strict=False):
@@ -210,9 +210,3 @@ def windows(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArra
     begins = np.arange(0, max(1, len(time) - length // 2), length)  # no short window at the end
     ends = np.append(begins[1:], len(time)) - 1
     return 0.5 * (time[begins] + time[ends]), np.minimum.reduceat(values, begins, axis=0)
-
-
-def _loads(case: CaseResult) -> FootLoads:
-    found = cabinet_in(case.record)
-    assert found is not None
-    return foot_loads(*found, wrenches_on_cabinet(case.record))

@@ -118,6 +118,9 @@ def _cabinet(parameters: MachineParameters) -> dict[str, Any] | None:
         "floor_z_W": cabinet.floor,
         "friction": cabinet.friction,
         "feet": {name: foot.model_dump() for name, foot in cabinet.feet.items()},
+        "moves": cabinet.moves,
+        "inertia_kgm2": cabinet.inertia and cabinet.inertia.model_dump(),
+        "foot_type": cabinet.foot_type and cabinet.foot_type.model_dump(),
     }
 
 

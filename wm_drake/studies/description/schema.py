@@ -267,14 +267,26 @@ class Foot(_Part):
     y: float = Field(description="In W. [m]")
 
 
+class FootType(_Part):
+    """The pads of the feet of a cabinet that moves."""
+
+    vertical_stiffness: float = Field(description="[N/m]")
+    vertical_damping: float = Field(description="[N s/m]")
+    horizontal_stiffness: float = Field(description="[N/m]")
+    horizontal_damping: float = Field(description="[N s/m]")
+
+
 class Cabinet(_Part):
-    """The rigid cabinet on four feet; it has no influence on the motion."""
+    """The rigid cabinet on four feet; it has no influence on the motion unless it moves."""
 
     mass: float = Field(description="Of all that does not hang on the mounts. [kg]")
     centre_of_mass_W: Vector = Field(description="[m]")
     floor_z_W: float = Field(description="Height of the floor. [m]")
     friction: float = Field(description="Coefficient of Coulomb friction of the feet.")
     feet: dict[str, Foot]
+    moves: bool = Field(description="Whether it moves on its feet; else the housing is fixed.")
+    inertia_kgm2: Inertia | None = Field(description="None for a fixed cabinet. [kg m^2]")
+    foot_type: FootType | None = Field(description="None for a fixed cabinet.")
 
 
 class Residual(_Part):

@@ -15,6 +15,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import case_of
 from wm_drake.studies.modes.amplitude import AmplitudeMode, amplitude_modes
 from wm_drake.studies.modes.campbell import Campbell, CriticalSpeed, campbell, critical_speeds
+from wm_drake.studies.modes.fixed_cabinet import check_fixed_cabinet
 from wm_drake.studies.modes.linearisation import MODES, Linearisation, Spectrum
 from wm_drake.studies.modes.sensitivity import Sensitivity, numbers_of, sensitivities
 from wm_drake.studies.modes.shapes import Mode, modes_of
@@ -118,6 +119,7 @@ def modes(
             f"{1e3 * amplitude:g} mm is no amplitude; allowed are more than 0 and up to 100 mm",
             key="amplitude",
         )
+    check_fixed_cabinet(machine.parameters)
     with threadpool_limits(1, "blas"):  # the matrices are small: several threads would be slower
         return _modes(machine, load, gasket, amplitude, run_up, progress)
 

@@ -192,6 +192,19 @@ class MachineDesigns:
             found.append(own)
         return found
 
+    @property
+    def shown(self) -> str:
+        """What `shown_runs` runs, in words."""
+        if self.scattered is not None:
+            return "every uncertain quantity at its median"
+        return f"loads {', '.join(case.name for case in self.cases)}"
+
+    def shown_runs(self, parameters: MachineParameters, name: str) -> list[Case]:
+        """Return the cases whose histories represent a design: all loads, or the median sample."""
+        if self.scattered is None or self.scores is None:
+            return self.runs_of(parameters, name)
+        return self.scattered(parameters).cases(np.zeros((1, self.scores.shape[1])))
+
     def evaluate(self, designs: FloatArray, run: Run) -> tuple[FloatArray, FloatArray]:
         """Return values of all objectives, then of all constraints, in units for reading.
 

@@ -20,6 +20,7 @@ from wm_drake.engines.compiled.slopes import SlopedDerivative
 from wm_drake.engines.compiled.tubes import DEFORMATION, TUBES_STATE_SIZE
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.modes.fixed_cabinet import check_fixed_cabinet
 from wm_drake.studies.steady.series import Series
 
 HARMONICS = 11
@@ -76,6 +77,7 @@ class HarmonicBalance:
         Raises:
             InputError: the machine has something that the compiled engine does not represent.
         """
+        check_fixed_cabinet(setup.parameters)
         self.derivative, self.series = SlopedDerivative(setup), series
         self.scale = _scale(self.derivative, setup)
         self.held = _held(self.derivative, setup)

@@ -1,0 +1,144 @@
+"""A cabinet that moves on its feet, as a further rigid body of the compiled engine.
+
+The laws of all mounts are evaluated with the motion of the tub seen from the cabinet, in its frame
+C; the wrench on the tub is turned back to W, and the opposite one acts on the cabinet. For a fixed
+cabinet, whose index is None, all of this is compiled away.
+
+State: a `CARRIER_STATE` of C, then the slips of the feet. Packed numbers: those of `TUB` for the
+cabinet without its mounts, then those of the feet.
+"""
+
+from wm_drake.compiler.compilation import law
+from wm_drake.compiler.elementary import where
+from wm_drake.compiler.matrices import plus
+from wm_drake.elements.cabinet import (
+    FEET_SIZE,
+    SLIP_SIZE,
+    feet_on_floor,
+    motion_in,
+    rates_in,
+    rpy_of,
+    wrenches_of_mounts,
+)
+from wm_drake.elements.motion import motion_at, read_tree_state, write_tree_state
+from wm_drake.engines.compiled.bearing import (
+    CARRIER_STATE,
+    CARRIER_STATE_SIZE,
+    TUB,
+    carrier_motion,
+    read_carrier_state,
+    tub_accelerations,
+    write_carrier_state,
+)
+
+FEET_BEGIN = TUB.fixed_size
+"""Index of the feet in the packed numbers of a cabinet."""
+CABINET_SIZE = FEET_BEGIN + FEET_SIZE
+"""Packed numbers of a cabinet."""
+SLIPS_BEGIN = CARRIER_STATE_SIZE
+"""Index of the slips in the state of a cabinet."""
+CABINET_STATE_SIZE = CARRIER_STATE_SIZE + SLIP_SIZE
+"""State of a cabinet."""
+VELOCITIES = range(CARRIER_STATE.offsets["angular_velocity"], CARRIER_STATE_SIZE)
+"""Indices of the velocities in the state of a cabinet."""
+
+LARGEST_TILT = 0.5
+"""Largest angle of a cabinet about a horizontal axis; a run beyond it diverged: it has tipped over.
+[rad]"""
+
+
+@law
+def cabinet_size(cabinet):
+    """Return the size of the state of the cabinet; 0 for a fixed one (None)."""
+    if cabinet is None:
+        return 0
+    return CABINET_STATE_SIZE
+
+
+@law
+def seen_from_cabinet(x, motion, cabinet, first):
+    """Return the motion of the tub seen from the cabinet; from W if it is fixed.
+
+    Args:
+        x: State.
+        motion: `TubMotion` of the tub in W.
+        cabinet: Index of the cabinet in the packed numbers; None for a fixed one.
+        first: Index in the state where the cabinet begins.
+    """
+    if cabinet is None:
+        return motion
+    moving, _ = carrier_motion(x, first)
+    return motion_in(moving, motion)
+
+
+@law
+def with_cabinet(x, dx, motion, total, gravity, p, cabinet, first):
+    """Return the wrench of the mounts on the tub in W; write the derivative of the cabinet's state.
+
+    Args:
+        x, dx: State and its derivative.
+        motion: `TubMotion` of the tub in W.
+        total: Moment about To and force of all mounts on the tub, in C. [N m, N]
+        gravity: Acceleration in W. [m/s^2]
+        p: Packed numbers.
+        cabinet, first: As for `seen_from_cabinet`.
+    """
+    if cabinet is None:
+        return total
+    moving, angle_rates = carrier_motion(x, first)
+    on_tub, on_cabinet = wrenches_of_mounts(moving, motion, total)
+    write_cabinet_rates(x, dx, moving, angle_rates, on_cabinet, gravity, p, cabinet, first)
+    return on_tub
+
+
+@law
+def write_cabinet_rates(x, dx, moving, angle_rates, on_cabinet, gravity, p, cabinet, first):
+    """Write the derivative of the cabinet's state under a wrench of its mounts.
+
+    Args:
+        x, dx: State and its derivative.
+        moving, angle_rates: From `carrier_motion`.
+        on_cabinet: Moment about the origin of C and force of the mounts, in W. [N m, N]
+        gravity, p, cabinet, first: As for `with_cabinet`.
+    """
+    feet = feet_on_floor(x, dx, first + SLIPS_BEGIN, moving, p, cabinet + FEET_BEGIN)
+    w_rate, v_rate = tub_accelerations(moving, plus(on_cabinet, feet), gravity, p, cabinet)
+    write_carrier_state(dx, first, angle_rates, moving.velocity, w_rate, v_rate)
+
+
+@law
+def write_seen_sample(history, at, x, dx, cabinet, first, rates):
+    """Replace the tub in a sample by what is seen from the cabinet; write the cabinet's `RATES`.
+
+    Args:
+        history, at: Samples, and index where this one begins.
+        x, dx: State and its derivative.
+        cabinet, first: As for `seen_from_cabinet`; nothing is done for a fixed one.
+        rates: Layouts' indices of the accelerations of the tub and of the cabinet in the samples.
+    """
+    if cabinet is not None:
+        moving, _ = carrier_motion(x, first)
+        body, rate = motion_at(x, 0), read_tree_state(dx, 0)
+        own = read_carrier_state(dx, first)
+        seen = motion_in(moving, body)
+        turned, moved = rates_in(
+            moving, own.angular_velocity, own.velocity, body, rate.angular_velocity, rate.velocity
+        )
+        angles = read_carrier_state(x, first).angles
+        stands = (abs(angles[0]) < LARGEST_TILT) & (abs(angles[1]) < LARGEST_TILT)
+        drum, (roll, pitch, yaw) = read_tree_state(x, 0), rpy_of(seen.rotation)
+        write_tree_state(
+            history,
+            at,
+            angles=(where(stands, roll, 0.0 * roll / 0.0), pitch, yaw),
+            position=seen.position,
+            joint_position=drum.joint_position,
+            angular_velocity=seen.angular_velocity,
+            velocity=seen.velocity,
+            joint_rate=drum.joint_rate,
+        )
+        for k in range(3):
+            history[rates[0] + k] = turned[k]
+            history[rates[0] + 3 + k] = moved[k]
+            history[rates[1] + k] = own.angular_velocity[k]
+            history[rates[1] + 3 + k] = own.velocity[k]

@@ -1,0 +1,113 @@
+"""A cabinet that moves: its motion in a record, the forces of the floor, how far it has walked."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wm_drake.compiler.compilation import long_running
+from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, sine_cosine
+from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.elements.cabinet import FEET_COUNT, FLOOR_FORCE_SIZE, foot_of
+from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE, carrier_motion, read_carrier_state
+from wm_drake.engines.compiled.cabinet import SLIPS_BEGIN
+from wm_drake.engines.trajectory import Trajectory
+from wm_drake.model.machine import Setup
+from wm_drake.parameters.cabinet import Cabinet
+from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.variables import Variables
+
+
+@dataclass(frozen=True)
+class Walk:
+    """How a cabinet stands after a run, against where it stood before.
+
+    Attributes:
+        shift: How far the middle of its feet has moved on the floor, x and y. (2,) [m]
+        turn: Angle about the vertical axis by which the feet have turned, counterclockwise from
+            above. [rad]
+    """
+
+    shift: FloatArray
+    turn: float
+
+    @property
+    def distance(self) -> float:
+        """Return the length of the shift. [m]"""
+        return float(np.hypot(*self.shift))
+
+
+def walk(cabinet: Cabinet, slips: FloatArray) -> Walk:
+    """Return shift and turn of a cabinet from how far each of its feet has slid.
+
+    They are those of the rigid motion that is nearest to the four slips (least squares).
+
+    Args:
+        cabinet: The cabinet.
+        slips: (4, 2) how far the end of each pad has slid. [m]
+    """
+    feet = np.array([(cabinet.feet[name].x, cabinet.feet[name].y) for name in cabinet.corners])
+    before = feet - feet.mean(axis=0)
+    after = before + slips - slips.mean(axis=0)
+    across = np.sum(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
+    return Walk(slips.mean(axis=0), float(np.arctan2(across, np.sum(before * after))))
+
+
+def cabinet_variables(setup: Setup, trajectory: Trajectory) -> Variables:
+    """Return the variables of the motion of a cabinet and of its feet; none if it is fixed."""
+    if setup.cabinet is None or trajectory.cabinet is None:
+        return {}
+    states = trajectory.cabinet
+    forces = floor_forces(states, setup.cabinet.packed())
+    slips = states[:, CARRIER_STATE_SIZE:].reshape(-1, FEET_COUNT, 2)
+    slips = np.concatenate([slips, np.zeros_like(slips[:, :, :1])], axis=2)
+    by_axis, by_foot = ("time", "axis"), ("time", "foot", "axis")
+    angle = "roll, pitch, yaw of the cabinet in W (3-2-1 Euler angles)"
+    return {
+        "cabinet_angle": (("time", "angle"), states[:, :3], "rad", angle),
+        "cabinet_position": (by_axis, states[:, 3:6], "m", "displacement of the cabinet in W"),
+        "cabinet_angular_velocity": (by_axis, states[:, 6:9], "rad/s", "of the cabinet, in W"),
+        "cabinet_velocity": (by_axis, states[:, 9:12], "m/s", "velocity of the cabinet in W"),
+        "floor_force": (by_foot, forces, "N", "force of the floor on each foot"),
+        "foot_slip": (by_foot, slips, "m", "how far each foot has slid on the floor, in W"),
+    }
+
+
+def floor_forces(states: FloatArray, p: FloatArray) -> FloatArray:
+    """Return the force of the floor on each foot over time, in axes that turn with the cabinet.
+
+    The third axis is vertical; the other two are those of W, turned by the yaw of the cabinet.
+
+    Args:
+        states: (n, 20) states of the cabinet, as in `Trajectory.cabinet`.
+        p: Packed numbers of the feet.
+
+    Returns:
+        (n, 4, 3) [N]
+    """
+    forces = np.empty((len(states), FLOOR_FORCE_SIZE))
+    floor_force_history(np.ascontiguousarray(states), p, forces)
+    return forces.reshape(-1, FEET_COUNT, 3)
+
+
+@long_running
+def floor_force_history(states, p, forces):
+    """Evaluate `floor_forces`.
+
+    Args:
+        states, p: As for `floor_forces`.
+        forces: (n, 12), written: x, y, z of each foot.
+    """
+    align_stack()
+    x_numbers, numbers = np.empty(states.shape[1] * WIDTH), np.empty(FLOOR_FORCE_SIZE * WIDTH)
+    p_numbers = in_each_lane(p)
+    x, q, answer = lane_array(x_numbers), lane_array(p_numbers), lane_array(numbers)
+    for begin in range(0, len(states), WIDTH):
+        rows_to_lanes(states, begin, x_numbers)
+        motion, _ = carrier_motion(x, 0)
+        s, c = sine_cosine(read_carrier_state(x, 0).angles[2])
+        for i in range(FEET_COUNT):
+            foot = foot_of(x, SLIPS_BEGIN, motion, q, 0, i)
+            f_x, f_y, normal = foot.force
+            answer[3 * i], answer[3 * i + 1] = c * f_x + s * f_y, c * f_y - s * f_x
+            answer[3 * i + 2] = normal
+        lanes_to_rows(numbers, begin, forces)

@@ -1,0 +1,83 @@
+"""Envelopes of the designs of a front, for the page on which designs are picked."""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from wm_drake.model.machine import OUTPUT_PERIOD
+from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.measures import envelopes
+from wm_drake.simulation.records import Record
+from wm_drake.studies.pareto.study import ParetoFront
+
+Histories: TypeAlias = Callable[[Sequence[Case], Callable[[int, Record], None]], None]
+"""Function that runs cases and calls its second argument with number and record of each."""
+
+INTERVALS = 120
+"""Number of intervals of time, each with the largest value of an envelope in it."""
+
+
+@dataclass(frozen=True)
+class Envelopes:
+    """Envelopes of the filtered displacements, the largest over the loads of each design.
+
+    Attributes:
+        time: Middle of each interval. (n,) [s]
+        sensors: Names of the sensors.
+        designs: (designs, sensors, n) [m] NaN behind the end of a run that failed.
+        nominal: Those of the machine itself. (sensors, n) [m]
+        of: What was run for each design, in words.
+    """
+
+    time: FloatArray
+    sensors: tuple[str, ...]
+    designs: FloatArray
+    nominal: FloatArray
+    of: str
+
+
+def front_envelopes(front: ParetoFront, histories: Histories) -> Envelopes:
+    """Return the envelopes of all designs of a front and of the machine itself.
+
+    Args:
+        front: The front.
+        histories: Function that runs cases.
+    """
+    designs = front.designs
+    points = [*front.found.designs, designs.nominal()]
+    runs = [designs.shown_runs(designs.machine_at(p), f"{i}") for i, p in enumerate(points, 1)]
+    owners = [number for number, cases in enumerate(runs) for _ in cases]
+    sensors = tuple(designs.parameters.sensors)
+    found = np.full((len(points), len(sensors), INTERVALS), np.nan)
+    duration = max(case.profile.duration for cases in runs for case in cases)
+
+    def add(number: int, record: Record) -> None:
+        own = owners[number]
+        found[own] = np.fmax(found[own], envelope_of(record, duration))
+
+    histories([case for cases in runs for case in cases], add)
+    time = (np.arange(INTERVALS) + 0.5) * duration / INTERVALS
+    return Envelopes(time, sensors, found[:-1], found[-1], designs.shown)
+
+
+def envelope_of(record: Record, duration: float) -> FloatArray:
+    """Return the largest value of the envelopes in each interval of time. (sensors, n) [m]
+
+    Args:
+        record: Record of a run.
+        duration: Duration that is divided into `INTERVALS`. [s]
+    """
+    found = envelopes(record)
+    size = np.maximum(np.abs(found.upper.values), np.abs(found.lower.values))
+    answer = np.full((size.shape[1], INTERVALS), np.nan)
+    per_interval = duration / OUTPUT_PERIOD / INTERVALS
+    ends = np.round(np.arange(INTERVALS + 1) * per_interval).astype(int)
+    for index, (begin, end) in enumerate(itertools.pairwise(ends)):
+        part = size[begin : max(end, begin + 1)]
+        if len(part):
+            answer[:, index] = part.max(axis=0)
+    return answer

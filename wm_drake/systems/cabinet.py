@@ -1,0 +1,110 @@
+"""A cabinet that moves: the frame that all mounts stand on, and its feet on the floor."""
+
+from typing import Any
+
+from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from wm_drake.elements.cabinet import (
+    FLOOR_FORCE_SIZE,
+    SLIP_SIZE,
+    evaluate_feet,
+    evaluate_mounts_on_cabinet,
+    evaluate_tub_in_cabinet,
+)
+from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE
+from wm_drake.parameters.types import FloatArray
+from wm_drake.systems.element_system import SCALARS, ElementSystem, empty, evaluator
+
+
+@TemplateSystem.define("Cabinet_", T_list=SCALARS)
+def Cabinet_(T: type) -> Any:
+    """Return the class Cabinet for a scalar type."""
+
+    class Cabinet(LeafSystem_[T]):
+        """Cabinet that moves: it shows the tub to its mounts, and takes their reaction.
+
+            plant_state (28)  ──▶ [ Cabinet ] ──▶ tub_in_cabinet (14)
+            mounts_force (7)  ──▶ [         ] ──▶ generalized_force (14) [N m, N]
+            feet_force (7)    ──▶ [         ]
+
+        The plant state is that of tub and drum (14), then that of cabinet and drum (14), in W.
+        `tub_in_cabinet` is the state of tub and drum seen from the cabinet, in its frame C;
+        `mounts_force` is the generalized force of all mounts on tub and drum, in C; `feet_force`
+        is that of the floor on the cabinet, in W. The generalized force acts on tub and drum, then
+        on cabinet and drum, in W.
+        """
+
+        def _construct(self, converter: Any = None) -> None:
+            LeafSystem_[T].__init__(self, converter=converter)
+            self._seen = evaluator(evaluate_tub_in_cabinet, T)
+            self._reactions = evaluator(evaluate_mounts_on_cabinet, T)
+            self._state = self.DeclareVectorInputPort("plant_state", 2 * PLANT_STATE_SIZE)
+            self._on_tub, self._on_feet = (
+                self.DeclareVectorInputPort(name, GENERALIZED_FORCE_SIZE)
+                for name in ("mounts_force", "feet_force")
+            )
+            state = self._state.ticket()
+            self.DeclareVectorOutputPort(
+                "tub_in_cabinet", PLANT_STATE_SIZE, self._calc_seen, {state}
+            )
+            self.DeclareVectorOutputPort(
+                "generalized_force",
+                2 * GENERALIZED_FORCE_SIZE,
+                self._calc_force,
+                {state, self._on_tub.ticket(), self._on_feet.ticket()},
+            )
+
+        def _construct_copy(self, _: Any, converter: Any = None) -> None:
+            Impl._construct(self, converter=converter)
+
+        def _calc_seen(self, context: Any, output: Any) -> None:
+            state, seen = self._state.Eval(context), empty(PLANT_STATE_SIZE, T)
+            self._seen(state[:PLANT_STATE_SIZE], state[PLANT_STATE_SIZE:], seen)
+            output.SetFromVector(seen)
+
+        def _calc_force(self, context: Any, output: Any) -> None:
+            force = empty(2 * GENERALIZED_FORCE_SIZE, T)
+            inputs = (port.Eval(context) for port in (self._state, self._on_tub, self._on_feet))
+            self._reactions(*inputs, force)
+            output.SetFromVector(force)
+
+    Impl = Cabinet
+    return Cabinet
+
+
+Cabinet = Cabinet_[None]
+
+
+@TemplateSystem.define("Feet_", T_list=SCALARS)
+def Feet_(T: type) -> Any:
+    """Return the class Feet for a scalar type."""
+
+    class Feet(ElementSystem, LeafSystem_[T]):
+        """Four feet of a cabinet on the floor; laws `pad_normal_force` and `pad_friction`.
+
+            plant_state (14) ──▶ [ Feet           ] ──▶ generalized_force (7) [N m, N]
+                                 [ (state: slips) ] ──▶ floor_force (12) on each foot, in W [N]
+                                                    ──▶ state (8) how far each has slid, x, y [m]
+
+        The plant state is that of cabinet and drum, and the generalized force acts on them.
+        """
+
+        def _construct(self, parameters: FloatArray, converter: Any = None) -> None:
+            LeafSystem_[T].__init__(self, converter=converter)
+            self.declare_element(
+                T,
+                evaluate_feet,
+                parameters,
+                {"floor_force": slice(0, FLOOR_FORCE_SIZE)},
+                state_size=SLIP_SIZE,
+            )
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._construct(self, other.packed, converter=converter)
+
+    Impl = Feet
+    return Feet
+
+
+Feet = Feet_[None]
