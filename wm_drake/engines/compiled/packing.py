@@ -9,6 +9,7 @@ from pydrake.systems.framework import Context
 
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.motion import POSE
+from wm_drake.elements.motor import MOTOR_STATE_SIZE, motor_structure, packed_motor
 from wm_drake.elements.rubber import AXIS_COUNT, Branches, RubberBushingParameters
 from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE, TUB, TUB_AND_BEARING
 from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE
@@ -45,6 +46,8 @@ class Layout:
         springs, dampers, bushings, telescopes: Index of each element.
         gasket: Index of the gasket, -1 without one.
         bearing: Index of the drum's compliant bearing, -1 for a rigid one.
+        motor: Index of the motor, -1 if the speed of the drum is prescribed.
+        control_period: Time between two samples of a sampled controller, else 0. [s]
         cabinet: Index of the cabinet, -1 for a fixed one.
         structure: Number of each damper's law and number of points of every table, in order.
         rubber: Index of each bushing of rubber, and number of its stretches.
@@ -56,6 +59,8 @@ class Layout:
     telescopes: tuple[int, ...]
     gasket: int
     bearing: int
+    motor: int
+    control_period: float
     cabinet: int
     structure: tuple[int, ...]
     rubber: tuple[tuple[int, int], ...] = ()
@@ -64,7 +69,7 @@ class Layout:
     def elements(self) -> Elements:
         """The indices in the form that compiled functions use.
 
-        Without telescopic dampers or without a compliant bearing their index is None, and the
+        Without telescopic dampers, a compliant bearing or a motor their index is None, and the
         functions are compiled without them.
         """
         springs, dampers, bushings, telescopes = (
@@ -80,6 +85,7 @@ class Layout:
             telescopes if self.telescopes else None,
             bearing,
             tubes,
+            self.motor if self.motor >= 0 else None,
             self.cabinet if self.cabinet >= 0 else None,
             self.branches(self.branches_begin),
         )
@@ -88,7 +94,8 @@ class Layout:
     def branches_begin(self) -> int:
         """Index in the state where the stretches of rubber bushings begin."""
         begin = STATE_SIZE + len(self.dampers) + TUBES_STATE_SIZE * len(self.telescopes)
-        return begin + (CARRIER_STATE_SIZE if self.bearing >= 0 else 0) + self.cabinet_size
+        begin += CARRIER_STATE_SIZE if self.bearing >= 0 else 0
+        return begin + self.motor_size + self.cabinet_size
 
     def branches(self, first: int) -> Branches | None:
         """Return the bushings of rubber, of which the first stretch has an index in the state."""
@@ -122,9 +129,19 @@ class Layout:
         )
         own, deformation_of_tubes = tubes[:, :, :STATE_SIZE], tubes[:, :, DEFORMATION]
         deformation = np.hstack([states[:, STATE_SIZE:tubes_begin], deformation_of_tubes])
-        carrier = states[:, tubes_end : self.branches_begin - self.cabinet_size]
+        carrier = states[:, tubes_end : self.motor_begin]
         stretches = states[:, self.branches_begin :]
         return states[:, :STATE_SIZE], deformation, own, carrier, stretches
+
+    @property
+    def motor_begin(self) -> int:
+        """Index in the state where the drive begins, if it has a motor."""
+        return self.branches_begin - self.cabinet_size - self.motor_size
+
+    @property
+    def motor_size(self) -> int:
+        """Size of the state of the drive, before that of the cabinet; 0 for a prescribed speed."""
+        return MOTOR_STATE_SIZE if self.motor >= 0 else 0
 
     def cabinet_part(self, states: FloatArray) -> FloatArray | None:
         """Return the states (n, `CABINET_STATE_SIZE`) of a cabinet that moves; None if fixed."""
@@ -176,6 +193,12 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
         tub = pack_rigid(setup, "tub")
         parts.append(TUB_AND_BEARING.pack(tub=tub, bearing=setup.bearing.packed()))
         structure += setup.bearing.structure
+    motor, control_period = -1, 0.0
+    if drive := setup.motor:
+        motor = BODIES_SIZE + sum(map(len, parts))
+        parts.append(packed_motor(drive))
+        structure += motor_structure(drive)
+        control_period = drive.controller.sample_time or 0.0
     cabinet = -1
     if setup.cabinet:
         cabinet = BODIES_SIZE + sum(map(len, parts))
@@ -189,6 +212,8 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
         **indices,
         gasket=gasket,
         bearing=bearing,
+        motor=motor,
+        control_period=control_period,
         cabinet=cabinet,
         structure=tuple(structure),
         rubber=rubber,
@@ -244,7 +269,7 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     """Return the state at the start of a run.
 
     The machine is at rest at the rest pose, the drum at its first speed; sponges and branches of
-    rubber are relaxed.
+    rubber are relaxed, a motor is without torque.
     """
     x = np.zeros(STATE_SIZE + len(setup.dampers))
     x[: POSE.fixed_size] = setup.rest_pose
@@ -252,9 +277,10 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     tubes = np.zeros((len(setup.telescopes), TUBES_STATE_SIZE))
     tubes[:, : setup.tube_rest.shape[1]] = setup.tube_rest
     carrier = np.append(setup.carrier_rest, np.zeros_like(setup.carrier_rest))
+    motor = np.zeros(MOTOR_STATE_SIZE if setup.motor else 0)
     cabinet = np.zeros(CABINET_STATE_SIZE if setup.cabinet else 0)
     stretches = np.zeros(sum(bushing.state_size for bushing in setup.bushings.values()))
-    return np.concatenate([x, tubes.ravel(), carrier, cabinet, stretches])
+    return np.concatenate([x, tubes.ravel(), carrier, motor, cabinet, stretches])
 
 
 def pack_tubes(setup: Setup, name: str) -> FloatArray:
