@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import os
+import time
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -88,9 +89,11 @@ class Studio:
 
     def run(self, state: State, keys: list[str]) -> dict[str, Any]:
         """Return the answer to a page."""
+        begin = time.perf_counter(), time.thread_time()
         machine, runner = self.opened(state.machine)
-        found = answer(machine, runner, state, keys)
-        return found | {"measured": machine.measured(state)}
+        found = answer(machine, runner, state, keys) | {"measured": machine.measured(state)}
+        passed = time.perf_counter() - begin[0], time.thread_time() - begin[1]
+        return found | {"server_s": {"wall": passed[0], "cpu": passed[1]}}
 
     async def ranking(self, state: State) -> list[dict[str, Any]]:
         """Return the arrows of all numbers that influence a run; pages share the work."""

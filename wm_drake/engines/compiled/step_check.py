@@ -88,7 +88,7 @@ def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
     Raises:
         InputError: the machine has something that the compiled engine does not represent.
     """
-    free, parts = _free_states(setup)
+    free, parts = free_states(setup)
     followed = {parts[k] for k, kind in enumerate(_treatment(setup, free)) if kind == PATH}
     matrices, _ = linearised(setup, *pack(setup), DIFFERENCE)
     if not np.all(np.isfinite(matrices)):
@@ -129,7 +129,7 @@ def linearised(
         (WIDTH, n, n) at states with slow and fast motion [1/s], and (n,) `SMOOTH`, `SPONGE` or
         `PATH` of `wm_drake.engines.compiled.linear`.
     """
-    free, _ = _free_states(setup)
+    free, _ = free_states(setup)
     matrices = jacobians(packed, layout, _states(setup, free), free, difference)
     return matrices, _treatment(setup, free)
 
@@ -229,7 +229,7 @@ def _allowed(longest: float) -> str:
     return text
 
 
-def _free_states(setup: Setup) -> tuple[list[int], list[str]]:
+def free_states(setup: Setup) -> tuple[list[int], list[str]]:
     """Return the indices of the states that are not prescribed, and what each belongs to."""
     parts = [TUB] * STATE_SIZE
     parts += [f"the sponge of damper '{name}'" for name in setup.dampers]

@@ -153,9 +153,15 @@ def _laws(parameters: MachineParameters) -> dict[str, str]:
 
 _RUNGE_KUTTA = "classical Runge-Kutta method of fourth order, fixed step"
 _MULTISTEP = "explicit multistep method of fourth order, one derivative a step, fixed step"
+_MIDPOINT = (
+    "implicit midpoint rule with one Newton step and a constant Jacobian of each damper's tubes, "
+    "one derivative a step, fixed step"
+)
 INTEGRATORS = {
-    "auto": f"{_MULTISTEP}, where it suits the machine; else {_RUNGE_KUTTA}",
+    "auto": f"{_MULTISTEP}, where it suits the machine; with telescopic dampers {_MIDPOINT}; "
+    f"else {_RUNGE_KUTTA}",
     "multistep": _MULTISTEP,
+    "midpoint": _MIDPOINT,
     "runge_kutta": _RUNGE_KUTTA,
 }
 """Description of each integrator of the compiled engine."""
