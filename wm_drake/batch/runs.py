@@ -121,7 +121,9 @@ class Runner:
         Returns:
             A result for each work item; none if `stopped` was set meanwhile.
         """
-        schedule = schedule_of(key.profile, key.stepping.step, OUTPUT_PERIOD)
+        schedule = schedule_of(
+            key.profile, key.stepping.step, OUTPUT_PERIOD, key.layout.control_period
+        )
         one_derivative = key.stepping.one_derivative(schedule)
         # without amplitudes only the detergent point is followed, which comes last
         first = 0 if _FILTERED & set(self.measures) else -3 * POINT_SIZE
@@ -131,7 +133,11 @@ class Runner:
         p = self._lanes("packed", [item.packed for item in work_items])
         x = self._lanes("begin", [item.begin for item in work_items])
         samples = self._array("samples", rows * size)
-        for _ in integrate_runs(schedule, one_derivative, key.layout, p, x, samples):
+        relaxation = None
+        if key.stepping.integrator == "midpoint":
+            matrices = [item.numbers.stepping.relaxation for item in work_items]
+            relaxation = self._lanes("relaxation", matrices)
+        for _ in integrate_runs(schedule, one_derivative, key.layout, p, x, samples, relaxation):
             if self.stopped.is_set():
                 return []
         moved, extremes = self._array("moved", rows * count), self._array("extremes", count + 7)
@@ -142,6 +148,7 @@ class Runner:
             (LARGEST_ANGLE, LARGEST_DISPLACEMENT),
             p,
             key.layout.gasket,
+            key.layout.elements.branches,
             self._lanes("points", points),
             count,
             moved,
@@ -390,7 +397,10 @@ class _Run:
     @classmethod
     def of_lane(cls, lane: int, *arrays: FloatArray) -> "_Run":
         """Return the run in a lane of the arrays, which are in the order of the attributes."""
-        return cls(*(array[..., lane] for array in arrays))
+        samples, moved, extremes, mounts, cabinet, lengths, of_batch = (
+            array[..., lane] for array in arrays
+        )
+        return cls(samples, moved, extremes, mounts, cabinet, lengths, of_batch)
 
     @property
     def good(self) -> int:

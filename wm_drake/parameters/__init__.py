@@ -18,6 +18,7 @@ from wm_drake.parameters.damper_laws import (
     StvDamper,
     StvSpongeDamper,
 )
+from wm_drake.parameters.drive import Drive, MotorDrive
 from wm_drake.parameters.elements import (
     Bushing,
     BushingType,
@@ -35,10 +36,12 @@ from wm_drake.parameters.factors import (
     Factor,
     FactorLevels,
     at_levels,
+    at_places,
     factor_of_text,
     levels_of,
     load_factors,
     nominal_stiffness,
+    place_of,
 )
 from wm_drake.parameters.files import (
     load_load,
@@ -56,7 +59,6 @@ from wm_drake.parameters.loop_files import MeasuredLoop, read_loop, read_loops
 from wm_drake.parameters.machine import (
     BodyOverride,
     Clearance,
-    Drive,
     FrameOverride,
     MachineParameters,
     Sensor,
@@ -90,6 +92,7 @@ __all__ = [
     "Load",
     "MachineParameters",
     "MeasuredLoop",
+    "MotorDrive",
     "MstvDamper",
     "PublishedResults",
     "PublishedTerm",
@@ -103,6 +106,7 @@ __all__ = [
     "TorqueTable",
     "Unbalance",
     "at_levels",
+    "at_places",
     "factor_of_text",
     "levels_of",
     "load_component",
@@ -116,6 +120,7 @@ __all__ = [
     "machine_yaml",
     "measured_amplitudes",
     "nominal_stiffness",
+    "place_of",
     "published_results",
     "quantities",
     "read_loop",

@@ -9,17 +9,21 @@ from collections import namedtuple
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.engines.compiled.drum import sample_controller
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
-    DRUM_RATE,
+    follow_profile,
     inputs_size,
     mass_properties,
+    motor_begin,
     state_derivative,
     state_size,
+    wanted_speed,
     write_sample,
 )
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES, multistep_step, remember
 from wm_drake.engines.compiled.packing import aligned
+from wm_drake.engines.compiled.rubber import end_paths, follow_paths, write_paths
 
 Work = namedtuple("Work", ("rate", "inputs", "stage", "total", "past_rates", "past_inputs"))
 """Arrays to work in. The past of a step with one derivative must stay from call to call."""
@@ -41,8 +45,9 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
     next one of every machine.
 
     Args:
-        steps: Length, drum acceleration, drum motion and sample number of each step, four fields
-            of a `Schedule`, and whether it takes one derivative; no arrays of lanes.
+        steps: Length, drum acceleration, drum motion and sample number of each step, and whether a
+            sampled controller acts at its start, five fields of a `Schedule`; and whether it takes
+            one derivative; no arrays of lanes.
         begin, end: Numbers of steps.
         p: Packed numbers.
         elements: `Elements`, which all machines have in common.
@@ -56,9 +61,12 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
     rate, inputs = lane_array(work.rate), lane_array(work.inputs)
     stage, total = lane_array(work.stage), lane_array(work.total)
     past = Past(lane_array(work.past_rates), lane_array(work.past_inputs))
-    length, acceleration, drum, row, one_derivative = steps
+    length, acceleration, drum, row, controls, one_derivative = steps
     zero = 0.0 * state[0]
     for i in range(begin, end):
+        sample_controller(
+            state, drum[2 * i, 0], controls[i], numbers, elements.motor, motor_begin(elements)
+        )
         masses = mass_properties(numbers, drum[2 * i, 1], drum[2 * i, 2])
         state_derivative(
             state, rate, inputs, masses, drum[2 * i, 0], acceleration[i], numbers, elements
@@ -74,8 +82,8 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
                 state, rate, inputs, stage, total, drum, i, length[i], acceleration[i],
                 numbers, elements
             )  # fmt: skip
-        state[DRUM_ANGLE] = zero + drum[2 * i + 2, 3]
-        state[DRUM_RATE] = zero + drum[2 * i + 2, 0]
+        angle, speed = zero + drum[2 * i + 2, 3], zero + drum[2 * i + 2, 0]
+        follow_profile(state, angle, speed, elements.motor)
 
 
 @law
@@ -86,13 +94,15 @@ def runge_kutta_step(
 
     Args:
         state, rate: State at the start of the step, advanced, and its time derivative there.
-        inputs, stage, total: Arrays to work in.
+        inputs: Inputs of internal states at the start of the step; an array to work in.
+        stage, total: Arrays to work in.
         drum, i: Motion of the drum, a field of a `Schedule`, and number of the step.
         h: Length of the step. [s]
         acceleration, numbers, elements: See `state_derivative`.
     """
-    size = state_size(elements)
+    size, branches, first = state_size(elements), elements.branches, len(elements.dampers)
     masses = mass_properties(numbers, drum[2 * i + 1, 1], drum[2 * i + 1, 2])
+    write_paths(rate, inputs, first, numbers, branches)
     for k in range(size):
         total[k] = state[k] + h / 6.0 * rate[k]
         stage[k] = state[k] + 0.5 * h * rate[k]
@@ -100,26 +110,30 @@ def runge_kutta_step(
         node = 2 * i + (number + 1) // 2
         if number == 3:
             masses = mass_properties(numbers, drum[node, 1], drum[node, 2])
+        follow_paths(stage, state, numbers, branches)
         state_derivative(
             stage, rate, inputs, masses, drum[node, 0], acceleration, numbers, elements
         )
+        write_paths(rate, inputs, first, numbers, branches)
         weight = h / 6.0 if number == 3 else h / 3.0
         ahead = h if number == 2 else 0.5 * h
         for k in range(size):
             total[k] = total[k] + weight * rate[k]
             stage[k] = state[k] + ahead * rate[k]
+    end_paths(total, state, inputs, first, h, numbers, branches)
     for k in range(size):
         state[k] = total[k]
 
 
 @long_running
-def derivative_lanes(x, dx, inputs, acceleration, p, elements):
+def derivative_lanes(x, dx, inputs, reference, acceleration, p, elements):
     """Evaluate `state_derivative` for `lanes.WIDTH` machines.
 
     Args:
         x: States; the drum's angle and rate are read from them.
         dx, inputs: Time derivatives and inputs of internal states, written.
-        acceleration: Acceleration of the drum, the same for all machines. [rad/s^2]
+        reference: Speed that the controller of a motor wants, the same for all machines. [rad/s]
+        acceleration: Acceleration of a prescribed drum, the same for all machines. [rad/s^2]
         p: Packed numbers.
         elements: `Elements`, which all machines have in common.
     """
@@ -132,7 +146,7 @@ def derivative_lanes(x, dx, inputs, acceleration, p, elements):
         lane_array(dx),
         lane_array(inputs),
         masses,
-        state[DRUM_RATE],
+        wanted_speed(state, reference, elements.motor),
         acceleration,
         numbers,
         elements,

@@ -8,6 +8,7 @@ from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.elements.motion import POSE, tub_motion
 from wm_drake.engines.cabinet_frame import seen_from_cabinet, seen_from_world
 from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE
+from wm_drake.engines.compiled.drum import motor_torque_history
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
@@ -35,7 +36,7 @@ def trajectory_of(
         p, layout: From `pack`.
     """
     states, rates = np.split(samples, [-layout.rates_size], axis=1)
-    motion, deformation, tubes, carrier = layout.parts(states)
+    motion, deformation, tubes, carrier, stretches = layout.parts(states)
     cabinet, of_tub = layout.cabinet_part(states), rates[:, :RATES_SIZE]
     with_drum = _motion_of_drum_and_carrier(motion, carrier)
     of_carrier = rates[:, RATES_SIZE : 2 * RATES_SIZE] if carrier.shape[1] else of_tub
@@ -46,16 +47,42 @@ def trajectory_of(
         else:
             tub, of_carrier = seen_from_world(*in_world, without_drum(motion), of_tub)
             with_drum = _motion_of_drum_and_carrier(motion, tub)
-    torque = np.empty((len(samples), 1))
-    drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
-    torque_history(with_drum, of_carrier, drum_acceleration, p, torque)
-    found = schedule.time, motion, deformation, torque[:, 0], of_tub, tubes, carrier
+    torque: FloatArray = np.empty((len(samples), 1))
+    if layout.motor >= 0:
+        torque = torque_of_motor(states, schedule, p, layout)
+    else:
+        drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
+        torque_history(with_drum, of_carrier, drum_acceleration, p, torque)
+    found = schedule.time, motion, deformation, torque[:, 0], of_tub, tubes, carrier, stretches
     return cut_at_divergence(Trajectory(*found, cabinet=cabinet))
 
 
 def without_drum(motion: FloatArray) -> FloatArray:
     """Return the motion of the tub (n, 12) without that of the drum (n, 14)."""
     return np.delete(motion, (DRUM_ANGLE, DRUM_RATE), axis=1)
+
+
+def torque_of_motor(
+    states: FloatArray, schedule: Schedule, p: FloatArray, layout: Layout
+) -> FloatArray:
+    """Return the torque of a motor on the drum at samples (n, 1). [N m]
+
+    Args:
+        states: (n, size)
+        schedule, p, layout: See `trajectory_of`.
+    """
+    torque = np.empty((len(states), 1))
+    reference = schedule.drum[:-1:2][schedule.row >= 0, :1]
+    first = layout.motor_begin
+    motor_torque_history(
+        np.ascontiguousarray(states),
+        np.ascontiguousarray(reference),
+        p,
+        layout.motor,
+        first,
+        torque,
+    )
+    return torque
 
 
 def _motion_of_drum_and_carrier(motion: FloatArray, carrier: FloatArray) -> FloatArray:

@@ -10,7 +10,6 @@ import numpy as np
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
-from wm_drake.elements.bushing import six_component_bushing_wrench
 from wm_drake.elements.cabinet import SLIP_SIZE
 from wm_drake.elements.friction_damper import (
     friction_damper_line,
@@ -18,9 +17,10 @@ from wm_drake.elements.friction_damper import (
     friction_damper_wrench,
 )
 from wm_drake.elements.motion import motion_at, read_tree_state, tub_motion
+from wm_drake.elements.rubber import bushing_wrench
 from wm_drake.elements.spring import spring_strut_wrench
 from wm_drake.elements.telescopic_damper import telescopic_damper_forces
-from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, VELOCITIES
+from wm_drake.engines.compiled.cabinet import VELOCITIES
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
@@ -36,7 +36,7 @@ from wm_drake.engines.compiled.tubes import (
     read_tubes_state,
     telescopic_damper_count,
 )
-from wm_drake.model.machine import Setup
+from wm_drake.model.machine import Setup, with_prescribed_speed
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 
@@ -53,8 +53,8 @@ class SlopedDerivative:
     """The time derivative of the state of a machine as it is set up, and its slopes.
 
     A state has the layout of `wm_drake.engines.compiled.mechanics`. Free are all its numbers but
-    angle and rate of the drum, which are prescribed, and the slips of the feet of a cabinet that
-    moves: the feet stick.
+    angle and rate of the drum, which are prescribed, also in a machine with a motor, and the slips
+    of the feet of a cabinet that moves: the feet stick.
 
     Attributes:
         layout: Indices of the parts of the machine in packed numbers and states.
@@ -70,18 +70,20 @@ class SlopedDerivative:
         Raises:
             InputError: the machine has something that the compiled engine does not represent.
         """
+        setup = with_prescribed_speed(setup)
         self.packed, self.layout = pack(setup)
         self.rest = initial_state(setup, SpinProfile(time=(0.0, 1.0), speed=(0.0, 0.0)))
         size = len(self.rest)
-        slips = size - SLIP_SIZE if setup.cabinet else size
-        self.free = np.setdiff1d(np.arange(slips), (DRUM_ANGLE, DRUM_RATE))
+        end = self.layout.branches_begin
+        slips = np.arange(end - SLIP_SIZE if setup.cabinet else end, end)
+        self.free = np.setdiff1d(np.arange(size), (DRUM_ANGLE, DRUM_RATE, *slips))
         velocities = np.zeros(size, dtype=bool)
         velocities[STATE_SIZE // 2 : STATE_SIZE] = True
         begin = STATE_SIZE + len(setup.dampers)
         for _ in setup.telescopes:
             velocities[begin + 7 : begin + TUBES_STATE_SIZE - 1] = True
             begin += TUBES_STATE_SIZE
-        cabinet = size - CABINET_STATE_SIZE if setup.cabinet else size
+        cabinet = end - self.layout.cabinet_size
         velocities[begin + (cabinet - begin) // 2 : cabinet] = True
         if setup.cabinet:
             velocities[cabinet + np.array(VELOCITIES)] = True
@@ -236,7 +238,7 @@ def tub_wrenches_at(states, columns, steps, p, elements, wrenches):
             )
             at_row += 6
         for at in elements.bushings:
-            wrench, _ = six_component_bushing_wrench(motion, numbers, at)
+            wrench, _ = bushing_wrench(motion, numbers, at, x, elements.branches)
             write_six(answer, at_row, wrench)
             at_row += 6
         for i in range(telescopic_damper_count(elements.telescopes)):
