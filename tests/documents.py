@@ -7,9 +7,12 @@ CHECKOUT = Path(__file__).parents[1]
 README = CHECKOUT / "README.md"
 HOW_TO = sorted((CHECKOUT / "docs" / "how-to").glob("*.md"))
 DECISIONS = sorted((CHECKOUT / "docs" / "decisions").glob("[0-9]*.md"))
-PAGES = sorted(
-    [*CHECKOUT.glob("*.md"), *(CHECKOUT / "docs").rglob("*.md"), CHECKOUT / "sdf" / "README.md"]
-)
+MANUAL = [
+    path
+    for path in (CHECKOUT / "docs").rglob("*.md")
+    if "_build" not in path.relative_to(CHECKOUT).parts
+]
+PAGES = sorted([*CHECKOUT.glob("*.md"), *MANUAL, CHECKOUT / "sdf" / "README.md"])
 
 
 def name_of(path):

@@ -647,7 +647,7 @@ def test_faulty_input_in_a_process_of_its_own(tmp_path):
     assert (ended.returncode, ended.stdout) == (2, "")
     assert (
         ended.stderr
-        == "nosuch.yaml: no such file, and no shipped machine of that name (known: free_stroke, reference)\n"
+        == "nosuch.yaml: no such file, and no shipped machine of that name (known: free_stroke, heavy_cabinet, light_cabinet, motor, reference)\n"
     )
 
 

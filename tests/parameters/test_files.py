@@ -316,7 +316,7 @@ def test_machine_that_extends_itself_is_refused(write):
 
 def test_missing_machine_is_refused_with_the_nearest(tmp_path):
     assert refused("refrence") == [
-        "refrence: no such file, and no shipped machine of that name (did you mean 'reference'? known: free_stroke, heavy_cabinet, light_cabinet, reference)"
+        "refrence: no such file, and no shipped machine of that name (did you mean 'reference'? known: free_stroke, heavy_cabinet, light_cabinet, motor, reference)"
     ]
     assert refused(tmp_path)[0].startswith(f"{tmp_path}: is a folder")
 

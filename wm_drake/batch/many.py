@@ -23,6 +23,9 @@ from wm_drake.simulation.runs import checked_integrator, checked_step
 FORCE_KINDS = dict(zip(KINDS, ("largest size", "RMS", "RMS without the mean"), strict=True))
 """Words for each of `KINDS`."""
 
+_IN_REGIONS = {"regions", "amplitudes in regions", "feet regions"}
+"""Measures with a value for each region of the profile."""
+
 _VARIABLES = {
     "detergent_displacement": (
         "axis",
@@ -33,6 +36,16 @@ _VARIABLES = {
     "gasket_moment": ("axis", "N m", "largest moment of the gasket on the housing, M of [B]"),
     "amplitude": ("sensor", "m", "largest absolute value of the envelopes"),
     "critical_speed": ("sensor", "rad/s", "drum speed at which the amplitude occurs"),
+    "region_amplitude": (
+        "region sensor",
+        "m",
+        "largest absolute value of the envelopes in each region of the spin profile",
+    ),
+    "region_critical_speed": (
+        "region sensor",
+        "rad/s",
+        "drum speed at which the amplitude of a region occurs",
+    ),
     "power_mean": (
         "sensor",
         "m",
@@ -112,6 +125,7 @@ def simulate_many(
         measures: Names of measures, keys of `MEASURES`:
             "extremes": D, F and M of [B];
             "amplitudes": amplitudes and critical speeds as in `Measures`;
+            "amplitudes in regions": the same in each region of the profile;
             "power means": smooth substitutes for the amplitudes (`measures.power_means`);
             "gap": smallest distance between tub group and housing, NaN if the SDF has no shapes;
             "contacts": number of the nearest pair of shapes; distance of each pair that touches;
@@ -140,6 +154,14 @@ def simulate_many(
         InputError: a case or an argument is wrong. `finished` was called for the runs that had
             ended before.
         SimulationInterrupted: Ctrl-C was pressed.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> machine = wm.build_machine(wm.load_machine("reference"))
+        >>> cases = [wm.case_of(machine.parameters, load) for load in ("middle", "counter")]
+        >>> table = wm.simulate_many(machine, cases)
+        >>> dict(table.amplitude.sizes)
+        {'run': 2, 'sensor': 6}
     """
     wanted = tuple(dict.fromkeys(measures))
     for name in wanted:
@@ -197,7 +219,7 @@ def as_table(
         labels["foot"] = list(parameters.cabinet.corners)
     if "regions" in measures:
         labels["accelerometer"] = list(parameters.accelerometer_frames())
-    if {"regions", "feet regions"} & set(measures):
+    if _IN_REGIONS & set(measures):
         labels["region"] = range(_region_count(measures, results))
     if "contacts" in measures:
         labels["pair"] = Scene(parameters).pair_names()

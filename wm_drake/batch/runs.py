@@ -50,6 +50,7 @@ from wm_drake.simulation.vibration import region_displacements
 MEASURES = {
     "extremes": ("detergent_displacement", "gasket_force", "gasket_moment"),
     "amplitudes": ("amplitude", "critical_speed"),
+    "amplitudes in regions": ("region_amplitude", "region_critical_speed"),
     "power means": ("power_mean",),
     "gap": ("smallest_gap",),
     "contacts": ("nearest_pair", "contact_gap"),
@@ -62,7 +63,7 @@ MEASURES = {
 }
 """What can be measured of each run, with the names of its variables."""
 
-_FILTERED = {"amplitudes", "power means"}
+_FILTERED = {"amplitudes", "amplitudes in regions", "power means"}
 """Measures that need the filtered displacements at the sensors."""
 
 _OF_FEET = {"feet", "feet regions"}
@@ -120,7 +121,9 @@ class Runner:
         Returns:
             A result for each work item; none if `stopped` was set meanwhile.
         """
-        schedule = schedule_of(key.profile, key.stepping.step, OUTPUT_PERIOD)
+        schedule = schedule_of(
+            key.profile, key.stepping.step, OUTPUT_PERIOD, key.layout.control_period
+        )
         one_derivative = key.stepping.one_derivative(schedule)
         # without amplitudes only the detergent point is followed, which comes last
         first = 0 if _FILTERED & set(self.measures) else -3 * POINT_SIZE
@@ -292,6 +295,20 @@ class Runner:
         size, at = amplitudes(run.displacement)
         return size, np.where(np.isnan(size), np.nan, run.samples[at, DRUM_RATE])
 
+    def _amplitudes_in_regions(
+        self, item: WorkItem, schedule: Schedule, run: "_Run"
+    ) -> Iterable[FloatArray]:
+        time = schedule.time[: run.good]
+        shape = len(item.case.profile.regions), run.sensors
+        sizes, speeds = np.full(shape, np.nan), np.full(shape, np.nan)
+        for row, region in enumerate(item.case.profile.regions):
+            inside = np.flatnonzero((time >= region.begin) & (time < region.end))
+            size, at = amplitudes(run.displacement[inside])
+            known = ~np.isnan(size)
+            sizes[row, known] = size[known]
+            speeds[row, known] = run.samples[inside[at[known]], DRUM_RATE]
+        return sizes, speeds
+
     def _power_means(
         self, _item: WorkItem, _schedule: Schedule, run: "_Run"
     ) -> Iterable[FloatArray]:
@@ -375,7 +392,10 @@ class _Run:
     @classmethod
     def of_lane(cls, lane: int, *arrays: FloatArray) -> "_Run":
         """Return the run in a lane of the arrays, which are in the order of the attributes."""
-        return cls(*(array[..., lane] for array in arrays))
+        samples, moved, extremes, mounts, cabinet, lengths, of_batch = (
+            array[..., lane] for array in arrays
+        )
+        return cls(samples, moved, extremes, mounts, cabinet, lengths, of_batch)
 
     @property
     def good(self) -> int:
@@ -398,6 +418,7 @@ class _Run:
 _MEASURED = {
     "extremes": Runner._extremes,
     "amplitudes": Runner._amplitudes,
+    "amplitudes in regions": Runner._amplitudes_in_regions,
     "power means": Runner._power_means,
     "gap": Runner._gap,
     "contacts": Runner._contacts,

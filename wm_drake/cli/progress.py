@@ -52,6 +52,12 @@ def progress_bar(total: int, what: str = "runs") -> Iterator[Callable[[int], Non
 
     Yields:
         Function to call with the number of steps that are done.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> with wm.progress_bar(total=3) as progress:
+        ...     for done in range(1, 4):
+        ...         progress(done)
     """
     columns = (
         TextColumn(what, markup=False),

@@ -9,6 +9,7 @@ from scipy.interpolate import PchipInterpolator
 
 from wm_drake.compiler.packed import SCALAR, PackedLayout
 from wm_drake.laws.table import CURVE, pack_number, pack_table
+from wm_drake.parameters.drive import TorqueLimit, TorqueLimitTable
 from wm_drake.parameters.elements import ForceTable, TorqueTable
 from wm_drake.parameters.types import FloatArray
 
@@ -57,6 +58,14 @@ def packed_stiffnesses(stiffnesses: Sequence[float | ForceTable | TorqueTable]) 
         ):
             packed[index] = curve
     return packed
+
+
+def packed_torque_limit(limit: TorqueLimit | TorqueLimitTable) -> FloatArray:
+    """Return the table of a torque limit as a curve that is constant at its end; 0 without one."""
+    if isinstance(limit, TorqueLimit):
+        return pack_number(0.0)
+    cubics = PchipInterpolator(limit.speed, limit.torque).c[::-1].T
+    return pack_table(limit.speed, cubics, 0.0)
 
 
 @functools.lru_cache(maxsize=256)  # a study packs the same curves for each run

@@ -41,6 +41,16 @@ def advance_to(simulator: Simulator, time: float, profile: SpinProfile) -> None:
         simulator: Simulation of a diagram that contains the machine.
         time: When to stop. [s]
         profile: The spin profile that the machine follows in the simulation's Context.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> from pydrake.systems.analysis import Simulator
+        >>> machine = wm.build_machine(wm.load_machine("reference"))
+        >>> setup = machine.set_up("middle")
+        >>> simulator = Simulator(machine.diagram, setup.context)
+        >>> wm.advance_to(simulator, 0.05, machine.parameters.profile)
+        >>> simulator.get_context().get_time()
+        0.05
     """
     context = simulator.get_mutable_context()
     for corner in profile.time[1:]:
@@ -80,6 +90,7 @@ def run_drake(
     try:
         for row, time in enumerate(samples.time):
             advance_to(simulator, time, profile)
+            simulator.AdvancePendingEvents()  # a sampled controller acts before the sample is taken
             samples.take(row)
             if row % SAMPLES_BETWEEN_CHECKS == 0:
                 if diverging_coordinate(samples.tub_pose()) is not None:

@@ -23,6 +23,7 @@ class Schedule:
             middle of each step and at the end of the last. [rad/s, 1, 1, rad]
         row: (n,) number of the sample at the start of each step, or -1.
         time: (rows,) times of the samples, from 0. [s]
+        controls: (n,) bool, whether a sampled controller acts at the start of each step.
         alike: (n,) number of steps just before each one that have its length and its acceleration.
     """
 
@@ -31,25 +32,32 @@ class Schedule:
     drum: FloatArray
     row: np.ndarray
     time: FloatArray
+    controls: np.ndarray
     alike: np.ndarray
 
     @property
-    def steps(self) -> tuple[FloatArray, FloatArray, FloatArray, np.ndarray]:
-        """Return the four arrays that `wm_drake.engines.compiled.integration` reads."""
-        return self.step, self.acceleration, self.drum, self.row
+    def steps(self) -> tuple[FloatArray, FloatArray, FloatArray, np.ndarray, np.ndarray]:
+        """Return the five arrays that `wm_drake.engines.compiled.integration` reads."""
+        return self.step, self.acceleration, self.drum, self.row, self.controls
 
 
 @functools.lru_cache(maxsize=8)
-def schedule_of(profile: SpinProfile, step: float, period: float) -> Schedule:
+def schedule_of(
+    profile: SpinProfile, step: float, period: float, control_period: float = 0.0
+) -> Schedule:
     """Return the steps through a profile.
 
     Args:
         profile: Drum speed over time.
         step: Largest step. [s]
         period: Time between samples. [s]
+        control_period: Time between samples of a sampled controller, 0 for none. [s] Steps end at
+            them, too.
     """
     time, corners = output_times(profile, period), np.array(profile.time)
     marks = np.union1d(time, corners)
+    if control_period:
+        marks = np.union1d(marks, output_times(profile, control_period))
     # a corner that differs from a sample by rounding only is that sample
     marks = np.delete(marks, np.flatnonzero(np.diff(marks) < 1e-9 * period) + 1)
     pieces = np.append(np.ceil(np.diff(marks) / step * (1.0 - 1e-9)).astype(int), 1)
@@ -59,9 +67,11 @@ def schedule_of(profile: SpinProfile, step: float, period: float) -> Schedule:
     begins = np.repeat(marks, pieces) + since_mark
     middles = begins + 0.5 * lengths
     row = np.full(len(lengths), -1, dtype=np.int64)
-    nearest = np.rint(marks / period).astype(int)
-    sampled = np.abs(marks - period * nearest) < 1e-9 * period
+    sampled, nearest = _multiples(marks, period)
     row[first[sampled]] = nearest[sampled]
+    controls = np.zeros(len(lengths), dtype=bool)
+    if control_period:
+        controls[first[_multiples(marks, control_period)[0]]] = True
     nodes = np.append(np.column_stack([begins, middles]).ravel(), marks[-1])
     speed, angle = drum_motion(profile, nodes)
     acceleration = drum_acceleration(profile, np.minimum(middles, marks[-1]))
@@ -71,8 +81,15 @@ def schedule_of(profile: SpinProfile, step: float, period: float) -> Schedule:
         drum=np.column_stack([speed, np.cos(angle), np.sin(angle), angle]),
         row=row,
         time=time,
+        controls=controls,
         alike=_alike(lengths, acceleration),
     )
+
+
+def _multiples(marks: FloatArray, period: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return which times are whole multiples of a period, and the nearest multiple of each."""
+    nearest = np.rint(marks / period).astype(int)
+    return np.abs(marks - period * nearest) < 1e-9 * period, nearest
 
 
 def _alike(lengths: FloatArray, acceleration: FloatArray) -> np.ndarray:

@@ -22,6 +22,7 @@ from pydrake.multibody.tree import (
 )
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names, shortened
+from wm_drake.model.rotor import set_rotor
 from wm_drake.model.sdf_shapes import check_shapes
 from wm_drake.model.state_layout import CABINET, CARRIER
 from wm_drake.parameters import (
@@ -32,6 +33,7 @@ from wm_drake.parameters import (
     with_value,
 )
 from wm_drake.parameters.cabinet import Cabinet
+from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.text_files import check_regular, is_file
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
@@ -78,7 +80,8 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
 
     The tub gets an RpyFloatingJoint, which an SDF file cannot contain; tub and drum then have 7
     positions and 7 velocities. The outer tubes of telescopic dampers get one too. The reflected
-    inertia of the drive makes the drum follow its speed source (`wm_drake.systems.speed_source`).
+    inertia of a prescribed drive makes the drum follow its speed source
+    (`wm_drake.systems.speed_source`); `set_bodies` replaces it by that of a motor.
     With a compliant bearing the drum turns in a massless floating body, the drum carrier
     (`wm_drake.model.state_layout.CARRIER`). Its frame coincides with T in the drawn pose. A cabinet
     that moves is a floating body too; the housing of the SDF stays where it is drawn, and gives the
@@ -428,6 +431,8 @@ def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameter
         frame = plant.GetFrameByName(name)
         rotation = frame.GetFixedPoseInBodyFrame().rotation()
         frame.SetPoseInParentFrame(context, RigidTransform(rotation, frame_override.position))
+    if drive := motor_of(parameters.drive):
+        set_rotor(plant, context, drive)
 
 
 def add_load(plant: MultibodyPlant, context: Any, load: Load) -> None:

@@ -6,21 +6,24 @@ from typing import Any
 import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from wm_drake.elements.cabinet import FEET_SIZE
+from wm_drake.elements.motor import packed_controller, packed_friction, packed_limit
 from wm_drake.model.bodies import add_bodies
 from wm_drake.model.frame_poses import FramePoses
-from wm_drake.model.machine import Machine, MachineSystems
+from wm_drake.model.machine import Machine, MachineSystems, MotorSystems
 from wm_drake.model.placed_elements import placed_elements
 from wm_drake.model.state_layout import state_layout_of
 from wm_drake.model.tub_points import measured_points, tub_points
 from wm_drake.model.visualization import add_visualizer
 from wm_drake.model.wiring import Link, Wiring
-from wm_drake.parameters import MachineParameters
+from wm_drake.parameters import MachineParameters, MotorDrive
+from wm_drake.parameters.drive import motor_of
 from wm_drake.systems.cabinet import Cabinet, Feet
 from wm_drake.systems.drum_bearing import DrumBearing
 from wm_drake.systems.friction_damper import FrictionDamper
+from wm_drake.systems.motor import Belt, DrumFriction, Motor, SpeedController
 from wm_drake.systems.sensors import Sensors
 from wm_drake.systems.six_component_bushing import SixComponentBushing
 from wm_drake.systems.speed_source import MotorTorque, SpeedSource
@@ -45,6 +48,14 @@ def add_washing_machine(
 
     Raises:
         InputError: the SDF or the machine file has an error.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> from pydrake.systems.framework import DiagramBuilder
+        >>> builder = DiagramBuilder()
+        >>> washer = wm.add_washing_machine(builder, wm.load_machine("reference"))
+        >>> sorted(washer.inputs)
+        ['drum_acceleration', 'tub_force']
     """
     prefix = f"{name}_" if name else ""
     plant = builder.AddNamedSystem(f"{prefix}bodies", MultibodyPlant(time_step=0.0))
@@ -66,24 +77,35 @@ def add_washing_machine(
     }
     bearing = DrumBearing(placed.bearing.packed()) if placed.bearing else None
     on_tub, links = _labelled(springs, dampers, bushings, telescopes, bearing)
-    profile, source, torque = _add_drive(wiring, parameters)
+    drive = motor_of(parameters.drive)
+    friction = DrumFriction(packed_friction(drive)) if drive else None
     tub_force, sensors = TubForce(), Sensors(points)
+    others = [("tub_force", tub_force), *([("drum_friction", friction)] if friction else [])]
     tub_state = wiring.tub_state()
     cabinet, feet, seen = None, None, tub_state
     if parameters.cabinet_moves:
         cabinet, feet = Cabinet(), Feet(np.zeros(FEET_SIZE))
         on_cabinet = Link("cabinet", cabinet, len(layout.trees) - 1)
-        wiring.connect_elements(tub_state, [("tub_force", tub_force)], [*links, on_cabinet])
+        wiring.connect_elements(tub_state, others, [*links, on_cabinet])
         seen = wiring.connect_cabinet(cabinet, on_tub, feet)
     else:
-        wiring.connect_elements(tub_state, [*on_tub, ("tub_force", tub_force)], links)
+        wiring.connect_elements(tub_state, [*on_tub, *others], links)
     builder.Connect(seen, wiring.add("sensors", sensors).GetInputPort("plant_state"))
-    inputs = {"drum_acceleration": source.GetInputPort("drum_acceleration")}
+    profile = wiring.add("spin_profile", SpinProfileSource(parameters.profile))
+    source, motor = None, None
+    if drive and friction:
+        motor, torque = _add_motor(wiring, drive, profile, sensors, friction)
+        inputs = {"drum_speed_reference": motor.controller.GetInputPort("speed_reference")}
+    else:
+        source, torque = _add_speed_source(wiring, profile)
+        inputs = {"drum_acceleration": source.GetInputPort("drum_acceleration")}
     inputs["tub_force"] = tub_force.GetInputPort("tub_force")
     outputs = {"state": plant.get_state_output_port()}
     for port in ("displacement", "detergent_displacement", "drum_speed"):
         outputs[port] = sensors.GetOutputPort(port)
-    outputs["motor_torque"] = torque.GetOutputPort("torque")
+    outputs["motor_torque"] = torque
+    if friction:
+        outputs["drum_friction_torque"] = friction.GetOutputPort("torque")
     if feet:
         outputs["tub_in_cabinet"], outputs["feet_floor_force"] = (
             seen,
@@ -94,7 +116,7 @@ def add_washing_machine(
             outputs[f"{label}_{port}"] = system.GetOutputPort(port)
     systems = springs, dampers, bushings, telescopes, bearing, cabinet, feet
     return MachineSystems(
-        parameters, plant, layout, profile, source, sensors, *systems, inputs, outputs
+        parameters, plant, layout, profile, source, motor, sensors, *systems, inputs, outputs
     )
 
 
@@ -110,6 +132,12 @@ def build_machine(parameters: MachineParameters, *, meshcat: Meshcat | None = No
 
     Raises:
         InputError: the SDF or the machine file has an error.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> machine = wm.build_machine(wm.load_machine("reference"))
+        >>> sorted(machine.springs)
+        ['left', 'rear', 'right']
     """
     builder = DiagramBuilder()
     systems = add_washing_machine(builder, parameters)
@@ -148,12 +176,44 @@ def _labelled(
     return on_tub, links
 
 
-def _add_drive(
-    wiring: Wiring, parameters: MachineParameters
-) -> tuple[SpinProfileSource, SpeedSource, MotorTorque]:
-    """Add spin profile, speed source and motor torque, and connect them to the plant."""
+def _add_motor(
+    wiring: Wiring,
+    drive: MotorDrive,
+    profile: SpinProfileSource,
+    sensors: Sensors,
+    friction: DrumFriction,
+) -> tuple[MotorSystems, OutputPort]:
+    """Add controller, motor and belt, and connect them to each other, the profile and the plant.
+
+    Returns:
+        All systems of the drive, and the port of the motor's torque on the drum.
+    """
+    connect = wiring.builder.Connect
+    sample_time = drive.controller.sample_time or 0.0
+    controller = wiring.add(
+        "speed_controller", SpeedController(packed_controller(drive), sample_time)
+    )
+    motor = wiring.add("motor", Motor(packed_limit(drive)))
+    belt = wiring.add("belt", Belt(np.array([drive.belt_ratio])))
+    connect(profile.GetOutputPort("speed"), controller.GetInputPort("profile_speed"))
+    connect(controller.GetOutputPort("demand"), motor.GetInputPort("demand"))
+    connect(motor.GetOutputPort("torque_limit"), controller.GetInputPort("torque_limit"))
+    connect(motor.GetOutputPort("torque"), belt.GetInputPort("motor_torque"))
+    connect(belt.GetOutputPort("motor_speed"), motor.GetInputPort("motor_speed"))
+    torque = belt.GetOutputPort("drum_torque")
+    connect(torque, wiring.plant.get_actuation_input_port())
+    for system in (controller, belt):
+        connect(sensors.GetOutputPort("drum_speed"), system.GetInputPort("drum_speed"))
+    return MotorSystems(controller, motor, belt, friction), torque
+
+
+def _add_speed_source(wiring: Wiring, profile: SpinProfileSource) -> tuple[SpeedSource, OutputPort]:
+    """Add speed source and motor torque, and connect them to the profile and the plant.
+
+    Returns:
+        The source, and the port of the motor's torque on the drum.
+    """
     builder, plant = wiring.builder, wiring.plant
-    profile = wiring.add("spin_profile", SpinProfileSource(parameters.profile))
     source = wiring.add("speed_source", SpeedSource())
     size, drum = plant.num_velocities(), wiring.layout.drum
     torque = wiring.add("motor_torque", MotorTorque(size, drum))
@@ -167,7 +227,7 @@ def _add_drive(
         plant.get_generalized_acceleration_output_port(),
         torque.GetInputPort("generalized_acceleration"),
     )
-    return profile, source, torque
+    return source, torque.GetOutputPort("torque")
 
 
 def _own_outputs(system: Any) -> list[str]:

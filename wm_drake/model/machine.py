@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from pydrake.systems.framework import Context, Diagram, InputPort, OutputPort
 from wm_drake.elements.bushing import SixComponentBushingParameters
 from wm_drake.elements.cabinet import CabinetOnFeet
 from wm_drake.elements.friction_damper import FrictionDamperParameters
+from wm_drake.elements.motor import packed_controller, packed_friction, packed_limit
 from wm_drake.elements.spring import SpringStrutParameters
 from wm_drake.elements.telescopic_damper import TelescopicDamperParameters
 from wm_drake.errors import input_error, nearest_names
@@ -23,11 +24,13 @@ from wm_drake.model.placed_elements import AppliedForce, PlacedElements, placed_
 from wm_drake.model.same_elements import check_same_elements
 from wm_drake.model.state_layout import StateLayout
 from wm_drake.model.tub_points import TubPoints, measured_points, tub_points
-from wm_drake.parameters import Load, MachineParameters, Sensor, SpinProfile
+from wm_drake.parameters import Drive, Load, MachineParameters, MotorDrive, Sensor, SpinProfile
+from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.types import FloatArray
 from wm_drake.systems.cabinet import Cabinet, Feet
 from wm_drake.systems.drum_bearing import DrumBearing
 from wm_drake.systems.friction_damper import FrictionDamper
+from wm_drake.systems.motor import Belt, DrumFriction, Motor, SpeedController
 from wm_drake.systems.sensors import Sensors
 from wm_drake.systems.six_component_bushing import SixComponentBushing
 from wm_drake.systems.speed_source import SpeedSource
@@ -106,6 +109,11 @@ class Setup:
         return self.elements.bearing
 
     @property
+    def motor(self) -> MotorDrive | None:
+        """Return the drive with a motor; None if the speed of the drum is prescribed."""
+        return motor_of(self.parameters.drive)
+
+    @property
     def sensor_points(self) -> dict[str, FloatArray]:
         """Return the points of the displacement sensors in T. [m]"""
         return self.points.sensors
@@ -126,6 +134,36 @@ class Setup:
         return measured_points(self.parameters, self.points, self.rest_pose)
 
 
+def with_prescribed_speed(setup: Setup) -> Setup:
+    """Return a setup whose parameters have a prescribed speed in place of a motor."""
+    if setup.motor is None:
+        return setup
+    drive = Drive(joint=setup.motor.joint)
+    return replace(setup, parameters=setup.parameters.model_copy(update={"drive": drive}))
+
+
+@dataclass(frozen=True)
+class MotorSystems:
+    """The systems of a drive with a motor."""
+
+    controller: SpeedController
+    motor: Motor
+    belt: Belt
+    friction: DrumFriction
+
+    def set_drive(self, context: Context, drive: MotorDrive) -> None:
+        """Set the numbers of a drive in a root Context, and its state before a run."""
+        numbers = (
+            (self.controller, packed_controller(drive)),
+            (self.motor, packed_limit(drive)),
+            (self.belt, np.array([drive.belt_ratio])),
+            (self.friction, packed_friction(drive)),
+        )
+        for system, packed in numbers:
+            system.set_parameters(system.GetMyContextFromRoot(context), packed)
+        self.controller.reset(self.controller.GetMyContextFromRoot(context))
+
+
 @dataclass(frozen=True)
 class MachineSystems:
     """The systems of a machine in a diagram, and the ports that other systems may connect to.
@@ -136,13 +174,16 @@ class MachineSystems:
         parameters: The numbers it was built from.
         plant: The bodies.
         state_layout: Indices in the state of the plant.
-        spin_profile, speed_source, sensors: Systems that drive the drum and measure the tub.
+        spin_profile, sensors: Systems of the spin profile and of what is measured.
+        speed_source: System that prescribes the speed of the drum; None with a motor.
+        motor: Systems of a drive with a motor; None if the speed is prescribed.
         springs, dampers, bushings, telescopes: Element systems by name.
         bearing: System of the compliant bearing; None for a rigid one.
         cabinet, feet: Systems of a cabinet that moves; None if it is fixed.
         inputs: By name. "drum_acceleration" (1) [rad/s^2] replaces the acceleration of the spin
-            profile if a value is connected or fixed. "tub_force" (6) is moment about To and force
-            on the tub in W [N m, N], zero if nothing is connected.
+            profile if a value is connected or fixed; with a motor, "drum_speed_reference" (1)
+            [rad/s] replaces its speed. "tub_force" (6) is moment about To and force on the tub in W
+            [N m, N], zero if nothing is connected.
         outputs: By name: "state" of the plant; "displacement" of the sensors,
             "detergent_displacement", "drum_speed"; "motor_torque"; and for each element its own
             outputs, such as "spring_left_force", "damper_left_force", "gasket_force" and
@@ -153,7 +194,8 @@ class MachineSystems:
     plant: MultibodyPlant
     state_layout: StateLayout
     spin_profile: SpinProfileSource
-    speed_source: SpeedSource
+    speed_source: SpeedSource | None
+    motor: MotorSystems | None
     sensors: Sensors
     springs: dict[str, SpringStrut]
     dampers: dict[str, FrictionDamper]
@@ -217,6 +259,7 @@ class MachineSystems:
         points = tub_points(poses, parameters)
         profile = profile or parameters.profile
         self._set_systems(context, elements, measured_points(parameters, points, q[layout.tub]))
+        self._set_drive(context, parameters)
         self._set_feet(context, cabinet)
         self.set_profile(context, profile)
         rest = q[layout.tub], residual, q[layout.tubes], q[layout.carrier]
@@ -248,7 +291,12 @@ class MachineSystems:
         """Fix the drum's acceleration in a root Context, in place of the spin profile. [rad/s^2]
 
         The port "drum_acceleration" must not be connected.
+
+        Raises:
+            InputError: a motor turns the drum.
         """
+        if self.speed_source is None:
+            raise input_error("a motor turns the drum; its acceleration follows", key="drive.kind")
         self.inputs["drum_acceleration"].FixValue(
             self.speed_source.GetMyContextFromRoot(context), [acceleration]
         )
@@ -313,6 +361,12 @@ class MachineSystems:
                     own.SetContinuousState(np.zeros(system.state_size))
         self.sensors.set_points(self.sensors.GetMyContextFromRoot(context), points)
 
+    def _set_drive(self, context: Context, parameters: MachineParameters) -> None:
+        """Set the numbers of a motor in a root Context, and its state before a run."""
+        if drive := motor_of(parameters.drive):
+            assert self.motor  # check_same_elements has seen to it
+            self.motor.set_drive(context, drive)
+
     def _set_feet(self, context: Context, cabinet: CabinetOnFeet | None) -> None:
         """Set the parameters of the feet of a cabinet that moves; no foot has slid."""
         if self.feet is not None and cabinet is not None:
@@ -365,4 +419,6 @@ class Machine(MachineSystems):
 
     def set_drum_acceleration(self, context: Context, acceleration: float) -> None:
         """Fix the drum's acceleration in a root Context; see `MachineSystems`. [rad/s^2]"""
+        if self.speed_source is None:
+            super().set_drum_acceleration(context, acceleration)
         self.diagram.GetInputPort("drum_acceleration").FixValue(context, [acceleration])

@@ -1,7 +1,9 @@
 """Check that numbers fit a machine that is built already."""
 
+from wm_drake.elements.motor import motor_structure
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.drive import motor_of
 
 
 def check_same_elements(built: MachineParameters, wanted: MachineParameters) -> None:
@@ -23,6 +25,7 @@ def check_same_elements(built: MachineParameters, wanted: MachineParameters) -> 
             f"{now}",
             key="imperfections.bearing",
         )
+    _check_drive(built, wanted)
     if wanted.cabinet_moves != built.cabinet_moves:
         kinds = ("moves", "does not")
         now, before = kinds if wanted.cabinet_moves else kinds[::-1]
@@ -31,6 +34,26 @@ def check_same_elements(built: MachineParameters, wanted: MachineParameters) -> 
             key="cabinet.moves",
         )
     _check_laws(built, wanted)
+
+
+def _check_drive(built: MachineParameters, wanted: MachineParameters) -> None:
+    """Raise InputError if a drive is of another kind, on another joint or with another sampling."""
+    drives = built.drive, wanted.drive
+    if drives[0].kind != drives[1].kind or drives[0].joint != drives[1].joint:
+        texts = [f"{drive.kind} at '{drive.joint}'" for drive in drives]
+        raise input_error(
+            f"is {texts[1]}; the built machine has {texts[0]}: rebuild the machine", key="drive"
+        )
+    motors = [motor for motor in map(motor_of, drives) if motor]
+    if len({tuple(motor_structure(motor)) for motor in motors}) > 1:
+        raise input_error(
+            "has another number of points than the built machine's; rebuild the machine",
+            key="drive.torque_limit",
+        )
+    if len({motor.controller.sample_time for motor in motors}) > 1:
+        raise input_error(
+            "is not the built machine's; rebuild the machine", key="drive.controller.sample_time"
+        )
 
 
 def _check_names(built: MachineParameters, wanted: MachineParameters) -> None:

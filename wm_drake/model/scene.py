@@ -144,6 +144,14 @@ class Scene:
 
     Attributes:
         plant: Plant with the shapes; its bearing is rigid.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> machine = wm.build_machine(wm.load_machine("reference"))
+        >>> scene = wm.Scene(machine.parameters)
+        >>> gap = wm.measure(wm.simulate(machine, "middle"), scene).smallest_gap
+        >>> gap.moving, gap.fixed
+        ('tub_shell', 'wall_right')
     """
 
     def __init__(self, parameters: MachineParameters, meshcat: Meshcat | None = None) -> None:

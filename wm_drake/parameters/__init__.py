@@ -18,6 +18,7 @@ from wm_drake.parameters.damper_laws import (
     StvDamper,
     StvSpongeDamper,
 )
+from wm_drake.parameters.drive import Drive, MotorDrive
 from wm_drake.parameters.elements import (
     Bushing,
     BushingType,
@@ -56,7 +57,6 @@ from wm_drake.parameters.loop_files import MeasuredLoop, read_loop, read_loops
 from wm_drake.parameters.machine import (
     BodyOverride,
     Clearance,
-    Drive,
     FrameOverride,
     MachineParameters,
     Sensor,
@@ -90,6 +90,7 @@ __all__ = [
     "Load",
     "MachineParameters",
     "MeasuredLoop",
+    "MotorDrive",
     "MstvDamper",
     "PublishedResults",
     "PublishedTerm",

@@ -62,6 +62,12 @@ def load_machine(name_or_path: str | Path = "reference") -> MachineParameters:
 
     Raises:
         InputError: the file is missing or wrong, with one problem for each error.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> parameters = wm.load_machine("reference")
+        >>> sorted(parameters.loads)
+        ['back', 'counter', 'front', 'middle']
     """
     path = machine_path(name_or_path)
     plain, sources = _without_sources(_extended(path, ()))
@@ -94,6 +100,16 @@ def load_load(path: Path) -> Load:
 
     Raises:
         InputError: the file is missing or wrong, with one problem for each error.
+
+    Example:
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> import wm_drake as wm
+        >>> path = Path(tempfile.mkdtemp()) / "towel.yaml"
+        >>> text = "unbalances: [{mass: 0.8 kg, radius: 240 mm, y: -50 mm}]"
+        >>> _ = path.write_text(text)
+        >>> wm.load_load(path).unbalances[0].mass
+        0.8
     """
     tree = read_yaml(path)
     return _validated(Load, _without_sources(tree)[0], path)
@@ -137,6 +153,11 @@ def load_profile(name_or_path: str | Path) -> SpinProfile:
 
     Raises:
         InputError: the file is missing or wrong, with one problem for each error.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> wm.load_profile("run_up").duration
+        70.0
     """
     shipped = shipped_profiles()
     path = shipped.get(f"profile_{name_or_path}", Path(name_or_path))

@@ -29,6 +29,13 @@ def with_value(parameters: Tree, key: str, value: Any) -> Tree:
     Raises:
         InputError: the key is unknown (the message names similar ones), or the value is not
             allowed.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> parameters = wm.load_machine("reference")
+        >>> softer = wm.with_value(parameters, "gasket.stiffness_x", "1.5 N/mm")
+        >>> softer.gasket.stiffness_x
+        1500.0
     """
     return with_values(parameters, {key: value})
 
@@ -50,6 +57,13 @@ def with_values(parameters: Tree, values: Mapping[str, Any]) -> Tree:
 
     Raises:
         InputError: a key is unknown (the message names similar ones), or a value is not allowed.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> changes = {"gasket.stiffness_x": 1500.0, "bodies.motor.mass": "6 kg"}
+        >>> changed = wm.with_values(wm.load_machine("reference"), changes)
+        >>> changed.bodies["motor"].mass
+        6.0
     """
     for key in values:
         if key.count(".") >= DEEPEST_KEY:

@@ -9,6 +9,7 @@ from wm_drake.parameters import units as u
 from wm_drake.parameters.bearing import Bearing
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.damper_laws import DamperType
+from wm_drake.parameters.drive import AnyDrive, Drive, MotorDrive
 from wm_drake.parameters.elements import (
     Bushing,
     BushingType,
@@ -87,16 +88,6 @@ class Sensor(Frozen):
 
     frame: str
     axis: Literal["x", "y", "z"]
-
-
-class Drive(Frozen):
-    """The motor, with the name of the joint that it drives.
-
-    Attributes:
-        joint: Revolute joint of the SDF between tub and drum.
-    """
-
-    joint: str = "drum_axis"
 
 
 class Clearance(Frozen):
@@ -196,7 +187,7 @@ class MachineParameters(Frozen):
     gravity: Annotated[u.Acceleration, Field(ge=0.0)]
     step: Annotated[u.Duration, Field(gt=0.0)] = DEFAULT_STEP
     integrator: Integrator = "auto"
-    drive: Drive = Drive()
+    drive: AnyDrive = Drive()
     bodies: dict[Name, BodyOverride] = {}
     frames: dict[Name, FrameOverride] = {}
     spring_types: dict[Name, SpringType]
@@ -272,6 +263,15 @@ class MachineParameters(Frozen):
         if "gasket" in self.bushings:
             raise ValueError(
                 "bushings: the name 'gasket' is reserved for the key 'gasket'; use another name"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _motor_has_a_rigid_bearing(self) -> "MachineParameters":
+        if self.imperfections.bearing and isinstance(self.drive, MotorDrive):
+            raise ValueError(
+                "drive.kind: 'motor' needs a rigid bearing of the drum; remove "
+                "imperfections.bearing, or use 'prescribed'"
             )
         return self
 

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ValidationError
 
 from wm_drake.errors import Problem, nearest_names, shortened
 from wm_drake.parameters.damper_laws import DAMPER_LAWS
+from wm_drake.parameters.drive import DRIVE_TAGS
 
 
 def problems_of(error: ValidationError, root: type[BaseModel], key: str = "") -> list[Problem]:
@@ -37,7 +38,7 @@ _WANTED = {
 }
 """What a value must be, by kind of error; pydantic would name its Python class."""
 
-_TAGS = ("[key]", "number", "table", *DAMPER_LAWS)
+_TAGS = ("[key]", "number", "table", *DRIVE_TAGS, *DAMPER_LAWS)
 
 
 def _message(detail: Any, root: type[BaseModel]) -> str:

@@ -22,6 +22,13 @@ class Case:
         profile: Drum speed over time.
         gasket: False removes the gasket from the machine.
         parameters: Parameters of the machine in this run; those of the built machine if None.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> parameters = wm.load_machine("reference")
+        >>> case = wm.Case("mine", parameters.loads["middle"], parameters.profile, gasket=False)
+        >>> case.name, case.gasket
+        ('mine', False)
     """
 
     name: str
@@ -57,6 +64,11 @@ def case_of(parameters: MachineParameters, load: str, *, gasket: bool = True) ->
 
     Raises:
         InputError: the machine has no load of this name.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> wm.case_of(wm.load_machine("reference"), "counter", gasket=False).name
+        'counter'
     """
     if load not in parameters.loads:
         raise input_error(

@@ -129,7 +129,14 @@ def _band_pass(period: float) -> tuple[FloatArray, FloatArray]:
 
 
 def filtered_displacement(record: Record) -> xr.DataArray:
-    """Return the displacements (time, sensor) of a record, filtered to 0.5-20 Hz. [m]"""
+    """Return the displacements (time, sensor) of a record, filtered to 0.5-20 Hz. [m]
+
+    Example:
+        >>> import wm_drake as wm
+        >>> record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
+        >>> wm.filtered_displacement(record).dims
+        ('time', 'sensor')
+    """
     raw = record.displacement
     return raw.copy(data=filtered(raw.values, _period(record)))
 
@@ -191,6 +198,13 @@ def envelopes(record: Record) -> xr.Dataset:
     """Return the upper and lower envelope (time, sensor) of the filtered displacements. [m]
 
     An envelope consists of straight lines from peak to peak.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
+        >>> envelope = wm.envelopes(record)
+        >>> bool((envelope.upper >= envelope.lower).all())
+        True
     """
     displacement = filtered_displacement(record)
     time = displacement.time.values
@@ -271,6 +285,13 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
     Args:
         record: Record of a run, from `wm_drake.simulation.runs.simulate`.
         scene: Shapes of the machine. If None, the smallest gap is not computed.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
+        >>> amplitude = wm.measure(record).amplitude  # m
+        >>> round(1e3 * float(amplitude.sel(sensor="Xr")))
+        24
     """
     # a dictionary of arrays is faster than attribute access of a dataset
     values = {name: variable.values for name, variable in record.variables.items()}

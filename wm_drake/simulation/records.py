@@ -83,6 +83,16 @@ def save_record(record: Record, path: Path) -> None:
 
     Raises:
         OSError: the file cannot be written.
+
+    Example:
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> import wm_drake as wm
+        >>> record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
+        >>> path = Path(tempfile.mkdtemp()) / "middle.nc"
+        >>> wm.save_record(record, path)
+        >>> path.exists()
+        True
     """
     compression = {
         name: {"compression": "gzip", "compression_opts": 1}
@@ -93,7 +103,18 @@ def save_record(record: Record, path: Path) -> None:
 
 
 def load_record(path: Path) -> Record:
-    """Read a record that `save_record` wrote."""
+    """Read a record that `save_record` wrote.
+
+    Example:
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> import wm_drake as wm
+        >>> record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
+        >>> path = Path(tempfile.mkdtemp()) / "middle.nc"
+        >>> wm.save_record(record, path)
+        >>> bool((wm.load_record(path).displacement == record.displacement).all())
+        True
+    """
     return xr.load_dataset(path, engine="h5netcdf")
 
 

@@ -57,6 +57,13 @@ def simulate(
     Raises:
         InputError: the load or the engine is unknown, the step size does not divide the output
             period, or the machine cannot be set up with the parameters of the case.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> machine = wm.build_machine(wm.load_machine("reference"))
+        >>> record = wm.simulate(machine, "middle")
+        >>> record.displacement.dims, float(record.time[-1])
+        (('time', 'sensor'), 70.0)
     """
     if engine not in ENGINES:
         raise input_error(f"no engine '{engine}'{nearest_names(engine, ENGINES)}", key="engine")

@@ -6,6 +6,7 @@ import pytest
 pytest.importorskip("pymoo")
 
 from wm_drake.studies.pareto.search import hypervolume, search_front
+from wm_drake.studies.pareto.surrogate import search_with_surfaces
 
 
 def zdt1(x):
@@ -107,3 +108,45 @@ def test_hypervolume_of_known_points():
     # scaled to (0.25, 0.5) and (0.5, 0.25): two boxes of 3/4 x 1/2 and 1/2 x 3/4, overlap 1/2 x 1/2
     front = np.array([[0.5, 2.0], [1.0, 1.0]])
     assert hypervolume(front, first) == pytest.approx(0.375 + 0.375 - 0.25)
+
+
+def circle(x):
+    """Return (x, y) outside a circle about 0: the front is its arc."""
+    return x, 0.64 - np.sum(x**2, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize(
+    ("problem", "size", "constraints"), [(zdt1, 6, 0), (circle, 2, 1)], ids=["ZDT1", "circle"]
+)
+def test_surfaces_need_fewer_designs(problem, size, constraints):
+    arguments = (problem, np.full(size, 0.9), 2, constraints)
+    settings = {"population": 32, "seed": 1}
+    genetic = search_front(*arguments, evaluations=256, **settings)
+    found = search_with_surfaces(*arguments, evaluations=96, **settings)
+    # both scale with the same first population, so that hypervolumes can be compared
+    assert np.array_equal(found.first, genetic.first)
+    assert found.hypervolume > genetic.hypervolume
+    assert found.evaluations == 96
+    assert [count for count, _ in found.history] == [32, 48, 64, 80, 96]
+    f, g = problem(found.designs)
+    assert f == pytest.approx(found.objectives)
+    assert (g <= 0.0).all()
+
+
+def test_surfaces_find_the_front_of_zdt1_again_with_the_same_seed():
+    settings = {"evaluations": 112, "population": 32, "seed": 2}
+    found, again = (search_with_surfaces(zdt1, np.full(6, 0.9), 2, 0, **settings) for _ in range(2))
+    above = found.objectives[:, 1] - (1.0 - np.sqrt(found.objectives[:, 0]))
+    assert above.min() >= -1e-12
+    assert np.quantile(above, 0.9) < 0.02
+    assert np.array_equal(found.designs, again.designs)
+
+
+def test_surfaces_leave_out_designs_that_cannot_run():
+    def half(x):
+        f, g = zdt1(x)
+        return np.where(x[:, :1] < 0.5, np.nan, f), g
+
+    found = search_with_surfaces(half, np.full(3, 0.9), 2, 0, evaluations=64, population=32)
+    assert len(found.designs)
+    assert (found.designs[:, 0] >= 0.5).all()

@@ -14,6 +14,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile
 from wm_drake.simulation.outputs import tub_outputs
 from wm_drake.studies.steady.balance import HARMONICS, HarmonicBalance
+from wm_drake.studies.steady.condensed import Corrections
 from wm_drake.studies.steady.continuation import first_motion
 from wm_drake.studies.steady.response import branch_of, trajectory_of_period
 from wm_drake.studies.steady.series import Series
@@ -349,7 +350,7 @@ def test_matrix_is_the_derivative_of_the_residual(machine):
     ahead, back = balance.residual(motion + change, speed), balance.residual(motion - change, speed)
     wanted = 0.5 * (ahead - back).ravel()
     np.testing.assert_allclose(
-        at.matrix @ change.ravel(), wanted, atol=2e-3 * np.max(np.abs(wanted))
+        np.tensordot(at.matrix, change, 2).ravel(), wanted, atol=2e-3 * np.max(np.abs(wanted))
     )
     faster, slower = balance.residual(motion, speed + 1e-5), balance.residual(motion, speed - 1e-5)
     by_speed = (faster - slower) / 2e-5
@@ -370,3 +371,48 @@ def test_matrix_is_the_derivative_of_the_residual(machine):
 def test_wrong_arguments_are_refused(machine, speeds, options, word):
     with pytest.raises(InputError, match=word):
         wm.steady_response(machine, "front", speeds, **options)
+
+
+def test_telescopic_dampers_move_as_the_engine_moves_them():
+    """The free-stroke machine: tubes as bodies, whose spin about their axes nothing holds."""
+    machine = build_machine(wm.load_machine("free_stroke"))
+    setup = machine.set_up("front")
+    speeds = np.array([100.0, 110.0]) * RPM
+    balance = HarmonicBalance(setup, Series(3, 64))
+    assert len(balance.kinematics.spins) == 3
+    points = [p for p in branch_of(balance, setup, speeds) if p.on_grid]
+    assert len(points) == 2
+    assert all(point.stable for point in points)
+    engine = settled_trajectory(setup, speeds[1], 128, 60)
+    own = trajectory_of_period(balance, points[1].coefficients, speeds[1], 128)
+    np.testing.assert_allclose(amplitudes(setup, own), amplitudes(setup, engine), rtol=2e-3)
+
+
+def test_condensed_corrections_are_those_of_the_whole_system(machine):
+    """Compare with a dense solution of the bordered system."""
+    balance = HarmonicBalance(machine.set_up("front"), Series(2, 32))
+    speed = 150.0 * RPM
+    rng = np.random.default_rng(2)
+    at = balance.linearised(balance.rest() + 1e-4 * rng.normal(size=balance.rest().shape), speed)
+    row = rng.normal(size=at.residual.shape)
+    row[:, balance.kinematics.velocities] = 0.0
+    size = row.size
+    whole = np.block(
+        [[at.matrix.reshape(size, size), at.by_speed.reshape(-1, 1)], [row.reshape(1, -1), 0.3]]
+    )
+    wanted = np.linalg.solve(whole, np.append(-at.residual.ravel(), 0.7))
+    change, faster = Corrections(balance, at, row, 0.3)(at.residual, 0.7)
+    np.testing.assert_allclose(change.ravel(), wanted[:-1], rtol=1e-6, atol=1e-9)
+    assert faster == pytest.approx(wanted[-1], rel=1e-6)
+
+
+def test_matrix_of_products_multiplies_series():
+    """The product with a factor, sampled; with few samples harmonics fold alike."""
+    rng = np.random.default_rng(4)
+    for samples in (7, 9, 32):
+        series = Series(3, samples)
+        factor, coefficients = rng.normal(size=(samples, 1, 1)), rng.normal(size=(7, 1))
+        matrix = np.zeros((7, 1, 7, 1))
+        series.minus_products(factor, matrix)
+        wanted = series.analysis @ (factor[:, 0] * (series.synthesis @ coefficients))
+        np.testing.assert_allclose(-matrix[:, 0, :, 0] @ coefficients, wanted, atol=1e-12)

@@ -33,6 +33,7 @@ from wm_drake.cli.study.common import (
     study_ledger,
 )
 from wm_drake.cli.terminal import Console, say
+from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
@@ -61,6 +62,14 @@ def design(
     population: Annotated[
         int, typer.Option(help="Designs of a generation.", min=4, metavar="N")
     ] = 64,
+    search: Annotated[
+        str,
+        typer.Option(
+            help="genetic: NSGA-II, or NSGA-III for more than two objectives. surfaces: NSGA on "
+            "response surfaces of the designs so far, which needs fewer designs.",
+            metavar="NAME",
+        ),
+    ] = "genetic",
     profile: ProfileOption = None,
     seed: SeedOption = 0,
     workers: WorkersOption = None,
@@ -75,8 +84,12 @@ def design(
     begin = time.perf_counter()
     from wm_drake.parameters.designs import load_design
     from wm_drake.studies.pareto.search import check_search
-    from wm_drake.studies.pareto.study import run_designs
+    from wm_drake.studies.pareto.study import SEARCHES, run_designs
 
+    if search not in SEARCHES:
+        raise input_error(
+            f"no search '{search}'{nearest_names(search, SEARCHES)}", where="--search"
+        )
     check_search(evaluations, population)
     parameters, task = load_parameters(machine, sets), load_design(file)
     check_buildable(machine, parameters)
@@ -95,6 +108,7 @@ def design(
                 evaluations=evaluations,
                 population=population,
                 seed=seed,
+                search=search,
             )
         ledger.mark_finished()
         shown = _envelopes(front, built, workers)

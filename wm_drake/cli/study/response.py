@@ -25,6 +25,8 @@ from wm_drake.cli.terminal import Console
 from wm_drake.errors import input_error
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    import xarray as xr
+
     from wm_drake.parameters import Load, MachineParameters
     from wm_drake.parameters.types import FloatArray
     from wm_drake.studies.steady.study import SteadyStudy
@@ -194,12 +196,25 @@ def _as_json(study: "SteadyStudy") -> dict[str, Any]:
                 "gasket_moment_Nm": columns(case.response.gasket_moment, "axis"),
                 "spring_tension_N": columns(case.response.spring_tension, "spring"),
                 "damper_tension_N": columns(case.response.damper_tension, "damper"),
+                "mount_force_N": _mount_forces(case.response),
                 "stable": case.response.stable.values.tolist(),
                 "wall_s": case.wall_s,
             }
             for case in study.cases
         ],
         "wall_s": study.wall_s,
+    }
+
+
+def _mount_forces(response: "xr.Dataset") -> dict[str, dict[str, list[float]]]:
+    """Return peak and RMS of the force of each mount on the cabinet, over the speeds. [N]"""
+    from wm_drake.simulation.mounts import KINDS
+
+    return {
+        str(mount): {
+            kind: response[f"mount_force_{kind}"].sel(mount=mount).values.tolist() for kind in KINDS
+        }
+        for mount in response.mount.values
     }
 
 

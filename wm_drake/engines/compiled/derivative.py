@@ -28,25 +28,30 @@ class StateDerivative:
         self._elements = self.layout.elements
         self._p = fill_lanes(aligned(len(packed) * WIDTH), [packed])
 
-    def __call__(self, x: FloatArray, acceleration: float) -> FloatArray:
+    def __call__(
+        self, x: FloatArray, acceleration: float = 0.0, *, reference: float = 0.0
+    ) -> FloatArray:
         """Return the time derivative at a state.
 
         Args:
             x: State (size,).
             acceleration: Acceleration of the drum against the tub, or against the drum carrier
-                with a compliant bearing. [rad/s^2]
+                with a compliant bearing; a motor decides it itself. [rad/s^2]
+            reference: Speed of the drum that the controller of a motor wants. [rad/s]
 
         Returns:
             Derivative of each number of the state (size,). All lanes compute the same derivative.
         """
-        return self.at_states(np.tile(x, (WIDTH, 1)), acceleration)[0]
+        return self.at_states(np.tile(x, (WIDTH, 1)), acceleration, reference=reference)[0]
 
-    def at_states(self, states: FloatArray, acceleration: float = 0.0) -> FloatArray:
+    def at_states(
+        self, states: FloatArray, acceleration: float = 0.0, *, reference: float = 0.0
+    ) -> FloatArray:
         """Return the time derivatives at several states of one machine.
 
         Args:
             states: (WIDTH, size), one a lane.
-            acceleration: As for a call, the same at all states. [rad/s^2]
+            acceleration, reference: As for a call, the same at all states. [rad/s^2, rad/s]
 
         Returns:
             (WIDTH, size)
@@ -54,5 +59,5 @@ class StateDerivative:
         state, rate = aligned(states.size), aligned(states.size)
         state[:] = states.T.ravel()
         inputs = aligned(len(self.layout.dampers) * WIDTH)
-        derivative_lanes(state, rate, inputs, acceleration, self._p, self._elements)
+        derivative_lanes(state, rate, inputs, reference, acceleration, self._p, self._elements)
         return rate.reshape(-1, WIDTH).T.copy()

@@ -9,13 +9,16 @@ from collections import namedtuple
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.engines.compiled.drum import sample_controller
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
-    DRUM_RATE,
+    follow_profile,
     inputs_size,
     mass_properties,
+    motor_begin,
     state_derivative,
     state_size,
+    wanted_speed,
     write_sample,
 )
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES, multistep_step, remember
@@ -41,8 +44,9 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
     next one of every machine.
 
     Args:
-        steps: Length, drum acceleration, drum motion and sample number of each step, four fields
-            of a `Schedule`, and whether it takes one derivative; no arrays of lanes.
+        steps: Length, drum acceleration, drum motion and sample number of each step, and whether a
+            sampled controller acts at its start, five fields of a `Schedule`; and whether it takes
+            one derivative; no arrays of lanes.
         begin, end: Numbers of steps.
         p: Packed numbers.
         elements: `Elements`, which all machines have in common.
@@ -56,9 +60,12 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
     rate, inputs = lane_array(work.rate), lane_array(work.inputs)
     stage, total = lane_array(work.stage), lane_array(work.total)
     past = Past(lane_array(work.past_rates), lane_array(work.past_inputs))
-    length, acceleration, drum, row, one_derivative = steps
+    length, acceleration, drum, row, controls, one_derivative = steps
     zero = 0.0 * state[0]
     for i in range(begin, end):
+        sample_controller(
+            state, drum[2 * i, 0], controls[i], numbers, elements.motor, motor_begin(elements)
+        )
         masses = mass_properties(numbers, drum[2 * i, 1], drum[2 * i, 2])
         state_derivative(
             state, rate, inputs, masses, drum[2 * i, 0], acceleration[i], numbers, elements
@@ -74,8 +81,8 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
                 state, rate, inputs, stage, total, drum, i, length[i], acceleration[i],
                 numbers, elements
             )  # fmt: skip
-        state[DRUM_ANGLE] = zero + drum[2 * i + 2, 3]
-        state[DRUM_RATE] = zero + drum[2 * i + 2, 0]
+        angle, speed = zero + drum[2 * i + 2, 3], zero + drum[2 * i + 2, 0]
+        follow_profile(state, angle, speed, elements.motor)
 
 
 @law
@@ -113,13 +120,14 @@ def runge_kutta_step(
 
 
 @long_running
-def derivative_lanes(x, dx, inputs, acceleration, p, elements):
+def derivative_lanes(x, dx, inputs, reference, acceleration, p, elements):
     """Evaluate `state_derivative` for `lanes.WIDTH` machines.
 
     Args:
         x: States; the drum's angle and rate are read from them.
         dx, inputs: Time derivatives and inputs of internal states, written.
-        acceleration: Acceleration of the drum, the same for all machines. [rad/s^2]
+        reference: Speed that the controller of a motor wants, the same for all machines. [rad/s]
+        acceleration: Acceleration of a prescribed drum, the same for all machines. [rad/s^2]
         p: Packed numbers.
         elements: `Elements`, which all machines have in common.
     """
@@ -132,7 +140,7 @@ def derivative_lanes(x, dx, inputs, acceleration, p, elements):
         lane_array(dx),
         lane_array(inputs),
         masses,
-        state[DRUM_RATE],
+        wanted_speed(state, reference, elements.motor),
         acceleration,
         numbers,
         elements,

@@ -16,6 +16,7 @@ from wm_drake.engines.compiled.mechanics import (
     DRUM_RATE,
     mass_properties,
     state_derivative,
+    wanted_speed,
 )
 from wm_drake.engines.compiled.multistep import (
     PAST_INPUTS,
@@ -100,14 +101,15 @@ def jacobian_lanes(x, work, free, difference, p, elements, jacobian):
     rate, inputs = lane_array(work[: size * WIDTH]), lane_array(work[size * WIDTH :])
     sine, cosine = sine_cosine(state[DRUM_ANGLE])
     masses = mass_properties(numbers, cosine, sine)
-    n = len(free)
+    n, reference = len(free), state[DRUM_RATE]
     for column in range(n):
         at_rest = state[free[column]]
         for row in range(n):
             found[row * n + column] = 0.0 * at_rest
         for side in (-1.0, 1.0):
             state[free[column]] = at_rest + side * difference
-            state_derivative(state, rate, inputs, masses, state[DRUM_RATE], 0.0, numbers, elements)
+            wanted = wanted_speed(state, reference, elements.motor)
+            state_derivative(state, rate, inputs, masses, wanted, 0.0, numbers, elements)
             for row in range(n):
                 change = side * rate[free[row]] / (2.0 * difference)
                 found[row * n + column] = found[row * n + column] + change

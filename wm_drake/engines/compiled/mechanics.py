@@ -1,4 +1,6 @@
-"""Rigid-body mechanics of the compiled engine: a floating tub and a drum with prescribed rotation.
+"""Rigid-body mechanics of the compiled engine: a floating tub and a drum that turns in it.
+
+The rotation of the drum is prescribed, or a motor turns it (`wm_drake.engines.compiled.drum`).
 
 Own derivation; the tests compare it with the Drake plant. All vectors are in the tub frame T, all
 moments about a point O of the drum axis:
@@ -15,8 +17,9 @@ harmonic of the angle and no other.
 The packed numbers of the bodies are those of `BODIES`, from index 0.
 
 State: tub and drum (`TREE_STATE`); the deformation of each strut damper; the `TUBES_STATE` of each
-telescopic damper; the `CARRIER_STATE` of the drum's carrier in a compliant bearing; the state of a
-cabinet that moves (`wm_drake.engines.compiled.cabinet`).
+telescopic damper; the `CARRIER_STATE` of the drum's carrier in a compliant bearing; the
+`MOTOR_STATE` of a drive with a motor; the state of a cabinet that moves
+(`wm_drake.engines.compiled.cabinet`).
 """
 
 from collections import namedtuple
@@ -40,6 +43,7 @@ from wm_drake.elements.motion import (
     rpy_rates,
     write_tree_state,
 )
+from wm_drake.elements.motor import read_motor
 from wm_drake.elements.spring import spring_strut_wrench
 from wm_drake.engines.compiled.bearing import (
     carrier_motion,
@@ -54,6 +58,11 @@ from wm_drake.engines.compiled.cabinet import (
     seen_from_cabinet,
     with_cabinet,
     write_seen_sample,
+)
+from wm_drake.engines.compiled.drum import (
+    motor_size,
+    motor_torque_and_rates,
+    with_free_drum,
 )
 from wm_drake.engines.compiled.tubes import (
     TUBES_STATE_SIZE,
@@ -106,13 +115,15 @@ read_first_harmonic, read_second_harmonic = FIRST_HARMONIC.read, SECOND_HARMONIC
 read_bodies, read_rates, write_rates_of = BODIES.read, RATES.read, RATES.write
 
 Elements = namedtuple(
-    "Elements", ("springs", "dampers", "bushings", "telescopes", "bearing", "tubes", "cabinet")
+    "Elements",
+    ("springs", "dampers", "bushings", "telescopes", "bearing", "tubes", "motor", "cabinet"),
 )
 """Indices at which the parts of a machine begin.
 
 springs, dampers, bushings: arrays of indices of the elements in the packed numbers; telescopes: the
 same for telescopic dampers, None if there are none; bearing: index of the drum's bearing in the
 packed numbers, None if the bearing is rigid; tubes: index of the telescopic dampers in the state;
+motor: index of the motor in the packed numbers, None if the speed of the drum is prescribed;
 cabinet: index of the cabinet in the packed numbers, None if it is fixed.
 """
 
@@ -234,12 +245,15 @@ def state_derivative(x, dx, inputs, masses, rate, acceleration, p, elements):
     """Write the time derivative of the state into `dx`.
 
     Args:
-        x, dx: State and its derivative; the drum's angle and rate in x are not read.
+        x, dx: State and its derivative; a prescribed drum's angle and rate in x are not read.
         inputs: Elongation rate of each strut damper, written. The deformation of its sponge
             depends on the motion through this number only. [m/s]
-        masses, rate, acceleration, p: See `accelerations`.
+        masses, rate, acceleration, p: See `accelerations`. With a motor, the prescribed rate is the
+            one that the controller wants, and the other two are not used.
         elements: `Elements`.
     """
+    motor, reference = elements.motor, rate
+    masses, rate = drum_now(x, masses, rate, p, motor)
     angles = read_tree_state(x, 0).angles
     roll, pitch, yaw = sine_cosine(angles[0]), sine_cosine(angles[1]), sine_cosine(angles[2])
     in_world = motion_from_sines(x, 0, roll, pitch, yaw)
@@ -268,6 +282,10 @@ def state_derivative(x, dx, inputs, masses, rate, acceleration, p, elements):
     w_rate, v_rate = tub_and_carrier_accelerations(
         x, dx, *bodies, elements.bearing, carrier_begin(elements)
     )
+    w_rate, v_rate, acceleration = turned_by_motor(
+        x, dx, in_world, masses, (w_rate, v_rate, acceleration), reference, p, motor,
+        motor_begin(elements)
+    )  # fmt: skip
     write_tree_state(
         dx,
         0,
@@ -310,9 +328,69 @@ def tub_and_carrier_accelerations(
 
 
 @law
+def drum_now(x, masses, rate, p, motor):
+    """Return `MassProperties` and rate of the drum: those given, or those of the state.
+
+    Args:
+        x: State.
+        masses, rate: Those of a prescribed drum.
+        p: Packed numbers.
+        motor: Index in them where the motor begins; None for a prescribed drum.
+    """
+    if motor is None:
+        return masses, rate
+    sine, cosine = sine_cosine(x[DRUM_ANGLE])
+    return mass_properties(p, cosine, sine), x[DRUM_RATE]
+
+
+@law
+def turned_by_motor(x, dx, motion, masses, rates, reference, p, motor, first):
+    """Return the accelerations of tub and drum, and write the rates of the drive's state.
+
+    Args:
+        x, dx: State and its derivative.
+        motion, masses: See `accelerations`.
+        rates: Angular acceleration of the tub and acceleration of To, in W, at an acceleration of
+            the drum, and this acceleration. It stays if there is no motor. [rad/s^2, m/s^2]
+        reference: Speed of the drum that is wanted. [rad/s]
+        p, motor, first: Packed numbers, and indices in them and in the state where the drive
+            begins; None if the rotation of the drum is prescribed.
+    """
+    w_rate, v_rate, acceleration = rates
+    if motor is None:
+        return w_rate, v_rate, acceleration
+    bodies, reflected = read_bodies(p, 0), read_motor(p, motor).reflected_inertia
+    torque = motor_torque_and_rates(x, dx, reference, p, motor, first)
+    missing = torque - motor_torque(motion, w_rate, v_rate, masses, x[DRUM_RATE], acceleration, p)
+    return with_free_drum(motion, masses, bodies, w_rate, v_rate, acceleration, missing, reflected)
+
+
+@law
+def follow_profile(x, angle, rate, motor):
+    """Set angle and rate of a drum whose speed is prescribed; a motor turns it itself."""
+    if motor is None:
+        x[DRUM_ANGLE] = angle
+        x[DRUM_RATE] = rate
+
+
+@law
+def wanted_speed(x, reference, motor):
+    """Return the speed that the controller wants; without a motor it is the drum's own."""
+    if motor is None:
+        return x[DRUM_RATE]
+    return reference
+
+
+@law
 def state_size(elements):
     """Return the size of the state of a machine with these elements."""
     return cabinet_begin(elements) + cabinet_size(elements.cabinet)
+
+
+@law
+def motor_begin(elements):
+    """Return the index in the state where the drive begins, if it has a motor."""
+    return carrier_begin(elements) + carrier_size(elements.bearing)
 
 
 @law
@@ -362,4 +440,4 @@ def carrier_begin(elements):
 @law
 def cabinet_begin(elements):
     """Return the index in the state where the cabinet begins, if it moves."""
-    return carrier_begin(elements) + carrier_size(elements.bearing)
+    return motor_begin(elements) + motor_size(elements.motor)

@@ -10,6 +10,7 @@ from pydrake.systems.framework import Context
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.compiler.matrices import about_centre, inverse
 from wm_drake.elements.motion import POSE
+from wm_drake.elements.motor import MOTOR_STATE_SIZE, motor_structure, packed_motor
 from wm_drake.engines.compiled.bearing import TUB, TUB_AND_BEARING
 from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE
 from wm_drake.engines.compiled.mechanics import (
@@ -45,6 +46,8 @@ class Layout:
         springs, dampers, bushings, telescopes: Index of each element.
         gasket: Index of the gasket, -1 without one.
         bearing: Index of the drum's compliant bearing, -1 for a rigid one.
+        motor: Index of the motor, -1 if the speed of the drum is prescribed.
+        control_period: Time between two samples of a sampled controller, else 0. [s]
         cabinet: Index of the cabinet, -1 for a fixed one.
         structure: Number of each damper's law and number of points of every table, in order.
     """
@@ -55,6 +58,8 @@ class Layout:
     telescopes: tuple[int, ...]
     gasket: int
     bearing: int
+    motor: int
+    control_period: float
     cabinet: int
     structure: tuple[int, ...]
 
@@ -62,7 +67,7 @@ class Layout:
     def elements(self) -> Elements:
         """The indices in the form that compiled functions use.
 
-        Without telescopic dampers or without a compliant bearing their index is None, and the
+        Without telescopic dampers, a compliant bearing or a motor their index is None, and the
         functions are compiled without them.
         """
         springs, dampers, bushings, telescopes = (
@@ -78,6 +83,7 @@ class Layout:
             telescopes if self.telescopes else None,
             bearing,
             tubes,
+            self.motor if self.motor >= 0 else None,
             self.cabinet if self.cabinet >= 0 else None,
         )
 
@@ -101,8 +107,17 @@ class Layout:
         )
         own, deformation_of_tubes = tubes[:, :, :STATE_SIZE], tubes[:, :, DEFORMATION]
         deformation = np.hstack([states[:, STATE_SIZE:tubes_begin], deformation_of_tubes])
-        carrier = states[:, tubes_end : states.shape[1] - self.cabinet_size]
-        return states[:, :STATE_SIZE], deformation, own, carrier
+        carrier_end = states.shape[1] - self.cabinet_size - self.motor_size
+        return states[:, :STATE_SIZE], deformation, own, states[:, tubes_end:carrier_end]
+
+    def motor_begin(self, size: int) -> int:
+        """Return the index in a state of a size where the drive begins, if it has a motor."""
+        return size - self.cabinet_size - self.motor_size
+
+    @property
+    def motor_size(self) -> int:
+        """Size of the state of the drive, before that of the cabinet; 0 for a prescribed speed."""
+        return MOTOR_STATE_SIZE if self.motor >= 0 else 0
 
     def cabinet_part(self, states: FloatArray) -> FloatArray | None:
         """Return the states (n, `CABINET_STATE_SIZE`) of a cabinet that moves; None if fixed."""
@@ -153,12 +168,24 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
         tub = pack_rigid(setup, "tub")
         parts.append(TUB_AND_BEARING.pack(tub=tub, bearing=setup.bearing.packed()))
         structure += setup.bearing.structure
+    motor, control_period = -1, 0.0
+    if drive := setup.motor:
+        motor = BODIES_SIZE + sum(map(len, parts))
+        parts.append(packed_motor(drive))
+        structure += motor_structure(drive)
+        control_period = drive.controller.sample_time or 0.0
     cabinet = -1
     if setup.cabinet:
         cabinet = BODIES_SIZE + sum(map(len, parts))
         parts += [pack_rigid(setup, CABINET), setup.cabinet.packed()]
     return np.concatenate(parts), Layout(
-        **indices, gasket=gasket, bearing=bearing, cabinet=cabinet, structure=tuple(structure)
+        **indices,
+        gasket=gasket,
+        bearing=bearing,
+        motor=motor,
+        control_period=control_period,
+        cabinet=cabinet,
+        structure=tuple(structure),
     )
 
 
@@ -210,7 +237,8 @@ def fill_lanes(lanes: FloatArray, runs: list[FloatArray]) -> FloatArray:
 def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     """Return the state at the start of a run.
 
-    The machine is at rest at the rest pose, the drum at its first speed, sponges undeformed.
+    The machine is at rest at the rest pose, the drum at its first speed, sponges undeformed, a
+    motor without torque.
     """
     x = np.zeros(STATE_SIZE + len(setup.dampers))
     x[: POSE.fixed_size] = setup.rest_pose
@@ -218,8 +246,9 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     tubes = np.zeros((len(setup.telescopes), TUBES_STATE_SIZE))
     tubes[:, : setup.tube_rest.shape[1]] = setup.tube_rest
     carrier = np.append(setup.carrier_rest, np.zeros_like(setup.carrier_rest))
+    motor = np.zeros(MOTOR_STATE_SIZE if setup.motor else 0)
     cabinet = np.zeros(CABINET_STATE_SIZE if setup.cabinet else 0)
-    return np.concatenate([x, tubes.ravel(), carrier, cabinet])
+    return np.concatenate([x, tubes.ravel(), carrier, motor, cabinet])
 
 
 def pack_tubes(setup: Setup, name: str) -> FloatArray:

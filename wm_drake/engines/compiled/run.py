@@ -48,7 +48,8 @@ def run_compiled(
         InputError: the machine has something that the compiled engine does not represent.
     """
     p, layout = pack(setup)
-    begin, schedule = initial_state(setup, profile), schedule_of(profile, step, period)
+    begin = initial_state(setup, profile)
+    schedule = schedule_of(profile, step, period, layout.control_period)
     rows, size = len(schedule.time), len(begin) + layout.rates_size
     samples = aligned(rows * size * WIDTH)
     numbers, x = (aligned(len(values) * WIDTH) for values in (p, begin))

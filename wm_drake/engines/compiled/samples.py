@@ -9,6 +9,7 @@ from wm_drake.elements.cabinet import motion_with, rates_with
 from wm_drake.elements.motion import POSE, tub_motion
 from wm_drake.engines.cabinet_frame import seen_from_cabinet
 from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE, carrier_motion
+from wm_drake.engines.compiled.drum import motor_torque_history
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
@@ -39,8 +40,6 @@ def trajectory_of(
     motion, deformation, tubes, carrier = layout.parts(states)
     cabinet, of_tub = layout.cabinet_part(states), rates[:, :RATES_SIZE]
     of_carrier = rates[:, RATES_SIZE : 2 * RATES_SIZE] if carrier.shape[1] else of_tub
-    torque = np.empty((len(samples), 1))
-    drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
     moving, turning = None, _motion_of_drum_and_carrier(motion, carrier)
     if cabinet is not None:
         in_world = cabinet[:, :CARRIER_STATE_SIZE], rates[:, -RATES_SIZE:]
@@ -48,9 +47,37 @@ def trajectory_of(
             carrier, _ = seen_from_cabinet(*in_world, carrier, of_carrier)
         else:
             moving = np.hstack(in_world)
-    torque_history(turning, of_carrier, drum_acceleration, p, moving, torque)
+    torque: FloatArray = np.empty((len(samples), 1))
+    if layout.motor >= 0:
+        torque = torque_of_motor(states, schedule, p, layout)
+    else:
+        drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
+        torque_history(turning, of_carrier, drum_acceleration, p, moving, torque)
     found = schedule.time, motion, deformation, torque[:, 0], of_tub, tubes, carrier
     return cut_at_divergence(Trajectory(*found, cabinet=cabinet))
+
+
+def torque_of_motor(
+    states: FloatArray, schedule: Schedule, p: FloatArray, layout: Layout
+) -> FloatArray:
+    """Return the torque of a motor on the drum at samples (n, 1). [N m]
+
+    Args:
+        states: (n, size)
+        schedule, p, layout: See `trajectory_of`.
+    """
+    torque = np.empty((len(states), 1))
+    reference = schedule.drum[:-1:2][schedule.row >= 0, :1]
+    first = layout.motor_begin(states.shape[1])
+    motor_torque_history(
+        np.ascontiguousarray(states),
+        np.ascontiguousarray(reference),
+        p,
+        layout.motor,
+        first,
+        torque,
+    )
+    return torque
 
 
 def _motion_of_drum_and_carrier(motion: FloatArray, carrier: FloatArray) -> FloatArray:

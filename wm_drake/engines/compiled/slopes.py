@@ -36,7 +36,7 @@ from wm_drake.engines.compiled.tubes import (
     read_tubes_state,
     telescopic_damper_count,
 )
-from wm_drake.model.machine import Setup
+from wm_drake.model.machine import Setup, with_prescribed_speed
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 
@@ -53,8 +53,8 @@ class SlopedDerivative:
     """The time derivative of the state of a machine as it is set up, and its slopes.
 
     A state has the layout of `wm_drake.engines.compiled.mechanics`. Free are all its numbers but
-    angle and rate of the drum, which are prescribed, and the slips of the feet of a cabinet that
-    moves: the feet stick.
+    angle and rate of the drum, which are prescribed, also in a machine with a motor, and the slips
+    of the feet of a cabinet that moves: the feet stick.
 
     Attributes:
         layout: Indices of the parts of the machine in packed numbers and states.
@@ -70,6 +70,7 @@ class SlopedDerivative:
         Raises:
             InputError: the machine has something that the compiled engine does not represent.
         """
+        setup = with_prescribed_speed(setup)
         self.packed, self.layout = pack(setup)
         self.rest = initial_state(setup, SpinProfile(time=(0.0, 1.0), speed=(0.0, 0.0)))
         size = len(self.rest)

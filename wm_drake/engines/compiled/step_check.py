@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wm_drake.compiler.lanes import WIDTH
+from wm_drake.elements.motor import MOTOR_STATE_SIZE
 from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, VELOCITIES
 from wm_drake.engines.compiled.linear import jacobians
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
@@ -38,6 +39,7 @@ SPEEDS = (1e-6, 1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0)
 The slowest has every friction on its steepest part; in the fast ones the sponges slip."""
 
 TUB, BEARING, CABINET = "the tub", "the drum in its bearing", "the cabinet on its feet"
+DRUM = "the drum with its motor"
 """Names of parts that move."""
 
 DEFORMATION = 1e-4
@@ -77,8 +79,9 @@ class FastestMotion:
 def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
     """Return the motion of each part of a machine that needs the shortest step, by part.
 
-    The parts are `TUB`, `BEARING`, `CABINET`, and the sponge and the tubes of each damper, as far
-    as they have a fastest motion of their own. The drum's own angle is prescribed.
+    The parts are `TUB`, `BEARING`, `DRUM`, `CABINET`, and the sponge and the tubes of each damper,
+    as far as they have a fastest motion of their own. The drum's own angle is prescribed without a
+    motor.
 
     Raises:
         InputError: the machine has something that the compiled engine does not represent.
@@ -87,7 +90,7 @@ def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
     matrices, _ = linearised(setup, *pack(setup), DIFFERENCE)
     if not np.all(np.isfinite(matrices)):
         return {"the machine": FastestMotion(np.inf, False, "the machine")}
-    moving = np.isin(free, _velocities(setup, len(free) + 2))
+    moving = np.isin(free, _velocities(setup))
     values, vectors = np.linalg.eig(matrices)
     found: dict[str, FastestMotion] = {}
     for rates, modes in zip(values, vectors, strict=True):
@@ -152,6 +155,44 @@ def check_step(setup: Setup, step: float) -> None:
     )
 
 
+def check_sample_time(setup: Setup) -> None:
+    """Check that a sampled speed controller and the drum are stable together.
+
+    Between two samples the torque of the controller is constant. The drum with its rotor, J about
+    its axis against a tub at rest, and the integral part then change by
+
+        r_(k+1) = r_k - n T_s/J (n K_p r_k - I_k),    I_(k+1) = I_k - n T_s K_i r_k
+
+    from the wanted speed. The eigenvalues must be inside the unit circle.
+
+    Raises:
+        InputError: the sample time is too long.
+    """
+    drive = setup.motor
+    if drive is None or drive.controller.sample_time is None:
+        return
+    period, control = drive.controller.sample_time, drive.controller
+    n, inertia = drive.belt_ratio, drum_inertia(setup)
+    steps = period * n * np.array([1.0 / inertia, 1.0])
+    loop = np.eye(2) + steps[:, None] * np.array(
+        [[-n * control.proportional_gain, 1.0], [-control.integral_gain, 0.0]]
+    )
+    if np.abs(np.linalg.eigvals(loop)).max() > 1.0 + 1e-12:
+        bound = 2.0 * inertia / (n**2 * control.proportional_gain)
+        raise input_error(
+            f"{1e3 * period:g} ms is too long for the gains of the controller: its "
+            f"speed loop is unstable; allowed is less than {1e3 * bound:.3g} ms, or lower gains",
+            key="drive.controller.sample_time",
+        )
+
+
+def drum_inertia(setup: Setup) -> float:
+    """Return the inertia of drum and rotor about the drum's axis, with a tub at rest. [kg m^2]"""
+    plant, context = setup.machine.plant, setup.plant_context
+    index = setup.machine.state_layout.drum
+    return float(plant.CalcMassMatrix(context)[index, index])
+
+
 def _allowed(longest: float) -> str:
     """Return the longest step that divides the output period, in words."""
     pieces = int(np.ceil(OUTPUT_PERIOD / longest))
@@ -171,9 +212,17 @@ def _free_states(setup: Setup) -> tuple[list[int], list[str]]:
         parts += [f"the tubes of damper '{name}'"] * (TUBES_STATE_SIZE - 1)
         parts.append(f"the sponge of damper '{name}'")
     size = len(initial_state(setup, _STANDSTILL))
+    driven = MOTOR_STATE_SIZE if setup.motor else 0
     cabinet = CABINET_STATE_SIZE if setup.cabinet else 0
-    parts += [BEARING] * (size - cabinet - len(parts)) + [CABINET] * cabinet
-    free = [index for index in range(size) if index not in (DRUM_ANGLE, DRUM_RATE)]
+    parts += [BEARING] * (size - driven - cabinet - len(parts))
+    parts += [DRUM] * driven + [CABINET] * cabinet
+    fixed = [DRUM_ANGLE, DRUM_RATE]
+    if setup.motor:
+        parts[DRUM_ANGLE] = parts[DRUM_RATE] = DRUM
+        # a sampled controller changes its state at its samples only; a continuous one holds nothing
+        demand = size - cabinet - 1
+        fixed = [demand - 1, demand] if setup.motor.controller.sample_time else [demand]
+    free = [index for index in range(size) if index not in fixed]
     return free, [parts[index] for index in free]
 
 
@@ -183,22 +232,24 @@ def _states(setup: Setup, free: list[int]) -> FloatArray:
     states = np.tile(rest, (WIDTH, 1))
     directions = np.random.default_rng(0).uniform(-1.0, 1.0, len(rest))
     speeds = np.resize(SPEEDS, WIDTH)
-    for index in set(free) & set(_velocities(setup, len(rest))):
+    for index in set(free) & set(_velocities(setup)):
         states[:, index] += speeds * directions[index]
     for index in _sponges(setup):
         states[:, index] += DEFORMATION * directions[index]
     return states
 
 
-def _velocities(setup: Setup, size: int) -> list[int]:
+def _velocities(setup: Setup) -> list[int]:
     """Return the indices of all velocities in the state."""
+    size = len(initial_state(setup, _STANDSTILL))
     found = list(range(STATE_SIZE // 2, STATE_SIZE))
     begin = STATE_SIZE + len(setup.dampers)
     for _ in setup.telescopes:
         found += range(begin + 7, begin + TUBES_STATE_SIZE - 1)
         begin += TUBES_STATE_SIZE
     cabinet = size - CABINET_STATE_SIZE if setup.cabinet else size
-    found += range(begin + (cabinet - begin) // 2, cabinet)
+    carrier = cabinet - (MOTOR_STATE_SIZE if setup.motor else 0)
+    found += range(begin + (carrier - begin) // 2, carrier)
     if setup.cabinet:
         found += [cabinet + index for index in VELOCITIES]
     return found

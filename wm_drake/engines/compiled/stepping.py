@@ -1,7 +1,8 @@
 """How a run is integrated: the integrator and its step, chosen from the machine and its profile.
 
 The multistep integrator (`wm_drake.engines.compiled.multistep`) takes one derivative a step, the
-Runge-Kutta scheme four. A choice depends on the parameters and the profile of a run only, never on
+Runge-Kutta scheme four. A sampled controller needs the Runge-Kutta scheme: its torque jumps.
+A choice depends on the parameters and the profile of a run only, never on
 other runs or on its load.
 """
 
@@ -12,7 +13,7 @@ import numpy as np
 from wm_drake.engines.compiled.linear import is_followed
 from wm_drake.engines.compiled.multistep import STEPS_BEFORE
 from wm_drake.engines.compiled.packing import Layout
-from wm_drake.engines.compiled.step_check import check_step, linearised
+from wm_drake.engines.compiled.step_check import check_sample_time, check_step, linearised
 from wm_drake.engines.schedule import Schedule
 from wm_drake.errors import input_error
 from wm_drake.model.machine import Setup
@@ -79,9 +80,10 @@ def choose_stepping(
             integrator if the step, or half of it, suits it, else the Runge-Kutta scheme.
 
     Raises:
-        InputError: the step is too long for the integrator.
+        InputError: the step is too long for the integrator, or the sample time of a controller for
+            the drum.
     """
-    if integrator != "runge_kutta":
+    if integrator != "runge_kutta" and not layout.control_period:
         jacobians, internal = linearised(setup, packed, layout, ACROSS_JUMPS)
         fastest = max(abs(speed) for speed in profile.speed)
         lengths = [step]
@@ -92,6 +94,7 @@ def choose_stepping(
             if turn <= LARGEST_TURN and is_followed(jacobians, internal, MARGIN * length):
                 return Stepping("multistep", length)
     check_step(setup, step)
+    check_sample_time(setup)
     if integrator == "multistep":
         raise input_error(
             f"'multistep' does not follow this machine at {1e3 * step:g} ms; "

@@ -115,42 +115,75 @@ def _finish(panels: FloatArray, used: int, rows: int, across: str, up: str) -> N
 
 
 def forces_figure(cases: list[SteadyCase]) -> Figure:
-    """Draw box, gasket and mounts over the speed, one line a load."""
-    loads = list(dict.fromkeys(case.load for case in cases))
-    colours = dict(zip(loads, _cycle(len(loads)), strict=True))
-    figure = Figure(figsize=(WIDTH, 5.4), layout="constrained")
-    panels = figure.subplots(2, COLUMNS, sharex=True).ravel()
+    """Draw displacement of the box and forces of the gasket over the speed, one line a load."""
+    figure = Figure(figsize=(WIDTH, 3.1), layout="constrained")
+    panels = figure.subplots(1, COLUMNS, sharex=True)
     quantities = (
         ("detergent_displacement", MM_PER_M, "detergent box, mm"),
         ("gasket_force", 1.0, "gasket force, N"),
         ("gasket_moment", 1.0, "gasket moment, N m"),
-        ("spring_tension", 1.0, "spring tension, ± N"),
-        ("damper_tension", 1.0, "damper tension, ± N"),
     )
-    for axes, (name, factor, title) in zip(panels, quantities, strict=False):
-        for case in cases:
-            values = factor * case.response[name].values
-            shown = values.max(axis=1) if values.shape[1] else np.zeros(len(values))
-            axes.plot(
-                RPM_PER_RAD_S * case.response.speed.values,
-                shown,
-                color=colours[case.load],
-                linewidth=1.5,
-                label=case.load,
-            )
-        axes.set_title(title, fontsize=9.5, loc="left")
-        axes.set_ylim(bottom=0.0)
-        axes.grid(color=GRID)
-        style_axes(axes)
+    for axes, (name, factor, title) in zip(panels, quantities, strict=True):
+        lines = [(case, factor * case.response[name].values.max(axis=1), "-") for case in cases]
+        _force_panel(axes, title, lines)
     _finish(panels, len(quantities), 0, "drum speed, rpm", "")
+    _load_legend(figure, panels[0])
+    return figure
+
+
+def mounts_figure(cases: list[SteadyCase]) -> Figure:
+    """Draw the force of each mount on the cabinet over the speed, one colour a load.
+
+    The peak is a line, the RMS without the mean is dashed.
+    """
+    gasket = any(case.gasket for case in cases)
+    mounts = [str(name) for name in cases[0].response.mount.values if gasket or name != "gasket"]
+    rows = -(-len(mounts) // COLUMNS)
+    figure = Figure(figsize=(WIDTH, 2.35 * rows + 0.5), layout="constrained")
+    panels = figure.subplots(rows, COLUMNS, squeeze=False, sharex=True).ravel()
+    for axes, mount in zip(panels, mounts, strict=False):
+        of_mount = [(case, case.response.sel(mount=mount)) for case in cases]
+        lines = [(case, force.mount_force_peak.values, "-") for case, force in of_mount]
+        lines += [(case, force.mount_force_dynamic_rms.values, "--") for case, force in of_mount]
+        _force_panel(axes, mount, lines)
+    _finish(panels, len(mounts), rows, "drum speed, rpm", "force, N")
+    _load_legend(figure, panels[0])
+    return figure
+
+
+def _force_panel(axes: Axes, title: str, lines: list[tuple[SteadyCase, FloatArray, str]]) -> None:
+    """Draw values over the speed of cases, one colour a load.
+
+    Args:
+        axes: Panel.
+        title: Title of the panel.
+        lines: Case, values, and line style; only solid lines are named in a legend.
+    """
+    loads = list(dict.fromkeys(case.load for case, _, _ in lines))
+    colours = dict(zip(loads, _cycle(len(loads)), strict=True))
+    for case, values, style in lines:
+        axes.plot(
+            RPM_PER_RAD_S * case.response.speed.values,
+            values,
+            color=colours[case.load],
+            linewidth=1.5 if style == "-" else 1.2,
+            linestyle=style,
+            label=case.load if style == "-" else "_",
+        )
+    axes.set_title(title, fontsize=9.5, loc="left", parse_math=False)
+    axes.set_ylim(bottom=0.0)
+    axes.grid(color=GRID)
+    style_axes(axes)
+
+
+def _load_legend(figure: Figure, axes: Axes) -> None:
     figure.legend(
-        *panels[0].get_legend_handles_labels(),
+        *axes.get_legend_handles_labels(),
         loc="outside lower center",
         ncols=6,
         frameon=False,
         fontsize=9,
     )
-    return figure
 
 
 def _cycle(count: int) -> list[str]:

@@ -9,10 +9,12 @@ from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.response.figures import (
     deflection_figure,
     forces_figure,
+    mounts_figure,
     response_figure,
     sweep_figure,
 )
 from wm_drake.report.tables import Group, Row, Table, parameter_table
+from wm_drake.simulation.mounts import KINDS
 from wm_drake.simulation.records import versions
 from wm_drake.studies.steady.study import SteadyCase, SteadyStudy
 
@@ -49,9 +51,15 @@ def response_report(study: SteadyStudy, command: str = "") -> str:
         peaks=_peaks_table(study),
         forces=picture(
             forces_figure(first),
-            "Displacement of the box and forces over the drum speed.",
-            f"Largest value of the axes or elements, {_gasket(first[0])}. Tension: half the range "
-            "in a revolution.",
+            "Displacement of the box and gasket forces over the drum speed.",
+            f"Largest value of the axes, {_gasket(first[0])}.",
+        ),
+        mounts=picture(
+            mounts_figure(first),
+            "Force of each mount on the cabinet over the drum speed.",
+            f"Size of the force of each mount on the cabinet in a revolution, {_gasket(first[0])}: "
+            "peak (line), and RMS without the mean (dashed). The peak has the weight that it "
+            "carries.",
         ),
         loads=sections,
         sweep=_sweep_picture(study),
@@ -177,6 +185,7 @@ def response_table(study: SteadyStudy) -> pd.DataFrame:
             ("gasket_moment", "axis", 1.0, "Nm"),
             ("spring_tension", "spring", 1.0, "N"),
             ("damper_tension", "damper", 1.0, "N"),
+            *((f"mount_force_{kind}", "mount", 1.0, "N") for kind in KINDS),
         ):
             for label in response[dim].values:
                 values = factor * response[name].sel({dim: label}).values

@@ -57,6 +57,12 @@ def describe(machine: Machine) -> dict[str, Any]:
     The frames are W (housing), T (tub) and D (drum); in the SDF all three coincide. The suffix of a
     key is the frame in which a point or direction is given. Inertias are about the centre of mass;
     products of inertia are elements of the matrix.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> description = wm.describe(wm.build_machine(wm.load_machine("reference")))
+        >>> description["machine"], description["gravity_W"]
+        ('reference', [0.0, 0.0, -9.81])
     """
     setup = machine.set_up()
     modes = natural_modes(machine)

@@ -42,6 +42,12 @@ def natural_modes(
         machine: A built machine.
         parameters: Parameters to use; those of the built machine if None.
         gasket: False removes the gasket.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> modes = wm.natural_modes(wm.build_machine(wm.load_machine("reference")))
+        >>> len(modes.frequency_hz)
+        6
     """
     setup = machine.set_up(parameters=parameters, gasket=gasket, dampers=False)
     found = Linearisation(setup).spectrum().first(MODES)

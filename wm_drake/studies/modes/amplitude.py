@@ -131,8 +131,8 @@ class _Free:
         moved = series.slope @ coefficients
         residual = omega * moved - series.analysis @ rates - damping
         residual = balance.with_hold(residual, coefficients)
-        matrix = balance.matrix(slopes, omega)
-        size = len(matrix)
+        size = coefficients.size
+        matrix = balance.matrix(slopes, omega).reshape(size, size)
         matrix[np.arange(size), np.arange(size)] -= 2.0 * beta * np.tile(self.velocity, series.size)
         bordered = np.zeros((size + 2, size + 2))
         bordered[:size, :size] = matrix

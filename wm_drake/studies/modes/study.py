@@ -113,6 +113,12 @@ def modes(
     Raises:
         InputError: the load is unknown, the amplitude is not positive, or the machine cannot be
             set up.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> result = wm.modes(wm.build_machine(wm.load_machine("reference")), "middle")
+        >>> len(result.modes["sliding"])
+        6
     """
     if not 0.0 < amplitude <= 0.1:
         raise input_error(

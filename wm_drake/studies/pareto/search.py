@@ -110,45 +110,28 @@ def search_front(
         WmDrakeError: pymoo is missing.
     """
     check_search(evaluations, population)
-    from pymoo.core.problem import Problem
-    from pymoo.optimize import minimize
-
     size, done, first = len(start), 0, list[FloatArray]()
     history: list[tuple[int, float]] = []
 
-    class Bounded(Problem):
-        """The problem in the form of pymoo."""
-
-        def __init__(self) -> None:
-            super().__init__(n_var=size, n_obj=objectives, n_ieq_constr=constraints, xl=0.0, xu=1.0)
-
-        def _evaluate(self, x: FloatArray, out: Any, *_: Any, **__: Any) -> None:
-            nonlocal done
-            f, g = evaluate(np.asarray(x, dtype=float))
-            usable = np.all(np.isfinite(np.hstack([f, g])), axis=1, keepdims=True)
-            out["F"] = np.where(usable, f, UNUSABLE)
-            if constraints:
-                out["G"] = np.where(usable, g, UNUSABLE)
-            if not first:
-                first.append(out["F"])
-            done += len(x)
-            generation(done)
+    def usable_only(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        nonlocal done
+        f, g = evaluate(x)
+        usable = np.all(np.isfinite(np.hstack([f, g])), axis=1, keepdims=True)
+        f, g = np.where(usable, f, UNUSABLE), np.where(usable, g, UNUSABLE)
+        if not first:
+            first.append(f)
+        done += len(x)
+        generation(done)
+        return f, g
 
     def note(algorithm: Any) -> None:
         optimum = algorithm.opt
         kept = optimum.get("F")[optimum.get("feas").ravel()] if len(optimum) else np.empty((0, 1))
         history.append((done, hypervolume(kept, first[0])))
 
-    sobol = stats.qmc.Sobol(size, scramble=True, seed=np.random.default_rng(seed))
-    points = sobol.random(1 << (population - 1).bit_length())[:population]
-    points[0] = start
-    result = minimize(
-        Bounded(),
-        _algorithm(objectives, population, points),
-        ("n_eval", evaluations),
-        seed=seed,
-        callback=note,
-    )
+    points = first_population(start, population, seed)
+    until = ("n_eval", evaluations)
+    result = minimized(usable_only, points, objectives, constraints, until, population, seed, note)
     if result.F is None:
         empty = np.empty((0, size)), np.empty((0, objectives)), np.empty((0, constraints))
         return Found(*empty, done, first[0], tuple(history))
@@ -158,6 +141,56 @@ def search_front(
     x, f, g = x[usable], f[usable], g[usable]
     order = np.lexsort(f.T[::-1])
     return Found(x[order], f[order], g[order], done, first[0], tuple(history))
+
+
+def first_population(start: FloatArray, population: int, seed: int) -> FloatArray:
+    """Return a first design (d,) and points of a scrambled Sobol sequence. (population, d)"""
+    sobol = stats.qmc.Sobol(len(start), scramble=True, seed=np.random.default_rng(seed))
+    points = sobol.random(1 << (population - 1).bit_length())[:population]
+    points[0] = start
+    return np.asarray(points)
+
+
+def minimized(
+    evaluate: Evaluate,
+    points: FloatArray,
+    objectives: int,
+    constraints: int,
+    until: tuple[str, int],
+    population: int,
+    seed: int,
+    note: Callable[[Any], None] | None = None,
+) -> Any:
+    """Return the result of pymoo's search.
+
+    Args:
+        evaluate: The problem; its values are finite.
+        points: First population. (population, d)
+        objectives, constraints: Numbers of objectives and constraints.
+        until: When to stop, in the words of pymoo: ("n_eval", 2000) or ("n_gen", 40).
+        population: Designs of a generation.
+        seed: Of all random numbers.
+        note: Called after each generation with pymoo's algorithm.
+    """
+    from pymoo.core.problem import Problem
+    from pymoo.optimize import minimize
+
+    class Bounded(Problem):
+        """The problem in the form of pymoo."""
+
+        def __init__(self) -> None:
+            super().__init__(
+                n_var=points.shape[1], n_obj=objectives, n_ieq_constr=constraints, xl=0.0, xu=1.0
+            )
+
+        def _evaluate(self, x: FloatArray, out: Any, *_: Any, **__: Any) -> None:
+            out["F"], g = evaluate(np.asarray(x, dtype=float))
+            if constraints:
+                out["G"] = g
+
+    algorithm = _algorithm(objectives, population, points)
+    more = {} if note is None else {"callback": note}
+    return minimize(Bounded(), algorithm, until, seed=seed, **more)
 
 
 def _algorithm(objectives: int, population: int, points: FloatArray) -> Any:

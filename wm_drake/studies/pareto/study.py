@@ -9,6 +9,10 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.pareto.problem import Goal, MachineDesigns, Run
 from wm_drake.studies.pareto.search import Found, search_front
+from wm_drake.studies.pareto.surrogate import search_with_surfaces
+
+SEARCHES = {"genetic": search_front, "surfaces": search_with_surfaces}
+"""Searches by name."""
 
 COMPROMISE = "compromise"
 """Name of the chosen design that is nearest to the best of all objectives."""
@@ -47,6 +51,7 @@ def run_designs(
     evaluations: int,
     population: int,
     seed: int,
+    search: str = "genetic",
     generation: Callable[[int], None] = lambda done: None,
 ) -> ParetoFront:
     """Search the Pareto front of the designs of a machine.
@@ -55,8 +60,9 @@ def run_designs(
         designs: The designs.
         run: Function that runs cases.
         evaluations, population, seed, generation: As of `search_front`.
+        search: Name in `SEARCHES`.
     """
-    found = search_front(
+    found = SEARCHES[search](
         lambda x: designs.costs(x, run),
         designs.nominal(),
         len(designs.objectives),

@@ -106,6 +106,13 @@ def run_spin(
 
     Raises:
         InputError: a case or an argument is wrong.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> parameters = wm.load_machine("reference")
+        >>> result = wm.run_spin(parameters, [wm.case_of(parameters, "middle")])
+        >>> result.results[0].case.name
+        'middle'
     """
     step = checked_step(parameters, step)
     count = min(workers or os.cpu_count() or 1, len(cases))

@@ -9,6 +9,11 @@ analysis of samples, it satisfies
 (Cameron and Griffin 1989; Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems,
 2019). f is evaluated at the samples of a period by the compiled right-hand side: rigid bodies and
 the laws of all elements. Deformations of sponges and motions of damper tubes are unknowns too.
+
+A telescopic damper may spin about its axis, where nothing but friction acts. Its steady motion then
+has a mean rate of spin c, while all else is periodic: the kinematic rows have the mean c u, with
+the rates u of angles and position by the spin. c is an unknown, and the mean angle, which changes
+no force, stays where it is.
 """
 
 from dataclasses import dataclass
@@ -21,6 +26,7 @@ from wm_drake.engines.compiled.tubes import DEFORMATION, TUBES_STATE_SIZE
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.modes.fixed_cabinet import check_fixed_cabinet
+from wm_drake.studies.steady.kinematics import kinematics_of
 from wm_drake.studies.steady.series import Series
 
 HARMONICS = 11
@@ -39,8 +45,9 @@ HOLD = 1e-6
 """Rate at which held numbers of the state return to their values at rest. [1/s]
 
 Held are the angles of damper tubes and the deformations of sponges. Nothing holds the spin of a
-tube about its axis, nor a sponge within its free stroke, so that their mean would be undetermined.
-Other motions change by this rate over their angular frequency, less than one part in a million."""
+tube about its axis in a free motion, nor a sponge within its free stroke, so that their mean would
+be undetermined. Other motions change by this rate over their angular frequency, less than one part
+in a million."""
 
 
 @dataclass(frozen=True)
@@ -48,16 +55,18 @@ class Linearised:
     """Residual of the harmonic balance and its derivatives at a motion.
 
     Attributes:
+        speed: Omega. [rad/s]
         residual: (2 N + 1, n)
-        matrix: Derivative by the coefficients. ((2 N + 1) n, (2 N + 1) n)
+        matrix: Derivative by the coefficients. (2 N + 1, n, 2 N + 1, n)
         by_speed: Derivative by the speed. (2 N + 1, n)
-        slopes: Slopes of the time derivative at the samples, by each number k. (samples, n, n)
+        spins: Rates of the numbers by the spin of each damper tube that turns freely. (spins, n)
     """
 
+    speed: float
     residual: FloatArray
     matrix: FloatArray
     by_speed: FloatArray
-    slopes: FloatArray
+    spins: FloatArray
 
 
 class HarmonicBalance:
@@ -69,6 +78,7 @@ class HarmonicBalance:
         scale: Factor of each number in the size of a motion: 1 for positions, `ANGLE_ARM` for
             angles, 0 for velocities, so that a size is in m. (n,)
         held: Indices of the numbers that `HOLD` is about.
+        kinematics: Positions, velocities and free spins among the numbers.
     """
 
     def __init__(self, setup: Setup, series: Series) -> None:
@@ -81,6 +91,7 @@ class HarmonicBalance:
         self.derivative, self.series = SlopedDerivative(setup), series
         self.scale = _scale(self.derivative, setup)
         self.held = _held(self.derivative, setup)
+        self.kinematics = kinematics_of(self.derivative, setup)
 
     @property
     def size(self) -> int:
@@ -125,25 +136,27 @@ class HarmonicBalance:
         states = self.states(coefficients, speed)
         rates, slopes = self.derivative.with_slopes(states, drum_rate=True)
         by_speed = self.series.slope @ coefficients - self.series.analysis @ slopes[:, -1]
-        own = np.ascontiguousarray(slopes[:, :-1])
         residual = self._residual(coefficients, speed, rates)
-        return Linearised(residual, self.matrix(own, speed), by_speed, own)
+        matrix = self.matrix(slopes[:, :-1], speed)
+        spins = [spin.direction(coefficients[0]) for spin in self.kinematics.spins]
+        return Linearised(
+            speed, residual, matrix, by_speed, np.reshape(spins, (len(spins), self.size))
+        )
 
     def matrix(self, slopes: FloatArray, speed: float) -> FloatArray:
-        """Return the derivative of the residual by the coefficients.
+        """Return the derivative of the residual by the coefficients. (2 N + 1, n, 2 N + 1, n)
 
         Args:
             slopes: (samples, n, n) slope of the time derivative by each number k at the samples.
             speed: Omega. [rad/s]
         """
         size, n = self.series.size, self.size
-        blocks = (self.series.products @ slopes.reshape(len(slopes), -1)).reshape(size, size, n, n)
-        matrix = np.empty((size, n, size, n))
-        np.negative(blocks.transpose(0, 3, 1, 2), out=matrix)
+        matrix = np.zeros((size, n, size, n))
         each = np.arange(n)
-        matrix[:, each, :, each] += speed * self.series.slope
+        matrix[:, each, :, each] = speed * self.series.slope
         matrix[0, self.held, 0, self.held] += HOLD
-        return matrix.reshape(size * n, size * n)
+        self.series.minus_products(slopes, matrix)
+        return matrix
 
     def extent(self, coefficients: FloatArray) -> float:
         """Return the size of a change of the coefficients. [m]"""

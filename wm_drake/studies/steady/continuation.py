@@ -5,16 +5,15 @@ solved at that speed; else on the plane across the tangent (Keller 1977). The ma
 linearisation serves all corrections of a step that converge fast (chord method).
 """
 
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
 
 from wm_drake.errors import input_error
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.steady.balance import HarmonicBalance
+from wm_drake.studies.steady.condensed import Corrections
 from wm_drake.studies.steady.stability import floquet_multipliers, is_stable
 
 LENGTH = 5e-3
@@ -44,6 +43,9 @@ FAST = 0.3
 
 SHORTEST_STEP = 1e-4
 """Shortest arc length of a step, in units of `LENGTH`."""
+
+LEAST_COSINE = 0.6
+"""Cosine of the largest bend of the branch in a step, about 50 degrees."""
 
 MOST_POINTS = 20
 """Largest number of points of a branch, as a multiple of the number of speeds."""
@@ -172,9 +174,9 @@ class _Metric:
         self.weights = (balance.scale / LENGTH) ** 2
         self.speed_weight = 1.0 / (SPEEDS * span) ** 2
 
-    def row(self, along: FloatArray, speed_along: float) -> FloatArray:
-        """Return the equation of the plane across a tangent."""
-        return np.append((along * self.weights).ravel(), speed_along * self.speed_weight)
+    def row(self, along: FloatArray, speed_along: float) -> tuple[FloatArray, float]:
+        """Return the coefficients of the plane across a tangent: of a motion and of its speed."""
+        return along * self.weights, speed_along * self.speed_weight
 
     def unit(self, along: FloatArray, speed_along: float) -> tuple[FloatArray, float]:
         """Return a direction scaled to an arc length of 1."""
@@ -194,23 +196,11 @@ class _Metric:
         """Return a motion with the tangent of its branch; it goes on from the place before."""
         at = balance.linearised(coefficients, speed)
         if before is None:
-            along = -np.linalg.solve(at.matrix, at.by_speed.ravel()).reshape(coefficients.shape)
-            return _Place(
-                coefficients, speed, *self.unit(np.asarray(way * along, dtype=np.float64), way)
-            )
-        matrix = _bordered(at.matrix, at.by_speed, self.row(before.along, before.speed_along))
-        right = np.zeros(len(matrix))
-        right[-1] = 1.0
-        solved = np.linalg.solve(matrix, right)
-        ahead = np.asarray(solved[:-1].reshape(coefficients.shape), dtype=np.float64)
-        return _Place(coefficients, speed, *self.unit(ahead, float(solved[-1])))
-
-
-def _bordered(matrix: FloatArray, by_speed: FloatArray, row: FloatArray) -> FloatArray:
-    size = len(matrix)
-    result = np.empty((size + 1, size + 1))
-    result[:size, :size], result[:size, size], result[size] = matrix, by_speed.ravel(), row
-    return result
+            row, row_speed = np.zeros(coefficients.shape), way
+        else:
+            row, row_speed = self.row(before.along, before.speed_along)
+        along, speed_along = Corrections(balance, at, row, row_speed)(None, 1.0)
+        return _Place(coefficients, speed, *self.unit(along, speed_along))
 
 
 def _step(
@@ -232,54 +222,102 @@ def _step(
         landing: Whether the speed is kept; else the motion is on the plane across the tangent.
     """
     row = metric.row(place.along, place.speed_along)
-    coefficients, factors, last, count = begin.copy(), None, np.inf, 0
-    right = np.zeros((len(row), 2))
-    right[-1, 1] = 1.0
-    constraint = np.append(np.zeros(len(row) - 1), 1.0) if landing else row
+    if landing:
+        row = np.zeros(begin.shape), 1.0
+    solved = _solved(balance, begin, speed, row)
+    if solved is None:
+        return None
+    coefficients, speed, solve, corrections = solved
+    if balance.extent(coefficients - begin) / LENGTH > 0.5 * max(length, 0.05):
+        return None
+    ahead = _turned(metric, place, coefficients, speed, solve)
+    if ahead is None:
+        return None
+    beyond, forwards = ahead
+    return beyond, corrections < 5 and forwards > 0.9
+
+
+def _solved(
+    balance: HarmonicBalance,
+    begin: FloatArray,
+    speed: float,
+    row: tuple[FloatArray, float],
+) -> tuple[FloatArray, float, Corrections, int] | None:
+    """Return a motion, its speed, factors near it, and the number of corrections; None if none.
+
+    Args:
+        balance: The machine.
+        begin, speed: First guess of the motion and its speed.
+        row: Last equation of the corrections.
+    """
+    coefficients, solve, last, count = begin.copy(), None, np.inf, 0
     corrections = 0
     while corrections < MOST_CORRECTIONS:
         corrections += 1
-        if factors is None:
-            at = balance.linearised(coefficients, speed)
-            residual = at.residual
-            with warnings.catch_warnings():  # a singular matrix gives no finite step
-                warnings.simplefilter("ignore", LinAlgWarning)
-                bordered = _bordered(at.matrix, at.by_speed, constraint)
-                factors = lu_factor(bordered, overwrite_a=True, check_finite=False)
-            count = 0
+        if solve is None:
+            solve, count = _corrections(balance, coefficients, speed, row), 0
+            if solve is None:
+                return None
+            residual = solve.at.residual
         else:
             residual = balance.residual(coefficients, speed)
-        right[:-1, 0] = -residual.ravel()
-        change = lu_solve(factors, right[:, 0], check_finite=False)
+        change, faster = solve(residual, 0.0)
+        size = balance.extent(change)
         if not np.all(np.isfinite(change)):
             return None
-        size = balance.extent(change[:-1].reshape(begin.shape))
         if count == 0 and FAST * last < size < NEAR:
-            change *= _share(balance, coefficients, speed, residual, change, landing)
-        coefficients = coefficients + change[:-1].reshape(begin.shape)
-        speed += 0.0 if landing else float(change[-1])
+            share = _share(balance, coefficients, speed, residual, change, faster)
+            change, faster = share * change, share * faster
+        coefficients = coefficients + change
+        speed += faster
         count += 1
         if size < TOLERANCE or FAST * last < size < STALLED:
             break
         if size > FAST * last or count >= MOST_CHORDS:
-            factors = None
+            solve = None
         last = size
     else:
         return None
-    moved = balance.extent(coefficients - begin) / LENGTH
-    if moved > 0.5 * max(length, 0.05) or factors is None:
+    return None if solve is None else (coefficients, speed, solve, corrections)
+
+
+def _corrections(
+    balance: HarmonicBalance,
+    coefficients: FloatArray,
+    speed: float,
+    row: tuple[FloatArray, float],
+) -> Corrections | None:
+    """Return the corrections at a motion, for a last equation; None if there are none."""
+    at = balance.linearised(coefficients, speed)
+    try:
+        return Corrections(balance, at, *row)
+    except np.linalg.LinAlgError:
         return None
-    solved = lu_solve(factors, right[:, 1], check_finite=False)
-    along, speed_along = solved[:-1].reshape(begin.shape), float(solved[-1])
-    along, speed_along = metric.unit(along, speed_along)
-    forwards = np.sum(along * place.along * metric.weights)
+
+
+def _turned(
+    metric: _Metric,
+    place: _Place,
+    coefficients: FloatArray,
+    speed: float,
+    solve: Corrections,
+) -> tuple[_Place, float] | None:
+    """Return the next place, and the cosine of the bend; None if the branch bends too much.
+
+    Args:
+        metric: Size of a step.
+        place: The place before.
+        coefficients, speed: The next motion.
+        solve: Factors near it.
+    """
+    along, speed_along = metric.unit(*solve(None, 1.0))
+    forwards = float(np.sum(along * place.along * metric.weights))
     forwards += speed_along * place.speed_along * metric.speed_weight
     if forwards < 0.0:
         along, speed_along = -along, -speed_along
-    if abs(forwards) < 0.6:  # the branch bends by more than 50 degrees
+    if abs(forwards) < LEAST_COSINE:
         return None
-    quick = corrections < 5 and bool(abs(forwards) > 0.9)
-    return _Place(coefficients, speed, along, speed_along), quick
+    return _Place(coefficients, speed, along, speed_along), abs(forwards)
 
 
 def _share(
@@ -288,7 +326,7 @@ def _share(
     speed: float,
     residual: FloatArray,
     change: FloatArray,
-    landing: bool,
+    faster: float,
 ) -> float:
     """Return the part of a correction that makes the residual smaller.
 
@@ -298,13 +336,11 @@ def _share(
     Args:
         balance: The machine.
         coefficients, speed, residual: The motion before the correction.
-        change: Correction of the coefficients and of the speed.
-        landing: Whether the speed is kept.
+        change, faster: Correction of the coefficients and of the speed.
     """
     share, before = 1.0, float(np.linalg.norm(residual))
     while share > SMALLEST_SHARE:
-        motion = coefficients + share * change[:-1].reshape(coefficients.shape)
-        ahead = speed if landing else speed + share * float(change[-1])
+        motion, ahead = coefficients + share * change, speed + share * faster
         if np.linalg.norm(balance.residual(motion, ahead)) < (1.0 - 0.1 * share) * before:
             break
         share *= 0.5
@@ -332,16 +368,15 @@ def _at_speed(balance: HarmonicBalance, guess: FloatArray, speed: float) -> Floa
     """Return the motion at a speed by Newton's method with halved steps; None if it fails."""
     coefficients, last = guess.copy(), np.inf
     for _ in range(60):
-        at = balance.linearised(coefficients, speed)
-        try:
-            step = -np.linalg.solve(at.matrix, at.residual.ravel())
-        except np.linalg.LinAlgError:
+        solve = _corrections(balance, coefficients, speed, (np.zeros(guess.shape), 1.0))
+        if solve is None:
             return None
-        change = np.asarray(step.reshape(guess.shape), float)
+        residual = solve.at.residual
+        change, _ = solve(residual, 0.0)
         size = balance.extent(change)
         if not np.isfinite(size):
             return None
-        share, before = 1.0, float(np.linalg.norm(at.residual))
+        share, before = 1.0, float(np.linalg.norm(residual))
         while share > SMALLEST_SHARE:
             trial = coefficients + share * change
             if np.linalg.norm(balance.residual(trial, speed)) < (1.0 - 0.1 * share) * before:

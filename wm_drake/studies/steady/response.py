@@ -1,6 +1,7 @@
 """Steady unbalance response of a machine over the speed of its drum."""
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -11,6 +12,7 @@ from wm_drake.errors import input_error
 from wm_drake.model.machine import Machine, Setup
 from wm_drake.parameters import Load
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.mounts import KINDS, force_measures, mount_names
 from wm_drake.simulation.outputs import AXES, variables_of
 from wm_drake.studies.steady.balance import HARMONICS, SAMPLES, HarmonicBalance
 from wm_drake.studies.steady.continuation import Point, first_motion, follow
@@ -52,10 +54,19 @@ def steady_response(
         largest Floquet multiplier. `amplitude` (sensor) is the largest deviation from the mean of a
         revolution; `detergent_displacement` (axis), `gasket_force`, `gasket_moment` (axis) are
         largest absolute values as in `Measures`; `spring_tension`, `damper_tension` are half the
-        range of a revolution; `first_harmonic` (coordinate, part) is the tub's pose. SI.
+        range of a revolution; `mount_force_peak`, `mount_force_rms`, `mount_force_dynamic_rms`
+        (mount) are largest size, RMS, and RMS without the mean, of the force of a mount on the
+        cabinet in a revolution; `first_harmonic` (coordinate, part) is the tub's pose. SI.
 
     Raises:
         InputError: an argument is wrong, or no periodic motion is found at the first speed.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> machine = wm.build_machine(wm.load_machine("reference"))
+        >>> response = wm.steady_response(machine, "middle", [38.0, 40.0], harmonics=3)
+        >>> bool(response.stable.all())
+        True
     """
     setup = machine.set_up(load, gasket=gasket)
     return response_of(setup, speeds, harmonics, samples, progress)
@@ -208,6 +219,7 @@ def _measured(setup: Setup, balance: HarmonicBalance, points: list[Point]) -> xr
                 half_range("damper_tension"),
                 {"units": "N", "long_name": "half the range of the tension in a revolution"},
             ),
+            **_mount_forces(by_point("mount_force")),
             "first_harmonic": (
                 ("point", "coordinate", "part"),
                 first,
@@ -223,8 +235,27 @@ def _measured(setup: Setup, balance: HarmonicBalance, points: list[Point]) -> xr
             "axis": list(AXES),
             "spring": list(setup.springs),
             "damper": dampers,
+            "mount": list(mount_names(setup.parameters)),
             "coordinate": list(COORDINATES),
             "part": ["cosine", "sine"],
         },
         {"harmonics": balance.series.order, "samples": samples},
     )
+
+
+def _mount_forces(forces: FloatArray) -> dict[str, tuple[tuple[str, str], FloatArray, Any]]:
+    """Return the variables of the forces of mounts on the cabinet.
+
+    Args:
+        forces: (points, samples, mounts, 3) [N]
+    """
+    measured = zip(*(force_measures(revolution) for revolution in forces), strict=True)
+    texts = ("largest size", "RMS", "RMS without the mean")
+    return {
+        f"mount_force_{kind}": (
+            ("point", "mount"),
+            np.stack(values),
+            {"units": "N", "long_name": f"{text} of the force on the cabinet in a revolution"},
+        )
+        for kind, text, values in zip(KINDS, texts, measured, strict=True)
+    }

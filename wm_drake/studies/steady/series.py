@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.steady.products import subtract_products
 
 
 @dataclass(frozen=True)
@@ -61,18 +62,20 @@ class Series:
         return matrix
 
     @cached_property
-    def products(self) -> FloatArray:
-        """Return the matrix that takes samples of a factor to its matrix of coefficients.
+    def double(self) -> FloatArray:
+        """Return the analysis of twice as many harmonics, which products need. (4 N + 1, samples)
 
-        The series of a product g(phase) x(phase) has the coefficients G X; the entries of G are
-        these products times the samples of g. ((2 N + 1)^2, samples)
+        With no more than 4 N samples, harmonics above half of the samples are those below it.
         """
-        products = self.analysis[:, None, :] * self.synthesis.T[None, :, :]
-        return np.ascontiguousarray(products.reshape(-1, self.samples))
+        return Series(2 * self.order, self.samples).analysis
 
-    def padded(self, coefficients: FloatArray, order: int) -> FloatArray:
-        """Return the coefficients (2 N + 1, n) for another order, with zeros or cut."""
-        result = np.zeros((2 * order + 1, coefficients.shape[1]))
-        kept = min(len(result), len(coefficients))
-        result[:kept] = coefficients[:kept]
-        return result
+    def minus_products(self, factors: FloatArray, matrix: FloatArray) -> None:
+        """Subtract the products with sampled factors from a matrix of coefficients.
+
+        Args:
+            factors: (samples, k, n) samples of the factor of each number k in each sum n.
+            matrix: (2 N + 1, n, 2 N + 1, k), changed.
+        """
+        flat = np.ascontiguousarray(factors).reshape(self.samples, -1)
+        harmonics = (self.double @ flat).reshape(-1, *factors.shape[1:])
+        subtract_products(np.ascontiguousarray(harmonics.transpose(0, 2, 1)), matrix)

@@ -14,6 +14,7 @@ from wm_drake.batch.runs import RunResult
 from wm_drake.errors import InputError, Problem
 from wm_drake.model.machine import Machine, Setup
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
+from wm_drake.parameters.spin import Region
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import envelopes
@@ -120,14 +121,20 @@ def run_steady_study(
         responses = list(pool.map(solve, range(len(pairs)), setups))
     profile = machine.parameters.profile
     runs = _records(machine, [Case(*pair[:2], profile, pair[2]) for pair in pairs], workers)
-    progress(share + 0.1)
+    begun = share + (0.1 if len(rates_rpm_s) else 0.0)
+    progress(begun)
     cases = [
         SteadyCase(name, gasket, response, _envelopes(run), wall)
         for (name, _, gasket), (response, wall), run in zip(pairs, responses, runs, strict=True)
     ]
     sweeps = None
     if len(rates_rpm_s):
-        sweeps = _sweeps(machine, loads, gaskets, speeds, rates_rpm_s, workers)
+        count = 2 * len(rates_rpm_s) * len(pairs)
+
+        def report_sweeps(finished: int) -> None:
+            progress(begun + (1.0 - begun) * finished / count)
+
+        sweeps = _sweeps(machine, loads, gaskets, speeds, rates_rpm_s, workers, report_sweeps)
     progress(1.0)
     return SteadyStudy(machine.parameters, cases, sweeps, time.perf_counter() - begin)
 
@@ -155,12 +162,15 @@ def _envelopes(record: Record | None) -> xr.Dataset | None:
 def sweep_profile(first: float, last: float, rate: float) -> SpinProfile:
     """Return a profile that holds the first speed, then goes to the last one at a rate.
 
+    Its only region is the sweep.
+
     Args:
         first, last: [rad/s]
         rate: > 0. [rad/s^2]
     """
     end = HOLD + abs(last - first) / rate
-    return SpinProfile(time=(0.0, HOLD, end), speed=(first, first, last))
+    sweep = Region(name="sweep", begin=HOLD, end=end)
+    return SpinProfile(time=(0.0, HOLD, end), speed=(first, first, last), regions=(sweep,))
 
 
 def _sweeps(
@@ -170,6 +180,7 @@ def _sweeps(
     speeds: FloatArray,
     rates_rpm_s: Sequence[float],
     workers: int | None,
+    done: Callable[[int], None],
 ) -> xr.Dataset:
     """Return the largest amplitudes of sweeps and their speeds."""
     low, high = float(min(speeds)), float(max(speeds))
@@ -184,20 +195,13 @@ def _sweeps(
                     places.append((k, g, r, d))
     shape = (len(loads), len(gaskets), len(rates_rpm_s), 2, len(machine.parameters.sensors))
     amplitude, speed = np.full(shape, np.nan), np.full(shape, np.nan)
-
-    def keep(run: RunResult) -> None:
-        if run.diverged or run.record is None:
-            return
-        found = envelopes(run.record)
-        kept = run.record.time.values >= HOLD
-        size = np.maximum(np.abs(found.upper.values), np.abs(found.lower.values))[kept]
-        if not len(size) or np.isnan(size).all():
-            return
-        at = np.argmax(size, axis=0)
-        amplitude[places[run.number]] = size[at, np.arange(size.shape[1])]
-        speed[places[run.number]] = run.record.drum_speed.values[kept][at]
-
-    simulate_many(machine, cases, measures=[], histories=True, workers=workers, finished=keep)
+    measure = ["amplitudes in regions"]
+    table = simulate_many(machine, cases, measures=measure, workers=workers, progress=done)
+    complete = table.diverged.values == ""
+    for place, kept, run in zip(places, complete, table.run.values, strict=True):
+        if kept:
+            amplitude[place] = table.region_amplitude.values[run, 0]
+            speed[place] = table.region_critical_speed.values[run, 0]
     dims = ("load", "gasket", "rate", "direction", "sensor")
     return xr.Dataset(
         {

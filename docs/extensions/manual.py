@@ -1,0 +1,162 @@
+"""Sphinx extension of the manual: what is written from the program, and links out of `docs`.
+
+A page asks for a text by a mark:
+
+- `<!-- machine file keys -->`: the keys of a machine file;
+- `<!-- public names -->`: the public names of the package;
+- `<!-- functions of MODULE -->`: the functions of a module of laws.
+"""
+
+import importlib
+import inspect
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from sphinx.application import Sphinx
+
+import wm_drake
+from wm_drake.parameters.file_keys import FileKey, KeyGroup, key_groups
+
+KEYS, NAMES = "<!-- machine file keys -->", "<!-- public names -->"
+FUNCTIONS = re.compile(r"<!-- functions of ([\w.]+) -->")
+LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s]+?)(#[^)\s]*)?\)")
+SECTION = re.compile(r"(Args|Returns|Raises|Yields|Attributes|Example):$")
+PAGES_OUTSIDE = {
+    "README.md": "about/sources",
+    "CHANGELOG.md": "about/changelog",
+    "CONTRIBUTING.md": "about/contributing",
+    "sdf/README.md": "reference/bodies",
+    "analyses/README.md": "about/analyses",
+}
+"""Pages of the manual that include documents of the checkout outside of `docs`."""
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Register the extension."""
+    app.connect("source-read", _complete)
+    app.connect("include-read", _complete_included)
+    app.connect("autodoc-process-docstring", _plain_docstring, priority=400)  # before napoleon
+    return {"parallel_read_safe": True}
+
+
+def _complete(app: Sphinx, docname: str, source: list[str]) -> None:
+    """Fill the marks of a page, and lead its links to pages of the manual."""
+    text = source[0]
+    if KEYS in text:
+        text = text.replace(KEYS, "\n".join(_keys()))
+    if NAMES in text:
+        text = text.replace(NAMES, _documented(_public_names()))
+    text = FUNCTIONS.sub(lambda found: _documented(_functions(found[1])), text)
+    source[0] = _relinked(text, Path(app.srcdir), Path(app.srcdir, docname).parent, docname)
+
+
+def _complete_included(app: Sphinx, path: Path, docname: str, content: list[str]) -> None:
+    """Lead the links of an included document to pages of the manual."""
+    folder = Path(app.srcdir, path).resolve().parent
+    content[0] = _relinked(content[0], Path(app.srcdir), folder, docname)
+
+
+def _relinked(text: str, docs: Path, folder: Path, docname: str) -> str:
+    """Return a text whose links to files of the checkout work in the manual.
+
+    Args:
+        text: Markdown.
+        docs: Folder of the manual.
+        folder: Folder that the links start from.
+        docname: Page that the text becomes a part of.
+    """
+    checkout, here = docs.parent, Path(docname).parent
+    up = "../" * (len(here.parts))
+
+    def replaced(link: re.Match[str]) -> str:
+        label, target, anchor = link[1], link[2], link[3] or ""
+        if ":" in target:
+            return link[0]
+        path = (folder / target).resolve()
+        if not path.is_relative_to(checkout):
+            return link[0]
+        name = path.relative_to(checkout).as_posix()
+        if name in PAGES_OUTSIDE:
+            return f"[{label}]({up}{PAGES_OUTSIDE[name]}.md)"
+        if name == "docs/README.md":
+            return f"[{label}]({up}index.md)"
+        if path.is_relative_to(docs) and path.suffix == ".md":
+            return f"[{label}]({up}{path.relative_to(docs).as_posix()}{anchor})"
+        if path.is_relative_to(docs) and path.is_file():
+            return link[0]
+        return f"{label} (`{name}`)" if label.strip("`") != name else f"`{name}`"
+
+    return LINK.sub(replaced, text)
+
+
+def _plain_docstring(
+    _app: Sphinx, _what: str, _name: str, _object: Any, _options: Any, lines: list[str]
+) -> None:
+    """Turn a docstring in plain text into reStructuredText.
+
+    An indented block before the sections of arguments is an equation. Bars and stars are no markup.
+    """
+    new: list[str] = []
+    in_sections = False
+    for line in lines:
+        in_sections |= bool(SECTION.match(line))
+        is_equation = line.startswith("    ") and not in_sections
+        if is_equation and not (new and new[-1].startswith("    ")) and not _inside(new):
+            new += ["::", ""]
+        new.append(line if is_equation else line.replace("|", "\\|").replace("*", "\\*"))
+    lines[:] = new
+
+
+def _inside(lines: list[str]) -> bool:
+    """Return whether the last lines are an equation, apart from empty ones."""
+    return next((line.startswith("    ") for line in reversed(lines) if line.strip()), False)
+
+
+def _public_names() -> Iterator[tuple[str, str]]:
+    for name in wm_drake.__all__:
+        kind = "autoclass" if inspect.isclass(getattr(wm_drake, name)) else "autofunction"
+        yield kind, f"wm_drake.{name}"
+
+
+def _functions(module: str) -> Iterator[tuple[str, str]]:
+    for name, value in vars(importlib.import_module(module)).items():
+        own = getattr(value, "py_func", value)
+        if inspect.isfunction(own) and own.__module__ == module and not name.startswith("_"):
+            yield "autofunction", f"{module}.{name}"
+
+
+def _documented(names: Iterator[tuple[str, str]]) -> str:
+    directives = "\n\n".join(f".. {kind}:: {name}" for kind, name in names)
+    return f"```{{eval-rst}}\n{directives}\n```"
+
+
+def _keys() -> Iterator[str]:
+    for group in key_groups():
+        yield from _section(group)
+
+
+def _section(group: KeyGroup) -> Iterator[str]:
+    yield f"## {group.title}\n"
+    yield f"{_escaped(group.about)}\n"
+    if group.places:
+        yield f"In the file: {', '.join(f'`{place}`' for place in group.places)}.\n"
+    if group.also:
+        anchor = group.also.lower().replace(" ", "-")
+        yield f"It has the keys of [{group.also}](#{anchor}) and these:\n"
+    yield "| key | meaning | value | allowed | default |"
+    yield "|---|---|---|---|---|"
+    yield from map(_row, group.keys)
+    yield ""
+
+
+def _row(key: FileKey) -> str:
+    needed = "" if not key.is_required else "required"
+    cells = (f"`{key.name}`", _escaped(key.meaning), key.form, key.allowed, key.default or needed)
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def _escaped(text: str) -> str:
+    """Return text whose brackets are no links; braces in backticks stay."""
+    return text.replace("[", "\\[").replace("]", "\\]")

@@ -1,0 +1,113 @@
+"""Which numbers of the state are positions and velocities of bodies, and which spins are free."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wm_drake.compiler.vectors import rotation_from_sines
+from wm_drake.elements.motion import TREE_STATE, rpy_rates
+from wm_drake.engines.compiled.bearing import CARRIER_STATE
+from wm_drake.engines.compiled.slopes import SlopedDerivative
+from wm_drake.engines.compiled.tubes import TUBES_STATE, TUBES_STATE_SIZE
+from wm_drake.model.machine import Setup
+from wm_drake.parameters.types import FloatArray
+
+NEUTRAL = 1e-6
+"""Largest part of the sum of its terms that the acceleration by a free spin may have."""
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """Indices among the free numbers of the state.
+
+    Attributes:
+        turns: Angles of each body (bodies, 3), and their angular velocities.
+        shifts: Positions whose time derivative is a number of the state: (k,), and these numbers.
+        spins: Damper tubes that nothing holds about their axis.
+    """
+
+    turns: tuple[np.ndarray, np.ndarray]
+    shifts: tuple[np.ndarray, np.ndarray]
+    spins: tuple["Spin", ...]
+
+    @property
+    def velocities(self) -> np.ndarray:
+        """Return the indices of all velocities: of angles, then of positions."""
+        return np.concatenate([self.turns[1].ravel(), self.shifts[1]])
+
+
+@dataclass(frozen=True)
+class Spin:
+    """Rotation of a telescopic damper about its axis.
+
+    Attributes:
+        angles, position: Indices of roll, pitch, yaw and of the position of the outer tube.
+        axis: Direction of the damper in the frame of the outer tube.
+        point: Point of the axis in this frame. [m]
+    """
+
+    angles: np.ndarray
+    position: np.ndarray
+    axis: FloatArray
+    point: FloatArray
+
+    def direction(self, numbers: FloatArray) -> FloatArray:
+        """Return the rates of the free numbers by a spin of 1 rad/s.
+
+        Args:
+            numbers: (n,) free numbers of the state.
+        """
+        angles = [(np.sin(angle), np.cos(angle)) for angle in numbers[self.angles]]
+        tube = np.reshape(rotation_from_sines(*angles), (3, 3))
+        axis = tube @ self.axis
+        direction = np.zeros(len(numbers))
+        direction[self.angles] = rpy_rates(tuple(axis), *angles[1:])
+        direction[self.position] = -np.cross(axis, tube @ self.point)
+        return direction
+
+
+def kinematics_of(derivative: SlopedDerivative, setup: Setup) -> Kinematics:
+    """Return the kinematics of a machine."""
+    place = {int(number): index for index, number in enumerate(derivative.free)}
+    tree = TREE_STATE.offsets
+    tubes = derivative.layout.elements.tubes + TUBES_STATE.offsets["tubes"]
+    begins = [tubes + TUBES_STATE_SIZE * i for i in range(len(setup.telescopes))]
+    three = np.arange(3)
+    bodies = [
+        (at + tree["angles"] + three, at + tree["angular_velocity"] + three) for at in (0, *begins)
+    ]
+    moves = [(at + tree["position"] + three, at + tree["velocity"] + three) for at in (0, *begins)]
+    joints = [
+        (np.array([at + tree["joint_position"]]), np.array([at + tree["joint_rate"]]))
+        for at in begins
+    ]
+    if setup.bearing:
+        at, own = len(derivative.rest) - CARRIER_STATE.fixed_size, CARRIER_STATE.offsets
+        bodies.append((at + own["angles"] + three, at + own["angular_velocity"] + three))
+        moves.append((at + own["position"] + three, at + own["velocity"] + three))
+
+    def indices(pairs: list[tuple[np.ndarray, np.ndarray]], side: int) -> np.ndarray:
+        return np.array([place[int(k)] for pair in pairs for k in pair[side]])
+
+    spins = [
+        Spin(
+            indices([bodies[1 + i]], 0),
+            indices([moves[1 + i]], 0),
+            telescope.axis,
+            telescope.tub_bushing.ground_side_point,
+        )
+        for i, telescope in enumerate(setup.telescopes.values())
+    ]
+    return Kinematics(
+        (indices(bodies, 0).reshape(-1, 3), indices(bodies, 1).reshape(-1, 3)),
+        (indices(moves + joints, 0), indices(moves + joints, 1)),
+        tuple(spin for spin in spins if _is_neutral(spin, derivative)),
+    )
+
+
+def _is_neutral(spin: Spin, derivative: SlopedDerivative) -> bool:
+    """Return whether a spin from rest changes no force."""
+    slopes = derivative.jacobian(derivative.rest[None])[0]
+    direction = spin.direction(derivative.rest[derivative.free])
+    change = np.abs(slopes @ direction)
+    return bool(np.all(change <= NEUTRAL * np.max(np.abs(slopes) @ np.abs(direction))))
