@@ -33,8 +33,8 @@ TUB = PackedLayout(
     inertia=SYMMETRIC,
     inverse_inertia=SYMMETRIC,
 )
-"""The tub without drum: 1/M [1/kg], S [kg m], I [kg m^2], inverse of the inertia about the centre of
-mass [1/(kg m^2)]."""
+"""The tub without drum: 1/M [1/kg], S [kg m], I [kg m^2], inverse of the inertia about the centre
+of mass [1/(kg m^2)]."""
 TUB_AND_BEARING = PackedLayout("TubAndBearingNumbers", tub=LAYOUT(TUB), bearing=LAYOUT(BUSHING))
 """Packed numbers of a compliant bearing: the tub, then the bushing."""
 CARRIER_STATE = PackedLayout(
