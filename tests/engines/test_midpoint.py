@@ -134,7 +134,7 @@ def test_the_midpoint_rule_is_refused_where_it_does_not_follow(setup, reference)
     steep[1:] *= 30.0  # far steeper than at rest, where R is from
     assert not midpoint_follows(setup, layout, steep, STEP)
     plain = build_machine(reference).set_up()
-    with pytest.raises(InputError, match="'midpoint' is for machines with telescopic dampers"):
+    with pytest.raises(InputError, match="'midpoint' needs telescopic dampers"):
         choose_stepping(plain, *pack(plain), STANDSTILL, 2.5e-3, "midpoint")
     fast = constant_speed(300.0, 1.0)
     with pytest.raises(InputError, match=r"'midpoint' does not follow this machine at 0\.25 ms"):

@@ -148,6 +148,7 @@ class Runner:
             (LARGEST_ANGLE, LARGEST_DISPLACEMENT),
             p,
             key.layout.gasket,
+            key.layout.elements.branches,
             self._lanes("points", points),
             count,
             moved,

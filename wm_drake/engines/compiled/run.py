@@ -118,7 +118,7 @@ def _advance(
 
     Arguments as for `integrate_runs`.
     """
-    sizes, elements = (len(x) // WIDTH, len(layout.dampers)), layout.elements
+    sizes, elements = (len(x) // WIDTH, layout.inputs_size), layout.elements
     if relaxation is None:
         work, steps = work_arrays(*sizes), (*schedule.steps, one_derivative)
         return lambda begin, end: integrate_lanes(steps, begin, end, p, elements, x, work, samples)

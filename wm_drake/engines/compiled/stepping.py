@@ -97,11 +97,12 @@ def choose_stepping(
         InputError: the step is too long for the integrator, or the sample time of a controller for
             the drum.
     """
-    only_tubes = bool(setup.telescopes) and not setup.cabinet and not setup.motor
+    moving = setup.cabinet or setup.motor or layout.rubber
+    only_tubes = bool(setup.telescopes) and not moving
     if integrator == "midpoint" and not only_tubes:
         raise input_error(
-            "'midpoint' is for machines with telescopic dampers, a cabinet at rest and a "
-            "prescribed drum speed; allowed are 'auto', 'multistep' or 'runge_kutta'",
+            "'midpoint' needs telescopic dampers, a cabinet at rest, a prescribed drum speed and "
+            "bushings without branches; allowed are 'auto', 'multistep' or 'runge_kutta'",
             key="integrator",
         )
     if integrator != "runge_kutta" and not layout.control_period:
