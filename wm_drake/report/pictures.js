@@ -93,13 +93,15 @@ const Pictures = (() => {
     return power * [1, 2, 5, 10].find(factor => factor * power >= raw * 0.999);
   }
 
+  const upCount = height => Math.max(3, Math.round(height / 34));
+
   /* Texts that a plain axis is likely to show: their widths make room for them. */
-  function likelyTexts(axis) {
+  function likelyTexts(axis, most) {
     if (axis.ticks) return axis.ticks.map(([, text]) => text);
     const [a, b] = axis.range, low = Math.min(a, b), high = Math.max(a, b);
     if (axis.is_log) return ["10\u221288"];
     if (!(high > low)) return [String(low)];
-    const step = niceStep(high - low, 5), decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+    const step = niceStep(high - low, most), decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
     return [Math.ceil(low / step) * step, Math.floor(high / step) * step]
       .map(value => value.toFixed(Math.min(8, decimals)));
   }
@@ -129,27 +131,27 @@ const Pictures = (() => {
   }
 
   /* Texts of the ticks upwards: in lines as long as needed, so that they lie above each other. */
-  function upTicks(axis, room, height, factor) {
+  function upTicks(axis, room, height, factor, total) {
     const px = size(axis.tick_size, factor);
     if (!axis.is_labelled || (axis.ticks && !axis.ticks.length)) return { px, width: 0 };
-    if (!axis.ticks) return { px, width: Math.max(0, ...likelyTexts(axis).map(text => width(text, px))) + 8 };
+    if (!axis.ticks) return { px, width: Math.max(0, ...likelyTexts(axis, upCount(height)).map(text => width(text, px))) + 8 };
     const span = Math.abs(axis.range[1] - axis.range[0]) || 1;
     const places = axis.ticks.map(([place]) => place).sort((u, v) => u - v);
     const cell = Math.min(height, ...places.slice(1).map((place, i) => height * (place - places[i]) / span));
     let texts;
-    for (const part of [0.32, 0.45, 0.55]) {
-      texts = axis.ticks.map(([, text]) => wrapped(text, px, Math.max(90, part * room)));
+    for (const most of [0.32 * room, 0.45 * room, 0.3 * total, 0.42 * total]) {
+      texts = axis.ticks.map(([, text]) => wrapped(text, px, Math.max(90, most)));
       if (Math.max(...texts.map(t => t.length)) * px * HEIGHT <= cell) break;
     }
     return { px, texts, width: Math.max(0, ...texts.flat().map(text => width(text, px))) + 8 };
   }
 
   /* Room that a panel needs outside its axes. [px] */
-  function around(panel, twin, room, height, factor, isSolo) {
+  function around(panel, twin, room, height, factor, isSolo, total) {
     const need = { left: 0, right: 4, top: 6, bottom: 4 };
     const x = { ...panel.x, is_labelled: panel.x.is_labelled || (isSolo && panel.x.ticks === null) };
     const y = { ...panel.y, is_labelled: panel.y.is_labelled || (isSolo && panel.y.ticks === null) };
-    need.upTicks = upTicks(y, room, height, factor);
+    need.upTicks = upTicks(y, room, height, factor, total);
     const label = size(y.label_size, factor);
     need.upLabel = y.label ? wrapped(y.label, label, Math.max(60, height)) : [];
     need.left = need.upTicks.width + (need.upLabel.length ? need.upLabel.length * label * HEIGHT + 6 : 0);
@@ -174,7 +176,7 @@ const Pictures = (() => {
       return { ...title, px, texts };
     });
     if (twin) {
-      const ticks = upTicks(twin.y, room, height, factor);
+      const ticks = upTicks(twin.y, room, height, factor, total);
       const far = size(twin.y.label_size, factor);
       need.right += ticks.width + (twin.y.label ? far * HEIGHT + 6 : 0);
     }
@@ -240,7 +242,7 @@ const Pictures = (() => {
         needs = shown.map(({ panel, index }) => {
           const at = cell(panel);
           const across = sum(x.slice(at.c0, at.c1 + 1)), up = sum(y.slice(at.r0, at.r1 + 1));
-          return around(panel, twins.get(index)?.panel, across, up, factor, solo !== null);
+          return around(panel, twins.get(index)?.panel, across, up, factor, solo !== null, pixels);
         });
         left.fill(0); right.fill(0); top.fill(0); bottom.fill(0);
         shown.forEach(({ panel, index }, k) => {
@@ -326,6 +328,7 @@ const Pictures = (() => {
     return text.replace(/-/g, MINUS);
   }
 
+  const dashes = dash => dash === "solid" ? dash : dash.split(",").map(length => `${length}px`).join(",");
   const colorscale = shades => shades.map((shade, i) => [i / (shades.length - 1), shade]);
 
   function hovered(part, panel, label) {
@@ -341,7 +344,7 @@ const Pictures = (() => {
         const x = numbers(part.x), y = numbers(part.y);
         const mode = [part.dash ? "lines" : null, part.mark ? "markers" : null].filter(Boolean).join("+");
         const trace = { type: "scatter", mode: mode || "lines", x, y, hovertemplate: hovered(part, panel, label) };
-        if (part.dash) trace.line = { color: area, width: Math.max(0.8, part.width * 1.15), dash: part.dash };
+        if (part.dash) trace.line = { color: area, width: Math.max(0.8, part.width * 1.15), dash: dashes(part.dash) };
         if (part.mark) trace.marker = marker(part, factor);
         return [trace];
       }
@@ -471,7 +474,7 @@ const Pictures = (() => {
     Object.assign(up, {
       domain: [1 - place.y1 / arrangement.height, 1 - place.y0 / arrangement.height], anchor: names.x,
       showticklabels: need.upTicks.width > 0, tickfont: { size: need.upTicks.px, color: look.quiet },
-      nticks: Math.max(3, Math.round((place.y1 - place.y0) / 34)),
+      nticks: upCount(place.y1 - place.y0),
       title: {
         text: lines(need.upLabel), standoff: 5,
         font: { size: size(panel.y.label_size, factor), color: hue(panel.y.color) },
@@ -524,18 +527,18 @@ const Pictures = (() => {
     arrangement.panels.forEach((place, k) => {
       const names = { x: `x${k + 1}`.replace(/^x1$/, "x"), y: `y${k + 1}`.replace(/^y1$/, "y") };
       axesOf(place, names, byShare, layout, look, factor, arrangement);
-      contents(d, place.panel, names, state, traces, shapes, annotations, factor);
+      contents(d, place.panel, names, state, traces, shapes, annotations, factor, place.x1 - place.x0);
       titles(place, names, annotations);
       if (place.panel.top) topAxis(place, names, 100 + k, layout, traces, look, factor);
       if (place.twin) {
         const other = { x: names.x, y: `y${200 + k}` }, axis = place.twin.panel.y;
         layout[`yaxis${200 + k}`] = {
-          ...plainAxis(axis, place.twin.panel, look), overlaying: names.y, side: "right", anchor: names.x, tickmode: "auto", nticks: Math.max(3, Math.round((place.y1 - place.y0) / 34)),
+          ...plainAxis(axis, place.twin.panel, look), overlaying: names.y, side: "right", anchor: names.x, tickmode: "auto", nticks: upCount(place.y1 - place.y0),
           showgrid: false, showline: true,
           tickfont: { size: size(axis.tick_size, factor), color: look.quiet },
           title: { text: escaped(axis.label), standoff: 5, font: { size: size(axis.label_size, factor), color: hue(axis.color) } },
         };
-        contents(d, place.twin.panel, other, state, traces, shapes, annotations, factor);
+        contents(d, place.twin.panel, other, state, traces, shapes, annotations, factor, place.x1 - place.x0);
       }
     });
     scalesOf(d, arrangement, traces, look);
@@ -554,9 +557,9 @@ const Pictures = (() => {
     }
   }
 
-  function contents(d, panel, names, state, traces, shapes, annotations, factor) {
+  function contents(d, panel, names, state, traces, shapes, annotations, factor, room) {
     const overCells = panel.parts.some(part => part.kind === "cells");
-    const texts = [];
+    const texts = [], notes = [];
     panel.parts.forEach(part => {
       const entry = entryOf(d, part), hidden = entry !== null && state.hidden.has(entry);
       const label = part.label || (entry !== null ? entries(d)[entry].label : null);
@@ -566,7 +569,7 @@ const Pictures = (() => {
         const across = part.along === "x";
         const shape = { type: is ? "line" : "rect", layer: is ? "above" : "below", xref: names.x, yref: names.y };
         if (is) {
-          Object.assign(shape, { [`${other}0`]: part.at, [`${other}1`]: part.at, line: { color: hue(part.color), width: Math.max(1, part.width), dash: part.dash } });
+          Object.assign(shape, { [`${other}0`]: part.at, [`${other}1`]: part.at, line: { color: hue(part.color), width: Math.max(1, part.width), dash: dashes(part.dash) } });
           Object.assign(shape, { [`${part.along}0`]: 0, [`${part.along}1`]: 1, [`${part.along}ref`]: `${names[part.along]} domain` });
         } else {
           Object.assign(shape, { fillcolor: hue(part.color), line: { width: 0 } });
@@ -577,14 +580,26 @@ const Pictures = (() => {
       } else if (part.kind === "text") {
         const isPlain = part.in_data.every(Boolean) && !part.arrow && !part.shift.some(Boolean) && !part.angle;
         if (isPlain) texts.push(part);
-        else annotations.push(note(part, names, factor, overCells));
+        else notes.push([part, note(part, names, factor, overCells)]);
       } else {
         for (const trace of curves(part, panel, label, factor))
           traces.push({ ...trace, xaxis: names.x, yaxis: names.y, visible: !hidden, showlegend: false });
       }
     });
+    lowered(notes, room, factor);
+    annotations.push(...notes.map(([, found]) => found));
     if (texts.length)
       for (const trace of textCurves(texts, factor, overCells)) traces.push({ ...trace, xaxis: names.x, yaxis: names.y });
+  }
+
+  /* Lowers the texts at the top right of a panel if they would meet those at its top left. */
+  function lowered(notes, room, factor) {
+    const atTop = side => notes.filter(([part]) => !part.in_data[0] && !part.in_data[1] && part.up === "top" && part.across === side);
+    const wide = list => Math.max(0, ...list.map(([part]) => width(part.text, size(part.size, factor), part.is_bold)));
+    const left = atTop("left"), right = atTop("right");
+    if (!left.length || wide(left) + wide(right) < 0.93 * room) return;
+    const down = Math.max(...left.map(([part]) => size(part.size, factor) * HEIGHT * part.text.split("\n").length));
+    for (const [, found] of right) found.yshift -= down;
   }
 
   function scalesOf(d, arrangement, traces, look) {
@@ -655,7 +670,7 @@ const Pictures = (() => {
     };
     if (entry.area) add("rect", { x: 2, y: 1.5, width: 22, height: 9, fill: hue(entry.area.color), stroke: entry.area.edge ? hue(entry.area.edge) : "none" });
     if (entry.line && entry.line.dash) {
-      const pattern = { dash: "6 3", dot: "2 3", dashdot: "6 3 2 3" }[entry.line.dash] || "";
+      const pattern = entry.line.dash === "solid" ? "" : entry.line.dash;
       add("line", { x1: 0, x2: 26, y1: 6, y2: 6, stroke: hue(entry.line.color), "stroke-width": Math.max(1.4, entry.line.width), "stroke-dasharray": pattern });
     }
     if (entry.line && entry.line.mark) {
