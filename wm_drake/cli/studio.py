@@ -83,6 +83,7 @@ def _loopback(port: int) -> socket.socket:
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
         listening.bind(("127.0.0.1", port))
+        listening.listen()  # a page that comes at once waits until the server is ready
     except OSError as error:
         listening.close()
         raise input_error(f"{port}: {reason_of(error)}", where="--port") from None

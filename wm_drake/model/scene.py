@@ -329,9 +329,9 @@ class Scene:
                 best = self._smallest_of_pair(pair, direction, best, time[near], poses[near])
         return best
 
-    def pair_names(self) -> tuple[str, ...]:
+    def pair_names(self) -> list[str]:
         """Return the names of the pairs of shapes: one of the tub group, one of the housing."""
-        return self._names
+        return list(self._names)
 
     def contacts(self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray) -> FloatArray:
         """Return the smallest distance of each pair that touches over sampled poses.

@@ -76,14 +76,20 @@ Judgement of this project: the numbers of household and small commercial machine
 """
 
 
-def unusual_numbers(parameters: MachineParameters) -> list[Problem]:
+def unusual_numbers(
+    parameters: MachineParameters, keys: Iterable[str] | None = None
+) -> list[Problem]:
     """Return one problem for each number of a machine outside its usual range.
 
     Args:
         parameters: The machine.
+        keys: Key paths of the numbers to check, or of entries of them; all if None.
     """
     found = []
+    wanted = None if keys is None else {whole for k in keys for whole in (k, k.rpartition(".")[0])}
     for key, value, unit in quantities(parameters):
+        if wanted is not None and key not in wanted:
+            continue
         usual = usual_range(key)
         values = value if isinstance(value, tuple) else (value,)
         # rounding of a converted number must not count as outside

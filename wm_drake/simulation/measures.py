@@ -267,7 +267,9 @@ def largest_motion(record: Record, largest: int | None = None) -> tuple[FloatArr
     """
     largest = moment_of_largest_amplitude(record) if largest is None else largest
     middle = float(record.time[largest])
-    stretch = record.sel(time=slice(middle - REPLAY_SPAN / 2, middle + REPLAY_SPAN / 2))
+    tubes = [f"tube_{part}" for part in ("angle", "position", "extension") if "tube" in record.dims]
+    moving = record[["tub_angle", "tub_position", "drum_angle", *tubes]]
+    stretch = moving.sel(time=slice(middle - REPLAY_SPAN / 2, middle + REPLAY_SPAN / 2))
     period = (
         float(record.time[1] - record.time[0]) if record.sizes["time"] > 1 else 1.0 / REPLAY_RATE
     )

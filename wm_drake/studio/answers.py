@@ -16,9 +16,10 @@ from wm_drake.batch.runs import Runner, RunResult
 from wm_drake.batch.work_items import BatchKey, WorkItem
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import InputError
-from wm_drake.model.plausibility import unusual_values
+from wm_drake.model.plausibility import unusual_springs
 from wm_drake.model.scene import Gap
 from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.spin.figures import ORBIT_REVOLUTIONS, axis_path_mm, orbit_window
@@ -74,7 +75,8 @@ def answer(
         case = machine.case(state)
         turned = _turned(machine, case, keys[:LANES])
         batch_key, items = _batch(machine, [case, *(other for _, _, other in turned)])
-        warnings = unusual_values(items[0].numbers.setup)
+        setup = items[0].numbers.setup
+        warnings = [*unusual_numbers(setup.parameters, state.values), *unusual_springs(setup)]
     results = {run.number: run for run in runner.run(batch_key, items)}
     main = results[0]
     return {
@@ -115,10 +117,12 @@ def arrows(
 
 def influential_keys(machine: OpenMachine, state: State) -> list[str]:
     """Return the numbers that can change a run of a state: not the cabinet, no other load."""
-    own = f"loads.{state.load}."
+    own = f"loads.{state.load}." if not state.masses else "no load of the machine"
+    with machine.lock:
+        numbers = machine.numbers
     return [
         key
-        for key in machine.numbers
+        for key in numbers
         if not key.startswith(("cabinet.", "step", "profile.", "imperfections.phase_error"))
         and (not key.startswith("loads.") or key.startswith(own))
         and (state.gasket or not key.startswith("gasket."))
@@ -140,8 +144,10 @@ def _turned(machine: OpenMachine, case: Case, keys: Iterable[str]) -> list[tuple
                 parameters = machine.moved_by(case.parameters, key, step)
             except InputError:
                 continue
-            load = parameters.loads.get(case.name, case.load)
-            other = replace(case, parameters=parameters, profile=parameters.profile, load=load)
+            if key.startswith("loads."):  # the same machine: it needs no set-up of its own
+                other = replace(case, load=parameters.loads[case.name])
+            else:
+                other = replace(case, parameters=parameters, profile=parameters.profile)
             found.append((key, step, other))
             break
     return found
@@ -281,13 +287,16 @@ def _orbits(record: Record, largest: int) -> list[dict[str, Any]]:
 def _forces(record: Record) -> dict[str, Any]:
     """Return smallest and largest value in each time bin of gasket and mount forces. [N, N m]"""
     forces = {}
-    if "gasket" in record.bushing.values:
+    has_gasket = record.attrs["gasket"] == "yes"
+    if has_gasket:
         gasket = record.sel(bushing="gasket")
         for kind, letter in (("force", "F"), ("moment", "M")):
             for index, axis in enumerate("xyz"):
                 forces[f"gasket {letter}{axis}"] = gasket[f"bushing_{kind}"].values[:, index]
     size = np.linalg.norm(record.mount_force.values, axis=2)
     for index, name in enumerate(record.mount.values):
+        if name == "gasket" and not has_gasket:
+            continue
         forces[f"mount {name}"] = size[:, index]
     count = record.sizes["time"]
     begins = np.unique(np.linspace(0, count, min(BINS, count), endpoint=False).astype(int))

@@ -24,10 +24,6 @@ _HEADERS = (
 )
 
 
-class _TooLargeError(Exception):
-    pass
-
-
 class Guard:
     """An ASGI application in front of another one.
 
@@ -51,26 +47,13 @@ class Guard:
         if refusal is not None:
             await _refuse(refusal, scope, receive, send)
             return
+        body = await _body(receive)
+        if body is None:
+            await _refuse((413, "the body is too large"), scope, receive, send)
+            return
         path = scope["path"][1 + len(self._token) :] or "/"
         inner = {**scope, "path": path, "raw_path": path.encode(), "root_path": ""}
-        started = False
-
-        async def sent(message: Message) -> None:
-            nonlocal started
-            if message["type"] == "http.response.start":
-                started = True
-                given = {name for name, _ in message["headers"]}
-                message["headers"] = [
-                    *message["headers"],
-                    *(header for header in _HEADERS if header[0] not in given),
-                ]
-            await send(message)
-
-        try:
-            await self.app(inner, _counted(receive), sent)
-        except _TooLargeError:
-            if not started:
-                await _refuse((413, "the body is too large"), scope, receive, send)
+        await self.app(inner, _replayed(body, receive), _with_headers(send))
 
     def _refusal(self, scope: Scope) -> tuple[int, str] | None:
         """Return status and reason if a request is not let in."""
@@ -101,16 +84,40 @@ async def _refuse(refusal: tuple[int, str], scope: Scope, receive: Receive, send
     await PlainTextResponse(reason, status, headers)(scope, receive, send)
 
 
-def _counted(receive: Receive) -> Receive:
-    """Return `receive` that refuses a body that grows too large, whatever length was declared."""
-    total = 0
-
-    async def counted() -> Message:
-        nonlocal total
+async def _body(receive: Receive) -> bytes | None:
+    """Return the body of a request; None if it grows too large, whatever length was declared."""
+    body, more = b"", True
+    while more:
         message = await receive()
-        total += len(message.get("body", b""))
-        if total > LARGEST_BODY:
-            raise _TooLargeError
-        return message
+        body += message.get("body", b"")
+        more = message.get("more_body", False)
+        if len(body) > LARGEST_BODY:
+            return None
+    return body
 
-    return counted
+
+def _replayed(body: bytes, receive: Receive) -> Receive:
+    """Return a `receive` that gives a body that was read already, then all that follows."""
+    given = False
+
+    async def replayed() -> Message:
+        nonlocal given
+        if given:
+            return await receive()
+        given = True
+        return {"type": "http.request", "body": body, "more_body": False}
+
+    return replayed
+
+
+def _with_headers(send: Send) -> Send:
+    """Return a `send` that adds the headers that each response has."""
+
+    async def sent(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            given = {name for name, _ in message["headers"]}
+            added = [header for header in _HEADERS if header[0] not in given]
+            message["headers"] = [*message["headers"], *added]
+        await send(message)
+
+    return sent

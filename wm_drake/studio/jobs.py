@@ -22,7 +22,12 @@ from wm_drake.studio.saving import chosen, write_machine
 from wm_drake.studio.state import State
 
 OPTIONS = {
-    "gasket": {"--trials": "[0-9]{1,6}", "--design": "d-optimal|orthogonal", "--load": "[\\w-]+"},
+    "gasket": {
+        "--trials": "[0-9]{1,6}",
+        "--design": "d-optimal|orthogonal",
+        "--model": "main|main\\+2fi",
+        "--load": "[\\w-]+",
+    },
     "tolerance": {"--samples": "[0-9]{1,6}", "--sensitivity": "[0-9]{1,6}", "--subset": "[0-9]+"},
     "spin-cycle": {"--case": "[\\w-]+"},
 }

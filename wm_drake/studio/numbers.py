@@ -10,6 +10,7 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from wm_drake.errors import InputError, Problem
 from wm_drake.parameters import MachineParameters, quantities, source_of
 from wm_drake.parameters.allowed import AllowedRange, allowed_range
+from wm_drake.parameters.keys import is_index
 from wm_drake.parameters.plausibility import UsualRange, usual_range
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.units import Unit
@@ -19,6 +20,9 @@ NOT_MOVED = ("gravity",)
 
 ABOUT = {"mm": 50.0, "deg": 45.0}
 """Half width of the slider of a place or an angle, by display unit."""
+
+LAST = ("bodies.", "frames.", "cabinet.", "imperfections.", "step")
+"""Numbers that are listed behind all others."""
 
 VECTORS = ("position", "centre_of_mass", "angles")
 """Quantities whose three entries have the names x, y and z."""
@@ -66,15 +70,20 @@ class Number:
             raise InputError(Problem("", self.key, p.message) for p in found) from None
 
     def for_page(self) -> dict[str, Any]:
-        """Return the number as the page shows it."""
-        parents, _, name = self.key.rpartition(".")
+        """Return the number as the page shows it; `short` is unique enough for a narrow column."""
+        *parents, name = self.key.split(".")
         if self.is_entry:
-            parents, _, vector = parents.rpartition(".")
+            vector = parents.pop()
             name = f"{vector} {'xyz'[int(name)] if vector in VECTORS else int(name) + 1}"
+        parents = [f"no. {int(part) + 1}" if is_index(part) else part for part in parents]
+        label, last = name.replace("_", " "), " ".join(parents[-1:]).replace("_", " ")
+        if last.startswith("no. "):
+            last = f"{parents[-2].rstrip('s')} {last.removeprefix('no. ')}"
         return {
             "key": self.key,
-            "group": parents.replace(".", " · ").replace("_", " ") or "machine",
-            "label": name.replace("_", " "),
+            "group": " · ".join(parents).replace("_", " ") or "machine",
+            "label": label,
+            "short": f"{last} {label}".strip(),
             "unit": _plain(self.unit),
             "value": self.unit.from_si(self.value),
             "low": self.low,
@@ -101,7 +110,8 @@ def numbers_of(parameters: MachineParameters) -> dict[str, Number]:
     Args:
         parameters: The machine, with the values of the SDF that are to be moved too.
     """
-    return {number.key: number for number in _numbers(parameters)}
+    found = sorted(_numbers(parameters), key=lambda number: number.key.startswith(LAST))
+    return {number.key: number for number in found}
 
 
 def _numbers(parameters: MachineParameters) -> Iterator[Number]:

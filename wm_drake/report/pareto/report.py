@@ -65,8 +65,8 @@ def summary(front: ParetoFront) -> str:
     designs, count = front.designs, len(front.objectives)
     if not count:
         return f"None of {front.found.evaluations} designs meets all constraints."
-    goals = [g.given.quantity for g in designs.objectives]
-    text = f"{front.found.evaluations} designs give a front of {count} for {' and '.join(goals)}."
+    goals = listed([g.given.quantity for g in designs.objectives])
+    text = f"{front.found.evaluations} designs give a front of {count} for {goals}."
     parts = []
     number = front.chosen.get(COMPROMISE, next(iter(front.chosen.values())))
     for goal, value, own in zip(
@@ -75,7 +75,12 @@ def summary(front: ParetoFront) -> str:
         unit = goal.unit.shown.replace("*", " ")
         parts.append(f"{goal.given.quantity} {_text(value)} {unit} in place of {_text(own)} {unit}")
     name = "The compromise" if COMPROMISE in front.chosen else "The best design"
-    return f"{text} {name} has {' and '.join(parts)} of the machine itself."
+    return f"{text} {name} has {listed(parts)} of the machine itself."
+
+
+def listed(words: list[str]) -> str:
+    """Return words as a list in a sentence: a, b and c."""
+    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
 
 
 def _text(value: float) -> str:

@@ -3,11 +3,11 @@
 import {digits, draw, fixed} from './dom.js';
 
 const WIDTH = 400;
-const HEIGHT = 190;
-const LEFT = 42;
+const HEIGHT = 200;
+const LEFT = 46;
 const RIGHT = 6;
 const TOP = 20;
-const BOTTOM = 22;
+const BOTTOM = 24;
 
 /** Return round values between two ends. */
 export function ticks(low, high, count) {
@@ -120,12 +120,12 @@ export class BandPanel {
     for (const value of ticks(low, high, 4)) {
       const y = this.y(value).toFixed(1);
       parts.push(draw('path', {class: 'grid', d: `M${LEFT} ${y}H${WIDTH - RIGHT}`}));
-      parts.push(draw('text', {x: String(LEFT - 4), y: String(Number(y) + 4), 'text-anchor': 'end'}, digits(value, 3)));
+      parts.push(draw('text', {x: String(LEFT - 4), y: String(Number(y) + 5), 'text-anchor': 'end'}, digits(value, 3)));
     }
     const marks = ticks(this.time.low, this.time.high, 5);
     marks.forEach((value, index) => {
       const x = this.x(value);
-      const anchor = x > WIDTH - 25 ? 'end' : 'middle';
+      const anchor = x > WIDTH - 32 ? 'end' : 'middle';
       const text = index === marks.length - 1 ? `${digits(value, 3)} s` : digits(value, 3);
       parts.push(draw('text', {x: x.toFixed(1), y: String(HEIGHT - 7), 'text-anchor': anchor}, text));
     });
@@ -139,7 +139,7 @@ export class BandPanel {
     for (const value of measured) {
       inside.append(draw('path', {class: 'measured-line', d: `M${LEFT} ${this.y(value)}H${WIDTH - RIGHT}M${LEFT} ${this.y(-value)}H${WIDTH - RIGHT}`}));
     }
-    parts.push(inside, draw('text', {class: 'title', x: String(LEFT), y: '13'}, `${this.title}, ${this.unit}`));
+    parts.push(inside, draw('text', {class: 'title', x: String(LEFT), y: '14'}, `${this.title}, ${this.unit}`));
     this.over = draw('g');
     this.svg.replaceChildren(...parts, this.over);
   }
@@ -177,7 +177,7 @@ export class BandPanel {
     const text = `${fixed(time, 1)} s${speed}: ${digits(lower, 3)} to ${digits(upper, 3)}`;
     const parts = [
       draw('path', {class: 'cursor', d: `M${x} ${TOP}V${HEIGHT - BOTTOM}`}),
-      draw('text', {x: String(WIDTH - RIGHT), y: '13', 'text-anchor': 'end'}, text),
+      draw('text', {class: 'reading', x: String(WIDTH - RIGHT - 4), y: String(HEIGHT - BOTTOM - 6), 'text-anchor': 'end'}, text),
     ];
     if (begin !== null) {
       const from = this.x(begin);
@@ -197,19 +197,19 @@ export class OrbitPanel {
 
   show(now, ghost, limit) {
     const size = 300;
-    const at = (value, sign) => 0.5 * size + (sign * value * (0.5 * size - 26)) / limit;
+    const at = (value, sign) => 0.5 * size + (sign * value * (0.5 * size - 32)) / limit;
     const path = (orbit) => line(orbit.x.map((v) => at(v / 1000, 1)), orbit.z.map((v) => at(v / 1000, -1)));
     const parts = [];
     for (const value of ticks(-limit, limit, 4)) {
       const x = at(value, 1).toFixed(1);
       const y = at(value, -1).toFixed(1);
-      parts.push(draw('path', {class: 'grid', d: `M${x} 26V274M26 ${y}H274`}));
-      parts.push(draw('text', {x, y: '288', 'text-anchor': 'middle'}, digits(value, 3)));
-      parts.push(draw('text', {x: '23', y: String(Number(y) + 4), 'text-anchor': 'end'}, digits(value, 3)));
+      parts.push(draw('path', {class: 'grid', d: `M${x} 32V268M32 ${y}H268`}));
+      parts.push(draw('text', {x, y: '286', 'text-anchor': 'middle'}, digits(value, 3)));
+      parts.push(draw('text', {x: '29', y: String(Number(y) + 5), 'text-anchor': 'end'}, digits(value, 3)));
     }
     if (ghost) parts.push(draw('path', {class: 'ghost-line', d: path(ghost)}));
     parts.push(draw('path', {class: 'now-line', d: path(now)}));
-    parts.push(draw('text', {class: 'title', x: '26', y: '14'}, `${this.title}, x and z in mm`));
+    parts.push(draw('text', {class: 'title', x: '32', y: '16'}, `${this.title}, x and z in mm`));
     this.svg.replaceChildren(...parts);
   }
 }

@@ -305,7 +305,7 @@ function showProblems(problems, warnings = []) {
 
 function labelOf(key) {
   const number = list.rows.get(key)?.number;
-  return number ? {name: `${number.group} · ${number.label}`, unit: number.unit} : {name: key, unit: ''};
+  return number ? {name: number.short, unit: number.unit} : {name: key, unit: ''};
 }
 
 const nameOf = (key) => list.rows.get(key)?.number.label ?? key;

@@ -19,16 +19,16 @@ function arrow(change, largest, step) {
   if (change === null || change === undefined) return make('td', {class: 'none'}, '–');
   const share = largest > 0 ? Math.abs(change) / largest : 0;
   const count = share > 0.5 ? 3 : share > 0.15 ? 2 : share > 0.02 ? 1 : 0;
-  const glyph = count === 0 ? '·' : (change > 0 ? '▲' : '▼').repeat(count);
+  const glyph = make('span', {class: `size${count}`}, count === 0 ? '·' : change > 0 ? '▲' : '▼');
   const sign = change > 0 ? '+' : '';
-  return make('td', {class: count === 0 ? 'none' : change > 0 ? 'up' : 'down', title: `${sign}${digits(change, 3)} for +${step}`}, `${glyph} ${sign}${digits(change, 2)}`);
+  return make('td', {class: count === 0 ? 'none' : change > 0 ? 'up' : 'down', title: `${sign}${digits(change, 3)} for +${step}`}, glyph, ` ${sign}${digits(change, 2)}`);
 }
 
 export function showMeasures(table, answer, ghost, machine, label) {
   const measured = answer.measured;
   const head = make('tr', {},
     make('th', {}), make('th', {}, 'now'), make('th', {}, 'as it was'), make('th', {}, 'change'),
-    ...measured.map(({source}) => make('th', {class: 'turned'}, source)),
+    ...measured.map(({source}) => make('th', {class: 'source'}, source)),
     ...answer.arrows.map(({key, step}) => make('th', {class: 'turned', title: key}, `${label(key).name}, +${digits(step, 3)} ${label(key).unit}`)));
   const before = ghost ? rowsOf(ghost, machine) : [];
   const body = rowsOf(answer, machine).map((row, place) => {

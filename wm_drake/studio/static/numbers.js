@@ -38,7 +38,7 @@ export class NumberList {
     const warning = make('div', {class: 'warning', hidden: true});
     const element = make('div', {class: 'number', 'data-key': number.key},
       make('span', {class: 'label', title: number.source ? `${number.key}\n${number.source}` : number.key}, number.label),
-      text, back, slider, make('div', {class: 'range'}, `${number.unit ? `${number.unit} · ` : ''}${ranges}`), problem, warning);
+      slider, text, back, make('div', {class: 'range'}, `${number.unit ? `${number.unit} · ` : ''}${ranges}`), problem, warning);
     const row = {number, element, text, slider, problem, warning, low: number.low, high: number.high};
     const sliderText = () => {
       const value = row.low + ((row.high - row.low) * Number(slider.value)) / STEPS;

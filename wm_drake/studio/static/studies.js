@@ -4,7 +4,7 @@ import {byId, make} from './dom.js';
 import {get, post} from './server.js';
 
 const HINTS = {
-  '--trials': 'all', '--design': 'd-optimal', '--load': 'middle and counter', '--samples': '4096',
+  '--trials': 'all', '--design': 'd-optimal', '--model': 'main+2fi', '--load': 'middle and counter', '--samples': '4096',
   '--sensitivity': '512', '--subset': '1000', '--case': 'all',
 };
 const PERIOD = 1000;
@@ -24,7 +24,7 @@ export class Studies {
   choose() {
     const names = this.options[byId('study').value];
     byId('study-options').replaceChildren(...names.map((name) =>
-      make('label', {}, ` ${name.slice(2)} `, make('input', {size: 9, placeholder: HINTS[name] ?? '', 'data-option': name, autocomplete: 'off'}))));
+      make('label', {}, ` ${name.slice(2)} `, make('input', {size: Math.max(8, (HINTS[name] ?? '').length), placeholder: HINTS[name] ?? '', 'data-option': name, autocomplete: 'off'}))));
   }
 
   async start() {

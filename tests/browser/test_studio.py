@@ -1,0 +1,250 @@
+"""The studio in a real browser: move, see, err, undo, save, reload, compare, study."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from urllib.parse import unquote
+
+import pytest
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+STIFFNESS = "gasket.stiffness_x"
+UNBALANCE = "loads.middle.unbalances.0.mass"
+ROW = "[data-key='{}'] {}"
+CURVE = "return document.querySelector('#envelopes .now-area').getAttribute('d')"
+GHOST = "return document.querySelector('#envelopes .ghost-line')?.getAttribute('d')"
+XR = "return document.querySelector('#measures [data-row^=Xr] td.now')?.textContent"
+
+
+class Server:
+    """The command `wm-drake studio` as a process."""
+
+    def __init__(self, folder, *options):
+        command = [sys.executable, "-m", "wm_drake", "studio", "--no-browser", *options]
+        self.process = subprocess.Popen(
+            [*command, "--folder", str(folder)],
+            stdout=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"PYTHONUNBUFFERED": "1"},
+        )
+        self.address = re.search(r"http://\S+", self.process.stdout.readline())[0]
+
+    def end(self):
+        self.process.terminate()
+        self.process.wait(20)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("studio")
+
+
+@pytest.fixture(scope="module")
+def server(folder):
+    server = Server(folder)
+    yield server
+    server.end()
+
+
+@pytest.fixture
+def page(browser, server):
+    browser.open(server.address)
+    ready(browser)
+    yield browser
+    browser.open(server.address)  # a report has no storage to clear
+    browser.run("sessionStorage.clear()")
+
+
+def ready(browser):
+    browser.wait(XR, timeout=180.0)
+    browser.wait(GHOST, timeout=60.0)
+
+
+def typed(browser, key, text):
+    browser.run(
+        "document.querySelector(arguments[0]).closest('details').open = true",
+        ROW.format(key, ".text"),
+    )
+    field = browser.find(ROW.format(key, ".text"))
+    browser.run("arguments[0].scrollIntoView({block: 'center'})", field)
+    field.clear()
+    field.send_keys(text + "\n")
+
+
+def changed_from(browser, script, before):
+    return browser.wait(
+        f"const now = (() => {{ {script} }})(); return now !== arguments[0] && now", before
+    )
+
+
+def test_value_typed_with_a_unit_changes_curve_and_numbers(page):
+    curve, amplitude, ghost = page.run(CURVE), page.run(XR), page.run(GHOST)
+    typed(page, UNBALANCE, "700 g")
+    assert changed_from(page, CURVE, curve)
+    assert float(changed_from(page, XR, amplitude)) < 0.85 * float(amplitude)
+    assert page.run(GHOST) == ghost  # the machine as it was stays behind
+    assert (
+        page.run(
+            "return document.querySelector('#measures [data-row^=Xr]').children[2].textContent"
+        )
+        == amplitude
+    )
+    assert page.errors() == []
+
+
+def test_slider_moves_the_curve_and_ends_in_the_history(page):
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    curve = page.run(CURVE)
+    page.run(
+        "document.querySelector(arguments[0]).closest('details').open = true",
+        ROW.format(UNBALANCE, ""),
+    )
+    slider = page.find(ROW.format(UNBALANCE, "input[type=range]"))
+    page.run("arguments[0].scrollIntoView({block: 'center'})", slider)
+    ActionChains(page.driver).click_and_hold(slider).move_by_offset(40, 0).perform()
+    during = changed_from(page, CURVE, curve)
+    assert "kg" in page.run(
+        "return document.querySelector(arguments[0]).value", ROW.format(UNBALANCE, ".text")
+    )
+    ActionChains(page.driver).move_by_offset(30, 0).release().perform()
+    after = changed_from(page, CURVE, during)
+    assert page.wait("return document.querySelectorAll('#history li').length") == 2
+    page.find("#undo").click()
+    assert page.wait(f"return (() => {{ {CURVE} }})() === arguments[0]", curve)
+    page.find("#redo").click()
+    assert page.wait(f"return (() => {{ {CURVE} }})() === arguments[0]", after)
+    assert page.errors() == []
+
+
+def test_error_stands_at_its_value_and_the_curve_stays(page):
+    curve = page.run(CURVE)
+    typed(page, STIFFNESS, "3")
+    problem = "return document.querySelector(arguments[0]).textContent"
+    words = "'3' has no unit; write for example '1 N/mm'"
+    assert page.wait(
+        f"return (() => {{ {problem} }})() === arguments[1]",
+        ROW.format(STIFFNESS, ".problem"),
+        words,
+    )
+    assert page.run(CURVE) == curve
+    typed(page, STIFFNESS, "6 N/mm")
+    assert changed_from(page, CURVE, curve)
+    assert not page.find(ROW.format(STIFFNESS, ".problem")).is_displayed()
+    # the browser itself notes the status 422 of the refused request
+    assert [m for m in page.errors() if "422" not in m] == []
+
+
+def test_gasket_is_taken_out(page):
+    curve = page.run(CURVE)
+    page.find("#gasket").click()
+    assert changed_from(page, CURVE, curve)
+    names = "return [...document.querySelectorAll('#forces svg')].map((s) => s.ariaLabel).join()"
+    assert "gasket" not in page.run(names)
+    measured = "return [...document.querySelectorAll('#measures [data-row^=Xr] td')].map((s) => s.textContent)"
+    assert "23.6" in page.run(measured)  # [B] Table 1, without gasket
+
+
+def test_arrows_of_seven_numbers_stand_in_the_table(page):
+    columns = "return document.querySelectorAll('#measures th[title]').length === 7"
+    assert page.wait(columns, timeout=60.0)
+    shown = page.run("return document.querySelector('#measures tbody').textContent")
+    assert "▲" in shown
+    assert "▼" in shown
+
+
+def test_smallest_gap_is_drawn_and_the_tub_moves(page):
+    assert page.find(".gap-line").get_attribute("d")
+    tub = "return document.querySelector('#scene .tub').getAttribute('d')"
+    before = page.run(tub)
+    page.find("#play").click()
+    moved = changed_from(page, tub, before)
+    assert changed_from(page, tub, moved)
+    page.find("#play").click()
+
+
+def test_reload_link_and_save_lose_nothing(page, folder):
+    before = page.run(CURVE)
+    typed(page, UNBALANCE, "800 g")
+    curve = changed_from(page, CURVE, before)
+    page.find("#keep").click()
+    page.find("#save-name").send_keys("lighter")
+    page.find("#save").click()
+    assert (
+        page.wait("return document.querySelector('#save-result').textContent")
+        == "saved as lighter.yaml"
+    )
+    assert "0.8 kg" in (folder / "lighter.yaml").read_text()
+    link = page.driver.current_url
+    assert "800 g" in unquote(link)
+    page.driver.refresh()
+    ready(page)
+    assert page.wait(f"return (() => {{ {CURVE} }})() === arguments[0]", curve)
+    assert len(page.driver.find_elements("css selector", "#variants th .dot")) == 1
+    page.find("#save").click()
+    page.find("#save-name").send_keys("lighter")
+    page.find("#save").click()
+    page.wait("return !document.querySelector('#replace').hidden")
+    page.find("#replace").click()
+    page.wait(
+        "return document.querySelector('#save-result').textContent === 'saved as lighter.yaml'"
+    )
+    # another server, as after a kill: the link and the file are still good
+    other = Server(folder, "--link", link)
+    try:
+        page.open(other.address)
+        ready(page)
+        assert page.wait(f"return (() => {{ {CURVE} }})() === arguments[0]", curve)
+        assert page.find("#machine option[value='lighter.yaml']")
+    finally:
+        other.end()
+
+
+def test_hostile_machine_name_is_text(page, folder):
+    name = "<script>document.title='broken'</script><img src=x onerror=\"document.title='broken'\">"
+    (folder / "hostile.yaml").write_text(
+        f"extends: reference\nname: {json.dumps(name)}\nabout: {json.dumps(name)}\n"
+    )
+    page.driver.refresh()
+    ready(page)
+    page.run(
+        "const m = document.querySelector('#machine'); m.value = 'hostile.yaml'; m.dispatchEvent(new Event('change'))"
+    )
+    assert page.wait("return document.querySelector('#about').textContent.includes('<script>')")
+    page.wait(XR)
+    assert page.run("return document.title").startswith("<script>")
+    assert page.run("return document.querySelectorAll('#about *').length") == 0
+    assert page.errors() == []
+
+
+def test_study_shows_progress_and_its_report_opens(page):
+    page.wait("return document.querySelector('#study-options input')")
+    for option, text in {"--trials": "27", "--design": "orthogonal", "--model": "main"}.items():
+        page.find(f"[data-option='{option}']").send_keys(text)
+    page.find("#start").click()
+    page.wait("return document.querySelector('.study a')", timeout=240.0)
+    report = page.find(".study a").get_attribute("href")
+    page.open(report)
+    assert page.wait("return document.querySelector('h1')?.textContent")
+    assert page.errors() == []  # its scripts and styles run
+    # a report has no origin: it cannot reach the studio that serves it
+    reached = "return fetch('../../api/machines').then(() => 'reached', () => 'refused')"
+    assert page.run(reached) == "refused"
+
+
+@pytest.mark.parametrize("width", [800, 1400])
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_nothing_is_cut_off(page, width, dark):
+    page.size(width)
+    page.media(dark=dark)
+    page.wait("return document.querySelectorAll('#measures th[title]').length === 7", timeout=60.0)
+    wide = """
+      const scrolls = (e) => e && (getComputedStyle(e).overflowX === 'auto' || scrolls(e.parentElement));
+      return [...document.querySelectorAll('body, header, aside, main, section, h2, p, button, .number, .panels > svg')]
+        .filter((e) => e.scrollWidth > e.clientWidth + 1 && e.clientWidth > 0)
+        .map((e) => `${e.tagName} ${e.id} ${e.className} ${e.textContent.slice(0, 30)}`)"""
+    assert page.run(wide) == []
+    assert page.run("return document.documentElement.scrollWidth <= window.innerWidth")

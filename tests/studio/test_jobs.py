@@ -1,0 +1,102 @@
+"""Studies that a page starts: options, folders, processes, reports."""
+
+import json
+import sys
+import time
+
+import pytest
+
+from wm_drake.errors import InputError
+from wm_drake.studio import jobs as jobs_module
+from wm_drake.studio.jobs import Jobs
+from wm_drake.studio.machines import Machines
+from wm_drake.studio.state import State
+
+STATE = State(machine="reference", load="middle", values={"gasket.stiffness_x": "4 N/mm"})
+PROGRAM = """
+import sys, pathlib, time
+arguments = sys.argv[3:]
+print("runs: 3 of 40, 10 s", flush=True)
+if "--samples=16" in arguments:
+    time.sleep(60)
+pathlib.Path("results").mkdir()
+pathlib.Path("results/report.html").write_text("done")
+"""
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory):
+    machines = Machines("reference", tmp_path_factory.mktemp("machines"))
+    return machines, machines.open("reference")
+
+
+@pytest.fixture
+def jobs(tmp_path, monkeypatch):
+    """Return studies whose command is a small program that behaves like one."""
+    program = tmp_path / "program"
+    program.write_text(f"#!{sys.executable}\n{PROGRAM}")
+    program.chmod(0o755)
+    monkeypatch.setattr(jobs_module.sys, "executable", str(program))
+    found = Jobs(tmp_path / "studies")
+    yield found
+    found.end(timeout=5.0)
+
+
+def waited(jobs, identifier, wanted):
+    end = time.monotonic() + 20.0
+    while time.monotonic() < end:
+        shown = jobs.shown(identifier)
+        if shown["state"] == wanted and shown["progress"]:
+            return shown
+        time.sleep(0.05)
+    raise AssertionError(f"never {wanted}: {shown}")
+
+
+def test_study_runs_and_its_report_is_found(jobs, opened):
+    identifier = jobs.start(*opened, STATE, "gasket", {"--trials": "27"})
+    shown = waited(jobs, identifier, "finished")
+    assert shown["progress"] == (3, 40)
+    assert shown["command"].endswith("--machine machine.yaml --out results --trials=27")
+    assert jobs.report_file(identifier, "report.html").read_text() == "done"
+    machine = (jobs.folder / identifier / "machine.yaml").read_text()
+    assert "4 N/mm" in machine
+    # a later server finds it
+    assert [job["state"] for job in Jobs(jobs.folder).listed()] == ["finished"]
+
+
+def test_study_is_cancelled_and_continued(jobs, opened):
+    identifier = jobs.start(*opened, STATE, "tolerance", {"--samples": "16"})
+    waited(jobs, identifier, "running")
+    jobs.cancel(identifier)
+    waited(jobs, identifier, "not finished")
+    path = jobs.folder / identifier / "job.json"
+    about = json.loads(path.read_text())
+    path.write_text(json.dumps(about | {"command": about["command"][:-1]}))  # a shorter one
+    jobs.resume(identifier)
+    assert waited(jobs, identifier, "finished")["report"]
+
+
+@pytest.mark.parametrize(
+    ("study", "options"),
+    [
+        ("rm", {}),
+        ("gasket", {"--out": "/tmp/x"}),
+        ("gasket", {"--trials": "1; rm -rf /"}),
+        ("gasket", {"--load": "--machine=x"}),
+        ("tolerance", {"--samples": "-1"}),
+    ],
+)
+def test_hostile_study_is_not_started(jobs, opened, study, options):
+    with pytest.raises(InputError):
+        jobs.start(*opened, STATE, study, options)
+    assert not jobs.folder.exists()
+
+
+@pytest.mark.parametrize("name", ["../job.json", "../../x", "/etc/passwd", "missing.html", ""])
+def test_report_file_stays_in_the_results(jobs, opened, name):
+    identifier = jobs.start(*opened, STATE, "gasket", {})
+    waited(jobs, identifier, "finished")
+    with pytest.raises(InputError):
+        jobs.report_file(identifier, name)
+    with pytest.raises(InputError):
+        jobs.report_file("../" + identifier, "report.html")
