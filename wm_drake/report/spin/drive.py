@@ -49,8 +49,8 @@ def drive_view(result: SpinResult) -> DriveView:
     n = drive.belt_ratio
     about = (
         "A motor with a torque limit and a PI speed controller turns the drum by a belt of ratio "
-        f"{number(n)}. Torques are those at the drum; at the motor's shaft they are "
-        f"{number(n)} times smaller. None of the motor's numbers is published: see their sources "
+        f"{n:g}. Torques are those at the drum; at the motor's shaft they are "
+        f"{n:g} times smaller. None of the motor's numbers is published: see their sources "
         "in the table of parameters."
     )
     in_short = "A motor turns the drum; the spin profile is the speed that its controller wants."
