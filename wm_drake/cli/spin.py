@@ -133,6 +133,7 @@ def spin(
                 engine,
                 progress=progress,
                 comparison=compared_cases(measured, sets or ([drive] if drive else None)),
+                modes=True,
             )
         _write(result, folder, Pages(replay, detail))
     diverged = divergences(result)
