@@ -93,14 +93,42 @@ class EnergyBook:
         r_rate = np.array(
             [self._rotation_vector_rate(a, b) for a, b in zip(r, self.w, strict=True)]
         )
-        stored = sum(
+        branch_stored, branch_power = self._branches(
+            g, np.hstack([d, r]), np.hstack([d_rate, r_rate])
+        )
+        stored = branch_stored + sum(
             elastic_energy(getattr(g, f"stiffness_{axis}"), d[:, i]) for i, axis in enumerate("xyz")
         )
         stored += sum(
             elastic_energy(getattr(g, f"rotational_stiffness_{axis}"), r[:, i])
             for i, axis in enumerate("xyz")
         )
-        return stored, d_rate**2 @ c + r_rate**2 @ cr
+        return stored, d_rate**2 @ c + r_rate**2 @ cr + branch_power
+
+    def _branches(self, gasket, moved, rate):
+        """Return energy [J] and dissipated power [W] of cross-stiffness, friction and Maxwell branches."""
+        stored = 0.5 * np.einsum("ni,ij,nj->n", moved, gasket.cross_matrix(), moved)
+        power = np.zeros(len(moved))
+        for k, key in enumerate(gasket.stretched_branches):
+            z = self.record.branch_stretch.values[:, k]
+            axis = "xyz".index(key[-1]) + 3 * ("torque" in key or "rotational" in key)
+            other = getattr(
+                gasket,
+                key.replace("force", "displacement").replace("torque", "angle")
+                if key.startswith("dahl")
+                else key.replace("stiffness", "damping"),
+            )
+            number = getattr(gasket, key)
+            if key.startswith("dahl"):  # all that does not stretch the element is friction
+                stiffness = number / other
+                power = power + stiffness * z * np.abs(rate[:, axis]) * z / other
+            else:
+                stiffness = number
+                power = (
+                    power + (stiffness * z) ** 2 / other
+                )  # the dashpot carries the force of the spring
+            stored = stored + 0.5 * stiffness * z**2
+        return stored, power
 
     @staticmethod
     def _rotation_vector_rate(r, w):
@@ -180,12 +208,16 @@ def dense_record(machine, case, step):
     plant_context = setup.plant_context
     accelerations = machine.plant.get_generalized_acceleration_output_port()
     dampers = [damper.GetMyContextFromRoot(context) for damper in machine.dampers.values()]
-    time, state, deformation, torque, acceleration = [], [], [], [], []
+    bushings = [bushing.GetMyContextFromRoot(context) for bushing in machine.bushings.values()]
+    time, state, deformation, torque, acceleration, stretches = [], [], [], [], [], []
 
     def sample(alpha):
         time.append(context.get_time())
         state.append(machine.plant.GetPositionsAndVelocities(plant_context))
         deformation.append([c.get_continuous_state_vector().GetAtIndex(0) for c in dampers])
+        stretches.append(
+            np.concatenate([c.get_continuous_state_vector().CopyToVector() for c in bushings])
+        )
         rates = accelerations.Eval(plant_context).copy()
         torque.append(REFLECTED_INERTIA * (alpha - rates[6]))
         acceleration.append(rates[:6])
@@ -201,6 +233,9 @@ def dense_record(machine, case, step):
             sample(alpha)
     arrays = map(np.array, (time, state, deformation, torque, acceleration))
     trajectory = Trajectory(
-        *arrays, tubes=np.empty((len(time), 0, 14)), carrier=np.empty((len(time), 0))
+        *arrays,
+        tubes=np.empty((len(time), 0, 14)),
+        carrier=np.empty((len(time), 0)),
+        stretches=np.array(stretches).reshape(len(time), -1),
     )
     return setup, as_record(setup, case, trajectory)

@@ -1,5 +1,7 @@
 """Variants of the reference machine with each kind of element, for comparisons of both engines."""
 
+import pytest
+
 from wm_drake.parameters import MachineParameters, load_machine
 
 END_BUSHING = {
@@ -46,6 +48,23 @@ DAMPERS = {
 FRICTION = {f"friction_torque_{axis}": 0.5 for axis in "xyz"} | {
     f"full_friction_rate_{axis}": 1.5 for axis in "xyz"
 }
+RUBBER = {
+    "dahl_force_x": 20.0,
+    "dahl_displacement_x": 2e-3,
+    "dahl_force_y": 10.0,
+    "dahl_displacement_y": 5e-4,
+    "dahl_torque_z": 1.0,
+    "dahl_angle_z": 5e-3,
+    "maxwell_stiffness_x": 3e3,
+    "maxwell_damping_x": 60.0,
+    "maxwell_stiffness_z": 2e3,
+    "maxwell_damping_z": 30.0,
+    "rotational_maxwell_stiffness_y": 50.0,
+    "rotational_maxwell_damping_y": 2.0,
+    "cross_stiffness_x_y": 300.0,
+    "cross_stiffness_z_about_x": 20.0,
+    "rotational_cross_stiffness_x_y": 5.0,
+}  # N, m; N m, rad; N/m, N s/m; N m/rad, N m s/rad; N/m, N/rad, N m/rad
 TABLES = {f"stiffness_{axis}": LINEAR_TABLE for axis in "xyz"} | {
     f"rotational_stiffness_{axis}": TORQUE_TABLE for axis in "xyz"
 }
@@ -54,6 +73,14 @@ TABLES = {f"stiffness_{axis}": LINEAR_TABLE for axis in "xyz"} | {
 def changed(**parts):
     """Return the reference machine with some of its top-level parts replaced."""
     return MachineParameters.model_validate(load_machine("reference").model_dump() | parts)
+
+
+def names_of_each_kind():
+    """Return the names of all variants; those with code of their own to compile are slow."""
+    return [
+        pytest.param(name, marks=pytest.mark.slow) if "rubber" in name else name
+        for name in machines_of_each_kind()
+    ]
 
 
 def machines_of_each_kind():
@@ -111,4 +138,6 @@ def machines_of_each_kind():
             for name, damper in list(reference["dampers"].items())[:1]
         },
     )
+    rubber = reference["gasket"] | {"stiffness_x": LINEAR_TABLE} | FRICTION | RUBBER
+    machines["two bushings of rubber"] = changed(gasket=rubber, bushings={"rear": second | RUBBER})
     return machines

@@ -54,6 +54,7 @@ def page(browser, server):
     browser.open(server.address)
     ready(browser)
     yield browser
+    browser.open(server.address)  # a report has no storage to clear
     browser.run("sessionStorage.clear()")
 
 
@@ -228,6 +229,7 @@ def test_study_shows_progress_and_its_report_opens(page):
     report = page.find(".study a").get_attribute("href")
     page.open(report)
     assert page.wait("return document.querySelector('h1')?.textContent")
+    assert page.errors() == []  # its scripts and styles run
     # a report has no origin: it cannot reach the studio that serves it
     reached = "return fetch('../../api/machines').then(() => 'reached', () => 'refused')"
     assert page.run(reached) == "refused"

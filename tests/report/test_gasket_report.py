@@ -215,7 +215,7 @@ def test_factor_table_has_every_level_and_its_unit(trials, words):
 def test_page_is_whole(screening, trials):
     page = gasket_report(screening, trials, "wm-drake study gasket", 12.0)
     assert "load towel &amp; co" in page
-    assert page.count("<figure data-picture>") == 1 + 3 + 2 * 4
+    assert page.count("<figure data-picture>") == 1 + 3 + 2 * 5
     assert "<img" not in page
     for text in (
         "0.0095 N s/mm",

@@ -385,7 +385,8 @@ def test_readings_repeat_the_force_port_row_by_row(element):
         for kind in (SpringStrut, FrictionDamper, SixComponentBushing)
     ]
     forces = np.empty((len(states), 6 if element.kind is SixComponentBushing else 1))
-    output_history(states, sponges, np.empty(0), element.packed, *begins, forces)
+    relaxed = np.empty((len(states), 0))
+    output_history(states, sponges, relaxed, np.empty(0), element.packed, *begins, None, forces)
     for x, own, force in zip(states, sponges[:, : len(element.state)], forces, strict=True):
         assert np.array_equal(own_outputs(system, context_of(system, x, own)), force)
 

@@ -133,7 +133,11 @@ class Runner:
         p = self._lanes("packed", [item.packed for item in work_items])
         x = self._lanes("begin", [item.begin for item in work_items])
         samples = self._array("samples", rows * size)
-        for _ in integrate_runs(schedule, one_derivative, key.layout, p, x, samples):
+        relaxation = None
+        if key.stepping.integrator == "midpoint":
+            matrices = [item.numbers.stepping.relaxation for item in work_items]
+            relaxation = self._lanes("relaxation", matrices)
+        for _ in integrate_runs(schedule, one_derivative, key.layout, p, x, samples, relaxation):
             if self.stopped.is_set():
                 return []
         moved, extremes = self._array("moved", rows * count), self._array("extremes", count + 7)
@@ -144,6 +148,7 @@ class Runner:
             (LARGEST_ANGLE, LARGEST_DISPLACEMENT),
             p,
             key.layout.gasket,
+            key.layout.elements.branches,
             self._lanes("points", points),
             count,
             moved,

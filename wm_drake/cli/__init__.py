@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from wm_drake.cli import calibrate, identify, machine, record, rig, spin, studio, study
+from wm_drake.cli.figures import writes_pages
 from wm_drake.cli.terminal import give_quiet
 from wm_drake.errors import Problem, WmDrakeError, reason_of
 
@@ -25,8 +26,8 @@ app.add_typer(machine.app, name="machine")
 app.add_typer(record.app, name="record")
 app.add_typer(rig.app, name="rig")
 app.add_typer(study.app, name="study")
-app.command()(spin.spin)
-app.command()(calibrate.calibrate)
+app.command()(writes_pages(spin.spin))
+app.command()(writes_pages(calibrate.calibrate))
 app.command()(studio.studio)
 give_quiet(app)
 

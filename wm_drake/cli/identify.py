@@ -29,6 +29,7 @@ from wm_drake.cli.components import (
     quantities_of,
     target_of,
 )
+from wm_drake.cli.figures import writes_pages
 from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.table2 import identify_table2
@@ -141,6 +142,7 @@ class _Asked:
 
 
 @app.command("damper", cls=ValidatingCommand)
+@writes_pages
 def identify_damper(
     files: FilesArgument,
     law: Annotated[
@@ -263,14 +265,14 @@ def _axis_command(kind: str) -> Callable[..., None]:
 
 
 app.command("bushing", cls=ValidatingCommand, help="One axis of a six-component bushing.")(
-    _axis_command("bushing")
+    writes_pages(_axis_command("bushing"))
 )
 app.command("gasket", cls=ValidatingCommand, help="One axis of the gasket.")(
-    _axis_command("gasket")
+    writes_pages(_axis_command("gasket"))
 )
 
 
-app.command("table2")(identify_table2)
+app.command("table2")(writes_pages(identify_table2))
 
 
 def _copies(model: "ComponentModel", axes: tuple[str, ...]) -> dict[str, str]:

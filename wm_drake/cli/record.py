@@ -14,6 +14,7 @@ from wm_drake.cli.common import (
     existing_file,
     interruptible,
 )
+from wm_drake.cli.figures import writes_pages
 from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.terminal import say
 
@@ -31,6 +32,7 @@ def _group() -> None:
 
 
 @app.command("orders")
+@writes_pages
 def record_orders(
     file: Annotated[
         Path,

@@ -14,6 +14,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,9 @@ LEDGER = "ledger.sqlite"
 
 SUFFIX = ".partial"
 """End of the name of a temporary folder."""
+
+FIGURES: ContextVar[Path | None] = ContextVar("figures", default=None)
+"""Folder of `--figures` for the running command."""
 
 TRIES = 5
 """Number of temporary folders that are tried."""
@@ -118,6 +122,8 @@ def prepare_folder(out: Path, run: Run) -> None:
         InputError: the run must not write to `out`, or `out` cannot be written to.
     """
     check_folder(out, run)
+    if (of_figures := FIGURES.get()) is not None:
+        check_folder(of_figures, _run_of_figures(of_figures, out, run))
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -126,6 +132,35 @@ def prepare_folder(out: Path, run: Run) -> None:
 
 @contextmanager
 def result_folder(out: Path, run: Run, kept: str = "") -> Iterator[Path]:
+    """Yield a temporary folder for results and, with `--figures`, write the pictures of its pages.
+
+    Args, Raises: as `one_folder`.
+    """
+    of_figures = FIGURES.get()
+    if of_figures is None:
+        with one_folder(out, run, kept) as folder:
+            yield folder
+        return
+    from wm_drake.report.publication import collected, write_figures
+
+    with (
+        one_folder(of_figures, _run_of_figures(of_figures, out, run), kept) as drawn,
+        one_folder(out, run, kept) as folder,
+    ):
+        with collected() as figures:
+            yield folder
+        write_figures(figures, drawn)
+
+
+def _run_of_figures(folder: Path, out: Path, run: Run) -> Run:
+    """Return the run that writes pictures; raise an InputError if their folder is that of `out`."""
+    if folder.resolve() == out.resolve():
+        raise input_error("must be another folder than --out", where="--figures")
+    return Run(f"{run.command} --figures", run.overwrite, run.identity)
+
+
+@contextmanager
+def one_folder(out: Path, run: Run, kept: str = "") -> Iterator[Path]:
     """Yield a temporary folder beside `out`, and move its files to `out` if the block succeeds.
 
     If the block fails, `out` keeps its earlier files. If it succeeds, the files of the earlier run

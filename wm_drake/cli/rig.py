@@ -26,6 +26,7 @@ from wm_drake.cli.components import (
     quantities_of,
     target_of,
 )
+from wm_drake.cli.figures import writes_pages
 from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.terminal import Console, say
@@ -64,6 +65,7 @@ MatrixOption = Annotated[
 
 
 @app.command("damper", cls=DamperCommand)
+@writes_pages
 def rig_damper(
     frequency: FrequencyOption = None,
     amplitude: AmplitudeOption = None,
@@ -155,8 +157,10 @@ def _axis_command(kind: str) -> Callable[..., None]:
     return rig_axis
 
 
-app.command("bushing", help="One axis of a six-component bushing.")(_axis_command("bushing"))
-app.command("gasket", help="One axis of the gasket.")(_axis_command("gasket"))
+app.command("bushing", help="One axis of a six-component bushing.")(
+    writes_pages(_axis_command("bushing"))
+)
+app.command("gasket", help="One axis of the gasket.")(writes_pages(_axis_command("gasket")))
 
 
 def _motions(

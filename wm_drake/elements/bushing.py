@@ -76,6 +76,11 @@ class SixComponentBushingParameters:
         return BUSHING_LAW.structure(self.packed_law)
 
     @property
+    def state_size(self) -> int:
+        """Number of own states: none without branches of rubber."""
+        return 0
+
+    @property
     def damping(self) -> FloatArray:
         """Damping along x, y, z and about them (6,). [N s/m, N m s/rad]"""
         return np.array(self._by_axis("damping"))

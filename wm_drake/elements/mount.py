@@ -14,19 +14,22 @@ from wm_drake.elements.friction_damper import (
     friction_damper_wrench,
 )
 from wm_drake.elements.motion import motion_at, read_tree_state, tub_motion
+from wm_drake.elements.rubber import bushing_wrench
 from wm_drake.elements.spring import spring_strut_wrench
 from wm_drake.elements.telescopic_damper import inner_tube_motion, read_telescopic_damper
 
 WRENCH_SIZE = 6
 """Numbers of the wrench of a mount: moment about the origin of W, then force, in W. [N m, N]"""
 
-Mounts = namedtuple("Mounts", ("springs", "dampers", "bushings", "telescopes", "sponges", "tubes"))
+Mounts = namedtuple(
+    "Mounts", ("springs", "dampers", "bushings", "telescopes", "sponges", "tubes", "branches")
+)
 """Indices at which the mounts of a machine begin.
 
 springs, dampers, bushings: arrays of indices of the elements in the packed numbers; telescopes: the
 same for the numbers of `TELESCOPIC_DAMPER`, None if there are none; sponges: index of the first
 deformation in the state; tubes: indices of the states of the tubes in the state, None if there are
-none.
+none; branches: `Branches` of rubber bushings, None without them.
 """
 
 
@@ -79,7 +82,8 @@ def write_mount_wrenches(x, p, mounts, wrenches):
     The order is that of `Mounts`: springs, dampers, bushings, telescopic dampers.
 
     Args:
-        x: State: `TREE_STATE` of tub and drum, deformations of the dampers, states of the tubes.
+        x: State: `TREE_STATE` of tub and drum, deformations of the dampers, states of the tubes;
+            stretches of rubber bushings.
         p: Packed numbers.
         mounts: `Mounts`.
         wrenches: Written: `WRENCH_SIZE` numbers for each mount.
@@ -95,7 +99,7 @@ def write_mount_wrenches(x, p, mounts, wrenches):
         wrench = friction_damper_wrench(motion, arm, line, tension, p, at)
         column = write_wrench(wrenches, column, reaction_on_cabinet(motion.position, wrench))
     for at in mounts.bushings:
-        wrench, _ = six_component_bushing_wrench(motion, p, at)
+        wrench, _ = bushing_wrench(motion, p, at, x, mounts.branches)
         column = write_wrench(wrenches, column, reaction_on_cabinet(motion.position, wrench))
     _write_telescopic_dampers(x, p, mounts.telescopes, mounts.tubes, wrenches, column)
 

@@ -132,6 +132,13 @@ class _Samples:
             for column, damper in enumerate(dampers.values())
             if damper.state_size
         ]
+        self._branches = [
+            (bushing, bushing.GetMyContextFromRoot(setup.context))
+            for bushing in self._machine.bushings.values()
+            if bushing.state_size
+        ]
+        stretches = sum(bushing.state_size for bushing, _ in self._branches)
+        self._stretches = np.zeros((len(time), stretches))
         self._plant_context = setup.plant_context
         self._torque = self._machine.outputs["motor_torque"]
         self._torque_context = self._torque.get_system().GetMyContextFromRoot(setup.context)
@@ -157,6 +164,10 @@ class _Samples:
         self._rate[row] = plant.get_generalized_acceleration_output_port().Eval(self._plant_context)
         for column, damper, context in self._sponges:
             self._deformation[row, column] = damper.GetOutputPort("state").Eval(context)[0]
+        if self._branches:
+            self._stretches[row] = np.concatenate(
+                [bush.GetOutputPort("state").Eval(context) for bush, context in self._branches]
+            )
         self._motor_torque[row] = self._torque.Eval(self._torque_context)[0]
         feet = self._machine.feet
         if feet is not None:
@@ -187,5 +198,5 @@ class _Samples:
                 carrier, _ = seen_from_cabinet(*in_world, carrier, self._rate[:, layout.carrier])
             moving = np.column_stack([cabinet, self._slips])
         found = self.time, state, self._deformation, self._motor_torque, of_tub, tubes, carrier
-        trajectory = Trajectory(*found, cabinet=moving)
+        trajectory = Trajectory(*found, self._stretches, cabinet=moving)
         return cut_at_divergence(trajectory, failure)

@@ -51,6 +51,8 @@ class Trajectory:
             damper, in the order of `state`: outer tube for the tub, extension for the drum angle.
         carrier: (n, 12) Positions and velocities of the drum carrier, in the order of those of the
             tub in `state`; (n, 0) with a rigid bearing.
+        stretches: (n, branches) Stretch of each branch of rubber bushings in use, (n, 0) without
+            them. [m or rad]
         divergence: None if the run reached the end of its profile.
         cabinet: (n, 20) Positions and velocities in W of a cabinet that moves, in the order of
             those of the tub in `state`, then how far each foot has slid, x and y [m]; None for a
@@ -64,6 +66,7 @@ class Trajectory:
     acceleration: FloatArray
     tubes: FloatArray
     carrier: FloatArray
+    stretches: FloatArray
     divergence: Divergence | None = None
     cabinet: FloatArray | None = None
 
@@ -98,6 +101,7 @@ def _cut(trajectory: Trajectory, length: int, divergence: Divergence) -> Traject
         trajectory.acceleration[:length],
         trajectory.tubes[:length],
         trajectory.carrier[:length],
+        trajectory.stretches[:length],
         divergence,
         None if trajectory.cabinet is None else trajectory.cabinet[:length],
     )

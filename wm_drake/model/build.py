@@ -10,6 +10,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from wm_drake.elements.cabinet import FEET_SIZE
 from wm_drake.elements.motor import packed_controller, packed_friction, packed_limit
+from wm_drake.elements.rubber import RubberBushingParameters
 from wm_drake.model.bodies import add_bodies
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.machine import Machine, MachineSystems, MotorSystems
@@ -70,7 +71,12 @@ def add_washing_machine(
         key: FrictionDamper(damper.packed(), int(damper.has_sponge))
         for key, damper in placed.dampers.items()
     }
-    bushings = {key: SixComponentBushing(bush.packed()) for key, bush in placed.bushings.items()}
+    bushings = {
+        key: SixComponentBushing(
+            bush.packed(), isinstance(bush, RubberBushingParameters), bush.state_size
+        )
+        for key, bush in placed.bushings.items()
+    }
     telescopes = {
         key: TelescopicDamper(telescope.packed(), int(telescope.has_sponge))
         for key, telescope in placed.telescopes.items()

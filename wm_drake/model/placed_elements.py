@@ -17,6 +17,12 @@ from wm_drake.elements.bushing import (
 from wm_drake.elements.damper_law import packed_damper_law
 from wm_drake.elements.friction_damper import FrictionDamperParameters, evaluate_friction_damper
 from wm_drake.elements.layouts import packed_stiffness
+from wm_drake.elements.rubber import (
+    MOST_STATES,
+    RubberBushingParameters,
+    evaluate_rubber_bushing,
+    placed_bushing,
+)
 from wm_drake.elements.spring import SpringStrutParameters, evaluate_spring_strut
 from wm_drake.elements.telescopic_damper import (
     FORCE_SIZE,
@@ -76,7 +82,8 @@ class PlacedElements:
         for damper in self.dampers.values():
             yield damper, evaluate_friction_damper, 0
         for bushing in self.bushings.values():
-            yield bushing, evaluate_six_component_bushing, 0
+            rubber = isinstance(bushing, RubberBushingParameters)
+            yield bushing, evaluate_rubber_bushing if rubber else evaluate_six_component_bushing, 0
         for tree, telescope in enumerate(self.telescopes.values(), start=1):
             yield telescope, evaluate_telescopic_damper, tree
         if self.bearing:
@@ -86,8 +93,8 @@ class PlacedElements:
 class AppliedForce:
     """Generalized force of placed elements on the plant, computed without a diagram.
 
-    The sponges of dampers are relaxed. The diagram of the machine applies the same laws to the same
-    packed numbers.
+    The sponges of dampers and the branches of bushings are relaxed. The diagram of the machine
+    applies the same laws to the same packed numbers.
     """
 
     def __init__(self, elements: PlacedElements, state_layout: StateLayout) -> None:
@@ -108,11 +115,11 @@ class AppliedForce:
 
     def __call__(self, state: FloatArray) -> FloatArray:
         """Return the generalized force (n,) at a state (2 n,) of the plant. [N m, N]"""
-        total, sponge = np.zeros(self._size), np.zeros(1)
-        own, rate = np.empty(LARGEST_OWN_SIZE), np.empty(1)
+        total, relaxed = np.zeros(self._size), np.zeros(MOST_STATES)
+        own, rate = np.empty(LARGEST_OWN_SIZE), np.empty(MOST_STATES)
         for evaluate, of_state, of_force, packed in self._calls:
             force = np.empty(len(of_force))
-            evaluate(np.ascontiguousarray(state[of_state]), sponge, packed, force, own, rate)
+            evaluate(np.ascontiguousarray(state[of_state]), relaxed, packed, force, own, rate)
             np.add.at(total, of_force, force)
         return total
 
@@ -191,12 +198,8 @@ def _bushings(
     """Place the bushings between tub and housing, the gasket among them."""
     placed = {}
     for name, bushing in parameters.all_bushings().items():
-        tub_point, housing_point = _ends(poses, bushing)
-        r_tub = poses("tub", bushing.tub_frame)[1]
-        r_housing = poses("world", bushing.housing_frame)[1]
-        placed[name] = SixComponentBushingParameters(
-            tub_point, r_tub, housing_point, r_housing, packed_bushing_law(bushing)
-        )
+        ends = poses("tub", bushing.tub_frame), poses("world", bushing.housing_frame)
+        placed[name] = placed_bushing(bushing, *ends)
     return placed
 
 

@@ -34,6 +34,20 @@ def check_same_elements(built: MachineParameters, wanted: MachineParameters) -> 
             key="cabinet.moves",
         )
     _check_laws(built, wanted)
+    _check_branches(built, wanted)
+
+
+def _check_branches(built: MachineParameters, wanted: MachineParameters) -> None:
+    """Raise InputError if a bushing uses other branches of rubber."""
+    others = built.all_bushings()
+    for name, bushing in wanted.all_bushings().items():
+        if bushing.branches_in_use != others[name].branches_in_use:
+            now, before = (", ".join(b.branches_in_use) or "none" for b in (bushing, others[name]))
+            raise input_error(
+                f"uses other branches of rubber ({now}) than the built machine ({before}); "
+                "rebuild the machine",
+                key=name if name == "gasket" else f"bushings.{name}",
+            )
 
 
 def _check_drive(built: MachineParameters, wanted: MachineParameters) -> None:

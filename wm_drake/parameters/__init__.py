@@ -36,10 +36,12 @@ from wm_drake.parameters.factors import (
     Factor,
     FactorLevels,
     at_levels,
+    at_places,
     factor_of_text,
     levels_of,
     load_factors,
     nominal_stiffness,
+    place_of,
 )
 from wm_drake.parameters.files import (
     load_load,
@@ -104,6 +106,7 @@ __all__ = [
     "TorqueTable",
     "Unbalance",
     "at_levels",
+    "at_places",
     "factor_of_text",
     "levels_of",
     "load_component",
@@ -117,6 +120,7 @@ __all__ = [
     "machine_yaml",
     "measured_amplitudes",
     "nominal_stiffness",
+    "place_of",
     "published_results",
     "quantities",
     "read_loop",

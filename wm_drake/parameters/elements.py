@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_val
 from scipy.interpolate import PchipInterpolator
 
 from wm_drake.parameters import units as u
+from wm_drake.parameters.rubber import RubberBranches
 from wm_drake.parameters.types import FloatArray
 
 
@@ -211,7 +212,11 @@ class BushingType(Frozen):
     full_friction_rate_z: PositiveRate = 1.0
 
 
-class Bushing(BushingType):
+class RubberBushingType(RubberBranches, BushingType):
+    """A six-component bushing of rubber: the branches are beside spring and dashpot."""
+
+
+class Bushing(RubberBushingType):
     """A six-component bushing in its place, such as the gasket of [B] Fig. 4.
 
     Its stiffness acts along the axes of the housing-side frame.

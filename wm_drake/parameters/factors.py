@@ -174,6 +174,60 @@ def at_levels(
     )
 
 
+def at_places(
+    parameters: MachineParameters, factors: Sequence[FactorLevels], places: Sequence[float]
+) -> MachineParameters:
+    """Return the machine with each factor at a place from -1 to 1, on or between its levels.
+
+    Numbers are interpolated linearly between two levels. The forces of a table follow its
+    stiffness.
+
+    Args:
+        parameters: The machine.
+        factors: Factors with their levels for this machine.
+        places: One place for each factor.
+    """
+    changes: dict[str, Any] = {}
+    for factor, place in zip(factors, places, strict=True):
+        for key, middle in factor.settings[1].items():
+            if isinstance(middle, ForceTable | TorqueTable):
+                numbers = factor.numbers[key]
+                changes[key] = scaled_table(middle, _between(place, numbers) / numbers[1])
+            else:
+                changes[key] = _between(place, [float(s[key]) for s in factor.settings])  # type: ignore[arg-type]
+    return with_values(parameters, changes)
+
+
+def _between(place: float, values: Sequence[float]) -> float:
+    return float(np.interp(place, (-1.0, 0.0, 1.0), values))
+
+
+def place_of(parameters: MachineParameters, factor: FactorLevels, text: str) -> float:
+    """Return the place from -1 to 1 of a value of a factor.
+
+    Args:
+        parameters: The machine whose levels the factor has.
+        factor: The factor.
+        text: Value of its first key with a unit, or in percent of the machine's number.
+
+    Raises:
+        InputError: the text is not a value of this key, or is outside the range of the factor.
+    """
+    key, numbers = next(iter(factor.numbers.items()))
+    known = {k: (value, unit) for k, value, unit in quantities(parameters)}
+    number, unit = nominal_at(parameters, known, key)
+    value = _bound(parameters, key, text, number)
+    shown = value if unit is None else unit.from_si(value)
+    slack = 1e-9 * (numbers[2] - numbers[0])
+    if not numbers[0] - slack <= shown <= numbers[2] + slack:
+        raise input_error(
+            f"'{text}' is outside the range of factor {factor.name}, "
+            f"{factor.shown[0]} to {factor.shown[2]}",
+            key=key,
+        )
+    return float(np.interp(shown, numbers, (-1.0, 0.0, 1.0)))
+
+
 def nominal_stiffness(table: ForceTable | TorqueTable) -> float:
     """Return the nominal stiffness of a table. [N/m or N m/rad]
 

@@ -203,12 +203,12 @@ def _attributes(docstring: str) -> dict[str, str]:
     found: dict[str, str] = {}
     names: list[str] = []
     for line in section.splitlines():
-        entry = re.match(r"^ {8}([\w, ]+?): (.*)$", line)
+        entry = re.match(r"^ {8}(\w[\w, ]*?):( .*)?$", line)
         if entry:
             names = [name.strip() for name in entry[1].split(",")]
-            found |= dict.fromkeys(names, entry[2].strip())
+            found |= dict.fromkeys(names, (entry[2] or "").strip())
         elif line.startswith(" " * 12):
-            found |= {name: f"{found[name]} {line.strip()}" for name in names}
+            found |= {name: f"{found[name]} {line.strip()}".strip() for name in names}
         elif line.strip():
             break
     # a unit at the end is that of the stored value, not that of the file

@@ -459,7 +459,12 @@ def _areas(areas: Any) -> Iterator[Description]:
     shades = [faces[i % len(faces)] for i in range(len(paths))]
     for shade in dict.fromkeys(map(tuple, shades)):
         own = [p for p, s in zip(paths, shades, strict=True) if tuple(s) == shade]
-        yield _area(own, _hex(shade), float(shade[3])) | {"label": _label(areas)}
+        part = _area(own, _hex(shade), float(shade[3])) | {"label": _label(areas)}
+        width, edges = float(areas.get_linewidth()[0]), areas.get_edgecolor()
+        if width and len(edges):
+            part["edge"] = {"color": _color(edges[0], areas), "width": width}
+            part["keys"] = [*part["keys"], f"line {_hex(edges[0])} solid"]
+        yield part
 
 
 def _area(paths: Sequence[Any], color: str, alpha: float) -> Description:

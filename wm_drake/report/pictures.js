@@ -128,13 +128,20 @@ const Pictures = (() => {
     return { px, texts, angle: -90, height: longest + 9 };
   }
 
-  function upTicks(axis, room, factor) {
+  /* Texts of the ticks upwards: in lines as long as needed, so that they lie above each other. */
+  function upTicks(axis, room, height, factor) {
     const px = size(axis.tick_size, factor);
     if (!axis.is_labelled || (axis.ticks && !axis.ticks.length)) return { px, width: 0 };
-    const most = Math.max(90, 0.32 * room);
-    const texts = axis.ticks ? axis.ticks.map(([, text]) => wrapped(text, px, most)) : null;
-    const all = texts ? texts.flat() : likelyTexts(axis);
-    return { px, texts, width: Math.max(0, ...all.map(text => width(text, px))) + 8 };
+    if (!axis.ticks) return { px, width: Math.max(0, ...likelyTexts(axis).map(text => width(text, px))) + 8 };
+    const span = Math.abs(axis.range[1] - axis.range[0]) || 1;
+    const places = axis.ticks.map(([place]) => place).sort((u, v) => u - v);
+    const cell = Math.min(height, ...places.slice(1).map((place, i) => height * (place - places[i]) / span));
+    let texts;
+    for (const part of [0.32, 0.45, 0.55]) {
+      texts = axis.ticks.map(([, text]) => wrapped(text, px, Math.max(90, part * room)));
+      if (Math.max(...texts.map(t => t.length)) * px * HEIGHT <= cell) break;
+    }
+    return { px, texts, width: Math.max(0, ...texts.flat().map(text => width(text, px))) + 8 };
   }
 
   /* Room that a panel needs outside its axes. [px] */
@@ -142,7 +149,7 @@ const Pictures = (() => {
     const need = { left: 0, right: 4, top: 6, bottom: 4 };
     const x = { ...panel.x, is_labelled: panel.x.is_labelled || (isSolo && panel.x.ticks === null) };
     const y = { ...panel.y, is_labelled: panel.y.is_labelled || (isSolo && panel.y.ticks === null) };
-    need.upTicks = upTicks(y, room, factor);
+    need.upTicks = upTicks(y, room, height, factor);
     const label = size(y.label_size, factor);
     need.upLabel = y.label ? wrapped(y.label, label, Math.max(60, height)) : [];
     need.left = need.upTicks.width + (need.upLabel.length ? need.upLabel.length * label * HEIGHT + 6 : 0);
@@ -167,7 +174,7 @@ const Pictures = (() => {
       return { ...title, px, texts };
     });
     if (twin) {
-      const ticks = upTicks(twin.y, room, factor);
+      const ticks = upTicks(twin.y, room, height, factor);
       const far = size(twin.y.label_size, factor);
       need.right += ticks.width + (twin.y.label ? far * HEIGHT + 6 : 0);
     }
@@ -523,7 +530,7 @@ const Pictures = (() => {
       if (place.twin) {
         const other = { x: names.x, y: `y${200 + k}` }, axis = place.twin.panel.y;
         layout[`yaxis${200 + k}`] = {
-          ...plainAxis(axis, place.twin.panel, look), overlaying: names.y, side: "right", anchor: names.x,
+          ...plainAxis(axis, place.twin.panel, look), overlaying: names.y, side: "right", anchor: names.x, tickmode: "auto", nticks: Math.max(3, Math.round((place.y1 - place.y0) / 34)),
           showgrid: false, showline: true,
           tickfont: { size: size(axis.tick_size, factor), color: look.quiet },
           title: { text: escaped(axis.label), standoff: 5, font: { size: size(axis.label_size, factor), color: hue(axis.color) } },
@@ -787,12 +794,13 @@ const Pictures = (() => {
     document.documentElement.dataset.pictures = "ready";
   }
 
-  begin().catch(error => {
+  const started = begin();
+  started.catch(error => {
     for (const figure of figures()) figure.querySelector(".plot").textContent = `This picture needs a newer browser: ${error.message}`;
   });
 
   return {
-    draw: show, all: () => figures().forEach(show), hue, theme, escaped, short, niceStep, font: FONT, isDark,
+    draw: show, all: () => figures().forEach(show), hue, theme, escaped, short, niceStep, font: FONT, isDark, started,
     library: () => plotly, ready: () => plotly !== null,
   };
 })();

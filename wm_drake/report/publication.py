@@ -98,6 +98,7 @@ def _pdf(figure: Figure) -> bytes:
     file = pdf.PdfFile(buffer, metadata=metadata)
     try:
         file.newPage(scale * width, scale * height)
+        file.width, file.height = width, height  # paths are cut here, before they are scaled
         file.output(scale, 0, 0, scale, 0, 0, pdf.Op.concat_matrix)
         figure.dpi = 72  # points of a PDF
         vectors = pdf.RendererPdf(file, dpi, height, width)

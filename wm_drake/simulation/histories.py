@@ -6,9 +6,9 @@ from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, where
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.compiler.vectors import add, rotate, rotation_from_rpy
-from wm_drake.elements.bushing import six_component_bushing_wrench
 from wm_drake.elements.friction_damper import friction_damper_force
 from wm_drake.elements.motion import PLANT_STATE_SIZE, read_pose, tub_motion
+from wm_drake.elements.rubber import bushing_wrench
 from wm_drake.elements.sensor import POINT_SIZE, displacement_at
 from wm_drake.elements.spring import spring_strut_wrench
 
@@ -37,7 +37,9 @@ def position_history(samples, points, positions):
 
 
 @long_running
-def output_history(state, deformation, points, p, springs, dampers, bushings, outputs):
+def output_history(
+    state, deformation, stretches, points, p, springs, dampers, bushings, branches, outputs
+):
     """Evaluate displacements at points and forces of springs, dampers and bushings at each sample.
 
     The forces are those of the elements' ports in Drake, from the same functions.
@@ -45,9 +47,11 @@ def output_history(state, deformation, points, p, springs, dampers, bushings, ou
     Args:
         state: (n, 14) states of the plant.
         deformation: (n, >= dampers) deformations of the dampers' sponges. [m]
+        stretches: (n, branches) stretches of rubber bushings. [m or rad]
         points: Measured points, one after the other (`POINT_SIZE` numbers each).
         p: Packed numbers of springs, dampers and bushings.
         springs, dampers, bushings: Arrays of the indices of the elements in them.
+        branches: `Branches` in these numbers and in `stretches`; None without them.
         outputs: (n, k) written: displacement at each point [m], tension of each spring and each
             damper [N], force and moment of each bushing on the housing [N, N m].
     """
@@ -63,9 +67,12 @@ def output_history(state, deformation, points, p, springs, dampers, bushings, ou
     )
     x, own, answer = lane_array(state_numbers), lane_array(own_numbers), lane_array(numbers)
     q, measured = lane_array(p_numbers), lane_array(point_numbers)
+    stretch_numbers = np.empty(stretches.shape[1] * WIDTH)
+    stretched = lane_array(stretch_numbers)
     for begin in range(0, len(state), WIDTH):
         rows_to_lanes(state, begin, state_numbers)
         rows_to_lanes(deformation, begin, own_numbers)
+        rows_to_lanes(stretches, begin, stretch_numbers)
         motion = tub_motion(x)
         column = len(points) // POINT_SIZE
         for k in range(column):
@@ -77,7 +84,7 @@ def output_history(state, deformation, points, p, springs, dampers, bushings, ou
             answer[column] = friction_damper_force(motion, own[i], q, at)
             column += 1
         for at in bushings:
-            _, on_housing = six_component_bushing_wrench(motion, q, at)
+            _, on_housing = bushing_wrench(motion, q, at, stretched, branches)
             for k in range(6):
                 answer[column + k] = on_housing[k]
             column += 6
@@ -106,7 +113,9 @@ def larger(largest, value, good):
 
 
 @long_running
-def measure_samples_lanes(samples, rows, size, bounds, p, gasket, points, count, moved, extremes):
+def measure_samples_lanes(
+    samples, rows, size, bounds, p, gasket, branches, points, count, moved, extremes
+):
     """Measure `lanes.WIDTH` runs side by side, each up to its first sample out of bounds.
 
     All arrays of floats are flat arrays of lanes.
@@ -116,13 +125,15 @@ def measure_samples_lanes(samples, rows, size, bounds, p, gasket, points, count,
         rows, size: Number of samples, and of the numbers in each.
         bounds: Largest angle and displacement of the tub at which a run goes on. [rad, m]
         p, gasket: Packed numbers and index of the gasket in them, -1 without one.
+        branches: `Branches` of rubber bushings, None without them.
         points, count: Measured points, one after the other, and their number.
         moved: Displacement at each sample and point, written. [m]
         extremes: Written: largest absolute displacement at each point [m]; largest absolute force
             and moment of the gasket on the housing, x, y, z [N, N m]; number of samples in bounds.
     """
     align_stack()
-    x_numbers = np.empty(PLANT_STATE_SIZE * WIDTH)
+    end = PLANT_STATE_SIZE if branches is None else size
+    x_numbers = np.empty(end * WIDTH)
     x, states, numbers = lane_array(x_numbers), lane_array(samples), lane_array(p)
     measured, values, largest = lane_array(points), lane_array(moved), lane_array(extremes)
     zero = 0.0 * numbers[0]
@@ -130,7 +141,7 @@ def measure_samples_lanes(samples, rows, size, bounds, p, gasket, points, count,
         largest[k] = zero
     good = zero + 1.0
     for row in range(rows):
-        for k in range(PLANT_STATE_SIZE):
+        for k in range(end):
             x[k] = states[row * size + k]
         good = good * in_bounds(x, bounds[0], bounds[1])
         motion = tub_motion(x)
@@ -139,7 +150,7 @@ def measure_samples_lanes(samples, rows, size, bounds, p, gasket, points, count,
             values[row * count + k] = value
             largest[k] = larger(largest[k], value, good)
         if gasket >= 0:
-            _, on_housing = six_component_bushing_wrench(motion, numbers, gasket)
+            _, on_housing = bushing_wrench(motion, numbers, gasket, x, branches)
             for k in range(6):
                 largest[count + k] = larger(largest[count + k], on_housing[k], good)
         largest[count + 6] = largest[count + 6] + good

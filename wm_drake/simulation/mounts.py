@@ -7,6 +7,7 @@ import numpy as np
 
 from wm_drake.elements.motion import PLANT_STATE_SIZE
 from wm_drake.elements.mount import WRENCH_SIZE, Mounts
+from wm_drake.elements.rubber import branches_of
 from wm_drake.engines.compiled.mechanics import STATE_SIZE
 from wm_drake.engines.compiled.packing import Layout, pack_on_tub
 from wm_drake.engines.compiled.tubes import TUBES_AND_DAMPER, TUBES_STATE_SIZE
@@ -55,7 +56,8 @@ def mounts_of(layout: Layout) -> Mounts:
     tubes = begin + TUBES_STATE_SIZE * np.arange(len(telescopes), dtype=np.int64)
     numbers = telescopes + TUBES_AND_DAMPER.offsets["damper"]
     parts = (numbers, tubes) if len(telescopes) else (None, None)
-    return Mounts(springs, dampers, bushings, parts[0], STATE_SIZE, parts[1])
+    branches = layout.elements.branches
+    return Mounts(springs, dampers, bushings, parts[0], STATE_SIZE, parts[1], branches)
 
 
 def mount_wrenches(setup: Setup, trajectory: Trajectory) -> FloatArray:
@@ -80,12 +82,25 @@ def mount_wrenches(setup: Setup, trajectory: Trajectory) -> FloatArray:
         np.array(indices[kind], dtype=np.int64) for kind in ("springs", "dampers", "bushings")
     )
     parts_of_tubes = (np.array(begins, dtype=np.int64), tubes) if begins else (None, None)
+    first = size + telescopes * PLANT_STATE_SIZE
+    branches = branches_of(setup.bushings, indices["bushings"], first)
     mounts = Mounts(
-        springs, on_dampers, bushings, parts_of_tubes[0], PLANT_STATE_SIZE, parts_of_tubes[1]
+        springs,
+        on_dampers,
+        bushings,
+        parts_of_tubes[0],
+        PLANT_STATE_SIZE,
+        parts_of_tubes[1],
+        branches,
     )
     deformation = trajectory.deformation[:, :dampers]
     states = np.hstack(
-        [trajectory.state, deformation, trajectory.tubes.reshape(n, telescopes * PLANT_STATE_SIZE)]
+        [
+            trajectory.state,
+            deformation,
+            trajectory.tubes.reshape(n, telescopes * PLANT_STATE_SIZE),
+            trajectory.stretches,
+        ]
     )
     count = sum(map(len, indices.values())) + telescopes
     wrenches = np.empty((n, count * WRENCH_SIZE), order="F")  # measures read columns

@@ -4,6 +4,7 @@ import numpy as np
 
 from wm_drake.elements.bearing import FORCE_SIZE as BEARING_FORCE_SIZE
 from wm_drake.elements.bearing import drum_bearing_history
+from wm_drake.elements.rubber import branches_of
 from wm_drake.elements.telescopic_damper import FORCE_SIZE, telescopic_damper_history
 from wm_drake.engines.compiled.packing import pack_on_tub
 from wm_drake.engines.trajectory import Trajectory
@@ -24,6 +25,7 @@ def variables_of(setup: Setup, trajectory: Trajectory) -> Variables:
         forces = _with_telescopes(setup, trajectory, *forces)
     return (
         _tubes(trajectory)
+        | _branches(setup, trajectory)
         | cabinet_variables(setup, trajectory)
         | _whirl(setup, trajectory)
         | _motion(setup, trajectory, displacements)
@@ -128,6 +130,29 @@ def _tubes(trajectory: Trajectory) -> Variables:
             "extension of the damper beyond its length in the SDF",
         ),
     }
+
+
+def _branches(setup: Setup, trajectory: Trajectory) -> Variables:
+    """Return the stretches of the branches of rubber bushings; none without them."""
+    if not branch_names(setup):
+        return {}
+    return {
+        "branch_stretch": (
+            ("time", "branch"),
+            trajectory.stretches,
+            "m, rad about an axis",
+            "stretch of the friction or the Maxwell spring of a bushing of rubber",
+        ),
+    }
+
+
+def branch_names(setup: Setup) -> tuple[str, ...]:
+    """Return the branches of rubber bushings by bushing and key, such as gasket.dahl_force_x."""
+    return tuple(
+        f"{name}.{key}"
+        for name, bushing in setup.parameters.all_bushings().items()
+        for key in bushing.stretched_branches
+    )
 
 
 def _whirl(setup: Setup, trajectory: Trajectory) -> Variables:
@@ -240,7 +265,9 @@ def tub_outputs(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, ...]:
     begins = [np.array(of_kind, dtype=np.int64) for of_kind in indices.values()]
     sizes = [len(points), len(begins[0]), len(begins[1]), 6 * len(begins[2])]
     columns = np.empty((len(trajectory.time), sum(sizes)), order="F")
-    output_history(trajectory.state, trajectory.deformation, points.ravel(), p, *begins, columns)
+    branches = branches_of(setup.bushings, indices["bushings"], 0)
+    motion = trajectory.state, trajectory.deformation, trajectory.stretches
+    output_history(*motion, points.ravel(), p, *begins, branches, columns)
     displacements, springs, dampers, bushings = np.split(columns, np.cumsum(sizes)[:-1], axis=1)
     return displacements, springs, dampers, bushings.reshape(len(columns), len(begins[2]), 6)
 

@@ -12,7 +12,7 @@ from wm_drake.engines.trajectory import COORDINATES, Trajectory, divergence_text
 from wm_drake.model.machine import Setup
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.mounts import mount_names
-from wm_drake.simulation.outputs import AXES, variables_of
+from wm_drake.simulation.outputs import AXES, branch_names, variables_of
 
 Record: TypeAlias = xr.Dataset
 """Outputs of one run over time, in SI units.
@@ -52,6 +52,7 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
         ),
         "mount": mount_names(setup.parameters),
         **({"tube": setup.telescopes} if setup.telescopes else {}),
+        **({"branch": branches} if (branches := branch_names(setup)) else {}),
         **({"foot": setup.cabinet.cabinet.corners} if setup.cabinet else {}),
     }
     label_coordinates = _label_coordinates(**{name: tuple(of) for name, of in labels.items()})

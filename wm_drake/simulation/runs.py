@@ -45,8 +45,8 @@ def simulate(
         engine: Name of an engine in `ENGINES`.
         step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
             step size of the machine is used. [s]
-        integrator: Integrator of the compiled engine, "auto", "multistep" or "runge_kutta"; None
-            for that of the machine. With "auto" the steps may be half as long.
+        integrator: Integrator of the compiled engine, "auto", "multistep", "midpoint" or
+            "runge_kutta"; None for that of the machine. With "auto" the steps may be shorter.
         progress: Called from time to time with the fraction done.
 
     Returns:
@@ -77,7 +77,10 @@ def simulate(
     setup = machine.set_up(**numbers)
     if engine == DEFAULT_ENGINE:  # the other one controls its error
         stepping = choose_stepping(setup, *pack(setup), case.profile, step, chosen)
-        step, run = stepping.step, functools.partial(run, integrator=stepping.integrator)
+        step, run = (
+            stepping.step,
+            functools.partial(run, integrator=stepping.integrator, relaxation=stepping.relaxation),
+        )
         how |= {"step_s": step, "integrator": stepping.integrator}
     setup = machine.set_up(case.load, context=setup.context, **numbers)
     trajectory = run(setup, case.profile, step, progress)

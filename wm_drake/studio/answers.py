@@ -118,9 +118,11 @@ def arrows(
 def influential_keys(machine: OpenMachine, state: State) -> list[str]:
     """Return the numbers that can change a run of a state: not the cabinet, no other load."""
     own = f"loads.{state.load}." if not state.masses else "no load of the machine"
+    with machine.lock:
+        numbers = machine.numbers
     return [
         key
-        for key in machine.numbers
+        for key in numbers
         if not key.startswith(("cabinet.", "step", "profile.", "imperfections.phase_error"))
         and (not key.startswith("loads.") or key.startswith(own))
         and (state.gasket or not key.startswith("gasket."))

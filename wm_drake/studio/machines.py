@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,9 @@ LONGEST_RUN = 300.0
 MOST_STEPS = 300_000
 """Largest number of steps of a run of a page."""
 
+MOST_OPEN = 16
+"""Largest number of machines that are kept open."""
+
 _SUFFIXES = (".yaml", ".yml")
 
 
@@ -52,7 +56,7 @@ class Machines:
 
     given: str
     folder: Path
-    _open: dict[tuple[Path, int], "OpenMachine"] = field(default_factory=dict)
+    _open: dict[tuple[Path, int], "Future[OpenMachine]"] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def listed(self) -> dict[str, str]:
@@ -93,19 +97,37 @@ class Machines:
         """
         name = self.name_or_path(identifier)
         path = shipped_machines().get(str(name), Path(name))
+        try:
+            key = path.resolve(), path.stat().st_mtime_ns
+        except OSError:
+            raise input_error("this file is gone", where=identifier, key="machine") from None
+        with self._lock:  # not held while a machine is built: other pages go on
+            is_new = key not in self._open
+            future = self._open.setdefault(key, Future())
+        if is_new:
+            self._open_into(future, key, name)
+        return future.result()
+
+    def _open_into(
+        self, future: "Future[OpenMachine]", key: tuple[Path, int], name: str | Path
+    ) -> None:
+        """Open a machine and give it, or the error, to all that wait for it."""
+        try:
+            future.set_result(self._opened(load_machine(name)))
+        except BaseException as error:
+            with self._lock:
+                self._open.pop(key, None)  # the next page tries again
+            future.set_exception(error)
         with self._lock:
-            try:
-                key = path.resolve(), path.stat().st_mtime_ns
-            except OSError:
-                raise input_error("this file is gone", where=identifier, key="machine") from None
-            if key not in self._open:
-                self._open[key] = self._opened(load_machine(name))
-            return self._open[key]
+            while len(self._open) > MOST_OPEN:
+                del self._open[next(iter(self._open))]
 
     def _opened(self, parameters: MachineParameters) -> "OpenMachine":
         """Return a machine, built anew only if no open one has the same elements."""
         checked_step(parameters, None)
-        for other in self._open.values():
+        with self._lock:
+            ready = [f for f in self._open.values() if f.done() and f.exception() is None]
+        for other in (future.result() for future in ready):
             try:
                 check_same_elements(other.machine.parameters, parameters)
             except InputError:
@@ -115,7 +137,7 @@ class Machines:
         return OpenMachine(parameters, build_machine(parameters), Scene(parameters))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OpenMachine:
     """A machine that pages move.
 

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
+from weakref import WeakKeyDictionary
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from starlette.applications import Starlette
@@ -36,7 +37,8 @@ KEPT_RANKINGS = 32
 
 _REPORT_POLICY = (
     "sandbox allow-scripts allow-popups allow-downloads; default-src 'none'; img-src 'self' data: "
-    "blob:; style-src 'unsafe-inline'; script-src 'unsafe-inline' 'unsafe-eval'; font-src data:"
+    "blob:; style-src 'unsafe-inline'; font-src data:; "
+    "script-src 'unsafe-inline' 'unsafe-eval' blob:"
 )
 """Policy of a report: it may draw itself, but it has no origin and reaches nothing."""
 
@@ -79,13 +81,13 @@ class Studio:
         self._workers = os.cpu_count() or 1
         self._executor = ThreadPoolExecutor(self._workers, thread_name_prefix="studio")
         self.turns = Turns(self._executor, self._workers)
-        self._runners: dict[int, Runner] = {}
+        self._runners: WeakKeyDictionary[OpenMachine, Runner] = WeakKeyDictionary()
         self._rankings: dict[str, asyncio.Task[list[dict[str, Any]]]] = {}
 
     def opened(self, identifier: str) -> tuple[OpenMachine, Runner]:
         """Return an open machine and its runner."""
         machine = self.machines.open(identifier)
-        return machine, self._runners.setdefault(id(machine), runner_of(machine))
+        return machine, self._runners.setdefault(machine, runner_of(machine))
 
     def run(self, state: State, keys: list[str]) -> dict[str, Any]:
         """Return the answer to a page."""
@@ -109,7 +111,8 @@ class Studio:
     async def _rank(self, key: str, state: State) -> list[dict[str, Any]]:
         take = partial(self.turns.take, f"ranking {key}", background=True)
         machine, runner = await take(lambda: self.opened(state.machine))
-        keys, found = influential_keys(machine, state), []
+        keys = await take(partial(influential_keys, machine, state))
+        found: list[dict[str, Any]] = []
         for begin in range(0, len(keys), LANES):
             part = keys[begin : begin + LANES]
             found += await take(partial(arrows, machine, runner, state, part))

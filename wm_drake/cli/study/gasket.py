@@ -21,6 +21,7 @@ from wm_drake.cli.common import (
     command_line,
     existing_file,
     load_parameters,
+    pairs_of,
 )
 from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import Run, result_folder
@@ -46,6 +47,7 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.studies.doe import Design
     from wm_drake.studies.doe.anova import AnovaTable
     from wm_drake.studies.gasket.beside import Beside
+    from wm_drake.studies.gasket.check import Check, Setting
     from wm_drake.studies.gasket.published import Published
     from wm_drake.studies.gasket.screening import Label, Screening
     from wm_drake.studies.gasket.study import GasketTrials
@@ -130,6 +132,15 @@ def gasket(
             metavar="CSV",
         ),
     ] = None,
+    check: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Run this setting of the factors too and compare it with the fitted model: "
+            "'C_L=0.5 N*s/mm, K_Lx=120 %'. Other factors are at their middle level. Repeatable; "
+            "the page gives the text for the setting of its sliders.",
+            metavar="NAME=VALUE,...",
+        ),
+    ] = None,
     profile: ProfileOption = None,
     workers: WorkersOption = None,
     cluster: ClusterOption = None,
@@ -148,6 +159,7 @@ def gasket(
 
     parameters = _with_published(load_parameters(machine, sets), published)
     levels = _factors(parameters, factor, factors, tables)
+    settings = [_setting(parameters, levels, text) for text in check or []]
     plan = _design(design, levels, trials, model, seed)
     check_degrees_of_freedom(plan)
     cases = _loads(parameters, load, profile)
@@ -172,11 +184,67 @@ def gasket(
             work.chosen,
             lambda built, some: run(built, some, measures=work.measures, ledger=ledger),
         )
+        checked = _check(screening, work, settings, partial(run, middle, ledger=ledger))
         ledger.mark_finished()
-        beside = Beside(known, zero)
+        beside = Beside(known, zero, checked)
         with result_folder(out, writer, RUNS_KEPT) as folder:
             _write(screening, work, beside, folder, time.perf_counter() - begin)
     _print_result(screening, work, beside, out, as_json, time.perf_counter() - begin)
+
+
+def _setting(
+    parameters: "MachineParameters", levels: "tuple[FactorLevels, ...]", text: str
+) -> "Setting":
+    """Return the setting of the factors that an option `--check` means."""
+    from wm_drake.parameters import place_of
+    from wm_drake.studies.gasket.check import Setting
+
+    places = {factor.name: 0.0 for factor in levels}
+    by_name = {factor.name: factor for factor in levels}
+    for name, value in pairs_of(text.split(","), "--check"):
+        if name not in by_name:
+            raise input_error(
+                f"unknown factor '{name}'{nearest_names(name, by_name)}", where="--check"
+            )
+        try:
+            places[name] = place_of(parameters, by_name[name], value)
+        except InputError as error:
+            raise InputError(replace(p, where="--check") for p in error.problems) from None
+    return Setting(text, tuple(places.values()))
+
+
+def _check(
+    screening: "Screening",
+    work: "GasketTrials",
+    settings: "list[Setting]",
+    run: "Callable[..., xr.Dataset]",
+) -> "Check | None":
+    """Run the settings of `--check` and return them beside the fitted model."""
+    from wm_drake.studies.gasket.check import run_check
+    from wm_drake.studies.gasket.surface import surfaces
+
+    if not settings:
+        return None
+    return run_check(
+        work, settings, surfaces(screening), lambda cases: run(cases, measures=work.measures)
+    )
+
+
+def _print_check(check: "Check") -> None:
+    """Print prediction and run of each setting of `--check`."""
+    from rich.table import Table
+
+    table = Table(title="Fitted model and runs of --check")
+    for name in ("setting", "load", "response"):
+        table.add_column(name)
+    for name in ("predicted", "± 95 %", "run", "inside"):
+        table.add_column(name, justify="right")
+    for row in check.frame().to_dict("records"):
+        numbers = (f"{row[name]:.4g}" for name in ("predicted", "half_width", "run"))
+        inside = "yes" if row["is_inside"] else "no"
+        response = f"{row['response']}, {row['unit']}"
+        table.add_row(str(row["setting"]), str(row["load"]), response, *numbers, inside)
+    Console().print(table)
 
 
 def _with_published(
@@ -370,6 +438,8 @@ def _print_result(
         typer.echo(to_json(as_plain_data(screening, beside) | {"wall_s": wall_s}))
     else:
         _print_table(screening, words, beside.published)
+        if beside.check is not None:
+            _print_check(beside.check)
         say("\n".join(summary(screening, words, beside)))
         say(f"Results in {out}: report.html and CSV tables")
     for text in warnings(screening, words):

@@ -58,6 +58,6 @@ class StateDerivative:
         """
         state, rate = aligned(states.size), aligned(states.size)
         state[:] = states.T.ravel()
-        inputs = aligned(len(self.layout.dampers) * WIDTH)
+        inputs = aligned(self.layout.inputs_size * WIDTH)
         derivative_lanes(state, rate, inputs, reference, acceleration, self._p, self._elements)
         return rate.reshape(-1, WIDTH).T.copy()

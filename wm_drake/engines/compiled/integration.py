@@ -23,6 +23,7 @@ from wm_drake.engines.compiled.mechanics import (
 )
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES, multistep_step, remember
 from wm_drake.engines.compiled.packing import aligned
+from wm_drake.engines.compiled.rubber import end_paths, follow_paths, write_paths
 
 Work = namedtuple("Work", ("rate", "inputs", "stage", "total", "past_rates", "past_inputs"))
 """Arrays to work in. The past of a step with one derivative must stay from call to call."""
@@ -93,13 +94,15 @@ def runge_kutta_step(
 
     Args:
         state, rate: State at the start of the step, advanced, and its time derivative there.
-        inputs, stage, total: Arrays to work in.
+        inputs: Inputs of internal states at the start of the step; an array to work in.
+        stage, total: Arrays to work in.
         drum, i: Motion of the drum, a field of a `Schedule`, and number of the step.
         h: Length of the step. [s]
         acceleration, numbers, elements: See `state_derivative`.
     """
-    size = state_size(elements)
+    size, branches, first = state_size(elements), elements.branches, len(elements.dampers)
     masses = mass_properties(numbers, drum[2 * i + 1, 1], drum[2 * i + 1, 2])
+    write_paths(rate, inputs, first, numbers, branches)
     for k in range(size):
         total[k] = state[k] + h / 6.0 * rate[k]
         stage[k] = state[k] + 0.5 * h * rate[k]
@@ -107,14 +110,17 @@ def runge_kutta_step(
         node = 2 * i + (number + 1) // 2
         if number == 3:
             masses = mass_properties(numbers, drum[node, 1], drum[node, 2])
+        follow_paths(stage, state, numbers, branches)
         state_derivative(
             stage, rate, inputs, masses, drum[node, 0], acceleration, numbers, elements
         )
+        write_paths(rate, inputs, first, numbers, branches)
         weight = h / 6.0 if number == 3 else h / 3.0
         ahead = h if number == 2 else 0.5 * h
         for k in range(size):
             total[k] = total[k] + weight * rate[k]
             stage[k] = state[k] + ahead * rate[k]
+    end_paths(total, state, inputs, first, h, numbers, branches)
     for k in range(size):
         state[k] = total[k]
 

@@ -9,7 +9,7 @@ an unstable step makes the numbers grow. `WIDTH` Jacobians go side by side in th
 import numpy as np
 
 from wm_drake.compiler.compilation import law, long_running
-from wm_drake.compiler.elementary import sine_cosine, where
+from wm_drake.compiler.elementary import decay_factor, sine_cosine, where
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
@@ -27,6 +27,10 @@ from wm_drake.engines.compiled.multistep import (
 )
 from wm_drake.engines.compiled.packing import Layout, aligned, fill_lanes
 from wm_drake.parameters.types import FloatArray
+
+SMOOTH, SPONGE, PATH = 0, 1, 2
+"""How the multistep integrator treats a state: with the explicit formula; as an internal state, by
+a step of the Runge-Kutta scheme of it alone; in closed form along its path."""
 
 STEPS = 1000
 """Steps of the linearised machine: growth of 0.2 % a step is seen."""
@@ -53,7 +57,7 @@ def jacobians(
     p = fill_lanes(aligned(len(packed) * WIDTH), [packed])
     x = fill_lanes(aligned(states.size), list(states))
     n = len(free)
-    found, work = aligned(n * n * WIDTH), aligned((states.shape[1] + len(layout.dampers)) * WIDTH)
+    found, work = aligned(n * n * WIDTH), aligned((states.shape[1] + layout.inputs_size) * WIDTH)
     jacobian_lanes(x, work, np.array(free), difference, p, layout.elements, found)
     return found.reshape(n, n, WIDTH).transpose(2, 0, 1)
 
@@ -63,7 +67,7 @@ def is_followed(jacobians: FloatArray, internal: np.ndarray, step: float) -> boo
 
     Args:
         jacobians: (WIDTH, n, n) [1/s]
-        internal: (n,) bool, which states are internal.
+        internal: (n,) `SMOOTH`, `SPONGE` or `PATH`: how each state is treated.
         step: Step size. [s]
     """
     if not np.all(np.isfinite(jacobians)):
@@ -122,7 +126,7 @@ def growth_lanes(jacobian, internal, h, steps, numbers, largest):
 
     Args:
         jacobian: Square matrices, by rows.
-        internal: Whether each state is internal.
+        internal: How each state is treated: `SMOOTH`, `SPONGE` or `PATH`.
         h: Step size. [s]
         steps: Number of steps.
         numbers: Anything to start from: state, its rate, past rates, past inputs.
@@ -147,14 +151,28 @@ def growth_lanes(jacobian, internal, h, steps, numbers, largest):
             own = a[row * n + row] * x[row]
             past_inputs[i % PAST_INPUTS * n + row] = rate[row] - own
         for row in range(n):
-            if internal[row]:
+            if internal[row] == SPONGE:
                 middle, ahead = extrapolated(past_inputs, i, row, n)
                 x[row] = decay_after_step(x[row], rate[row], a[row * n + row], middle, ahead, h)
+            elif internal[row] == PATH:
+                middle, ahead = extrapolated(past_inputs, i, row, n)
+                start = past_inputs[i % PAST_INPUTS * n + row]
+                path = h / 6.0 * (start + 4.0 * middle + ahead)
+                x[row] = path_after_step(x[row], a[row * n + row], path, h)
             else:
                 x[row] = explicit_multistep(x[row], past_rates, i, row, n, h)
             quarter = 4 * i // steps
             size = abs(x[row])
             top[quarter] = where(size > top[quarter], size, top[quarter])
+
+
+@law
+def path_after_step(x, a, path, h):
+    """Return the solution of x' = u + a x, a <= 0, after a step with the mean input path / h."""
+    decay = where(a < 0.0, -a * h, 0.0 * a)
+    factor, small = decay_factor(decay), decay < 1e-6
+    mean = where(small, 1.0 - 0.5 * decay, (1.0 - factor) / where(small, 1.0, decay))
+    return x * factor + path * mean
 
 
 @law

@@ -19,7 +19,7 @@ The packed numbers of the bodies are those of `BODIES`, from index 0.
 State: tub and drum (`TREE_STATE`); the deformation of each strut damper; the `TUBES_STATE` of each
 telescopic damper; the `CARRIER_STATE` of the drum's carrier in a compliant bearing; the
 `MOTOR_STATE` of a drive with a motor; the state of a cabinet that moves
-(`wm_drake.engines.compiled.cabinet`).
+(`wm_drake.engines.compiled.cabinet`); the stretches of the branches of rubber bushings.
 """
 
 from collections import namedtuple
@@ -30,7 +30,6 @@ from wm_drake.compiler.matrices import about_centre, inverse, plus, times
 from wm_drake.compiler.packed import LAYOUT, SCALAR, SYMMETRIC, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import add, cross, dot, rotate, rotate_back, scale, subtract
 from wm_drake.elements.bearing import drum_bearing_forces
-from wm_drake.elements.bushing import six_component_bushing_wrench
 from wm_drake.elements.friction_damper import (
     friction_damper_line,
     friction_damper_tension,
@@ -44,6 +43,7 @@ from wm_drake.elements.motion import (
     write_tree_state,
 )
 from wm_drake.elements.motor import read_motor
+from wm_drake.elements.rubber import bushing_wrench
 from wm_drake.elements.spring import spring_strut_wrench
 from wm_drake.engines.compiled.bearing import (
     carrier_motion,
@@ -63,6 +63,11 @@ from wm_drake.engines.compiled.drum import (
     motor_size,
     motor_torque_and_rates,
     with_free_drum,
+)
+from wm_drake.engines.compiled.rubber import (
+    branch_count,
+    branch_input_count,
+    write_branches,
 )
 from wm_drake.engines.compiled.tubes import (
     TUBES_STATE_SIZE,
@@ -116,7 +121,17 @@ read_bodies, read_rates, write_rates_of = BODIES.read, RATES.read, RATES.write
 
 Elements = namedtuple(
     "Elements",
-    ("springs", "dampers", "bushings", "telescopes", "bearing", "tubes", "motor", "cabinet"),
+    (
+        "springs",
+        "dampers",
+        "bushings",
+        "telescopes",
+        "bearing",
+        "tubes",
+        "motor",
+        "cabinet",
+        "branches",
+    ),
 )
 """Indices at which the parts of a machine begin.
 
@@ -124,7 +139,8 @@ springs, dampers, bushings: arrays of indices of the elements in the packed numb
 same for telescopic dampers, None if there are none; bearing: index of the drum's bearing in the
 packed numbers, None if the bearing is rigid; tubes: index of the telescopic dampers in the state;
 motor: index of the motor in the packed numbers, None if the speed of the drum is prescribed;
-cabinet: index of the cabinet in the packed numbers, None if it is fixed.
+cabinet: index of the cabinet in the packed numbers, None if it is fixed; branches: `Branches` of
+rubber bushings, None if there are none.
 """
 
 MassProperties = namedtuple(
@@ -246,8 +262,9 @@ def state_derivative(x, dx, inputs, masses, rate, acceleration, p, elements):
 
     Args:
         x, dx: State and its derivative; a prescribed drum's angle and rate in x are not read.
-        inputs: Elongation rate of each strut damper, written. The deformation of its sponge
-            depends on the motion through this number only. [m/s]
+        inputs: Elongation rate of each strut damper, then the rates of the six axes of each
+            bushing of rubber, written. The deformation of a sponge and the stretches of branches
+            depend on the motion through these numbers only. [m/s, rad/s]
         masses, rate, acceleration, p: See `accelerations`. With a motor, the prescribed rate is the
             one that the controller wants, and the other two are not used.
         elements: `Elements`.
@@ -265,8 +282,9 @@ def state_derivative(x, dx, inputs, masses, rate, acceleration, p, elements):
         wrench, _ = spring_strut_wrench(motion, p, at)
         total = plus(total, wrench)
     for at in elements.bushings:
-        wrench, _ = six_component_bushing_wrench(motion, p, at)
+        wrench, _ = bushing_wrench(motion, p, at, x, elements.branches)
         total = plus(total, wrench)
+    write_branches(x, dx, inputs, len(elements.dampers), motion, p, elements.branches)
     for i in range(len(elements.dampers)):
         at, k = elements.dampers[i], STATE_SIZE + i
         arm, line = friction_damper_line(motion, p, at)
@@ -384,6 +402,12 @@ def wanted_speed(x, reference, motor):
 @law
 def state_size(elements):
     """Return the size of the state of a machine with these elements."""
+    return branches_begin(elements) + branch_count(elements.branches)
+
+
+@law
+def branches_begin(elements):
+    """Return the index in the state where the stretches of rubber bushings begin."""
     return cabinet_begin(elements) + cabinet_size(elements.cabinet)
 
 
@@ -395,8 +419,8 @@ def motor_begin(elements):
 
 @law
 def inputs_size(elements):
-    """Return the number of inputs of internal states: one for each strut damper."""
-    return len(elements.dampers)
+    """Return the number of inputs of internal states: see `state_derivative`."""
+    return len(elements.dampers) + branch_input_count(elements.branches)
 
 
 @law

@@ -1,7 +1,8 @@
 """A step of the multistep integrator: one evaluation of the time derivative.
 
 The state has smooth parts b (rigid bodies) and stiff internal parts z (deformations of sponges),
-which depend on the motion through few inputs u (elongation rates of the struts):
+which depend on the motion through few inputs u (elongation rates of the struts, rates of rubber
+bushings):
 
     b' = f(b, z),    z' = g(u(b), z)
 
@@ -16,13 +17,23 @@ times the fifth backward difference of f: any such sum has order four. These two
 choice (docs/decisions/0087): the error constant is 0.15 in place of 0.35, and the formula is stable
 for h lambda from -0.38 to 0 and to 0.34 i, in place of -0.30 and 0.43 i.
 
+The friction of a rubber bushing follows its path in closed form instead
+(`wm_drake.laws.rubber.dahl_after_step`).
+
 An internal part evaluates its own law only, a small part of f. With the decay of a sponge (320 1/s)
 in the first line, 1.1 ms would be the longest stable step.
 """
 
 from wm_drake.compiler.compilation import law
 from wm_drake.elements.friction_damper import friction_damper_tension
-from wm_drake.engines.compiled.mechanics import STATE_SIZE, inputs_size, state_size
+from wm_drake.elements.rubber import AXIS_COUNT, read_rubber, read_rubber_bushing
+from wm_drake.engines.compiled.mechanics import (
+    STATE_SIZE,
+    branches_begin,
+    inputs_size,
+    state_size,
+)
+from wm_drake.engines.compiled.rubber import branch_after_step
 
 PAST_RATES, PAST_INPUTS = 6, 3
 """Numbers of steps, with the one at hand, whose rates and inputs a step uses."""
@@ -41,15 +52,39 @@ def multistep_step(state, rate, past, i, h, p, elements):
         h: Length of the step. [s]
         p, elements: See `state_derivative`.
     """
-    size, struts = state_size(elements), inputs_size(elements)
+    size, struts, inputs = state_size(elements), len(elements.dampers), inputs_size(elements)
     for k in range(STATE_SIZE):
         state[k] = explicit_multistep(state[k], past.rates, i, k, size, h)
-    for k in range(STATE_SIZE + struts, size):
+    for k in range(STATE_SIZE + struts, branches_begin(elements)):
         state[k] = explicit_multistep(state[k], past.rates, i, k, size, h)
     for d in range(struts):
         k, at = STATE_SIZE + d, elements.dampers[d]
-        middle, end = extrapolated(past.inputs, i, d, struts)
+        middle, end = extrapolated(past.inputs, i, d, inputs)
         state[k] = sponge_after_step(state[k], rate[k], middle, end, h, p, at)
+    branches_after_step(state, past.inputs, i, h, p, elements.branches, struts, inputs)
+
+
+@law
+def branches_after_step(state, inputs, i, h, p, branches, first, size):
+    """Advance the stretches of rubber bushings by a step; nothing without them.
+
+    Args:
+        state: State, written.
+        inputs: Inputs at the start of the last `PAST_INPUTS` steps, `remember`ed.
+        i, h: Number of the step and its length. [s]
+        p: Packed numbers.
+        branches: `Branches`; None without bushings of rubber.
+        first, size: Index of the first of their inputs, and number of all inputs.
+    """
+    if branches is None:
+        return
+    for j in range(len(branches.at)):
+        rubber = read_rubber(*read_rubber_bushing(p, branches.at[j]).rubber)
+        for axis in range(AXIS_COUNT):
+            d = first + AXIS_COUNT * j + axis
+            start = inputs[i % PAST_INPUTS * size + d]
+            middle, end = extrapolated(inputs, i, d, size)
+            branch_after_step(state, branches.states[j], axis, start, middle, end, h, rubber)
 
 
 @law

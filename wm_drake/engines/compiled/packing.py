@@ -10,7 +10,8 @@ from pydrake.systems.framework import Context
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.motion import POSE
 from wm_drake.elements.motor import MOTOR_STATE_SIZE, motor_structure, packed_motor
-from wm_drake.engines.compiled.bearing import TUB, TUB_AND_BEARING
+from wm_drake.elements.rubber import AXIS_COUNT, Branches, RubberBushingParameters
+from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE, TUB, TUB_AND_BEARING
 from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE
 from wm_drake.engines.compiled.mechanics import (
     BODIES,
@@ -49,6 +50,7 @@ class Layout:
         control_period: Time between two samples of a sampled controller, else 0. [s]
         cabinet: Index of the cabinet, -1 for a fixed one.
         structure: Number of each damper's law and number of points of every table, in order.
+        rubber: Index of each bushing of rubber, and number of its stretches.
     """
 
     springs: tuple[int, ...]
@@ -61,6 +63,7 @@ class Layout:
     control_period: float
     cabinet: int
     structure: tuple[int, ...]
+    rubber: tuple[tuple[int, int], ...] = ()
 
     @property
     def elements(self) -> Elements:
@@ -84,20 +87,40 @@ class Layout:
             tubes,
             self.motor if self.motor >= 0 else None,
             self.cabinet if self.cabinet >= 0 else None,
+            self.branches(self.branches_begin),
         )
+
+    @property
+    def branches_begin(self) -> int:
+        """Index in the state where the stretches of rubber bushings begin."""
+        begin = STATE_SIZE + len(self.dampers) + TUBES_STATE_SIZE * len(self.telescopes)
+        begin += CARRIER_STATE_SIZE if self.bearing >= 0 else 0
+        return begin + self.motor_size + self.cabinet_size
+
+    def branches(self, first: int) -> Branches | None:
+        """Return the bushings of rubber, of which the first stretch has an index in the state."""
+        if not self.rubber:
+            return None
+        at, counts = np.array(self.rubber, dtype=np.int64).T
+        return Branches(at.copy(), first + np.cumsum(counts) - counts, int(counts.sum()))
+
+    @property
+    def inputs_size(self) -> int:
+        """Number of inputs of internal states."""
+        return len(self.dampers) + AXIS_COUNT * len(self.rubber)
 
     @property
     def rates_size(self) -> int:
         """Number of accelerations in a sample, behind the state."""
         return RATES_SIZE * (1 + (self.bearing >= 0) + (self.cabinet >= 0))
 
-    def parts(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def parts(self, states: FloatArray) -> tuple[FloatArray, ...]:
         """Split states (n, size) into their parts.
 
         Returns:
             State of tub and drum (n, 14); deformations of all dampers, those of telescopic ones
             last (n, d); states of the tubes (n, k, 14); state of the drum's carrier (n, 12), or
-            (n, 0) without one. The rest is the `cabinet_part`.
+            (n, 0) without one; stretches of rubber bushings (n, s). The rest is the `cabinet_part`.
         """
         tubes_begin = STATE_SIZE + len(self.dampers)
         tubes_end = tubes_begin + TUBES_STATE_SIZE * len(self.telescopes)
@@ -106,12 +129,14 @@ class Layout:
         )
         own, deformation_of_tubes = tubes[:, :, :STATE_SIZE], tubes[:, :, DEFORMATION]
         deformation = np.hstack([states[:, STATE_SIZE:tubes_begin], deformation_of_tubes])
-        carrier_end = states.shape[1] - self.cabinet_size - self.motor_size
-        return states[:, :STATE_SIZE], deformation, own, states[:, tubes_end:carrier_end]
+        carrier = states[:, tubes_end : self.motor_begin]
+        stretches = states[:, self.branches_begin :]
+        return states[:, :STATE_SIZE], deformation, own, carrier, stretches
 
-    def motor_begin(self, size: int) -> int:
-        """Return the index in a state of a size where the drive begins, if it has a motor."""
-        return size - self.cabinet_size - self.motor_size
+    @property
+    def motor_begin(self) -> int:
+        """Index in the state where the drive begins, if it has a motor."""
+        return self.branches_begin - self.cabinet_size - self.motor_size
 
     @property
     def motor_size(self) -> int:
@@ -120,11 +145,12 @@ class Layout:
 
     def cabinet_part(self, states: FloatArray) -> FloatArray | None:
         """Return the states (n, `CABINET_STATE_SIZE`) of a cabinet that moves; None if fixed."""
-        return states[:, states.shape[1] - self.cabinet_size :] if self.cabinet >= 0 else None
+        end = self.branches_begin
+        return states[:, end - self.cabinet_size : end] if self.cabinet >= 0 else None
 
     @property
     def cabinet_size(self) -> int:
-        """Size of the state of the cabinet, which is last; 0 for a fixed one."""
+        """Size of the state of the cabinet; 0 for a fixed one."""
         return CABINET_STATE_SIZE if self.cabinet >= 0 else 0
 
 
@@ -177,6 +203,11 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
     if setup.cabinet:
         cabinet = BODIES_SIZE + sum(map(len, parts))
         parts += [pack_rigid(setup, CABINET), setup.cabinet.packed()]
+    rubber = tuple(
+        (at, bushing.state_size)
+        for at, bushing in zip(indices["bushings"], setup.bushings.values(), strict=True)
+        if isinstance(bushing, RubberBushingParameters)
+    )
     return np.concatenate(parts), Layout(
         **indices,
         gasket=gasket,
@@ -185,6 +216,7 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
         control_period=control_period,
         cabinet=cabinet,
         structure=tuple(structure),
+        rubber=rubber,
     )
 
 
@@ -236,8 +268,8 @@ def fill_lanes(lanes: FloatArray, runs: list[FloatArray]) -> FloatArray:
 def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     """Return the state at the start of a run.
 
-    The machine is at rest at the rest pose, the drum at its first speed, sponges undeformed, a
-    motor without torque.
+    The machine is at rest at the rest pose, the drum at its first speed; sponges and branches of
+    rubber are relaxed, a motor is without torque.
     """
     x = np.zeros(STATE_SIZE + len(setup.dampers))
     x[: POSE.fixed_size] = setup.rest_pose
@@ -247,7 +279,8 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     carrier = np.append(setup.carrier_rest, np.zeros_like(setup.carrier_rest))
     motor = np.zeros(MOTOR_STATE_SIZE if setup.motor else 0)
     cabinet = np.zeros(CABINET_STATE_SIZE if setup.cabinet else 0)
-    return np.concatenate([x, tubes.ravel(), carrier, motor, cabinet])
+    stretches = np.zeros(sum(bushing.state_size for bushing in setup.bushings.values()))
+    return np.concatenate([x, tubes.ravel(), carrier, motor, cabinet, stretches])
 
 
 def pack_tubes(setup: Setup, name: str) -> FloatArray:

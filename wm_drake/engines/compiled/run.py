@@ -6,6 +6,7 @@ import numpy as np
 
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.integration import integrate_lanes, work_arrays
+from wm_drake.engines.compiled.midpoint import integrate_midpoint_lanes, midpoint_work
 from wm_drake.engines.compiled.packing import Layout, aligned, fill_lanes, initial_state, pack
 from wm_drake.engines.compiled.samples import trajectory_of
 from wm_drake.engines.compiled.stepping import Stepping
@@ -27,6 +28,7 @@ def run_compiled(
     progress: Callable[[float], None],
     period: float = OUTPUT_PERIOD,
     integrator: Integrator = "runge_kutta",
+    relaxation: FloatArray | None = None,
 ) -> Trajectory:
     """Run a machine through a spin profile with the compiled engine.
 
@@ -39,7 +41,8 @@ def run_compiled(
         step: Step size. [s]
         progress: Called with the fraction done.
         period: Time between two samples. [s]
-        integrator: "multistep" or "runge_kutta".
+        integrator: "multistep", "midpoint" or "runge_kutta".
+        relaxation: As in the `Stepping`, for "midpoint".
 
     Returns:
         The sampled motion; up to the last good sample if it diverged.
@@ -56,7 +59,10 @@ def run_compiled(
     fill_lanes(numbers, [p])
     fill_lanes(x, [begin])
     one_derivative = Stepping(integrator, step).one_derivative(schedule)
-    for done in integrate_runs(schedule, one_derivative, layout, numbers, x, samples):
+    matrices = None
+    if integrator == "midpoint" and relaxation is not None:
+        matrices = fill_lanes(aligned(len(relaxation) * WIDTH), [relaxation])
+    for done in integrate_runs(schedule, one_derivative, layout, numbers, x, samples, matrices):
         progress(done)
     return trajectory_of(samples.reshape(rows, size, WIDTH)[..., 0].copy(), schedule, p, layout)
 
@@ -68,6 +74,7 @@ def integrate_runs(
     p: FloatArray,
     x: FloatArray,
     samples: FloatArray,
+    relaxation: FloatArray | None = None,
 ) -> Iterator[float]:
     """Integrate `WIDTH` runs side by side until the schedule ends or all of them have diverged.
 
@@ -81,18 +88,41 @@ def integrate_runs(
         p, x: Packed numbers and states as flat arrays of lanes; x is advanced.
         samples: Flat array of lanes for the samples, as `integrate` writes them; NaN behind the
             last one that was reached.
+        relaxation: Matrices of the midpoint rule as a flat array of lanes; None for others.
 
     Yields:
         The fraction done, after each `PAUSE_STEPS` steps.
     """
-    work = work_arrays(len(x) // WIDTH, len(layout.dampers))
-    steps_of = (*schedule.steps, one_derivative)
+    advance = _advance(schedule, one_derivative, layout, p, x, samples, relaxation)
     by_sample = samples.reshape(len(schedule.time), -1, WIDTH)
     done, steps, last, diverged = 0, len(schedule.step), 0, False
     while done < steps and not diverged:
         begin, done = done, min(done + PAUSE_STEPS, steps)
-        integrate_lanes(steps_of, begin, done, p, layout.elements, x, work, samples)
+        advance(begin, done)
         last = max(last, int(schedule.row[begin:done].max()))
         diverged = all(diverging_coordinate(positions) for positions in by_sample[last, :6].T)
         yield done / steps
     by_sample[last + 1 :] = float("nan")
+
+
+def _advance(
+    schedule: Schedule,
+    one_derivative: np.ndarray,
+    layout: Layout,
+    p: FloatArray,
+    x: FloatArray,
+    samples: FloatArray,
+    relaxation: FloatArray | None,
+) -> Callable[[int, int], None]:
+    """Return the function that integrates from one number of a step to another.
+
+    Arguments as for `integrate_runs`.
+    """
+    sizes, elements = (len(x) // WIDTH, layout.inputs_size), layout.elements
+    if relaxation is None:
+        work, steps = work_arrays(*sizes), (*schedule.steps, one_derivative)
+        return lambda begin, end: integrate_lanes(steps, begin, end, p, elements, x, work, samples)
+    middle = midpoint_work(*sizes)
+    return lambda begin, end: integrate_midpoint_lanes(
+        schedule.steps[:4], begin, end, p, elements, relaxation, x, middle, samples
+    )

@@ -36,7 +36,7 @@ def trajectory_of(
         p, layout: From `pack`.
     """
     states, rates = np.split(samples, [-layout.rates_size], axis=1)
-    motion, deformation, tubes, carrier = layout.parts(states)
+    motion, deformation, tubes, carrier, stretches = layout.parts(states)
     cabinet, of_tub = layout.cabinet_part(states), rates[:, :RATES_SIZE]
     with_drum = _motion_of_drum_and_carrier(motion, carrier)
     of_carrier = rates[:, RATES_SIZE : 2 * RATES_SIZE] if carrier.shape[1] else of_tub
@@ -53,7 +53,7 @@ def trajectory_of(
     else:
         drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
         torque_history(with_drum, of_carrier, drum_acceleration, p, torque)
-    found = schedule.time, motion, deformation, torque[:, 0], of_tub, tubes, carrier
+    found = schedule.time, motion, deformation, torque[:, 0], of_tub, tubes, carrier, stretches
     return cut_at_divergence(Trajectory(*found, cabinet=cabinet))
 
 
@@ -73,7 +73,7 @@ def torque_of_motor(
     """
     torque = np.empty((len(states), 1))
     reference = schedule.drum[:-1:2][schedule.row >= 0, :1]
-    first = layout.motor_begin(states.shape[1])
+    first = layout.motor_begin
     motor_torque_history(
         np.ascontiguousarray(states),
         np.ascontiguousarray(reference),

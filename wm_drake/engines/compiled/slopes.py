@@ -10,7 +10,6 @@ import numpy as np
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
-from wm_drake.elements.bushing import six_component_bushing_wrench
 from wm_drake.elements.cabinet import SLIP_SIZE
 from wm_drake.elements.friction_damper import (
     friction_damper_line,
@@ -18,9 +17,10 @@ from wm_drake.elements.friction_damper import (
     friction_damper_wrench,
 )
 from wm_drake.elements.motion import motion_at, read_tree_state, tub_motion
+from wm_drake.elements.rubber import bushing_wrench
 from wm_drake.elements.spring import spring_strut_wrench
 from wm_drake.elements.telescopic_damper import telescopic_damper_forces
-from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, VELOCITIES
+from wm_drake.engines.compiled.cabinet import VELOCITIES
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
@@ -74,15 +74,16 @@ class SlopedDerivative:
         self.packed, self.layout = pack(setup)
         self.rest = initial_state(setup, SpinProfile(time=(0.0, 1.0), speed=(0.0, 0.0)))
         size = len(self.rest)
-        slips = size - SLIP_SIZE if setup.cabinet else size
-        self.free = np.setdiff1d(np.arange(slips), (DRUM_ANGLE, DRUM_RATE))
+        end = self.layout.branches_begin
+        slips = np.arange(end - SLIP_SIZE if setup.cabinet else end, end)
+        self.free = np.setdiff1d(np.arange(size), (DRUM_ANGLE, DRUM_RATE, *slips))
         velocities = np.zeros(size, dtype=bool)
         velocities[STATE_SIZE // 2 : STATE_SIZE] = True
         begin = STATE_SIZE + len(setup.dampers)
         for _ in setup.telescopes:
             velocities[begin + 7 : begin + TUBES_STATE_SIZE - 1] = True
             begin += TUBES_STATE_SIZE
-        cabinet = size - CABINET_STATE_SIZE if setup.cabinet else size
+        cabinet = end - self.layout.cabinet_size
         velocities[begin + (cabinet - begin) // 2 : cabinet] = True
         if setup.cabinet:
             velocities[cabinet + np.array(VELOCITIES)] = True
@@ -237,7 +238,7 @@ def tub_wrenches_at(states, columns, steps, p, elements, wrenches):
             )
             at_row += 6
         for at in elements.bushings:
-            wrench, _ = six_component_bushing_wrench(motion, numbers, at)
+            wrench, _ = bushing_wrench(motion, numbers, at, x, elements.branches)
             write_six(answer, at_row, wrench)
             at_row += 6
         for i in range(telescopic_damper_count(elements.telescopes)):

@@ -14,8 +14,9 @@ import numpy as np
 
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.motor import MOTOR_STATE_SIZE
+from wm_drake.elements.rubber import FRICTION, RubberBushingParameters
 from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, VELOCITIES
-from wm_drake.engines.compiled.linear import jacobians
+from wm_drake.engines.compiled.linear import PATH, SMOOTH, SPONGE, jacobians
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
 from wm_drake.engines.compiled.packing import Layout, initial_state, pack
 from wm_drake.engines.compiled.tubes import TUBES_STATE_SIZE
@@ -79,14 +80,16 @@ class FastestMotion:
 def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
     """Return the motion of each part of a machine that needs the shortest step, by part.
 
-    The parts are `TUB`, `BEARING`, `DRUM`, `CABINET`, and the sponge and the tubes of each damper,
-    as far as they have a fastest motion of their own. The drum's own angle is prescribed without a
-    motor.
+    The parts are `TUB`, `BEARING`, `DRUM`, `CABINET`, the sponge and the tubes of each damper, and
+    the Maxwell branches of each bushing, as far as they have a fastest motion of their own. The
+    drum's own angle is prescribed without a motor. The friction of a bushing of rubber is left out:
+    every step follows its path in closed form. Its stiffness counts in the motion of the tub.
 
     Raises:
         InputError: the machine has something that the compiled engine does not represent.
     """
-    free, parts = _free_states(setup)
+    free, parts = free_states(setup)
+    followed = {parts[k] for k, kind in enumerate(_treatment(setup, free)) if kind == PATH}
     matrices, _ = linearised(setup, *pack(setup), DIFFERENCE)
     if not np.all(np.isfinite(matrices)):
         return {"the machine": FastestMotion(np.inf, False, "the machine")}
@@ -99,6 +102,8 @@ def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
             # velocities as the displacements that they make within 1 / |lambda|
             amplitude = np.abs(mode) / np.where(moving, max(size, 1e-9), 1.0)
             part = parts[int(np.argmax(amplitude))]
+            if part in followed:
+                continue
             motion = FastestMotion(size, bool(abs(rate.imag) > abs(rate.real)), part)
             if part not in found or motion.longest_step < found[part].longest_step:
                 found[part] = motion
@@ -113,7 +118,7 @@ def fastest_motion(setup: Setup) -> FastestMotion:
 def linearised(
     setup: Setup, packed: FloatArray, layout: Layout, difference: float
 ) -> tuple[FloatArray, np.ndarray]:
-    """Return the Jacobians of the free states, and which of these are internal to a damper strut.
+    """Return the Jacobians of the free states, and how the multistep integrator treats each.
 
     Args:
         setup: The machine.
@@ -121,11 +126,31 @@ def linearised(
         difference: Half a step of the central differences. [m, rad, m/s, rad/s]
 
     Returns:
-        (WIDTH, n, n) at states with slow and fast motion [1/s], and (n,) bool.
+        (WIDTH, n, n) at states with slow and fast motion [1/s], and (n,) `SMOOTH`, `SPONGE` or
+        `PATH` of `wm_drake.engines.compiled.linear`.
     """
-    free, _ = _free_states(setup)
-    struts = range(STATE_SIZE, STATE_SIZE + len(setup.dampers))
-    return jacobians(packed, layout, _states(setup, free), free, difference), np.isin(free, struts)
+    free, _ = free_states(setup)
+    matrices = jacobians(packed, layout, _states(setup, free), free, difference)
+    return matrices, _treatment(setup, free)
+
+
+def _treatment(setup: Setup, free: list[int]) -> np.ndarray:
+    """Return how the multistep integrator treats the free states. (n,)"""
+    kinds = np.full(free[-1] + 1, SMOOTH)
+    kinds[STATE_SIZE : STATE_SIZE + len(setup.dampers)] = SPONGE
+    for index, (_, kind) in zip(reversed(free), reversed(_branches(setup)), strict=False):
+        kinds[index] = PATH if kind == FRICTION else SPONGE
+    return kinds[free]
+
+
+def _branches(setup: Setup) -> list[tuple[str, str]]:
+    """Return the bushing and the kind of each stretch of rubber, the last states of a machine."""
+    return [
+        (name, kind)
+        for name, bushing in setup.bushings.items()
+        if isinstance(bushing, RubberBushingParameters)
+        for kind in bushing.state_kinds
+    ]
 
 
 def check_step(setup: Setup, step: float) -> None:
@@ -204,7 +229,7 @@ def _allowed(longest: float) -> str:
     return text
 
 
-def _free_states(setup: Setup) -> tuple[list[int], list[str]]:
+def free_states(setup: Setup) -> tuple[list[int], list[str]]:
     """Return the indices of the states that are not prescribed, and what each belongs to."""
     parts = [TUB] * STATE_SIZE
     parts += [f"the sponge of damper '{name}'" for name in setup.dampers]
@@ -212,15 +237,16 @@ def _free_states(setup: Setup) -> tuple[list[int], list[str]]:
         parts += [f"the tubes of damper '{name}'"] * (TUBES_STATE_SIZE - 1)
         parts.append(f"the sponge of damper '{name}'")
     size = len(initial_state(setup, _STANDSTILL))
+    branches = [f"the {kind} of bushing '{name}'" for name, kind in _branches(setup)]
     driven = MOTOR_STATE_SIZE if setup.motor else 0
     cabinet = CABINET_STATE_SIZE if setup.cabinet else 0
-    parts += [BEARING] * (size - driven - cabinet - len(parts))
-    parts += [DRUM] * driven + [CABINET] * cabinet
+    parts += [BEARING] * (size - driven - cabinet - len(branches) - len(parts))
+    parts += [*[DRUM] * driven, *[CABINET] * cabinet, *branches]
     fixed = [DRUM_ANGLE, DRUM_RATE]
     if setup.motor:
         parts[DRUM_ANGLE] = parts[DRUM_RATE] = DRUM
         # a sampled controller changes its state at its samples only; a continuous one holds nothing
-        demand = size - cabinet - 1
+        demand = size - len(branches) - cabinet - 1
         fixed = [demand - 1, demand] if setup.motor.controller.sample_time else [demand]
     free = [index for index in range(size) if index not in fixed]
     return free, [parts[index] for index in free]
@@ -247,7 +273,8 @@ def _velocities(setup: Setup) -> list[int]:
     for _ in setup.telescopes:
         found += range(begin + 7, begin + TUBES_STATE_SIZE - 1)
         begin += TUBES_STATE_SIZE
-    cabinet = size - CABINET_STATE_SIZE if setup.cabinet else size
+    end = size - len(_branches(setup))
+    cabinet = end - CABINET_STATE_SIZE if setup.cabinet else end
     carrier = cabinet - (MOTOR_STATE_SIZE if setup.motor else 0)
     found += range(begin + (carrier - begin) // 2, carrier)
     if setup.cabinet:

@@ -1,16 +1,18 @@
 """How a run is integrated: the integrator and its step, chosen from the machine and its profile.
 
 The multistep integrator (`wm_drake.engines.compiled.multistep`) takes one derivative a step, the
-Runge-Kutta scheme four. A sampled controller needs the Runge-Kutta scheme: its torque jumps.
-A choice depends on the parameters and the profile of a run only, never on
-other runs or on its load.
+Runge-Kutta scheme four. The midpoint rule (`wm_drake.engines.compiled.midpoint`) takes one, and
+follows the tubes of telescopic dampers. A sampled controller needs the Runge-Kutta scheme: its
+torque jumps. A choice depends on the parameters and the profile of a run only, never on other runs
+or on its load.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from wm_drake.engines.compiled.linear import is_followed
+from wm_drake.engines.compiled.midpoint_check import midpoint_follows, relaxation_matrices
 from wm_drake.engines.compiled.multistep import STEPS_BEFORE
 from wm_drake.engines.compiled.packing import Layout
 from wm_drake.engines.compiled.step_check import check_sample_time, check_step, linearised
@@ -36,6 +38,14 @@ LONGEST_STEP = 2.5e-3
 """Longest step with one derivative that "auto" takes. [s] Peaks hold to 0.1 % with it; the edges of
 friction laws, and not stability, make longer ones inaccurate (docs/performance.md)."""
 
+LARGEST_TURN_OF_MIDPOINT = 0.04
+"""Largest turn of the drum in a step of the midpoint rule. [rad] At a constant speed its relative
+error is turn^2 / 24: 0.007 %."""
+
+LONGEST_STEP_OF_MIDPOINT = 2.5e-4
+"""Longest step of the midpoint rule that "auto" takes. [s] Peaks hold to 0.1 % with it; the sponges
+of MSTV dampers make twice as long ones inaccurate (docs/performance.md)."""
+
 PIECES = (1, 2)
 """Into how many steps with one derivative a step may be divided: four take as long as one step of
 the Runge-Kutta scheme."""
@@ -46,12 +56,14 @@ class Stepping:
     """How a run is integrated.
 
     Attributes:
-        integrator: "multistep" or "runge_kutta".
+        integrator: "multistep", "midpoint" or "runge_kutta".
         step: Step size. [s]
+        relaxation: Matrices R of the midpoint rule, one after the other; none for the others.
     """
 
     integrator: Integrator
     step: float
+    relaxation: FloatArray = field(default_factory=lambda: np.empty(0), compare=False)
 
     def one_derivative(self, schedule: Schedule) -> np.ndarray:
         """Return which steps of a schedule take one derivative. (n,) bool
@@ -76,29 +88,76 @@ def choose_stepping(
         packed, layout: From `pack`.
         profile: Spin profile of the runs.
         step: Largest step. [s]
-        integrator: "multistep" or "runge_kutta" for steps of this size; "auto" for the multistep
-            integrator if the step, or half of it, suits it, else the Runge-Kutta scheme.
+        integrator: "multistep", "midpoint" or "runge_kutta" for steps of this size; "auto" for the
+            midpoint rule with telescopic dampers if a step of 0.25 ms or half of it suits it, else
+            for the multistep integrator if the step, or half of it, suits it, else for the
+            Runge-Kutta scheme.
 
     Raises:
         InputError: the step is too long for the integrator, or the sample time of a controller for
             the drum.
     """
+    moving = setup.cabinet or setup.motor or layout.rubber
+    only_tubes = bool(setup.telescopes) and not moving
+    if integrator == "midpoint" and not only_tubes:
+        raise input_error(
+            "'midpoint' needs telescopic dampers, a cabinet at rest, a prescribed drum speed and "
+            "bushings without branches; allowed are 'auto', 'multistep' or 'runge_kutta'",
+            key="integrator",
+        )
     if integrator != "runge_kutta" and not layout.control_period:
         jacobians, internal = linearised(setup, packed, layout, ACROSS_JUMPS)
         fastest = max(abs(speed) for speed in profile.speed)
-        lengths = [step]
-        if integrator == "auto":
-            lengths = [step / n for n in PIECES if step / n < LONGEST_STEP * (1.0 + 1e-9)]
-        for length in lengths:
-            turn = fastest * length
-            if turn <= LARGEST_TURN and is_followed(jacobians, internal, MARGIN * length):
-                return Stepping("multistep", length)
+        if only_tubes and integrator != "multistep":
+            found = _midpoint(setup, layout, jacobians, fastest, step, integrator)
+            if found:
+                return found
+        if integrator != "midpoint":
+            for length in _lengths(step, integrator, LONGEST_STEP):
+                turn = fastest * length
+                if turn <= LARGEST_TURN and is_followed(jacobians, internal, MARGIN * length):
+                    return Stepping("multistep", length)
     check_step(setup, step)
     check_sample_time(setup)
-    if integrator == "multistep":
+    if integrator in ("multistep", "midpoint"):
         raise input_error(
-            f"'multistep' does not follow this machine at {1e3 * step:g} ms; "
+            f"'{integrator}' does not follow this machine at {1e3 * step:g} ms; "
             "allowed are 'auto', 'runge_kutta' or a shorter step",
             key="integrator",
         )
     return Stepping("runge_kutta", step)
+
+
+def _midpoint(
+    setup: Setup,
+    layout: Layout,
+    jacobians: FloatArray,
+    fastest: float,
+    step: float,
+    integrator: Integrator,
+) -> Stepping | None:
+    """Return how to integrate with the midpoint rule; None if it does not suit the machine.
+
+    Args:
+        setup, layout, step, integrator: As for `choose_stepping`.
+        jacobians: Of the machine, from `linearised`.
+        fastest: Highest speed of the drum. [rad/s]
+    """
+    lengths = [step]
+    if integrator == "auto":
+        fewest = int(np.ceil(step / LONGEST_STEP_OF_MIDPOINT * (1.0 - 1e-9)))
+        lengths = [step / (n * fewest) for n in PIECES]
+    for length in lengths:
+        if fastest * length > LARGEST_TURN_OF_MIDPOINT:
+            continue
+        if midpoint_follows(setup, layout, jacobians, MARGIN * length):
+            matrices = relaxation_matrices(setup, layout, jacobians, length)
+            return Stepping("midpoint", length, matrices.ravel())
+    return None
+
+
+def _lengths(step: float, integrator: Integrator, longest: float) -> list[float]:
+    """Return the steps that may be taken with one derivative, with `longest` for "auto". [s]"""
+    if integrator != "auto":
+        return [step]
+    return [step / n for n in PIECES if step / n < longest * (1.0 + 1e-9)]

@@ -1,18 +1,24 @@
 """Figures of a screening study: contributions, spread, effects, interactions, residuals."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from scipy.stats import f as f_distribution
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH
 from wm_drake.report.formatting import number
 from wm_drake.report.gasket.words import LEVELS, Words
+from wm_drake.studies.doe.anova import AnovaTable, Term
 from wm_drake.studies.gasket.screening import (
+    LEADING_INTERACTION_PERCENT,
     LEADING_MAIN_PERCENT,
     Label,
     Screening,
@@ -20,6 +26,7 @@ from wm_drake.studies.gasket.screening import (
     main_effects,
     mean_at,
 )
+from wm_drake.studies.gasket.surface import Surfaces
 
 LEVEL_COLOURS = (OURS, QUIET, MEASURED)
 """Colours of the levels -1, 0 and 1."""
@@ -42,6 +49,15 @@ CHARACTER = 0.08
 COLUMNS = 3
 """Number of panels in a row."""
 
+PARETO_BARS = 8
+"""Number of bars of a panel of the Pareto chart."""
+
+SIGNIFICANCE = 0.05
+"""Probability below which an F test is called significant."""
+
+INTERACTION, GREY = "#56b4e9", "#b8bec6"
+"""Colours of interactions and of terms that are not significant in the Pareto chart."""
+
 
 def heat_map_figure(screening: Screening, words: Words) -> Figure:
     """Draw the contributions in percent: one row per term, one column per load and response."""
@@ -52,7 +68,7 @@ def heat_map_figure(screening: Screening, words: Words) -> Figure:
     figure = Figure(figsize=(WIDTH, 0.27 * len(shown) + 1.5), layout="constrained")
     axes = figure.subplots()
     # the square root makes small contributions visible
-    image = axes.imshow(np.sqrt(values), cmap="Blues", vmin=0.0, vmax=10.0, aspect="auto")
+    image = axes.imshow(values, cmap="Blues", norm=PowerNorm(0.5, 0.0, 100.0), aspect="auto")
     for (row, column), value in np.ndenumerate(values):
         if value >= 0.5:
             colour = "white" if value > 40.0 else MARK
@@ -97,7 +113,7 @@ def heat_map_figure(screening: Screening, words: Words) -> Figure:
     for side in axes.spines.values():
         side.set_visible(False)
     bar = figure.colorbar(
-        image, ax=axes, fraction=0.025, pad=0.015, ticks=np.sqrt([0, 1, 5, 10, 25, 50, 100])
+        image, ax=axes, fraction=0.025, pad=0.015, ticks=[0, 1, 5, 10, 25, 50, 100]
     )
     bar.ax.set_yticklabels(["0", "1", "5", "10", "25", "50", "100 %"], fontsize=8.5)
     bar.outline.set_visible(False)
@@ -113,6 +129,7 @@ def spread_figure(screening: Screening, names: Sequence[str], what: str, words: 
     panels = figure.subplots(1, len(screening.loads), squeeze=False, sharey=True)[0]
     rng = np.random.default_rng(0)  # for the horizontal spread, which has no meaning
     for axes, load in zip(panels, screening.loads, strict=True):
+        boxes: dict[float, FloatArray] = {}
         for place, name in enumerate(names):
             every = screening.responses.values[load][name].dropna().to_numpy()
             values = _thinned(every)
@@ -126,7 +143,8 @@ def spread_figure(screening: Screening, names: Sequence[str], what: str, words: 
                 markeredgewidth=0.0,
                 rasterized=True,
             )
-            _box(axes, place, every, 0.34)
+            boxes[place] = every
+        _boxes(axes, boxes, 0.34)
         titles = [words.response(name) for name in names]
         width = WIDTH / len(screening.loads) / len(names) / CHARACTER
         is_long = max(map(len, titles)) > width
@@ -149,10 +167,75 @@ def spread_figure(screening: Screening, names: Sequence[str], what: str, words: 
     return figure
 
 
-def main_effects_figure(screening: Screening, load: str, words: Words) -> Figure:
+def pareto_figure(screening: Screening, load: str, words: Words) -> Figure:
+    """Draw the largest contributions to each response as sorted bars, one panel per response.
+
+    Bars of terms that are not significant are grey. Dashed lines: the thresholds of [B] for main
+    effects and interactions. Dotted line: where the F test of a main effect is significant at 5 %.
+    """
+
+    def draw(axes: Axes, label: Label) -> None:
+        table = screening.tables[label]
+        ranked = sorted(table.terms, key=lambda term: -np.nan_to_num(term.percent))[:PARETO_BARS]
+        places = range(len(ranked))
+        axes.barh(
+            places,
+            [float(np.nan_to_num(term.percent)) for term in ranked],
+            color=[_pareto_colour(term) for term in ranked],
+            height=0.72,
+        )
+        for value in (LEADING_MAIN_PERCENT, LEADING_INTERACTION_PERCENT):
+            axes.axvline(value, color=MEASURED, linewidth=0.9, linestyle="--")
+        significant = significant_percent(table)
+        if significant is not None:
+            axes.axvline(significant, color=MARK, linewidth=1.0, linestyle=":")
+        axes.set_yticks(
+            places, [term.name.replace(":", " × ") for term in ranked], fontsize=8, parse_math=False
+        )
+        axes.set_ylim(len(ranked) - 0.5, -0.5)
+        _style_panel(axes, "x")
+        axes.tick_params(axis="y", labelsize=8, length=0)
+
+    figure = _panels(screening, load, draw, words, extra=0.75, name_axis="x", unit="%")
+    handles = [
+        Patch(color=OURS, label="main effect"),
+        Patch(color=INTERACTION, label="interaction"),
+        Patch(color=GREY, label="not significant (F test, 5 %)"),
+        Line2D([], [], color=MEASURED, linestyle="--", linewidth=0.9, label="thresholds of [B]"),
+        Line2D([], [], color=MARK, linestyle=":", label="significant from here (main effects)"),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, frameon=False, fontsize=9)
+    return figure
+
+
+def _pareto_colour(term: Term) -> str:
+    if not term.p < SIGNIFICANCE:  # also of NaN, without degrees of freedom
+        return GREY
+    return OURS if len(term.factors) == 1 else INTERACTION
+
+
+def significant_percent(table: AnovaTable) -> float | None:
+    """Return the contribution at which the F test of a main effect is significant at 5 %.
+
+    It is the same for all main effects of an orthogonal design; of another, this is the median.
+    None without degrees of freedom or spread.
+    """
+    found = [
+        term.percent * float(f_distribution.isf(SIGNIFICANCE, term.df, table.residual_df)) / term.f
+        for term in table.terms
+        if len(term.factors) == 1 and table.residual_df > 0 and np.isfinite(term.f) and term.f > 0.0
+    ]
+    known = [value for value in found if np.isfinite(value)]
+    return float(np.median(known)) if known else None
+
+
+def main_effects_figure(
+    screening: Screening, load: str, words: Words, surfaces: Surfaces
+) -> Figure:
     """Draw the mean response at the three values of each factor, one panel per response.
 
-    A line of a panel is a factor; its name and its values are at the left end of the row.
+    A line of a panel is a factor; its name and its values are at the left end of the row. Bars are
+    the 95 % intervals of the means.
     """
     names = screening.design.factors
     titles = [f"{words.factor(name)}\n{words.span(name)}" for name in names]
@@ -160,15 +243,21 @@ def main_effects_figure(screening: Screening, load: str, words: Words) -> Figure
     def draw(axes: Axes, label: Label) -> None:
         table = screening.tables[label]
         axes.axvline(table.constant, color=QUIET, linewidth=0.8)
-        for place, factor in enumerate(names):
-            means = list(mean_at(screening, label, [factor]).values())
-            percent = next(term.percent for term in table.terms if term.factors == (factor,))
-            strong = percent >= LEADING_MAIN_PERCENT
-            at = place + 0.28 * np.array(LEVELS)
-            axes.plot(means, at, color=MARK if strong else QUIET, linewidth=1.4 if strong else 0.6)
-            shown = zip(means, at, LEVEL_COLOURS, LEVEL_MARKS, strict=True)
-            for mean, y, colour, mark in shown:
-                axes.plot(mean, y, mark, color=colour, markersize=4.5 if strong else 3.0)
+        percents = {t.factors[0]: t.percent for t in table.terms if len(t.factors) == 1}
+        means = np.array([list(mean_at(screening, label, [name]).values()) for name in names])
+        at = np.arange(len(names))[:, None] + 0.28 * np.array(LEVELS)
+        strong = np.array([percents[name] >= LEADING_MAIN_PERCENT for name in names])
+        gap = np.full((len(names), 1), np.nan)
+        for chosen, colour, width in ((~strong, QUIET, 0.6), (strong, MARK, 1.4)):
+            lines = [np.hstack([part[chosen], gap[chosen]]).ravel() for part in (means, at)]
+            axes.plot(*lines, color=colour, linewidth=width)
+        half = np.array([surfaces.mean_half_width(label, n, x) for n in names for x in LEVELS])
+        ends = means.ravel()
+        axes.hlines(at.ravel(), ends - half, ends + half, color=QUIET, linewidth=0.9)
+        for column, (colour, mark) in enumerate(zip(LEVEL_COLOURS, LEVEL_MARKS, strict=True)):
+            for chosen, size in ((~strong, 3.0), (strong, 4.5)):
+                x, y = means[chosen, column], at[chosen, column]
+                axes.plot(x, y, mark, color=colour, markersize=size)
         is_first = axes.get_subplotspec().is_first_col()  # type: ignore[union-attr]
         axes.set_yticks(
             range(len(names)),
@@ -228,10 +317,12 @@ def combinations_figure(screening: Screening, load: str, words: Words) -> Figure
         columns = [screening.design.factors.index(name) for name in (first, second)]
         levels = screening.design.levels[:, columns]
         values = screening.responses.values[label[0]][label[1]].to_numpy()
-        for x in (-1, 0, 1):
-            for level, colour in zip((-1, 0, 1), LEVEL_COLOURS, strict=True):
-                here = values[(levels[:, 0] == x) & (levels[:, 1] == level)]
-                _box(axes, x + 0.27 * level, here[np.isfinite(here)], 0.1, colour)
+        for level, colour in zip(LEVELS, LEVEL_COLOURS, strict=True):
+            here = {
+                x + 0.27 * level: values[(levels[:, 0] == x) & (levels[:, 1] == level)]
+                for x in LEVELS
+            }
+            _boxes(axes, {x: v[np.isfinite(v)] for x, v in here.items()}, 0.1, colour)
         _label_pair(axes, first, second, words)
 
     figure = _panels(screening, load, draw, words, extra=0.75)
@@ -289,6 +380,7 @@ def _panels(
     words: Words,
     extra: float,
     name_axis: Literal["x", "y"] = "y",
+    unit: str = "",
 ) -> Figure:
     """Make one panel per response of a load, three in a row, each with name and unit.
 
@@ -299,6 +391,7 @@ def _panels(
         words: Names of the responses.
         extra: Height of a row beyond that of its axes. [in]
         name_axis: Axis that has the values of the response.
+        unit: Unit on this axis; "" for that of the response.
     """
     names = screening.names
     rows = -(-len(names) // COLUMNS)
@@ -306,7 +399,7 @@ def _panels(
     panels = list(figure.subplots(rows, COLUMNS, squeeze=False).flat)
     for axes, name in zip(panels, names, strict=False):
         draw(axes, (load, name))
-        text = f"{words.response(name)}, {screening.responses.units[name]}"
+        text = f"{words.response(name)}, {unit or screening.responses.units[name]}"
         set_label = axes.set_xlabel if name_axis == "x" else axes.set_ylabel
         set_label(text, fontsize=8.5, parse_math=False)
     for axes in panels[len(names) :]:
@@ -314,38 +407,32 @@ def _panels(
     return figure
 
 
-def _box(
-    axes: Axes, place: float, values: FloatArray, half_width: float, colour: str = MARK
+def _boxes(
+    axes: Axes, values: Mapping[float, FloatArray], half_width: float, colour: str = MARK
 ) -> None:
-    """Draw a line from smallest to largest value, a box between the quartiles, and the median."""
-    if not len(values):
+    """Draw lines from smallest to largest value, boxes between the quartiles, and the medians.
+
+    Args:
+        axes: The panel.
+        values: Values by the place of their box.
+        half_width: Half of the width of a box.
+        colour: Colour of all boxes.
+    """
+    known = {place: np.percentile(v, (0, 25, 50, 75, 100)) for place, v in values.items() if len(v)}
+    if not known:
         return
-    low, first, median, third, high = np.percentile(values, (0, 25, 50, 75, 100))
-    axes.plot([place, place], [low, high], color=colour, linewidth=0.9, solid_capstyle="butt")
-    corners = (
-        [
-            place - half_width,
-            place + half_width,
-            place + half_width,
-            place - half_width,
-            place - half_width,
-        ],
+    places, marks = np.array(list(known)), np.array(list(known.values())).T
+    low, first, median, third, high = marks
+    left, right = places - half_width, places + half_width
+    axes.vlines(places, low, high, color=colour, linewidth=0.9)
+    corners = [[left, first], [right, first], [right, third], [left, third], [left, first]]
+    outline = list(np.moveaxis(np.array(corners), 2, 0))
+    axes.add_collection(
+        PolyCollection(
+            outline, facecolor=(1.0, 1.0, 1.0, 0.45), edgecolor=colour, linewidth=1.2, zorder=3
+        )
     )
-    axes.fill(
-        *corners,
-        [first, first, third, third, first],
-        facecolor=(1.0, 1.0, 1.0, 0.45),
-        edgecolor=colour,
-        linewidth=1.2,
-        zorder=3,
-    )
-    axes.plot(
-        [place - half_width, place + half_width],
-        [median, median],
-        color=colour,
-        linewidth=2.0,
-        zorder=4,
-    )
+    axes.hlines(median, left, right, color=colour, linewidth=2.0, zorder=4)
 
 
 def _thinned(values: FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ from wm_drake.report.gasket.words import LEVELS, Words
 from wm_drake.report.springs import CONSEQUENCE
 from wm_drake.studies.doe.anova import Term
 from wm_drake.studies.gasket.beside import ALONE, Beside
+from wm_drake.studies.gasket.check import Check
 from wm_drake.studies.gasket.level_zero import LevelZero
 from wm_drake.studies.gasket.published import FAR, Published
 from wm_drake.studies.gasket.responses import GAP
@@ -57,6 +58,8 @@ def summary(screening: Screening, words: Words, beside: Beside = ALONE) -> list[
         sentences += _against_published(screening, words, beside.published)
     if beside.level_zero is not None:
         sentences.append(level_zero_text(beside.level_zero, words))
+    if beside.check is not None:
+        sentences.append(about_check(beside.check))
     return sentences
 
 
@@ -353,6 +356,16 @@ def _effect_text(term: Term, unit: str, words: Words) -> str:
         f"{verb} by {digits(abs(high - low))} {unit} as {name} rises from "
         f"{words.span(term.name)} ({share})"
     )
+
+
+def about_check(check: Check) -> str:
+    """Return a sentence on how many runs of `--check` lie inside the interval of the model."""
+    table = check.frame()
+    inside = int(table["is_inside"].sum())
+    text = (
+        f"{inside} of {len(table)} responses of the checked settings lie inside the 95 % interval"
+    )
+    return f"{text} of the fitted model."
 
 
 def about_residual(screening: Screening) -> str:

@@ -6,7 +6,15 @@ from pathlib import Path
 from wm_drake.parameters.machine import DEFAULT_STEP
 from wm_drake.report.formatting import number
 from wm_drake.report.gasket import figures, tables
-from wm_drake.report.gasket.findings import about_residual, advice, load_findings, summary, warnings
+from wm_drake.report.gasket.explore import explorer_data
+from wm_drake.report.gasket.findings import (
+    about_check,
+    about_residual,
+    advice,
+    load_findings,
+    summary,
+    warnings,
+)
 from wm_drake.report.gasket.words import Words
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.tables import Table, parameter_table
@@ -15,6 +23,7 @@ from wm_drake.studies.gasket.beside import ALONE, Beside
 from wm_drake.studies.gasket.published import Published
 from wm_drake.studies.gasket.screening import Screening
 from wm_drake.studies.gasket.study import GasketTrials
+from wm_drake.studies.gasket.surface import Surfaces, surfaces
 
 
 @dataclass(frozen=True)
@@ -47,6 +56,7 @@ def gasket_report(
     """
     parameters = trials.parameters
     words = Words(trials.factors, screening.responses.meanings)
+    models = surfaces(screening)
     return render(
         "gasket/page.html",
         title=f"Gasket study of machine {parameters.name}",
@@ -60,10 +70,14 @@ def gasket_report(
         about_residual=about_residual(screening),
         spreads=_spreads(screening, words),
         loads=[
-            _load_view(screening, index, load, words, beside.published)
+            _load_view(screening, index, load, words, beside.published, models)
             for index, load in enumerate(screening.loads)
         ],
         level_zero=beside.level_zero and tables.level_zero(beside.level_zero, words),
+        models=explorer_data(screening, models, trials, words),
+        has_interactions=screening.design.model != "main",
+        check=beside.check and tables.check(beside.check, words),
+        about_check=beside.check and about_check(beside.check),
         design=tables.design(screening),
         factors=tables.factors(trials.factors, words),
         responses=_about_responses(screening, words),
@@ -157,7 +171,12 @@ def _spreads(screening: Screening, words: Words) -> list[Picture]:
 
 
 def _load_view(
-    screening: Screening, index: int, load: str, words: Words, published: Published
+    screening: Screening,
+    index: int,
+    load: str,
+    words: Words,
+    published: Published,
+    models: Surfaces,
 ) -> LoadView:
     return LoadView(
         anchor=f"load-{index + 1}",
@@ -165,19 +184,29 @@ def _load_view(
         findings=tuple(load_findings(screening, load, words)),
         leading=tables.leading(screening, load, words, published),
         contributions=tables.contributions(screening, load, words),
-        pictures=tuple(_pictures(screening, load, words)),
+        pictures=tuple(_pictures(screening, load, words, models)),
     )
 
 
-def _pictures(screening: Screening, load: str, words: Words) -> list[Picture]:
+def _pictures(screening: Screening, load: str, words: Words, models: Surfaces) -> list[Picture]:
     shown = [
         picture(
-            figures.main_effects_figure(screening, load, words),
+            figures.pareto_figure(screening, load, words),
+            f"Largest contributions to every response, load {load}.",
+            f"Pareto chart of the contributions, load {load}: the largest shares of the variance "
+            "of each response, in percent. Dashed lines: thresholds of [B] Table 5, 10 % for main "
+            "effects and 5 % for interactions. Dotted line and grey bars: F test at 5 % against "
+            "the residual. This is a yardstick only: the residual is what the model leaves out, "
+            "not noise.",
+        ),
+        picture(
+            figures.main_effects_figure(screening, load, words, models),
             f"Main effects of every factor on every response, load {load}.",
             f"Main effects, load {load}: mean response at the low, middle and high value of each "
             "factor, averaged over all values of the other factors. Black lines: factors that "
-            "contribute 10 % of the variance or more. Vertical line: overall mean.",
-        )
+            "contribute 10 % of the variance or more. Vertical line: overall mean. Bars: 95 % "
+            "intervals of the means.",
+        ),
     ]
     if screening.design.model != "main":
         shown.append(

@@ -8,6 +8,7 @@ from wm_drake.report.gasket.words import LEVELS, Words
 from wm_drake.report.tables import Group, Row, Table, line
 from wm_drake.studies.doe import MODELS
 from wm_drake.studies.doe.anova import Term
+from wm_drake.studies.gasket.check import Check
 from wm_drake.studies.gasket.level_zero import LevelZero
 from wm_drake.studies.gasket.published import FAR, NOTHING, Published
 from wm_drake.studies.gasket.screening import (
@@ -201,6 +202,36 @@ def level_zero(zero: LevelZero, words: Words) -> Table:
         "rest, as in [B]. Differences are from the machine."
     )
     return Table(caption, header, tuple(groups), text_columns=3)
+
+
+def check(found: Check, words: Words) -> Table:
+    """Return prediction and run of each setting of `--check`."""
+    groups = []
+    for setting, of_setting in found.frame().groupby("setting", sort=False):
+        rows = []
+        for _, row in of_setting.iterrows():
+            cells = [digits(row[name]) for name in ("predicted", "half_width", "run", "difference")]
+            inside = "yes" if row["is_inside"] else "no"
+            kind = "" if row["is_inside"] else "alarm"
+            what = (str(row["load"]), words.response(str(row["response"])), str(row["unit"]))
+            rows.append(Row((*what, *cells, inside), kind))
+        groups.append(Group(str(setting), tuple(rows)))
+    caption = (
+        "Settings of --check: prediction of the fitted model, half width of its 95 % interval for "
+        "a new run, the run, and run − prediction. Other factors are at their middle level."
+    )
+    header = (
+        "setting",
+        "load",
+        "response",
+        "unit",
+        "predicted",
+        "± 95 %",
+        "run",
+        "difference",
+        "inside",
+    )
+    return Table(caption, header, tuple(groups), text_columns=4)
 
 
 def _change(value: float) -> str:

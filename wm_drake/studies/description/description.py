@@ -12,7 +12,14 @@ from wm_drake.model.bodies import oscillating_bodies, tubes_of
 from wm_drake.model.equilibrium import tensions_at
 from wm_drake.model.machine import OUTPUT_PERIOD, Machine, Setup
 from wm_drake.model.state_layout import CARRIER
-from wm_drake.parameters import DAMPER_LAWS, ForceTable, MachineParameters, TorqueTable
+from wm_drake.parameters import (
+    DAMPER_LAWS,
+    BushingType,
+    ForceTable,
+    MachineParameters,
+    TorqueTable,
+)
+from wm_drake.parameters.rubber import RubberBranches
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.measures import BAND_HZ, FILTER_ORDER, PADDING
 from wm_drake.simulation.vibration import HIGH_PASS_HZ
@@ -133,6 +140,12 @@ def _laws(parameters: MachineParameters) -> dict[str, str]:
     found["spring"] = "Hooke's law; wm_drake.laws.spring.spring_tension"
     if parameters.all_bushings() or parameters.telescopic_dampers:
         found["bushing"] = "[A] (7), (8), [B] Fig. 4; wm_drake.laws.bushing.bushing_force"
+    if any(bushing.branches_in_use for bushing in parameters.all_bushings().values()):
+        found["rubber"] = (
+            "friction F_max z / x_c with z' = v - |v| z / x_c (Dahl 1968; F_max dahl_force, x_c "
+            "dahl_displacement), Maxwell spring k z with z' = v - k z / c, cross-stiffness K: "
+            "F_i = -K_ij q_j over position and rotation vector; wm_drake.laws.rubber"
+        )
     if parameters.dampers:
         found["end_bushing"] = "[A] (7), [B] section 3; wm_drake.laws.strut.bending_moment"
     return found
@@ -140,9 +153,15 @@ def _laws(parameters: MachineParameters) -> dict[str, str]:
 
 _RUNGE_KUTTA = "classical Runge-Kutta method of fourth order, fixed step"
 _MULTISTEP = "explicit multistep method of fourth order, one derivative a step, fixed step"
+_MIDPOINT = (
+    "implicit midpoint rule with one Newton step and a constant Jacobian of each damper's tubes, "
+    "one derivative a step, fixed step"
+)
 INTEGRATORS = {
-    "auto": f"{_MULTISTEP}, where it suits the machine; else {_RUNGE_KUTTA}",
+    "auto": f"{_MULTISTEP}, where it suits the machine; with telescopic dampers {_MIDPOINT}; "
+    f"else {_RUNGE_KUTTA}",
     "multistep": _MULTISTEP,
+    "midpoint": _MIDPOINT,
     "runge_kutta": _RUNGE_KUTTA,
 }
 """Description of each integrator of the compiled engine."""
@@ -295,8 +314,11 @@ def _bushing(setup: Setup, name: str) -> dict[str, Any]:
     constants = {
         key: _stiffness(value) if isinstance(value, ForceTable | TorqueTable) else value
         for key, value in element
-        if not key.endswith("_frame")
+        if key in BushingType.model_fields
     }
+    rubber = {key: value for key, value in element if key in RubberBranches.model_fields and value}
+    if rubber:
+        constants["rubber"] = rubber
     return {
         "tub_point_T": placed.tub_side_point.tolist(),
         "tub_rotation_T": placed.tub_side_rotation.tolist(),

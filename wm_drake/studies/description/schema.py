@@ -192,6 +192,12 @@ class Bushing(BushingLaw):
     tub_rotation_T: Rotation
     housing_point_W: Vector = Field(description="[m]")
     housing_rotation_W: Rotation
+    rubber: dict[str, float] | None = Field(
+        None,
+        description="Friction, Maxwell branches and cross-stiffness by key of the machine file, as "
+        "far as they are not 0; in SI (N, m, N m, rad, s). Their stretches are 0 at the start of a "
+        "run. None or absent without them.",
+    )
 
 
 class TelescopicDamper(_Part):

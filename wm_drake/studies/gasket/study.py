@@ -61,11 +61,15 @@ class GasketTrials:
         """Yield all runs: for each trial, one for each load."""
         for number, levels in enumerate(design.levels, start=1):
             changed = at_levels(self.parameters, self.factors, levels.tolist())
-            for case in self.loads:
-                # a factor may be a mass of one of the machine's own loads
-                is_own = self.parameters.loads.get(case.name) == case.load
-                load = changed.loads[case.name] if is_own else case.load
-                yield Case(f"{case.name}, trial {number}", load, case.profile, parameters=changed)
+            yield from self.cases_of(changed, f"trial {number}")
+
+    def cases_of(self, changed: MachineParameters, name: str) -> Iterator[Case]:
+        """Yield a case of each load for a changed machine."""
+        for case in self.loads:
+            # a factor may be a mass of one of the machine's own loads
+            is_own = self.parameters.loads.get(case.name) == case.load
+            load = changed.loads[case.name] if is_own else case.load
+            yield Case(f"{case.name}, {name}", load, case.profile, parameters=changed)
 
     def responses(self, design: Design, run: Run) -> Responses:
         """Run all trials and return their responses."""

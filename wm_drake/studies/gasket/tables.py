@@ -33,7 +33,8 @@ def write_tables(
         screening: Result of the study.
         folder: Where the files are written.
         factors: Levels of the factors, for their physical values in design.csv and runs.csv.
-        beside: What the results are compared with; published.csv and level_zero.csv show it.
+        beside: What the results are compared with; published.csv, level_zero.csv and
+            check.csv show it.
     """
     values = physical_values(screening.design, factors)
     write_design(screening.design, folder / "design.csv", values)
@@ -48,6 +49,8 @@ def write_tables(
         tables["published.csv"] = published_table(screening, beside.published)
     if beside.level_zero is not None:
         tables["level_zero.csv"] = beside.level_zero.frame()
+    if beside.check is not None:
+        tables["check.csv"] = beside.check.frame()
     for name, table in tables.items():
         table.to_csv(folder / name, index=False, float_format=DIGITS)
 
@@ -248,6 +251,11 @@ def as_plain_data(screening: Screening, beside: Beside = ALONE) -> dict[str, Any
     compared: dict[str, Any] = {}
     if published:
         compared["published"] = published.source
+    if beside.check is not None:
+        compared["check"] = [
+            {k: finite(v) if isinstance(v, float) else v for k, v in row.items()}
+            for row in beside.check.frame().to_dict("records")
+        ]
     if zero is not None:
         compared["level_zero"] = {
             "tables": zero.tables,

@@ -134,7 +134,7 @@ def trajectory_of_period(
     """Return a revolution of a periodic motion; it has no torque and no accelerations (NaN)."""
     phase = 2.0 * np.pi * np.arange(samples) / samples
     states = balance.states(coefficients, speed, phase)
-    motion, deformation, tubes, carrier = balance.derivative.layout.parts(states)
+    motion, deformation, tubes, carrier, stretches = balance.derivative.layout.parts(states)
     return Trajectory(
         phase / speed,
         np.ascontiguousarray(motion),
@@ -143,6 +143,7 @@ def trajectory_of_period(
         np.full((samples, 6), np.nan),
         tubes,
         np.ascontiguousarray(carrier),
+        np.ascontiguousarray(stretches),
     )
 
 
@@ -163,6 +164,7 @@ def _measured(setup: Setup, balance: HarmonicBalance, points: list[Point]) -> xr
         joined("acceleration"),
         joined("tubes"),
         joined("carrier"),
+        joined("stretches"),
     )
     variables = variables_of(setup, whole)
 

@@ -43,6 +43,7 @@ def settled_trajectory(
         run.acceleration[kept],
         run.tubes[kept],
         run.carrier[kept],
+        run.stretches[kept],
         run.divergence,
     )
 
@@ -56,5 +57,5 @@ def settled_coefficients(balance: HarmonicBalance, setup: Setup, speed: float) -
         [run.tubes, run.deformation[:, len(setup.dampers) :, None]], axis=2
     ).reshape(len(run.time), -1)
     own = run.deformation[:, : len(setup.dampers)]
-    states = np.hstack([run.state, own, tubes, run.carrier])
+    states = np.hstack([run.state, own, tubes, run.carrier, run.stretches])
     return np.asarray(balance.series.analysis @ states[:, balance.derivative.free])

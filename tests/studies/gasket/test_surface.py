@@ -1,0 +1,125 @@
+"""Tests of the fitted model of a gasket study between its levels, and of its check by runs."""
+
+import itertools
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from wm_drake.errors import InputError
+from wm_drake.parameters import (
+    GASKET_FACTORS,
+    at_levels,
+    at_places,
+    levels_of,
+    load_factors,
+    load_machine,
+    place_of,
+    quantities,
+)
+from wm_drake.studies.doe import make_design
+from wm_drake.studies.gasket.check import Check, Setting
+from wm_drake.studies.gasket.screening import Responses, run_screening
+from wm_drake.studies.gasket.surface import codes, model_row, surfaces
+
+NAMES = ("a", "b", "c")
+
+
+def truth(x):
+    """Polynomial that the model with interactions contains."""
+    a, b, c = np.asarray(x, dtype=float).T
+    return 3.0 + 2.0 * a - 1.5 * a * a + b + 0.5 * a * b * b - 0.25 * a * a * c * c + 0.1 * c
+
+
+def screening_of(noise, seed=0):
+    def evaluate(design):
+        rng = np.random.default_rng(seed)
+        y = truth(design.levels) + noise * rng.normal(size=design.trials)
+        return Responses({"middle": pd.DataFrame({"y": y})}, {"y": "mm"}, {})
+
+    return run_screening(make_design("full", NAMES, model="main+2fi"), evaluate)
+
+
+def test_codes_are_those_of_the_levels():
+    assert codes(np.array([-1.0, 0.0, 1.0])).tolist() == [[1.0, 0.0], [0.0, 1.0], [-1.0, -1.0]]
+
+
+def test_polynomial_of_the_model_is_recovered_between_the_levels():
+    found = surfaces(screening_of(0.0))
+    for x in np.random.default_rng(1).uniform(-1.0, 1.0, (20, 3)):
+        assert found.prediction(("middle", "y"), x) == pytest.approx(truth(x), abs=1e-10)
+
+
+def test_intervals_are_those_of_least_squares_with_another_basis():
+    screening = screening_of(0.4)
+    found, label, x = surfaces(screening), ("middle", "y"), (0.3, -0.7, 0.5)
+
+    def powers(a, b, c):
+        one = [[v, v * v] for v in (a, b, c)]
+        pairs = [p * q for u, w in itertools.combinations(one, 2) for p in u for q in w]
+        return np.array([1.0, *itertools.chain(*one), *pairs])
+
+    levels = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=3)))
+    order = {tuple(row): i for i, row in enumerate(screening.design.levels.tolist())}
+    y = screening.responses.values["middle"]["y"].to_numpy()
+    y = y[[order[tuple(map(int, row))] for row in levels]]
+    matrix = np.array([powers(*row) for row in levels])
+    beta, residual, *_ = np.linalg.lstsq(matrix, y)
+    df = len(y) - matrix.shape[1]
+    leverage = powers(*x) @ np.linalg.solve(matrix.T @ matrix, powers(*x))
+    spread = stats.t.ppf(0.975, df) * np.sqrt(residual[0] / df)
+    assert found.prediction(label, x) == pytest.approx(powers(*x) @ beta, abs=1e-10)
+    assert found.half_width(label, x, of_run=False) == pytest.approx(spread * leverage**0.5)
+    assert found.half_width(label, x, of_run=True) == pytest.approx(spread * (1 + leverage) ** 0.5)
+    # a mean over 9 of the 27 trials of the full factorial
+    assert found.mean_half_width(label, "b", 1.0) == pytest.approx(spread / 3.0)
+
+
+def test_row_without_interactions_is_short():
+    assert model_row((0.0, 1.0), interactions=False).tolist() == [1.0, 0.0, 1.0, -1.0, -1.0]
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return load_machine("reference")
+
+
+@pytest.mark.parametrize("tables", ["scaled", "linear"])
+def test_places_on_levels_are_the_levels_and_between_them_lie_between(machine, tables):
+    factors = levels_of(machine, load_factors(GASKET_FACTORS), tables)
+    levels = [-1, 0, 1, 0, -1, 1, 0, 1]
+    ours = {k: v for k, v, _ in quantities(at_places(machine, factors, levels))}
+    theirs = {k: v for k, v, _ in quantities(at_levels(machine, factors, levels))}
+    assert ours.keys() == theirs.keys()
+    for key, value in theirs.items():
+        assert ours[key] == pytest.approx(value, rel=1e-12), key
+    half = at_places(machine, factors, [0.5] * 8)
+    for factor in factors:
+        for key, setting in factor.settings[1].items():
+            if isinstance(setting, float):
+                values = {k: v for k, v, _ in quantities(half)}
+                assert values[key] == pytest.approx(
+                    0.5 * (setting + factor.settings[2][key]), rel=1e-12
+                )
+
+
+def test_place_of_a_value_in_percent_and_with_unit(machine):
+    factor = next(f for f in levels_of(machine, load_factors(GASKET_FACTORS)) if f.name == "C_L")
+    assert place_of(machine, factor, "50 %") == pytest.approx(-1.0)
+    assert place_of(machine, factor, "125 %") == pytest.approx(0.5)
+    shown = factor.numbers["gasket.damping_x"]
+    assert place_of(machine, factor, f"{shown[2]} N*s/mm") == pytest.approx(1.0)
+    with pytest.raises(InputError, match="outside the range of factor C_L"):
+        place_of(machine, factor, "200 %")
+
+
+def test_check_says_which_runs_are_inside_the_interval():
+    found = surfaces(screening_of(0.4))
+    settings = (Setting("a=1", (1.0, 0.0, 0.0)), Setting("a=-1", (-1.0, 0.0, 0.0)))
+    half = found.half_width(("middle", "y"), settings[0].places, of_run=True)
+    middle = found.prediction(("middle", "y"), settings[0].places)
+    runs = pd.DataFrame({"y": [middle + 0.9 * half, 99.0]})
+    table = Check(settings, found, Responses({"middle": runs}, {"y": "mm"}, {})).frame()
+    assert table.is_inside.tolist() == [True, False]
+    assert table.difference[0] == pytest.approx(0.9 * half)

@@ -1,0 +1,232 @@
+"""The midpoint rule for machines with telescopic dampers: one evaluation of the derivative a step.
+
+The tubes of a damper are light bodies between stiff bushings: their own motions are much faster
+than the tub, so that explicit steps must be short. The implicit midpoint rule has no such limit.
+With positions q, velocities v, accelerations a(q, v) and q' = E(q) v, a step of length h has the
+acceleration A that solves
+
+    A = a(q + h/2 E (v + h/2 A), v + h/2 A)
+
+Own derivation: one Newton step from the A of the step before, with a Jacobian that stays the same
+for the whole run, of each damper for itself:
+
+    A = A_before + R (a(q + h/2 E (v + h/2 A_before), v + h/2 A_before) - A_before)
+    R = inverse of 1 - h/2 da/dv - h^2/4 da/dq E
+
+The tub and the drum's carrier move slowly and have R = 1. A slow motion has the same A as with the
+exact solution, to second order in h, whatever R is: R acts on the change of A only. Friction that
+is steeper in R than at the moment does not act like additional mass. A sponge takes a midpoint step
+under the predicted velocities.
+
+The step needs no step before it but for A, so the corners of a profile need no start.
+"""
+
+from collections import namedtuple
+
+from wm_drake.compiler.compilation import law, long_running
+from wm_drake.compiler.elementary import sine_cosine
+from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.elements.motion import TREE_STATE, rpy_rates
+from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE
+from wm_drake.engines.compiled.mechanics import (
+    DRUM_ANGLE,
+    DRUM_RATE,
+    STATE_SIZE,
+    carrier_begin,
+    inputs_size,
+    mass_properties,
+    state_derivative,
+    state_size,
+    write_sample,
+)
+from wm_drake.engines.compiled.packing import aligned
+from wm_drake.engines.compiled.tubes import DEFORMATION, TUBES_STATE_SIZE, telescopic_damper_count
+
+BODY, TUBES = 6, 7
+"""Degrees of freedom of a floating body, and of the tubes of a damper."""
+VELOCITIES = TREE_STATE.offsets["angular_velocity"]
+"""Where the velocities of a `TREE_STATE` begin; its positions are before them, in this order."""
+CARRIER_VELOCITIES = CARRIER_STATE_SIZE // 2
+
+MidpointWork = namedtuple("MidpointWork", ("rate", "inputs", "middle", "past", "change"))
+"""Arrays to work in. `past` must stay from call to call: at the index of each velocity its A, at
+that of each sponge the rate of its deformation."""
+
+
+def midpoint_work(size, inputs):
+    """Return the `MidpointWork` for states and inputs of these sizes."""
+    sizes = (size, inputs, size, size, TUBES)
+    return MidpointWork(*(aligned(count * WIDTH) for count in sizes))
+
+
+@long_running
+def integrate_midpoint_lanes(steps, begin, end, p, elements, relaxation, x, work, history):
+    """Advance `lanes.WIDTH` machines by steps of the midpoint rule.
+
+    Args:
+        steps: Length, drum acceleration, drum motion and sample number of each step, four fields
+            of a `Schedule`; no arrays of lanes.
+        begin, end: Numbers of steps.
+        p: Packed numbers.
+        elements: `Elements`, which all machines have in common; telescopes is not None.
+        relaxation: R of each telescopic damper, by rows.
+        x: States; they are advanced.
+        work: `MidpointWork`, the same from the first step to the last.
+        history: Samples, as in `wm_drake.engines.compiled.integration`.
+    """
+    align_stack()
+    numbers, state, samples = lane_array(p), lane_array(x), lane_array(history)
+    rate, inputs, middle = lane_array(work.rate), lane_array(work.inputs), lane_array(work.middle)
+    past, change = lane_array(work.past), lane_array(work.change)
+    matrices = lane_array(relaxation)
+    length, acceleration, drum, row = steps
+    zero = 0.0 * state[0]
+    for i in range(begin, end):
+        if row[i] >= 0 or i == 0:
+            masses = mass_properties(numbers, drum[2 * i, 1], drum[2 * i, 2])
+            state_derivative(
+                state, rate, inputs, masses, drum[2 * i, 0], acceleration[i], numbers, elements
+            )
+            if row[i] >= 0:
+                write_sample(samples, row[i], state, rate, elements)
+            if i == 0:
+                for k in range(state_size(elements)):
+                    past[k] = rate[k]
+        h = length[i]
+        predict_middle(state, middle, past, h, elements)
+        node = 2 * i + 1
+        masses = mass_properties(numbers, drum[node, 1], drum[node, 2])
+        state_derivative(
+            middle, rate, inputs, masses, drum[node, 0], acceleration[i], numbers, elements
+        )
+        advance(state, middle, rate, past, change, h, matrices, elements)
+        state[DRUM_ANGLE] = zero + drum[2 * i + 2, 3]
+        state[DRUM_RATE] = zero + drum[2 * i + 2, 0]
+
+
+@law
+def predict_middle(state, middle, past, h, elements):
+    """Write the state in the middle of a step, with the accelerations of the step before.
+
+    Args:
+        state: State at the start of the step.
+        middle: State, written.
+        past: See `MidpointWork`.
+        h: Length of the step. [s]
+        elements: `Elements`.
+    """
+    predict_body(state, middle, past, 0, VELOCITIES, BODY, h)
+    middle[DRUM_ANGLE], middle[DRUM_RATE] = state[DRUM_ANGLE], state[DRUM_RATE]
+    for k in range(STATE_SIZE, STATE_SIZE + inputs_size(elements)):
+        middle[k] = state[k] + 0.5 * h * past[k]
+    for i in range(telescopic_damper_count(elements.telescopes)):
+        at = elements.tubes + TUBES_STATE_SIZE * i
+        predict_body(state, middle, past, at, VELOCITIES, TUBES, h)
+        sponge = at + DEFORMATION
+        middle[sponge] = state[sponge] + 0.5 * h * past[sponge]
+    if elements.bearing is not None:
+        at = carrier_begin(elements)
+        predict_body(state, middle, past, at, CARRIER_VELOCITIES, BODY, h)
+
+
+@law
+def predict_body(state, middle, past, at, velocities, count, h):
+    """Write the part of `predict_middle` of the body whose state begins at index `at`.
+
+    Args:
+        state, middle, past, h: As for `predict_middle`.
+        at, velocities: Index where the body begins, and of its velocities from there.
+        count: Number of its velocities.
+    """
+    for k in range(at, at + count):
+        middle[velocities + k] = state[velocities + k] + 0.5 * h * past[velocities + k]
+    move_body(state, middle, state, middle, at, velocities, count, 0.5 * h)
+
+
+@law
+def move_body(state, moved, angles, velocity, at, velocities, count, time):
+    """Write the positions of a body after some time with constant velocities.
+
+    Args:
+        state: Positions before.
+        moved: Positions after it, written.
+        angles: State whose roll, pitch and yaw give the rates of the angles.
+        velocity: State with the velocities.
+        at, velocities, count: See `predict_body`.
+        time: Time. [s]
+    """
+    first = at + velocities
+    w = (velocity[first], velocity[first + 1], velocity[first + 2])
+    rates = rpy_rates(w, sine_cosine(angles[at + 1]), sine_cosine(angles[at + 2]))
+    for k in range(3):
+        moved[at + k] = state[at + k] + time * rates[k]
+    for k in range(3, count):
+        moved[at + k] = state[at + k] + time * velocity[first + k]
+
+
+@law
+def advance(state, middle, rate, past, change, h, relaxation, elements):
+    """Advance the state by a step and keep its accelerations.
+
+    Args:
+        state: State at the start of the step, advanced.
+        middle, rate: Predicted state in the middle of the step, and its time derivative there.
+        past: See `MidpointWork`; written.
+        change: Array to work in.
+        h: Length of the step. [s]
+        relaxation: R of each telescopic damper, by rows.
+        elements: `Elements`.
+    """
+    keep(past, rate, VELOCITIES, BODY)
+    advance_body(state, middle, past, 0, VELOCITIES, BODY, h)
+    for k in range(STATE_SIZE, STATE_SIZE + inputs_size(elements)):
+        past[k] = rate[k]
+        state[k] = state[k] + h * rate[k]
+    for i in range(telescopic_damper_count(elements.telescopes)):
+        at = elements.tubes + TUBES_STATE_SIZE * i
+        relax(past, rate, change, at + VELOCITIES, relaxation, TUBES * TUBES * i)
+        advance_body(state, middle, past, at, VELOCITIES, TUBES, h)
+        sponge = at + DEFORMATION
+        past[sponge] = rate[sponge]
+        state[sponge] = state[sponge] + h * rate[sponge]
+    if elements.bearing is not None:
+        at = carrier_begin(elements)
+        keep(past, rate, at + CARRIER_VELOCITIES, BODY)
+        advance_body(state, middle, past, at, CARRIER_VELOCITIES, BODY, h)
+
+
+@law
+def keep(past, rate, first, count):
+    """Keep the accelerations from index `first` as they were evaluated."""
+    for k in range(first, first + count):
+        past[k] = rate[k]
+
+
+@law
+def relax(past, rate, change, first, relaxation, at):
+    """Take the Newton step of the accelerations of a damper, from index `first`.
+
+    Args:
+        past, rate, change: As for `advance`.
+        first: Index of the first velocity.
+        relaxation, at: Array that holds R, and where it begins.
+    """
+    for k in range(TUBES):
+        change[k] = rate[first + k] - past[first + k]
+    for row in range(TUBES):
+        total = past[first + row]
+        for column in range(TUBES):
+            total = total + relaxation[at + TUBES * row + column] * change[column]
+        past[first + row] = total
+
+
+@law
+def advance_body(state, middle, past, at, velocities, count, h):
+    """Advance a body by a step with the accelerations in `past`; arguments as `predict_body`.
+
+    The velocities in `middle` are replaced by those in the middle of the step.
+    """
+    for k in range(at + velocities, at + velocities + count):
+        middle[k] = state[k] + 0.5 * h * past[k]
+        state[k] = state[k] + h * past[k]
+    move_body(state, state, middle, middle, at, velocities, count, h)

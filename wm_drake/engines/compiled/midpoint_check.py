@@ -1,0 +1,137 @@
+"""When the midpoint rule of `wm_drake.engines.compiled.midpoint` suits a machine, and its matrices.
+
+The linearised machine takes the steps of the rule, with the matrices R of the machine at rest, at
+states with slow and fast motion. It must not grow faster than the linearised machine itself.
+"""
+
+import numpy as np
+from scipy.linalg import expm
+
+from wm_drake.engines.compiled.mechanics import STATE_SIZE
+from wm_drake.engines.compiled.midpoint import BODY, CARRIER_VELOCITIES, TUBES, VELOCITIES
+from wm_drake.engines.compiled.packing import Layout
+from wm_drake.engines.compiled.step_check import free_states
+from wm_drake.engines.compiled.tubes import DEFORMATION, TUBES_STATE_SIZE
+from wm_drake.model.machine import Setup
+from wm_drake.parameters.types import FloatArray
+
+DOUBLINGS = 9
+"""Growth is seen from 2^9 to 2^10 steps."""
+
+LARGEST_GROWTH = 3.0
+"""Largest growth in these steps beyond that of the linearised machine."""
+
+
+def relaxation_matrices(
+    setup: Setup, layout: Layout, jacobians: FloatArray, step: float
+) -> FloatArray:
+    """Return R of each telescopic damper at a step, from the Jacobian at rest. (dampers, 7, 7)
+
+    Args:
+        setup, layout: The machine and its layout.
+        jacobians: (lanes, n, n) of its free states, the first one at rest. [1/s]
+        step: Step size. [s]
+    """
+    place = _places(setup)
+    return np.array(
+        [
+            np.linalg.inv(_newton_matrix(jacobians[0], place, begin, step))
+            for begin in _tubes(layout)
+        ]
+    )
+
+
+def _newton_matrix(
+    jacobian: FloatArray, place: dict[int, int], begin: int, step: float
+) -> FloatArray:
+    """Return the inverse of R of the damper whose state begins at an index. (7, 7)"""
+    q = [place[begin + k] for k in range(TUBES)]
+    v = [place[begin + VELOCITIES + k] for k in range(TUBES)]
+    by_position = jacobian[np.ix_(v, q)] @ jacobian[np.ix_(q, v)]
+    found: FloatArray = (
+        np.eye(TUBES) - 0.5 * step * jacobian[np.ix_(v, v)] - 0.25 * step**2 * by_position
+    )
+    return found
+
+
+def midpoint_follows(setup: Setup, layout: Layout, jacobians: FloatArray, step: float) -> bool:
+    """Return whether steps of the midpoint rule grow no faster than the linearised machine.
+
+    Args:
+        setup, layout, jacobians, step: As for `relaxation_matrices`.
+    """
+    if not np.all(np.isfinite(jacobians)):
+        return False
+    steps = step_matrices(setup, layout, jacobians, step)
+    with np.errstate(over="ignore", invalid="ignore"):
+        grown = _growth(steps) / np.maximum(_growth(expm(step * jacobians)), 1.0)
+    return bool(np.all(grown <= LARGEST_GROWTH))  # not a number: no
+
+
+def step_matrices(setup: Setup, layout: Layout, jacobians: FloatArray, step: float) -> FloatArray:
+    """Return the matrices that take the linearised machine through a step of the midpoint rule.
+
+    Args:
+        setup, layout, jacobians, step: As for `relaxation_matrices`.
+
+    Returns:
+        (lanes, m, m) for the free states, then what is kept from step to step: the acceleration
+        of each velocity and the rate of each sponge.
+    """
+    place = _places(setup)
+    q, v, sponges = (np.array([place[k] for k in part]) for part in _parts(setup, layout))
+    n, moving, internal = jacobians.shape[1], len(v), len(sponges)
+    relaxation = np.eye(moving)
+    for number, matrix in enumerate(relaxation_matrices(setup, layout, jacobians, step)):
+        at = BODY + TUBES * number
+        relaxation[at : at + TUBES, at : at + TUBES] = matrix
+    state, kept, rates = np.split(np.eye(n + moving + internal), [n, n + moving])
+    found = []
+    for jacobian in jacobians:
+        kinematics = jacobian[np.ix_(q, v)]
+        middle, after = state.copy(), state.copy()
+        middle[v] += 0.5 * step * kept
+        middle[q] += 0.5 * step * kinematics @ middle[v]
+        middle[sponges] += 0.5 * step * rates
+        rate = jacobian @ middle
+        acceleration = kept + relaxation @ (rate[v] - kept)
+        after[q] += step * kinematics @ (state[v] + 0.5 * step * acceleration)
+        after[v] += step * acceleration
+        after[sponges] += step * rate[sponges]
+        found.append(np.vstack([after, acceleration, rate[sponges]]))
+    return np.array(found)
+
+
+def _growth(matrices: FloatArray) -> FloatArray:
+    """Return how much a power 2^(DOUBLINGS + 1) of each matrix is larger than its root. (n,)"""
+    power = matrices
+    for _ in range(DOUBLINGS):
+        power = power @ power
+    sizes = [np.linalg.norm(each, axis=(1, 2)) for each in (power @ power, power)]
+    return np.asarray(sizes[0] / sizes[1])
+
+
+def _places(setup: Setup) -> dict[int, int]:
+    """Return the place of each free state among them, by its index in the state."""
+    free, _ = free_states(setup)
+    return {index: place for place, index in enumerate(free)}
+
+
+def _tubes(layout: Layout) -> list[int]:
+    """Return the index in the state where each telescopic damper begins."""
+    begin = STATE_SIZE + len(layout.dampers)
+    return [begin + TUBES_STATE_SIZE * number for number in range(len(layout.telescopes))]
+
+
+def _parts(setup: Setup, layout: Layout) -> tuple[list[int], list[int], list[int]]:
+    """Return the indices in the state of positions, of their velocities, and of sponges."""
+    bodies = [(0, VELOCITIES, BODY)]
+    bodies += [(begin, VELOCITIES, TUBES) for begin in _tubes(layout)]
+    sponges = list(range(STATE_SIZE, STATE_SIZE + len(layout.dampers)))
+    sponges += [begin + DEFORMATION for begin in _tubes(layout)]
+    if setup.bearing:
+        end = STATE_SIZE + len(layout.dampers) + TUBES_STATE_SIZE * len(layout.telescopes)
+        bodies.append((end, CARRIER_VELOCITIES, BODY))
+    positions = [begin + k for begin, _, count in bodies for k in range(count)]
+    velocities = [begin + first + k for begin, first, count in bodies for k in range(count)]
+    return positions, velocities, sponges

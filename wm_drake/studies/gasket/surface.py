@@ -1,0 +1,139 @@
+"""Fitted model of a screening between the levels: predictions with their intervals.
+
+The analysis of variance has an effect for each of the three levels of a factor. Three points
+determine one parabola, so the same model is a polynomial in the places x from -1 to 1 of the
+factors: with interactions, products of two parabolas. At the levels it gives the fitted values.
+
+With the row r(x) of the sum-coded model, n trials, p coefficients and the residual variance
+s^2 = SSR / (n - p), the 95 % interval of the mean has the half width
+
+    t(0.975; n - p) s sqrt(r' (X' X)^-1 r)
+
+and that of a single new run the half width
+
+    t(0.975; n - p) s sqrt(1 + r' (X' X)^-1 r)
+
+A run has no noise: what is random is only where in the range it is. Both intervals hold for
+settings like those of the design, not for each single setting.
+"""
+
+import functools
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.stats import t as t_distribution
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.doe.anova import AnovaTable, SumCoding
+from wm_drake.studies.gasket.screening import Label, Screening
+
+CONFIDENCE = 0.95
+"""Probability of the intervals."""
+
+
+def codes(places: FloatArray) -> FloatArray:
+    """Return the two sum-coded columns of factors at places from -1 to 1. (..., 2)
+
+    They are parabolas through the codes (1, 0), (0, 1), (-1, -1) of the levels -1, 0 and 1.
+    """
+    x = np.asarray(places, dtype=float)
+    low, middle, high = 0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)
+    return np.stack([low - high, middle - high], axis=-1)
+
+
+def model_row(places: Sequence[float], *, interactions: bool) -> FloatArray:
+    """Return the row of the model at places of all factors: constant, mains, interactions. (p,)"""
+    of_factors = codes(np.asarray(places, dtype=float))
+    blocks = [np.ones(1), of_factors.ravel()]
+    if interactions:
+        pairs = itertools.combinations(of_factors, 2)
+        blocks += [np.outer(first, second).ravel() for first, second in pairs]
+    return np.concatenate(blocks)
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """Fitted models of all responses of a screening.
+
+    Attributes:
+        factors: Names of the factors.
+        interactions: Whether the model has two-factor interactions.
+        coefficients: By label: of the row of the model (p,). [unit of the response]
+        deviations: By label: residual standard deviation s; NaN without degrees of freedom.
+        quantiles: By label: quantile of Student's t for the intervals.
+        inverses: By load: (X' X)^-1 of its trials (p, p).
+    """
+
+    factors: tuple[str, ...]
+    interactions: bool
+    coefficients: Mapping[Label, FloatArray]
+    deviations: Mapping[Label, float]
+    quantiles: Mapping[Label, float]
+    inverses: Mapping[str, FloatArray]
+
+    def prediction(self, label: Label, places: Sequence[float]) -> float:
+        """Return the fitted response at places of the factors. [unit of the response]"""
+        row = model_row(places, interactions=self.interactions)
+        return float(row @ self.coefficients[label])
+
+    def half_width(self, label: Label, places: Sequence[float], *, of_run: bool) -> float:
+        """Return the half width of the interval of a new run, or of the mean.
+
+        Args:
+            label: Load and response.
+            places: Places of the factors.
+            of_run: Whether the interval is that of a single run.
+        """
+        row = model_row(places, interactions=self.interactions)
+        return self._half_width(label, row, of_run=of_run)
+
+    def mean_half_width(self, label: Label, factor: str, place: float) -> float:
+        """Return the half width of the mean over all levels of the other factors."""
+        row = model_row([0.0] * len(self.factors), interactions=self.interactions) * 0.0
+        row[0], at = 1.0, 1 + 2 * self.factors.index(factor)
+        row[at : at + 2] = codes(np.array(place))
+        return self._half_width(label, row, of_run=False)
+
+    def _half_width(self, label: Label, row: FloatArray, *, of_run: bool) -> float:
+        leverage = float(row @ self.inverses[label[0]] @ row)
+        scale = self.quantiles[label] * self.deviations[label]
+        return scale * math.sqrt(leverage + (1.0 if of_run else 0.0))
+
+
+def surfaces(screening: Screening) -> Surfaces:
+    """Return the fitted models of a screening; its design has three levels of each factor."""
+    design = screening.design
+    interactions = design.model != "main"
+    inverses = {}
+    inverse = functools.cache(functools.partial(_inverse, screening, interactions))
+    for load, values in screening.responses.values.items():
+        good = np.isfinite(values.to_numpy()).all(axis=1)
+        inverses[load] = inverse(good.tobytes())
+    deviations, quantiles = {}, {}
+    for label, table in screening.tables.items():
+        df = table.residual_df
+        deviations[label] = math.sqrt(table.residual_sum_sq / df) if df else math.nan
+        quantiles[label] = float(t_distribution.ppf(0.5 + 0.5 * CONFIDENCE, df)) if df else math.nan
+    coefficients = {label: _coefficients(table) for label, table in screening.tables.items()}
+    return Surfaces(
+        tuple(design.factors), interactions, coefficients, deviations, quantiles, inverses
+    )
+
+
+def _inverse(screening: Screening, interactions: bool, good: bytes) -> FloatArray:
+    design = screening.design
+    rows = design.levels[np.frombuffer(good, dtype=bool)]
+    matrix = SumCoding(pd.DataFrame(rows, columns=list(design.factors)), interactions).matrix
+    return np.asarray(np.linalg.inv(matrix.T @ matrix))
+
+
+def _coefficients(table: AnovaTable) -> FloatArray:
+    """Return the coefficients: of sum-coded columns they are the effects at -1 and 0."""
+    found = [table.constant]
+    for term in table.terms:
+        found += [term.effects[at] for at in itertools.product((-1, 0), repeat=len(term.factors))]
+    return np.array(found)
