@@ -8,12 +8,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import xarray as xr
 from ruamel.yaml import YAML
 
 from wm_drake.model.bodies import SDF_FOLDER
 from wm_drake.parameters.components import COMPONENTS_FOLDER
+from wm_drake.parameters.designs import DESIGNS_FOLDER
 from wm_drake.parameters.factors import GASKET_FACTORS
 from wm_drake.parameters.files import CYCLES_FOLDER, MACHINES_FOLDER
+from wm_drake.parameters.tolerances import TOLERANCES_FOLDER
 
 
 @dataclass
@@ -255,6 +259,15 @@ OPTIONS = [
     ("rig damper", ["--frequency", "--amplitude", "--matrix", "--sponge-mass", "--name", "--component"]),
     ("rig gasket --axis x -f 1Hz", ["--amplitude", "--arm", "--axis"]),
     ("spin", ["--load", "--engine", "--machine", "--profile", "--set", "--out"]),
+    ("spin --machine reference --machine free_stroke", ["--machine", "--load", "--compare-gasket", "--measured"]),
+    ("spin --compare-gasket", ["--no-gasket", "--replay", "--load", "--measured"]),
+    ("study gasket --trials 100 --model main", ["--published", "--response"]),
+    ("study tolerance --samples 16", ["--samples", "--sensitivity", "--subset", "--limits", "--response", "--seed"]),
+    ("study design --evaluations 8 --population 4", ["--evaluations", "--population", "--seed"]),
+    ("study modes", ["--amplitude", "--load"]),
+    ("study response", ["--from", "--to", "--points", "--harmonics", "--rate", "--load", "--workers"]),
+    ("record orders record.csv", ["--highest", "--unit"]),
+    ("calibrate --free FREE", ["--fewer", "--targets"]),
 ]  # fmt: skip
 VALUED = {
     "--weight": ["middle=", "=", "middle:Xf=", "nowhere="],
@@ -345,8 +358,11 @@ SHIPPED = {
     "regions": CYCLES_FOLDER / "profile_spin_cycle.yaml",
     "component": COMPONENTS_FOLDER / "mstv_damper.yaml",
     "factors": GASKET_FACTORS,
+    "tolerance": TOLERANCES_FOLDER / "laundry.yaml",
+    "design file": DESIGNS_FOLDER / "gasket.yaml",
 }
 TEXTS = {
+    "limits": "limits:\n- {quantity: gap, at_least: 0 mm, allowed_share: 0.1 %}\n",
     "load": "unbalances:\n- {mass: 400 g, radius: 240 mm, y: 0 mm, phase: 10 deg}\n",
     "free": (
         "quantities:\n  spring:\n    bounds: (1, 20) N/mm\n    prior: (7.5, 2) N/mm\n"
@@ -376,6 +392,10 @@ CSV = {
     "targets": (MACHINES_FOLDER / "sanchez_tabuenca_2020_table3.csv").read_text(encoding="utf-8"),
     "loop": loop_text(),
     "design": "C_L\n-1\n0\n1\n",
+    "published": (MACHINES_FOLDER / "sanchez_tabuenca_2020_table5_means.csv").read_text("utf-8"),
+    "signals": "time_s,speed_rpm,Xr,Zf\n" + "".join(
+        f"{0.01 * n:g},{0.3 * n:g},{n % 7},{n % 5}\n" for n in range(3000)
+    ),
     "record": "time_s,Xr,Yr,Zr,Xf,Yf,Zf\n" + "".join(
         f"{0.01 * n:g},{n % 7},0,1,2,3,{n % 5}\n" for n in range(60)
     ),
@@ -403,12 +423,17 @@ def commands(file: str) -> dict[str, list[str]]:
         "acceleration": ["study", "spin-cycle", "--case", "1", "--accelerations", "."],
         "loop": ["identify", "damper", file],
         "record": ["study", "gasket-damping", "--record", f"middle={file}"],
+        "published": ["study", "gasket", "--trials", "100", "--model", "main", "--published", file],
+        "signals": ["record", "orders", file],
+        "tolerance": ["study", "tolerance", file, "--samples", "16"],
+        "limits": ["study", "tolerance", "--samples", "16", "--limits", file],
+        "design file": ["study", "design", file, "--evaluations", "8", "--population", "4"],
     }
 
 
 MEASURED = sorted(MACHINES_FOLDER.glob("*.csv"))
 YAML_DOORS = (*SHIPPED, *TEXTS)
-DOORS = (*YAML_DOORS, *CSV, "sdf", "mesh", "set", "options", "links")
+DOORS = (*YAML_DOORS, *CSV, "netcdf", "sdf", "mesh", "set", "options", "links")
 """Every door; a case takes them in turn."""
 
 
@@ -435,15 +460,8 @@ def case_of(number: int, folder: Path) -> FuzzCase:
     (folder / "free.yaml").write_text(TEXTS["free"], encoding="utf-8")
     for table in MEASURED if "machine" in door else ():
         (folder / table.name).write_bytes(table.read_bytes())
-    if door == "set":
-        return _set_case(random_)
-    if door == "options":
-        (folder / "loop.csv").write_text(CSV["loop"], encoding="utf-8")
-        return _options_case(random_)
-    if door == "links":
-        return _links_case(random_, folder)
-    if door in ("sdf", "mesh"):
-        return _sdf_case(random_, door, folder)
+    if door in OWN_CASES:
+        return OWN_CASES[door](random_, folder)
     name = "input.csv" if door in CSV else "input.yaml"
     if door == "acceleration":
         name = "1.csv"
@@ -484,6 +502,72 @@ def _mutated_table(random_: random.Random, text: str) -> str:
     return "\n".join(map(",".join, rows)) + "\n"
 
 
+@functools.cache
+def record() -> xr.Dataset:
+    """Return a record with what the commands read of one."""
+    time = 0.005 * np.arange(1200)
+    angle = 3.0 * time**2
+    displacement = 1e-3 * np.outer(np.cos(angle), np.arange(1.0, 7.0))
+    return xr.Dataset(
+        {
+            "displacement": (("time", "sensor"), displacement, {"units": "m"}),
+            "drum_angle": ("time", angle, {"units": "rad"}),
+            "drum_speed": ("time", 6.0 * time, {"units": "rad/s"}),
+        },
+        {"time": time, "sensor": ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]},
+        {"gasket": "yes", "load": "middle"},
+    )
+
+
+def _netcdf_case(random_: random.Random, folder: Path) -> FuzzCase:
+    """Records: broken bytes, lost and odd variables, other files."""
+    path, kind = folder / "input.nc", random_.randrange(4)
+    if kind == 0:
+        path.write_bytes(
+            random_.choice([b"", b"\x89HDF\r\n\x1a\n", b"CDF\x01", b"x" * 100_000, b"\0" * 5000])
+        )
+    elif kind == 1:
+        record().to_netcdf(path, engine="h5netcdf")
+        data = bytearray(path.read_bytes())
+        for _ in range(random_.choice([1, 3, 30, 300])):
+            data[random_.randrange(len(data))] ^= 1 << random_.randrange(8)
+        path.write_bytes(data[: random_.choice([None, None, len(data) // 2, 100])])
+    else:
+        _changed_record(random_).to_netcdf(path, engine="h5netcdf")
+    command = random_.choice(
+        [
+            ["record", "orders", path.name],
+            ["study", "gasket-damping", "--record", f"middle={path.name}"],
+        ]
+    )
+    return FuzzCase("netcdf", command, [path.name, "--record"])
+
+
+def _changed_record(random_: random.Random) -> xr.Dataset:
+    """Return a record with a lost, an odd or a short variable."""
+    changed, name = record().copy(deep=True), random_.choice(list(record().variables))
+    kind = random_.randrange(6)
+    if kind == 0:
+        return changed.drop_vars(name)
+    if kind == 1:
+        return changed.isel(time=slice(0, random_.choice([0, 1, 2, 5, 20])))
+    if kind == 2:
+        return changed.isel(sensor=slice(0, random_.choice([0, 1, 5])))
+    if kind == 3:
+        return changed.assign_coords(sensor=random_.sample([*WORDS[:20], "<script>"], 6))
+    if kind == 4:
+        return changed.rename({name: "odd"})
+    values = changed["displacement"].values if name == "sensor" else changed[name].values
+    values = values.copy()
+    values[random_.randrange(len(values))] = random_.choice([np.nan, np.inf, -1e300, 0.0, 1e300])
+    name = "displacement" if name == "sensor" else name
+    return (
+        changed.assign_coords(time=values)
+        if name == "time"
+        else changed.assign({name: (changed[name].dims, values)})
+    )
+
+
 SHAPES = [
     "<plane><normal>0 0 1</normal><size>1 1</size></plane>",
     "<sphere><radius>nan</radius></sphere>",
@@ -521,7 +605,7 @@ MESHES = {
 }
 
 
-def _sdf_case(random_: random.Random, door: str, folder: Path) -> FuzzCase:
+def _sdf_case(random_: random.Random, folder: Path, door: str) -> FuzzCase:
     text = (SDF_FOLDER / "oscillating_group.sdf").read_text(encoding="utf-8")
     (folder / "machine.yaml").write_text("extends: reference\nmodel: bodies.sdf\n", "utf-8")
     if door == "mesh":
@@ -572,7 +656,7 @@ SET_KEYS = [
 ]  # fmt: skip
 
 
-def _set_case(random_: random.Random) -> FuzzCase:
+def _set_case(random_: random.Random, _folder: Path) -> FuzzCase:
     key = random_.choice(SET_KEYS)
     value = random_.choice([*WORDS, *NUMBERS]).replace("\0", "")
     entry = f"{key}={value}" if random_.random() < 0.95 else value
@@ -584,7 +668,9 @@ def _set_case(random_: random.Random) -> FuzzCase:
     return FuzzCase("set", [*command, "--set", entry], ["--set", "reference.yaml"], parts)
 
 
-def _options_case(random_: random.Random) -> FuzzCase:
+def _options_case(random_: random.Random, folder: Path) -> FuzzCase:
+    (folder / "loop.csv").write_text(CSV["loop"], encoding="utf-8")
+    (folder / "record.csv").write_text(CSV["signals"], encoding="utf-8")
     command, options = random_.choice(OPTIONS)
     option = random_.choice(options)
     value = random_.choice(NUMBERS)
@@ -638,3 +724,14 @@ def _links_case(  # noqa: C901 - one branch a kind of link
         path.write_text("extends: reference\n", encoding="utf-8")
         path.chmod(0)
     return FuzzCase("links", ["machine", "check", file], [file[:20], ".yaml", "no such file"])
+
+
+OWN_CASES = {
+    "set": _set_case,
+    "options": _options_case,
+    "links": _links_case,
+    "netcdf": _netcdf_case,
+    "sdf": functools.partial(_sdf_case, door="sdf"),
+    "mesh": functools.partial(_sdf_case, door="mesh"),
+}
+"""Doors whose cases are not a changed file of one kind."""

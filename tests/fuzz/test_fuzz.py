@@ -43,7 +43,7 @@ class Worker:
         threading.Thread(
             target=lambda: [lines.put(line) for line in process.stdout], daemon=True
         ).start()
-        assert self.lines.get(timeout=120) == "ready\n"
+        assert self.lines.get(timeout=240) == "ready\n"
 
     def outcome(self, number):
         """Return the outcome of a case, or None if it took too long or killed the process."""

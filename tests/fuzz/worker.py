@@ -30,6 +30,11 @@ COMPUTATIONS = (
     "wm_drake.studies.gasket_damping.study.identify_damping",
     "wm_drake.studies.fitting.identify",
     "wm_drake.studies.calibration.calibration.calibrate",
+    "wm_drake.studies.tolerance.study.run_tolerances",
+    "wm_drake.studies.pareto.study.run_designs",
+    "wm_drake.studies.steady.study.run_steady_study",
+    "wm_drake.studies.modes.study.modes",
+    "wm_drake.report.orders.report.orders_report",
     "wm_drake.rigs.run_rig",
     "wm_drake.studies.description.description.describe",
 )

@@ -129,7 +129,7 @@ const Pictures = (() => {
   }
 
   /* Texts of the ticks upwards: in lines as long as needed, so that they lie above each other. */
-  function upTicks(axis, room, height, factor) {
+  function upTicks(axis, room, height, factor, total) {
     const px = size(axis.tick_size, factor);
     if (!axis.is_labelled || (axis.ticks && !axis.ticks.length)) return { px, width: 0 };
     if (!axis.ticks) return { px, width: Math.max(0, ...likelyTexts(axis).map(text => width(text, px))) + 8 };
@@ -137,19 +137,19 @@ const Pictures = (() => {
     const places = axis.ticks.map(([place]) => place).sort((u, v) => u - v);
     const cell = Math.min(height, ...places.slice(1).map((place, i) => height * (place - places[i]) / span));
     let texts;
-    for (const part of [0.32, 0.45, 0.55]) {
-      texts = axis.ticks.map(([, text]) => wrapped(text, px, Math.max(90, part * room)));
+    for (const most of [0.32 * room, 0.45 * room, 0.3 * total, 0.42 * total]) {
+      texts = axis.ticks.map(([, text]) => wrapped(text, px, Math.max(90, most)));
       if (Math.max(...texts.map(t => t.length)) * px * HEIGHT <= cell) break;
     }
     return { px, texts, width: Math.max(0, ...texts.flat().map(text => width(text, px))) + 8 };
   }
 
   /* Room that a panel needs outside its axes. [px] */
-  function around(panel, twin, room, height, factor, isSolo) {
+  function around(panel, twin, room, height, factor, isSolo, total) {
     const need = { left: 0, right: 4, top: 6, bottom: 4 };
     const x = { ...panel.x, is_labelled: panel.x.is_labelled || (isSolo && panel.x.ticks === null) };
     const y = { ...panel.y, is_labelled: panel.y.is_labelled || (isSolo && panel.y.ticks === null) };
-    need.upTicks = upTicks(y, room, height, factor);
+    need.upTicks = upTicks(y, room, height, factor, total);
     const label = size(y.label_size, factor);
     need.upLabel = y.label ? wrapped(y.label, label, Math.max(60, height)) : [];
     need.left = need.upTicks.width + (need.upLabel.length ? need.upLabel.length * label * HEIGHT + 6 : 0);
@@ -174,7 +174,7 @@ const Pictures = (() => {
       return { ...title, px, texts };
     });
     if (twin) {
-      const ticks = upTicks(twin.y, room, height, factor);
+      const ticks = upTicks(twin.y, room, height, factor, total);
       const far = size(twin.y.label_size, factor);
       need.right += ticks.width + (twin.y.label ? far * HEIGHT + 6 : 0);
     }
@@ -240,7 +240,7 @@ const Pictures = (() => {
         needs = shown.map(({ panel, index }) => {
           const at = cell(panel);
           const across = sum(x.slice(at.c0, at.c1 + 1)), up = sum(y.slice(at.r0, at.r1 + 1));
-          return around(panel, twins.get(index)?.panel, across, up, factor, solo !== null);
+          return around(panel, twins.get(index)?.panel, across, up, factor, solo !== null, pixels);
         });
         left.fill(0); right.fill(0); top.fill(0); bottom.fill(0);
         shown.forEach(({ panel, index }, k) => {
@@ -524,7 +524,7 @@ const Pictures = (() => {
     arrangement.panels.forEach((place, k) => {
       const names = { x: `x${k + 1}`.replace(/^x1$/, "x"), y: `y${k + 1}`.replace(/^y1$/, "y") };
       axesOf(place, names, byShare, layout, look, factor, arrangement);
-      contents(d, place.panel, names, state, traces, shapes, annotations, factor);
+      contents(d, place.panel, names, state, traces, shapes, annotations, factor, place.x1 - place.x0);
       titles(place, names, annotations);
       if (place.panel.top) topAxis(place, names, 100 + k, layout, traces, look, factor);
       if (place.twin) {
@@ -535,7 +535,7 @@ const Pictures = (() => {
           tickfont: { size: size(axis.tick_size, factor), color: look.quiet },
           title: { text: escaped(axis.label), standoff: 5, font: { size: size(axis.label_size, factor), color: hue(axis.color) } },
         };
-        contents(d, place.twin.panel, other, state, traces, shapes, annotations, factor);
+        contents(d, place.twin.panel, other, state, traces, shapes, annotations, factor, place.x1 - place.x0);
       }
     });
     scalesOf(d, arrangement, traces, look);
@@ -554,9 +554,9 @@ const Pictures = (() => {
     }
   }
 
-  function contents(d, panel, names, state, traces, shapes, annotations, factor) {
+  function contents(d, panel, names, state, traces, shapes, annotations, factor, room) {
     const overCells = panel.parts.some(part => part.kind === "cells");
-    const texts = [];
+    const texts = [], notes = [];
     panel.parts.forEach(part => {
       const entry = entryOf(d, part), hidden = entry !== null && state.hidden.has(entry);
       const label = part.label || (entry !== null ? entries(d)[entry].label : null);
@@ -577,14 +577,26 @@ const Pictures = (() => {
       } else if (part.kind === "text") {
         const isPlain = part.in_data.every(Boolean) && !part.arrow && !part.shift.some(Boolean) && !part.angle;
         if (isPlain) texts.push(part);
-        else annotations.push(note(part, names, factor, overCells));
+        else notes.push([part, note(part, names, factor, overCells)]);
       } else {
         for (const trace of curves(part, panel, label, factor))
           traces.push({ ...trace, xaxis: names.x, yaxis: names.y, visible: !hidden, showlegend: false });
       }
     });
+    lowered(notes, room, factor);
+    annotations.push(...notes.map(([, found]) => found));
     if (texts.length)
       for (const trace of textCurves(texts, factor, overCells)) traces.push({ ...trace, xaxis: names.x, yaxis: names.y });
+  }
+
+  /* Lowers the texts at the top right of a panel if they would meet those at its top left. */
+  function lowered(notes, room, factor) {
+    const atTop = side => notes.filter(([part]) => !part.in_data[0] && !part.in_data[1] && part.up === "top" && part.across === side);
+    const wide = list => Math.max(0, ...list.map(([part]) => width(part.text, size(part.size, factor), part.is_bold)));
+    const left = atTop("left"), right = atTop("right");
+    if (!left.length || wide(left) + wide(right) < 0.93 * room) return;
+    const down = Math.max(...left.map(([part]) => size(part.size, factor) * HEIGHT * part.text.split("\n").length));
+    for (const [, found] of right) found.yshift -= down;
   }
 
   function scalesOf(d, arrangement, traces, look) {

@@ -1,14 +1,19 @@
 """The record: a labelled dataset of one run, with units; how it is made, written and read."""
 
 import functools
+import gc
 import importlib.metadata
 import json
+import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
+import numpy as np
 import xarray as xr
 
 from wm_drake.engines.trajectory import COORDINATES, Trajectory, divergence_text
+from wm_drake.errors import input_error
 from wm_drake.model.machine import Setup
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.mounts import mount_names
@@ -77,6 +82,10 @@ def _label_coordinates(**labels: tuple[str, ...]) -> xr.Coordinates:
     return xr.Coordinates({name: list(of) for name, of in labels.items()})
 
 
+MOST_REASON = 150
+"""Largest number of characters of the reason why a file cannot be read."""
+
+
 def save_record(record: Record, path: Path) -> None:
     """Write a record to a compressed netCDF file.
 
@@ -117,6 +126,51 @@ def load_record(path: Path) -> Record:
         True
     """
     return xr.load_dataset(path, engine="h5netcdf")
+
+
+def read_measured(path: Path, variables: Mapping[str, tuple[str, ...]]) -> xr.Dataset:
+    """Read variables of a record that a user names as a measurement.
+
+    Args:
+        path: netCDF file.
+        variables: Names of the wanted variables, with their dimensions.
+
+    Raises:
+        InputError: the file is no netCDF file, or a variable is missing, has other dimensions, or
+            is not made of finite numbers.
+    """
+    record = _readable(path)
+    if isinstance(record, str):
+        raise input_error(f"cannot be read as a netCDF record ({record})", where=str(path))
+    for name, dims in variables.items():
+        if name not in record.variables or record[name].dims != dims:
+            found = "is missing" if name not in record.variables else "has other dimensions"
+            need = ", ".join(dims)
+            raise input_error(f"{found}; it needs the dimensions {need}", where=str(path), key=name)
+        if record[name].dtype.kind not in "iuf" or not np.all(np.isfinite(record[name].values)):
+            raise input_error("has values that are not finite numbers", where=str(path), key=name)
+    if "sensor" in record.dims and "sensor" not in record.coords:
+        message = "is missing; it has the names of the sensors"
+        raise input_error(message, where=str(path), key="sensor")
+    return record[list(variables)]
+
+
+def _readable(path: Path) -> xr.Dataset | str:
+    """Return a record, or why it cannot be read.
+
+    The reader leaves a half-open file behind, whose removal prints a Python error. It is removed
+    here, and nothing is printed.
+    """
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        try:
+            return xr.load_dataset(path, engine="h5netcdf")
+        except Exception as error:  # damaged files end in errors of any kind
+            reason = " ".join(str(error).split())[:MOST_REASON]
+        gc.collect()
+    finally:
+        sys.unraisablehook = hook
+    return reason or "it is damaged"
 
 
 @functools.cache  # reading them takes more than 10 % of the time of a run

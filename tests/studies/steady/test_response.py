@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import wofz
 from simple_machines import DAMPING, MASS, STIFFNESS, isotropic_machine, unbalance
+from threadpoolctl import threadpool_limits
 
 import wm_drake as wm
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE
@@ -279,6 +280,73 @@ def test_time_integration_holds_stable_motions_and_leaves_unstable_ones(folded):
         assert (away[-1] < 0.5 * away[0]) == holds
         if not holds:
             assert away[-1] > 5.0 * away[0]
+
+
+def revolutions_of(balance, start, speed, count, steps=256):
+    """Return the states after each revolution by RK4, from free states (n, size) at angle 0."""
+    derivative = balance.derivative
+    states = np.tile(derivative.rest, (len(start), 1))
+    states[:, DRUM_RATE] = speed
+    step = 2.0 * np.pi / speed / steps
+
+    def rate(angle, free):
+        states[:, derivative.free], states[:, DRUM_ANGLE] = free, angle
+        return derivative(states)[:, derivative.free]
+
+    here, ended = np.array(start), [np.array(start)]
+    for _ in range(count):
+        for number in range(steps):
+            angle, half = 2.0 * np.pi * number / steps, 0.5 * step
+            first = rate(angle, here)
+            second = rate(angle + speed * half, here + half * first)
+            third = rate(angle + speed * half, here + half * second)
+            fourth = rate(angle + speed * step, here + step * third)
+            here = here + step / 6.0 * (first + 2.0 * (second + third) + fourth)
+        ended.append(here)
+    return np.array(ended)
+
+
+def test_a_machine_without_gasket_leaves_its_unstable_motions_and_keeps_its_stable_ones(machine):
+    """Load middle: unstable from 169 to 190 rpm, with a pair of complex multipliers.
+
+    A run that starts on the harmonic balance misses the motion by the cut harmonics, 0.01 mm. This
+    distance stays on a stable motion and grows on an unstable one.
+    """
+    setup = machine.set_up("middle", gasket=False)
+    balance = HarmonicBalance(setup, Series(HARMONICS, 128))
+    with threadpool_limits(1, "blas"):
+        points = branch_of(balance, setup, np.linspace(150.0, 205.0, 12) * RPM)
+    unstable = max(points, key=lambda point: point.multiplier)
+    assert 175.0 < unstable.speed / RPM < 185.0
+    for point, count in ((points[2], 20), (unstable, 40), (points[-2], 20)):
+        begin = balance.series.synthesis[0] @ point.coefficients
+        states = revolutions_of(balance, [begin], point.speed, count)[:, 0]
+        away = np.linalg.norm((states - begin) * balance.scale, axis=1)
+        assert away[1] < 2e-5
+        assert point.stable == (away[-1] < 1.2 * away[1])
+        if point is unstable:
+            assert away[-1] > 10.0 * away[1]
+    step = 1e-6 * np.eye(balance.size)
+    begin = balance.series.synthesis[0] @ unstable.coefficients
+    ends = revolutions_of(balance, [*(begin + step), *(begin - step)], unstable.speed, 1, 512)[-1]
+    change = (ends[: balance.size] - ends[balance.size :]).T / 2e-6
+    largest = np.abs(np.linalg.eigvals(change)).max()
+    assert unstable.multiplier == pytest.approx(largest, rel=3e-3)
+    assert largest > 1.1
+
+
+def test_harmonics_converge_in_length_where_one_amplitude_does_not(machine):
+    """Load back: one sensor is worse with 5 harmonics than with 3; the motion is better."""
+    setup, speeds = machine.set_up("back"), np.array([78.0, 96.0]) * RPM
+    motions = {}
+    with threadpool_limits(1, "blas"):
+        for order in (3, 5, 7, 11):
+            balance = HarmonicBalance(setup, Series(order, 128))
+            points = [point for point in branch_of(balance, setup, speeds) if point.on_grid]
+            motions[order] = np.array([point.coefficients[:7, :6] for point in points])
+    errors = [np.abs(motions[order] - motions[11]).max() for order in (3, 5, 7)]
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] < 0.6 * errors[0]
 
 
 def test_floquet_multipliers_are_those_of_the_map_of_a_revolution(folded):

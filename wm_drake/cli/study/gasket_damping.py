@@ -91,7 +91,7 @@ def _read(parameters: "MachineParameters", entries: list[str]) -> "Measured":
     import xarray as xr
 
     from wm_drake.parameters.csv_files import finite_numbers, read_csv
-    from wm_drake.simulation.records import load_record
+    from wm_drake.simulation.records import read_measured
     from wm_drake.studies.gasket_damping.study import MM_PER_M, as_measured
 
     measured = {}
@@ -114,18 +114,10 @@ def _read(parameters: "MachineParameters", entries: list[str]) -> "Measured":
                 ["time", "sensor"],
             )
         else:
-            record = _displacement(load_record, path)
+            wanted = {"time": ("time",), "displacement": ("time", "sensor")}
+            record = read_measured(path, wanted).displacement
         measured[load] = as_measured(record, sensors, name)
     return measured
-
-
-def _displacement(load_record: Any, path: Path) -> Any:
-    try:
-        return load_record(path).displacement
-    except (OSError, ValueError, AttributeError, KeyError) as error:
-        raise input_error(
-            f"cannot be read as a netCDF record ({' '.join(str(error).split())})", where=str(path)
-        ) from None
 
 
 def _planted(parameters: "MachineParameters", linear: str, torsional: str) -> "FloatArray":

@@ -304,27 +304,44 @@ const Explore = (() => {
     return found;
   }
 
-  /* The best setting: all level combinations, then steps along single factors from the best few. */
+  /* The best setting: all level combinations, then moves from the best few. */
   function best(all) {
     const ranked = starts().map(places => ({ places, value: desirability(all, places) }));
     ranked.sort((a, b) => b.value - a.value);
     let top = ranked[0];
-    for (const start of ranked.slice(0, 6)) {
-      let { places, value } = start;
-      for (let step = 0.5; step > 0.009; step /= 2) {
-        for (let moved = true; moved;) {
-          moved = false;
-          for (let k = 0; k < places.length; k++) for (const sign of [-1, 1]) {
-            const next = places.slice();
-            next[k] = Math.min(1, Math.max(-1, next[k] + sign * step));
-            const found = desirability(all, next);
-            if (found > value + 1e-12) { places = next; value = found; moved = true; }
-          }
-        }
-      }
-      if (value > top.value) top = { places, value };
+    for (const start of ranked.slice(0, 4)) {
+      const found = climbed(all, start);
+      if (found.value > top.value) top = found;
     }
     return top;
+  }
+
+  /* Numbers from -1 to 1 that look random and are the same each time (mulberry32). */
+  function spread(seed) {
+    let at = seed;
+    return () => {
+      at = (at + 0x6d2b79f5) | 0;
+      let word = Math.imul(at ^ (at >>> 15), 1 | at);
+      word = (word + Math.imul(word ^ (word >>> 7), 61 | word)) ^ word;
+      return ((word ^ (word >>> 14)) >>> 0) / 2147483648 - 1;
+    };
+  }
+
+  /* Moves along single factors, and in many directions, which follows limits, while they help. */
+  function climbed(all, { places, value }) {
+    const next = spread(1), axes = places.flatMap((_, k) => [-1, 1].map(sign => places.map((__, j) => (j === k ? sign : 0))));
+    const directions = [...axes, ...Array.from({ length: 20 * places.length }, () => places.map(next))];
+    const tried = (direction, step) => {
+      const moved = places.map((place, k) => Math.min(1, Math.max(-1, place + step * direction[k])));
+      const found = desirability(all, moved);
+      if (found <= value + 1e-9) return false;
+      [places, value] = [moved, found];
+      return true;
+    };
+    for (let step = 0.5; step > 0.004; step /= 2)
+      for (let round = 0; round < 20; round++)
+        if (!directions.filter(direction => tried(direction, step)).length) break;
+    return { places, value };
   }
 
   function find() {

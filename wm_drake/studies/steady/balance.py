@@ -32,8 +32,9 @@ from wm_drake.studies.steady.series import Series
 HARMONICS = 11
 """Default number of harmonics.
 
-Against the compiled engine, amplitudes of the reference machine deviate at any sensor by up to 24 %
-with 3, 4 % with 5, 1.3 % with 9, and 0.3 % with 11 harmonics."""
+Against 31 harmonics, at 20 speeds from 60 to 400 rpm with the loads back and middle of the
+reference machine, displacements deviate by up to 0.07, 0.035, 0.016, 0.008 and 0.006 mm with 3, 5,
+7, 9 and 11 harmonics, and amplitudes by up to 3.0, 1.6, 1.0, 0.3 and 0.2 %."""
 
 SAMPLES = 128
 """Default number of samples of a period."""

@@ -11,7 +11,7 @@ from wm_drake.errors import input_error
 from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.orders import REVOLUTIONS, frequency_map, order_map
-from wm_drake.simulation.records import load_record
+from wm_drake.simulation.records import read_measured
 
 RAD_S_PER_RPM = np.pi / 30.0
 TIME, SPEED = "time_s", "speed_rpm"
@@ -64,15 +64,10 @@ def read_signals(path: Path, unit: str) -> Signals:
     """
     if path.suffix.lower() == ".csv":
         return _read_csv(path, unit)
-    try:
-        record = load_record(path)
-        time, angle = record.time.values, record.drum_angle.values
-        values = 1e3 * record.displacement.values
-    except (OSError, ValueError, AttributeError, KeyError) as error:
-        reason = " ".join(str(error).split())
-        raise input_error(
-            f"cannot be read as a netCDF record ({reason})", where=str(path)
-        ) from None
+    wanted = {"time": ("time",), "displacement": ("time", "sensor"), "drum_angle": ("time",)}
+    record = read_measured(path, wanted)
+    time, angle = record.time.values, record.drum_angle.values
+    values = 1e3 * record.displacement.values
     names = [str(name) for name in record.sensor.values]
     return _checked(Signals(path.name, names, "mm", time, angle, values), path)
 

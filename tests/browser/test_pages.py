@@ -1,0 +1,267 @@
+"""Report pages in a real browser: nothing cut off, no label over another, no network, controls work.
+
+Each kind of page with pictures of its own is opened at 1400 and 800 pixels.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hand_made_records import case_result, spin_result
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors, load_machine
+from wm_drake.report.gasket.report import gasket_report
+from wm_drake.report.page import picture, render
+from wm_drake.report.spin.comparison import comparison_report
+from wm_drake.report.spin.report import spin_report
+from wm_drake.simulation.cases import Case
+from wm_drake.studies.doe import make_design
+from wm_drake.studies.gasket.screening import Meaning, Responses, run_screening
+from wm_drake.studies.gasket.study import GasketTrials
+from wm_drake.studies.gasket.surface import surfaces
+from wm_drake.studies.spin.comparison import Variant
+
+pytestmark = pytest.mark.browser
+
+LAYOUT = (Path(__file__).parent / "layout.js").read_text(encoding="utf-8")
+READY = "return document.documentElement.dataset.pictures === 'ready'"
+HOSTILE = "<b>b</b><a href='javascript:1'>x</a> %{x} $y$"
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return load_machine("reference")
+
+
+@pytest.fixture(scope="module")
+def screening(machine):
+    levels = levels_of(machine, load_factors(GASKET_FACTORS))
+    loads = ("middle", "counter")
+    cases = [Case(name, machine.loads[name], machine.profile, True) for name in loads]
+    trials = GasketTrials(machine, levels, cases)
+    units = {"Dx": "mm", "Fz": "N", "Mx": "N m"}
+    meanings = {
+        "Dx": Meaning("displacement x", kind="displacement"),
+        "Fz": Meaning("force z", kind="force"),
+        "Mx": Meaning("moment x", kind="moment"),
+    }
+
+    def evaluate(design):
+        x = design.levels.astype(float)
+        noise = 0.05 * np.random.default_rng(0).normal(size=len(x))
+        frame = pd.DataFrame(
+            {
+                "Dx": 20.0 - 2.0 * x[:, 0] + x[:, 2] ** 2 + noise,
+                "Fz": 30.0 + x[:, 2] * x[:, 3] + noise,
+                "Mx": 5.0 + x[:, 0] - 0.5 * x[:, 4] + noise,
+            }
+        )
+        return Responses({"middle": frame, "counter": 1.2 * frame}, units, {}, meanings)
+
+    names = tuple(level.name for level in levels)
+    design = make_design("d-optimal", names, trials=200, model="main+2fi", seed=1)
+    return run_screening(design, evaluate), trials
+
+
+def spin_page(machine, _):
+    names = ("middle", "back")
+    return spin_report(spin_result(machine, [case_result(machine, n, samples=4000) for n in names]))
+
+
+def comparison_page(machine, _):
+    results = [
+        spin_result(machine, [case_result(machine, "middle", gasket)]) for gasket in (True, False)
+    ]
+    variants = [
+        Variant(name, r) for name, r in zip(("with gasket", "without"), results, strict=True)
+    ]
+    return comparison_report(variants)
+
+
+def gasket_page(_, screening):
+    return gasket_report(*screening)
+
+
+@pytest.fixture(scope="module")
+def pages(machine, screening, tmp_path_factory):
+    """Return a function that writes a kind of page once and returns its file."""
+    folder, made = tmp_path_factory.mktemp("pages"), {}
+
+    def of(kind):
+        if kind not in made:
+            made[kind] = folder / f"{kind.__name__}.html"
+            made[kind].write_text(kind(machine, screening), encoding="utf-8")
+        return made[kind]
+
+    return of
+
+
+def opened(browser, path, width=1400, *, dark=False):
+    browser.size(width)
+    browser.media(dark=dark)
+    browser.open(path)
+    browser.wait(READY, timeout=60.0)
+    browser.run("Pictures.all()")
+
+
+@pytest.mark.parametrize("kind", [spin_page, comparison_page, gasket_page])
+def test_nothing_is_cut_off_or_over_another_and_nothing_is_loaded(browser, pages, kind):
+    for width in (1400, 800):
+        opened(browser, pages(kind), width)
+        assert browser.run(LAYOUT) == []
+    loaded = browser.run("return performance.getEntriesByType('resource').map(one => one.name)")
+    assert all(name.startswith(("blob:", "data:")) for name in loaded)
+    assert browser.errors() == []
+
+
+def test_print_draws_every_picture_on_a4_in_light_colours(browser, pages):
+    browser.size(1400)
+    browser.media(dark=True)
+    browser.open(pages(spin_page))
+    browser.wait(READY, timeout=60.0)
+    browser.driver.execute_cdp_cmd("Page.printToPDF", {"paperWidth": 8.27, "paperHeight": 11.69})
+    missing = "return document.querySelectorAll('figure[data-picture]:not([data-drawn])').length"
+    assert browser.run(missing) == 0
+    browser.size(690)
+    browser.media(media="print")
+    browser.run("dispatchEvent(new Event('beforeprint'))")
+    wide = "return [...document.querySelectorAll('.plot')].map(p => p.scrollWidth)"
+    assert max(browser.run(wide)) <= 690
+    ink = "return getComputedStyle(document.querySelector('.plot .xtick text')).fill"
+    assert browser.run(ink) == "rgb(82, 96, 109)"
+    browser.run("dispatchEvent(new Event('afterprint'))")
+
+
+def test_dark_scheme_has_light_words_and_axes(browser, pages):
+    opened(browser, pages(spin_page), dark=True)
+    assert (
+        browser.run("return getComputedStyle(document.body).backgroundColor") == "rgb(20, 24, 29)"
+    )
+    ink = "return getComputedStyle(document.querySelector('.plot .xtick text')).fill"
+    assert browser.run(ink) == "rgb(154, 165, 177)"
+
+
+def small_page(title):
+    figure = Figure(figsize=(10.6, 3.0))
+    left, right = figure.subplots(1, 2)
+    for axes, name in ((left, title), (right, "second")):
+        axes.plot([0.0, 1.0, 2.0], [0.0, 1.0, 4.0], color="#0072b2")
+        axes.plot([0.0, 2.0], [1.0, 1.0], "--", color="#b34700")
+        axes.set_title(name, parse_math=False)
+        axes.set_xlabel("time, s")
+    handles = [
+        Line2D([], [], color="#0072b2", label="computed"),
+        Line2D([], [], color="#b34700", linestyle="--", label="measured"),
+    ]
+    figure.legend(handles=handles)
+    body = {"title": "t", "about": "", "warnings": [], "summary": "s"}
+    return body, picture(figure, "Two panels.", "Caption.")
+
+
+@pytest.fixture
+def small(tmp_path, monkeypatch):
+    from jinja2 import DictLoader
+
+    import wm_drake.report.page as module
+
+    own = module.FileSystemLoader
+
+    class Both(DictLoader):
+        def get_source(self, environment, name):
+            try:
+                return super().get_source(environment, name)
+            except Exception:
+                return own(Path(module.__file__).parent).get_source(environment, name)
+
+    text = (
+        '{% extends "page.html" %}{% from "macros.html" import picture %}'
+        "{% block content %}{{ picture(p) }}{% endblock %}"
+    )
+    monkeypatch.setattr(module, "FileSystemLoader", lambda _: Both({"small.html": text}))
+
+    def write(title):
+        body, shown = small_page(title)
+        path = tmp_path / "small.html"
+        path.write_text(render("small.html", **body, p=shown), encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_markup_in_a_name_is_text(browser, small):
+    opened(browser, small(HOSTILE))
+    texts = browser.run(
+        "return [...document.querySelectorAll('.plot text')].map(t => t.textContent)"
+    )
+    assert HOSTILE in texts
+    assert browser.run("return document.querySelectorAll('.plot a').length") == 0
+    assert (
+        browser.run("return document.querySelector('.panels button:nth-child(2)').textContent")
+        == HOSTILE
+    )
+    assert browser.errors() == []
+
+
+def test_curves_and_panels_are_switched_and_zoomed(browser, small):
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    opened(browser, small("first"))
+    lines = "return document.querySelectorAll('.plot .scatterlayer .js-line').length"
+    assert browser.run(lines) == 4
+    browser.find(".legend button:nth-child(2)").click()
+    assert browser.run(lines) == 2
+    assert browser.find(".legend button:nth-child(2)").get_attribute("aria-pressed") == "false"
+    browser.find(".legend button:nth-child(2)").click()
+    browser.find(".panels button:nth-child(3)").click()
+    assert browser.run(lines) == 2
+    assert browser.run("return document.querySelectorAll('.plot .subplot').length") == 1
+    limits = "return document.querySelector('.plot').layout.xaxis.range.slice()"
+    before = browser.run(limits)
+    area = browser.find(".plot .nsewdrag")
+    ActionChains(browser.driver).move_to_element(area).click_and_hold().move_by_offset(
+        150, 60
+    ).release().perform()
+    browser.wait(
+        "return document.querySelector('.plot').layout.xaxis.range[0] > arguments[0] + 0.5",
+        before[0],
+    )
+    after = browser.run(limits)
+    assert before[0] < after[0] < after[1] < before[1]
+
+
+def test_profiler_shows_the_fitted_model_and_finds_the_best_setting(browser, pages, screening):
+    opened(browser, pages(gasket_page))
+    models = surfaces(screening[0])
+    places = [0.3, -0.7, 0.5, 0.0, -1.0, 0.25, 1.0, -0.2]
+    for load, name in (("middle", "Dx"), ("counter", "Fz")):
+        call = f"return Explore.{{}}('{load}', '{name}', arguments[0])"
+        value, half = (browser.run(call.format(f), places) for f in ("predict", "halfWidth"))
+        assert value == pytest.approx(models.prediction((load, name), places), rel=1e-5)
+        expected = models.half_width((load, name), places, of_run=True)
+        assert half == pytest.approx(expected, rel=1e-4)
+    before = browser.run("return document.querySelector('.profiler .line').getAttribute('d')")
+    browser.run(
+        "const s = document.getElementById('factor-1'); s.value = 1;"
+        "s.dispatchEvent(new Event('input'));"
+    )
+    assert "C_T=90 N*mm*s/deg" in browser.find(".setting code").text
+    assert (
+        browser.run("return document.querySelector('.profiler .line').getAttribute('d')") != before
+    )
+    # least displacement wants much C_L, the limit of the moment little: C_L ends in between
+    browser.run(
+        "const of = name => document.querySelector(`[data-response=${name}]`);"
+        "of('Dx').querySelector('select').value = 'smallest';"
+        "of('Mx').querySelector('select').value = 'most';"
+        "of('Mx').querySelector('input').value = 6.2;"
+        "Explore.find();"
+    )
+    best = browser.run("return Explore.state.places")
+    assert models.prediction(("counter", "Mx"), best) <= 6.2 + 1e-4
+    assert best[0] > 0.5
+    assert best[4] > 0.9  # lowers the moment at no cost
+    assert abs(best[2]) < 0.2  # the least of a parabola at 0
+    assert "Desirability" in browser.find(".found").text
