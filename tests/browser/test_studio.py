@@ -7,6 +7,7 @@ import subprocess
 import sys
 from urllib.parse import unquote
 
+import numpy as np
 import pytest
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -164,6 +165,15 @@ def test_smallest_gap_is_drawn_and_the_tub_moves(page):
     moved = changed_from(page, tub, before)
     assert changed_from(page, tub, moved)
     page.find("#play").click()
+
+
+def test_pose_is_turned_as_in_drake(page):
+    from pydrake.math import RollPitchYaw
+
+    angles = (0.1, -0.2, 0.3)
+    turned = "return import('./static/scene.js').then((scene) => scene.rotation(...arguments))"
+    expected = RollPitchYaw(*angles).ToRotationMatrix().matrix()
+    assert np.array(page.run(turned, *angles)) == pytest.approx(expected, abs=1e-12)
 
 
 def test_reload_link_and_save_lose_nothing(page, folder):

@@ -78,8 +78,8 @@ def compared(machine, setup, count, seed=5):
 
 
 @pytest.mark.parametrize("name", MACHINES)
-def test_derivatives_are_those_of_the_diagram_at_1000_random_states(name):
+def test_derivatives_are_those_of_the_diagram_at_random_states(name):
     machine = build_machine(MACHINES[name])
-    worst, did = compared(machine, machine.set_up(LOAD), 1000)
+    worst, did = compared(machine, machine.set_up(LOAD), 1000 if name == "reference" else 200)
     assert worst < 1e-10
     assert did == {"lifted", "pressed", "sticks", "slides"}

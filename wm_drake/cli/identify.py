@@ -194,7 +194,11 @@ def _axis_command(kind: str) -> Callable[..., None]:
         axis: OptionalAxisOption = None,
         static: StaticOption = False,
         law: Annotated[
-            str, typer.Option(help="voigt, table (monotone curve) or, about an axis, voigt_havsin.")
+            str,
+            typer.Option(
+                help="voigt, table (monotone curve), voigt_dahl, voigt_maxwell, rubber (both) or, "
+                "about an axis, voigt_havsin."
+            ),
         ] = "voigt",
         validate: ValidateOption = None,
         arm: ArmOption = None,

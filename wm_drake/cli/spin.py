@@ -129,6 +129,7 @@ def spin(
                 engine,
                 progress=progress,
                 comparison=compared_cases(measured, sets),
+                modes=True,
             )
         _write(result, folder, Pages(replay, detail))
     diverged = divergences(result)

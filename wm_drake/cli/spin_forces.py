@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
 
+    from wm_drake.simulation.cabinet import Walk
     from wm_drake.simulation.measures import Measures
 
 FEET = {
@@ -32,6 +33,7 @@ def forces_as_json(measures: "Measures") -> dict[str, Any]:
             "moment_Nm": _sizes(measures, "cabinet_moment"),
         },
         "feet": None if measures.feet is None else _feet(measures.feet),
+        "walk": None if measures.walk is None else _walk(measures.walk),
     }
 
 
@@ -56,6 +58,16 @@ def _sizes(measures: "Measures | xr.Dataset", name: str) -> dict[str, dict[str, 
         for label, value in zip(labels, map(float, values.values), strict=True):
             found.setdefault(str(label), {})[kind] = _number(value)
     return found
+
+
+def _walk(walk: "Walk") -> dict[str, float]:
+    """Return distance and turn of a cabinet that moves, at the end of the run."""
+    from wm_drake.parameters.units import Unit
+
+    return {
+        "distance_mm": Unit("m", "mm").from_si(walk.distance),
+        "turn_deg": Unit("rad", "deg").from_si(walk.turn),
+    }
 
 
 def _feet(feet: "xr.Dataset") -> dict[str, Any]:

@@ -45,12 +45,12 @@ PADS = PackedLayout(
     vertical_damping=SCALAR,
     horizontal_stiffness=SCALAR,
     horizontal_damping=SCALAR,
-    full_damping_at=SCALAR,
+    damping_growth=SCALAR,
 )
 """What the feet have in common: friction coefficient, stiffness [N/m] and damping [N s/m] of a pad,
-compression from which its vertical damping is full [m]."""
+growth of the share of its vertical damping with the compression [1/m]."""
 FOOT = PackedLayout("FootNumbers", position=VECTOR, at_rest=SCALAR)
-"""A foot: its position in C, on the floor at rest [m]; its normal force at rest [N]."""
+"""A foot: its position in C, on the floor at rest [m]; compression of its pad at rest [m]."""
 FEET_SIZE = PADS.fixed_size + FEET_COUNT * FOOT.fixed_size
 """Packed numbers of the feet: `PADS`, then a `FOOT` for each."""
 SLIP_SIZE = 2 * FEET_COUNT
@@ -94,11 +94,13 @@ class CabinetOnFeet:
             vertical_damping=pads.vertical_damping,
             horizontal_stiffness=pads.horizontal_stiffness,
             horizontal_damping=pads.horizontal_damping,
-            full_damping_at=FULL_DAMPING * mean / pads.vertical_stiffness,
+            damping_growth=pads.vertical_stiffness / (FULL_DAMPING * mean),
         )
         places = [cabinet.feet[name] for name in cabinet.corners]
         feet = [
-            FOOT.pack(position=(foot.x, foot.y, cabinet.floor), at_rest=force)
+            FOOT.pack(
+                position=(foot.x, foot.y, cabinet.floor), at_rest=force / pads.vertical_stiffness
+            )
             for foot, force in zip(places, self.at_rest, strict=True)
         ]
         return np.concatenate([common, *feet])
@@ -118,11 +120,11 @@ def foot_force(motion, foot, slip, pads):
     place = add(motion.position, arm)
     v = add(motion.velocity, cross(motion.angular_velocity, arm))
     normal = pad_normal_force(
-        foot.at_rest / pads.vertical_stiffness - (place[2] - at[2]),
+        foot.at_rest - (place[2] - at[2]),
         -v[2],
         pads.vertical_stiffness,
         pads.vertical_damping,
-        pads.full_damping_at,
+        pads.damping_growth,
     )
     f_x, f_y, w_x, w_y = pad_friction(
         (place[0] - at[0] - slip[0], place[1] - at[1] - slip[1]),

@@ -1,17 +1,15 @@
-"""Sampled motion in W and seen from a cabinet that moves; both engines use it.
+"""Sampled motion seen from a cabinet that moves; both engines use it.
 
 A motion has the form of a `CARRIER_STATE`: roll, pitch, yaw and position of a body, its angular
 velocity and velocity (n, 12). Accelerations are angular and of the origin (n, 6).
 """
-
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wm_drake.compiler.compilation import generic
 from wm_drake.compiler.vectors import rotation_from_rpy
-from wm_drake.elements.cabinet import motion_in, motion_with, rates_in, rates_with
+from wm_drake.elements.cabinet import motion_in, rates_in
 from wm_drake.elements.motion import TubMotion
 from wm_drake.parameters.types import FloatArray
 
@@ -25,27 +23,9 @@ def seen_from_cabinet(
         cabinet, cabinet_rates: Motion and accelerations of the cabinet, in W.
         body, rates: The same of the body.
     """
-    return _converted(motion_in, rates_in, cabinet, cabinet_rates, body, rates)
-
-
-def seen_from_world(
-    cabinet: FloatArray, cabinet_rates: FloatArray, body: FloatArray, rates: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return motion and accelerations in W of a body; inverse of `seen_from_cabinet`."""
-    return _converted(motion_with, rates_with, cabinet, cabinet_rates, body, rates)
-
-
-def _converted(
-    motion_law: Any,
-    rates_law: Any,
-    cabinet: FloatArray,
-    cabinet_rates: FloatArray,
-    body: FloatArray,
-    rates: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
     moving, of_body = _motion(cabinet), _motion(body)
-    found = generic(motion_law)(moving, of_body)
-    accelerations = generic(rates_law)(moving, *_vectors(cabinet_rates), of_body, *_vectors(rates))
+    found = generic(motion_in)(moving, of_body)
+    accelerations = generic(rates_in)(moving, *_vectors(cabinet_rates), of_body, *_vectors(rates))
     matrices = np.stack(found.rotation, axis=1).reshape(-1, 3, 3)
     angles = np.full((len(body), 3), np.nan)
     good = np.isfinite(matrices).all(axis=(1, 2))  # a run that diverged has other samples

@@ -20,7 +20,8 @@ Equation -> function -> test (below tests/laws):
     [C] (6)        STV friction                friction.stv_friction             test_friction
     [C] (7)        MSTV, corrected             friction.mstv_friction            test_friction
 
-Own derivations: normal loads of four feet, margins of sliding, turning and tilting in `feet`, test
+Rubber beyond [A] and [B] (Dahl 1968; own closed forms): rubber.dahl_rate, dahl_after_path,
+maxwell_rate, test in test_rubber. Own derivations: normal loads of four feet, margins of sliding, turning and tilting in `feet`, test
 in test_feet. Torque limit, speed controller and bearing friction of a drive in `motor`, test in
 test_motor.
 

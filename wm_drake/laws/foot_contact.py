@@ -7,14 +7,14 @@ models, IEEE Transactions on Automatic Control 47 (2002) 787-792.
 """
 
 from wm_drake.compiler.compilation import law
-from wm_drake.compiler.elementary import sqrt, where
+from wm_drake.compiler.elementary import anywhere, sqrt, where
 
 
 @law
-def pad_normal_force(compression, rate, stiffness, damping, full_damping_at):
+def pad_normal_force(compression, rate, stiffness, damping, growth):
     """Return the normal force of the floor on a pad.
 
-        N = k d + c d' min(1, d / d_c),    d > 0 and N > 0;    N = 0 else
+        N = k d + c d' min(1, g d),    d > 0 and N > 0;    N = 0 else
 
     The damping grows with the compression from 0, so that the force does not jump where the pad
     touches the floor. The pad does not pull.
@@ -22,12 +22,12 @@ def pad_normal_force(compression, rate, stiffness, damping, full_damping_at):
     Args:
         compression, rate: d and its rate; d < 0 for a foot above the floor. [m, m/s]
         stiffness, damping: k, > 0, and c, >= 0. [N/m, N s/m]
-        full_damping_at: d_c, compression from which the damping is full, > 0. [m]
+        growth: g, > 0; the damping is full from the compression 1 / g on. [1/m]
 
     Returns:
         Force, up, >= 0. [N]
     """
-    share = compression / full_damping_at
+    share = growth * compression
     share = where(share < 1.0, share, 1.0)
     force = stiffness * compression + damping * rate * share
     return where((compression > 0.0) & (force > 0.0), force, 0.0 * force)
@@ -59,9 +59,11 @@ def pad_friction(shear, velocity, stiffness, damping, limit):
     """
     f_x = stiffness * shear[0] + damping * velocity[0]
     f_y = stiffness * shear[1] + damping * velocity[1]
-    size = sqrt(f_x * f_x + f_y * f_y)
-    slides = size > limit
-    share = where(slides, limit / size, 1.0)
-    # (1 - share) F / c, which is 0 without rounding where it sticks
-    rate = where(slides, (1.0 - share) / damping, 0.0)
+    square = f_x * f_x + f_y * f_y
+    slides = square > limit * limit
+    share, rate = 1.0, 0.0
+    if anywhere(slides):  # a root and quotients, which most states do not need
+        share = where(slides, limit / sqrt(square), 1.0)
+        # (1 - share) F / c, which is 0 without rounding where it sticks
+        rate = where(slides, (1.0 - share) / damping, 0.0)
     return -share * f_x, -share * f_y, rate * f_x, rate * f_y

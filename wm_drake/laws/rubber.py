@@ -97,3 +97,21 @@ def maxwell_after_step(stretch, start, middle, end, step, stiffness, damping):
     third = maxwell_rate(stretch + 0.5 * step * second, middle, stiffness, damping)
     fourth = maxwell_rate(stretch + step * third, end, stiffness, damping)
     return stretch + step / 6.0 * ((first + fourth) + 2.0 * (second + third))
+
+
+@law
+def maxwell_after_path(stretch, path, step, stiffness, damping):
+    """Return the stretch of a Maxwell element after a step at a constant rate, in closed form.
+
+        z = z_0 e + v t (1 - e),    e = exp(-h / t),   t = c / k,   v = path / h    own derivation
+
+    Args:
+        stretch: Stretch z_0 before. [m or rad]
+        path: Displacement over the step. [m or rad]
+        step: Time step h, > 0, of any length. [s]
+        stiffness, damping: Spring k and dashpot c in series. [N/m, N s/m; N m/rad, N m s/rad]
+    """
+    decay = stiffness * step / damping
+    factor, small = decay_factor(decay), decay < 1e-5
+    mean = where(small, 1.0 - 0.5 * decay, (1.0 - factor) / where(small, 1.0, decay))
+    return stretch * factor + path * mean

@@ -8,14 +8,14 @@ from pydantic import TypeAdapter, ValidationError
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.parameters.damper_laws import DamperType
-from wm_drake.parameters.elements import BushingType, Frozen
+from wm_drake.parameters.elements import BushingType, Frozen, RubberBushingType
 from wm_drake.parameters.files import read_mapping
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.text_files import is_file
 
 COMPONENTS_FOLDER = Path(__file__).parents[1] / "data" / "components"
 
-ComponentParameters: TypeAlias = DamperType | BushingType
+ComponentParameters: TypeAlias = DamperType | BushingType | RubberBushingType
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,9 @@ def _validated(plain: dict[str, Any], path: Path) -> ComponentParameters:
             return (
                 TypeAdapter(_DamperFile).validate_python({"damper": plain}, context=context).damper
             )
-        return BushingType.model_validate(plain, context=context)
+        return RubberBushingType.model_validate(plain, context=context)
     except ValidationError as error:
-        root = _DamperFile if "law" in plain else BushingType
+        root = _DamperFile if "law" in plain else RubberBushingType
         problems = problems_of(error, root)
         raise InputError(
             Problem(str(path), p.key.removeprefix("damper").lstrip("."), p.message)

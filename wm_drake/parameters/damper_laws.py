@@ -26,7 +26,7 @@ from wm_drake.parameters.elements import (
     PositiveVelocity,
 )
 
-Kind: TypeAlias = Literal["force", "stiffness", "damping", "speed"]
+Kind: TypeAlias = Literal["force", "stiffness", "damping", "speed", "length", "branch", "dashpot"]
 Search: TypeAlias = Kind | tuple[float, float]
 """Where the identification searches a number: in the range of its kind, which follows from the
 measured loops, or between two bounds in SI."""

@@ -311,14 +311,14 @@ def _line_style(line: Any) -> Description:
 
 
 def _dash(line: Any) -> str:
-    """Return the kind of a line: solid, dash, dot, dashdot, or "" without a line."""
-    style = line.get_linestyle()
-    if not isinstance(style, str):
-        return "dash"
-    names = {"-": "solid", "--": "dash", ":": "dot", "-.": "dashdot"}
-    if style == "--" or line._dash_pattern[1]:
-        return names.get(style, "dash")
-    return names.get(style, "")
+    """Return the pattern of a line: solid, lengths of dashes and gaps in points, or "" without."""
+    if line.get_linestyle() in ("None", "none", " ", ""):
+        return ""
+    lengths = line._unscaled_dash_pattern[1]
+    if lengths is None:
+        return "solid"
+    width = max(float(line.get_linewidth()), 0.8)
+    return ",".join(f"{float(length) * width:.3g}" for length in lengths)
 
 
 def _label(artist: Any) -> str | None:

@@ -93,13 +93,15 @@ const Pictures = (() => {
     return power * [1, 2, 5, 10].find(factor => factor * power >= raw * 0.999);
   }
 
+  const upCount = height => Math.max(3, Math.round(height / 34));
+
   /* Texts that a plain axis is likely to show: their widths make room for them. */
-  function likelyTexts(axis) {
+  function likelyTexts(axis, most) {
     if (axis.ticks) return axis.ticks.map(([, text]) => text);
     const [a, b] = axis.range, low = Math.min(a, b), high = Math.max(a, b);
     if (axis.is_log) return ["10\u221288"];
     if (!(high > low)) return [String(low)];
-    const step = niceStep(high - low, 5), decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+    const step = niceStep(high - low, most), decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
     return [Math.ceil(low / step) * step, Math.floor(high / step) * step]
       .map(value => value.toFixed(Math.min(8, decimals)));
   }
@@ -132,7 +134,7 @@ const Pictures = (() => {
   function upTicks(axis, room, height, factor, total) {
     const px = size(axis.tick_size, factor);
     if (!axis.is_labelled || (axis.ticks && !axis.ticks.length)) return { px, width: 0 };
-    if (!axis.ticks) return { px, width: Math.max(0, ...likelyTexts(axis).map(text => width(text, px))) + 8 };
+    if (!axis.ticks) return { px, width: Math.max(0, ...likelyTexts(axis, upCount(height)).map(text => width(text, px))) + 8 };
     const span = Math.abs(axis.range[1] - axis.range[0]) || 1;
     const places = axis.ticks.map(([place]) => place).sort((u, v) => u - v);
     const cell = Math.min(height, ...places.slice(1).map((place, i) => height * (place - places[i]) / span));
@@ -326,6 +328,7 @@ const Pictures = (() => {
     return text.replace(/-/g, MINUS);
   }
 
+  const dashes = dash => dash === "solid" ? dash : dash.split(",").map(length => `${length}px`).join(",");
   const colorscale = shades => shades.map((shade, i) => [i / (shades.length - 1), shade]);
 
   function hovered(part, panel, label) {
@@ -341,7 +344,7 @@ const Pictures = (() => {
         const x = numbers(part.x), y = numbers(part.y);
         const mode = [part.dash ? "lines" : null, part.mark ? "markers" : null].filter(Boolean).join("+");
         const trace = { type: "scatter", mode: mode || "lines", x, y, hovertemplate: hovered(part, panel, label) };
-        if (part.dash) trace.line = { color: area, width: Math.max(0.8, part.width * 1.15), dash: part.dash };
+        if (part.dash) trace.line = { color: area, width: Math.max(0.8, part.width * 1.15), dash: dashes(part.dash) };
         if (part.mark) trace.marker = marker(part, factor);
         return [trace];
       }
@@ -471,7 +474,7 @@ const Pictures = (() => {
     Object.assign(up, {
       domain: [1 - place.y1 / arrangement.height, 1 - place.y0 / arrangement.height], anchor: names.x,
       showticklabels: need.upTicks.width > 0, tickfont: { size: need.upTicks.px, color: look.quiet },
-      nticks: Math.max(3, Math.round((place.y1 - place.y0) / 34)),
+      nticks: upCount(place.y1 - place.y0),
       title: {
         text: lines(need.upLabel), standoff: 5,
         font: { size: size(panel.y.label_size, factor), color: hue(panel.y.color) },
@@ -530,7 +533,7 @@ const Pictures = (() => {
       if (place.twin) {
         const other = { x: names.x, y: `y${200 + k}` }, axis = place.twin.panel.y;
         layout[`yaxis${200 + k}`] = {
-          ...plainAxis(axis, place.twin.panel, look), overlaying: names.y, side: "right", anchor: names.x, tickmode: "auto", nticks: Math.max(3, Math.round((place.y1 - place.y0) / 34)),
+          ...plainAxis(axis, place.twin.panel, look), overlaying: names.y, side: "right", anchor: names.x, tickmode: "auto", nticks: upCount(place.y1 - place.y0),
           showgrid: false, showline: true,
           tickfont: { size: size(axis.tick_size, factor), color: look.quiet },
           title: { text: escaped(axis.label), standoff: 5, font: { size: size(axis.label_size, factor), color: hue(axis.color) } },
@@ -566,7 +569,7 @@ const Pictures = (() => {
         const across = part.along === "x";
         const shape = { type: is ? "line" : "rect", layer: is ? "above" : "below", xref: names.x, yref: names.y };
         if (is) {
-          Object.assign(shape, { [`${other}0`]: part.at, [`${other}1`]: part.at, line: { color: hue(part.color), width: Math.max(1, part.width), dash: part.dash } });
+          Object.assign(shape, { [`${other}0`]: part.at, [`${other}1`]: part.at, line: { color: hue(part.color), width: Math.max(1, part.width), dash: dashes(part.dash) } });
           Object.assign(shape, { [`${part.along}0`]: 0, [`${part.along}1`]: 1, [`${part.along}ref`]: `${names[part.along]} domain` });
         } else {
           Object.assign(shape, { fillcolor: hue(part.color), line: { width: 0 } });
@@ -667,7 +670,7 @@ const Pictures = (() => {
     };
     if (entry.area) add("rect", { x: 2, y: 1.5, width: 22, height: 9, fill: hue(entry.area.color), stroke: entry.area.edge ? hue(entry.area.edge) : "none" });
     if (entry.line && entry.line.dash) {
-      const pattern = { dash: "6 3", dot: "2 3", dashdot: "6 3 2 3" }[entry.line.dash] || "";
+      const pattern = entry.line.dash === "solid" ? "" : entry.line.dash;
       add("line", { x1: 0, x2: 26, y1: 6, y2: 6, stroke: hue(entry.line.color), "stroke-width": Math.max(1.4, entry.line.width), "stroke-dasharray": pattern });
     }
     if (entry.line && entry.line.mark) {

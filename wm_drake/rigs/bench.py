@@ -11,6 +11,7 @@ from wm_drake.errors import input_error
 from wm_drake.parameters.damper_laws import DAMPER_LAWS, DamperNumbers
 from wm_drake.parameters.elements import BushingType
 from wm_drake.parameters.types import FloatArray
+from wm_drake.rigs.rubber import axis_branches
 
 AXES = ("x", "y", "z", "about_x", "about_y", "about_z")
 """Axes of a bushing, in the order of its law: along, then about."""
@@ -96,11 +97,13 @@ class BushingBench:
         packed: Parameters, from `packed_bushing_law`.
         axis: One of `AXES`.
         arm: Radius of the jig through which a rotation is driven; 0 turns it directly. [m]
+        branches: Numbers of the branches of rubber of the axis (`axis_branches`); None without.
     """
 
     packed: FloatArray
     axis: str
     arm: float = 0.0
+    branches: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Check axis and arm.
@@ -120,8 +123,8 @@ class BushingBench:
 
     @property
     def state_size(self) -> int:
-        """Number of states: none."""
-        return 0
+        """Number of states: none, or the stretches of friction and Maxwell element."""
+        return 0 if self.branches is None else 2
 
 
 Bench: TypeAlias = DamperBench | BushingBench
@@ -136,4 +139,4 @@ def damper_bench(
 
 def bushing_bench(bushing: BushingType, axis: str, arm: float = 0.0) -> BushingBench:
     """Return the bench of a bushing or gasket of a machine file."""
-    return BushingBench(packed_bushing_law(bushing), axis, arm)
+    return BushingBench(packed_bushing_law(bushing), axis, arm, axis_branches(bushing, axis))

@@ -8,6 +8,9 @@ from wm_drake.elements.damper_law import damper_response
 from wm_drake.laws.bushing import bushing_force
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import AXES, BushingBench
+from wm_drake.rigs.integration import PHASE
+from wm_drake.rigs.measured import RecordedMotion
+from wm_drake.rigs.rubber import branch_forces
 
 
 @long_running
@@ -53,8 +56,58 @@ def bushing_reactions(position, rate, packed, axis):  # type: ignore[no-untyped-
     return force
 
 
+def harmonic_loads(
+    bench: BushingBench,
+    amplitude: float,
+    omega: float,
+    phase: FloatArray,
+    position: FloatArray,
+    rate: FloatArray,
+) -> FloatArray:
+    """Return force or moment at the driven end of a bushing under steady harmonic motion (n,).
+
+    Args:
+        bench: The bushing.
+        amplitude, omega: Amplitude and angular frequency of the motion. [m or rad, rad/s]
+        phase: Phases, from 0 to 2 pi (n,). [rad]
+        position, rate: Motion at these phases. [m, m/s; rad, rad/s if it rotates]
+    """
+    force = bushing_loads(bench, position, rate)
+    if bench.branches is None:
+        return force
+    step = np.diff(PHASE) / omega
+    own = _of_branches(bench, step, amplitude * np.sin(PHASE), len(step))
+    return force + np.interp(phase, PHASE, own)
+
+
+def recorded_loads(bench: BushingBench, motion: RecordedMotion) -> FloatArray:
+    """Return force or moment at the samples of a recorded motion (n,). [N; N m]
+
+    Branches begin relaxed, or in the steady state of the first period of a motion that repeats.
+    """
+    force = bushing_loads(bench, motion.position, motion.rate)
+    if bench.branches is None:
+        return force
+    paths = 0.5 * motion.step * (motion.step_rate[1:] + motion.step_rate[:-1])
+    place = np.append(0.0, np.cumsum(paths))
+    place += motion.position[0] - place[motion.samples[0]]
+    return force + _of_branches(bench, motion.step, place, motion.repeats)[motion.samples]
+
+
+def _of_branches(
+    bench: BushingBench, step: FloatArray, position: FloatArray, period: int
+) -> FloatArray:
+    """Return the force of the branches at the driven end (k + 1,); see `branch_forces`."""
+    assert bench.branches is not None
+    if not bench.arm:
+        return branch_forces(bench.branches, step, position, period)
+    angle = np.arcsin(position / bench.arm)
+    moment = branch_forces(bench.branches, step, angle, period)
+    return np.asarray(moment / (bench.arm * np.cos(angle)))
+
+
 def bushing_loads(bench: BushingBench, position: FloatArray, rate: FloatArray) -> FloatArray:
-    """Return force or moment at the driven end of a bushing (n,). [N; N m]
+    """Return force or moment at the driven end of a bushing without its branches (n,). [N; N m]
 
     Through a jig arm of radius R the actuator moves by d = R sin(theta), and the moment M needs the
     force F = M / (R cos(theta)), which does the same work. [A] section 2.2 takes M = F R, which

@@ -8,7 +8,7 @@ import numpy as np
 from wm_drake.errors import input_error
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import Bench, BushingBench, DamperBench, Harmonic
-from wm_drake.rigs.forces import bushing_loads, damper_tensions
+from wm_drake.rigs.forces import damper_tensions, harmonic_loads
 from wm_drake.rigs.heavy_sponge import steady_tensions
 from wm_drake.rigs.integration import PHASE, steady_states
 
@@ -70,7 +70,17 @@ def force_loops(bench: Bench, motions: Sequence[Harmonic]) -> list[ForceLoop]:
     phase = PHASE[:-1]
     if isinstance(bench, BushingBench):
         return [
-            _loop(bench, motion, bushing_loads(bench, *_driven(bench, motion, phase)))
+            _loop(
+                bench,
+                motion,
+                harmonic_loads(
+                    bench,
+                    motion.amplitude,
+                    motion.angular_frequency,
+                    phase,
+                    *_driven(bench, motion, phase),
+                ),
+            )
             for motion in motions
         ]
     if bench.sponge_mass > 0.0:

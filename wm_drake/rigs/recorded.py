@@ -13,7 +13,7 @@ from wm_drake.compiler.compilation import long_running
 from wm_drake.elements.damper_law import damper_response
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import Bench, BushingBench, DamperBench
-from wm_drake.rigs.forces import bushing_loads, damper_tensions
+from wm_drake.rigs.forces import damper_tensions, recorded_loads
 from wm_drake.rigs.integration import NotSteadyError, closed_loop
 from wm_drake.rigs.measured import RecordedMotion
 
@@ -37,7 +37,7 @@ def recorded_forces(bench: Bench, motion: RecordedMotion) -> FloatArray:
         motion: The motion.
     """
     if isinstance(bench, BushingBench):
-        return bushing_loads(bench, motion.position, motion.rate)
+        return recorded_loads(bench, motion)
     deformation: FloatArray = np.zeros(len(motion.step_rate))
     if bench.state_size:
         deformation = recorded_deformation(bench, motion)

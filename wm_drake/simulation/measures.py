@@ -12,6 +12,7 @@ from wm_drake.model.scene import REPLAY_RATE, Gap, Scene
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.cabinet import Walk, walk
 from wm_drake.simulation.feet import BY_FOOT, REGION_VARIABLES, FootLoads, foot_loads, foot_measures
 from wm_drake.simulation.mount_forces import speed_ranges
 from wm_drake.simulation.mounts import KINDS, force_measures
@@ -62,6 +63,7 @@ class Measures:
         feet: Measures of the feet of the cabinet by the names in `wm_drake.simulation.feet`, with
             the dimensions foot and region; None if the machine has no cabinet, or for a record of
             version 0.1.
+        walk: How the cabinet stands at the end, against where it stood before; None if it is fixed.
     """
 
     amplitude: xr.DataArray
@@ -81,6 +83,7 @@ class Measures:
     cabinet_moment_dynamic_rms: xr.DataArray
     smallest_tension: xr.DataArray
     feet: xr.Dataset | None
+    walk: Walk | None = None
 
 
 def filtered(displacement: FloatArray, period: float) -> FloatArray:
@@ -319,6 +322,7 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
             smallest_tensions(values["spring_tension"]), record.coords["spring"].coords
         ),
         feet=feet_of(record),
+        walk=walk_of(record),
     )
 
 
@@ -356,6 +360,14 @@ def feet_of(record: Record) -> xr.Dataset | None:
     labels = {"foot": list(found[0].corners), "region": [part.name for part in parts]}
     dims = dict.fromkeys(REGION_VARIABLES, "region") | dict.fromkeys(BY_FOOT, "foot")
     return xr.Dataset({n: ([dims[n]] if n in dims else [], v) for n, v in values.items()}, labels)
+
+
+def walk_of(record: Record) -> Walk | None:
+    """Return how far a cabinet that moves has walked; None if it is fixed, or without samples."""
+    found = cabinet_in(record)
+    if found is None or "foot_slip" not in record or not record.sizes["time"]:
+        return None
+    return walk(found[0], record.foot_slip.values[-1, :, :2])
 
 
 def foot_loads_of(record: Record) -> FootLoads:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from synthetic_loops import measured, motions_mm
 
 from wm_drake.elements.damper_law import law_numbers
 from wm_drake.errors import InputError
@@ -13,7 +14,7 @@ from wm_drake.parameters import (
     load_component,
     load_machine,
 )
-from wm_drake.rigs import Harmonic, bushing_bench, damper_bench, force_loops
+from wm_drake.rigs import Harmonic, bushing_bench, damper_bench
 from wm_drake.rigs.measured import RecordedMotion, measured_motion
 from wm_drake.studies.fitting import METHODS, identify, least_squares
 from wm_drake.studies.identification import bushing_model, damper_model, fit_problem, fragment
@@ -35,32 +36,6 @@ GASKET, BUSHING = (
     load_machine("free_stroke").gasket,
     load_machine("free_stroke").bushing_types["connecting"],
 )
-
-
-def motions_mm(*pairs):
-    return [Harmonic(frequency, 1e-3 * amplitude) for frequency, amplitude in pairs]
-
-
-def measured(bench, motions, *, noise=0.0, seed=0, samples=150, periods=3.2):
-    """As a bench would record them: unevenly, from anywhere in the motion, with offset and drift of both instruments."""
-    place, rng, found = np.random.default_rng(5), np.random.default_rng(seed), []
-    for k, (motion, loop) in enumerate(zip(motions, force_loops(bench, motions), strict=True)):
-        t = np.sort(place.uniform(0.0, periods / motion.frequency, samples))
-        phase = 2.0 * np.pi * motion.frequency * t + 1.0
-        force = np.interp(
-            phase % (2.0 * np.pi),
-            np.append(loop.time * motion.angular_frequency, 2.0 * np.pi),
-            np.append(loop.force, loop.force[0]),
-        )
-        largest = np.max(np.abs(force))
-        force = force + largest * (0.1 - 0.05 * t / t[-1] + noise * rng.normal(size=samples))
-        displacement = motion.amplitude * (np.sin(phase) + 0.3 + 0.2 * t / t[-1])
-        found.append(
-            measured_motion(
-                MeasuredLoop(f"loop {k}", f"{k}.csv", t + 7.0, displacement, force, loop.rotates)
-            )
-        )
-    return found
 
 
 def relative_errors(fit, truth):

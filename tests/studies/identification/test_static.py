@@ -118,7 +118,7 @@ def test_command_gives_all_axes_in_one_plot_and_a_machine(wm_drake):
     assert gasket.rotational_stiffness_z.torque[-1] == pytest.approx(elastic(0.1), rel=0.01)
     assert gasket.damping_x == load_machine("reference").gasket.damping_x
     page = Path("fit/report.html").read_text()
-    assert page.count("<img ") == 1
+    assert page.count("<figure data-picture>") == 1
     assert set(pd.read_csv("fit/static.csv").axis) == {"x", "y", "about_x", "about_y"}
 
 

@@ -12,7 +12,7 @@ The packed numbers are those of `TUB_AND_BEARING`; the state of the carrier is a
 
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import sine_cosine
-from wm_drake.compiler.matrices import about_centre, inverse, times
+from wm_drake.compiler.matrices import times
 from wm_drake.compiler.packed import LAYOUT, SCALAR, SYMMETRIC, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import (
     add,
@@ -26,8 +26,15 @@ from wm_drake.compiler.vectors import (
 from wm_drake.elements.bushing import BUSHING
 from wm_drake.elements.motion import TubMotion, rpy_rates
 
-TUB = PackedLayout("TubNumbers", inverse_mass=SCALAR, moment=VECTOR, inertia=SYMMETRIC)
-"""The tub without drum: 1/M [1/kg], S [kg m], I [kg m^2]."""
+TUB = PackedLayout(
+    "TubNumbers",
+    inverse_mass=SCALAR,
+    moment=VECTOR,
+    inertia=SYMMETRIC,
+    inverse_inertia=SYMMETRIC,
+)
+"""The tub without drum: 1/M [1/kg], S [kg m], I [kg m^2], inverse of the inertia about the centre
+of mass [1/(kg m^2)]."""
 TUB_AND_BEARING = PackedLayout("TubAndBearingNumbers", tub=LAYOUT(TUB), bearing=LAYOUT(BUSHING))
 """Packed numbers of a compliant bearing: the tub, then the bushing."""
 CARRIER_STATE = PackedLayout(
@@ -61,7 +68,7 @@ def tub_accelerations(motion, wrench, gravity, p, at):
     force = subtract(force, cross(w, cross(w, first)))
     moment = rotate_back(motion.rotation, (wrench[0], wrench[1], wrench[2]))
     moment = subtract(subtract(moment, cross(w, times(i, w))), scale(q, cross(first, force)))
-    w_rate = times(inverse(about_centre(i, first, q)), moment)
+    w_rate = times(tub.inverse_inertia, moment)
     a_O = scale(q, subtract(force, cross(w_rate, first)))
     return rotate(motion.rotation, w_rate), add(rotate(motion.rotation, a_O), gravity)
 

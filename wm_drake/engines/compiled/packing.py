@@ -8,6 +8,7 @@ from pydrake.multibody.tree import ForceElementIndex, RevoluteJoint, SpatialIner
 from pydrake.systems.framework import Context
 
 from wm_drake.compiler.lanes import WIDTH
+from wm_drake.compiler.matrices import about_centre, inverse
 from wm_drake.elements.motion import POSE
 from wm_drake.elements.motor import MOTOR_STATE_SIZE, motor_structure, packed_motor
 from wm_drake.elements.rubber import AXIS_COUNT, Branches, RubberBushingParameters
@@ -330,11 +331,9 @@ def pack_rigid(setup: Setup, name: str) -> FloatArray:
     body = plant.GetBodyByName(name)
     group = [other.index() for other in plant.GetBodiesWeldedTo(body)]
     inertia = plant.CalcSpatialInertia(context, body.body_frame(), group)
-    return TUB.pack(
-        inverse_mass=1.0 / inertia.get_mass(),
-        moment=_moment(inertia),
-        inertia=_six(_matrix(inertia)),
-    )
+    q, moment, six = 1.0 / inertia.get_mass(), _moment(inertia), _six(_matrix(inertia))
+    central = about_centre(tuple(six), tuple(moment), q)
+    return TUB.pack(inverse_mass=q, moment=moment, inertia=six, inverse_inertia=inverse(central))
 
 
 def pack_bodies(plant: MultibodyPlant, context: Context, drive: str) -> FloatArray:

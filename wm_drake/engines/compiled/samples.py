@@ -5,9 +5,10 @@ import numpy as np
 from wm_drake.compiler.compilation import long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.elements.cabinet import motion_with, rates_with
 from wm_drake.elements.motion import POSE, tub_motion
-from wm_drake.engines.cabinet_frame import seen_from_cabinet, seen_from_world
-from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE
+from wm_drake.engines.cabinet_frame import seen_from_cabinet
+from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE, carrier_motion
 from wm_drake.engines.compiled.drum import motor_torque_history
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
@@ -38,28 +39,22 @@ def trajectory_of(
     states, rates = np.split(samples, [-layout.rates_size], axis=1)
     motion, deformation, tubes, carrier, stretches = layout.parts(states)
     cabinet, of_tub = layout.cabinet_part(states), rates[:, :RATES_SIZE]
-    with_drum = _motion_of_drum_and_carrier(motion, carrier)
     of_carrier = rates[:, RATES_SIZE : 2 * RATES_SIZE] if carrier.shape[1] else of_tub
+    moving, turning = None, _motion_of_drum_and_carrier(motion, carrier)
     if cabinet is not None:
         in_world = cabinet[:, :CARRIER_STATE_SIZE], rates[:, -RATES_SIZE:]
-        if carrier.shape[1]:
+        if carrier.shape[1]:  # samples have the carrier in W, and the tub seen from the cabinet
             carrier, _ = seen_from_cabinet(*in_world, carrier, of_carrier)
         else:
-            tub, of_carrier = seen_from_world(*in_world, without_drum(motion), of_tub)
-            with_drum = _motion_of_drum_and_carrier(motion, tub)
+            moving = np.hstack(in_world)
     torque: FloatArray = np.empty((len(samples), 1))
     if layout.motor >= 0:
         torque = torque_of_motor(states, schedule, p, layout)
     else:
         drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
-        torque_history(with_drum, of_carrier, drum_acceleration, p, torque)
+        torque_history(turning, of_carrier, drum_acceleration, p, moving, torque)
     found = schedule.time, motion, deformation, torque[:, 0], of_tub, tubes, carrier, stretches
     return cut_at_divergence(Trajectory(*found, cabinet=cabinet))
-
-
-def without_drum(motion: FloatArray) -> FloatArray:
-    """Return the motion of the tub (n, 12) without that of the drum (n, 14)."""
-    return np.delete(motion, (DRUM_ANGLE, DRUM_RATE), axis=1)
 
 
 def torque_of_motor(
@@ -101,7 +96,7 @@ def _motion_of_drum_and_carrier(motion: FloatArray, carrier: FloatArray) -> Floa
 
 
 @long_running
-def torque_history(motions, rates, acceleration, p, torque):
+def torque_history(motions, rates, acceleration, p, cabinet, torque):
     """Evaluate the torque of the motor on the drum at samples.
 
     Args:
@@ -111,6 +106,8 @@ def torque_history(motions, rates, acceleration, p, torque):
             [rad/s^2, m/s^2]
         acceleration: (n, 1) acceleration of the drum. [rad/s^2]
         p: Packed numbers of the bodies.
+        cabinet: (n, 18) motion and accelerations of the cabinet in W, if motions and rates are seen
+            from it; None if they are in W.
         torque: (n, 1), written. [N m]
     """
     align_stack()
@@ -118,19 +115,21 @@ def torque_history(motions, rates, acceleration, p, torque):
     drum_numbers, numbers, p_numbers = np.empty(WIDTH), np.empty(WIDTH), in_each_lane(p)
     x, dx, drum = lane_array(x_numbers), lane_array(rates_numbers), lane_array(drum_numbers)
     answer, q = lane_array(numbers), lane_array(p_numbers)
+    cabinet_numbers = np.empty((CARRIER_STATE_SIZE + RATES_SIZE) * WIDTH)
+    c = lane_array(cabinet_numbers)
     for begin in range(0, len(torque), WIDTH):
         rows_to_lanes(motions, begin, x_numbers)
         rows_to_lanes(rates, begin, rates_numbers)
         rows_to_lanes(acceleration, begin, drum_numbers)
         sine, cosine = sine_cosine(x[DRUM_ANGLE])
-        masses, rate = mass_properties(q, cosine, sine), read_rates(dx, 0)
-        answer[0] = motor_torque(
-            tub_motion(x),
-            rate.angular_acceleration,
-            rate.acceleration,
-            masses,
-            x[DRUM_RATE],
-            drum[0],
-            q,
-        )
+        masses, rate, motion = mass_properties(q, cosine, sine), read_rates(dx, 0), tub_motion(x)
+        w_rate, v_rate = rate.angular_acceleration, rate.acceleration
+        if cabinet is not None:
+            rows_to_lanes(cabinet, begin, cabinet_numbers)
+            (moving, _), own = carrier_motion(c, 0), read_rates(c, CARRIER_STATE_SIZE)
+            w_rate, v_rate = rates_with(
+                moving, own.angular_acceleration, own.acceleration, motion, w_rate, v_rate
+            )
+            motion = motion_with(moving, motion)
+        answer[0] = motor_torque(motion, w_rate, v_rate, masses, x[DRUM_RATE], drum[0], q)
         lanes_to_rows(numbers, begin, torque)

@@ -10,6 +10,7 @@ from wm_drake.report.figures import GRID, MARK, WIDTH, style_axes
 from wm_drake.report.formatting import number
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.spin.cases import case_title
+from wm_drake.report.spin.walk import WALKING, WalkView, walk_view, walk_warning
 from wm_drake.report.tables import Group, Row, Table
 from wm_drake.simulation.feet import MARGINS
 from wm_drake.simulation.measures import foot_loads_of
@@ -39,11 +40,13 @@ class FloorView:
         about: Sentences about the model.
         tables: Tables, the resultant on the cabinet first.
         picture: Loads and margins over time; None without feet.
+        walk: Where a cabinet that moves goes; None for a fixed one.
     """
 
     about: str
     tables: tuple[Table, ...]
     picture: Picture | None
+    walk: WalkView | None = None
 
 
 def floor_view(result: SpinResult) -> FloorView:
@@ -56,22 +59,27 @@ def floor_view(result: SpinResult) -> FloorView:
             "if it has mass, centre of mass, floor, friction and feet under the key 'cabinet'."
         )
         return FloorView(about, (resultant_table(result),), None)
+    tables = (resultant_table(result), margins_table(standing), feet_table(standing))
+    if any(case.measures.walk for case in standing):
+        return FloorView(WALKING, tables, _picture(standing), walk_view(standing))
     about = (
         "Loads of the feet of a rigid cabinet that does not move, on a rigid level floor. Normal "
         "loads: four feet of equal vertical stiffness that do not pull. Margins: what is missing "
         f"until the cabinet slides or turns at friction {cabinet.friction:g}, or tips over; below "
         "0 it does. The model does not let it move, so what happens after that is not computed."
     )
-    tables = (resultant_table(result), margins_table(standing), feet_table(standing))
     return FloorView(about, tables, _picture(standing))
 
 
 def floor_warnings(result: SpinResult) -> list[str]:
-    """Return a warning for each case in which the cabinet would move."""
+    """Return a warning for each case in which the cabinet would move, or walks."""
     found = []
     for case in result.results:
         feet = case.measures.feet
         if feet is None or case.record.attrs["diverged"]:
+            continue
+        if case.measures.walk is not None:
+            found += walk_warning(case)
             continue
         verbs = [verb for name, verb in zip(MARGINS, VERBS, strict=True) if feet[name] <= 0.0]
         if verbs:
@@ -144,10 +152,12 @@ def feet_table(cases: list[CaseResult]) -> Table:
             cells = [number(float(feet[f"foot_{name}"][index]), 0) for name in names]
             rows.append(Row((str(foot).replace("_", " "), *cells)))
         groups.append(Group(case_title(case), tuple(rows)))
-    caption = (
-        "Loads of each foot over the run. Assumption for the horizontal loads: each foot resists "
-        "in proportion to its normal load."
-    )
+    caption = "Loads of each foot over the run."
+    if not any(case.measures.walk for case in cases):
+        caption += (
+            " Assumption for the horizontal loads: each foot resists in proportion to its normal "
+            "load."
+        )
     header = ("load", "foot", "smallest, N", "largest, N", "largest horizontal, N")
     return Table(caption, header, tuple(groups), text_columns=2)
 

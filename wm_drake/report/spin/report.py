@@ -16,6 +16,7 @@ from wm_drake.report.formatting import (
     percent,
     shape_name,
 )
+from wm_drake.report.modes.report import natural_modes_table
 from wm_drake.report.page import Picture, picture, render, versions_of
 from wm_drake.report.spin import tables
 from wm_drake.report.spin.cases import case_title, has_gasket, speed_rpm
@@ -84,6 +85,8 @@ def spin_report(
         comparison=tables.comparison(result, table),
         largest_values=tables.largest_values(result),
         critical_speeds=tables.critical_speeds(result),
+        modes=natural_modes_table(result.modes) if result.modes else None,
+        modes_of=result.modes.load if result.modes else "",
         accelerations=tables.accelerations(result),
         mount_forces=tables.mount_force_tables(result),
         drawn_alone="" if len(detailed) == len(result.results) else case_title(main),

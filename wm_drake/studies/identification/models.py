@@ -14,12 +14,13 @@ from pydantic import TypeAdapter, ValidationError
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters import DAMPER_LAWS, DamperType, ForceTable, TorqueTable
 from wm_drake.parameters.damper_laws import DamperLaw, DamperNumbers, Kind
-from wm_drake.parameters.elements import BushingType
+from wm_drake.parameters.elements import BushingType, RubberBushingType
 from wm_drake.parameters.keys import unit_of
 from wm_drake.parameters.problems import problems_of
+from wm_drake.parameters.rubber import DAHL_FIELDS, MAXWELL_FIELDS
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.rigs import Bench, bushing_bench, damper_bench
+from wm_drake.rigs import AXES, Bench, bushing_bench, damper_bench
 from wm_drake.rigs.measured import MeasuredMotion
 from wm_drake.studies.fitting import Unknown
 from wm_drake.studies.identification.scales import (
@@ -37,9 +38,17 @@ from wm_drake.studies.identification.tables import OddTable, TwoSidedTable
 KNOTS = 5
 """Knots of a table on each side of zero."""
 
-BUSHING_LAWS = {"voigt": slice(0, 2), "table": slice(1, 2), "voigt_havsin": slice(0, 4)}
+BUSHING_LAWS = {
+    "voigt": (0, 1),
+    "table": (1,),
+    "voigt_havsin": (0, 1, 2, 3),
+    "voigt_dahl": (0, 1, 4, 5),
+    "voigt_maxwell": (0, 1, 6, 7),
+    "rubber": (0, 1, 4, 5, 6, 7),
+}
 """Laws of a bushing, and which of `_bushing_kinds` are unknown numbers: stiffness and damping;
-monotone table and damping; for rotations, stiffness, damping and HAVSIN friction."""
+monotone table and damping; for rotations, stiffness, damping and HAVSIN friction; stiffness and
+damping with rate-independent friction, with a Maxwell branch, with both."""
 
 
 @dataclass(frozen=True)
@@ -158,13 +167,21 @@ def bushing_model(
     scale, kinds = scale_of(motions, arm), _bushing_kinds(axis)
     stiffness = next(iter(kinds))
     tables = (TwoSidedTable(stiffness, scale, knots, about),) if law == "table" else ()
-    searched = {name: kinds[name] for name in list(kinds)[BUSHING_LAWS[law]]}
+    if set(BUSHING_LAWS[law]) & _OF_RUBBER and not isinstance(base, RubberBushingType):
+        raise input_error(
+            f"law '{law}' has branches of rubber, which a bushing of a damper's tubes cannot have; "
+            "allowed are voigt, table and voigt_havsin",
+            where="--law",
+        )
+    names = list(kinds)
+    searched = {names[k]: kinds[names[k]] for k in BUSHING_LAWS[law]}
     check_names([*searched, *_rises(tables)], bounds, fixed)
     kinds_of_units = ABOUT if about else ALONG
     units = {name: kinds_of_units[kind] for name, kind in searched.items()}
     numbers = unknowns_of(searched, units, scale, bounds, fixed)
     unknowns = (*numbers, *_free_rises(tables, bounds, fixed))
-    _check_fixed(base, {name: value for name, value in (fixed or {}).items() if name in searched})
+    known = {name: value for name, value in (fixed or {}).items() if name in searched}
+    _check_fixed(base, {unknown.name: unknown.upper for unknown in numbers} | known)
     fields = _Fields(fixed or {}, unknowns, tables)
 
     def bench(point: FloatArray) -> Bench:
@@ -194,12 +211,19 @@ def _check_fixed(base: BushingType, fixed: Mapping[str, float]) -> None:
 def _bushing_kinds(axis: str) -> dict[str, Kind]:
     """Return the fields of a bushing along or about an axis with their kinds."""
     prefix, letter = ("rotational_" if axis.startswith("about") else ""), axis[-1]
+    k = AXES.index(axis)
     return {
         f"{prefix}stiffness_{letter}": "stiffness",
         f"{prefix}damping_{letter}": "damping",
         f"friction_torque_{letter}": "force",
         f"full_friction_rate_{letter}": "speed",
+        **dict(zip(DAHL_FIELDS[k], ("force", "length"), strict=True)),
+        **dict(zip(MAXWELL_FIELDS[k], ("branch", "dashpot"), strict=True)),
     }
+
+
+_OF_RUBBER = {4, 5, 6, 7}
+"""Which of `_bushing_kinds` belong to branches of rubber."""
 
 
 @dataclass(frozen=True)
@@ -258,7 +282,8 @@ def fields_of_law(law: str, axis: str = "") -> tuple[str, ...]:
     if not axis:
         return DAMPER_LAWS[law].fields
     kinds = list(_bushing_kinds(axis))
-    return (*kinds[BUSHING_LAWS[law]], *(kinds[:1] if law == "table" else ()))
+    own = (kinds[k] for k in BUSHING_LAWS[law])
+    return (*own, *(kinds[:1] if law == "table" else ()))
 
 
 def units_of_fields() -> dict[str, Unit]:
@@ -266,7 +291,7 @@ def units_of_fields() -> dict[str, Unit]:
     found = {name: unit for law in DAMPER_LAWS.values() for name, unit in _units(law).items()}
     for letter in "xyz":
         along, about = _bushing_kinds(letter), _bushing_kinds(f"about_{letter}")
-        found |= {name: ALONG[kind] for name, kind in list(along.items())[:2]}
+        found |= {name: ALONG[kind] for name, kind in along.items() if "friction" not in name}
         found |= {name: ABOUT[kind] for name, kind in about.items()}
     return found
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs import Bench, BushingBench, DamperBench, NotSteadyError
-from wm_drake.rigs.forces import bushing_loads, damper_tensions
+from wm_drake.rigs.forces import damper_tensions, harmonic_loads
 from wm_drake.rigs.integration import PHASE
 from wm_drake.rigs.loops import steady_deformations
 from wm_drake.rigs.measured import (
@@ -64,7 +64,7 @@ def _steady_forces(benches: Sequence[Bench], motions: Sequence[HarmonicMotion]) 
     if isinstance(benches[0], BushingBench):
         return np.array(
             [
-                np.concatenate([bushing_loads(bench, m.position, m.rate) for m in motions])
+                np.concatenate([_bushing_forces(bench, m) for m in motions])
                 for bench in benches
                 if isinstance(bench, BushingBench)
             ]
@@ -74,6 +74,12 @@ def _steady_forces(benches: Sequence[Bench], motions: Sequence[HarmonicMotion]) 
         _damper_forces(benches[k : k + at_once], motions) for k in range(0, len(benches), at_once)
     ]
     return np.concatenate(parts)
+
+
+def _bushing_forces(bench: BushingBench, m: HarmonicMotion) -> FloatArray:
+    """Return the forces of a steady loop of a bushing at its samples."""
+    size = m.motion.amplitude, m.motion.angular_frequency
+    return harmonic_loads(bench, *size, m.phase, m.position, m.rate)
 
 
 def _damper_forces(benches: Sequence[Bench], motions: Sequence[HarmonicMotion]) -> FloatArray:

@@ -18,13 +18,25 @@ ROTATIONAL_STIFFNESS, ROTATIONAL_DAMPING = (
     Unit("N*m*s/rad", "N*mm*s/rad"),
 )
 RATE = Unit("rad/s", "rad/s")
+LENGTH, ANGLE = Unit("m", "mm"), Unit("rad", "deg")
 
-ALONG = {"force": FORCE, "stiffness": STIFFNESS, "damping": DAMPING, "speed": SPEED}
+ALONG = {
+    "force": FORCE,
+    "stiffness": STIFFNESS,
+    "damping": DAMPING,
+    "speed": SPEED,
+    "length": LENGTH,
+    "branch": STIFFNESS,
+    "dashpot": DAMPING,
+}
 ABOUT = {
     "force": TORQUE,
     "stiffness": ROTATIONAL_STIFFNESS,
     "damping": ROTATIONAL_DAMPING,
     "speed": RATE,
+    "length": ANGLE,
+    "branch": ROTATIONAL_STIFFNESS,
+    "dashpot": ROTATIONAL_DAMPING,
 }
 """Units by kind of a number, along an axis and about one."""
 
@@ -59,6 +71,9 @@ class Scale:
             "stiffness": (0.1 * self.stiffness, 10.0 * self.stiffness, True),
             "damping": (DASHPOT * self.damping, self.damping, True),
             "speed": (1e-3 * self.fastest, 2.0 * self.fastest, True),
+            "length": (1e-3 * self.stroke, 3.0 * self.stroke, True),
+            "branch": (1e-3 * self.stiffness, 10.0 * self.stiffness, True),
+            "dashpot": (1e-3 * self.damping, 30.0 * self.damping, True),
         }[search]
 
 
