@@ -3,9 +3,9 @@
 The script prepares and runs samples of the shipped files laundry (seven quantities of the load) and
 laundry_and_parts (twelve quantities), and designs of the shipped file gasket. It prints the
 processor time of each part in ms per run: the sample, its preparation, its run with only D, F and
-M, and its run with all measures of the study. The last columns are the processor time of all runs of
-the study at this size, and the least time on two cores. The times are processor times, which other
-programs on the computer change less than the time on the clock.
+M, and its run with all measures of the study. The last columns are the processor time of all runs
+of the study at its full size, and the least time on two cores. Other programs change
+processor times less than times on the clock.
 """
 
 import argparse
