@@ -67,18 +67,24 @@ def write_cases(
 
 
 def _replay(result: "SpinResult", case: "CaseResult") -> str:
+    import numpy as np
+
     from wm_drake.model.replay import Motion, replay_page
     from wm_drake.simulation.measures import largest_motion
 
     # Meshcat would print the address of its server
     logging.getLogger("drake").setLevel(logging.WARNING)
     time, positions = largest_motion(case.record)
+    cabinet = None
+    if "cabinet_angle" in case.record:
+        shown = case.record.sel(time=time)
+        cabinet = np.hstack([shown.cabinet_angle.values, shown.cabinet_position.values])
     speed = case.record.drum_speed.sel(time=time).values
     parameters, gasket = result.parameters, case.record.attrs["gasket"] == "yes"
     words = "" if gasket or parameters.gasket is None else ", without gasket"
     return replay_page(
         parameters,
-        Motion(time, positions, speed),
+        Motion(time, positions, speed, cabinet),
         title=f"Machine {parameters.name}, load {case.case.name}{words}",
         load=case.case.load,
         gasket=gasket,
