@@ -173,6 +173,20 @@ class PackedLayout:
             raise ValueError(f"{self.name}: values and fields differ in {odd}")
         return np.concatenate([self._flat(field, values[field]) for field in self.fields])
 
+    def pack_rows(self, **values: Any) -> _FloatArray:
+        """Return the packed numbers of n components (n, size); fields of fixed size.
+
+        Args:
+            values: For each field its numbers (n, size of the field).
+
+        Raises:
+            ValueError: A value is missing or has another size than its field.
+        """
+        rows = np.column_stack([values[field] for field in self.fields])
+        if set(values) != set(self.fields) or rows.shape[1] != self.fixed_size:
+            raise ValueError(f"{self.name}: values do not have the sizes of the fields")
+        return rows
+
     def _flat(self, field: str, value: Any) -> _FloatArray:
         flat = np.asarray(value, dtype=float).ravel()
         kind = self.fields[field]

@@ -19,7 +19,7 @@ from wm_drake.compiler.vectors import (
     subtract,
 )
 from wm_drake.compiler.vectors import transpose as transposed
-from wm_drake.elements.layouts import layout_of, packed_fields
+from wm_drake.elements.layouts import layout_of, packed_fields, packed_once
 from wm_drake.elements.motion import tub_motion, write_generalized_force
 from wm_drake.elements.strut import wrench_at_origin
 from wm_drake.laws.bushing import bushing_force
@@ -100,6 +100,7 @@ class SixComponentBushingParameters:
         frictionless = {f"friction_torque_{axis}": 0.0 for axis in AXES}
         return replace(self, packed_law=BUSHING_LAW.replaced(self.packed_law, **frictionless))
 
+    @packed_once
     def packed(self) -> FloatArray:
         """Return the numbers of `BUSHING`."""
         return BUSHING.pack(

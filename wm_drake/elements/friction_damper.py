@@ -15,7 +15,7 @@ from wm_drake.elements.damper_law import (
     law_structure,
     packed_damper_law,
 )
-from wm_drake.elements.layouts import layout_of, packed_fields
+from wm_drake.elements.layouts import layout_of, packed_fields, packed_once
 from wm_drake.elements.motion import tub_motion, write_generalized_force
 from wm_drake.elements.strut import strut_line, transverse, wrench_at_origin
 from wm_drake.laws.strut import bending_moment, transverse_couple
@@ -64,6 +64,7 @@ class FrictionDamperParameters:
         law = frictionless_law(self.packed_law)
         return replace(self, end_bushing=bushing, packed_law=law)
 
+    @packed_once
     def packed(self) -> FloatArray:
         """Return the numbers of `FRICTION_DAMPER`."""
         line = self.p_ToA_T - self.p_WH

@@ -1,7 +1,8 @@
 """From the frozen types of a machine file to packed numbers: curves, and the layout of a type."""
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel
@@ -25,6 +26,19 @@ def layout_of(name: str, kind: type[BaseModel], fields: Sequence[str]) -> Packed
     numbers = [field for field in fields if kind.model_fields[field].annotation is float]
     curves = [field for field in fields if field not in numbers]
     return PackedLayout(name, **dict.fromkeys(numbers, SCALAR), **dict.fromkeys(curves, CURVE))
+
+
+def packed_once(pack: Callable[[Any], FloatArray]) -> Callable[[Any], FloatArray]:
+    """Return a method `packed` of a frozen component that packs once; each call gets a copy."""
+
+    @functools.wraps(pack)
+    def packed(self: Any) -> FloatArray:
+        kept = vars(self)
+        if "_packed" not in kept:
+            kept["_packed"] = pack(self)
+        return np.array(kept["_packed"])
+
+    return packed
 
 
 def packed_fields(layout: PackedLayout, values: BaseModel) -> FloatArray:

@@ -9,6 +9,7 @@ from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import numbers
 from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import rotate, scale
+from wm_drake.elements.layouts import packed_once
 from wm_drake.elements.motion import tub_motion, write_generalized_force
 from wm_drake.elements.strut import strut_line, wrench_at_origin
 from wm_drake.laws.spring import spring_tension
@@ -96,6 +97,7 @@ class SpringStrutParameters:
         """Number of points of its table, 0 without one."""
         return CURVE.structure(self.packed_stiffness, 0)
 
+    @packed_once
     def packed(self) -> FloatArray:
         """Return the numbers of `SPRING`."""
         return SPRING.pack(

@@ -22,6 +22,7 @@ from wm_drake.elements.damper_law import (
     law_of,
     law_structure,
 )
+from wm_drake.elements.layouts import packed_once
 from wm_drake.elements.motion import (
     GENERALIZED_FORCE_SIZE,
     PLANT_STATE_SIZE,
@@ -107,6 +108,7 @@ class TelescopicDamperParameters:
             packed_law=frictionless_law(self.packed_law),
         )
 
+    @packed_once
     def packed(self) -> FloatArray:
         """Return the numbers of `TELESCOPIC_DAMPER`."""
         return TELESCOPIC_DAMPER.pack(

@@ -1,11 +1,16 @@
 """Poses of the frames of the SDF as drawn, under the overrides of a machine file."""
 
+from collections.abc import Callable
+from typing import Any, TypeVar
+
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 
 from wm_drake.model.bodies import set_bodies
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
+
+Placed = TypeVar("Placed")
 
 
 class FramePoses:
@@ -25,6 +30,7 @@ class FramePoses:
         self._context = plant.CreateDefaultContext()
         set_bodies(plant, self._context, parameters)
         self._known: dict[tuple[str, str], tuple[FloatArray, FloatArray]] = {}
+        self._placed: dict[str, tuple[tuple[Any, ...], Any]] = {}
 
     def __call__(self, body: str, frame: str) -> tuple[FloatArray, FloatArray]:
         """Return position (3,) [m] and rotation (3, 3) of a frame in the frame of a body."""
@@ -38,3 +44,19 @@ class FramePoses:
                 np.array(pose.rotation().matrix()),
             )
         return self._known[body, frame]
+
+    def placed(self, key: str, parts: tuple[Any, ...], place: Callable[[], Placed]) -> Placed:
+        """Return an element placed at these frames; that of the last call, if its parts were these.
+
+        Cases of a design share what their parameters do not change.
+
+        Args:
+            key: Key path of the element.
+            parts: Frozen parameters that the element is made of.
+            place: Places the element.
+        """
+        known = self._placed.get(key)
+        if known is None or any(a is not b for a, b in zip(known[0], parts, strict=True)):
+            known = self._placed[key] = parts, place()
+        found: Placed = known[1]
+        return found

@@ -1,5 +1,6 @@
 """Elements of a machine placed at their frames, and the force that they apply to the plant."""
 
+import functools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -34,6 +35,8 @@ from wm_drake.laws.table import stiffness_force
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.state_layout import StateLayout
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.damper_laws import DamperNumbers
+from wm_drake.parameters.elements import Damper, Spring, SpringType
 from wm_drake.parameters.types import FloatArray
 
 SHORTEST_STRUT = 1e-3
@@ -102,25 +105,24 @@ class AppliedForce:
         trees, states = state_layout.trees, state_layout.states()
         self._size = state_layout.size
         self._calls = []
+        self._states: list[np.ndarray] = []
+        parts: dict[int, tuple[int, np.ndarray]] = {}
         for element, evaluate, tree in elements.links():
-            acted_on = [0, tree] if tree else [0]
-            self._calls.append(
-                (
-                    evaluate,
-                    np.concatenate([states[t] for t in acted_on]),
-                    np.concatenate([trees[t] for t in acted_on]),
-                    element.packed(),
-                )
-            )
+            if tree not in parts:  # elements on the same trees share a part of the state
+                acted_on = [0, tree] if tree else [0]
+                parts[tree] = len(parts), np.concatenate([trees[t] for t in acted_on])
+                self._states.append(np.concatenate([states[t] for t in acted_on]))
+            self._calls.append((evaluate, *parts[tree], element.packed()))
 
     def __call__(self, state: FloatArray) -> FloatArray:
         """Return the generalized force (n,) at a state (2 n,) of the plant. [N m, N]"""
         total, relaxed = np.zeros(self._size), np.zeros(MOST_STATES)
         own, rate = np.empty(LARGEST_OWN_SIZE), np.empty(MOST_STATES)
-        for evaluate, of_state, of_force, packed in self._calls:
+        parts = [np.ascontiguousarray(state[indices]) for indices in self._states]
+        for evaluate, part, of_force, packed in self._calls:
             force = np.empty(len(of_force))
-            evaluate(np.ascontiguousarray(state[of_state]), relaxed, packed, force, own, rate)
-            np.add.at(total, of_force, force)
+            evaluate(parts[part], relaxed, packed, force, own, rate)
+            total[of_force] += force  # no index occurs twice
         return total
 
 
@@ -162,22 +164,26 @@ def _springs(poses: FramePoses, parameters: MachineParameters) -> dict[str, Spri
     """Place the springs, without the preloads that follow from static equilibrium."""
     placed = {}
     for name, spring in parameters.springs.items():
-        kind = parameters.spring_types[spring.type]
-        found = SpringStrutParameters(
-            *_strut_ends(poses, spring, f"springs.{name}"),
-            0.0,
-            packed_stiffness(kind.stiffness),
-            pushes=kind.action == "tension-compression",
-        )
-        preload = spring.preload
-        if kind.free_length is not None:
-            preload = -stiffness_force(
-                kind.free_length - found.rest_length, found.packed_stiffness, 0
-            )
-        if preload is not None:
-            found = replace(found, preload=float(preload), is_given=True)
-        placed[name] = found
+        kind, key = parameters.spring_types[spring.type], f"springs.{name}"
+        place = functools.partial(_placed_spring, poses, spring, kind, key)
+        placed[name] = poses.placed(key, (spring, kind), place)
     return placed
+
+
+def _placed_spring(
+    poses: FramePoses, spring: Spring, kind: SpringType, key: str
+) -> SpringStrutParameters:
+    """Place a spring; preload 0 if none is given."""
+    found = SpringStrutParameters(
+        *_strut_ends(poses, spring, key),
+        0.0,
+        packed_stiffness(kind.stiffness),
+        pushes=kind.action == "tension-compression",
+    )
+    preload = spring.preload
+    if kind.free_length is not None:
+        preload = -stiffness_force(kind.free_length - found.rest_length, found.packed_stiffness, 0)
+    return found if preload is None else replace(found, preload=float(preload), is_given=True)
 
 
 def _dampers(
@@ -186,10 +192,18 @@ def _dampers(
     """Place the dampers that are massless struts."""
     placed = {}
     for name, damper in parameters.dampers.items():
-        kind = parameters.damper_types[damper.type]
-        ends = _strut_ends(poses, damper, f"dampers.{name}")
-        placed[name] = FrictionDamperParameters(*ends, kind.end_bushing, packed_damper_law(kind))
+        kind, key = parameters.damper_types[damper.type], f"dampers.{name}"
+        place = functools.partial(_placed_damper, poses, damper, kind, key)
+        placed[name] = poses.placed(key, (damper, kind), place)
     return placed
+
+
+def _placed_damper(
+    poses: FramePoses, damper: Damper, kind: DamperNumbers, key: str
+) -> FrictionDamperParameters:
+    """Place a damper that is a massless strut."""
+    ends = _strut_ends(poses, damper, key)
+    return FrictionDamperParameters(*ends, kind.end_bushing, packed_damper_law(kind))
 
 
 def _bushings(

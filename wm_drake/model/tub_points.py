@@ -54,9 +54,6 @@ def measured_points(
     axes = [*(AXES.index(sensor.axis) for sensor in parameters.sensors.values()), 0, 1, 2]
     rotation = np.reshape(rotation_from_rpy(*map(float, rest[:3])), (3, 3))
     at_rest = (positions @ rotation.T + rest[3:6])[range(len(axes)), axes]
-    return np.array(
-        [
-            MEASURED_POINT.pack(p_ToM_T=position, direction_W=np.eye(3)[axis], at_rest=value)
-            for position, axis, value in zip(positions, axes, at_rest, strict=True)
-        ]
+    return MEASURED_POINT.pack_rows(
+        p_ToM_T=positions, direction_W=np.eye(3)[axes], at_rest=at_rest[:, None]
     )

@@ -3,7 +3,6 @@
 from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.elements.cabinet import (
     FLOOR_FORCE_SIZE,
@@ -14,10 +13,10 @@ from wm_drake.elements.cabinet import (
 )
 from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE
 from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.element_system import SCALARS, ElementSystem, empty, evaluator
+from wm_drake.systems.element_system import ElementSystem, define_system, empty, evaluator
 
 
-@TemplateSystem.define("Cabinet_", T_list=SCALARS)
+@define_system("Cabinet_", __name__)
 def Cabinet_(T: type) -> Any:
     """Return the class Cabinet for a scalar type."""
 
@@ -76,7 +75,7 @@ def Cabinet_(T: type) -> Any:
 Cabinet = Cabinet_[None]
 
 
-@TemplateSystem.define("Feet_", T_list=SCALARS)
+@define_system("Feet_", __name__)
 def Feet_(T: type) -> Any:
     """Return the class Feet for a scalar type."""
 

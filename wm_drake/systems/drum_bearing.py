@@ -3,11 +3,10 @@
 from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.elements.bearing import evaluate_drum_bearing
 from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.element_system import SCALARS, ElementSystem
+from wm_drake.systems.element_system import ElementSystem, define_system
 
 OWN_OUTPUTS = {
     "displacement": slice(0, 3),
@@ -18,7 +17,7 @@ OWN_OUTPUTS = {
 """Own output ports, and their part of the own numbers of the element."""
 
 
-@TemplateSystem.define("DrumBearing_", T_list=SCALARS)
+@define_system("DrumBearing_", __name__)
 def DrumBearing_(T: type) -> Any:
     """Return the class DrumBearing for a scalar type."""
 

@@ -1,11 +1,14 @@
 """Ports, parameters and state that all element systems share."""
 
+import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
+from pydrake.common import cpp_template
 from pydrake.systems.framework import BasicVector_, NumericParameterIndex
+from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.compiler.compilation import generic
 from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE
@@ -13,6 +16,32 @@ from wm_drake.parameters.types import FloatArray
 
 SCALARS = (float, AutoDiffXd)
 """Scalar types of all systems. With `Expression`, Drake would trace the callbacks symbolically."""
+
+
+def define_system(name: str, module: str) -> Callable[[Callable[[type], Any]], Any]:
+    """Return the decorator of a system that converts between `SCALARS`.
+
+    It is `TemplateSystem.define` of Drake. Drake finds the module of a template by reading all
+    frames of the stack, twice for each class. During an import of this package that takes seconds
+    in total. Here it is told the module.
+
+    Args:
+        name: Name of the template.
+        module: `__name__` of the module that defines it.
+    """
+    scope = sys.modules[module]
+
+    def decorate(of_scalar: Callable[[type], Any]) -> Any:
+        template = TemplateSystem.define(name, T_list=SCALARS, scope=scope)(of_scalar)
+        search = cpp_template._get_module_from_stack
+        cpp_template._get_module_from_stack = lambda frame=2: scope
+        try:
+            template[None]  # defines the class for float
+        finally:
+            cpp_template._get_module_from_stack = search
+        return template
+
+    return decorate
 
 
 def evaluator(compiled: Any, scalar: type) -> Callable[..., None]:

@@ -3,14 +3,13 @@
 from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.elements.friction_damper import evaluate_friction_damper
 from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.element_system import SCALARS, ElementSystem
+from wm_drake.systems.element_system import ElementSystem, define_system
 
 
-@TemplateSystem.define("FrictionDamper_", T_list=SCALARS)
+@define_system("FrictionDamper_", __name__)
 def FrictionDamper_(T: type) -> Any:
     """Return the class FrictionDamper for a scalar type."""
 

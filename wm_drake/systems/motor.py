@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 from pydrake.systems.framework import BasicVector_, LeafSystem_, NumericParameterIndex
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.elements.motor import evaluate_controller, evaluate_drum_friction, evaluate_motor
 from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.element_system import SCALARS, ElementSystem, empty, evaluator
+from wm_drake.systems.element_system import ElementSystem, define_system, empty, evaluator
 
 
 class _Packed:
@@ -101,7 +100,7 @@ class _Controller(_Packed):
         state.get_mutable_vector().SetFromVector([integral + self.sample_time * growth, demand])
 
 
-@TemplateSystem.define("SpeedController_", T_list=SCALARS)
+@define_system("SpeedController_", __name__)
 def SpeedController_(T: type) -> Any:
     """Return the class SpeedController for a scalar type."""
 
@@ -132,7 +131,7 @@ def SpeedController_(T: type) -> Any:
 SpeedController = SpeedController_[None]
 
 
-@TemplateSystem.define("Motor_", T_list=SCALARS)
+@define_system("Motor_", __name__)
 def Motor_(T: type) -> Any:
     """Return the class Motor for a scalar type."""
 
@@ -177,7 +176,7 @@ def Motor_(T: type) -> Any:
 Motor = Motor_[None]
 
 
-@TemplateSystem.define("Belt_", T_list=SCALARS)
+@define_system("Belt_", __name__)
 def Belt_(T: type) -> Any:
     """Return the class Belt for a scalar type."""
 
@@ -217,7 +216,7 @@ def Belt_(T: type) -> Any:
 Belt = Belt_[None]
 
 
-@TemplateSystem.define("DrumFriction_", T_list=SCALARS)
+@define_system("DrumFriction_", __name__)
 def DrumFriction_(T: type) -> Any:
     """Return the class DrumFriction for a scalar type."""
 

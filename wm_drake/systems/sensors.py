@@ -3,18 +3,17 @@
 from typing import Any
 
 from pydrake.systems.framework import BasicVector_, LeafSystem_, NumericParameterIndex
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.elements.motion import PLANT_STATE_SIZE
 from wm_drake.elements.sensor import POINT_SIZE, evaluate_sensors
 from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.element_system import SCALARS, empty, evaluator
+from wm_drake.systems.element_system import define_system, empty, evaluator
 
 DETERGENT_SIZE = 3
 """The last three measured points are the point nearest the detergent box, along x, y, z."""
 
 
-@TemplateSystem.define("Sensors_", T_list=SCALARS)
+@define_system("Sensors_", __name__)
 def Sensors_(T: type) -> Any:
     """Return the class Sensors for a scalar type."""
 

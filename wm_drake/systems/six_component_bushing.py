@@ -3,15 +3,14 @@
 from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.elements.bushing import evaluate_six_component_bushing
 from wm_drake.elements.rubber import evaluate_rubber_bushing
 from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.element_system import SCALARS, ElementSystem
+from wm_drake.systems.element_system import ElementSystem, define_system
 
 
-@TemplateSystem.define("SixComponentBushing_", T_list=SCALARS)
+@define_system("SixComponentBushing_", __name__)
 def SixComponentBushing_(T: type) -> Any:
     """Return the class SixComponentBushing for a scalar type."""
 

@@ -3,9 +3,8 @@
 from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
-from wm_drake.systems.element_system import SCALARS
+from wm_drake.systems.element_system import define_system
 
 REFLECTED_INERTIA = 1e8
 """Inertia of the drive at the drum joint. [kg m^2] Not physical: it enters only the diagonal of the
@@ -13,7 +12,7 @@ mass matrix at the joint. The actuation J alpha therefore accelerates the drum b
 motion of the tub, to one part in 1e8. The motor torque is J (alpha - drum acceleration)."""
 
 
-@TemplateSystem.define("SpeedSource_", T_list=SCALARS)
+@define_system("SpeedSource_", __name__)
 def SpeedSource_(T: type) -> Any:
     """Return the class SpeedSource for a scalar type."""
 
@@ -48,7 +47,7 @@ def SpeedSource_(T: type) -> Any:
 SpeedSource = SpeedSource_[None]
 
 
-@TemplateSystem.define("MotorTorque_", T_list=SCALARS)
+@define_system("MotorTorque_", __name__)
 def MotorTorque_(T: type) -> Any:
     """Return the class MotorTorque for a scalar type."""
 

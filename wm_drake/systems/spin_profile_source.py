@@ -5,14 +5,13 @@ from typing import Any
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import AbstractParameterIndex, LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.elements.spin_profile import drum_acceleration, drum_motion
 from wm_drake.parameters import SpinProfile
-from wm_drake.systems.element_system import SCALARS
+from wm_drake.systems.element_system import define_system
 
 
-@TemplateSystem.define("SpinProfileSource_", T_list=SCALARS)
+@define_system("SpinProfileSource_", __name__)
 def SpinProfileSource_(T: type) -> Any:
     """Return the class SpinProfileSource for a scalar type."""
 

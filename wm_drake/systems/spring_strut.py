@@ -3,14 +3,13 @@
 from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.elements.spring import evaluate_spring_strut
 from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.element_system import SCALARS, ElementSystem
+from wm_drake.systems.element_system import ElementSystem, define_system
 
 
-@TemplateSystem.define("SpringStrut_", T_list=SCALARS)
+@define_system("SpringStrut_", __name__)
 def SpringStrut_(T: type) -> Any:
     """Return the class SpringStrut for a scalar type."""
 

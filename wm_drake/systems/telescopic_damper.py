@@ -3,11 +3,10 @@
 from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.elements.telescopic_damper import evaluate_telescopic_damper
 from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.element_system import SCALARS, ElementSystem
+from wm_drake.systems.element_system import ElementSystem, define_system
 
 OWN_OUTPUTS = {
     "force": slice(0, 1),
@@ -19,7 +18,7 @@ OWN_OUTPUTS = {
 """Own output ports, and their part of the own numbers of the element."""
 
 
-@TemplateSystem.define("TelescopicDamper_", T_list=SCALARS)
+@define_system("TelescopicDamper_", __name__)
 def TelescopicDamper_(T: type) -> Any:
     """Return the class TelescopicDamper for a scalar type."""
 

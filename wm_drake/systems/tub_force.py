@@ -3,13 +3,12 @@
 from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE
-from wm_drake.systems.element_system import SCALARS
+from wm_drake.systems.element_system import define_system
 
 
-@TemplateSystem.define("TubForce_", T_list=SCALARS)
+@define_system("TubForce_", __name__)
 def TubForce_(T: type) -> Any:
     """Return the class TubForce for a scalar type."""
 

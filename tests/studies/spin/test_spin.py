@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from wm_drake.parameters import SpinProfile, load_machine
+from wm_drake.report.spin.report import spin_report
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.spin.study import run_spin
 
@@ -33,7 +34,12 @@ def test_results_do_not_depend_on_the_number_of_workers(engine):
 
 def test_single_case_runs_in_this_process_and_is_measured():
     parameters = load_machine("reference")
-    (result,) = run_spin(parameters, [Case("middle", parameters.loads["middle"], SHORT)]).results
+    run = run_spin(parameters, [Case("middle", parameters.loads["middle"], SHORT)], modes=True)
+    (result,) = run.results
     assert result.wall_s > 0.0
     assert np.isfinite(result.measures.amplitude).all()
     assert result.measures.smallest_gap.distance > 0.0
+    assert run.modes.load == "middle"
+    text = spin_report(run)
+    assert "<h2>Natural modes</h2>" in text
+    assert f"{run.modes.modes['sliding'][0].frequency_hz:.3f}" in text

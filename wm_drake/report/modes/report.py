@@ -19,7 +19,7 @@ from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.tables import Group, Row, Table, parameter_table
 from wm_drake.simulation.records import versions
 from wm_drake.studies.modes.sensitivity import Sensitivity
-from wm_drake.studies.modes.study import SLIDING, STUCK, MachineModes
+from wm_drake.studies.modes.study import SLIDING, STUCK, MachineModes, NaturalModes
 
 
 def modes_report(
@@ -39,7 +39,7 @@ def modes_report(
         about=result.parameters.about,
         summary=summary(result),
         warnings=[],
-        modes=_modes_table(result),
+        modes=natural_modes_table(result),
         critical=_critical_table(result),
         campbell=_campbell_picture(result),
         amplitude=_amplitude_picture(result),
@@ -84,7 +84,8 @@ def summary(result: MachineModes) -> str:
     return " ".join(sentences)
 
 
-def _modes_table(result: MachineModes) -> Table:
+def natural_modes_table(result: MachineModes | NaturalModes) -> Table:
+    """Return the table of natural frequencies and damping ratios of all linearisations."""
     groups = []
     at_amplitude = {value.name: value for value in result.at_amplitude}
     for mode in result.modes[STUCK]:

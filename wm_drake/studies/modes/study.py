@@ -51,6 +51,25 @@ class AmplitudeValue:
 
 
 @dataclass(frozen=True)
+class NaturalModes:
+    """Natural modes of a machine with a drum that stands still.
+
+    Attributes:
+        parameters: The machine.
+        load: Name of the load; "" for the empty drum.
+        modes: Modes by linearisation, stuck and sliding.
+        amplitude: Amplitude of the third linearisation. [m]
+        at_amplitude: Its modes; the values are None for a machine with telescopic dampers.
+    """
+
+    parameters: MachineParameters
+    load: str
+    modes: dict[str, list[Mode]]
+    amplitude: float
+    at_amplitude: list[AmplitudeValue]
+
+
+@dataclass(frozen=True)
 class MachineModes:
     """Modes of a machine.
 
@@ -130,6 +149,51 @@ def modes(
         return _modes(machine, load, gasket, amplitude, run_up, progress)
 
 
+def natural_modes(
+    machine: Machine,
+    load: Load | str,
+    *,
+    parameters: MachineParameters | None = None,
+    gasket: bool = True,
+    amplitude: float = DEFAULT_AMPLITUDE,
+) -> NaturalModes:
+    """Return the natural modes of a machine with a load, without anything that takes seconds.
+
+    Args:
+        machine: A built machine.
+        load: Point masses in the drum, or the name of one of the machine's loads.
+        parameters: Numbers to use; those it was built from if None.
+        gasket: False removes the gasket.
+        amplitude: Amplitude of the third linearisation, as for `modes`. [m]
+
+    Raises:
+        InputError: the cabinet moves, or the machine cannot be set up.
+    """
+    numbers = parameters or machine.parameters
+    check_fixed_cabinet(numbers)
+    with threadpool_limits(1, "blas"):  # the matrices are small: several threads would be slower
+        found = {}
+        for name, friction in ((SLIDING, False), (STUCK, True)):
+            setup = machine.set_up(load, parameters=numbers, gasket=gasket, friction=friction)
+            linear = Linearisation(setup, loaded=True)
+            spectrum = linear.spectrum().first(MODES)
+            found[name] = modes_of(spectrum, linear.wrench_slopes())
+        # the last setup is the one with friction
+        names = [mode.name for mode in found[STUCK]]
+        if numbers.telescopic_dampers:
+            values = [AmplitudeValue(name, None, None) for name in names]
+        else:
+            over = amplitude_modes(setup, spectrum, found[STUCK], np.array([amplitude]))
+            values = _values_at(over, amplitude)
+    return NaturalModes(
+        numbers, load if isinstance(load, str) else "given", found, amplitude, values
+    )
+
+
+def _values_at(over: list[AmplitudeMode], amplitude: float) -> list[AmplitudeValue]:
+    return [AmplitudeValue(mode.name, *(mode.at(amplitude) or (None, None))) for mode in over]
+
+
 def _modes(
     machine: Machine,
     load: Load | str | None,
@@ -170,7 +234,7 @@ def _modes(
         linear[STUCK].names,
         found,
         amplitude,
-        [AmplitudeValue(mode.name, *(mode.at(amplitude) or (None, None))) for mode in over],
+        _values_at(over, amplitude),
         over,
         diagrams,
         {name: critical_speeds(diagram, ORDERS) for name, diagram in diagrams.items()},

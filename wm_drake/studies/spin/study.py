@@ -6,12 +6,13 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
 from queue import Empty
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
@@ -20,6 +21,9 @@ from wm_drake.simulation.cases import Case, is_as_measured
 from wm_drake.simulation.measures import Measures, measure
 from wm_drake.simulation.records import Record
 from wm_drake.simulation.runs import DEFAULT_ENGINE, DivergenceWarning, checked_step, simulate
+
+if TYPE_CHECKING:
+    from wm_drake.studies.modes.study import NaturalModes
 
 _IN_PROCESSES = {"drake"}
 """Engines whose cases run in separate processes.
@@ -55,13 +59,18 @@ class Comparison(Enum):
 
 @dataclass(frozen=True)
 class SpinResult:
-    """Results of all cases, in the order in which the cases were given."""
+    """Results of all cases, in the order in which the cases were given.
+
+    `modes` are the natural modes of the machine with the load of the first case; None if they were
+    not asked for, or if the machine has none.
+    """
 
     parameters: MachineParameters
     engine: str
     step: float
     results: tuple[CaseResult, ...]
     comparison: Comparison = Comparison.AS_MEASURED
+    modes: "NaturalModes | None" = None
 
     def is_compared(self, result: CaseResult) -> bool:
         """Return whether a case is compared with the measured amplitudes of the machine."""
@@ -89,6 +98,7 @@ def run_spin(
     progress: Callable[[int, float], None] = lambda index, fraction: None,
     workers: int | None = None,
     comparison: Comparison = Comparison.AS_MEASURED,
+    modes: bool = False,
 ) -> SpinResult:
     """Run cases and return their records and measures.
 
@@ -103,6 +113,7 @@ def run_spin(
         workers: Number of processes for an engine that needs processes; None for the number of
             cores. A single case always runs in this process.
         comparison: Which cases are compared with the measured amplitudes of the machine.
+        modes: Whether to compute the natural modes with the load of the first case.
 
     Raises:
         InputError: a case or an argument is wrong.
@@ -117,6 +128,7 @@ def run_spin(
     step = checked_step(parameters, step)
     count = min(workers or os.cpu_count() or 1, len(cases))
     work_items = [_WorkItem(parameters, case, engine, step) for case in cases]
+    machine = None
     if engine in _IN_PROCESSES and count > 1:
         results = _run_in_processes(work_items, count, progress)
     else:
@@ -125,7 +137,19 @@ def run_spin(
             _run(item, machine, scene, partial(progress, index))
             for index, item in enumerate(work_items)
         ]
-    return SpinResult(parameters, engine, step, tuple(results), comparison)
+    natural = _modes_of(machine or build_machine(parameters), cases[0]) if modes else None
+    return SpinResult(parameters, engine, step, tuple(results), comparison, natural)
+
+
+def _modes_of(machine: Machine, case: Case) -> "NaturalModes | None":
+    """Return the natural modes of a machine with the load of a case; None if it has none."""
+    from wm_drake.studies.modes.study import natural_modes
+
+    try:
+        found = natural_modes(machine, case.load, parameters=case.parameters, gasket=case.gasket)
+    except InputError:  # its cabinet moves, or the compiled engine does not represent it
+        return None
+    return replace(found, load=case.name)
 
 
 def _run_in_processes(
