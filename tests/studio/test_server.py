@@ -84,6 +84,20 @@ def test_arrow_is_the_difference_of_two_runs(client, answer):
     )
 
 
+def test_every_number_can_be_turned_or_is_left_out(client):
+    found = client.post("api/ranking", json={"page": "test", "state": state()})
+    assert found.status_code == 200
+    keys = {arrow["key"] for arrow in found.json()["arrows"]}
+    assert {STIFFNESS, "bodies.drum.mass", "loads.middle.unbalances.0.mass"} <= keys
+    assert not any(key.startswith(("cabinet.", "loads.counter.")) for key in keys)
+
+
+def test_number_that_was_zero_builds_its_element(client, answer):
+    found = run(client, {STIFFNESS: "4 N/mm", "gasket.cross_stiffness_x_z": "0.5 N/mm"})
+    assert found.status_code == 200
+    assert found.json()["amplitude"] != pytest.approx(answer["amplitude"], rel=1e-6)
+
+
 def test_smallest_gap_is_drawn_where_it_is(answer):
     first, second = np.array(answer["gap_points"]["points"])
     assert 1e3 * np.linalg.norm(first - second) == pytest.approx(

@@ -161,3 +161,5 @@ _READERS: dict[str, tuple[Callable[[Path], list[Channel]], str]] = {
     ".unv": (_uff, "pyuff"),
     ".mat": (_mat, "scipy"),
 }
+SUFFIXES = tuple(_READERS)
+"""Suffixes of the files that this module reads."""

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from wm_drake.batch.runs import Runner, RunResult
-from wm_drake.batch.work_items import BatchKey, WorkItem
+from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import InputError
 from wm_drake.model.plausibility import unusual_springs
@@ -32,7 +32,7 @@ from wm_drake.simulation.measures import (
 )
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.records import Record
-from wm_drake.studio.machines import OpenMachine
+from wm_drake.studio.machines import OpenMachine, is_same
 from wm_drake.studio.state import State
 
 MEASURES = ("extremes", "amplitudes", "gap", "mounts")
@@ -137,6 +137,7 @@ def _turned(machine: OpenMachine, case: Case, keys: Iterable[str]) -> list[tuple
     """
     found = []
     assert case.parameters is not None  # a page's case has parameters of its own
+    preparation = machine.preparation(case.parameters)
     for key in keys:
         number = machine.numbers.get(key)
         for step in (number.step, -number.step) if number is not None else ():
@@ -144,13 +145,24 @@ def _turned(machine: OpenMachine, case: Case, keys: Iterable[str]) -> list[tuple
                 parameters = machine.moved_by(case.parameters, key, step)
             except InputError:
                 continue
+            if not is_same(preparation.machine, parameters):  # it would be another machine
+                continue
             if key.startswith("loads."):  # the same machine: it needs no set-up of its own
                 other = replace(case, load=parameters.loads[case.name])
             else:
                 other = replace(case, parameters=parameters, profile=parameters.profile)
-            found.append((key, step, other))
-            break
+            if _can_be_set_up(preparation, other):
+                found.append((key, step, other))
+                break
     return found
+
+
+def _can_be_set_up(preparation: Preparation, case: Case) -> bool:
+    """Return whether a case has an equilibrium and a step; its set-up is kept for the run."""
+    try:
+        return any(True for _ in preparation.batches([case]))
+    except InputError:
+        return False
 
 
 def _batch(machine: OpenMachine, cases: list[Case]) -> tuple[BatchKey, list[WorkItem]]:

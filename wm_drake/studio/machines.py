@@ -39,6 +39,9 @@ LONGEST_RUN = 300.0
 MOST_STEPS = 300_000
 """Largest number of steps of a run of a page."""
 
+MOST_BUILT = 4
+"""Largest number of machines that are built for one file; a built machine is never freed."""
+
 MOST_OPEN = 16
 """Largest number of machines that are kept open."""
 
@@ -152,7 +155,8 @@ class OpenMachine:
     machine: Machine
     scene: Scene
     lock: threading.Lock = field(default_factory=threading.Lock)
-    _preparations: dict[tuple[float, str], Preparation] = field(default_factory=dict)
+    _preparations: dict[tuple[int, float, str], Preparation] = field(default_factory=dict)
+    _others: list[Machine] = field(default_factory=list)
     _numbers: dict[str, Number] = field(default_factory=dict)
 
     @property
@@ -169,10 +173,25 @@ class OpenMachine:
         """Return the preparation of runs with the step and the integrator of some parameters."""
         step = checked_step(parameters, None)
         integrator = checked_integrator(parameters, None)
-        key = step, integrator
+        built = self._built_for(parameters)
+        key = id(built), step, integrator
         if key not in self._preparations:
-            self._preparations[key] = Preparation(self.machine, step, integrator)
+            self._preparations[key] = Preparation(built, step, integrator)
         return self._preparations[key]
+
+    def _built_for(self, parameters: MachineParameters) -> Machine:
+        """Return a built machine with the elements of some parameters.
+
+        A number that is zero may have no element; the first other value then builds a machine.
+        """
+        machines = [self.machine, *self._others]
+        for built in machines:
+            if is_same(built, parameters):
+                return built
+        if len(machines) > MOST_BUILT:
+            check_same_elements(self.machine.parameters, parameters)
+        self._others.append(build_machine(parameters))
+        return self._others[-1]
 
     def moved(self, values: Mapping[str, str]) -> MachineParameters:
         """Return the machine with other numbers.
@@ -323,6 +342,15 @@ def _value_at(parameters: MachineParameters, key: str) -> float:
         else:
             node = node[part] if isinstance(node, dict) else getattr(node, part)
     return float(node)
+
+
+def is_same(built: Machine, parameters: MachineParameters) -> bool:
+    """Return whether a built machine has the elements of some parameters."""
+    try:
+        check_same_elements(built.parameters, parameters)
+    except InputError:
+        return False
+    return True
 
 
 def check_length(case: Case) -> None:

@@ -10,6 +10,8 @@ import xarray as xr
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.csv_files import read_csv
+from wm_drake.parameters.lab_files import SUFFIXES, is_lab_file
+from wm_drake.parameters.lab_signals import ACCELERATION, lab_signals
 from wm_drake.parameters.time_stamps import with_distinct_times
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.vibration import HIGH_PASS_HZ, high_passed, integrated_twice, region_rms
@@ -74,7 +76,8 @@ def read_accelerations(
     """Compute RMS displacements from records of acceleration, integrated twice.
 
     The folder has one file CASE.csv for each measured case; cases without a file are NaN. The
-    columns are time_s, which starts with the profile, and SENSOR_AXIS (S1_x, ...) in m/s^2. The
+    columns are time_s, which starts with the profile, and SENSOR_AXIS (S1_x, ...) in m/s^2. A file
+    may be MDF4, TDMS, UFF 58 or MAT instead, with channels of these names and units of its own. The
     bias of each sensor is estimated by a mean with a Hann window and subtracted.
 
     Args:
@@ -89,29 +92,52 @@ def read_accelerations(
         InputError: the folder has no file of a case, a file has other columns or values that are
             not finite numbers, or the samples are not evenly spaced.
     """
-    paths = {name: folder / f"{name}.csv" for name in labels["case"]}
-    if not any(path.is_file() for path in paths.values()):
+    paths = {name: _file_of(folder, name) for name in labels["case"]}
+    if not any(paths.values()):
         raise input_error(
             "has no file CASE.csv with accelerations of a case of this study; give at least one",
             where=str(folder),
         )
     empty = np.full([len(labels[dim]) for dim in DIMS[1:]], np.nan)
     rows = [
-        _from_acceleration(path, labels, profile) if path.is_file() else empty
+        empty if path is None else _from_acceleration(path, labels, profile)
         for path in paths.values()
     ]
     return xr.DataArray(np.array(rows), labels, DIMS)
+
+
+def _file_of(folder: Path, case: str) -> Path | None:
+    """Return the file of a case; None if there is none.
+
+    Raises:
+        InputError: there are several.
+    """
+    found = [
+        path for suffix in (".csv", *SUFFIXES) if (path := folder / f"{case}{suffix}").is_file()
+    ]
+    if len(found) > 1:
+        names = " and ".join(path.name for path in found)
+        raise input_error(f"has {names}; give one file for each case", where=str(folder))
+    return found[0] if found else None
+
+
+def _samples(path: Path, channels: list[str]) -> FloatArray:
+    """Return time [s] and accelerations [m/s^2] of a file, one row a sample."""
+    if is_lab_file(path):
+        time, found = lab_signals(path, dict.fromkeys(channels, ACCELERATION), "m/s^2")
+        return np.column_stack([time, *found.values()])
+    return (
+        read_csv(path, ["time_s", *channels])
+        .apply(pd.to_numeric, errors="coerce")
+        .to_numpy(dtype=float)
+    )
 
 
 def _from_acceleration(
     path: Path, labels: Mapping[str, Sequence[str]], profile: SpinProfile
 ) -> FloatArray:
     channels = [f"{sensor}_{axis}" for sensor in labels["accelerometer"] for axis in labels["axis"]]
-    numbers = (
-        read_csv(path, ["time_s", *channels])
-        .apply(pd.to_numeric, errors="coerce")
-        .to_numpy(dtype=float)
-    )
+    numbers = _samples(path, channels)
     if not np.isfinite(numbers).all() or len(numbers) < 2:
         raise input_error(
             "has a value that is not a finite number, or fewer than two rows; at least two rows of "

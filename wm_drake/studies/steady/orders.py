@@ -9,6 +9,9 @@ from scipy.integrate import cumulative_trapezoid
 
 from wm_drake.errors import input_error
 from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header
+from wm_drake.parameters.lab_files import is_lab_file, read_channels
+from wm_drake.parameters.lab_signals import SPEED as DRUM_SPEED
+from wm_drake.parameters.lab_signals import TIME_NAMES, clock_of, on_clock
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.orders import REVOLUTIONS, frequency_map, order_map
 from wm_drake.simulation.records import read_measured
@@ -52,18 +55,21 @@ class Orders:
 
 
 def read_signals(path: Path, unit: str) -> Signals:
-    """Read signals from a record (netCDF) or from a file of measurements (CSV).
+    """Read signals from a record (netCDF), a CSV or a file of a laboratory.
 
     Args:
         path: Record of the command spin, with the displacements at the sensors; or CSV with the
-            columns time_s, speed_rpm and a column for each signal.
-        unit: Unit of the signals of a CSV, for reading.
+            columns time_s, speed_rpm and a column for each signal; or MDF4, TDMS, UFF 58 or MAT
+            with a channel speed_rpm or speed and one for each signal, in units of its own.
+        unit: Unit of signals whose file has none, for reading.
 
     Raises:
         InputError: the file cannot be read or has too few columns or rows.
     """
     if path.suffix.lower() == ".csv":
         return _read_csv(path, unit)
+    if is_lab_file(path):
+        return _read_lab(path, unit)
     wanted = {"time": ("time",), "displacement": ("time", "sensor"), "drum_angle": ("time",)}
     record = read_measured(path, wanted)
     time, angle = record.time.values, record.drum_angle.values
@@ -83,6 +89,34 @@ def _read_csv(path: Path, unit: str) -> Signals:
     time = numbers[:, 0]
     angle = cumulative_trapezoid(RAD_S_PER_RPM * numbers[:, 1], time, initial=0.0)
     return _checked(Signals(path.name, names, unit, time, angle, numbers[:, 2:]), path)
+
+
+def _read_lab(path: Path, unit: str) -> Signals:
+    """Return the signals of a file of a laboratory: the channel of the speed, and all others."""
+    available = read_channels(path)
+    speeds = [channel for channel in available if channel.name in (SPEED, "speed")]
+    used = [
+        channel
+        for channel in available
+        if channel not in speeds and channel.name.lower() not in TIME_NAMES
+    ]
+    if len(speeds) != 1 or not used:
+        raise input_error(
+            f"needs one channel {SPEED} or speed and one for each signal", where=str(path)
+        )
+    time = clock_of(available, used, path)
+    speed = on_clock(speeds[0], time, DRUM_SPEED, "rpm", path)
+    units = {channel.unit for channel in used}
+    if len(units) > 1:
+        names = ", ".join(f"{channel.name} [{channel.unit}]" for channel in used[:4])
+        raise input_error(f"its signals have different units: {names}", where=str(path))
+    shown = units.pop() or unit
+    values = [np.interp(time, c.time, c.values) if c.time is not None else c.values for c in used]
+    if len({len(one) for one in (time, *values)}) > 1:
+        raise input_error("its channels have different numbers of samples", where=str(path))
+    angle = cumulative_trapezoid(speed, time, initial=0.0)
+    names = [channel.name for channel in used]
+    return _checked(Signals(path.name, names, shown, time, angle, np.stack(values, axis=1)), path)
 
 
 def _checked(signals: Signals, path: Path) -> Signals:
