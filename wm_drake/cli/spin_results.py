@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from wm_drake.cli.spin_drive import drive_as_json
 from wm_drake.cli.spin_forces import forces_as_json
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -66,18 +67,24 @@ def write_cases(
 
 
 def _replay(result: "SpinResult", case: "CaseResult") -> str:
+    import numpy as np
+
     from wm_drake.model.replay import Motion, replay_page
     from wm_drake.simulation.measures import largest_motion
 
     # Meshcat would print the address of its server
     logging.getLogger("drake").setLevel(logging.WARNING)
     time, positions = largest_motion(case.record)
+    cabinet = None
+    if "cabinet_angle" in case.record:
+        shown = case.record.sel(time=time)
+        cabinet = np.hstack([shown.cabinet_angle.values, shown.cabinet_position.values])
     speed = case.record.drum_speed.sel(time=time).values
     parameters, gasket = result.parameters, case.record.attrs["gasket"] == "yes"
     words = "" if gasket or parameters.gasket is None else ", without gasket"
     return replay_page(
         parameters,
-        Motion(time, positions, speed),
+        Motion(time, positions, speed, cabinet),
         title=f"Machine {parameters.name}, load {case.case.name}{words}",
         load=case.case.load,
         gasket=gasket,
@@ -147,6 +154,7 @@ def case_as_json(case: "CaseResult") -> dict[str, Any]:
         "gasket_force_N": numbers(measures.gasket_force, Unit("N", "N"), "F"),
         "gasket_moment_Nm": numbers(measures.gasket_moment, Unit("N*m", "N*m"), "M"),
         **forces_as_json(measures),
+        "motor": drive_as_json(measures.drive),
         "smallest_gap_mm": millimetre.from_si(measures.smallest_gap.distance)
         if measures.smallest_gap
         else None,

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.geometry import Box, Cylinder, Meshcat, MeshcatParams, Rgba, Sphere
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
+from wm_drake.model.cabinet import with_fixed_cabinet
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.placed_elements import placed_elements
 from wm_drake.model.scene import Scene
@@ -22,6 +23,8 @@ from wm_drake.parameters.units import Unit
 SPRING_COLOUR = Rgba(0.0, 0.447, 0.698, 1.0)
 DAMPER_COLOUR, ROD_COLOUR = Rgba(0.90, 0.62, 0.0, 1.0), Rgba(0.25, 0.25, 0.25, 1.0)
 GASKET_COLOUR, RING_COLOUR = Rgba(0.0, 0.62, 0.45, 0.35), Rgba(0.0, 0.45, 0.33, 1.0)
+FLOOR_COLOUR, FLOOR_SIZE = Rgba(0.72, 0.74, 0.77, 1.0), (1.6, 1.6, 0.005)
+"""Colour and size [m] of the drawn floor below a cabinet that moves."""
 UNBALANCE_COLOUR = Rgba(0.835, 0.369, 0.0, 1.0)
 
 COILS, COIL_RADIUS, WIRE_RADIUS = 9, 0.017, 0.0028
@@ -56,11 +59,14 @@ class Motion:
         positions: (n, >= 7) Positions of the plant: roll, pitch, yaw, x, y, z of the tub, drum
             angle, then those of damper tubes. [rad, m]
         speed: (n,) Drum speed. [rad/s]
+        cabinet: (n, 6) Roll, pitch, yaw and position of a cabinet that moves; the positions are
+            seen from it. None for a fixed one. [rad, m]
     """
 
     time: FloatArray
     positions: FloatArray
     speed: FloatArray
+    cabinet: FloatArray | None = None
 
 
 def replay_page(
@@ -86,6 +92,7 @@ def replay_page(
     meshcat.SetProperty("/Background", "top_color", [1.0, 1.0, 1.0])
     meshcat.SetProperty("/Background", "bottom_color", [0.86, 0.88, 0.91])
     meshcat.SetCameraPose(camera_in_world=[0.5, -1.15, 0.34], target_in_world=[0.0, 0.0, -0.04])
+    parameters = with_fixed_cabinet(parameters)
     scene = Scene(parameters, meshcat)
     parts = list(_parts(scene, parameters, load, gasket))
     for part in parts:
@@ -95,10 +102,26 @@ def replay_page(
         frame = _Frame(moment, scene.pose_in_world("tub"), scene.pose_in_world("drum"))
         for part in parts:
             part.move(meshcat, frame)
+        _move_cabinet(meshcat, motion, moment)
 
+    if motion.cabinet is not None and parameters.cabinet is not None:
+        meshcat.SetObject("/floor", Box(*FLOOR_SIZE), FLOOR_COLOUR)
+        below = parameters.cabinet.floor - 0.5 * FLOOR_SIZE[2]
+        meshcat.SetTransform("/floor", RigidTransform([0.0, 0.0, below]))
     scene.animate(meshcat, motion.time, motion.positions, move_parts)
     title = title or f"Machine {parameters.name}"
     return _with_caption(str(meshcat.StaticHtml()), motion, title, [part.kind for part in parts])
+
+
+def _move_cabinet(meshcat: Meshcat, motion: Motion, moment: float) -> None:
+    """Record the pose of a cabinet that moves, with all that is drawn in its frame."""
+    if motion.cabinet is None:
+        return
+    frame = int(np.argmin(np.abs(motion.time - motion.time[0] - moment)))
+    angles, position = np.split(motion.cabinet[frame], 2)
+    X_WC = RigidTransform(RollPitchYaw(angles), position)
+    for path in ("/drake/visualizer", "/elements"):
+        meshcat.SetTransform(path, X_WC, moment)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
 from wm_drake.model.bodies import add_bodies, sdf_path, set_bodies, unusable
+from wm_drake.model.cabinet import with_fixed_cabinet
 from wm_drake.model.outline import support_history
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
@@ -158,7 +159,7 @@ class Scene:
         """Build plant and geometry of a machine.
 
         A compliant bearing is replaced by a rigid one: the drum moves in it by hundredths of a
-        millimetre only.
+        millimetre only. A cabinet that moves is fixed: poses are those seen from it.
 
         Args:
             parameters: The machine.
@@ -166,6 +167,7 @@ class Scene:
         """
         perfect = parameters.imperfections.model_copy(update={"bearing": None})
         parameters = parameters.model_copy(update={"imperfections": perfect})
+        parameters = with_fixed_cabinet(parameters)
         builder = DiagramBuilder()
         self.plant, self._scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
         add_bodies(self.plant, parameters)

@@ -8,6 +8,7 @@ from pydrake.systems.primitives import MatrixGain
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from wm_drake.model.bodies import add_bodies
+from wm_drake.model.cabinet import with_fixed_cabinet
 from wm_drake.model.state_layout import StateLayout, state_layout_of
 from wm_drake.parameters import MachineParameters
 
@@ -34,18 +35,21 @@ def add_visualizer(
         builder: The diagram that the machine is in.
         parameters: The machine.
         state_layout: State layout of the machine's plant.
-        state: Output port of the plant's state.
+        state: Output port of the plant's state; for a cabinet that moves, port of the state of tub
+            and drum seen from it.
         meshcat: Where to show it.
     """
     scene_graph = builder.AddNamedSystem("shapes", SceneGraph())
     plant = MultibodyPlant(time_step=0.0)
     plant.RegisterAsSourceForSceneGraph(scene_graph)
-    shown = with_rigid_bearing(parameters)
+    shown = with_fixed_cabinet(with_rigid_bearing(parameters))
     add_bodies(plant, shown)
     layout = state_layout_of(plant, shown)
     select = np.zeros((plant.num_positions(), state.size()))
     shown_trees = np.concatenate(layout.trees)
     moved_trees = np.concatenate(state_layout.trees[: len(layout.trees)])
+    if parameters.cabinet_moves:  # the state is that of tub and drum alone
+        moved_trees = np.arange(len(shown_trees))
     select[shown_trees, moved_trees] = 1.0
     positions = builder.AddNamedSystem("shown_positions", MatrixGain(select))
     poses = builder.AddNamedSystem("shape_poses", MultibodyPositionToGeometryPose(plant))

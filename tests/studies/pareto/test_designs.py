@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import stats
 
 pytest.importorskip("pymoo")
 
@@ -14,8 +15,14 @@ from wm_drake.report.pareto.report import pareto_report
 from wm_drake.simulation.cases import Case, case_of
 from wm_drake.studies.pareto.envelopes import front_envelopes
 from wm_drake.studies.pareto.problem import machine_designs
+from wm_drake.studies.pareto.robust import _is_kept, promises, summary_of
 from wm_drake.studies.pareto.study import run_designs
-from wm_drake.studies.pareto.tables import as_plain_data, front_table, write_tables
+from wm_drake.studies.pareto.tables import (
+    as_plain_data,
+    front_table,
+    promises_table,
+    write_tables,
+)
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.variables import uncertain_machine
 
@@ -110,12 +117,12 @@ def test_front_under_a_constraint_is_found(machine, tmp_path):
     assert data["evaluations"] == 640
     assert set(data["front"][0]) == {"objectives", "constraints", "variables"}
     assert len(front_table(front)) == len(data["front"])
-    write_tables(front, tmp_path)
+    write_tables(front, (), tmp_path)
     for name, number in front.chosen.items():
         loaded = load_machine(tmp_path / f"machine_{name.replace(' ', '_')}.yaml")
         wanted = front.machine(number).spring_types["suspension"].stiffness
         assert loaded.spring_types["suspension"].stiffness == pytest.approx(wanted, rel=1e-12)
-    page = pareto_report(front, front_envelopes(front, histories_of(machine)), "about")
+    page = pareto_report(front, front_envelopes(front, histories_of(machine)), (), "about")
     assert "compromise" in page
     assert "loads middle, counter" in page
     assert page.count("<circle") == len(front.objectives)
@@ -202,6 +209,33 @@ def test_robust_front_keeps_its_promise_on_fresh_samples(machine):
     nominal = np.array([10.0 * k.number(float(x)) for (x,) in front.found.designs])
     assert front.objectives[:, 0] == pytest.approx((1.0 + 1.645 * 0.05) * nominal, rel=2e-3)
     assert fresh == pytest.approx(front.objectives, rel=5e-3)
+    kept = promises(front, run_of(machine), 0)
+    assert {p.design for p in kept} == {"best Fx", "best Dx", "compromise"}
+    assert all(p.is_kept for p in kept)
+    number = front.chosen["best Fx"]
+    (best,) = (p for p in kept if (p.design, p.goal.given.quantity) == ("best Fx", "Fx"))
+    assert best.promised.value == pytest.approx(front.objectives[number, 0])
+    # the quantile of the normal distribution lies in both intervals
+    exact = (1.0 + stats.norm.ppf(0.95) * 0.05) * nominal[number]
+    for found in (best.promised, best.fresh):
+        assert found.lower < exact < found.upper
+    assert best.fresh.upper - best.fresh.lower < best.promised.upper - best.promised.lower
+    table = promises_table(kept)
+    assert list(table["kept"]) == [True] * 6
+    assert as_plain_data(front, kept)["robust"][0]["fresh_value"] > 0.0
+    page = pareto_report(front, None, kept, "about")
+    assert "On fresh samples 6 of 6 values" in page
+
+
+def test_promise_of_too_few_samples_is_seen_to_break(machine):
+    designs = designs_of(machine, task_of(objectives=({"quantity": "Fx", "over": "mean"},)))
+    (goal,) = designs.objectives
+    lucky, fresh = np.linspace(9.0, 10.0, 16), np.linspace(9.0, 12.0, 64)
+    before, after = summary_of(goal, lucky), summary_of(goal, fresh)
+    # t quantile 2.131 of 15 degrees of freedom
+    assert before.upper - before.value == pytest.approx(2.1314 * np.std(lucky, ddof=1) / 4.0, 1e-4)
+    assert _is_kept(goal, before, after) is False
+    assert _is_kept(goal, before, before) is True
 
 
 def test_failed_runs_are_not_on_the_front(machine):

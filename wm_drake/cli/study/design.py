@@ -45,6 +45,7 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.simulation.records import Record
     from wm_drake.studies.pareto.envelopes import Envelopes
     from wm_drake.studies.pareto.problem import MachineDesigns
+    from wm_drake.studies.pareto.robust import Promise
     from wm_drake.studies.pareto.study import ParetoFront
 
 DEFAULT_OUT = Path("wm-drake-design")
@@ -98,23 +99,38 @@ def design(
     identity = study_identity("design", designs.parameters, measures, seed, design=task)
     writer = Run("study design", overwrite, identity)
     with study_ledger(out, writer, identity, resume) as ledger:
-        with (
-            batch_runner(built, ledger, measures, workers, cluster) as batch,
-            progress_bar(evaluations * designs.scenarios) as progress,
-        ):
-            front = run_designs(
-                designs,
-                _counted(batch, progress),
-                evaluations=evaluations,
-                population=population,
-                seed=seed,
-                search=search,
-            )
+        with batch_runner(built, ledger, measures, workers, cluster) as batch:
+            with progress_bar(evaluations * designs.scenarios) as progress:
+                front = run_designs(
+                    designs,
+                    _counted(batch, progress),
+                    evaluations=evaluations,
+                    population=population,
+                    seed=seed,
+                    search=search,
+                )
+            kept = _promises(front, batch, seed)
         ledger.mark_finished()
         shown = _envelopes(front, built, workers)
         with result_folder(out, writer, RUNS_KEPT) as folder:
-            _write(front, shown, task, folder, time.perf_counter() - begin)
-    _print_result(front, out, as_json, time.perf_counter() - begin)
+            _write(front, shown, kept, task, folder, time.perf_counter() - begin)
+    _print_result(front, kept, out, as_json, time.perf_counter() - begin)
+
+
+def _promises(
+    front: "ParetoFront",
+    batch: "Callable[[Iterable[Case], Callable[[int], None]], xr.Dataset]",
+    seed: int,
+) -> "list[Promise]":
+    """Return the check of a robust front on fresh samples."""
+    from wm_drake.studies.pareto.robust import promises
+
+    def run(cases: "Iterable[Case]") -> "xr.Dataset":
+        listed = list(cases)
+        with progress_bar(len(listed), "fresh samples") as progress:
+            return batch(listed, progress)
+
+    return promises(front, run, seed)
 
 
 def _envelopes(front: "ParetoFront", built: "Machine", workers: int | None) -> "Envelopes | None":
@@ -214,6 +230,7 @@ def _measures(designs: "MachineDesigns") -> tuple[str, ...]:
 def _write(
     front: "ParetoFront",
     shown: "Envelopes | None",
+    kept: "list[Promise]",
     task: "DesignTask",
     folder: Path,
     wall_s: float,
@@ -221,12 +238,14 @@ def _write(
     from wm_drake.report.pareto.report import pareto_report
     from wm_drake.studies.pareto.tables import write_tables
 
-    write_tables(front, folder)
-    page = pareto_report(front, shown, task.about, command_line(), wall_s)
+    write_tables(front, kept, folder)
+    page = pareto_report(front, shown, kept, task.about, command_line(), wall_s)
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 
-def _print_result(front: "ParetoFront", out: Path, as_json: bool, wall_s: float) -> None:
+def _print_result(
+    front: "ParetoFront", kept: "list[Promise]", out: Path, as_json: bool, wall_s: float
+) -> None:
     from rich.table import Table
 
     from wm_drake.report.pareto.report import summary
@@ -234,7 +253,7 @@ def _print_result(front: "ParetoFront", out: Path, as_json: bool, wall_s: float)
     from wm_drake.studies.pareto.tables import as_plain_data, front_table
 
     if as_json:
-        typer.echo(to_json(as_plain_data(front) | {"wall_s": wall_s}))
+        typer.echo(to_json(as_plain_data(front, kept) | {"wall_s": wall_s}))
         return
     rows = front_table(front)
     table = Table(title="Chosen designs of the front")
@@ -246,5 +265,5 @@ def _print_result(front: "ParetoFront", out: Path, as_json: bool, wall_s: float)
         texts = [f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells]
         table.add_row(str(column), *texts)
     Console().print(table)
-    say(summary(front))
+    say(summary(front, kept))
     say(f"Results in {out}: report.html, front.csv, machine files")

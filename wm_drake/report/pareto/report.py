@@ -1,5 +1,6 @@
 """Report of the design study: front with designs to pick, chosen designs, history, run details."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from wm_drake.report.formatting import MISSING, MM_PER_M, significant
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.tables import Group, Table, line
 from wm_drake.studies.pareto.envelopes import Envelopes
+from wm_drake.studies.pareto.robust import FRESH, Promise
 from wm_drake.studies.pareto.study import COMPROMISE, ParetoFront
 from wm_drake.studies.pareto.tables import machine_file_name
 
@@ -24,6 +26,7 @@ LEFT, RIGHT, TOP, BOTTOM = 80.0, 700.0, 20.0, 320.0
 def pareto_report(
     front: ParetoFront,
     shown: Envelopes | None,
+    kept: Sequence[Promise],
     about: str,
     command: str = "",
     wall_s: float = 0.0,
@@ -33,6 +36,7 @@ def pareto_report(
     Args:
         front: Result of the study.
         shown: Envelopes of its designs; None without a front.
+        kept: Check of a robust front on fresh samples; empty for a nominal one.
         about: Description in the design file.
         command: Command line of the study, shown on the page.
         wall_s: Duration of the study. [s]
@@ -49,18 +53,19 @@ def pareto_report(
         "pareto/page.html",
         title=f"Designs of machine {designs.parameters.name}",
         about=about,
-        summary=summary(front),
+        summary=summary(front, kept),
         warnings=[] if has_front else ["No design meets all constraints."],
         plot=_plot(front) if has_front and len(designs.objectives) > 1 else None,
         picked=_picked(front, shown) if has_front and shown else None,
         envelopes_of=shown.of if shown else "",
         chosen=_chosen(front) if has_front else None,
+        promises=_promises(kept) if kept else None,
         history=_history(front),
         facts=[(word, text) for word, text in facts if text],
     )
 
 
-def summary(front: ParetoFront) -> str:
+def summary(front: ParetoFront, kept: Sequence[Promise] = ()) -> str:
     """Return the findings as one paragraph."""
     designs, count = front.designs, len(front.objectives)
     if not count:
@@ -74,8 +79,15 @@ def summary(front: ParetoFront) -> str:
     ):
         unit = goal.unit.shown.replace("*", " ")
         parts.append(f"{goal.given.quantity} {_text(value)} {unit} in place of {_text(own)} {unit}")
+    judged = [p.is_kept for p in kept if p.is_kept is not None]
+    robust = (
+        f" On fresh samples {sum(judged)} of {len(judged)} values of the chosen designs keep what "
+        "they promised."
+        if judged
+        else ""
+    )
     name = "The compromise" if COMPROMISE in front.chosen else "The best design"
-    return f"{text} {name} has {listed(parts)} of the machine itself."
+    return f"{text} {name} has {listed(parts)} of the machine itself.{robust}"
 
 
 def listed(words: list[str]) -> str:
@@ -174,6 +186,26 @@ def _chosen(front: ParetoFront) -> Table:
         "the range of the front. Each has a machine file for --machine."
     )
     return Table(caption, ("name", "kind", *front.chosen), tuple(groups), text_columns=2)
+
+
+def _promises(kept: Sequence[Promise]) -> Table:
+    """Return what the chosen designs of a robust front promised and keep on fresh samples."""
+    groups = []
+    for p in kept:
+        unit = p.goal.unit.shown.replace("*", " ")
+        cells = [f"{p.goal.given.quantity}, {p.goal.given.over}", unit]
+        for found in (p.promised, p.fresh):
+            ends = f" ({_text(found.lower)} to {_text(found.upper)})"
+            cells.append(_text(found.value) + (ends if np.isfinite(found.lower) else ""))
+        cells.append({True: "yes", False: "no", None: MISSING}[p.is_kept])
+        groups.append(line(p.design, cells, "alarm" if p.is_kept is False else ""))
+    caption = (
+        f"Chosen designs on {FRESH} times as many fresh samples. In brackets: 95 % intervals. A "
+        "promise is kept if the fresh value is not worse than the worse end of its interval. The "
+        "worst of the samples has no interval: it grows with their number."
+    )
+    header = ("design", "quantity", "unit", "promised", "fresh samples", "kept")
+    return Table(caption, header, tuple(groups), text_columns=3)
 
 
 def _history(front: ParetoFront) -> Picture:

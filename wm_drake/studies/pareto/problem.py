@@ -133,9 +133,18 @@ class MachineDesigns:
     scores: FloatArray | None = None
 
     @property
+    def goals(self) -> tuple[Goal, ...]:
+        """Objectives, then constraints."""
+        return (*self.objectives, *self.constraints)
+
+    def with_scores(self, scores: FloatArray) -> "MachineDesigns":
+        """Return the same designs with other samples."""
+        return replace(self, scores=scores)
+
+    @property
     def responses(self) -> tuple[Response, ...]:
         """Responses that the goals need."""
-        found = [g.response for g in (*self.objectives, *self.constraints) if g.response]
+        found = [g.response for g in self.goals if g.response]
         return tuple(dict.fromkeys(found))
 
     @property
@@ -215,6 +224,22 @@ class MachineDesigns:
         Returns:
             (n, objectives) and (n, constraints); NaN for a design of which a run failed.
         """
+        values = self.scenario_values(designs, run)
+        columns = np.column_stack(
+            [goal.over(value) for goal, value in zip(self.goals, values, strict=True)]
+        )
+        return columns[:, : len(self.objectives)], columns[:, len(self.objectives) :]
+
+    def scenario_values(self, designs: FloatArray, run: Run) -> list[FloatArray]:
+        """Return the values of each goal by design and scenario, in units for reading.
+
+        Args:
+            designs: (n, dimensions) in [0, 1]
+            run: Function that runs cases.
+
+        Returns:
+            For each of `goals` (n, scenarios); NaN for a run that failed.
+        """
         machines = [self.machine_at(design) for design in designs]
         table = run(
             [
@@ -223,17 +248,16 @@ class MachineDesigns:
                 for case in self.runs_of(machine, f"design {number}")
             ]
         )
-        failed = (table.diverged.values != "").reshape(len(designs), -1).any(axis=1)
-        values = []
-        for goal in (*self.objectives, *self.constraints):
+        failed = table.diverged.values != ""
+        found: list[FloatArray] = []
+        for goal in self.goals:
             if goal.response is None:
                 own = [goal.unit.from_si(value_at(m, goal.given.quantity)) for m in machines]
-                values.append(np.array(own))
+                values: FloatArray = np.repeat(np.array(own), self.scenarios)
             else:
-                values.append(goal.over(goal.response.values(table).reshape(len(designs), -1)))
-        columns = np.column_stack(values)
-        columns[failed] = np.nan
-        return columns[:, : len(self.objectives)], columns[:, len(self.objectives) :]
+                values = goal.response.values(table)
+            found.append(np.where(failed, np.nan, values).reshape(len(designs), -1))
+        return found
 
     def costs(self, designs: FloatArray, run: Run) -> tuple[FloatArray, FloatArray]:
         """Return what the search makes small, and constraints that are met at 0 and below."""

@@ -1,5 +1,6 @@
 """Tables of a design study, for CSV files and JSON, and its machine files."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +8,7 @@ import pandas as pd
 
 from wm_drake.parameters import machine_yaml
 from wm_drake.studies.gasket.tables import finite
+from wm_drake.studies.pareto.robust import Promise
 from wm_drake.studies.pareto.study import ParetoFront
 
 
@@ -40,8 +42,25 @@ def machine_file_name(name: str) -> str:
     return f"machine_{name.replace(' ', '_')}.yaml"
 
 
-def write_tables(front: ParetoFront, folder: Path) -> None:
+def promises_table(kept: Sequence[Promise]) -> pd.DataFrame:
+    """Return the check of a robust front on fresh samples."""
+    return pd.DataFrame(
+        {
+            "design": p.design,
+            "quantity": p.goal.key,
+            "over": p.goal.given.over,
+            **{f"promised_{name}": value for name, value in vars(p.promised).items()},
+            **{f"fresh_{name}": value for name, value in vars(p.fresh).items()},
+            "kept": p.is_kept,
+        }
+        for p in kept
+    )
+
+
+def write_tables(front: ParetoFront, kept: Sequence[Promise], folder: Path) -> None:
     """Write the CSV files of a study and the machine files of its chosen designs."""
+    if kept:
+        promises_table(kept).to_csv(folder / "robust.csv", index=False)
     front_table(front).to_csv(folder / "front.csv", index=False)
     history_table(front).to_csv(folder / "history.csv", index=False)
     for name, number in front.chosen.items():
@@ -51,7 +70,7 @@ def write_tables(front: ParetoFront, folder: Path) -> None:
         (folder / machine_file_name(name)).write_text(machine_yaml(copy), encoding="utf-8")
 
 
-def as_plain_data(front: ParetoFront) -> dict[str, Any]:
+def as_plain_data(front: ParetoFront, kept: Sequence[Promise] = ()) -> dict[str, Any]:
     """Return a result as data for JSON."""
     designs = front.designs
     entries = []
@@ -71,6 +90,10 @@ def as_plain_data(front: ParetoFront) -> dict[str, Any]:
             }
         )
     return {
+        "robust": [
+            {k: finite(v) if isinstance(v, float) else v for k, v in row.items()}
+            for row in promises_table(kept).to_dict("records")
+        ],
         "evaluations": front.found.evaluations,
         "front": entries,
         "hypervolume": front.found.hypervolume,

@@ -1,0 +1,35 @@
+"""Subset simulation against a crude count, on the reference machine."""
+
+import numpy as np
+import pytest
+
+from wm_drake import build_machine, load_machine, simulate_many
+from wm_drake.parameters.tolerances import load_tolerances
+from wm_drake.simulation.cases import Case
+from wm_drake.studies.tolerance.distributions import base_samples
+from wm_drake.studies.tolerance.rare import subset_simulation
+from wm_drake.studies.tolerance.shares import share_of
+from wm_drake.studies.tolerance.variables import uncertain_machine
+
+GAP = 0.012
+"""Gap that about one run in a hundred falls below with heavy laundry. [m]"""
+
+
+@pytest.mark.slow
+def test_subset_simulation_agrees_with_a_crude_count_on_the_reference_machine():
+    parameters = load_machine("reference")
+    case = Case("laundry", next(iter(parameters.loads.values())), parameters.profile)
+    uncertain = uncertain_machine(parameters, load_tolerances("heavy_laundry"), case)
+    machine = build_machine(uncertain.parameters)
+
+    def above(scores):
+        table = simulate_many(machine, uncertain.cases(scores), measures=("gap",))
+        return np.where(table.diverged.values != "", np.nan, table.smallest_gap.values - GAP)
+
+    size = uncertain.joint.size
+    crude = share_of(above(base_samples(size, 2048, 0)[0]) <= 0.0)
+    event = subset_simulation(above, size, samples=500, seed=1)
+    assert 2e-3 < crude.estimate < 5e-2
+    assert event.lower < crude.upper
+    assert crude.lower < event.upper
+    assert event.evaluations < 2048
