@@ -410,6 +410,7 @@ def test_spin_prints_one_json_object(plain):
             "mount_force_N",
             "cabinet_wrench",
             "feet",
+            "walk",
             "smallest_gap_mm",
             "smallest_spring_tension_N",
             "critical_rpm",
