@@ -250,7 +250,7 @@ NUMBERS = [
 ]  # fmt: skip
 OPTIONS = [
     ("calibrate --free FREE", ["--starts", "--iterations", "--seed", "--deviation", "--resolution", "--workers", "--weight", "--leave-out", "--method"]),
-    ("study gasket --trials 100", ["--seed", "--workers", "--design", "--model", "--tables", "--factor", "--load"]),
+    ("study gasket --trials 200", ["--seed", "--workers", "--design", "--model", "--tables", "--factor", "--load"]),
     ("study gasket", ["--trials"]),
     ("study spin-cycle", ["--workers", "--engine", "--profile", "--case"]),
     ("study spin-identify", ["--seed", "--noise", "--workers", "--unknown", "--case"]),

@@ -15,6 +15,7 @@ from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.drive import VARIABLES as DRIVE_VARIABLES
 from wm_drake.simulation.feet import BY_FOOT, FOOT_VARIABLES, MARGINS, WORDS, cabinet_of
 from wm_drake.simulation.mounts import KINDS, POINT, mount_names
 from wm_drake.simulation.outputs import AXES
@@ -83,6 +84,7 @@ _VARIABLES = {
         "m",
         "smallest elongation from the free length; negative if the spring goes slack",
     ),
+    **DRIVE_VARIABLES,
     **{name: ("foot" if name in BY_FOOT else "", *WORDS[name]) for name in FOOT_VARIABLES},
     **{
         f"region_{name}": ("region", unit, f"{text}; smallest in each region")
@@ -135,6 +137,8 @@ def simulate_many(
             "cabinet": the same of force and moment of all mounts on the cabinet, for each axis;
             "spring tensions": smallest tension of each spring, 0 if it goes slack, and smallest
             elongation from its free length;
+            "drive": torque, power, work, speed ripple and capture of the drive, speed at the end,
+            and parts of torque and acceleration that go round with the drum;
             "feet": loads of the feet, and margins of sliding, turning and tilting;
             "feet regions": the smallest of them in each region of the profile.
         step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
@@ -217,6 +221,8 @@ def as_table(
         labels["spring"] = list(parameters.springs)
     if parameters.cabinet:
         labels["foot"] = list(parameters.cabinet.corners)
+    if "drive" in measures:
+        labels["order"] = ["cosine", "sine"]
     if "regions" in measures:
         labels["accelerometer"] = list(parameters.accelerometer_frames())
     if _IN_REGIONS & set(measures):

@@ -12,7 +12,7 @@ from wm_drake.batch.work_items import BatchKey, WorkItem
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.mount import WRENCH_SIZE
 from wm_drake.elements.sensor import POINT_SIZE
-from wm_drake.engines.compiled.mechanics import DRUM_RATE, RATES_SIZE, STATE_SIZE
+from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, RATES_SIZE, STATE_SIZE
 from wm_drake.engines.compiled.packing import aligned, fill_lanes
 from wm_drake.engines.compiled.run import integrate_runs
 from wm_drake.engines.compiled.samples import trajectory_of
@@ -30,6 +30,8 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cabinet import floor_forces
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.drive import VARIABLES as DRIVE_VARIABLES
+from wm_drake.simulation.drive import measured_drive
 from wm_drake.simulation.feet import FOOT_VARIABLES, REGION_VARIABLES, cabinet_of, foot_measures
 from wm_drake.simulation.histories import measure_samples_lanes
 from wm_drake.simulation.measures import amplitudes, filtered, filtered_columns, power_means
@@ -56,6 +58,7 @@ MEASURES = {
     "contacts": ("nearest_pair", "contact_gap"),
     "regions": ("region_displacement", "region_displacement_integrated"),
     "mounts": tuple(f"mount_force_{kind}" for kind in KINDS),
+    "drive": tuple(DRIVE_VARIABLES),
     "feet": FOOT_VARIABLES,
     "feet regions": REGION_VARIABLES,
     "cabinet": tuple(f"cabinet_{of}_{kind}" for of in ("force", "moment") for kind in KINDS),
@@ -327,6 +330,12 @@ class Runner:
     ) -> Iterable[FloatArray]:
         return tensions_at(item.numbers.setup.springs.values(), run.spring_lengths)
 
+    def _drive(self, item: WorkItem, schedule: Schedule, run: "_Run") -> Iterable[FloatArray]:
+        samples = np.ascontiguousarray(run.samples)
+        found = trajectory_of(samples, schedule, item.packed, item.numbers.layout)
+        motion = found.state[:, DRUM_ANGLE], found.state[:, DRUM_RATE]
+        return measured_drive(found.time, *motion, found.motor_torque, item.case.profile)
+
     def _mounts(self, _item: WorkItem, _schedule: Schedule, run: "_Run") -> Iterable[FloatArray]:
         return mount_measures(run.mounts)
 
@@ -430,6 +439,7 @@ _MEASURED = {
     "regions": Runner._regions,
     "mounts": Runner._mounts,
     "cabinet": Runner._cabinet,
+    "drive": Runner._drive,
     "feet": Runner._feet,
     "feet regions": Runner._feet_in_regions,
     "spring tensions": Runner._spring_tensions,

@@ -2,7 +2,7 @@
 
 import shlex
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -87,11 +87,21 @@ def located_in(file: str) -> Iterator[None]:
         raise located(error, machine_path(file)) from None
 
 
-def load_parameters(file: str, sets: list[str] | None) -> "MachineParameters":
-    """Return the machine of a file or a shipped name, changed by the `--set` options."""
+def load_parameters(
+    file: str,
+    sets: list[str] | None,
+    change: "Callable[[MachineParameters], MachineParameters]" = lambda machine: machine,
+) -> "MachineParameters":
+    """Return the machine of a file or a shipped name, changed by the `--set` options.
+
+    Args:
+        file: Name or path.
+        sets: Changes of numbers.
+        change: Change of the machine before them.
+    """
     from wm_drake.parameters import load_machine
 
-    parameters = load_machine(file)
+    parameters = change(load_machine(file))
     changed, sources = with_sets(parameters, parameters.sources, sets)
     return changed.model_copy(update={"sources": sources})
 

@@ -33,7 +33,7 @@ from wm_drake.cli.figures import writes_pages
 from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.table2 import identify_table2
-from wm_drake.cli.terminal import Console
+from wm_drake.cli.terminal import Console, say
 from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:
@@ -139,6 +139,7 @@ class _Asked:
     validate: list[Path] = field(default_factory=list)
     cutoff: str | None = None
     channels: str | None = None
+    driven_mass: float = 0.0
 
 
 @app.command("damper", cls=ValidatingCommand)
@@ -161,6 +162,18 @@ def identify_damper(
     machine: MachineOption = "reference",
     name: NameOption = None,
     component: ComponentOption = None,
+    sponge_mass: Annotated[
+        str | None,
+        typer.Option(help="Mass of the sponge on the bench, under sines, e.g. '10 g'."),
+    ] = None,
+    outer_mass: Annotated[
+        str | None,
+        typer.Option(help="Mass of the outer tube, at the driven end ([A] Eq. 6), e.g. '150 g'."),
+    ] = None,
+    jig_mass: Annotated[
+        str | None,
+        typer.Option(help="Mass of the jig, at the driven end ([C] Eq. 2), e.g. '2 kg'."),
+    ] = None,
     out: OutOption = DEFAULT_OUT,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
@@ -168,22 +181,45 @@ def identify_damper(
 ) -> None:
     """Identify a friction damper; a curve of its law is found as a monotone table.
 
-    Several laws are fitted to the same files and compared.
+    Several laws are fitted to the same files and compared. Forces of inertia of masses at the
+    driven end are printed and taken out of the measured ones.
     """
     from wm_drake.studies.identification import damper_model
 
     target = target_of("damper", machine, name, component, sets)
     own = str(target.component.parameters.law)  # type: ignore[union-attr]
-    asked = _Asked(
-        files, units, method, seed, out, overwrite, as_json, sets, validate or [], cutoff, channels
+    sponge, outer, jig = (
+        _mass(text, option)
+        for text, option in (
+            (sponge_mass, "--sponge-mass"),
+            (outer_mass, "--outer-mass"),
+            (jig_mass, "--jig-mass"),
+        )
     )
+    common = (files, units, method, seed, out, overwrite, as_json, sets)
+    asked = _Asked(*common, validate or [], cutoff, channels, outer + jig)
     laws, ranges, fixed = _laws(law or own, ""), _ranges(bounds), _single(fix, "--fix")
     motions = _motions(asked, asked.files, rotates=False)
     models = {
-        one: damper_model(one, motions, *given, knots, _kept_fields(target, one, given[0]))
+        one: damper_model(one, motions, *given, knots, _kept_fields(target, one, given[0]), sponge)
         for one, given in _given_by_law(laws, ranges, fixed, "").items()
     }
-    _run_all(asked, f"damper {target.component.name}", target, models, motions, {})
+    parts = [f"damper {target.component.name}"]
+    parts += [f"sponge of {1e3 * sponge:g} g"] if sponge else []
+    parts += [f"less the inertia of {outer + jig:g} kg at the driven end"] if outer + jig else []
+    _run_all(asked, ", ".join(parts), target, models, motions, {})
+
+
+def _mass(text: str | None, option: str) -> float:
+    """Return the mass of an option, 0 without it. [kg]"""
+    from wm_drake.parameters.units import Unit
+
+    if text is None:
+        return 0.0
+    mass = quantities_of(text, Unit("kg", "kg"), option)[0]
+    if mass < 0.0:
+        raise input_error(f"is {mass:g} kg; allowed is >= 0", where=option)
+    return mass
 
 
 def _axis_command(kind: str) -> Callable[..., None]:
@@ -374,7 +410,7 @@ def _motions(asked: _Asked, files: list[Path], *, rotates: bool) -> "list[Measur
     from wm_drake.errors import InputError, Problem
     from wm_drake.parameters import read_loops
     from wm_drake.parameters.units import Unit
-    from wm_drake.rigs.measured import measured_motion
+    from wm_drake.rigs.measured import inertia_share, measured_motion, without_inertia
     from wm_drake.studies.fitting import METHODS
 
     if asked.method not in METHODS:
@@ -401,7 +437,17 @@ def _motions(asked: _Asked, files: list[Path], *, rotates: bool) -> "list[Measur
             problems += error.problems
     if problems:
         raise InputError(problems)
-    return sorted(motions, key=lambda measured: measured.order)
+    found = sorted(motions, key=lambda measured: measured.order)
+    if asked.driven_mass > 0.0:
+        for motion in found:
+            inertia, share = inertia_share(motion, asked.driven_mass)
+            say(
+                f"{motion.loop.name}: {asked.driven_mass:g} kg at the driven end take up to "
+                f"{inertia:.3g} N, {100.0 * share:.3g} % of the measured force; taken out.",
+                err=True,
+            )
+        found = [without_inertia(motion, asked.driven_mass) for motion in found]
+    return found
 
 
 def units_of(text: str | None) -> tuple[str, str, str] | None:

@@ -1,6 +1,7 @@
 """Command `wm-drake spin`: simulate a spin run and report the motion of the tub."""
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,6 +22,7 @@ from wm_drake.cli.common import (
 from wm_drake.cli.progress import progress_bars
 from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.spin_comparison import Choice, compare
+from wm_drake.cli.spin_drive import DriveOption, drive_text, with_drive
 from wm_drake.cli.spin_results import (
     Pages,
     amplitude_lines,
@@ -101,6 +103,7 @@ def spin(
             metavar="CSV",
         ),
     ] = None,
+    drive: DriveOption = None,
     as_json: JsonOption = False,
     sets: SetOption = None,
 ) -> None:
@@ -115,10 +118,11 @@ def spin(
         )
     machines = machine or ["reference"]
     if len(machines) > 1 or compare_gasket:
-        choice = Choice(machines, load, no_gasket, compare_gasket, profile, measured, sets)
+        choice = Choice(machines, load, no_gasket, compare_gasket, profile, measured, sets, drive)
         compare(choice, engine, out, overwrite, Pages(replay, detail), as_json)
         return
-    parameters = with_measured(load_parameters(machines[0], sets), measured, "--measured")
+    loaded = load_parameters(machines[0], sets, partial(with_drive, drive=drive))
+    parameters = with_measured(loaded, measured, "--measured")
     cases = cases_of(parameters, load, not no_gasket, profile)
     check_buildable(machines[0], parameters)
     with interruptible(), result_folder(out, Run("spin", overwrite)) as folder:
@@ -128,7 +132,7 @@ def spin(
                 cases,
                 engine,
                 progress=progress,
-                comparison=compared_cases(measured, sets),
+                comparison=compared_cases(measured, sets or ([drive] if drive else None)),
                 modes=True,
             )
         _write(result, folder, Pages(replay, detail))
@@ -173,6 +177,8 @@ def _print_tables(result: "SpinResult", out: Path, replay: bool) -> None:
             f"{case.case.name}: smallest spring tension "
             + ", ".join(f"{name} {tension:.1f} N" for name, tension in shown)
         )
+        if result.parameters.drive.kind == "motor":
+            console.print(f"{case.case.name}: {drive_text(case.measures.drive)}")
     replays = ", replay_<load>.html" if replay else ""
     console.print(f"Results in {out}: report.html, amplitudes.csv, record_<load>.nc{replays}")
 

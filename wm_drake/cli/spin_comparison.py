@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from wm_drake.cli.common import (
 )
 from wm_drake.cli.progress import progress_bars
 from wm_drake.cli.result_folder import Run, result_folder
+from wm_drake.cli.spin_drive import with_drive
 from wm_drake.cli.spin_results import (
     Pages,
     amplitude_lines,
@@ -55,6 +57,7 @@ class Choice:
         profile: File of the spin profile; None for that of each machine.
         measured: Files of measured amplitudes; None for those of the machine files.
         sets: Changes of numbers, made in every machine.
+        drive: Drive of every machine; None for that of its file.
     """
 
     machines: list[str]
@@ -64,6 +67,7 @@ class Choice:
     profile: Path | None
     measured: list[Path] | None
     sets: list[str] | None
+    drive: str | None = None
 
 
 @dataclass(frozen=True)
@@ -110,7 +114,7 @@ def _plan(choice: Choice) -> list[_Planned]:
             where="--machine",
         )
     machines = [
-        with_measured(_loaded(name, choice.sets), choice.measured, "--measured")
+        with_measured(_loaded(name, choice), choice.measured, "--measured")
         for name in choice.machines
     ]
     check_comparable(machines, "--machine")
@@ -128,10 +132,10 @@ def _plan(choice: Choice) -> list[_Planned]:
     return planned
 
 
-def _loaded(file: str, sets: list[str] | None) -> "MachineParameters":
-    """Return a machine with the numbers of `--set`; its problems name the machine."""
+def _loaded(file: str, choice: Choice) -> "MachineParameters":
+    """Return a machine with drive and numbers of a choice; its problems name the machine."""
     try:
-        return load_parameters(file, sets)
+        return load_parameters(file, choice.sets, partial(with_drive, drive=choice.drive))
     except InputError as error:
         raise InputError(
             Problem(
@@ -168,7 +172,8 @@ def _run(planned: list[_Planned], choice: Choice, engine: str) -> "list[Variant]
     from wm_drake.studies.spin.study import run_spin
 
     names = [f"{one.name}: {case.name}" for one in planned for case in one.cases]
-    comparison = compared_cases(choice.measured, choice.sets)
+    changes = choice.sets or ([choice.drive] if choice.drive else None)
+    comparison = compared_cases(choice.measured, changes)
     variants: list[Variant] = []
     with progress_bars(names) as progress:
         for one in planned:

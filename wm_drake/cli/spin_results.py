@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from wm_drake.cli.spin_drive import drive_as_json
 from wm_drake.cli.spin_forces import forces_as_json
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -153,6 +154,7 @@ def case_as_json(case: "CaseResult") -> dict[str, Any]:
         "gasket_force_N": numbers(measures.gasket_force, Unit("N", "N"), "F"),
         "gasket_moment_Nm": numbers(measures.gasket_moment, Unit("N*m", "N*m"), "M"),
         **forces_as_json(measures),
+        "motor": drive_as_json(measures.drive),
         "smallest_gap_mm": millimetre.from_si(measures.smallest_gap.distance)
         if measures.smallest_gap
         else None,

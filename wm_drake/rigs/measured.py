@@ -1,6 +1,6 @@
 """From a recorded test to the motion of the bench: a sine where it is one, else as recorded."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -143,6 +143,36 @@ def measured_motion(loop: MeasuredLoop, cutoff: float | None = None) -> Measured
         if sine is not None:
             return sine
     return _recorded(loop, cutoff)
+
+
+def inertia_force(motion: MeasuredMotion, mass: float) -> FloatArray:
+    """Return the force that accelerates a mass at the driven end, at the samples (n,). [N]
+
+        M Y'' of [C] Eq. (2), m_o xo'' of [A] Eq. (6)
+
+    Args:
+        motion: The motion: a sine, or as recorded, whose smoothed rate is differentiated.
+        mass: Mass of jig and outer tube. [kg]
+    """
+    if isinstance(motion, HarmonicMotion):
+        return -mass * motion.motion.angular_frequency**2 * motion.position
+    time = motion.loop.time
+    return np.asarray(mass * np.gradient(motion.rate, time))
+
+
+def inertia_share(motion: MeasuredMotion, mass: float) -> tuple[float, float]:
+    """Return the largest force of inertia [N], and its share of half the measured range of force.
+
+    Arguments as for `inertia_force`.
+    """
+    largest = float(np.max(np.abs(inertia_force(motion, mass))))
+    return largest, largest / (0.5 * float(np.ptp(motion.loop.force)))
+
+
+def without_inertia(motion: MeasuredMotion, mass: float) -> MeasuredMotion:
+    """Return a measured test less the inertia of a mass at its driven end; see `inertia_force`."""
+    force = motion.loop.force - inertia_force(motion, mass)
+    return replace(motion, loop=replace(motion.loop, force=force))
 
 
 def _sine(loop: MeasuredLoop) -> HarmonicMotion | None:

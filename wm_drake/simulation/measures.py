@@ -13,6 +13,7 @@ from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cabinet import Walk, walk
+from wm_drake.simulation.drive import DriveMeasures, drive_measures
 from wm_drake.simulation.feet import BY_FOOT, REGION_VARIABLES, FootLoads, foot_loads, foot_measures
 from wm_drake.simulation.mount_forces import speed_ranges
 from wm_drake.simulation.mounts import KINDS, force_measures
@@ -63,6 +64,7 @@ class Measures:
         feet: Measures of the feet of the cabinet by the names in `wm_drake.simulation.feet`, with
             the dimensions foot and region; None if the machine has no cabinet, or for a record of
             version 0.1.
+        drive: Torque, power, energy, speed ripple and capture of the drive.
         walk: How the cabinet stands at the end, against where it stood before; None if it is fixed.
     """
 
@@ -83,6 +85,7 @@ class Measures:
     cabinet_moment_dynamic_rms: xr.DataArray
     smallest_tension: xr.DataArray
     feet: xr.Dataset | None
+    drive: DriveMeasures
     walk: Walk | None = None
 
 
@@ -322,8 +325,20 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
             smallest_tensions(values["spring_tension"]), record.coords["spring"].coords
         ),
         feet=feet_of(record),
+        drive=drive_measures(
+            values["time"],
+            values["drum_angle"],
+            values["drum_speed"],
+            values["motor_torque"],
+            profile_of(record),
+        ),
         walk=walk_of(record),
     )
+
+
+def profile_of(record: Record) -> SpinProfile:
+    """Return the spin profile of the run of a record."""
+    return SpinProfile.model_validate_json(record.attrs["profile"])
 
 
 def cabinet_in(record: Record) -> tuple[Cabinet, float] | None:
@@ -347,7 +362,7 @@ def feet_of(record: Record) -> xr.Dataset | None:
     found = cabinet_in(record)
     if found is None or "cabinet_force" not in record:
         return None
-    profile = SpinProfile.model_validate_json(record.attrs["profile"])
+    profile = profile_of(record)
     parts = speed_ranges(record, profile)
     values = foot_measures(
         *found,

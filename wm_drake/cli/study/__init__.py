@@ -5,6 +5,7 @@ import typer
 from wm_drake.cli.figures import writes_pages
 from wm_drake.cli.study import (
     design,
+    drive,
     gasket,
     gasket_damping,
     gasket_effect,
@@ -17,6 +18,7 @@ from wm_drake.cli.study import (
 
 app = typer.Typer(help="Run a study of many runs and write a report.", no_args_is_help=True)
 app.command("design")(writes_pages(design.design))
+app.command("drive")(writes_pages(drive.drive))
 app.command("gasket")(writes_pages(gasket.gasket))
 app.command("gasket-damping")(writes_pages(gasket_damping.gasket_damping))
 app.command("gasket-effect")(writes_pages(gasket_effect.gasket_effect))

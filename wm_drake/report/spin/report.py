@@ -20,6 +20,7 @@ from wm_drake.report.modes.report import natural_modes_table
 from wm_drake.report.page import Picture, picture, render, versions_of
 from wm_drake.report.spin import tables
 from wm_drake.report.spin.cases import case_title, has_gasket, speed_rpm
+from wm_drake.report.spin.drive import capture_warnings, drive_view
 from wm_drake.report.spin.figures import envelopes_figure, gaps_figure, gasket_figure, orbits_figure
 from wm_drake.report.spin.floor import floor_view, floor_warnings
 from wm_drake.report.spin.tables import amplitude_table
@@ -91,6 +92,7 @@ def spin_report(
         mount_forces=tables.mount_force_tables(result),
         drawn_alone="" if len(detailed) == len(result.results) else case_title(main),
         floor=floor_view(result),
+        drive=drive_view(result),
         smallest_gaps=tables.smallest_gaps(result),
         gaps_picture=_gaps_picture(result),
         smallest_tensions=tables.smallest_tensions(result),
@@ -238,7 +240,7 @@ def warnings_of(result: SpinResult) -> list[str]:
                 "model has no contact forces. In the real machine these parts would collide, and "
                 "the motion after that is not valid."
             )
-    return found + slack_springs_warning(result) + floor_warnings(result)
+    return found + slack_springs_warning(result) + floor_warnings(result) + capture_warnings(result)
 
 
 def slack_springs_warning(result: SpinResult) -> list[str]:

@@ -21,7 +21,7 @@ from wm_drake.parameters.rubber import DAHL_FIELDS, MAXWELL_FIELDS
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.rigs import AXES, Bench, bushing_bench, damper_bench
-from wm_drake.rigs.measured import MeasuredMotion
+from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion
 from wm_drake.studies.fitting import Unknown
 from wm_drake.studies.identification.scales import (
     ABOUT,
@@ -78,6 +78,7 @@ def damper_model(
     fixed: Mapping[str, float] | None = None,
     knots: int = KNOTS,
     kept: Mapping[str, float] | None = None,
+    sponge_mass: float = 0.0,
 ) -> ComponentModel:
     """Return a damper with unknown numbers.
 
@@ -91,15 +92,18 @@ def damper_model(
         fixed: Values that are known, by field. [SI]
         knots: Points of each curve of the law on each side of zero.
         kept: Numbers of the component that stay as they are, unless they are fixed. [SI]
+        sponge_mass: Mass of the sponge on the bench; all motions must be sines then. [kg]
 
     Raises:
-        InputError: There is no such law, or no such field.
+        InputError: There is no such law, or no such field, or the sponge cannot have a mass.
     """
     if law not in DAMPER_LAWS:
         raise input_error(
             f"no law '{law}' of a damper{nearest_names(law, DAMPER_LAWS)}", where="--law"
         )
     registered, scale = DAMPER_LAWS[law], scale_of(motions)
+    if sponge_mass > 0.0:
+        _check_sponge_mass(registered, motions)
     tables = tuple(OddTable(curve, scale, knots) for curve in registered.curves)
     numbers_of_law = [name for name in registered.fields if name not in registered.curves]
     check_names([*numbers_of_law, *_rises(tables)], bounds, fixed)
@@ -110,8 +114,28 @@ def damper_model(
     unknowns = (*numbers, *_free_rises(tables, bounds, fixed))
     fields = _Fields({"law": law, **known}, unknowns, tables)
     return ComponentModel(
-        law, unknowns, fields, lambda point: damper_bench(_damper(fields(point))), fixed or {}
+        law,
+        unknowns,
+        fields,
+        lambda point: damper_bench(_damper(fields(point)), sponge_mass),
+        fixed or {},
     )
+
+
+def _check_sponge_mass(law: DamperLaw, motions: Sequence[MeasuredMotion]) -> None:
+    """Raise InputError if a law has no sponge that can have a mass, or a motion is no sine."""
+    if law.sponge_with_mass is None:
+        names = [other.name for other in DAMPER_LAWS.values() if other.sponge_with_mass]
+        raise input_error(
+            f"law '{law.name}' has no sponge that can have a mass; allowed are {', '.join(names)}",
+            where="--sponge-mass",
+        )
+    for motion in motions:
+        if not isinstance(motion, HarmonicMotion):
+            raise input_error(
+                "is not a sine; a sponge with mass is computed under sines only",
+                where=motion.loop.path,
+            )
 
 
 def _units(law: DamperLaw) -> dict[str, Unit]:

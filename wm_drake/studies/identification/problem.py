@@ -7,6 +7,7 @@ import numpy as np
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs import Bench, BushingBench, DamperBench, NotSteadyError
 from wm_drake.rigs.forces import damper_tensions, harmonic_loads
+from wm_drake.rigs.heavy_sponge import steady_tensions
 from wm_drake.rigs.integration import PHASE
 from wm_drake.rigs.loops import steady_deformations
 from wm_drake.rigs.measured import (
@@ -69,11 +70,27 @@ def _steady_forces(benches: Sequence[Bench], motions: Sequence[HarmonicMotion]) 
                 if isinstance(bench, BushingBench)
             ]
         )
+    if isinstance(benches[0], DamperBench) and benches[0].sponge_mass > 0.0:
+        return np.array([_heavy_sponge_forces(bench, motions) for bench in benches])
     at_once = max(1, MOST_ROWS // len(motions))
     parts = [
         _damper_forces(benches[k : k + at_once], motions) for k in range(0, len(benches), at_once)
     ]
     return np.concatenate(parts)
+
+
+def _heavy_sponge_forces(bench: Bench, motions: Sequence[HarmonicMotion]) -> FloatArray:
+    """Return the forces of a damper whose sponge has a mass at all samples; NaN if not steady."""
+    assert isinstance(bench, DamperBench)
+    forces = []
+    for m in motions:
+        size = m.motion.amplitude, m.motion.angular_frequency
+        try:
+            loop = steady_tensions(bench.packed, bench.sponge_mass, *size)
+        except NotSteadyError:
+            return np.full(sum(len(each.phase) for each in motions), np.nan)
+        forces.append(np.interp(m.phase, PHASE, np.append(loop, loop[0])))
+    return np.concatenate(forces)
 
 
 def _bushing_forces(bench: BushingBench, m: HarmonicMotion) -> FloatArray:

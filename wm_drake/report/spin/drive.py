@@ -1,0 +1,171 @@
+"""Section of a spin page about the drive: torque, power, energy, speed ripple, capture."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from wm_drake.elements.motor import evaluate_motor, packed_limit
+from wm_drake.parameters.drive import motor_of
+from wm_drake.parameters.types import FloatArray
+from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH, style_axes
+from wm_drake.report.formatting import MISSING, RPM_PER_RAD_S, number
+from wm_drake.report.page import Picture, picture
+from wm_drake.report.spin.cases import case_title
+from wm_drake.report.spin.panels import revolution_starts
+from wm_drake.report.tables import Group, Row, Table
+from wm_drake.simulation.drive import CAPTURE_LAG, CAPTURE_TIME, over_revolutions
+from wm_drake.simulation.measures import profile_of
+from wm_drake.studies.spin.study import CaseResult, SpinResult
+
+
+@dataclass(frozen=True)
+class DriveView:
+    """Section of the page.
+
+    Attributes:
+        about: Sentences about the drive.
+        in_short: One sentence for the details of the run.
+        table: Measures of each load.
+        pictures: Speed and torque over time, for each load with a motor.
+    """
+
+    about: str
+    in_short: str
+    table: Table
+    pictures: tuple[Picture, ...]
+
+
+def drive_view(result: SpinResult) -> DriveView:
+    """Return the section."""
+    drive = motor_of(result.parameters.drive)
+    if drive is None:
+        about = (
+            "The drum follows the spin profile exactly, whatever torque that takes. The option "
+            "--drive motor shows what a motor with a torque limit does."
+        )
+        in_short = "The drum follows the spin profile exactly; the motor torque has no limit."
+        return DriveView(about, in_short, drive_table(result), ())
+    n = drive.belt_ratio
+    about = (
+        "A motor with a torque limit and a PI speed controller turns the drum by a belt of ratio "
+        f"{n:g}. Torques are those at the drum; at the motor's shaft they are "
+        f"{n:g} times smaller. None of the motor's numbers is published: see their sources "
+        "in the table of parameters."
+    )
+    in_short = "A motor turns the drum; the spin profile is the speed that its controller wants."
+    shown = [case for case in result.results if case.record.sizes["time"] > 1]
+    pictures = tuple(_picture(result, case) for case in shown)
+    return DriveView(about, in_short, drive_table(result), pictures)
+
+
+def capture_warnings(result: SpinResult) -> list[str]:
+    """Return a warning for each case in which the drum is caught below the wanted speed."""
+    return [
+        f"Load {case_title(case)}: caught at {number(RPM_PER_RAD_S * caught.speed, 0)} rpm "
+        f"from {number(caught.begin)} s to {number(caught.end)} s with a mean torque of "
+        f"{number(caught.torque, 2)} N m. The drive is too weak to pass (Sommerfeld effect), or to "
+        "lift the unbalance."
+        for case in result.results
+        if (caught := case.measures.drive.capture)
+    ]
+
+
+def drive_table(result: SpinResult) -> Table:
+    """Return the measures of the drive for each load."""
+    groups = []
+    for case in result.results:
+        drive = case.measures.drive
+        caught = drive.capture
+        cells = (
+            number(drive.peak_torque),
+            number(drive.mean_torque, 2),
+            number(RPM_PER_RAD_S * drive.mean_torque_speed, 0),
+            number(drive.peak_power, 0),
+            number(drive.energy, 0),
+            number(100.0 * drive.speed_ripple),
+            f"{number(RPM_PER_RAD_S * caught.speed, 0)} rpm, {number(caught.torque, 2)} N\u00a0m"
+            if caught
+            else MISSING,
+        )
+        row = Row(cells, "alarm" if caught else "")
+        groups.append(Group(case_title(case), (row,)))
+    caption = (
+        "Torque of the motor on the drum: largest value, and largest average over a revolution "
+        "with its speed; largest power; work over the run. Ripple: largest difference between "
+        "highest and lowest speed in a revolution, in parts of the mean, from 60 rpm on. Caught: "
+        f"mean speed and torque of a drum that stays for {CAPTURE_TIME:g} s or longer more than "
+        f"{100.0 * CAPTURE_LAG:g} % below the wanted speed."
+    )
+    header = (
+        "load",
+        "largest torque, N\u00a0m",
+        "over a revolution, N\u00a0m",
+        "at, rpm",
+        "largest power, W",
+        "work, J",
+        "speed ripple, %",
+        "caught at",
+    )
+    return Table(caption, header, tuple(groups))
+
+
+def _picture(result: SpinResult, case: CaseResult) -> Picture:
+    drive = case.measures.drive
+    caption = (
+        f"Load {case_title(case)}. Upper panel: speed of the drum, and the wanted one (dashed). "
+        "Lower panel: torque of the motor on the drum, from the smallest to the largest in each "
+        "revolution, its average over a revolution (line), and the limit (dashed)."
+    )
+    alternative = (
+        f"Speed and torque over time, load {case_title(case)}: up to "
+        f"{number(drive.peak_torque)} N m."
+    )
+    return picture(drive_figure(result, case), alternative, caption)
+
+
+def drive_figure(result: SpinResult, case: CaseResult) -> Figure:
+    """Draw speed and torque of a drive with a motor over time."""
+    record, time = case.record, case.record.time.values
+    torque, speed = record.motor_torque.values, record.drum_speed.values
+    figure = Figure(figsize=(WIDTH, 5.0))
+    above, below = figure.subplots(2, 1, sharex=True)
+    starts = revolution_starts(record)
+    above.plot(time, RPM_PER_RAD_S * speed, color=OURS, linewidth=1.0, label="speed of the drum")
+    wanted = RPM_PER_RAD_S * np.asarray(profile_of(record).speed_at(time))
+    above.plot(time, wanted, color=MARK, linewidth=1.0, linestyle=(0, (5, 2.5)), label="wanted")
+    if caught := case.measures.drive.capture:
+        above.axvspan(caught.begin, caught.end, color=MEASURED, alpha=0.12, linewidth=0.0)
+        place = 0.5 * (caught.begin + caught.end), RPM_PER_RAD_S * caught.speed
+        text = f"caught at {number(place[1], 0)} rpm"
+        above.annotate(text, place, (0, -6), textcoords="offset points", ha="center", va="top",
+                       color=MEASURED, fontsize=9.5)  # fmt: skip
+    low, high = (side.reduceat(torque, starts) for side in (np.minimum, np.maximum))
+    below.fill_between(time[starts], low, high, color=OURS, alpha=0.25, linewidth=0.0)
+    mean = over_revolutions(time, record.drum_angle.values, torque)
+    below.plot(time, mean, color=OURS, linewidth=1.2, label="torque, average over a revolution")
+    limit = _limit(result, speed[starts])
+    if np.abs(limit).min() < 4.0 * np.abs(torque).max():  # else it would hide the torque
+        below.plot(time[starts], limit, color=QUIET, linewidth=1.0,
+                   linestyle=(0, (5, 2.5)), label="limit")  # fmt: skip
+    above.set_ylabel("speed, rpm", fontsize=9.5)
+    below.set_ylabel("torque at the drum, N\u00a0m", fontsize=9.5)
+    below.set_xlabel("time, s", fontsize=9.5)
+    below.set_xlim(0.0, float(time[-1]))
+    for axes in (above, below):
+        axes.grid(color=GRID)
+        style_axes(axes)
+        axes.legend(frameon=False, fontsize=9.5, loc="lower right", ncols=2)
+    figure.subplots_adjust(left=0.075, right=0.985, top=0.98, bottom=0.1, hspace=0.1)
+    return figure
+
+
+def _limit(result: SpinResult, speed: FloatArray) -> FloatArray:
+    """Return the torque limit at the drum at speeds of the drum (n,). [N m]"""
+    drive = motor_of(result.parameters.drive)
+    assert drive is not None
+    packed, own, limit = packed_limit(drive), np.empty(2), np.empty(len(speed))
+    for index, rate in enumerate(drive.belt_ratio * speed):
+        evaluate_motor(np.array([0.0, rate]), packed, own)
+        limit[index] = drive.belt_ratio * own[1]
+    return limit

@@ -1,0 +1,253 @@
+"""What the drive does in a run: torque, power, energy, speed ripple, and capture at a resonance.
+
+Torques are those of the motor on the drum. A drive with a prescribed speed has them too: it gives
+whatever the motion needs.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.types import FloatArray
+
+SLOWEST = 2.0 * np.pi
+"""Speed from which the ripple is measured: 60 rpm. [rad/s] Below it a turn is mostly start-up."""
+
+REVOLUTIONS = 8
+"""Revolutions at the end of a run over which parts of order one are taken."""
+
+CAPTURE_TIME = 5.0
+"""Time for which the speed must stay almost the same below the wanted one to be caught. [s]"""
+
+CAPTURE_LAG = 0.1
+"""Part of the wanted speed by which a caught drum is slower, at least."""
+
+CAPTURE_DRIFT = 0.02
+"""Largest change of the mean speed of a caught drum from one half of `CAPTURE_TIME` to the next, in
+parts of it."""
+
+STALL_DRIFT = 0.005
+"""The same for a drum that hardly turns or swings, in parts of the wanted speed."""
+
+
+VARIABLES = {
+    "drive_peak_torque": ("", "N m", "largest torque of the motor on the drum"),
+    "drive_mean_torque": ("", "N m", "largest torque of the motor averaged over a revolution"),
+    "drive_mean_torque_speed": ("", "rad/s", "speed of the drum at the largest mean torque"),
+    "drive_peak_power": ("", "W", "largest power of the motor"),
+    "drive_energy": ("", "J", "work of the motor over the run"),
+    "drive_speed_ripple": ("", "", "largest coefficient of fluctuation of the speed"),
+    "drive_end_speed": ("", "rad/s", "speed of the drum at the end, averaged over a revolution"),
+    "drive_caught_speed": ("", "rad/s", "speed at which the drum is caught; NaN if it is not"),
+    "drive_caught_torque": ("", "N m", "mean torque of the motor where the drum is caught"),
+    "drive_torque_order_one": ("order", "N m", "torque with cosine and sine of the drum angle"),
+    "drive_acceleration_order_one": ("order", "rad/s^2", "acceleration of the drum with them"),
+}
+"""Dimensions, unit and meaning of each measure of the drive in a batch."""
+
+
+@dataclass(frozen=True)
+class Capture:
+    """A drum that stays at a speed below the wanted one, as at a resonance (Sommerfeld effect).
+
+    Attributes:
+        begin, end: When it is caught. [s]
+        speed: Mean speed in the last half of `CAPTURE_TIME`. [rad/s]
+        torque: Mean torque of the motor then. [N m]
+    """
+
+    begin: float
+    end: float
+    speed: float
+    torque: float
+
+
+@dataclass(frozen=True)
+class DriveMeasures:
+    """Measures of the drive over a run.
+
+    Attributes:
+        peak_torque: Largest torque of the motor on the drum, without sign. [N m]
+        mean_torque: Largest torque averaged over a revolution; NaN without one. [N m]
+        mean_torque_speed: Speed of the drum there. [rad/s]
+        peak_power: Largest mechanical power. [W]
+        energy: Work of the motor over the run. [J]
+        speed_ripple: Largest difference between the highest and the lowest speed in a revolution,
+            in parts of the mean speed, without the trend of a ramp (coefficient of fluctuation);
+            from `SLOWEST` on. NaN if the drum does not reach it.
+        capture: Where the drum was caught; None if it was not.
+    """
+
+    peak_torque: float
+    mean_torque: float
+    mean_torque_speed: float
+    peak_power: float
+    energy: float
+    speed_ripple: float
+    capture: Capture | None
+
+
+def drive_measures(
+    time: FloatArray,
+    angle: FloatArray,
+    speed: FloatArray,
+    torque: FloatArray,
+    profile: SpinProfile,
+) -> DriveMeasures:
+    """Return the measures of the drive over a run.
+
+    Args:
+        time: (n,) evenly spaced. [s]
+        angle, speed: (n,) Angle and speed of the drum against the tub. [rad, rad/s]
+        torque: (n,) Torque of the motor on the drum. [N m]
+        profile: Speed that is wanted.
+    """
+    if len(time) < 2:
+        nan = float("nan")
+        return DriveMeasures(nan, nan, nan, nan, nan, nan, None)
+    mean = over_revolutions(time, angle, torque)
+    nan = not np.isfinite(mean).any()
+    largest = 0 if nan else int(np.nanargmax(np.abs(mean)))
+    power = torque * speed
+    return DriveMeasures(
+        peak_torque=float(np.abs(torque).max()),
+        mean_torque=float(mean[largest]),
+        mean_torque_speed=float(over_revolutions(time, angle, speed)[largest]),
+        peak_power=float(np.abs(power).max()),
+        energy=float(np.trapezoid(power, time)),
+        speed_ripple=speed_ripple(time, angle, speed),
+        capture=capture(time, speed, torque, profile),
+    )
+
+
+def over_revolutions(time: FloatArray, angle: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the average of a signal over the revolution of the drum around each sample.
+
+    Args:
+        time, angle, values: (n,) [s, rad, any]
+
+    Returns:
+        (n,), NaN in the first and the last half revolution.
+    """
+    turned = np.maximum.accumulate(angle)  # a weak drive may turn back a little
+    distinct = np.append(True, np.diff(turned) > 0.0)
+    steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
+    integral = np.append(0.0, np.cumsum(steps))
+    ends = [
+        np.interp(angle + side, turned[distinct], time[distinct], left=np.nan, right=np.nan)
+        for side in (-np.pi, np.pi)
+    ]
+    sums = [np.interp(end, time, integral) for end in ends]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray((sums[1] - sums[0]) / (ends[1] - ends[0]))
+
+
+def order_one(time: FloatArray, angle: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the part of a signal that goes round with the drum, by least squares. (2,)
+
+        values = mean + trend (t - t_mean) + A cos(phi) + B sin(phi)
+
+    Args:
+        time, angle, values: (n,) [s, rad, any]
+
+    Returns:
+        A and B; NaN with fewer than five samples.
+    """
+    if len(time) < 5:
+        return np.full(2, np.nan)
+    columns = (np.ones(len(time)), time - time.mean(), np.cos(angle), np.sin(angle))
+    return np.asarray(np.linalg.lstsq(np.column_stack(columns), values, rcond=None)[0][2:])
+
+
+def orders_at_end(
+    time: FloatArray, angle: FloatArray, speed: FloatArray, torque: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the parts of order one of torque and acceleration in the last revolutions of a run.
+
+    Args:
+        time, angle, speed, torque: As for `drive_measures`.
+
+    Returns:
+        (2,) of the torque [N m] and (2,) of the acceleration [rad/s^2], as `order_one`. The
+        acceleration follows from the speed: d/dt (A cos phi + B sin phi) = w (B cos phi - A sin
+        phi) at the mean speed w.
+    """
+    last = angle >= angle[-1] - 2.0 * np.pi * REVOLUTIONS if len(angle) else np.zeros(0, bool)
+    at = time[last], angle[last]
+    in_speed, mean = order_one(*at, speed[last]), float(np.mean(speed[last])) if last.any() else 0.0
+    return order_one(*at, torque[last]), mean * np.array([in_speed[1], -in_speed[0]])
+
+
+def speed_ripple(time: FloatArray, angle: FloatArray, speed: FloatArray) -> float:
+    """Return the largest coefficient of fluctuation of the speed, see `DriveMeasures`."""
+    mean = over_revolutions(time, angle, speed)
+    good = mean >= SLOWEST  # false for NaN
+    if not good.any():
+        return float("nan")
+    revolution = np.floor(angle[good] / (2.0 * np.pi))
+    begins = np.flatnonzero(np.append(True, np.diff(revolution) != 0.0))
+    deviation = (speed - mean)[good]
+    spread = np.maximum.reduceat(deviation, begins) - np.minimum.reduceat(deviation, begins)
+    return float((spread / mean[good][begins]).max())
+
+
+def capture(
+    time: FloatArray, speed: FloatArray, torque: FloatArray, profile: SpinProfile
+) -> Capture | None:
+    """Return where the drum is caught; None if it is not.
+
+    It is caught when its mean speed hardly changes from one half of `CAPTURE_TIME` to the next,
+    while it is slower than the wanted speed by more than `CAPTURE_LAG`, which does not fall.
+    """
+    half = round(0.5 * CAPTURE_TIME / float(time[1] - time[0]))
+    if len(time) <= 2 * half:
+        return None
+    wanted = np.asarray(profile.speed_at(time))
+
+    def means(signal: FloatArray) -> FloatArray:
+        sums = np.append(0.0, np.cumsum(signal))
+        return np.asarray((sums[half:] - sums[:-half]) / half)
+
+    fast, at, load = means(wanted), means(speed), means(torque)
+    before, now = at[:-half], at[half:]  # windows that end where the next one begins
+    slow = now < (1.0 - CAPTURE_LAG) * fast[half:]
+    allowed = np.maximum(CAPTURE_DRIFT * np.abs(now), STALL_DRIFT * np.abs(fast[half:]))
+    steady = np.abs(now - before) <= allowed
+    falls = fast[half:] < (1.0 - CAPTURE_DRIFT) * fast[:-half]
+    caught = np.flatnonzero(slow & steady & ~falls)
+    if not len(caught):
+        return None
+    # the last uninterrupted stretch
+    gaps = np.flatnonzero(np.diff(caught) > 1)
+    first = caught[gaps[-1] + 1] if len(gaps) else caught[0]
+    last = caught[-1]
+    return Capture(
+        float(time[first]), float(time[last + 2 * half - 1]), float(now[last]),
+        float(load[half + last]),
+    )  # fmt: skip
+
+
+def measured_drive(
+    time: FloatArray,
+    angle: FloatArray,
+    speed: FloatArray,
+    torque: FloatArray,
+    profile: SpinProfile,
+) -> list[FloatArray]:
+    """Return the numbers of `VARIABLES`, in their order; arguments as for `drive_measures`."""
+    found = drive_measures(time, angle, speed, torque, profile)
+    caught = found.capture
+    end = angle >= angle[-1] - 2.0 * np.pi if len(angle) else np.zeros(0, dtype=bool)
+    numbers = (
+        found.peak_torque,
+        found.mean_torque,
+        found.mean_torque_speed,
+        found.peak_power,
+        found.energy,
+        found.speed_ripple,
+        float(np.mean(speed[end])) if end.any() else np.nan,
+        caught.speed if caught else np.nan,
+        caught.torque if caught else np.nan,
+    )
+    return [*map(np.array, numbers), *orders_at_end(time, angle, speed, torque)]

@@ -1,0 +1,88 @@
+"""Tables of the drive study: CSV files and plain data for JSON."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from wm_drake.parameters.units import Unit
+from wm_drake.studies.drive.study import DriveResult, motor_with_limit
+
+rpm = Unit("rad/s", "rpm").from_si
+
+
+def thresholds_table(result: DriveResult) -> pd.DataFrame:
+    """Return the smallest torque limit of each load, at the motor's shaft and at the drum."""
+    ratio = motor_with_limit(result.parameters)[0].belt_ratio
+    return pd.DataFrame(
+        [
+            {
+                "load": t.load,
+                "caught_below_Nm": t.caught_below,
+                "passes_from_Nm": t.passes_from,
+                "passes_from_at_drum_Nm": ratio * t.passes_from,
+                "caught_rpm": rpm(t.caught_speed),
+                "caught_mean_torque_at_drum_Nm": t.caught_torque,
+            }
+            for t in result.thresholds
+        ]
+    )
+
+
+def map_table(result: DriveResult) -> pd.DataFrame:
+    """Return the map over torque limit and unbalance, a row for each run."""
+    found = result.map
+    rows = [
+        {
+            "load": found.load,
+            "mass_factor": factor,
+            "unbalance_gm": 1e3 * found.unbalance[u],
+            "torque_limit_Nm": torque,
+            "end_rpm": rpm(float(found.end_speed[u, t])),
+            "caught_rpm": rpm(float(found.caught_speed[u, t])),
+        }
+        for u, factor in enumerate(found.factors)
+        for t, torque in enumerate(found.torques)
+    ]
+    return pd.DataFrame(rows)
+
+
+def estimation_table(result: DriveResult) -> pd.DataFrame:
+    """Return planted and estimated unbalance of each random load. [g m]"""
+    found = result.estimation
+    if found is None:
+        return pd.DataFrame()
+    return pd.DataFrame(
+        {
+            "planted_gm": 1e3 * found.planted,
+            "estimated_gm": 1e3 * found.estimated,
+            "error_gm": 1e3 * found.errors,
+            "from_torque_alone_gm": 1e3 * found.from_torque,
+            "from_speed_alone_gm": 1e3 * found.from_speed,
+        }
+    )
+
+
+def error_measures(result: DriveResult) -> dict[str, float] | None:
+    """Return bias, RMS and 95 % quantile of the error of the estimated unbalance. [g m]"""
+    if result.estimation is None:
+        return None
+    errors = 1e3 * result.estimation.errors
+    return {
+        "loads": float(len(errors)),
+        "bias_gm": float(np.mean(errors)),
+        "rms_gm": float(np.sqrt(np.mean(errors**2))),
+        "p95_gm": float(np.quantile(np.abs(errors), 0.95)),
+        "mean_planted_gm": float(np.mean(1e3 * result.estimation.planted)),
+    }
+
+
+def as_plain_data(result: DriveResult) -> dict[str, Any]:
+    """Return the result for JSON."""
+    return {
+        "machine": result.parameters.name,
+        "runs": result.runs,
+        "thresholds": thresholds_table(result).to_dict("records"),
+        "map": map_table(result).to_dict("records"),
+        "estimation": error_measures(result),
+    }
