@@ -410,6 +410,7 @@ def test_spin_prints_one_json_object(plain):
             "mount_force_N",
             "cabinet_wrench",
             "feet",
+            "walk",
             "smallest_gap_mm",
             "smallest_spring_tension_N",
             "critical_rpm",
@@ -431,7 +432,9 @@ def test_spin_prints_one_json_object(plain):
         *("smallest_normal_force_N", "slide_margin_N", "turn_margin_Nm", "tilt_margin_Nm"),
         "regions",
     }
-    assert feet["regions"] == {}
+    assert list(feet["regions"]) == ["0 to 100 rpm"]  # the profile has no regions
+    assert feet["regions"]["0 to 100 rpm"]["slide_margin_N"] == feet["slide_margin_N"]
+    assert case["walk"] is None
     assert 0.0 < feet["smallest_normal_force_N"] < 250.0
     assert 0.0 < feet["slide_margin_N"] < 0.4 * 71.0 * 9.81
     assert set(case["cabinet_wrench"]) == {"about", "force_N", "moment_Nm"}
