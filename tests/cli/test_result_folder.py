@@ -278,3 +278,36 @@ def test_deeply_nested_run_file_is_refused():
     (OUT / RUN_FILE).write_text("[" * 100_000)
     with pytest.raises(InputError, match="does not describe a run"):
         written(Run("spin", overwrite=True), "report.html")
+
+
+@pytest.mark.slow
+def test_calibrate_whose_files_cannot_grow_keeps_its_runs_and_ends_with_a_message(tmp_path):
+    """The ledger fits on the disk, the results do not."""
+    (tmp_path / "short.yaml").write_text(
+        "extends: reference\nname: short\nmeasured: []\n"
+        "profile: {time: '(0, 6) s', speed: '(40, 200) rpm'}\n"
+    )
+    (tmp_path / "free.yaml").write_text(
+        "quantities:\n  friction: {bounds: '(10, 60) N', prior: '(30, 10) N', "
+        "sets: damper_types.friction.friction_force, source: test}\n"
+    )
+    (tmp_path / "measured.csv").write_text(
+        "load,gasket,source,Xr,Yr,Zr,Xf,Yf,Zf\nmiddle,yes,experiment,10,5,12,8,5,11\n"
+    )
+    given = sorted(path.name for path in tmp_path.iterdir())
+    words = "calibrate --machine short.yaml --free free.yaml --targets measured.csv --starts 1"
+    ended = subprocess.run(
+        [sys.executable, "-c", "from wm_drake.cli import main; main()", *words.split()],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000)),
+    )
+    assert ended.returncode == 2, ended.stderr
+    assert "Traceback" not in ended.stderr
+    message = "cannot be written to: File too large; all runs are kept"
+    assert message in ended.stderr.strip().splitlines()[-1]
+    kept = sorted(path.name for path in tmp_path.iterdir())
+    assert kept == sorted([*given, "wm-drake-calibrate"])
+    assert [path.name for path in (tmp_path / "wm-drake-calibrate").iterdir()] == ["ledger.sqlite"]

@@ -250,7 +250,7 @@ NUMBERS = [
 ]  # fmt: skip
 OPTIONS = [
     ("calibrate --free FREE", ["--starts", "--iterations", "--seed", "--deviation", "--resolution", "--workers", "--weight", "--leave-out", "--method"]),
-    ("study gasket --trials 100", ["--seed", "--workers", "--design", "--model", "--tables", "--factor", "--load"]),
+    ("study gasket --trials 200", ["--seed", "--workers", "--design", "--model", "--tables", "--factor", "--load"]),
     ("study gasket", ["--trials"]),
     ("study spin-cycle", ["--workers", "--engine", "--profile", "--case"]),
     ("study spin-identify", ["--seed", "--noise", "--workers", "--unknown", "--case"]),
@@ -520,7 +520,7 @@ def record() -> xr.Dataset:
 
 
 def _netcdf_case(random_: random.Random, folder: Path) -> FuzzCase:
-    """Records: broken bytes, lost and odd variables, other files."""
+    """Return a case of a record: broken bytes, lost and odd variables, other files."""
     path, kind = folder / "input.nc", random_.randrange(4)
     if kind == 0:
         path.write_bytes(
@@ -692,7 +692,7 @@ def _options_case(random_: random.Random, folder: Path) -> FuzzCase:
 def _links_case(  # noqa: C901 - one branch a kind of link
     random_: random.Random, folder: Path
 ) -> FuzzCase:
-    """Files that name each other: chains, cycles, links, devices, folders."""
+    """Return a case of files that name each other: chains, cycles, links, devices, folders."""
     kind = random_.randrange(9)
     file = "machine.yaml"
     path = folder / file

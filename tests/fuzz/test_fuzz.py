@@ -99,7 +99,7 @@ def faults_of_refusal(outcome):
 
 @pytest.fixture(scope="module")
 def worker():
-    """A process for the cases."""
+    """Yield a process for the cases."""
     worker = Worker()
     yield worker
     worker.end()

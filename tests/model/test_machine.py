@@ -10,7 +10,7 @@ from wm_drake.errors import InputError
 from wm_drake.model.bodies import sdf_path
 from wm_drake.model.build import build_machine
 from wm_drake.model.equilibrium import EQUILIBRIUM_TOLERANCE
-from wm_drake.parameters import Load, Unbalance, load_machine, with_value
+from wm_drake.parameters import Load, Unbalance, load_machine, with_value, with_values
 from wm_drake.studies.description.modal import natural_modes
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
@@ -233,3 +233,25 @@ def test_a_compliant_bearing_needs_a_joint_between_tub_and_drum(tmp_path):
         match="needs a revolute joint from 'tub' to 'drum'; joint 'drum_axis' is revolute, from 'motor'",
     ):
         build_machine(parameters)
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        ("damper_types.free_stroke.sponge", r"telescopic_dampers.left: sponge has 4 points, .* 12"),
+        (
+            "bushing_types.connecting.stiffness_y",
+            r"telescopic_dampers.left.tub_bushing: stiffness_y has 4 points, .* 6; rebuild",
+        ),
+        (
+            "bushing_types.connecting.stiffness_x",
+            r"tub_bushing: stiffness_x has 4 points, that of the built machine none",
+        ),
+    ],
+)
+def test_a_table_with_other_points_is_refused_by_its_name(key, message):
+    machine = build_machine(load_machine("free_stroke"))
+    table = {"displacement": "(-20, -5, 5, 20) mm", "force": "(-100, 0, 0, 100) N"}
+    changed = with_values(machine.parameters, {key: table})
+    with pytest.raises(InputError, match=message):
+        machine.set_up("front", parameters=changed)

@@ -1,9 +1,14 @@
 """Check that numbers fit a machine that is built already."""
 
+from collections.abc import Iterator
+
+from pydantic import BaseModel
+
 from wm_drake.elements.motor import motor_structure
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.drive import motor_of
+from wm_drake.parameters.elements import ForceTable, TorqueTable
 
 
 def check_same_elements(built: MachineParameters, wanted: MachineParameters) -> None:
@@ -35,6 +40,8 @@ def check_same_elements(built: MachineParameters, wanted: MachineParameters) -> 
         )
     _check_laws(built, wanted)
     _check_branches(built, wanted)
+    if wanted is not built:
+        _check_tables(built, wanted)
 
 
 def _check_branches(built: MachineParameters, wanted: MachineParameters) -> None:
@@ -117,3 +124,43 @@ def _check_laws(built: MachineParameters, wanted: MachineParameters) -> None:
                     "is not the built machine's joint; rebuild the machine",
                     key=f"{table}.{name}.joint",
                 )
+
+
+def _check_tables(built: MachineParameters, wanted: MachineParameters) -> None:
+    """Raise InputError if an element has a table where the other has none or fewer points."""
+    others = dict(_types_of_elements(built))
+    for key, type_ in _types_of_elements(wanted):
+        if type_ is others[key]:
+            continue
+        now, before = _points(type_), _points(others[key])
+        for field in now.keys() | before.keys():
+            if now.get(field, 0) != before.get(field, 0):
+                raise input_error(
+                    f"{field} has {now.get(field, 0) or 'no'} points, that of the built machine "
+                    f"{before.get(field, 0) or 'none'}; rebuild the machine",
+                    key=key,
+                )
+
+
+def _types_of_elements(machine: MachineParameters) -> Iterator[tuple[str, BaseModel]]:
+    """Yield key path and type of each element whose type may have tables."""
+    for name, spring in machine.springs.items():
+        yield f"springs.{name}", machine.spring_types[spring.type]
+    for name, damper in machine.dampers.items():
+        yield f"dampers.{name}", machine.damper_types[damper.type]
+    for name, bushing in machine.all_bushings().items():
+        yield name if name == "gasket" else f"bushings.{name}", bushing
+    for name, telescope in machine.telescopic_dampers.items():
+        key = f"telescopic_dampers.{name}"
+        yield key, machine.damper_types[telescope.type]
+        yield f"{key}.tub_bushing", machine.bushing_types[telescope.tub_bushing]
+        yield f"{key}.housing_bushing", machine.bushing_types[telescope.housing_bushing]
+
+
+def _points(type_: BaseModel) -> dict[str, int]:
+    """Return the number of points of each table of a type, by its field."""
+    return {
+        name: len(value.curve[0])
+        for name, value in type_
+        if isinstance(value, ForceTable | TorqueTable)
+    }

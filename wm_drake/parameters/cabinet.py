@@ -3,7 +3,6 @@
 import math
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field, StringConstraints, model_validator
 
 from wm_drake.parameters import units as u
@@ -86,8 +85,9 @@ class Cabinet(Frozen):
             raise ValueError(f"feet: has {len(self.feet)} feet; allowed are four")
         corners = [(self.feet[name].x, self.feet[name].y) for name in self.corners]
         for index in range(4):
-            before, here, after = (np.array(corners[(index + k) % 4]) for k in (-1, 0, 1))
-            first, second = here - before, after - here
+            before, here, after = (corners[(index + k) % 4] for k in (-1, 0, 1))
+            first = here[0] - before[0], here[1] - before[1]
+            second = after[0] - here[0], after[1] - here[1]
             lengths = math.hypot(*first) * math.hypot(*second)
             if not first[0] * second[1] - first[1] * second[0] > SMALLEST_SINE * lengths:
                 raise ValueError(
@@ -99,9 +99,9 @@ class Cabinet(Frozen):
     @property
     def corners(self) -> tuple[str, ...]:
         """Names of the feet, counterclockwise from above, from the left front corner on."""
-        x, y = (
-            float(np.mean([getattr(foot, axis) for foot in self.feet.values()])) for axis in "xy"
-        )
+        count = len(self.feet)
+        x = sum(foot.x for foot in self.feet.values()) / count
+        y = sum(foot.y for foot in self.feet.values()) / count
         return tuple(
             sorted(
                 self.feet,

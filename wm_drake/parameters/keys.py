@@ -106,7 +106,9 @@ def _replaced(node: Any, changes: list[_Change]) -> Any:
         )
     parts: dict[str, list[_Change]] = {}
     for change in changes:
-        parts.setdefault(change.path[0], []).append(replace(change, path=change.path[1:]))
+        parts.setdefault(change.path[0], []).append(
+            _Change(change.key, change.path[1:], change.value)
+        )
     if isinstance(node, BaseModel):
         return _replaced_in_model(node, parts)
     if isinstance(node, dict):
@@ -206,7 +208,9 @@ def _nested(changes: list[_Change]) -> Any:
     for change in changes:
         if not change.path:
             return change.value
-        tree.setdefault(change.path[0], []).append(replace(change, path=change.path[1:]))
+        tree.setdefault(change.path[0], []).append(
+            _Change(change.key, change.path[1:], change.value)
+        )
     return {name: _nested(inner) for name, inner in tree.items()}
 
 

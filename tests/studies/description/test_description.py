@@ -150,3 +150,19 @@ def test_neutral_direction_is_that_of_the_drawing_not_of_rest():
     assert (
         np.abs(np.subtract(damper["direction_at_rest_W"], damper["neutral_direction"])).max() > 1e-6
     )
+
+
+def test_a_motor_is_described(described):
+    machine, plain = described
+    drive = machine.parameters.drive
+    if drive.kind == "prescribed":
+        assert plain["motor"] is None
+        return
+    assert plain["motor"]["belt_ratio"] == drive.belt_ratio
+    assert plain["motor"]["torque_limit"] == {"torque": 2.2, "power": 550.0}
+    # n J of the rotor is at the drum instead of the tub, see wm_drake.model.rotor
+    reference = describe(build_machine(load_machine("reference")))["bodies"]
+    for body, sign in (("drum", 1.0), ("tub", -1.0)):
+        inertias = (b[body]["inertia_about_centre_T"]["yy"] for b in (plain["bodies"], reference))
+        change = np.subtract(*inertias)
+        assert change == pytest.approx(sign * drive.belt_ratio * drive.rotor_inertia)

@@ -173,7 +173,7 @@ def deviation_from_engine(machine, load, harmonics, speeds, settled):
 @pytest.mark.slow
 @pytest.mark.parametrize("load", ["middle", "counter", "back", "front"])
 def test_harmonic_balance_has_the_amplitudes_of_the_engine(machine, load):
-    """20 speeds: within 1 % at every sensor, and not worse than with fewer harmonics.
+    """Check 20 speeds: within 1 % at every sensor, and not worse than with fewer harmonics.
 
     Below about 0.2 % the 128 samples of the comparison decide, so the errors need not fall
     strictly.
@@ -307,7 +307,7 @@ def revolutions_of(balance, start, speed, count, steps=256):
 
 
 def test_a_machine_without_gasket_leaves_its_unstable_motions_and_keeps_its_stable_ones(machine):
-    """Load middle: unstable from 169 to 190 rpm, with a pair of complex multipliers.
+    """Check load middle: unstable from 169 to 190 rpm, with a pair of complex multipliers.
 
     A run that starts on the harmonic balance misses the motion by the cut harmonics, 0.01 mm. This
     distance stays on a stable motion and grows on an unstable one.
@@ -336,7 +336,7 @@ def test_a_machine_without_gasket_leaves_its_unstable_motions_and_keeps_its_stab
 
 
 def test_harmonics_converge_in_length_where_one_amplitude_does_not(machine):
-    """Load back: one sensor is worse with 5 harmonics than with 3; the motion is better."""
+    """Check load back: one sensor is worse with 5 harmonics than with 3; the motion is better."""
     setup, speeds = machine.set_up("back"), np.array([78.0, 96.0]) * RPM
     motions = {}
     with threadpool_limits(1, "blas"):
@@ -442,7 +442,7 @@ def test_wrong_arguments_are_refused(machine, speeds, options, word):
 
 
 def test_telescopic_dampers_move_as_the_engine_moves_them():
-    """The free-stroke machine: tubes as bodies, whose spin about their axes nothing holds."""
+    """Check the free-stroke machine: nothing holds the spin of its tubes about their axes."""
     machine = build_machine(wm.load_machine("free_stroke"))
     setup = machine.set_up("front")
     speeds = np.array([100.0, 110.0]) * RPM
@@ -475,7 +475,7 @@ def test_condensed_corrections_are_those_of_the_whole_system(machine):
 
 
 def test_matrix_of_products_multiplies_series():
-    """The product with a factor, sampled; with few samples harmonics fold alike."""
+    """Compare with the product of samples; with few samples harmonics fold alike."""
     rng = np.random.default_rng(4)
     for samples in (7, 9, 32):
         series = Series(3, samples)

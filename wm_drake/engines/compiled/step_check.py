@@ -7,6 +7,7 @@ light body decays within a step. The eigenvalues of the machine's Jacobian at a 
 and fast motion show it, whatever the law.
 """
 
+import functools
 import itertools
 from dataclasses import dataclass
 
@@ -256,13 +257,19 @@ def _states(setup: Setup, free: list[int]) -> FloatArray:
     """Return the states to look at (WIDTH, size): the rest pose, with speeds of each size."""
     rest = initial_state(setup, _STANDSTILL)
     states = np.tile(rest, (WIDTH, 1))
-    directions = np.random.default_rng(0).uniform(-1.0, 1.0, len(rest))
+    directions = _directions(len(rest))
     speeds = np.resize(SPEEDS, WIDTH)
     for index in set(free) & set(_velocities(setup)):
         states[:, index] += speeds * directions[index]
     for index in _sponges(setup):
         states[:, index] += DEFORMATION * directions[index]
     return states
+
+
+@functools.cache
+def _directions(size: int) -> FloatArray:
+    """Return the same numbers at random between -1 and 1 for all machines of a size. (size,)"""
+    return np.random.default_rng(0).uniform(-1.0, 1.0, size)
 
 
 def _velocities(setup: Setup) -> list[int]:

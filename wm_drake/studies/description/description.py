@@ -42,7 +42,8 @@ CONVENTIONS = {
     "the first speed of the profile, sponges undeformed.",
     "loads": "Point masses are added to mass, centre and inertia of the drum. The empty machine "
     "has none.",
-    "drum motion": "Prescribed by the profile; the motor torque reacts on the tub.",
+    "drum motion": "Prescribed by the profile, or turned by the motor, whose controller wants the "
+    "speed of the profile; the motor torque reacts on the tub.",
     "tables": "PCHIP (Fritsch and Carlson 1980, as in scipy) between points; beyond the ends "
     "straight, with the slope at the end.",
     "rotation vector": "Axis times angle of the rotation of the tub-side frame in the law frame "
@@ -85,6 +86,7 @@ def describe(machine: Machine) -> dict[str, Any]:
         "oscillating_mass_kg": oscillating_mass(setup),
         "drum_joint": {"name": parameters.drive.joint, **_drum_axis(setup)},
         "drum_bearing": _drum_bearing(setup),
+        "motor": _motor(setup),
         "imperfections": parameters.imperfections.model_dump(exclude={"bearing"}),
         "springs": {name: _spring(setup, name) for name in setup.springs},
         "dampers": {name: _damper(setup, name) for name in setup.dampers},
@@ -266,6 +268,21 @@ def _drum_bearing(setup: Setup) -> dict[str, Any] | None:
         **kind,
         "sag_of_Do_at_rest_W": sag.tolist(),
         **rate,
+    }
+
+
+def _motor(setup: Setup) -> dict[str, Any] | None:
+    """Return the motor; None if the speed of the drum is prescribed."""
+    drive = setup.motor
+    if drive is None:
+        return None
+    return {
+        "belt_ratio": drive.belt_ratio,
+        "rotor_inertia_kgm2": drive.rotor_inertia,
+        "reflected_inertia_kgm2": drive.reflected_inertia,
+        "torque_limit": drive.torque_limit.model_dump(),
+        "controller": drive.controller.model_dump(),
+        "bearing_friction": drive.bearing_friction.model_dump(),
     }
 
 

@@ -83,6 +83,28 @@ class DrumBearing(_Part):
     rotation_T: Rotation = Field(description="Its y axis is the drum axis.")
 
 
+class Motor(_Part):
+    """A motor with belt and speed controller: friction at the drum, the rest at its shaft."""
+
+    belt_ratio: float = Field(description="Speed of the motor over speed of the drum.")
+    rotor_inertia_kgm2: float = Field(
+        description="About the motor's axis. The inertias of tub and drum contain its coupling."
+    )
+    reflected_inertia_kgm2: float = Field(
+        description="Acts on the joint of the drum alone, beside the inertia of the drum."
+    )
+    torque_limit: dict[str, Any] = Field(
+        description="torque [N m] and power [W], or speed [rad/s] and torque [N m] of a table."
+    )
+    controller: dict[str, float | None] = Field(
+        description="proportional_gain [N m s/rad], integral_gain [N m/rad], tracking_time [s] of "
+        "the anti-windup, sample_time [s]; None if not given."
+    )
+    bearing_friction: dict[str, float] = Field(
+        description="friction_torque [N m], full_friction_rate [rad/s], damping [N m s/rad]."
+    )
+
+
 class PointMass(_Part):
     """A point mass that is fixed to the drum at (radius sin(phase), y, radius cos(phase)) in D."""
 
@@ -324,6 +346,7 @@ class Description(_Part):
     oscillating_mass_kg: float
     drum_joint: DrumJoint
     drum_bearing: DrumBearing | None
+    motor: Motor | None
     imperfections: Imperfections
     springs: dict[str, Spring]
     dampers: dict[str, Damper]
