@@ -411,6 +411,7 @@ def test_spin_prints_one_json_object(plain):
             "cabinet_wrench",
             "feet",
             "walk",
+            "motor",
             "smallest_gap_mm",
             "smallest_spring_tension_N",
             "critical_rpm",
