@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -150,7 +151,7 @@ def foot_measures(
         region (regions,). NaN without samples, and where the run ended before the region did.
     """
     p, regions = packed_feet(cabinet, gravity), region_limits(profile, period)
-    parts = [slice(*limits) for limits in regions] or list(ranges)
+    parts: list[Any] = [slice(*limits) for limits in regions] or [*ranges]
     extremes, smallest = np.empty((3, FEET_COUNT)), np.empty((1 + len(parts), len(MARGINS)))
     region_of = np.full(len(wrenches), -1, dtype=np.int64)
     for number, part in enumerate(parts):

@@ -108,8 +108,8 @@ def _read_lab(path: Path, unit: str) -> Signals:
     speed = on_clock(speeds[0], time, DRUM_SPEED, "rpm", path)
     units = {channel.unit for channel in used}
     if len(units) > 1:
-        names = ", ".join(f"{channel.name} [{channel.unit}]" for channel in used[:4])
-        raise input_error(f"its signals have different units: {names}", where=str(path))
+        named = ", ".join(f"{channel.name} [{channel.unit}]" for channel in used[:4])
+        raise input_error(f"its signals have different units: {named}", where=str(path))
     shown = units.pop() or unit
     values = [np.interp(time, c.time, c.values) if c.time is not None else c.values for c in used]
     if len({len(one) for one in (time, *values)}) > 1:
