@@ -202,6 +202,14 @@ def test_the_example_of_tolerances_is_in_order(tmp_path):
     assert [limit.quantity for limit in limits] == ["gap", "amplitude_Xr"]
 
 
+def test_the_drive_of_the_page_is_one(tmp_path):
+    path = written(tmp_path, page("drive"))
+    path.write_text(f"name: driven\nextends: reference\n{path.read_text(encoding='utf-8')}")
+    drive = load_machine(path).drive
+    assert drive.kind == "motor"
+    assert drive.belt_ratio == 12.0
+
+
 def test_the_moving_cabinet_of_the_page_is_one(tmp_path):
     cabinet = load_machine(written(tmp_path, page("floor"), 1)).cabinet
     assert cabinet.moves
@@ -222,6 +230,7 @@ def test_every_yaml_block_is_one_of_those_above():
         "docs/how-to/calibrate.md": 2,
         "docs/how-to/compliant-bearing.md": 1,
         "docs/how-to/designs.md": 1,
+        "docs/how-to/drive.md": 1,
         "docs/how-to/floor.md": 2,
         "docs/how-to/own-machine.md": 3,
         "docs/how-to/rubber.md": 1,

@@ -282,7 +282,7 @@ def test_shown_machine_is_complete(wm_drake, reference):
             "dampers",
             "bushings",
         ),
-        *("telescopic_dampers", "drum_bearing", "cabinet"),
+        *("telescopic_dampers", "drum_bearing", "cabinet", "motor"),
         *("sensors", "detergent_point_T", "loads", "profile", "rest_pose", "equilibrium_residual"),
         "sag_at_rest",
         *("natural_frequencies_hz", "mode_damping_ratios"),

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from wm_drake.parameters import SpinProfile
 from wm_drake.simulation.measures import (
     envelopes,
     filtered_displacement,
@@ -32,6 +33,7 @@ def record_of(displacement, drum_speed=None):
     force = np.zeros((n, 2, 3))
     force[n // 2, 0] = (-3.0, 2.0, 1.0)
     force[n // 3, 1] = 50.0
+    profile = SpinProfile(time=(0.0, n / RATE), speed=(0.0, 40.0))
     return xr.Dataset(
         {
             "displacement": (("time", "sensor"), np.asarray(displacement)[:, None]),
@@ -46,9 +48,10 @@ def record_of(displacement, drum_speed=None):
             "tub_angle": (("time", "angle"), zeros),
             "tub_position": (("time", "axis"), zeros),
             "spring_tension": (("time", "spring"), np.linspace(150.0, 60.0, n)[:, None]),
+            "motor_torque": (("time",), np.full(n, 0.5)),
         },
         {"time": np.arange(n) / RATE, **axes},
-        {"rest_pose": np.zeros(6)},
+        {"rest_pose": np.zeros(6), "profile": profile.model_dump_json()},
     )
 
 

@@ -1,6 +1,6 @@
 """Component on the bench, the axis that is driven, and its harmonic motion."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -139,4 +139,5 @@ def damper_bench(
 
 def bushing_bench(bushing: BushingType, axis: str, arm: float = 0.0) -> BushingBench:
     """Return the bench of a bushing or gasket of a machine file."""
-    return BushingBench(packed_bushing_law(bushing), axis, arm, axis_branches(bushing, axis))
+    bench = BushingBench(packed_bushing_law(bushing), axis, arm)  # checks the axis
+    return replace(bench, branches=axis_branches(bushing, axis))

@@ -317,7 +317,7 @@ def test_twelve_noisy_loops_are_fitted():
             lambda m: bushing_model("voigt_havsin", m, GASKET, "x"),
             "--law: voigt_havsin is a law about an axis",
         ),
-        (lambda m: bushing_model("rubber", m, GASKET, "x"), "--law: no law 'rubber' of a bushing"),
+        (lambda m: bushing_model("putty", m, GASKET, "x"), "--law: no law 'putty' of a bushing"),
     ],
 )
 def test_bad_questions_are_told(make, message):
