@@ -52,10 +52,13 @@ def _complete(app: Sphinx, docname: str, source: list[str]) -> None:
     source[0] = _relinked(text, Path(app.srcdir), Path(app.srcdir, docname).parent, docname)
 
 
-def _complete_included(app: Sphinx, path: Path, docname: str, content: list[str]) -> None:
-    """Lead the links of an included document to pages of the manual."""
+def _complete_included(app: Sphinx, path: Path, _docname: str, content: list[str]) -> None:
+    """Lead the links of an included document to pages of the manual.
+
+    MyST gives the last part of the page's name only, so the name is that of the environment.
+    """
     folder = Path(app.srcdir, path).resolve().parent
-    content[0] = _relinked(content[0], Path(app.srcdir), folder, docname)
+    content[0] = _relinked(content[0], Path(app.srcdir), folder, app.env.docname)
 
 
 def _relinked(text: str, docs: Path, folder: Path, docname: str) -> str:
