@@ -1,6 +1,7 @@
 """Command `wm-drake spin`: simulate a spin run and report the motion of the tub."""
 
 import json
+import math
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -179,6 +180,11 @@ def _print_tables(result: "SpinResult", out: Path, replay: bool) -> None:
         )
         if result.parameters.drive.kind == "motor":
             console.print(f"{case.case.name}: {drive_text(case.measures.drive)}")
+        if (walk := case.measures.walk) is not None:
+            console.print(
+                f"{case.case.name}: the cabinet walks {1e3 * walk.distance:.1f} mm and turns by "
+                f"{math.degrees(walk.turn):.1f} deg"
+            )
     replays = ", replay_<load>.html" if replay else ""
     console.print(f"Results in {out}: report.html, amplitudes.csv, record_<load>.nc{replays}")
 
