@@ -213,7 +213,7 @@ def lanes_all(typing_context, condition):
 def lane_array(typing_context, array):
     """Return a contiguous array of floats as an array of lanes; its bounds are not checked.
 
-    The array of floats must outlive it.
+    The array of floats must outlive it: see `keep`.
     """
     return (LANE_ARRAY(array), _address_of) if _is_flat(array) else None
 
@@ -222,9 +222,23 @@ def lane_array(typing_context, array):
 def number_array(typing_context, array):
     """Return a contiguous array of floats as a `NumberArrayType`; its bounds are not checked.
 
-    The array of floats must outlive it.
+    The array of floats must outlive it: see `keep`.
     """
     return (NUMBER_ARRAY(array), _address_of) if _is_flat(array) else None
+
+
+@intrinsic
+def keep(typing_context, array):
+    """Do nothing but use an array, so that its memory is not freed before.
+
+    numba frees an array of a function after its last use, whatever points to it. A function that
+    makes an array and then only uses its `lane_array` or `number_array` must end with this.
+    """
+
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return context.get_dummy_value()
+
+    return types.none(array), emit
 
 
 def _is_flat(array: Any) -> bool:

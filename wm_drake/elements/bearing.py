@@ -4,7 +4,7 @@ import numpy as np
 
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, numbers, rows_to_lanes
-from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.compiler.vectors import rotate_back, rotation_vector
 from wm_drake.elements.bushing import motion_between, six_component_bushing_between
 from wm_drake.elements.motion import (
@@ -69,3 +69,4 @@ def drum_bearing_history(states, own_states, p, forces):
         for k in range(FORCE_SIZE):
             own[k] = found[k]
         lanes_to_rows(own_numbers, begin, forces)
+    keep(p_numbers)

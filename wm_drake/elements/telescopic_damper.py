@@ -6,7 +6,7 @@ import numpy as np
 
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, numbers, rows_to_lanes
-from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.compiler.packed import ARRAY, LAYOUT, SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import add, cross, dot, rotate, scale
 from wm_drake.elements.bushing import (
@@ -227,3 +227,4 @@ def telescopic_damper_history(states, own_states, p, forces):
         _, _, _, _, tension, first, second = _forces_at(x, own[0], q)
         write_own_forces(own_force, 0, tension, first, second)
         lanes_to_rows(force_numbers, begin, forces)
+    keep(p_numbers)

@@ -6,7 +6,7 @@ import numpy as np
 
 from wm_drake.compiler.compilation import long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, sine_cosine
-from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.elements.cabinet import FEET_COUNT, FLOOR_FORCE_SIZE, foot_of
 from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE, carrier_motion, read_carrier_state
 from wm_drake.engines.compiled.cabinet import SLIPS_BEGIN
@@ -111,3 +111,4 @@ def floor_force_history(states, p, forces):
             answer[3 * i], answer[3 * i + 1] = c * f_x + s * f_y, c * f_y - s * f_x
             answer[3 * i + 2] = normal
         lanes_to_rows(numbers, begin, forces)
+    keep(p_numbers)

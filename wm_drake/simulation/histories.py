@@ -4,7 +4,7 @@ import numpy as np
 
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, where
-from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.compiler.vectors import add, rotate, rotation_from_rpy
 from wm_drake.elements.friction_damper import friction_damper_force
 from wm_drake.elements.motion import PLANT_STATE_SIZE, read_pose, tub_motion
@@ -89,6 +89,8 @@ def output_history(
                 answer[column + k] = on_housing[k]
             column += 6
         lanes_to_rows(numbers, begin, outputs)
+    keep(p_numbers)
+    keep(point_numbers)
 
 
 @law
@@ -154,3 +156,4 @@ def measure_samples_lanes(
             for k in range(6):
                 largest[count + k] = larger(largest[count + k], on_housing[k], good)
         largest[count + 6] = largest[count + 6] + good
+    keep(x_numbers)

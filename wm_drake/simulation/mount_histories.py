@@ -4,7 +4,7 @@ import numpy as np
 
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, where
-from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import dot, subtract
 from wm_drake.elements.mount import WRENCH_SIZE, write_mount_wrenches
@@ -42,6 +42,7 @@ def wrench_history(states, p, mounts, wrenches):
         rows_to_lanes(states, begin, x_numbers)
         write_mount_wrenches(x, q, mounts, found)
         lanes_to_rows(numbers, begin, wrenches)
+    keep(p_numbers)
 
 
 @law
@@ -128,3 +129,5 @@ def measure_mounts_lanes(samples, rows, size, bounds, p, mounts, count, cabinet,
             if keeps:
                 resultant[row * WRENCH_SIZE + k] = value
     total[of_cabinet + WRENCH_SIZE * SIGNAL_SIZE] = samples_in_bounds
+    keep(x_numbers)
+    keep(found_numbers)

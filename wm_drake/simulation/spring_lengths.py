@@ -4,7 +4,7 @@ import numpy as np
 
 from wm_drake.compiler.compilation import long_running
 from wm_drake.compiler.elementary import where
-from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.compiler.vectors import rotate
 from wm_drake.elements.motion import PLANT_STATE_SIZE, tub_motion
 from wm_drake.elements.spring import read_spring
@@ -45,3 +45,4 @@ def smallest_lengths_lanes(samples, rows, size, bounds, p, springs, smallest):
             arm = rotate(motion.rotation, spring.p_ToA_T)
             length, _, _, _, _ = strut_line(motion, arm, spring.p_WH)
             least[k] = where((good > 0.5) & (length < least[k]), length, least[k])
+    keep(x_numbers)

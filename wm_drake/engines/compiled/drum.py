@@ -21,7 +21,7 @@ import numpy as np
 
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes
-from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.compiler.matrices import times
 from wm_drake.compiler.vectors import add, cross, dot, rotate, scale, subtract
 from wm_drake.elements.motion import read_tree_state
@@ -130,3 +130,4 @@ def motor_torque_history(states, reference, p, motor, first, torque):
         state, rate = read_motor_state(x, first), read_tree_state(x, 0).joint_rate
         answer[0], _ = motor_response(state, rate, wanted[0], q, motor)
         lanes_to_rows(numbers, begin, torque)
+    keep(p_numbers)

@@ -4,7 +4,7 @@ import numpy as np
 
 from wm_drake.compiler.compilation import long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, sine_cosine
-from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.elements.cabinet import motion_with, rates_with
 from wm_drake.elements.motion import POSE, tub_motion
 from wm_drake.engines.cabinet_frame import seen_from_cabinet
@@ -133,3 +133,4 @@ def torque_history(motions, rates, acceleration, p, cabinet, torque):
             motion = motion_with(moving, motion)
         answer[0] = motor_torque(motion, w_rate, v_rate, masses, x[DRUM_RATE], drum[0], q)
         lanes_to_rows(numbers, begin, torque)
+    keep(p_numbers)

@@ -9,7 +9,7 @@ import numpy as np
 
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, sine_cosine
-from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.elements.cabinet import SLIP_SIZE
 from wm_drake.elements.friction_damper import (
     friction_damper_line,
@@ -195,6 +195,8 @@ def derivatives_at(states, columns, steps, p, elements, rates, moved):
             else:
                 for k in range(size):
                     moved[row, move - 1, k] = dx_numbers[k * WIDTH + lane]
+    keep(p_numbers)
+    keep(inputs_numbers)
 
 
 @long_running
@@ -251,6 +253,7 @@ def tub_wrenches_at(states, columns, steps, p, elements, wrenches):
         for k in range(6 * wrenches.shape[1]):
             for lane in range(WIDTH):
                 wrenches[begin + lane, k // 6, k % 6] = out[k * WIDTH + lane]
+    keep(p_numbers)
 
 
 @law
