@@ -300,7 +300,8 @@ def test_memory_does_not_grow_with_the_number_of_runs(reference, machine):
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     results = (2500 - 500) * 2000  # bytes; the table itself, and the numbers kept for the next load
-    assert peaks[1] - peaks[0] < results + KEPT_NUMBERS * 12_000
+    # elements, start and rest of a kept machine take 13 kB
+    assert peaks[1] - peaks[0] < results + KEPT_NUMBERS * 14_000
     assert peaks[1] < 60e6
 
 
