@@ -8,9 +8,24 @@ from pathlib import Path
 import pytest
 
 ANALYSES = Path(__file__).parents[2] / "analyses"
+LONG = {  # more than ten seconds
+    "benchmark_rival_laws.py",
+    "calibrate_reference.py",
+    "check_spin_of_tubes.py",
+    "compare_dampers.py",
+    "compare_designs.py",
+    "compare_mujoco.py",
+    "compare_searches.py",
+    "measure_studio.py",
+    "write_validation.py",
+}
+SCRIPTS = [
+    pytest.param(path.name, marks=[pytest.mark.slow] if path.name in LONG else [])
+    for path in sorted(ANALYSES.glob("*.py"))
+]
 
 
-@pytest.mark.parametrize("script", sorted(path.name for path in ANALYSES.glob("*.py")))
+@pytest.mark.parametrize("script", SCRIPTS)
 def test_script_runs_quickly_and_writes_its_output(script, tmp_path):
     out = tmp_path / "out.txt"
     command = [sys.executable, str(ANALYSES / script), "--quick", "--out", str(out)]

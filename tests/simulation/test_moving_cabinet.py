@@ -41,6 +41,7 @@ def walked(machine, **changes):
     return 1e3 * walk_of(simulate(machine, case, step=step)).distance
 
 
+@pytest.mark.slow
 def test_a_light_cabinet_walks_and_a_heavy_one_does_not(light):
     heavy = load_machine("heavy_cabinet")
     found = measure(simulate(build_machine(heavy), case_of(heavy, "middle")))
