@@ -170,6 +170,7 @@ def test_the_example_of_a_relation_is_that_of_a_ring(machine):
     assert relation.at(np.array([[torsion, radial]])) == pytest.approx([0.9])
 
 
+@pytest.mark.slow
 def test_the_example_of_a_compliant_bearing_runs(tmp_path):
     whirling = load_machine(written(tmp_path, page("compliant-bearing")))
     record = simulate(

@@ -8,14 +8,18 @@ from pathlib import Path
 import pytest
 
 ANALYSES = Path(__file__).parents[2] / "analyses"
-LONG = {  # more than ten seconds
+LONG = {  # more than five seconds
+    "benchmark_engines.py",
     "benchmark_rival_laws.py",
+    "benchmark_tolerances.py",
     "calibrate_reference.py",
     "check_spin_of_tubes.py",
+    "choose_step.py",
     "compare_dampers.py",
     "compare_designs.py",
     "compare_mujoco.py",
     "compare_searches.py",
+    "fit_coulomb_to_mstv.py",
     "measure_studio.py",
     "write_validation.py",
 }

@@ -30,6 +30,7 @@ def cases_of(reference, count):
         yield Case(f"case {index}", reference.loads["middle"], SHORT, parameters=changed)
 
 
+@pytest.mark.slow
 def test_no_scheduler_at_the_address():
     with pytest.raises(
         InputError, match=r"--cluster: no scheduler answers at 'tcp://127\.0\.0\.1:9'"

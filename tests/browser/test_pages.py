@@ -24,7 +24,7 @@ from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.surface import surfaces
 from wm_drake.studies.spin.comparison import Variant
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 LAYOUT = (Path(__file__).parent / "layout.js").read_text(encoding="utf-8")
 READY = "return document.documentElement.dataset.pictures === 'ready'"

@@ -200,6 +200,7 @@ def test_mount_forces_and_accelerations_of_planted_motion(
         assert float(text) == pytest.approx(omega**2 * displacement, rel=0.05)
 
 
+@pytest.mark.slow
 def test_detail_draws_the_vibration_of_every_load(result: SpinResult, page: str) -> None:
     assert "drawn below for the load with the largest amplitude, middle (with gasket)" in page
     detailed = spin_report(result, detail=True)

@@ -172,6 +172,7 @@ def test_number_of_the_machine_is_an_objective(machine):
     assert values[0, 0] == pytest.approx(0.5e-3 * k)  # in N/mm
 
 
+@pytest.mark.slow
 def test_robust_front_keeps_its_promise_on_fresh_samples(machine):
     tolerances = Tolerances.model_validate(
         {

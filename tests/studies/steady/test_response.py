@@ -441,6 +441,7 @@ def test_wrong_arguments_are_refused(machine, speeds, options, word):
         wm.steady_response(machine, "front", speeds, **options)
 
 
+@pytest.mark.slow
 def test_telescopic_dampers_move_as_the_engine_moves_them():
     """Check the free-stroke machine: nothing holds the spin of its tubes about their axes."""
     machine = build_machine(wm.load_machine("free_stroke"))
