@@ -18,7 +18,7 @@ from wm_drake.studies.modes.linearisation import (
 )
 from wm_drake.studies.modes.sensitivity import sensitivities
 from wm_drake.studies.modes.shapes import ANGLE_ARM, modes_of
-from wm_drake.studies.modes.study import SLIDING, STUCK, natural_modes
+from wm_drake.studies.modes.study import SLIDING, STUCK, three_linearisations
 
 BALL_INERTIA, BALLS = 0.3, 6
 """Inertia of each of the six bodies of the isotropic machine, and their number. [kg m^2]"""
@@ -297,7 +297,7 @@ def test_modes_of_the_reference_machine(machine):
     assert np.all(np.diff(result.critical_speeds) > 0.0)
     assert ANGLE_ARM == 0.25
     # the short list of the spin page has the same values
-    short = natural_modes(machine, "middle", amplitude=1e-4)
+    short = three_linearisations(machine, "middle", amplitude=1e-4)
     for name in (STUCK, SLIDING):
         assert [mode.frequency_hz for mode in short.modes[name]] == pytest.approx(
             [mode.frequency_hz for mode in result.modes[name]]

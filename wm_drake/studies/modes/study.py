@@ -149,7 +149,7 @@ def modes(
         return _modes(machine, load, gasket, amplitude, run_up, progress)
 
 
-def natural_modes(
+def three_linearisations(
     machine: Machine,
     load: Load | str,
     *,

@@ -143,10 +143,12 @@ def run_spin(
 
 def _modes_of(machine: Machine, case: Case) -> "NaturalModes | None":
     """Return the natural modes of a machine with the load of a case; None if it has none."""
-    from wm_drake.studies.modes.study import natural_modes
+    from wm_drake.studies.modes.study import three_linearisations
 
     try:
-        found = natural_modes(machine, case.load, parameters=case.parameters, gasket=case.gasket)
+        found = three_linearisations(
+            machine, case.load, parameters=case.parameters, gasket=case.gasket
+        )
     except InputError:  # its cabinet moves, or the compiled engine does not represent it
         return None
     return replace(found, load=case.name)
