@@ -5,6 +5,7 @@ calls a study, and writes the results; this room contains no physics and no stat
 May import: all other rooms; neither pydrake nor a plotting library.
 """
 
+import gc
 import sys
 from typing import Annotated
 
@@ -14,6 +15,12 @@ from wm_drake.cli import calibrate, identify, machine, record, rig, spin, studio
 from wm_drake.cli.figures import writes_pages
 from wm_drake.cli.terminal import give_quiet
 from wm_drake.errors import Problem, WmDrakeError, reason_of
+
+NEW_OBJECTS = 200_000
+"""Number of new objects after which the garbage collector looks for cycles.
+
+Imports make half a million objects that stay. With Python's default of 700 the collector takes a
+second to look at them again and again; results are freed without it."""
 
 app = typer.Typer(
     help="Dynamics of front-loading washing machines.",
@@ -57,6 +64,7 @@ def _options(
 
 def main() -> None:
     """Run the command; an error of the input or the disk ends it with a message and exit code 2."""
+    gc.set_threshold(NEW_OBJECTS)
     try:
         app()
     except WmDrakeError as error:

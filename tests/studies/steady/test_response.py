@@ -418,7 +418,9 @@ def test_matrix_is_the_derivative_of_the_residual(machine):
     ahead, back = balance.residual(motion + change, speed), balance.residual(motion - change, speed)
     wanted = 0.5 * (ahead - back).ravel()
     np.testing.assert_allclose(
-        np.tensordot(at.matrix, change, 2).ravel(), wanted, atol=2e-3 * np.max(np.abs(wanted))
+        np.tensordot(balance.matrix(at.slopes, speed), change, 2).ravel(),
+        wanted,
+        atol=2e-3 * np.max(np.abs(wanted)),
     )
     faster, slower = balance.residual(motion, speed + 1e-5), balance.residual(motion, speed - 1e-5)
     by_speed = (faster - slower) / 2e-5
@@ -466,9 +468,8 @@ def test_condensed_corrections_are_those_of_the_whole_system(machine):
     row = rng.normal(size=at.residual.shape)
     row[:, balance.kinematics.velocities] = 0.0
     size = row.size
-    whole = np.block(
-        [[at.matrix.reshape(size, size), at.by_speed.reshape(-1, 1)], [row.reshape(1, -1), 0.3]]
-    )
+    matrix = balance.matrix(at.slopes, speed).reshape(size, size)
+    whole = np.block([[matrix, at.by_speed.reshape(-1, 1)], [row.reshape(1, -1), 0.3]])
     wanted = np.linalg.solve(whole, np.append(-at.residual.ravel(), 0.7))
     change, faster = Corrections(balance, at, row, 0.3)(at.residual, 0.7)
     np.testing.assert_allclose(change.ravel(), wanted[:-1], rtol=1e-6, atol=1e-9)
@@ -481,7 +482,6 @@ def test_matrix_of_products_multiplies_series():
     for samples in (7, 9, 32):
         series = Series(3, samples)
         factor, coefficients = rng.normal(size=(samples, 1, 1)), rng.normal(size=(7, 1))
-        matrix = np.zeros((7, 1, 7, 1))
-        series.minus_products(factor, matrix)
+        matrix = series.products(series.factors(factor), 2.0)
         wanted = series.analysis @ (factor[:, 0] * (series.synthesis @ coefficients))
-        np.testing.assert_allclose(-matrix[:, 0, :, 0] @ coefficients, wanted, atol=1e-12)
+        np.testing.assert_allclose(matrix[:, 0, :, 0] @ coefficients, 2.0 * wanted, atol=1e-12)

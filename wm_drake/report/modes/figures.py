@@ -20,6 +20,9 @@ from wm_drake.studies.modes.study import ORDERS, SLIDING, STUCK, MachineModes
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a6a00", "#56b4e9")
 """Colours of Okabe and Ito, one a mode; the yellow is darkened."""
 
+VIEWS = (("front", 0, 2), ("side", 1, 2), ("top", 0, 1))
+"""Views of the tub, with the coordinate across and the one upwards."""
+
 SHOWN_MOTION = 0.18
 """Largest displacement of a drawn mode shape, as part of the tub's radius."""
 
@@ -171,20 +174,18 @@ def amplitude_figure(result: MachineModes) -> Figure:
 
 def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> Figure:
     """Draw the tub in each mode, in three views: at rest, and at both ends of the motion."""
-    views = (("front", 0, 2), ("side", 1, 2), ("top", 0, 1))
     figure = Figure(figsize=(WIDTH, 5.9), layout="constrained")
     panels = figure.subplots(3, len(modes), squeeze=False)
     lines = tub_lines(outlines)
     reach = max(float(np.abs(line).max()) for line in lines)
     for column, mode in enumerate(modes):
         ends = _ends_of_motion(mode, lines, reach)
-        for row, (view, across, up) in enumerate(views):
+        for row, (view, across, up) in enumerate(VIEWS):
             axes = panels[row, column]
             for pose, colour, width in zip(
                 ends, (QUIET, OURS, MEASURED), (0.8, 1.2, 1.2), strict=True
             ):
-                for line in pose:
-                    axes.plot(line[:, across], line[:, up], color=colour, linewidth=width)
+                axes.plot(pose[:, across], pose[:, up], color=colour, linewidth=width)
             limit = 1.35 * reach
             axes.set_xlim(-limit, limit)
             axes.set_ylim(-limit, limit)
@@ -218,7 +219,18 @@ def tub_lines(outlines: Mapping[str, Outline]) -> list[FloatArray]:
     return [largest.centre + (line * largest.half) @ largest.axes for line in (*ends, *sides)]
 
 
-def _ends_of_motion(mode: Mode, lines: list[FloatArray], reach: float) -> list[list[FloatArray]]:
+def joined(points: FloatArray, lines: list[FloatArray]) -> FloatArray:
+    """Return points of lines as one line with gaps, which is drawn faster than many lines.
+
+    Args:
+        points: Points of all lines, one line after the other. (n, k)
+        lines: Lines, for the number of points of each.
+    """
+    ends = np.cumsum([len(line) for line in lines])[:-1]
+    return np.insert(points, ends, np.nan, axis=0)
+
+
+def _ends_of_motion(mode: Mode, lines: list[FloatArray], reach: float) -> list[FloatArray]:
     """Return the lines at rest and at both ends of the motion, enlarged to be seen."""
     points = np.concatenate(lines)
     poses = np.outer([1e-3, 0.0], mode.real_shape)
@@ -226,8 +238,7 @@ def _ends_of_motion(mode: Mode, lines: list[FloatArray], reach: float) -> list[l
     largest = float(np.abs(moved[0] - moved[1]).max())
     scale = 1e-3 * SHOWN_MOTION * reach / largest
     poses = np.outer([0.0, scale, -scale], mode.real_shape)
-    cuts = np.cumsum([len(line) for line in lines])[:-1]
-    return [np.split(pose, cuts) for pose in point_positions(poses, points)]
+    return [joined(pose, lines) for pose in point_positions(poses, points)]
 
 
 def energy_figure(result: MachineModes) -> Figure:

@@ -58,14 +58,15 @@ class Linearised:
     Attributes:
         speed: Omega. [rad/s]
         residual: (2 N + 1, n)
-        matrix: Derivative by the coefficients. (2 N + 1, n, 2 N + 1, n)
+        slopes: Fourier coefficients of the slope of each time derivative by each number, from which
+            `HarmonicBalance.matrix` follows. (4 N + 1, n, n)
         by_speed: Derivative by the speed. (2 N + 1, n)
         spins: Rates of the numbers by the spin of each damper tube that turns freely. (spins, n)
     """
 
     speed: float
     residual: FloatArray
-    matrix: FloatArray
+    slopes: FloatArray
     by_speed: FloatArray
     spins: FloatArray
 
@@ -138,25 +139,34 @@ class HarmonicBalance:
         rates, slopes = self.derivative.with_slopes(states, drum_rate=True)
         by_speed = self.series.slope @ coefficients - self.series.analysis @ slopes[:, -1]
         residual = self._residual(coefficients, speed, rates)
-        matrix = self.matrix(slopes[:, :-1], speed)
+        factors = self.series.factors(slopes[:, :-1])
         spins = [spin.direction(coefficients[0]) for spin in self.kinematics.spins]
         return Linearised(
-            speed, residual, matrix, by_speed, np.reshape(spins, (len(spins), self.size))
+            speed, residual, factors, by_speed, np.reshape(spins, (len(spins), self.size))
         )
 
-    def matrix(self, slopes: FloatArray, speed: float) -> FloatArray:
-        """Return the derivative of the residual by the coefficients. (2 N + 1, n, 2 N + 1, n)
+    def matrix(
+        self,
+        slopes: FloatArray,
+        speed: float,
+        rows: np.ndarray | None = None,
+        columns: np.ndarray | None = None,
+    ) -> FloatArray:
+        """Return the derivative of the residual by the coefficients. (2 N + 1, r, 2 N + 1, c)
 
         Args:
-            slopes: (samples, n, n) slope of the time derivative by each number k at the samples.
+            slopes: Fourier coefficients as in `Linearised`. (4 N + 1, n, n)
             speed: Omega. [rad/s]
+            rows, columns: Indices of numbers whose residuals are wanted (r,), and by which (c,);
+                None for all.
         """
-        size, n = self.series.size, self.size
-        matrix = np.zeros((size, n, size, n))
-        each = np.arange(n)
-        matrix[:, each, :, each] = speed * self.series.slope
-        matrix[0, self.held, 0, self.held] += HOLD
-        self.series.minus_products(slopes, matrix)
+        rows = np.arange(self.size) if rows is None else rows
+        columns = np.arange(self.size) if columns is None else columns
+        matrix = self.series.products(slopes[:, rows[:, None], columns], -1.0)
+        own_row, own_column = np.nonzero(rows[:, None] == columns)
+        matrix[:, own_row, :, own_column] += speed * self.series.slope
+        kept = np.isin(rows[own_row], self.held)
+        matrix[0, own_row[kept], 0, own_column[kept]] += HOLD
         return matrix
 
     def extent(self, coefficients: FloatArray) -> float:

@@ -38,54 +38,56 @@ class Corrections:
         Raises:
             numpy.linalg.LinAlgError: a body is turned so far that its angles are not defined.
         """
-        self._kinematics, self.at = balance.kinematics, at
-        self._slope = at.speed * balance.series.slope
-        size, n = at.residual.shape
-        turned, shifted = balance.kinematics.turns, balance.kinematics.shifts
-        self._positions = np.concatenate([turned[0].ravel(), shifted[0]])
-        self._velocities = np.concatenate([turned[1].ravel(), shifted[1]])
-        self._kept = np.setdiff1d(np.arange(n), self._velocities)
-        self._rows = np.setdiff1d(np.arange(n), self._positions)
+        self.at, self._numbers = at, balance.kinematics
+        self._turn = _quarter_turns(balance.series.order, at.speed)
+        size, numbers = len(at.residual), balance.kinematics
         self._blocks = [
-            (_block(at.matrix, angles, angles), np.linalg.inv(_block(at.matrix, angles, rates)))
-            for angles, rates in zip(*turned, strict=True)
+            (
+                balance.matrix(at.slopes, at.speed, angles, angles).reshape(3 * size, 3 * size),
+                np.linalg.inv(
+                    balance.matrix(at.slopes, at.speed, angles, rates).reshape(3 * size, 3 * size)
+                ),
+            )
+            for angles, rates in zip(*numbers.turns, strict=True)
         ]
-        borders = np.zeros((size, n, len(at.spins) + 1))
+        borders = np.zeros((size, numbers.count, len(at.spins) + 1))
         borders[0, :, :-1], borders[..., -1] = at.spins.T, at.by_speed
-        self._borders = borders[:, self._positions]
-        dynamic = at.matrix[:, self._rows]
-        by_velocity = np.ascontiguousarray(dynamic[..., self._velocities])
-        self._by_velocity = by_velocity.reshape(size * len(self._rows), -1)
-        self._factors = self._factored(dynamic, borders[:, self._rows], row, row_speed)
+        self._borders = borders[:, numbers.positions]
+        by_velocity = balance.matrix(at.slopes, at.speed, numbers.dynamic, numbers.velocities)
+        self._by_velocity = by_velocity.reshape(size * len(numbers.dynamic), -1)
+        condensed = balance.matrix(at.slopes, at.speed, numbers.dynamic, numbers.others)
+        self._condense(condensed, by_velocity)
+        self._factors = self._factored(condensed, borders, row, row_speed)
 
-    def _factored(
-        self, dynamic: FloatArray, borders: FloatArray, row: FloatArray, row_speed: float
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the factors of the condensed system."""
-        size, m, k = len(dynamic), len(self._rows), len(self._kept)
-        condensed = dynamic[..., self._kept]
-        shifts = 3 * len(self._blocks)
-        by_velocity = self._by_velocity.reshape(size, m, size, -1)
-        along = np.tensordot(by_velocity[..., shifts:], self._slope, axes=(2, 0))
-        condensed[..., np.searchsorted(self._kept, self._positions[shifts:])] += along.swapaxes(
-            2, 3
-        )
+    def _condense(self, condensed: FloatArray, by_velocity: FloatArray) -> None:
+        """Add what the velocities do, as they follow from positions, to a matrix of positions."""
+        size, m = condensed.shape[:2]
+        places, shifts = self._numbers.places, 3 * len(self._blocks)
+        partner, factor = self._turn
+        moved = by_velocity[:, :, partner, shifts:] * factor[partner, None]
+        condensed[..., places[shifts:]] += moved
         for i, (by_angles, inverse) in enumerate(self._blocks):
             where = slice(3 * i, 3 * i + 3)
             rates = by_velocity[..., where].reshape(size * m, -1) @ (inverse @ by_angles)
-            columns = np.searchsorted(self._kept, self._positions[where])
-            condensed[..., columns] -= rates.reshape(size, m, size, 3)
-        spins = self._borders.shape[2]
+            condensed[..., places[where]] -= rates.reshape(size, m, size, 3)
+
+    def _factored(
+        self, condensed: FloatArray, borders: FloatArray, row: FloatArray, row_speed: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the factors of the transpose of the condensed system, with its borders."""
+        size, m, _, k = condensed.shape
+        numbers, spins = self._numbers, borders.shape[2]
         matrix = np.zeros((size * m + spins, size * k + spins))
         matrix[: size * m, : size * k] = condensed.reshape(size * m, size * k)
-        flat = borders.reshape(size * m, spins)
+        flat = borders[:, numbers.dynamic].reshape(size * m, spins)
         matrix[: size * m, size * k :] = flat - self._by_velocity @ self._rates(self._borders)
-        matrix[size * m : -1, :k] = self.at.spins[:, self._kept]
-        matrix[-1, : size * k] = row[:, self._kept].ravel()
+        matrix[size * m : -1, :k] = self.at.spins[:, numbers.others]
+        matrix[-1, : size * k] = row[:, numbers.others].ravel()
         matrix[-1, -1] = row_speed
         with warnings.catch_warnings():  # a singular matrix gives no finite correction
             warnings.simplefilter("ignore", LinAlgWarning)
-            factors, pivots = lu_factor(matrix, overwrite_a=True, check_finite=False)
+            # the transpose has the order in memory that the factors need
+            factors, pivots = lu_factor(matrix.T, overwrite_a=True, check_finite=False)
         return factors, pivots
 
     def _rates(self, values: FloatArray) -> FloatArray:
@@ -106,29 +108,45 @@ class Corrections:
             last: Value that the left side of the last equation takes.
         """
         size, n = self.at.residual.shape
-        m, k, spins = len(self._rows), len(self._kept), self._borders.shape[2]
+        numbers, spins = self._numbers, self._borders.shape[2]
+        m, k = len(numbers.dynamic), len(numbers.others)
         right = np.zeros(size * m + spins)
         right[-1] = last
-        values = np.zeros((size, len(self._positions), 1))
+        values = np.zeros((size, len(numbers.positions), 1))
         if residual is not None:
-            values[..., 0] = residual[:, self._positions]
+            values[..., 0] = residual[:, numbers.positions]
             right[:-spins] = self._by_velocity @ self._rates(values)[:, 0]
-            right[:-spins] -= residual[:, self._rows].ravel()
-        solved = lu_solve(self._factors, right, check_finite=False)
+            right[:-spins] -= residual[:, numbers.dynamic].ravel()
+        solved = lu_solve(self._factors, right, trans=1, check_finite=False)
         change = np.zeros((size, n))
-        change[:, self._kept] = solved[: size * k].reshape(size, k)
+        change[:, numbers.others] = solved[: size * k].reshape(size, k)
         shifts = 3 * len(self._blocks)
         values[..., 0] += self._borders @ solved[size * k :]
-        values[:, shifts:, 0] += self._slope @ change[:, self._positions[shifts:]]
+        partner, factor = self._turn
+        moved = change[:, numbers.positions[shifts:]]
+        values[:, shifts:, 0] += factor[:, None] * moved[partner]
         for i, (by_angles, _) in enumerate(self._blocks):
             where = slice(3 * i, 3 * i + 3)
-            moved = by_angles @ change[:, self._positions[where]].ravel()
-            values[:, where, 0] += moved.reshape(size, 3)
-        change[:, self._velocities] = -self._rates(values).reshape(size, -1)
+            turned = by_angles @ change[:, numbers.positions[where]].ravel()
+            values[:, where, 0] += turned.reshape(size, 3)
+        change[:, numbers.velocities] = -self._rates(values).reshape(size, -1)
         return change, float(solved[-1])
 
 
-def _block(matrix: FloatArray, rows: np.ndarray, columns: np.ndarray) -> FloatArray:
-    """Return the part of a matrix (2 N + 1, n, 2 N + 1, n) of some rows and columns."""
-    size = len(matrix)
-    return matrix[:, rows][..., columns].reshape(size * len(rows), size * len(columns))
+def _quarter_turns(order: int, speed: float) -> tuple[np.ndarray, FloatArray]:
+    """Return how the coefficients of a time derivative follow from those of a series.
+
+        v_cos k = k Omega p_sin k,     v_sin k = -k Omega p_cos k
+
+    Args:
+        order: Number of harmonics.
+        speed: Omega. [rad/s]
+
+    Returns:
+        Index of the coefficient that each one follows from, and the factor. (2 N + 1,)
+    """
+    harmonic = np.arange(1, order + 1)
+    partner, factor = np.zeros(2 * order + 1, dtype=int), np.zeros(2 * order + 1)
+    partner[1::2], partner[2::2] = 2 * harmonic, 2 * harmonic - 1
+    factor[1::2], factor[2::2] = speed * harmonic, -speed * harmonic
+    return partner, factor

@@ -22,7 +22,7 @@ LENGTH = 5e-3
 SPEEDS = 0.05
 """Part of the range of speeds that counts as much as `LENGTH`."""
 
-TOLERANCE = 1e-10
+TOLERANCE = 1e-9
 """Largest last correction of a motion. [m]"""
 
 STALLED = 1e-8

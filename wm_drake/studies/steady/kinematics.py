@@ -1,6 +1,7 @@
 """Which numbers of the state are positions and velocities of bodies, and which spins are free."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -24,16 +25,38 @@ class Kinematics:
         turns: Angles of each body (bodies, 3), and their angular velocities.
         shifts: Positions whose time derivative is a number of the state: (k,), and these numbers.
         spins: Damper tubes that nothing holds about their axis.
+        count: Number of free numbers.
     """
 
     turns: tuple[np.ndarray, np.ndarray]
     shifts: tuple[np.ndarray, np.ndarray]
     spins: tuple["Spin", ...]
+    count: int
 
-    @property
+    @cached_property
+    def positions(self) -> np.ndarray:
+        """Return the indices of all positions: angles of each body, then the others."""
+        return np.concatenate([self.turns[0].ravel(), self.shifts[0]])
+
+    @cached_property
     def velocities(self) -> np.ndarray:
         """Return the indices of all velocities: of angles, then of positions."""
         return np.concatenate([self.turns[1].ravel(), self.shifts[1]])
+
+    @cached_property
+    def others(self) -> np.ndarray:
+        """Return the indices of all numbers but velocities: positions and deformations."""
+        return np.setdiff1d(np.arange(self.count), self.velocities)
+
+    @cached_property
+    def dynamic(self) -> np.ndarray:
+        """Return the indices of all numbers but positions: velocities and deformations."""
+        return np.setdiff1d(np.arange(self.count), self.positions)
+
+    @cached_property
+    def places(self) -> np.ndarray:
+        """Return the place of each of the positions in `others`."""
+        return np.searchsorted(self.others, self.positions)
 
 
 @dataclass(frozen=True)
@@ -102,6 +125,7 @@ def kinematics_of(derivative: SlopedDerivative, setup: Setup) -> Kinematics:
         (indices(bodies, 0).reshape(-1, 3), indices(bodies, 1).reshape(-1, 3)),
         (indices(moves + joints, 0), indices(moves + joints, 1)),
         tuple(spin for spin in spins if _is_neutral(spin, derivative)),
+        len(derivative.free),
     )
 
 
