@@ -17,6 +17,7 @@ from wm_drake.simulation.outputs import tub_outputs
 from wm_drake.studies.steady.balance import HARMONICS, HarmonicBalance
 from wm_drake.studies.steady.condensed import Corrections
 from wm_drake.studies.steady.continuation import first_motion
+from wm_drake.studies.steady.products import write_derivative
 from wm_drake.studies.steady.response import branch_of, trajectory_of_period
 from wm_drake.studies.steady.series import Series
 from wm_drake.studies.steady.settled import settled_trajectory
@@ -466,7 +467,7 @@ def test_condensed_corrections_are_those_of_the_whole_system(machine):
     rng = np.random.default_rng(2)
     at = balance.linearised(balance.rest() + 1e-4 * rng.normal(size=balance.rest().shape), speed)
     row = rng.normal(size=at.residual.shape)
-    row[:, balance.kinematics.velocities] = 0.0
+    row[:, balance.kinematics.partition.velocities] = 0.0
     size = row.size
     matrix = balance.matrix(at.slopes, speed).reshape(size, size)
     whole = np.block([[matrix, at.by_speed.reshape(-1, 1)], [row.reshape(1, -1), 0.3]])
@@ -479,9 +480,14 @@ def test_condensed_corrections_are_those_of_the_whole_system(machine):
 def test_matrix_of_products_multiplies_series():
     """Compare with the product of samples; with few samples harmonics fold alike."""
     rng = np.random.default_rng(4)
+    one = np.zeros(1, dtype=int)
     for samples in (7, 9, 32):
         series = Series(3, samples)
-        factor, coefficients = rng.normal(size=(samples, 1, 1)), rng.normal(size=(7, 1))
-        matrix = series.products(series.factors(factor), 2.0)
-        wanted = series.analysis @ (factor[:, 0] * (series.synthesis @ coefficients))
-        np.testing.assert_allclose(matrix[:, 0, :, 0] @ coefficients, 2.0 * wanted, atol=1e-12)
+        factor, coefficients = rng.normal(size=(samples, 1, 1)), rng.normal(size=7)
+        matrix = np.empty((7, 7))
+        held = np.ones(1, dtype=bool)
+        write_derivative(series.factors(factor), one, one, 2.0, held, 0.3, matrix)
+        wanted = 2.0 * series.slope @ coefficients
+        wanted -= series.analysis @ (factor[:, 0, 0] * (series.synthesis @ coefficients))
+        wanted[0] += 0.3 * coefficients[0]
+        np.testing.assert_allclose(matrix @ coefficients, wanted, atol=1e-12)

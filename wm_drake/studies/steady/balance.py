@@ -27,6 +27,7 @@ from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.modes.fixed_cabinet import check_fixed_cabinet
 from wm_drake.studies.steady.kinematics import kinematics_of
+from wm_drake.studies.steady.products import write_derivative
 from wm_drake.studies.steady.series import Series
 
 HARMONICS = 11
@@ -80,6 +81,7 @@ class HarmonicBalance:
         scale: Factor of each number in the size of a motion: 1 for positions, `ANGLE_ARM` for
             angles, 0 for velocities, so that a size is in m. (n,)
         held: Indices of the numbers that `HOLD` is about.
+        is_held: Whether each number is one of them. (n,)
         kinematics: Positions, velocities and free spins among the numbers.
     """
 
@@ -93,6 +95,7 @@ class HarmonicBalance:
         self.derivative, self.series = SlopedDerivative(setup), series
         self.scale = _scale(self.derivative, setup)
         self.held = _held(self.derivative, setup)
+        self.is_held = np.isin(np.arange(self.size), self.held)
         self.kinematics = kinematics_of(self.derivative, setup)
 
     @property
@@ -145,29 +148,17 @@ class HarmonicBalance:
             speed, residual, factors, by_speed, np.reshape(spins, (len(spins), self.size))
         )
 
-    def matrix(
-        self,
-        slopes: FloatArray,
-        speed: float,
-        rows: np.ndarray | None = None,
-        columns: np.ndarray | None = None,
-    ) -> FloatArray:
-        """Return the derivative of the residual by the coefficients. (2 N + 1, r, 2 N + 1, c)
+    def matrix(self, slopes: FloatArray, speed: float) -> FloatArray:
+        """Return the derivative of the residual by the coefficients. (2 N + 1, n, 2 N + 1, n)
 
         Args:
             slopes: Fourier coefficients as in `Linearised`. (4 N + 1, n, n)
             speed: Omega. [rad/s]
-            rows, columns: Indices of numbers whose residuals are wanted (r,), and by which (c,);
-                None for all.
         """
-        rows = np.arange(self.size) if rows is None else rows
-        columns = np.arange(self.size) if columns is None else columns
-        matrix = self.series.products(slopes[:, rows[:, None], columns], -1.0)
-        own_row, own_column = np.nonzero(rows[:, None] == columns)
-        matrix[:, own_row, :, own_column] += speed * self.series.slope
-        kept = np.isin(rows[own_row], self.held)
-        matrix[0, own_row[kept], 0, own_column[kept]] += HOLD
-        return matrix
+        size, every = self.series.size * self.size, np.arange(self.size)
+        matrix = np.empty((size, size))
+        write_derivative(slopes, every, every, speed, self.is_held, HOLD, matrix)
+        return matrix.reshape(self.series.size, self.size, self.series.size, self.size)
 
     def extent(self, coefficients: FloatArray) -> float:
         """Return the size of a change of the coefficients. [m]"""

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,29 +35,40 @@ class Kinematics:
     count: int
 
     @cached_property
-    def positions(self) -> np.ndarray:
-        """Return the indices of all positions: angles of each body, then the others."""
-        return np.concatenate([self.turns[0].ravel(), self.shifts[0]])
+    def partition(self) -> "Partition":
+        """Return positions, velocities and other numbers."""
+        positions = np.concatenate([self.turns[0].ravel(), self.shifts[0]])
+        velocities = np.concatenate([self.turns[1].ravel(), self.shifts[1]])
+        others = np.setdiff1d(np.arange(self.count), velocities)
+        return Partition(
+            *self.turns,
+            positions,
+            velocities,
+            others,
+            np.setdiff1d(np.arange(self.count), positions),
+            np.searchsorted(others, positions),
+        )
 
-    @cached_property
-    def velocities(self) -> np.ndarray:
-        """Return the indices of all velocities: of angles, then of positions."""
-        return np.concatenate([self.turns[1].ravel(), self.shifts[1]])
 
-    @cached_property
-    def others(self) -> np.ndarray:
-        """Return the indices of all numbers but velocities: positions and deformations."""
-        return np.setdiff1d(np.arange(self.count), self.velocities)
+class Partition(NamedTuple):
+    """Indices among the free numbers of the state, for compiled code.
 
-    @cached_property
-    def dynamic(self) -> np.ndarray:
-        """Return the indices of all numbers but positions: velocities and deformations."""
-        return np.setdiff1d(np.arange(self.count), self.positions)
+    Attributes:
+        turned, turning: Angles of each body, and their angular velocities. (bodies, 3)
+        positions: Angles of all bodies, then other positions. (p,)
+        velocities: Angular velocities, then the time derivatives of the other positions. (p,)
+        others: All numbers but velocities.
+        dynamic: All numbers but positions.
+        places: Place of each of the positions in `others`. (p,)
+    """
 
-    @cached_property
-    def places(self) -> np.ndarray:
-        """Return the place of each of the positions in `others`."""
-        return np.searchsorted(self.others, self.positions)
+    turned: np.ndarray
+    turning: np.ndarray
+    positions: np.ndarray
+    velocities: np.ndarray
+    others: np.ndarray
+    dynamic: np.ndarray
+    places: np.ndarray
 
 
 @dataclass(frozen=True)

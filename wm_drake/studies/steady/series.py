@@ -6,7 +6,6 @@ from functools import cached_property
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.steady.products import write_products
 
 
 @dataclass(frozen=True)
@@ -70,22 +69,11 @@ class Series:
         return Series(2 * self.order, self.samples).analysis
 
     def factors(self, samples: FloatArray) -> FloatArray:
-        """Return the coefficients of the factors of products. (4 N + 1, n, k)
+        """Return the coefficients of the factors of products, of twice the order. (4 N + 1, n, k)
 
         Args:
             samples: (samples, k, n) samples of the factor of each number k in each sum n.
         """
         flat = np.ascontiguousarray(samples).reshape(self.samples, -1)
-        return (self.double @ flat).reshape(-1, *samples.shape[1:]).transpose(0, 2, 1)
-
-    def products(self, factors: FloatArray, factor: float = 1.0) -> FloatArray:
-        """Return the matrix that multiplies series by factors. (2 N + 1, n, 2 N + 1, k)
-
-        Args:
-            factors: (4 N + 1, n, k) coefficients of the factors, from `factors`.
-            factor: Factor of the matrix.
-        """
-        _, n, k = factors.shape
-        matrix = np.empty((self.size, n, self.size, k))
-        write_products(np.ascontiguousarray(factors), factor, matrix)
-        return matrix
+        found = (self.double @ flat).reshape(-1, *samples.shape[1:])
+        return np.ascontiguousarray(found.transpose(0, 2, 1))
