@@ -20,7 +20,7 @@ from wm_drake.studies.steady.continuation import first_motion
 from wm_drake.studies.steady.products import write_derivative
 from wm_drake.studies.steady.response import branch_of, trajectory_of_period
 from wm_drake.studies.steady.series import Series
-from wm_drake.studies.steady.settled import settled_trajectory
+from wm_drake.studies.steady.settled import coefficients_of, settled_trajectory
 from wm_drake.studies.steady.stability import floquet_multipliers, is_stable
 
 RPM = np.pi / 30.0
@@ -458,6 +458,43 @@ def test_telescopic_dampers_move_as_the_engine_moves_them():
     engine = settled_trajectory(setup, speeds[1], 128, 60)
     own = trajectory_of_period(balance, points[1].coefficients, speeds[1], 128)
     np.testing.assert_allclose(amplitudes(setup, own), amplitudes(setup, engine), rtol=2e-3)
+
+
+@pytest.mark.slow
+def test_response_follows_dampers_that_spin():
+    """Check 220 rpm, where the left damper turns by 2 degrees in a revolution of the drum.
+
+    The engine never settles: its amplitudes follow the angles of the dampers. At each of these
+    angles the harmonic balance has the same amplitudes.
+    """
+    machine = build_machine(wm.load_machine("free_stroke"))
+    setup, speed = machine.set_up("front"), 220.0 * RPM
+    balance = HarmonicBalance(setup, Series(HARMONICS, 128))
+    sizes = []
+    for revolutions in (71, 271, 371):
+        engine = settled_trajectory(setup, speed, 128, revolutions)
+        begin = coefficients_of(balance, setup, engine)
+        with threadpool_limits(1, "blas"):
+            motion = first_motion(balance, speed, iter([begin]))
+        own = trajectory_of_period(balance, motion, speed, 128)
+        sizes.append(amplitudes(setup, engine))
+        large = sizes[-1] > 1e-3
+        np.testing.assert_allclose(amplitudes(setup, own)[large], sizes[-1][large], rtol=5e-3)
+        rates = balance.derivative(balance.states(motion, speed))[:, balance.derivative.free]
+        spins = balance.kinematics.spin_rates(motion[0], rates.mean(axis=0))
+        assert 1.0 < 360.0 * abs(spins[0]) / speed < 3.0
+    assert np.ptp(sizes, axis=0).max() > 0.3e-3  # they vary by 3 % of 15 mm
+
+
+def test_telescopic_dampers_begin_at_any_speed():
+    """Check a first speed at which a sample is at a reversal of friction."""
+    machine = build_machine(wm.load_machine("free_stroke"))
+    balance = HarmonicBalance(machine.set_up("front"), Series(3, 64))
+    setup = machine.set_up("front")
+    with threadpool_limits(1, "blas"):
+        points = branch_of(balance, setup, np.array([200.0, 202.0]) * RPM)
+    assert points[0].speed == pytest.approx(200.0 * RPM)
+    assert len(points[0].spins) == 3
 
 
 def test_condensed_corrections_are_those_of_the_whole_system(machine):

@@ -172,6 +172,7 @@ def _as_json(study: "SteadyStudy") -> dict[str, Any]:
     from wm_drake.parameters.units import Unit
 
     millimetre, rpm = Unit("m", "mm").from_si(1.0), Unit("rad/s", "rpm").from_si(1.0)
+    degree = Unit("rad/s", "deg/s").from_si(1.0)
 
     def columns(values: Any, dim: str, factor: float = 1.0) -> dict[str, list[float]]:
         return {
@@ -196,6 +197,7 @@ def _as_json(study: "SteadyStudy") -> dict[str, Any]:
                 "spring_tension_N": columns(case.response.spring_tension, "spring"),
                 "damper_tension_N": columns(case.response.damper_tension, "damper"),
                 "mount_force_N": _mount_forces(case.response),
+                "damper_spin_deg_s": columns(case.response.damper_spin, "spinning", degree),
                 "stable": case.response.stable.values.tolist(),
                 "wall_s": case.wall_s,
             }

@@ -49,6 +49,16 @@ class Kinematics:
             np.searchsorted(others, positions),
         )
 
+    def spin_rates(self, mean: FloatArray, rates: FloatArray) -> FloatArray:
+        """Return the rate of each free spin of a steady motion. (spins,) [rad/s]
+
+        Args:
+            mean: Mean of each number over a revolution. (n,)
+            rates: Mean of its time derivative, which only a spin can make. (n,)
+        """
+        directions = [spin.direction(mean) for spin in self.spins]
+        return np.array([rates @ d / (d @ d) for d in directions])
+
 
 class Partition(NamedTuple):
     """Indices among the free numbers of the state, for compiled code.
@@ -76,11 +86,13 @@ class Spin:
     """Rotation of a telescopic damper about its axis.
 
     Attributes:
+        name: Of the damper.
         angles, position: Indices of roll, pitch, yaw and of the position of the outer tube.
         axis: Direction of the damper in the frame of the outer tube.
         point: Point of the axis in this frame. [m]
     """
 
+    name: str
     angles: np.ndarray
     position: np.ndarray
     axis: FloatArray
@@ -126,12 +138,13 @@ def kinematics_of(derivative: SlopedDerivative, setup: Setup) -> Kinematics:
 
     spins = [
         Spin(
+            name,
             indices([bodies[1 + i]], 0),
             indices([moves[1 + i]], 0),
             telescope.axis,
             telescope.tub_bushing.ground_side_point,
         )
-        for i, telescope in enumerate(setup.telescopes.values())
+        for i, (name, telescope) in enumerate(setup.telescopes.items())
     ]
     return Kinematics(
         (indices(bodies, 0).reshape(-1, 3), indices(bodies, 1).reshape(-1, 3)),
