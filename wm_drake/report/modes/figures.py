@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -38,62 +39,70 @@ def campbell_figure(result: MachineModes) -> Figure:
     panels = figure.subplots(1, 2, sharey=True)
     ratios = np.concatenate([d.damping_ratio.ravel() for d in result.diagrams.values()])
     norm = Normalize(0.0, max(0.05, float(np.nanmax(ratios))))
-    last = max(float(np.nanmax(d.frequency_hz)) for d in result.diagrams.values())
+    top = 1.08 * max(float(np.nanmax(d.frequency_hz)) for d in result.diagrams.values())
     for axes, name in zip(panels, (SLIDING, STUCK), strict=True):
-        diagram = result.diagrams[name]
-        rpm = RPM_PER_RAD_S * diagram.speed
-        for mode, column in enumerate(diagram.frequency_hz.T):
-            axes.plot(rpm, column, color=QUIET, linewidth=0.8, zorder=1)
-            points = axes.scatter(
-                rpm,
-                column,
-                c=diagram.damping_ratio[:, mode],
-                norm=norm,
-                cmap="viridis_r",
-                s=11,
-                zorder=2,
-            )
-        for order in ORDERS:
-            axes.plot(rpm, order * rpm / 60.0, "--", color=MARK, linewidth=1.0)
-            _label_order(axes, order, rpm[-1], 1.08 * last)
-        _mark_critical(axes, result, name)
-        _mark_run_up(axes, result)
-        axes.set_xlim(0.0, 1.16 * rpm[-1])
-        axes.set_ylim(0.0, 1.08 * last)
-        _label_modes(axes, result, name, float(rpm[-1]))
-        axes.set_title(TITLES[name], loc="left", fontsize=10.5, fontweight="bold")
-        axes.set_xlabel("drum speed, rpm", fontsize=9.5)
-        axes.grid(color=GRID)
-        style_axes(axes)
+        points = _draw_campbell(axes, result, name, norm, top)
     panels[0].set_ylabel("natural frequency, Hz", fontsize=9.5)
     figure.colorbar(points, ax=panels, label="damping ratio", pad=0.015, fraction=0.035)
+    keys = [("--", "order of the drum speed", MARK), ("o", "critical speed", MEASURED)]
+    if result.run_up is not None:
+        keys.append(("v", "largest amplitude of a sensor in a run-up", OURS))
     handles = [
-        Line2D([], [], color=MARK, linestyle="--", linewidth=1.0, label="order of the drum speed"),
         Line2D(
             [],
             [],
-            marker="o",
-            color=MEASURED,
-            fillstyle="none",
-            linestyle="",
-            ms=7,
-            label="critical speed",
-        ),
-    ]
-    if result.run_up is not None:
-        handles.append(
-            Line2D(
-                [],
-                [],
-                marker="v",
-                color=OURS,
-                linestyle="",
-                ms=6,
-                label="largest amplitude of a sensor in a run-up",
-            )
+            color=colour,
+            linestyle=mark if mark == "--" else "",
+            linewidth=1.0,
+            marker="" if mark == "--" else mark,
+            fillstyle="none" if mark == "o" else "full",
+            ms=7 if mark == "o" else 6,
+            label=text,
         )
+        for mark, text, colour in keys
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     return figure
+
+
+def _draw_campbell(
+    axes: Axes, result: MachineModes, name: str, norm: Normalize, top: float
+) -> PathCollection:
+    """Draw the diagram of one linearisation; return its points, for the scale of colours.
+
+    Args:
+        axes: Panel.
+        result: The modes.
+        name: Linearisation.
+        norm: Damping ratios to colours.
+        top: Highest frequency. [Hz]
+    """
+    diagram = result.diagrams[name]
+    rpm = RPM_PER_RAD_S * diagram.speed
+    for mode, column in enumerate(diagram.frequency_hz.T):
+        axes.plot(rpm, column, color=QUIET, linewidth=0.8, zorder=1)
+        points = axes.scatter(
+            rpm,
+            column,
+            c=diagram.damping_ratio[:, mode],
+            norm=norm,
+            cmap="viridis_r",
+            s=11,
+            zorder=2,
+        )
+    for order in ORDERS:
+        axes.plot(rpm, order * rpm / 60.0, "--", color=MARK, linewidth=1.0)
+        _label_order(axes, order, rpm[-1], top)
+    _mark_critical(axes, result, name)
+    _mark_run_up(axes, result)
+    axes.set_xlim(0.0, 1.16 * rpm[-1])
+    axes.set_ylim(0.0, top)
+    _label_modes(axes, result, name, float(rpm[-1]))
+    axes.set_title(TITLES[name], loc="left", fontsize=10.5, fontweight="bold")
+    axes.set_xlabel("drum speed, rpm", fontsize=9.5)
+    axes.grid(color=GRID)
+    style_axes(axes)
+    return points
 
 
 def _label_order(axes: Axes, order: float, last_rpm: float, top: float) -> None:

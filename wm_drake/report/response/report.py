@@ -178,8 +178,10 @@ def _sweep_picture(study: SteadyStudy) -> Picture | None:
         return None
     caption = (
         "Sweeps at a constant rate, up and down, computed by the compiled engine. A faster sweep "
-        "passes a resonance later and lower. For each load the sensor with its largest steady "
-        "amplitude is shown. Where two peaks are about as high, a sweep may prefer the other one."
+        "passes a resonance later. A single resonance is also passed lower; where the machine "
+        "still moves in one mode when the next one is met, the sum of both may be above the steady "
+        "peak. For each load the sensor with its largest steady amplitude is shown. Where two "
+        "peaks are about as high, a sweep may prefer the other one."
     )
     return picture(sweep_figure(study), "Shift and height of peaks over the sweep rate.", caption)
 

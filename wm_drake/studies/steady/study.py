@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from wm_drake.batch import simulate_many
 from wm_drake.batch.runs import RunResult
 from wm_drake.errors import InputError, Problem
-from wm_drake.model.machine import Machine
+from wm_drake.model.machine import Machine, Setup
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.types import FloatArray
@@ -116,13 +116,8 @@ def run_steady_study(
         return runs, sweeps
 
     def solve(index: int) -> tuple[xr.Dataset, float]:
-        start = time.perf_counter()
-        try:
-            found = response_of(setups[index], speeds, harmonics, samples, done.of(index))
-        except InputError as error:
-            raise InputError(
-                Problem(f"load '{pairs[index][0]}'", p.key, p.message) for p in error.problems
-            ) from None
+        start, name = time.perf_counter(), pairs[index][0]
+        found = _response(setups[index], name, speeds, harmonics, samples, done.of(index))
         return found, time.perf_counter() - start
 
     # the matrices are small: several threads each would be slower
@@ -139,6 +134,23 @@ def run_steady_study(
         for (name, _, gasket), (response, wall), run in zip(pairs, responses, runs, strict=True)
     ]
     return SteadyStudy(machine.parameters, cases, sweeps, time.perf_counter() - begin)
+
+
+def _response(
+    setup: Setup,
+    load: str,
+    speeds: FloatArray,
+    harmonics: int,
+    samples: int,
+    progress: Callable[[float], None],
+) -> xr.Dataset:
+    """Return the steady response of a setup; an error names its load."""
+    try:
+        return response_of(setup, speeds, harmonics, samples, progress)
+    except InputError as error:
+        raise InputError(
+            Problem(f"load '{load}'", p.key, p.message) for p in error.problems
+        ) from None
 
 
 class _Progress:
