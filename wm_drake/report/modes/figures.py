@@ -1,6 +1,7 @@
 """Figures of the modes of a machine."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -44,25 +45,20 @@ def campbell_figure(result: MachineModes) -> Figure:
         points = _draw_campbell(axes, result, name, norm, top)
     panels[0].set_ylabel("natural frequency, Hz", fontsize=9.5)
     figure.colorbar(points, ax=panels, label="damping ratio", pad=0.015, fraction=0.035)
-    keys = [("--", "order of the drum speed", MARK), ("o", "critical speed", MEASURED)]
-    if result.run_up is not None:
-        keys.append(("v", "largest amplitude of a sensor in a run-up", OURS))
+    order = "order of the drum speed"
     handles = [
-        Line2D(
-            [],
-            [],
-            color=colour,
-            linestyle=mark if mark == "--" else "",
-            linewidth=1.0,
-            marker="" if mark == "--" else mark,
-            fillstyle="none" if mark == "o" else "full",
-            ms=7 if mark == "o" else 6,
-            label=text,
-        )
-        for mark, text, colour in keys
+        Line2D([], [], color=MARK, linestyle="--", linewidth=1.0, label=order),
+        _key("o", MEASURED, "critical speed", ms=7, fillstyle="none"),
     ]
+    if result.run_up is not None:
+        handles.append(_key("v", OURS, "largest amplitude of a sensor in a run-up", ms=6))
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     return figure
+
+
+def _key(marker: str, colour: str, text: str, **style: Any) -> Line2D:
+    """Return the entry of a marker in a legend."""
+    return Line2D([], [], marker=marker, color=colour, linestyle="", label=text, **style)
 
 
 def _draw_campbell(
