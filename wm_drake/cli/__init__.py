@@ -16,12 +16,6 @@ from wm_drake.cli.figures import writes_pages
 from wm_drake.cli.terminal import give_quiet
 from wm_drake.errors import Problem, WmDrakeError, reason_of
 
-NEW_OBJECTS = 200_000
-"""Number of new objects after which the garbage collector looks for cycles.
-
-Imports make half a million objects that stay. With Python's default of 700 the collector takes a
-second to look at them again and again; results are freed without it."""
-
 app = typer.Typer(
     help="Dynamics of front-loading washing machines.",
     no_args_is_help=True,
@@ -64,7 +58,9 @@ def _options(
 
 def main() -> None:
     """Run the command; an error of the input or the disk ends it with a message and exit code 2."""
-    gc.set_threshold(NEW_OBJECTS)
+    # imports and studies make millions of objects that stay; looking through them takes a fifth
+    # of the time of the imports
+    gc.set_threshold(100_000, 20, 20)
     try:
         app()
     except WmDrakeError as error:
