@@ -18,6 +18,8 @@ from wm_drake.simulation.cases import Case, case_of
 from wm_drake.simulation.measures import measure, walk_of
 from wm_drake.simulation.records import as_record
 from wm_drake.simulation.runs import DivergenceWarning, simulate
+from wm_drake.studies.modes.study import modes, three_linearisations
+from wm_drake.studies.steady.response import steady_response
 
 RUN_UP = SpinProfile(time=(0.0, 1.0, 12.0, 15.0), speed=(0.0, 5.0, 24.0, 24.0))
 SHORT = SpinProfile(time=(0.0, 0.5, 2.0), speed=(4.0, 8.0, 20.0))
@@ -233,6 +235,18 @@ def test_other_refusals():
     fixed = build_machine(load_machine("reference"))
     with pytest.raises(InputError, match=r"cabinet.moves: this cabinet moves"):
         fixed.set_up(parameters=with_moving_cabinet())
+
+
+def test_modes_and_steady_states_are_refused(light):
+    """One message that names the key and what to set, before anything is computed."""
+    message = r"^cabinet\.moves: the cabinet of machine 'light_cabinet' moves; .* set it to false$"
+    for refused in (
+        lambda: modes(light),
+        lambda: steady_response(light, "middle", [10.0, 20.0]),
+        lambda: three_linearisations(light, "middle"),
+    ):
+        with pytest.raises(InputError, match=message):
+            refused()
 
 
 def test_a_cabinet_that_tips_over_is_said_to():
