@@ -45,12 +45,12 @@ def machine(reference):
 
 
 def radial_force(reference, stiffness):
-    """Of a straight table for the gasket, as long as the machine's."""
+    """Return a straight table of the gasket's force, as long as the machine's."""
     return tuple(float(stiffness * x) for x in reference.gasket.stiffness_x.displacement)
 
 
 def cases_of(reference, count, seed=1):
-    """Cases with other gaskets, weights, loads and profiles, some without gasket."""
+    """Return cases with other gaskets, weights, loads and profiles, some without gasket."""
     rng = np.random.default_rng(seed)
     for index in range(count):
         changed = with_value(
@@ -120,6 +120,17 @@ def test_smallest_gap_is_that_of_the_scene(machine, reference, cases):
         assert told.smallest_gap.values[index] == pytest.approx(
             alone.smallest_gap.distance, rel=1e-9
         )
+
+
+def test_scenes_are_used_again_and_change_no_bit(machine, cases):
+    built = build_machine(machine.parameters)
+    first = simulate_many(built, cases[:9], measures=["gap", "contacts"], workers=2)
+    count = len(built.scenes)
+    assert 1 <= count <= 2
+    xr.testing.assert_identical(
+        simulate_many(built, cases[:9], measures=["gap", "contacts"], workers=1), first
+    )
+    assert len(built.scenes) == count
 
 
 def recorded(machine, cases):

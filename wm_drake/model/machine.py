@@ -1,6 +1,5 @@
 """The machine in a Drake diagram: its systems and ports, and the numbers set in a Context."""
 
-import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -22,6 +21,7 @@ from wm_drake.model.equilibrium import preloaded, put_to_rest
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.placed_elements import AppliedForce, PlacedElements, placed_elements
 from wm_drake.model.same_elements import check_same_elements
+from wm_drake.model.scene import Scene
 from wm_drake.model.state_layout import StateLayout
 from wm_drake.model.tub_points import TubPoints, measured_points, tub_points
 from wm_drake.parameters import Drive, Load, MachineParameters, MotorDrive, Sensor, SpinProfile
@@ -60,6 +60,7 @@ class Setup:
             empty. (6,) [rad, m]
         cabinet: The cabinet on its feet if it moves, else None. Its frame then takes the place of W
             for the tub; at rest they coincide.
+        measured_points: The measured points as packed numbers, from the function of this name.
     """
 
     machine: "MachineSystems"
@@ -72,6 +73,7 @@ class Setup:
     tube_rest: FloatArray
     carrier_rest: FloatArray
     cabinet: CabinetOnFeet | None
+    measured_points: FloatArray
 
     @property
     def plant_context(self) -> Context:
@@ -128,11 +130,6 @@ class Setup:
         """Return the points of the vibration sensors in T. [m]"""
         return self.points.accelerometers
 
-    @functools.cached_property
-    def measured_points(self) -> FloatArray:
-        """Return the measured points, see `measured_points`."""
-        return measured_points(self.parameters, self.points, self.rest_pose)
-
 
 def with_prescribed_speed(setup: Setup) -> Setup:
     """Return a setup whose parameters have a prescribed speed in place of a motor."""
@@ -188,6 +185,7 @@ class MachineSystems:
             "detergent_displacement", "drum_speed"; "motor_torque"; and for each element its own
             outputs, such as "spring_left_force", "damper_left_force", "gasket_force" and
             "gasket_moment"; of a cabinet that moves "feet_floor_force".
+        scenes: Scenes of the machine that no thread uses; many short batches share them.
     """
 
     parameters: MachineParameters
@@ -207,6 +205,7 @@ class MachineSystems:
     inputs: dict[str, InputPort]
     outputs: dict[str, OutputPort]
     _poses: list[FramePoses] = field(default_factory=list, repr=False, compare=False, kw_only=True)
+    scenes: list[Scene] = field(default_factory=list, repr=False, compare=False, kw_only=True)
 
     def set_up(
         self,
@@ -258,12 +257,13 @@ class MachineSystems:
         q = self.plant.GetPositions(plant_context)
         points = tub_points(poses, parameters)
         profile = profile or parameters.profile
-        self._set_systems(context, elements, measured_points(parameters, points, q[layout.tub]))
+        measured = measured_points(parameters, points, q[layout.tub])
+        self._set_systems(context, elements, measured)
         self._set_drive(context, parameters)
         self._set_feet(context, cabinet)
         self.set_profile(context, profile)
         rest = q[layout.tub], residual, q[layout.tubes], q[layout.carrier]
-        return Setup(self, parameters, context, elements, points, *rest, cabinet)
+        return Setup(self, parameters, context, elements, points, *rest, cabinet, measured)
 
     def set_up_bodies(
         self, load: Load | None, parameters: MachineParameters, context: Context
