@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from textwrap import fill
 
+import pandas as pd
+
 from wm_drake.report.provenance import now, program
 from wm_drake.studies.validation.rows import FITTED, MISSED, PREDICTED, Row, counts
 
@@ -14,7 +16,11 @@ COLUMNS = ("quantity", "kind", "published", "ours", "difference", "verdict", "re
 
 
 def validation_page(
-    rows: Sequence[Row], command: str, notes: Sequence[str] = (), reasons: Mapping[str, str] = {}
+    rows: Sequence[Row],
+    command: str,
+    notes: Sequence[str] = (),
+    reasons: Mapping[str, str] = {},
+    tables: Mapping[str, pd.DataFrame] = {},
 ) -> str:
     """Return the page as Markdown.
 
@@ -22,7 +28,9 @@ def validation_page(
         rows: All rows; those of one section follow each other.
         command: Command that writes the page.
         notes: Sentences on what was run.
-        reasons: Explanations of missed rows, by section or by `SECTION | QUANTITY`.
+        reasons: Explanations of missed rows, by section or by `SECTION | QUANTITY`; and of tables,
+            by heading.
+        tables: Tables without verdicts by heading, for the end of the page.
     """
     text = [
         "# Validation",
@@ -56,6 +64,12 @@ def validation_page(
             verdict = f"**{row.verdict}**" if row.verdict == MISSED else row.verdict
             cells = (row.quantity, row.kind, row.published, row.ours, row.difference, verdict, why)
             text.append(_line(cells))
+    for heading, table in tables.items():
+        text += ["", f"## {heading}", ""]
+        if heading in reasons:
+            text += [fill(reasons[heading], WIDTH), ""]
+        text += _line(list(map(str, table.columns))), _line(["---"] * len(table.columns))
+        text += [_line(list(map(str, row))) for row in table.itertuples(index=False)]
     return "\n".join(text) + "\n"
 
 
