@@ -101,7 +101,9 @@ def tilting_margin(down, moment_x, moment_y, x, y):
 
 @law
 def sliding_margin(force_x, force_y, holding):
-    """Return the horizontal force that friction can still take: sum mu N - |f|. [N]
+    """Return the horizontal force that friction can still take. [N]
+
+        margin = sum mu N_i - |f|
 
     Args:
         force_x, force_y: Horizontal load. [N]
