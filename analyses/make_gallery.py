@@ -292,8 +292,8 @@ def _lines(plots: dict[str, list[str]]) -> list[str]:
     lines = [
         "# Gallery",
         "",
-        "The top of every page, its plots, and the commands that write it. A plot is a picture of the",
-        "page; `--figures DIR` writes it for a publication. The pictures are made by",
+        "The top of every page, its plots, and the commands that write it. A plot is a picture of",
+        "the page; `--figures DIR` writes it for a publication. The pictures are made by",
         "`analyses/make_gallery.py`.",
     ]
     for entry in ENTRIES:
@@ -306,7 +306,7 @@ def _lines(plots: dict[str, list[str]]) -> list[str]:
         if titles:
             lines.append("")
             lines += [
-                f"![{title}](pictures/gallery/{entry.name}_{number}.png)"
+                f"![{title[:40]}](pictures/gallery/{entry.name}_{number}.png)"
                 for number, title in enumerate(titles, start=1)
             ]
     return lines

@@ -75,7 +75,12 @@ CYCLES = CHECKOUT / "wm_drake" / "data" / "cycles"
 def prepare(folder, page):
     """Write the files that the commands of a page name: of its own blocks, and of a laboratory."""
     (folder / "mine.yaml").write_text(MINE, encoding="utf-8")
-    for name, mass in (("a", "9 kg"), ("b", "11 kg"), ("my_machine", "10 kg"), ("mine_machine", "10 kg")):
+    for name, mass in (
+        ("a", "9 kg"),
+        ("b", "11 kg"),
+        ("my_machine", "10 kg"),
+        ("mine_machine", "10 kg"),
+    ):
         text = MINE.replace("mine", name).replace("9.5 kg", mass)
         (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
     (folder / "spin.csv").write_text("time_s,speed_rpm\n0,30\n10,120\n12,120\n", encoding="utf-8")
@@ -101,8 +106,12 @@ def write_laboratory(folder):
     write_loops(folder / "bench", damper, [(1.0, 0.3), (1.0, 1.0), (3.0, 1.0), (10.0, 1.0)])
     write_loops(folder / "fit", damper, [(1.0, 0.3), (3.0, 1.0), (10.0, 1.0)])
     write_loops(folder / "held", damper, [(1.0, 1.0)])
-    write_loops(folder / "rubber", bushing_bench(bushing, "y"), [(1.0, 0.4), (3.0, 0.4), (5.0, 0.4)])
-    there = np.concatenate([np.linspace(0, 20, 60), np.linspace(20, -20, 120), np.linspace(-20, 0, 60)])
+    write_loops(
+        folder / "rubber", bushing_bench(bushing, "y"), [(1.0, 0.4), (3.0, 0.4), (5.0, 0.4)]
+    )
+    there = np.concatenate(
+        [np.linspace(0, 20, 60), np.linspace(20, -20, 120), np.linspace(-20, 0, 60)]
+    )
     time = np.arange(len(there)) / 4.0
     for name, unit, size, rate in (
         ("r", "mm", 1.0, 3.0), ("a", "mm", 1.0, 5.0), ("t", "deg", 0.25, 0.8), ("w", "deg", 0.25, 0.5)
@@ -118,7 +127,9 @@ def write_loops(folder, bench, motions):
     noise = np.random.default_rng(1)
     harmonics = [Harmonic(frequency, 1e-3 * amplitude) for frequency, amplitude in motions]
     for harmonic, loop in zip(harmonics, force_loops(bench, harmonics), strict=True):
-        force = loop.force + 0.01 * np.abs(loop.force).max() * noise.standard_normal(len(loop.force))
+        force = loop.force + 0.01 * np.abs(loop.force).max() * noise.standard_normal(
+            len(loop.force)
+        )
         table = {
             "time [s]": loop.time,
             "displacement [mm]": 1e3 * loop.displacement,

@@ -27,13 +27,13 @@ NOT_SHELL = {
 }
 ELSEWHERE = {  # pages whose commands something else runs
     "docs/gallery.md": "analyses/make_gallery.py runs them and takes pictures of what they write",
-    "docs/validation.md": "tests/analyses runs the script with --quick",
 }
 NOT_RUN = {  # beginning of a command, and why this test does not run it
     "python3 -m venv": "installs into a new environment: .ci/run",
     ".venv/bin/pip": "installs into a new environment: .ci/run",
     "source .venv": "changes the shell only",
     "pip install": "installs into a new environment: .ci/run",
+    "python analyses/write_validation.py": "tests/analyses runs it with --quick",
     "sphinx-build": "builds the manual: .ci/run",
     "wm-drake studio": "serves until it is stopped: tests/studio",
     "wm-drake study gasket --cluster": "needs a cluster: tests/batch/test_cluster.py and a tutorial",

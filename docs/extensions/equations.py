@@ -17,10 +17,19 @@ from dataclasses import dataclass
 from html import escape
 
 GREEK = {
-    "pi": "π", "delta": "δ", "eps": "ε", "epsilon": "ε", "lambda": "λ", "mu": "μ", "tau": "τ",
-    "omega": "ω", "phi": "φ", "theta": "θ",
-}  # fmt: skip
-FUNCTIONS = frozenset("sin cos tan cot exp tanh sgn clip min max HAVSIN curve".split())
+    "delta": "δ",
+    "eps": "ε",
+    "epsilon": "ε",
+    "lambda": "λ",
+    "mu": "μ",
+    "omega": "ω",
+    "phi": "φ",
+    "pi": "π",
+    "tau": "τ",
+    "theta": "θ",
+}
+FUNCTIONS = {"sin", "cos", "tan", "cot", "exp", "tanh", "sgn", "clip", "min", "max"}
+FUNCTIONS |= {"HAVSIN", "curve"}
 TWO_LETTERS = {"xs": ("x", "s"), "da": ("d", "a"), "dv": ("d", "v"), "dq": ("d", "q")}
 """Names of two letters: x with index s in [A], and differentials."""
 RELATIONS = {"=": "=", "<": "&lt;", ">": "&gt;", "<=": "≤", ">=": "≥", "+": "+", "-": "−"}
@@ -218,7 +227,11 @@ class _Reader:
         inside = self._terms(closing)
         if self._peek() is not None:
             self._next()
-        fence = "<mo form='{}'>{}</mo>" if "mfrac" in inside else "<mo stretchy='false' form='{}'>{}</mo>"
+        fence = (
+            "<mo form='{}'>{}</mo>"
+            if "mfrac" in inside
+            else "<mo stretchy='false' form='{}'>{}</mo>"
+        )
         whole = fence.format("prefix", opening) + inside + fence.format("postfix", closing)
         return Factor(f"<mrow>{whole}</mrow>", inside if opening == "(" else None)
 
@@ -230,7 +243,9 @@ class _Reader:
             first, second = TWO_LETTERS[name]
             if first == "d":
                 return Factor(f"<mrow><mo>∂</mo><mi>{second}</mi></mrow>")
-            return Factor(f"<msub><mi>{first}</mi><mrow><mi>{second}</mi>{_number(number)}</mrow></msub>")
+            return Factor(
+                f"<msub><mi>{first}</mi><mrow><mi>{second}</mi>{_number(number)}</mrow></msub>"
+            )
         if name in FUNCTIONS:
             return Factor(f"<mi>{name}</mi>")
         letter = GREEK.get(name, name)
@@ -257,7 +272,9 @@ class _Reader:
             elif token.text in "_^":
                 self._next()
                 script = self._script()
-                below, above = (below + script, above) if token.text == "_" else (below, above + script)
+                below, above = (
+                    (below + script, above) if token.text == "_" else (below, above + script)
+                )
             else:
                 break
         mathml = _scripted(base.mathml, below, above)

@@ -50,10 +50,21 @@ PICTURES_OF_KEYS = {
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the extension."""
+    app.connect("env-before-read-docs", _spread)
     app.connect("source-read", _complete)
     app.connect("include-read", _complete_included)
     app.connect("autodoc-process-docstring", _plain_docstring, priority=400)  # before napoleon
     return {"parallel_read_safe": True}
+
+
+def _spread(_app: Sphinx, _env: Any, names: list[str]) -> None:
+    """Spread the notebooks evenly over the pages: processes read pages in blocks, in this order."""
+    notebooks = [name for name in names if name.startswith("tutorials/")]
+    others = [name for name in names if name not in notebooks]
+    step = len(others) / max(1, len(notebooks))
+    for number, name in reversed(list(enumerate(notebooks))):
+        others.insert(round(number * step), name)
+    names[:] = others
 
 
 def _complete(app: Sphinx, docname: str, source: list[str]) -> None:
@@ -115,8 +126,8 @@ def _plain_docstring(
 ) -> None:
     """Turn a docstring in plain text into reStructuredText.
 
-    An indented block before the sections of arguments is an equation, which is typeset. Bars and stars
-    are no markup.
+    An indented block before the sections of arguments is an equation, which is typeset. Bars and
+    stars are no markup.
     """
     new: list[str] = []
     block: list[str] = []

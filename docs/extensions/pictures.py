@@ -157,9 +157,13 @@ def bushing_curves() -> Figure:
     figure, (left, right) = _axes(2)
     d = np.linspace(-5e-3, 5e-3, 50)
     for rate in (-0.1, 0.0, 0.1):
-        force = [bushing_force.py_func((x, 0.0, 0.0), (rate, 0.0, 0.0), none, none, law)[0][0] for x in d]
+        force = [
+            bushing_force.py_func((x, 0.0, 0.0), (rate, 0.0, 0.0), none, none, law)[0][0] for x in d
+        ]
         left.plot(1e3 * d, force, label=f"rate {1e3 * rate:g} mm/s")
-    left.set(xlabel="displacement d, mm", ylabel="force F, N", title="along an axis: spring, dashpot")
+    left.set(
+        xlabel="displacement d, mm", ylabel="force F, N", title="along an axis: spring, dashpot"
+    )
     w = np.linspace(-1.0, 1.0, 201)
     for angle in (-0.02, 0.0, 0.02):
         turned = (angle, 0.0, 0.0)
@@ -232,7 +236,9 @@ def spring_curves() -> Figure:
         numbers = (7.5, 0.5, 0.8, 0.1)
         moment = [bending_moment((0.0, 0.0, 1.0), (x, 0.0, 0.0), axis, *numbers)[0] for x in rates]
         right.plot(rates, moment, label=f"bent by {angle:g} rad")
-    right.set(xlabel="rate a', rad/s", ylabel="moment m, N m", title="bushing at the end of a strut")
+    right.set(
+        xlabel="rate a', rad/s", ylabel="moment m, N m", title="bushing at the end of a strut"
+    )
     right.legend()
     return figure
 
@@ -249,7 +255,9 @@ def drive_curves() -> Figure:
     figure, (left, right) = _axes(2)
     rpm = np.linspace(0.0, 12000.0, 300)
     left.plot(rpm, [motor.torque_limit.py_func(x * np.pi / 30.0, limit) for x in rpm])
-    left.set(xlabel="speed of the motor, rpm", ylabel="N m", title="torque limit T_max", ylim=(0, None))
+    left.set(
+        xlabel="speed of the motor, rpm", ylabel="N m", title="torque limit T_max", ylim=(0, None)
+    )
     rate = np.linspace(-5.0, 5.0, 401)
     own = SimpleNamespace(
         friction_torque=drive.bearing_friction.friction_torque,
@@ -301,7 +309,7 @@ def _three_views(height: float) -> tuple[Figure, list[tuple[Axes, list[int], str
     for axes, (right, up, title) in zip(all_axes, VIEWS, strict=True):
         axes.set(title=title, xlabel=f"{right}, mm", ylabel=f"{up}, mm")
         axes.set_aspect("equal", adjustable="datalim")
-        axes.margins(0.15)
+        axes.margins(0.2)
         axes.grid(alpha=0.2)
         views.append((axes, [COORDINATE[right], COORDINATE[up]], title))
     return figure, views
@@ -309,7 +317,12 @@ def _three_views(height: float) -> tuple[Figure, list[tuple[Axes, list[int], str
 
 def _named(axes: Axes, text: str, place: Any, colour: str) -> None:
     axes.annotate(
-        text.replace("_", " "), place, xytext=(4, -3), textcoords="offset points", fontsize=8, color=colour
+        text.replace("_", " "),
+        place,
+        xytext=(7, -3),
+        textcoords="offset points",
+        fontsize=8,
+        color=colour,
     )
 
 
@@ -321,11 +334,14 @@ def geometry() -> Figure:
     angle = np.linspace(0.0, 2.0 * np.pi, 100)
     for axes, pair, title in views:
         is_front = title == "from the door"
-        for kind, colour in (("springs", BLUE), ("dampers", ORANGE)):
+        for kind, colour, seen_from in (
+            ("springs", BLUE, "from the door"),
+            ("dampers", ORANGE, "from above"),
+        ):
             for name, element in shown[kind].items():
                 ends = 1e3 * np.array([element["tub_point_T"], element["housing_point_W"]])
                 axes.plot(*ends[:, pair].T, "o-", color=colour, ms=3)
-                if is_front:
+                if title == seen_from:
                     _named(axes, name, ends[1, pair], colour)
         for name, sensor in shown["sensors"].items():
             place = 1e3 * np.array(sensor["point_T"])[pair]
@@ -344,7 +360,9 @@ def geometry() -> Figure:
     return figure
 
 
-@picture("load", "Radius, phase and place along the drum of an unbalance, and the sense of rotation")
+@picture(
+    "load", "Radius, phase and place along the drum of an unbalance, and the sense of rotation"
+)
 def load_picture() -> Figure:
     """Draw where the unbalance of a load is."""
     figure = Figure(figsize=(9.0, 3.8))
@@ -372,7 +390,7 @@ def load_picture() -> Figure:
     side.annotate("", (y, -40), (0, -40), arrowprops={"arrowstyle": "<->", "color": RED})
     side.text(y / 2, -75, "y < 0", color=RED, ha="center")
     side.axvline(0.0, color="0.5", lw=1, ls=":")
-    side.set(title="from the right; the door is on the left", xlabel="y, mm", ylabel="z, mm")
+    side.set(title="from the right (door: left)", xlabel="y, mm", ylabel="z, mm")
     side.set_aspect("equal")
     return figure
 
@@ -389,7 +407,7 @@ def tubes() -> Figure:
             axes.plot(*np.array([ends[0], middle])[:, pair].T, color=ORANGE, lw=7, alpha=0.5)
             axes.plot(*np.array([middle, ends[1]])[:, pair].T, color=ORANGE, lw=3)
             axes.plot(*ends[:, pair].T, "o", color=RED, ms=6)
-            if title == "from the door":
+            if title == "from the right":
                 _named(axes, name, ends[1, pair], ORANGE)
     axes, pair, _ = views[0]
     axes.plot([], [], color=ORANGE, lw=7, alpha=0.5, label="outer tube, at the tub")
@@ -423,7 +441,7 @@ def cabinet() -> Figure:
     front.set(title="from the door", xlabel="x, mm", ylabel="z, mm")
     for axes in (above, front):
         axes.set_aspect("equal", adjustable="datalim")
-        axes.margins(0.25)
+        axes.margins(0.35)
     return figure
 
 

@@ -21,7 +21,9 @@ TESTS = [name for rows in GROUPS.values() for row in rows for name in row.get("t
 
 def rows_of(page, columns):
     """Return the rows of the tables of a page that have so many columns."""
-    lines = [line.strip("| ").split(" | ") for line in text_of(page).splitlines() if line[:1] == "|"]
+    lines = [
+        line.strip("| ").split(" | ") for line in text_of(page).splitlines() if line[:1] == "|"
+    ]
     return [cells for cells in lines if len(cells) == columns]
 
 
@@ -62,7 +64,7 @@ def test_the_amplitudes_on_the_page_are_those_of_the_machine(reference):
     both = pd.concat(amplitude_table(result) for result in (effect.without, effect.with_gasket))
     shown = {cells[0]: cells for cells in rows_of(DOCS / "validation.md", 6)}
     for row in amplitude_rows(both):
-        quantity, published, ours, *_ = shown[row.quantity]
+        _, published, ours, *_ = shown[row.quantity]
         if row.quantity == "mean difference":
             continue
         assert published == row.published

@@ -157,5 +157,7 @@ def test_the_page_of_verification_has_a_row_per_comparison():
     page = verification_page({"Laws": rows}, "python write.py", {})
     assert "| a law | hand values | 1e-9 | `a.py`<br>`b.py` |" in page
     assert "| a run | MuJoCo | 1 % | `python c.py` |" in page
-    ran = verification_page({"Laws": rows}, "python write.py", {"a.py": "2 passed", "b.py": "2 passed"})
+    ran = verification_page(
+        {"Laws": rows}, "python write.py", {"a.py": "2 passed", "b.py": "2 passed"}
+    )
     assert "| `a.py`<br>`b.py` | 2 passed |" in ran

@@ -124,7 +124,8 @@ def _head_of_section(section: str, reasons: Mapping[str, str]) -> list[str]:
         words = reasons.get(f"{section} | {name}")
         if words:
             code = "; ".join(f"`{part}`" for part in words.split("; "))
-            lines += [f"{name.capitalize()}: {code if name == 'command' else words}.", ""]
+            sentence = f"{name.capitalize()}: {code if name == 'command' else words}."
+            lines += [sentence if name == "command" else fill(sentence, WIDTH), ""]
     return lines
 
 
