@@ -45,12 +45,12 @@ def machine(reference):
 
 
 def radial_force(reference, stiffness):
-    """Of a straight table for the gasket, as long as the machine's."""
+    """Return a straight table of the gasket's force, as long as the machine's."""
     return tuple(float(stiffness * x) for x in reference.gasket.stiffness_x.displacement)
 
 
 def cases_of(reference, count, seed=1):
-    """Cases with other gaskets, weights, loads and profiles, some without gasket."""
+    """Return cases with other gaskets, weights, loads and profiles, some without gasket."""
     rng = np.random.default_rng(seed)
     for index in range(count):
         changed = with_value(
