@@ -37,12 +37,21 @@ PLOTS = "plots.json"
 FREE = """\
 quantities:
   friction:
-    {bounds: (10, 60) N, prior: (30, 10) N, sets: damper_types.friction.friction_force}
+    bounds: (10, 60) N
+    prior: (30, 10) N
+    sets: damper_types.friction.friction_force
+    source: "data sheet: 20 to 40 N"
   radius:
-    {bounds: (200, 250) mm, prior: (240, 10) mm, sets: loads.middle.unbalances.0.radius}
+    bounds: (200, 250) mm
+    prior: (240, 10) mm
+    sets: loads.middle.unbalances.0.radius
+    source: laundry at the drum wall
 """
 BENCH = 'wm-drake rig damper --component mstv_damper -f "1,3,10 Hz" -a "0.3,1 mm" --out bench'
-RUBBER = 'wm-drake rig gasket --axis axial -f "1,3,5 Hz" -a "1,5,10 mm" --out rubber'
+RUBBER = (
+    'wm-drake rig gasket --axis axial --set "gasket.dahl_force_y=4 N" '
+    '--set "gasket.dahl_displacement_y=0.5 mm" -f "1,3,5 Hz" -a "1,5,10 mm" --out rubber'
+)
 
 
 @dataclass(frozen=True)
@@ -280,7 +289,7 @@ def _write_plots(entry: Entry, figures: Path, pictures: Path) -> list[str]:
 def _thumbnail(screenshot: bytes, width: int) -> Image.Image:
     picture = Image.open(io.BytesIO(screenshot)).convert("RGB")
     height = round(picture.height * width / picture.width)
-    return picture.resize((width, height), Image.Resampling.LANCZOS).quantize(32)
+    return picture.resize((width, height), Image.Resampling.LANCZOS).quantize(64)
 
 
 def _plots(pictures: Path) -> dict[str, list[str]]:
