@@ -206,7 +206,7 @@ def main() -> None:
     pictures = arguments.out.parent / "pictures" / "gallery"
     if not arguments.quick:
         _write_pictures(pictures, arguments.only)
-    text = "\n".join(_lines(_plots(pictures)))
+    text = "\n".join(_lines(_plots(pictures), {path.stem for path in pictures.glob("*.png")}))
     print(text)
     arguments.out.write_text(text + "\n", encoding="utf-8")
 
@@ -297,7 +297,8 @@ def _plots(pictures: Path) -> dict[str, list[str]]:
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
 
 
-def _lines(plots: dict[str, list[str]]) -> list[str]:
+def _lines(plots: dict[str, list[str]], made: set[str]) -> list[str]:
+    """Return the page; it shows the pictures that are made."""
     lines = [
         "# Gallery",
         "",
@@ -310,7 +311,8 @@ def _lines(plots: dict[str, list[str]]) -> list[str]:
         for name, text in entry.files:
             lines += [f"`{name}`:", "", "```yaml", *text.splitlines(), "```", ""]
         lines += ["```text", *entry.before, entry.command, "```", ""]
-        lines += [f"![{entry.title}](pictures/gallery/{entry.name}.png)"]
+        if entry.name in made:
+            lines.append(f"![{entry.title}](pictures/gallery/{entry.name}.png)")
         titles = plots.get(entry.name, [])
         if titles:
             lines.append("")

@@ -41,6 +41,7 @@ TOKEN = re.compile(
 )
 RELATION = re.compile("[=<>]|min over")
 SOURCE = re.compile(r"\[[ABC]\]")
+CITATION = re.compile(r'<mtext class="source">(\[[ABC]\]|own derivation)')
 WORDS = re.compile(r"(?!for\b|min\b|max\b|sum\b|curve\b)[A-Za-z]{3,}[-' :,]")
 COLUMN = re.compile(r"\s{3,}")
 
@@ -97,12 +98,15 @@ def _second_column(line: str) -> int:
 
 
 def _table(lines: list[str]) -> str:
-    """Return the MathML of lines with the same columns."""
+    """Return the MathML of lines with the same columns, and their sources below."""
     rows = [[_column(cell) for cell in COLUMN.split(line.strip())] for line in lines]
+    sources = [row.pop() for row in rows if CITATION.match(row[-1])]
     table = "".join(
         "<mtr>" + "".join(f"<mtd>{cell}</mtd>" for cell in row) + "</mtr>" for row in rows
     )
-    return f'<math display="block"><mtable displaystyle="true">{table}</mtable></math>'
+    whole = f'<math display="block"><mtable displaystyle="true">{table}</mtable></math>'
+    below = "; ".join(re.sub("<[^>]*>", "", source) for source in sources)
+    return whole + (f'<div class="source">{below}</div>' if below else "")
 
 
 def _column(text: str) -> str:

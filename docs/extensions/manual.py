@@ -17,6 +17,7 @@ from typing import Any
 
 from equations import mathml_of
 from pictures import svg_of
+from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
 
 import wm_drake
@@ -50,6 +51,7 @@ PICTURES_OF_KEYS = {
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the extension."""
+    app.add_lexer("csv", TextLexer)
     app.connect("env-before-read-docs", _spread)
     app.connect("source-read", _complete)
     app.connect("include-read", _complete_included)
