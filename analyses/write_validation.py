@@ -9,8 +9,9 @@ docs/validation.md, docs/prediction.md and docs/verification.md.
     python analyses/write_validation.py --out docs/validation.md --fitted-means
 
 Explanations of results that are missed are in validation_reasons.yaml, the tests of the page of
-verification in verification.yaml, and results of held-out loads, which take hours, in
-held_out_loads.csv. It takes about two minutes; with --tests, which runs the tests too, ten.
+verification in verification.yaml. Loads held out of the calibration, and fits with fewer free
+quantities, take hours: calibrate_reference.py wrote them to reference_held_out.csv and
+reference_fewer.csv. The script takes about two minutes; with --tests, which runs the tests, ten.
 """
 
 import argparse
@@ -55,7 +56,7 @@ from wm_drake.studies.validation import rows
 
 HERE = Path(__file__).parent
 REASONS, VERIFICATION = HERE / "validation_reasons.yaml", HERE / "verification.yaml"
-HELD_OUT = HERE / "held_out_loads.csv"
+HELD_OUT, FEWER = HERE / "reference_held_out.csv", HERE / "reference_fewer.csv"
 SHOWN_BY_A = ("2", "5", "29")  # cases of [A] Table 9 that [A] describes
 
 
@@ -92,6 +93,7 @@ def compared(reference: MachineParameters, quick: bool, means_kind: str) -> list
     effect = run_gasket_effect(reference, cases)
     both = [amplitude_table(result) for result in (effect.without, effect.with_gasket)]
     found = rows.amplitude_rows(pd.concat(both))
+    found += rows.held_out_rows(pd.read_csv(HELD_OUT))
     found += rows.effect_rows(effect_table(effect))
     published = published_results(reference.published)
     found += rows.mean_rows(grand_means(reference, quick), published, means_kind)
@@ -105,25 +107,21 @@ def compared(reference: MachineParameters, quick: bool, means_kind: str) -> list
     return found + rows.coulomb_rows(coulomb(quick))
 
 
-def held_out_section() -> list[str]:
-    """Return the section on calibrations that hold loads out."""
-    table = pd.read_csv(HELD_OUT)
-    lines = [
-        "",
-        "## Held-out loads",
-        "",
-        "Amplitudes of loads that a calibration of the reference machine did not see: mean and",
-        "largest error when they were calibrated, too, and when they were held out and predicted;",
-        "errors of the other loads in that calibration. It takes hours, so results are kept",
-        "([decision 0053](decisions/0053-predictions-start-at-priors.md)).",
-        "",
-        "Command: `wm-drake calibrate --free analyses/reference_free.yaml --leave-out back,front`.",
-        "",
-        "Tolerance: 95 % of the measured amplitudes in the 95 % intervals.",
-        "",
-    ]
-    rows_of = [list(table.columns), ["---"] * len(table.columns), *table.to_numpy().tolist()]
-    return lines + [f"| {' | '.join(map(str, row))} |" for row in rows_of]
+def simpler_machines() -> pd.DataFrame:
+    """Return the reference machine's fits with fewer free quantities, as a table of texts."""
+    table = pd.read_csv(FEWER, keep_default_na=False)
+    names = [str(text).replace(" ", ", ").replace("_", " ") for text in table.set_to_expected]
+    return pd.DataFrame(
+        {
+            "free quantities": table.free_quantities.astype(str),
+            "cost": table.cost.map("{:.0f}".format),
+            "amplitudes: mean difference": table.amplitudes_mean_percent.map("{:.1f} %".format),
+            "largest": table.amplitudes_largest_percent.map("{:.0f} %".format),
+            "means: mean difference": table.responses_mean_percent.map("{:.1f} %".format),
+            "largest of the means": table.responses_largest_percent.map("{:.0f} %".format),
+            "set to expected values here": names,
+        }
+    )
 
 
 def run_tests(groups: dict[str, list[dict[str, Any]]]) -> dict[str, str]:
@@ -192,8 +190,13 @@ def main() -> None:
     made = Made(command, notes, reasons)
     groups = YAML(typ="safe").load(VERIFICATION)
     pages = {
-        "validation.md": validation_page(found, made, rows.FITTED),
-        "prediction.md": validation_page(found, made, rows.PREDICTED, held_out_section()),
+        "validation.md": validation_page(
+            found,
+            made,
+            rows.FITTED,
+            {"Reference machine with fewer free quantities": simpler_machines()},
+        ),
+        "prediction.md": validation_page(found, made, rows.PREDICTED),
         "verification.md": verification_page(
             groups, command, run_tests(groups) if arguments.tests else {}
         ),

@@ -111,6 +111,7 @@ class Runner:
         parameters: MachineParameters,
         measures: tuple[str, ...],
         histories: bool | Container[int],
+        scenes: list[Scene] | None = None,
     ) -> None:
         """Prepare for a machine.
 
@@ -118,11 +119,14 @@ class Runner:
             parameters: Of the machine.
             measures: Keys of `MEASURES`.
             histories: Whether results have records, or the numbers of the cases that have one.
+            scenes: Scenes of the machine that no thread uses; the runner takes them from the list.
         """
         self.parameters = parameters
         self.measures, self.histories = measures, histories
         self.stopped = threading.Event()
         self._memory = threading.local()
+        self._spare = [] if scenes is None else scenes
+        self.scenes: list[Scene] = []
 
     def run(self, key: BatchKey, work_items: list[WorkItem]) -> list[RunResult]:
         """Run up to `WIDTH` work items side by side and measure them.
@@ -237,7 +241,7 @@ class Runner:
         keeps = self.histories
         keeps = keeps if isinstance(keeps, bool) else item.number in keeps
         record = self._record(item, schedule, run.samples.copy()) if keeps else None
-        diverged = _divergence(schedule.time, run.samples, run.good)
+        diverged = _divergence(schedule.time, run.samples, run.good, item)
         gap = run.gap[0] if run.gap else None
         return RunResult(item.number, item.case, values, diverged, record, gap)
 
@@ -305,7 +309,11 @@ class Runner:
         """Return the shapes of the machine, those of the thread that calls."""
         kept = self._memory.__dict__
         if "scene" not in kept:  # one for each thread: a scene has one pose at a time
-            kept["scene"] = Scene(self.parameters)
+            try:
+                kept["scene"] = self._spare.pop()
+            except IndexError:
+                kept["scene"] = Scene(self.parameters)
+            self.scenes.append(kept["scene"])
         return cast(Scene, kept["scene"])
 
     def _amplitudes(
@@ -375,11 +383,13 @@ def _floor_forces(item: WorkItem, run: "_Run") -> FloatArray | None:
     return floor_forces(cabinet, item.numbers.setup.cabinet.packed())
 
 
-def _divergence(time: FloatArray, samples: FloatArray, good: int) -> str:
+def _divergence(time: FloatArray, samples: FloatArray, good: int, item: WorkItem) -> str:
     """Return why and when a run diverged, as its record has it; "" if it did not."""
     if good == len(time):
         return ""
-    reason = diverging_coordinate(samples[good])
+    states = samples[good : good + 1, : len(item.begin)]
+    cabinet = item.numbers.layout.cabinet_part(states)
+    reason = diverging_coordinate(samples[good], None if cabinet is None else cabinet[0, :2])
     assert reason is not None  # this is the first sample out of bounds
     return divergence_text(Divergence(float(time[good]), *reason), time[:good], samples[:good])
 

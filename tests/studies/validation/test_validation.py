@@ -25,6 +25,7 @@ from wm_drake.studies.validation.rows import (
     coulomb_rows,
     counts,
     effect_rows,
+    held_out_rows,
     mean_rows,
     spin_cycle_rows,
 )
@@ -127,6 +128,32 @@ def test_coulomb_fits_are_judged_by_difference_and_ratio():
     assert [row.verdict for row in coulomb_rows(fits)] == [MET, MISSED, MISSED, MET]
 
 
+def test_held_out_loads_are_judged_by_their_mean_and_their_intervals():
+    table = pd.DataFrame(
+        {
+            "held_out": ["back front"],
+            "amplitudes": [12],
+            "calibrated_mean_percent": [8.5],
+            "predicted_mean_percent": [18.3],
+            "predicted_largest_percent": [48.9],
+            "in_intervals_percent": [100.0],
+        }
+    )
+    mean, covered = held_out_rows(table)
+    assert mean.quantity == "back and front: mean difference of 12 amplitudes"
+    assert (mean.ours, mean.verdict, mean.kind) == ("18.3 %", MISSED, PREDICTED)
+    assert (covered.ours, covered.verdict) == ("100 %", MET)
+
+
+def test_page_ends_with_tables_without_verdicts(amplitude_table):
+    table = pd.DataFrame({"free quantities": ["40"], "cost": ["137"]})
+    made = Made("x", reasons={"Fewer": "Why."})
+    page = validation_page(amplitude_rows(amplitude_table), made, FITTED, {"Fewer": table})
+    assert page.endswith(
+        "\n## Fewer\n\nWhy.\n\n| free quantities | cost |\n| --- | --- |\n| 40 | 137 |\n"
+    )
+
+
 def test_page_counts_and_explains(amplitude_table):
     rows = amplitude_rows(amplitude_table)
     table = counts(rows)
@@ -144,9 +171,9 @@ def test_page_counts_and_explains(amplitude_table):
     assert "python write.py" in page
     assert "Written 20" in page
     assert "wm_drake" in page
-    other = validation_page(rows, made, PREDICTED, ["The end."])
+    other = validation_page(rows, made, PREDICTED)
     assert other.startswith("# Prediction\n")
-    assert other.endswith("Nothing was compared.\nThe end.\n")
+    assert other.endswith("Nothing was compared.\n")
 
 
 def test_the_page_of_verification_has_a_row_per_comparison():

@@ -6,6 +6,8 @@ from itertools import groupby
 from textwrap import fill
 from typing import Any
 
+import pandas as pd
+
 from wm_drake.report.provenance import now, program
 from wm_drake.studies.validation.rows import FITTED, MISSED, PREDICTED, Row, counts
 
@@ -44,14 +46,16 @@ class Made:
     reasons: Mapping[str, str] = field(default_factory=dict)
 
 
-def validation_page(rows: Sequence[Row], made: Made, kind: str, end: Sequence[str] = ()) -> str:
+def validation_page(
+    rows: Sequence[Row], made: Made, kind: str, tables: Mapping[str, pd.DataFrame] = {}
+) -> str:
     """Return the page of the rows of one kind as Markdown.
 
     Args:
         rows: All rows; those of one section follow each other.
         made: How they were made.
         kind: `FITTED` or `PREDICTED`.
-        end: Lines behind the last section.
+        tables: Tables without verdicts by heading, for the end of the page.
     """
     own = [row for row in rows if row.kind == kind]
     text = [
@@ -72,7 +76,11 @@ def validation_page(rows: Sequence[Row], made: Made, kind: str, end: Sequence[st
         text += ["", f"## {section}", "", *_head_of_section(section, made.reasons)]
         text += _line(COLUMNS), _line(["---"] * len(COLUMNS))
         text += [_line(_cells(row, made.reasons)) for row in group]
-    return "\n".join([*text, *end]) + "\n"
+    for heading, table in tables.items():
+        text += ["", f"## {heading}", "", *_head_of_section(heading, made.reasons)]
+        text += _line(list(map(str, table.columns))), _line(["---"] * len(table.columns))
+        text += [_line(list(map(str, row))) for row in table.itertuples(index=False)]
+    return "\n".join(text) + "\n"
 
 
 def verification_page(
