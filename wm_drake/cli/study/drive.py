@@ -131,4 +131,5 @@ def _print_result(result: "DriveResult", out: Path, as_json: bool) -> None:
         table.add_row(threshold.load, *threshold_cells(result, threshold))
     Console().print(table)
     say(summary(result))
-    say(f"Results in {out}: report.html, thresholds.csv, map.csv, estimation.csv")
+    estimated = ", estimation.csv" if result.estimation is not None else ""
+    say(f"Results in {out}: report.html, thresholds.csv, map.csv{estimated}")
