@@ -90,6 +90,7 @@ def test_indices_of_the_bearing_are_right_beside_rubber():
     np.testing.assert_array_equal(balance.scale[angles], ANGLE_ARM)
     end = begin + CARRIER_STATE_SIZE
     assert balance.derivative.layout.branches_begin == end
-    free = balance.derivative.free[balance.kinematics.velocities]
-    assert free.max() < end
-    assert np.all(balance.derivative.is_velocity[balance.kinematics.velocities])
+    turns, shifts = balance.kinematics.turns, balance.kinematics.shifts
+    velocities = np.concatenate([turns[1].ravel(), shifts[1]])
+    assert balance.derivative.free[velocities].max() < end
+    assert np.all(balance.derivative.is_velocity[velocities])
