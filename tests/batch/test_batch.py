@@ -3,6 +3,7 @@
 import itertools
 import tracemalloc
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ import xarray as xr
 from simple_machines import with_gasket_tables
 
 from wm_drake.batch import SimulationInterrupted, simulate_many
-from wm_drake.batch.work_items import KEPT_NUMBERS
+from wm_drake.batch.runs import Runner
+from wm_drake.batch.work_items import KEPT_NUMBERS, Preparation
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
@@ -120,6 +122,20 @@ def test_smallest_gap_is_that_of_the_scene(machine, reference, cases):
         assert told.smallest_gap.values[index] == pytest.approx(
             alone.smallest_gap.distance, rel=1e-9
         )
+
+
+def test_helper_and_likeness_change_no_bit(machine, reference, cases):
+    """Compare a runner of the studio, which filters in a second thread, with a plain one."""
+    kinds = ("extremes", "amplitudes", "gap", "mounts")
+    key, items = next(Preparation(machine, 2.5e-3, "auto").batches(cases[:5]))
+    plain = Runner(reference, kinds, histories=False).run(key, items)
+    with ThreadPoolExecutor(1) as helper:
+        shared = Runner(reference, kinds, histories=False, helper=helper, are_alike=True)
+        found = shared.run(key, items)
+    for one, other in zip(plain, found, strict=True):
+        assert one.gap == other.gap
+        for name, values in one.values.items():
+            assert np.array_equal(values, other.values[name], equal_nan=True), name
 
 
 def recorded(machine, cases):

@@ -2,7 +2,8 @@
 
 import functools
 import threading
-from collections.abc import Container, Iterable
+from collections.abc import Callable, Container, Iterable
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -105,6 +106,9 @@ class Runner:
         parameters: MachineParameters,
         measures: tuple[str, ...],
         histories: bool | Container[int],
+        *,
+        helper: Executor | None = None,
+        are_alike: bool = False,
     ) -> None:
         """Prepare for a machine.
 
@@ -112,7 +116,12 @@ class Runner:
             parameters: Of the machine.
             measures: Keys of `MEASURES`.
             histories: Whether results have records, or the numbers of the cases that have one.
+            helper: Threads that filter displacements while other measures are taken, for a runner
+                that does not have all cores busy; None to do all in the thread that calls.
+            are_alike: Whether the runs of a batch differ little, so that the smallest gap of the
+                first leads to those of the others.
         """
+        self._helper, self._are_alike = helper, are_alike
         self.parameters = parameters
         self.measures, self.histories = measures, histories
         self.stopped = threading.Event()
@@ -157,6 +166,7 @@ class Runner:
             moved,
             extremes,
         )
+        filtered, wait = self._filtered(moved.reshape(rows, count, WIDTH), extremes[-WIDTH:])
         histories = (
             samples.reshape(rows, size, WIDTH),
             moved.reshape(rows, count, WIDTH),
@@ -164,13 +174,22 @@ class Runner:
             *self._forces_of_mounts(key, samples, rows, size, p),
         )
         lengths = self._spring_lengths(key, p, samples, rows, size)
-        filtered = self._filtered(moved.reshape(rows, count, WIDTH), extremes[-WIDTH:])
+        runs = [
+            _Run.of_lane(lane, *histories, lengths, filtered) for lane in range(len(work_items))
+        ]
+        if "gap" in self.measures:
+            near: Gap | None = None
+            for item, run in zip(work_items, runs, strict=True):
+                found = self._smallest_gap(item, schedule, run, near)
+                near = (near or found) if self._are_alike else None
+        wait()
         return [
-            self._result(item, schedule, _Run.of_lane(lane, *histories, lengths, filtered))
-            for lane, item in enumerate(work_items)
+            self._result(item, schedule, run) for item, run in zip(work_items, runs, strict=True)
         ]
 
-    def _filtered(self, moved: FloatArray, good: FloatArray) -> FloatArray:
+    def _filtered(
+        self, moved: FloatArray, good: FloatArray
+    ) -> tuple[FloatArray, Callable[[], object]]:
         """Return the filtered displacements at the sensors of runs side by side, if needed.
 
         Args:
@@ -179,12 +198,17 @@ class Runner:
 
         Returns:
             (rows, sensors, lanes); of no rows if no measure needs them or no run is complete. [m]
+            And a function that returns when they are complete.
         """
         rows, sensors = len(moved), moved.shape[1] - 3
         if not _FILTERED & set(self.measures) or not np.any(good == rows):
-            return np.empty((0, 0, WIDTH))
-        flat = filtered_columns(moved.reshape(rows, -1), sensors * WIDTH, OUTPUT_PERIOD)
-        return flat.reshape(rows, sensors, WIDTH)
+            return np.empty((0, 0, WIDTH)), lambda: None
+        flat = np.empty((rows, sensors * WIDTH))
+        work = functools.partial(
+            filtered_columns, moved.reshape(rows, -1), sensors * WIDTH, OUTPUT_PERIOD, flat
+        )
+        wait = self._helper.submit(work).result if self._helper else work
+        return flat.reshape(rows, sensors, WIDTH), wait
 
     def _forces_of_mounts(
         self, key: BatchKey, samples: FloatArray, rows: int, size: int, p: FloatArray
@@ -285,9 +309,11 @@ class Runner:
             touching = scene.contacts(*run.poses(schedule), item.begin[:6])
         return [np.array(float(pairs.index(f"{gap.moving}|{gap.fixed}"))), touching]
 
-    def _smallest_gap(self, item: WorkItem, schedule: Schedule, run: "_Run") -> Gap | None:
+    def _smallest_gap(
+        self, item: WorkItem, schedule: Schedule, run: "_Run", near: Gap | None = None
+    ) -> Gap | None:
         if not run.gap:
-            run.gap.append(self.scene().smallest_gap(*run.poses(schedule), item.begin[:6]))
+            run.gap.append(self.scene().smallest_gap(*run.poses(schedule), item.begin[:6], near))
         return run.gap[0]
 
     def scene(self) -> Scene:

@@ -105,19 +105,24 @@ def filtered(displacement: FloatArray, period: float) -> FloatArray:
     return filtered_columns(np.ascontiguousarray(displacement), displacement.shape[1], period)
 
 
-def filtered_columns(signals: FloatArray, columns: int, period: float) -> FloatArray:
+def filtered_columns(
+    signals: FloatArray, columns: int, period: float, answer: FloatArray | None = None
+) -> FloatArray:
     """Return the first columns of an array of signals, as from `filtered`.
 
     Args:
         signals: (n, >= columns), contiguous. [m]
         columns: Number of columns to filter.
         period: Time between samples. [s]
+        answer: (n, columns) array to write to; None for a new one.
     """
     rows, stride = signals.shape
+    answer = np.empty((rows, columns)) if answer is None else answer
     padding = min(round(PADDING / period), rows - 1)
     if padding <= 6 * FILTER_ORDER + 3:  # the padding that sosfiltfilt chooses by default
-        return np.full((rows, columns), np.nan)
-    answer, work = np.empty((rows, columns)), np.empty((rows + 2 * padding, columns))
+        answer[:] = np.nan
+        return answer
+    work = np.empty((rows + 2 * padding, columns))
     sections, settled = _band_pass(period)
     shape = (rows, columns, stride)
     filter_both_ways(signals.ravel(), shape, sections, settled, padding, work, answer)

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import gc
 import json
 import os
 import time
@@ -81,13 +82,18 @@ class Studio:
         self._workers = os.cpu_count() or 1
         self._executor = ThreadPoolExecutor(self._workers, thread_name_prefix="studio")
         self.turns = Turns(self._executor, self._workers)
+        self._helper = ThreadPoolExecutor(self._workers, thread_name_prefix="helper")
         self._runners: WeakKeyDictionary[OpenMachine, Runner] = WeakKeyDictionary()
         self._rankings: dict[str, asyncio.Task[list[dict[str, Any]]]] = {}
 
     def opened(self, identifier: str) -> tuple[OpenMachine, Runner]:
         """Return an open machine and its runner."""
         machine = self.machines.open(identifier)
-        return machine, self._runners.setdefault(machine, runner_of(machine))
+        if machine not in self._runners:
+            self._runners.setdefault(machine, runner_of(machine, self._helper))
+            # a full collection over all that an open machine keeps takes as long as an answer
+            gc.freeze()
+        return machine, self._runners[machine]
 
     def run(self, state: State, keys: list[str]) -> dict[str, Any]:
         """Return the answer to a page."""
@@ -121,7 +127,8 @@ class Studio:
     def end(self) -> None:
         """End all studies and threads."""
         self.jobs.end()
-        self._executor.shutdown(wait=False, cancel_futures=True)
+        for threads in (self._executor, self._helper):
+            threads.shutdown(wait=False, cancel_futures=True)
 
 
 def application(studio: Studio, token: str, port: int) -> Guard:
