@@ -93,6 +93,7 @@ def started_browser(tmp_path_factory):
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     service = webdriver.ChromeService(shutil.which("chromedriver"))
     driver = webdriver.Chrome(options=options, service=service)
+    driver.set_script_timeout(120.0)  # on a computer that has other work
     yield driver
     driver.quit()
 

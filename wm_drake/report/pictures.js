@@ -5,7 +5,7 @@
    and before printing. Sizes of texts are measured, so that no label lies over another. Every text
    is escaped here: in a description nothing is markup. */
 const Pictures = (() => {
-  const DESIGN_WIDTH = 1060, INCH = 100, GAP = 16, BAR = 20, PRINT_WIDTH = 690, MINUS = "\u2212";
+  const DESIGN_WIDTH = 1060, INCH = 100, GAP = 16, BAR = 20, PRINT_WIDTH = 686, MINUS = "\u2212";
   const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Liberation Sans", Arial, sans-serif';
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const pen = document.createElement("canvas").getContext("2d");
@@ -40,6 +40,9 @@ const Pictures = (() => {
   }
 
   // ---- texts -------------------------------------------------------------------------------
+  /* A text may be broken after a blank, a dash, a slash and, as names of responses, at _ and dots. */
+  const BREAK = /(?<=[\s/\u2013_-]|\.(?=[a-z]))/;
+
   function width(text, size, bold) {
     pen.font = `${bold ? "bold " : ""}${size}px ${FONT}`;
     return Math.max(0, ...String(text).split("\n").map(line => pen.measureText(line).width));
@@ -49,7 +52,7 @@ const Pictures = (() => {
     const found = [];
     for (const line of String(text).split("\n")) {
       let now = "";
-      for (const word of line.split(/(?<=[ /\u2013-])/)) {
+      for (const word of line.split(BREAK)) {
         if (now && width((now + word).trimEnd(), size, bold) > room) {
           found.push(now.trimEnd());
           now = word;
@@ -120,7 +123,7 @@ const Pictures = (() => {
     let cell = room;
     for (let i = 1; i < places.length; i++)
       cell = Math.min(cell, room * Math.abs(places[i] - places[i - 1]) / span);
-    const words = axis.ticks.flatMap(([, text]) => text.split(/[\s]+/));
+    const words = axis.ticks.flatMap(([, text]) => text.split(BREAK).map(word => word.trimEnd()));
     if (Math.max(0, ...words.map(word => width(word, px))) <= cell - 4) {
       const texts = axis.ticks.map(([, text]) => wrapped(text, px, cell - 4));
       return { px, texts, angle: 0, height: Math.max(...texts.map(t => t.length)) * px * HEIGHT + 5 };
@@ -583,7 +586,7 @@ const Pictures = (() => {
         else notes.push([part, note(part, names, factor, overCells)]);
       } else {
         for (const trace of curves(part, panel, label, factor))
-          traces.push({ ...trace, xaxis: names.x, yaxis: names.y, visible: !hidden, showlegend: false });
+          traces.push({ ...trace, xaxis: names.x, yaxis: names.y, visible: !hidden, showlegend: false, meta: part.label });
       }
     });
     lowered(notes, room, factor);
@@ -639,7 +642,7 @@ const Pictures = (() => {
 
   function outerTexts(d, arrangement, annotations, look) {
     const px = size(9.5, arrangement.factor), base = { showarrow: false, xref: "paper", yref: "paper", font: { size: px, color: look.ink } };
-    if (d.up) annotations.push({ ...base, text: escaped(d.up), textangle: -90, x: 0, xanchor: "left", y: 0.5, yanchor: "middle" });
+    if (d.up) annotations.push({ ...base, text: lines(wrapped(d.up, px, arrangement.height - 8)), textangle: -90, x: 0, xanchor: "left", y: 0.5, yanchor: "middle" });
     if (d.across) annotations.push({ ...base, text: escaped(d.across), x: 0.5, xanchor: "center", y: 0, yanchor: "bottom" });
     if (d.title) annotations.push({ ...base, text: escaped(d.title), x: 0.5, xanchor: "center", y: 1, yanchor: "top" });
     for (const part of d.notes) annotations.push({ ...base, ...anchor(part), text: lines(part.text.split("\n")), x: part.x, y: part.y });
@@ -754,6 +757,22 @@ const Pictures = (() => {
     legendOf(picture);
     panelButtons(picture);
     target.closest("figure").dataset.drawn = "yes";
+    if (picture.clicked && target.on && !picture.listens) {
+      picture.listens = true;
+      target.on("plotly_click", ({ points: [point] }) => picture.clicked({ label: point.data.meta, number: point.pointNumber }));
+    }
+  }
+
+  /* Changes the description of a picture, and draws it again if it is drawn. */
+  function change(figure, edit) {
+    const picture = drawn.get(figure) || prepare(figure);
+    edit(picture.d);
+    if (picture.total) draw(picture);
+  }
+
+  /* Calls a function with the label of a curve and the number of its point that a reader clicks. */
+  function clicked(figure, action) {
+    (drawn.get(figure) || prepare(figure)).clicked = action;
   }
 
   function prepare(figure) {
@@ -815,7 +834,7 @@ const Pictures = (() => {
   });
 
   return {
-    draw: show, all: () => figures().forEach(show), hue, theme, escaped, short, niceStep, font: FONT, isDark, started,
+    draw: show, change, clicked, all: () => figures().forEach(show), hue, theme, escaped, short, niceStep, font: FONT, isDark, started,
     library: () => plotly, ready: () => plotly !== null,
   };
 })();

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from scipy.stats import f as f_distribution
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH
+from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH, name_ticks
 from wm_drake.report.formatting import number
 from wm_drake.report.gasket.words import LEVELS, Words
 from wm_drake.studies.doe.anova import AnovaTable, Term
@@ -189,9 +189,7 @@ def pareto_figure(screening: Screening, load: str, words: Words) -> Figure:
         significant = significant_percent(table)
         if significant is not None:
             axes.axvline(significant, color=MARK, linewidth=1.0, linestyle=":")
-        axes.set_yticks(
-            places, [term.name.replace(":", " × ") for term in ranked], fontsize=8, parse_math=False
-        )
+        name_ticks(axes, "y", places, [term.name.replace(":", " × ") for term in ranked])
         axes.set_ylim(len(ranked) - 0.5, -0.5)
         _style_panel(axes, "x")
         axes.tick_params(axis="y", labelsize=8, length=0)
@@ -259,12 +257,7 @@ def main_effects_figure(
                 x, y = means[chosen, column], at[chosen, column]
                 axes.plot(x, y, mark, color=colour, markersize=size)
         is_first = axes.get_subplotspec().is_first_col()  # type: ignore[union-attr]
-        axes.set_yticks(
-            range(len(names)),
-            titles if is_first else [""] * len(names),
-            fontsize=7.5,
-            parse_math=False,
-        )
+        name_ticks(axes, "y", range(len(names)), titles if is_first else [""] * len(names))
         axes.set_ylim(len(names) - 0.5, -0.5)
         _style_panel(axes, "x")
         axes.tick_params(axis="y", labelsize=7.5, length=0)
@@ -360,7 +353,7 @@ def residuals_figure(screening: Screening, load: str, words: Words) -> Figure:
 
 def _label_pair(axes: Axes, first: str, second: str, words: Words, more: str = "") -> None:
     """Label a panel of two factors: the first on the axis, the second, by colour, above it."""
-    axes.set_xticks(LEVELS, [words.number(first, level) for level in LEVELS])
+    name_ticks(axes, "x", LEVELS, [words.number(first, level) for level in LEVELS])
     axes.set_xlabel(words.axis(first), fontsize=8.5, parse_math=False)
     values = ", ".join(words.number(second, level) for level in LEVELS)
     axes.set_title(
