@@ -124,8 +124,12 @@ def small_page(title):
     for axes, name in ((left, title), (right, "second")):
         axes.plot([0.0, 1.0, 2.0], [0.0, 1.0, 4.0], color="#0072b2")
         axes.plot([0.0, 2.0], [1.0, 1.0], "--", color="#b34700")
+        axes.axvspan(0.5, 0.75, color="#e2e5ea")
+        axes.axhline(3.0, color="#1a1a1a")
         axes.set_title(name, parse_math=False)
         axes.set_xlabel("time, s")
+        axes.set_xlim(0.0, 2.0)
+    right.set_xticks([0.0, 2.0], ["start", "the end of the run"])
     handles = [
         Line2D([], [], color="#0072b2", label="computed"),
         Line2D([], [], color="#b34700", linestyle="--", label="measured"),
@@ -177,6 +181,23 @@ def test_markup_in_a_name_is_text(browser, small):
         == HOSTILE
     )
     assert browser.errors() == []
+
+
+def test_bands_lines_and_the_last_tick_are_where_they_belong(browser, small):
+    opened(browser, small("first"))
+    box = """const box = n => { const r = n.getBoundingClientRect(); return [r.left, r.right, r.top, r.bottom]; };
+        const plot = document.querySelector('.plot'), shown = selector => [...plot.querySelectorAll(selector)].map(box);
+        return [box(plot), shown('.nsewdrag'), shown('.shapelayer path'), shown('.xtick text')]"""
+    plot, panels, shapes, ticks = browser.run(box)
+    left, right, top, bottom = panels[0]
+    band = next(s for s in shapes if s[1] - s[0] < 0.5 * (right - left))
+    at = [(edge - left) / (right - left) for edge in band[:2]]
+    assert at == pytest.approx([0.25, 0.375], abs=0.01)
+    assert band[2:] == pytest.approx([top, bottom], abs=2.0)
+    rule = next(s for s in shapes if s[1] - s[0] > 0.9 * (right - left))
+    assert (bottom - rule[2]) / (bottom - top) == pytest.approx(3.2 / 4.4, abs=0.02)
+    assert "the end of the run" in browser.run("return document.querySelector('.plot').textContent")
+    assert max(tick[1] for tick in ticks) <= plot[1]
 
 
 def test_curves_and_panels_are_switched_and_zoomed(browser, small):

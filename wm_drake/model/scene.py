@@ -334,8 +334,8 @@ class Scene:
             for distance, direction, pair in near_rest:
                 if distance - motion.shift >= best.distance:
                     break  # this pair and all that follow are farther apart at every pose
-                near = motion.nearer_than(best.distance, distance, direction, stride)
-                best = self._smallest_of_pair(pair, direction, best, time[near], poses[near])
+                left = motion.nearer_than(best.distance, distance, direction, stride)
+                best = self._smallest_of_pair(pair, direction, best, time[left], poses[left])
         return best
 
     def pair_names(self) -> list[str]:

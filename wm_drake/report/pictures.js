@@ -98,16 +98,18 @@ const Pictures = (() => {
 
   const upCount = height => Math.max(3, Math.round(height / 34));
 
-  /* Texts that a plain axis is likely to show: their widths make room for them. */
-  function likelyTexts(axis, most) {
-    if (axis.ticks) return axis.ticks.map(([, text]) => text);
+  /* First and last tick that a plain axis is likely to show, [place, text]: they need room. */
+  function likelyTicks(axis, most) {
+    if (axis.ticks) return axis.ticks;
     const [a, b] = axis.range, low = Math.min(a, b), high = Math.max(a, b);
-    if (axis.is_log) return ["10\u221288"];
-    if (!(high > low)) return [String(low)];
+    if (axis.is_log) return [[low, "10\u221288"]];
+    if (!(high > low)) return [[low, String(low)]];
     const step = niceStep(high - low, most), decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
     return [Math.ceil(low / step) * step, Math.floor(high / step) * step]
-      .map(value => value.toFixed(Math.min(8, decimals)));
+      .map(value => [value, value.toFixed(Math.min(8, decimals)).replace("-", MINUS)]);
   }
+
+  const likelyTexts = (axis, most) => likelyTicks(axis, most).map(([, text]) => text);
 
   // ---- room around a panel -----------------------------------------------------------------
   const size = (points, factor) => Math.max(9.5, points * (INCH / 72) * factor);
@@ -149,6 +151,21 @@ const Pictures = (() => {
     return { px, texts, width: Math.max(0, ...texts.flat().map(text => width(text, px))) + 8 };
   }
 
+  /* How far the first and the last tick across reach beyond the axes. [px] */
+  function overhang(axis, { px, height, texts, angle }, room) {
+    const found = { left: 0, right: 0 };
+    if (!height) return found;
+    const scale = axis.is_log ? Math.log10 : value => value, [a, b] = axis.range.map(scale);
+    likelyTicks(axis, Math.max(3, Math.round(room / 62))).forEach(([place, text], i) => {
+      const at = room * (scale(place) - a) / (b - a || 1), own = texts ? texts[i] : [text];
+      const half = angle ? 0.5 * own.length * px * HEIGHT : 0.5 * Math.max(...own.map(line => width(line, px)));
+      if (at < -1 || at > room + 1) return;
+      found.left = Math.max(found.left, half - at);
+      found.right = Math.max(found.right, at + half - room);
+    });
+    return found;
+  }
+
   /* Room that a panel needs outside its axes. [px] */
   function around(panel, twin, room, height, factor, isSolo, total) {
     const need = { left: 0, right: 4, top: 6, bottom: 4 };
@@ -159,6 +176,9 @@ const Pictures = (() => {
     need.upLabel = y.label ? wrapped(y.label, label, Math.max(60, height)) : [];
     need.left = need.upTicks.width + (need.upLabel.length ? need.upLabel.length * label * HEIGHT + 6 : 0);
     need.acrossTicks = acrossTicks(x, room, factor);
+    const beyond = overhang(x, need.acrossTicks, room);
+    need.left = Math.max(need.left, beyond.left + 2);
+    need.right = Math.max(need.right, beyond.right + 4);
     const under = size(x.label_size, factor);
     need.acrossLabel = x.label ? wrapped(x.label, under, Math.max(80, room)) : [];
     const outside = need.acrossTicks.height
@@ -471,6 +491,7 @@ const Pictures = (() => {
       },
     });
     if (panel.x.ticks) {
+      across.ticklabeloverflow = "allow";
       across.tickvals = panel.x.ticks.map(([at]) => at);
       across.ticktext = panel.x.ticks.map(([, text], i) => lines(ticks.texts ? ticks.texts[i] : [text]));
     }
@@ -568,18 +589,15 @@ const Pictures = (() => {
       const label = part.label || (entry !== null ? entries(d)[entry].label : null);
       if (part.kind === "rule" || part.kind === "span") {
         if (hidden) return;
-        const other = part.along === "x" ? "y" : "x", is = part.kind === "rule";
-        const across = part.along === "x";
-        const shape = { type: is ? "line" : "rect", layer: is ? "above" : "below", xref: names.x, yref: names.y };
-        if (is) {
-          Object.assign(shape, { [`${other}0`]: part.at, [`${other}1`]: part.at, line: { color: hue(part.color), width: Math.max(1, part.width), dash: dashes(part.dash) } });
-          Object.assign(shape, { [`${part.along}0`]: 0, [`${part.along}1`]: 1, [`${part.along}ref`]: `${names[part.along]} domain` });
-        } else {
-          Object.assign(shape, { fillcolor: hue(part.color), line: { width: 0 } });
-          Object.assign(shape, { [`${part.along}0`]: part.range[0], [`${part.along}1`]: part.range[1] });
-          Object.assign(shape, { [`${other}0`]: 0, [`${other}1`]: 1, [`${other}ref`]: `${names[other]} domain` });
-        }
-        shapes.push(shape);
+        const { along } = part, other = along === "x" ? "y" : "x", isRule = part.kind === "rule";
+        const [begin, end] = isRule ? [part.at, part.at] : part.range;
+        shapes.push({
+          type: isRule ? "line" : "rect", layer: isRule ? "above" : "below",
+          [`${other}ref`]: names[other], [`${other}0`]: begin, [`${other}1`]: end,
+          [`${along}ref`]: `${names[along]} domain`, [`${along}0`]: 0, [`${along}1`]: 1,
+          ...(isRule ? { line: { color: hue(part.color), width: Math.max(1, part.width), dash: dashes(part.dash) } }
+            : { fillcolor: hue(part.color), line: { width: 0 } }),
+        });
       } else if (part.kind === "text") {
         const isPlain = part.in_data.every(Boolean) && !part.arrow && !part.shift.some(Boolean) && !part.angle;
         if (isPlain) texts.push(part);
