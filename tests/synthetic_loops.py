@@ -12,7 +12,7 @@ def motions_mm(*pairs):
 
 
 def measured(bench, motions, *, noise=0.0, seed=0, samples=150, periods=3.2):
-    """As a bench would record them: unevenly, from anywhere in the motion, with offset and drift of both instruments."""
+    """Return loops as a bench records them: uneven times, any start, offset and drift of both instruments."""
     place, rng, found = np.random.default_rng(5), np.random.default_rng(seed), []
     for k, (motion, loop) in enumerate(zip(motions, force_loops(bench, motions), strict=True)):
         t = np.sort(place.uniform(0.0, periods / motion.frequency, samples))

@@ -78,7 +78,11 @@ FAULTY_MACHINES = {
     ),
     "missing measured table": (
         in_machine("measured: [nosuch.csv]"),
-        "measured: No such file or directory",
+        "machine.yaml:2: measured.0: file 'nosuch.csv': No such file or directory",
+    ),
+    "missing table of published results": (
+        in_machine("published: [nosuch.csv]"),
+        "machine.yaml:2: published.0: file 'nosuch.csv': No such file or directory",
     ),
     "spring that would push": (
         in_machine("frames: {spring_left_housing: {position: '(-250, 0, -600) mm'}}"),
@@ -179,7 +183,7 @@ def assert_refused(ended, before, message):
 @pytest.mark.parametrize("fault", FAULTY_MACHINES)
 def test_faulty_machine_is_refused_with_one_line_and_nothing_written(wm_drake, fault, command):
     files, message = FAULTY_MACHINES[fault]
-    if (fault, command) == ("missing measured table", ("machine", "show")):
+    if fault.startswith("missing ") and "table" in fault and command == ("machine", "show"):
         pytest.skip("what is shown needs no measured amplitudes")
     before = write_all(files)
     ended = wm_drake(*command, "machine.yaml")

@@ -379,3 +379,12 @@ def test_bad_input_gets_one_message_and_leaves_nothing(wm_drake, arguments, mess
 def test_help_names_methods_and_units(wm_drake):
     assert "response-surface" in wm_drake("identify", "damper", "--help").out
     assert "Hz" in wm_drake("rig", "damper", "--help").out
+
+
+def test_damper_file_without_a_law_is_told_so(wm_drake):
+    Path("slider.yaml").write_text("friction_force: 45 N\nsponge_stiffness: 176 N/mm\n")
+    ended = wm_drake("rig", "damper", "--component", "slider.yaml", "-f", "1 Hz", "-a", "1 mm")
+    assert ended.code == 2
+    assert ended.err.startswith("slider.yaml: law: ")
+    assert "mstv" in ended.err
+    assert len(ended.messages) == 1

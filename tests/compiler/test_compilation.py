@@ -144,12 +144,12 @@ LAWS = {
 
 
 def _same_way(f, other):
-    """The other law compiled or interpreted, as f is."""
+    """Return the other law compiled or interpreted, as f is."""
     return other if hasattr(f, "py_func") else generic(other)
 
 
 def flat(answer):
-    """A law's answer, a scalar or nested tuples, as one list."""
+    """Return a law's answer, a scalar or nested tuples, as one list."""
     return [x for part in answer for x in flat(part)] if isinstance(answer, tuple) else [answer]
 
 

@@ -66,7 +66,7 @@ def test_interpreted_they_are_numpys(function):
 
 @compiled
 def everything(x, y, out):
-    """Each operation that lanes know, one result a line."""
+    """Return each operation that lanes know, one result a line."""
     a, b = x[0], x[1]
     out[0], out[1], out[2], out[3], out[4] = a + b, a - b, a * b, a / b, -a
     out[5], out[6], out[7] = abs(a), floor(a), sqrt(abs(a))

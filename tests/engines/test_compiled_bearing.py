@@ -61,7 +61,7 @@ MACHINES = machines()
 
 
 def random_states(rng, coordinates, sponges):
-    """A state of the plant as one block for tub and drum, one for each damper's tubes, one for the carrier; and of sponges."""
+    """Draw a state of tub and drum, of each damper's tubes, of the carrier and of the sponges."""
     blocks = [rng.uniform(-1.0, 1.0, 14) * SIZES for _ in range(2 + len(coordinates.tubes))]
     for block in blocks[1:-1]:
         block[6] *= 0.05 / SIZES[6]  # an extension

@@ -93,7 +93,7 @@ def test_derivatives_agree_without_gasket_and_dampers_and_with_other_bodies():
 
 
 def redrawn(tmp_path, *changes):
-    """The SDF of the reference machine with pieces of its text replaced, as a file; frames and shapes stay where they are."""
+    """Write the SDF of the reference machine with pieces of its text replaced; frames and shapes stay."""
     text = sdf_path("oscillating_group.sdf").read_text()
     for pattern, replacement in changes:
         text, count = re.subn(pattern, replacement, text, count=1, flags=re.DOTALL)

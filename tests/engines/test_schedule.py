@@ -21,7 +21,7 @@ PROFILES = {
 
 
 def angle_at(profile, time):
-    """By quadrature of the speed, exact for straight pieces."""
+    """Integrate the speed by quadrature, exact for straight pieces."""
     grid = np.union1d(np.array(profile.time), np.append(time, 0.0))
     grid = grid[grid <= time]
     return np.trapezoid(profile.speed_at(grid), grid)

@@ -52,7 +52,7 @@ LOSSY = packed(DAMPING, ROTATIONAL_DAMPING, FRICTION_TORQUE)
 
 
 def angular_velocity(r, r_rate):
-    """In the fixed frame, of the rotation exp(r) while r changes (textbook left Jacobian of the exponential map)."""
+    """Return the rate of the rotation exp(r) in the fixed frame, by the left Jacobian of the exponential map."""
     angle = np.linalg.norm(r)
     first, second = (1.0 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
     return r_rate + first * np.cross(r, r_rate) + second * np.cross(r, np.cross(r, r_rate))

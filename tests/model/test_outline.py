@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wm_drake.compiler.lanes import WIDTH
-from wm_drake.model.outline import support_history
+from wm_drake.model.outline import lowest_points
 
 CENTRE, HALF, RADIUS = np.array([0.1, -0.2, 0.05]), np.array([0.03, 0.2, 0.11]), 0.17  # m
 AXES = Rotation.from_euler("xyz", [0.3, -0.8, 1.1]).as_matrix()
@@ -32,7 +32,8 @@ def test_a_shape_begins_at_its_first_point_along_the_direction(points, half, is_
     for direction in (*rng.normal(size=(4, 3)), AXES[2]):  # the last along a cylinder's own axis
         direction = direction / np.linalg.norm(direction)
         nearest = np.empty((len(poses), 1))
-        support_history(poses, direction, CENTRE, AXES.ravel(), half, is_round, nearest)
+        shape = np.concatenate([CENTRE, AXES.ravel(), half])
+        lowest_points(poses, direction, shape, is_round, nearest)
         for pose, found in zip(poses, nearest[:, 0], strict=True):
             placed = Rotation.from_euler("xyz", pose[:3]).apply(CENTRE + points @ AXES) + pose[3:]
             assert found == pytest.approx(np.min(placed @ direction), abs=1e-8)

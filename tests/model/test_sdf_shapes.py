@@ -38,12 +38,13 @@ PLANE = "<plane><normal>0 0 1</normal><size>1 1</size></plane>"
     ("shape", "message"),
     [
         (PLANE, "is a plane, which has no bounds"),
-        ("<sphere><radius>nan</radius></sphere>", "has 'nan' as its radius; allowed are finite numbers above 0"),
+        ("<sphere><radius>nan</radius></sphere>", "has 'nan' as its radius; allowed are numbers up to 1000 (metres), above 0"),
         ("<sphere><radius>-1</radius></sphere>", "has '-1' as its radius"),
+        ("<sphere><radius>1e300</radius></sphere>", "has '1e300' as its radius"),
         ("<box><size>1 0 1</size></box>", "has '1 0 1' as its size"),
         (mesh("nosuch.obj"), "has the mesh 'nosuch.obj', which cannot be read: No such file or directory"),
         (mesh("empty.obj"), "has the mesh 'empty.obj', which has no corners"),
-        (mesh("nan.obj"), "has the mesh 'nan.obj', which has a corner that is not three finite numbers"),
+        (mesh("nan.obj"), "has the mesh 'nan.obj', which has a corner that is not three numbers up to 1000"),
         (mesh("http://localhost/a.obj"), "has the mesh 'http://localhost/a.obj'; allowed is the name of a file"),
         (mesh("file:///dev/zero"), "allowed is the name of a file"),
         (mesh("pictures.png"), "allowed are files .obj, .vtk, .gltf"),
@@ -76,6 +77,17 @@ def test_every_bad_shape_is_reported(tmp_path):
     with pytest.raises(InputError) as error:
         check_shapes(path)
     assert len(error.value.problems) == 2
+
+
+@pytest.mark.parametrize("pose", ["1e300 0 0 0 0 0", "0 nan 0 0 0 0"])
+def test_pose_too_far_away_is_refused(tmp_path, pose):
+    path = tmp_path / "far.sdf"
+    path.write_text(
+        f"<sdf version='1.9'><model name='m'><link name='l'><pose>{pose}</pose></link></model></sdf>",
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match=r"a pose is '.*'; allowed are numbers up to 1000"):
+        check_shapes(path)
 
 
 def test_shipped_models_are_accepted():

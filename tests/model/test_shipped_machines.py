@@ -48,7 +48,7 @@ def readme():
 
 
 def is_written(node, parts):
-    """Whether a number stands in the file; defaults do not."""
+    """Return whether a number stands in the file; defaults do not."""
     if not parts:
         return True
     if isinstance(node, BaseModel):

@@ -29,7 +29,7 @@ HARDENING = ForceTable(
 
 @pytest.fixture
 def plain(reference):
-    """The reference machine with plain numbers for the stiffnesses of its gasket."""
+    """Return the reference machine with plain numbers for the stiffnesses of its gasket."""
     for index, name in enumerate(STIFFNESSES):
         reference = with_value(reference, f"gasket.{name}", 3000.0 + 100.0 * index)
     return reference

@@ -23,7 +23,7 @@ def refused(function, *arguments):
 
 
 def doubling(levels, width=2):
-    """A list of lists ... of which each is an alias: width ** levels values."""
+    """Return nested lists of aliases with width ** levels values."""
     rows = ["a0: &a0 [" + ", ".join("x" * width) + "]"]
     rows += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * width)}]" for n in range(1, levels)]
     return "\n".join(rows) + "\n"

@@ -33,7 +33,7 @@ def machine():
 
 @pytest.fixture(scope="module")
 def variants(machine):
-    """With and without gasket; without, the tub moves half as far and the gap is wider."""
+    """Return a run with and one without gasket; the latter moves half as far with a wider gap."""
     cases = [
         [case_result(machine, "middle", True), case_result(machine, "back", True)],
         [

@@ -20,7 +20,7 @@ RATE = 200.0  # Hz, as records are sampled
 
 
 def record_of(displacement, drum_speed=None):
-    """A record with one sensor, at rest but for its displacement."""
+    """Return a record with one sensor, at rest but for its displacement."""
     n = len(displacement)
     zeros = np.zeros((n, 3))
     axes = {

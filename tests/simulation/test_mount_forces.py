@@ -14,7 +14,7 @@ TIME = 5e-3 * np.arange(8000)
 
 
 def record(gasket="yes"):
-    """A spring at 100 N + 20 N sin, a damper of 30 N sgn, a gasket force that turns with 5 N."""
+    """Return a record: a spring at 100 N + 20 N sin, a damper of 30 N sgn, a gasket force of 5 N that turns."""
     phase, none = 2.0 * np.pi * 5.0 * TIME, 0.0 * TIME
     spring = np.stack([none, none, -100.0 - 20.0 * np.sin(phase)], axis=1)
     damper = np.stack([18.0 * np.sign(np.sin(phase)), none, 24.0 * np.sign(np.sin(phase))], axis=1)

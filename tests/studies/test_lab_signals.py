@@ -61,7 +61,7 @@ def write_uff(path, channels):
 
 
 def write_mat(path, channels):
-    """A MAT file has no units: accelerations are in m/s^2, the speed in rpm."""
+    """Write a MAT file, which has no units: accelerations are in m/s^2, the speed in rpm."""
     factors = {"g": G}
     values = {name: value * factors.get(unit, 1.0) for name, (value, unit) in channels.items()}
     scipy.io.savemat(path, {"time": TIME, **values})

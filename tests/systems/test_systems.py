@@ -392,7 +392,7 @@ def test_readings_repeat_the_force_port_row_by_row(element):
 
 
 def computed(system, context):
-    """All that a system computes, as one array: generalized force, own outputs, rate of its state."""
+    """Return all that a system computes as one array: generalized force, own outputs, rate of its state."""
     rate = (
         system.EvalTimeDerivatives(context).CopyToVector()
         if context.num_continuous_states()

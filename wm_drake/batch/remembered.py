@@ -7,7 +7,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from wm_drake.batch.ledger import Ledger, key_of
+from wm_drake.batch.ledger import Ledger, Result, key_of
 from wm_drake.batch.many import as_table, simulate_many
 from wm_drake.batch.runs import MEASURES, RunResult
 from wm_drake.model.bodies import sdf_path
@@ -124,16 +124,34 @@ def simulate_remembered(
                 to_run.append(len(keys) - 1)
                 yield case
 
-    def store(run: RunResult) -> None:
-        nonlocal done
-        ledger.put(keys[to_run[run.number]], run.values, run.diverged)
-        done += 1
-        progress(done)
+    ended: dict[str, Result] = {}  # finished since the last call of `store`
 
-    simulate_many(machine, missing(), measures=wanted, step=step, workers=workers, finished=store)
+    def keep(run: RunResult) -> None:
+        ended[keys[to_run[run.number]]] = Result(run.values, run.diverged)
+
+    def store(_finished: int) -> None:
+        nonlocal done
+        together = dict(ended)  # runs that end together are stored together
+        ended.clear()
+        ledger.put_all(together)
+        found.update(together)
+        for _ in together:
+            done += 1
+            progress(done)
+
+    found: dict[str, Result] = {}
+    simulate_many(
+        machine,
+        missing(),
+        measures=wanted,
+        step=step,
+        workers=workers,
+        progress=store,
+        finished=keep,
+    )
     rows = {}
     for number, (name, key) in enumerate(zip(names, keys, strict=True)):
-        result = ledger.get(key)
+        result = found[key] if key in found else ledger.get(key)
         rows[number] = (
             name,
             result.note,

@@ -2,8 +2,7 @@
 
 import functools
 import threading
-from collections.abc import Callable, Container, Iterable
-from concurrent.futures import Executor
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -34,8 +33,8 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.drive import VARIABLES as DRIVE_VARIABLES
 from wm_drake.simulation.drive import measured_drive
 from wm_drake.simulation.feet import FOOT_VARIABLES, REGION_VARIABLES, cabinet_of, foot_measures
-from wm_drake.simulation.histories import measure_samples_lanes
-from wm_drake.simulation.measures import amplitudes, filtered, filtered_columns, power_means
+from wm_drake.simulation.histories import measure_samples_lanes, poses_of_runs
+from wm_drake.simulation.measures import amplitudes, filtered, filtered_lanes, power_means
 from wm_drake.simulation.mount_histories import measure_mounts_lanes
 from wm_drake.simulation.mounts import (
     KINDS,
@@ -46,7 +45,6 @@ from wm_drake.simulation.mounts import (
     sums_size,
 )
 from wm_drake.simulation.records import Record, as_record
-from wm_drake.simulation.spring_lengths import smallest_lengths_lanes
 from wm_drake.simulation.spring_tension import tensions_at
 from wm_drake.simulation.vibration import region_displacements
 
@@ -70,11 +68,18 @@ MEASURES = {
 _FILTERED = {"amplitudes", "amplitudes in regions", "power means"}
 """Measures that need the filtered displacements at the sensors."""
 
+_OF_GAP = {"gap", "contacts"}
+"""Measures that need the poses of the tub."""
+
 _OF_FEET = {"feet", "feet regions"}
 """Measures that need the wrench on the cabinet over time."""
 
 _OF_MOUNTS = {"mounts", "cabinet"} | _OF_FEET
 """Measures that need the forces of the mounts."""
+
+
+_NONE = np.empty(0, dtype=np.int64)
+"""No indices."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +112,6 @@ class Runner:
         measures: tuple[str, ...],
         histories: bool | Container[int],
         *,
-        helper: Executor | None = None,
         are_alike: bool = False,
     ) -> None:
         """Prepare for a machine.
@@ -116,12 +120,10 @@ class Runner:
             parameters: Of the machine.
             measures: Keys of `MEASURES`.
             histories: Whether results have records, or the numbers of the cases that have one.
-            helper: Threads that filter displacements while other measures are taken, for a runner
-                that does not have all cores busy; None to do all in the thread that calls.
             are_alike: Whether the runs of a batch differ little, so that the smallest gap of the
                 first leads to those of the others.
         """
-        self._helper, self._are_alike = helper, are_alike
+        self.are_alike = are_alike
         self.parameters = parameters
         self.measures, self.histories = measures, histories
         self.stopped = threading.Event()
@@ -153,6 +155,8 @@ class Runner:
             if self.stopped.is_set():
                 return []
         moved, extremes = self._array("moved", rows * count), self._array("extremes", count + 7)
+        springs = key.layout.elements.springs if "spring tensions" in self.measures else _NONE
+        lengths = self._array("spring lengths", len(springs))
         measure_samples_lanes(
             samples,
             rows,
@@ -163,33 +167,42 @@ class Runner:
             key.layout.elements.branches,
             self._lanes("points", points),
             count,
+            springs,
             moved,
             extremes,
+            lengths,
         )
-        filtered, wait = self._filtered(moved.reshape(rows, count, WIDTH), extremes[-WIDTH:])
         histories = (
             samples.reshape(rows, size, WIDTH),
             moved.reshape(rows, count, WIDTH),
             extremes.reshape(-1, WIDTH),
             *self._forces_of_mounts(key, samples, rows, size, p),
         )
-        lengths = self._spring_lengths(key, p, samples, rows, size)
-        runs = [
-            _Run.of_lane(lane, *histories, lengths, filtered) for lane in range(len(work_items))
-        ]
-        if "gap" in self.measures:
-            near: Gap | None = None
-            for item, run in zip(work_items, runs, strict=True):
-                found = self._smallest_gap(item, schedule, run, near)
-                near = (near or found) if self._are_alike else None
-        wait()
+        filtered = self._filtered(moved.reshape(rows, count, WIDTH), extremes[-WIDTH:])
+        by_lane = (
+            lengths.reshape(-1, WIDTH),
+            filtered,
+            *_peaks(filtered),
+            np.moveaxis(self._poses(samples, rows, size), 0, -1),
+        )
+        runs = [_Run.of_lane(lane, *histories, *by_lane) for lane in range(len(work_items))]
+        if self.are_alike and "gap" in self.measures:
+            first = self._smallest_gap(work_items[0], schedule, runs[0])
+            for item, run in zip(work_items[1:], runs[1:], strict=True):
+                self._smallest_gap(item, schedule, run, first)
         return [
             self._result(item, schedule, run) for item, run in zip(work_items, runs, strict=True)
         ]
 
-    def _filtered(
-        self, moved: FloatArray, good: FloatArray
-    ) -> tuple[FloatArray, Callable[[], object]]:
+    def _poses(self, samples: FloatArray, rows: int, size: int) -> FloatArray:
+        """Return the poses of the tub of each run (lanes, rows, 6), if a measure needs them."""
+        if not _OF_GAP & set(self.measures):
+            return np.empty((WIDTH, 0, 6))
+        poses = self._array("poses", rows * 6).reshape(WIDTH, rows, 6)
+        poses_of_runs(samples, rows, size, poses)
+        return poses
+
+    def _filtered(self, moved: FloatArray, good: FloatArray) -> FloatArray:
         """Return the filtered displacements at the sensors of runs side by side, if needed.
 
         Args:
@@ -198,17 +211,12 @@ class Runner:
 
         Returns:
             (rows, sensors, lanes); of no rows if no measure needs them or no run is complete. [m]
-            And a function that returns when they are complete.
         """
         rows, sensors = len(moved), moved.shape[1] - 3
         if not _FILTERED & set(self.measures) or not np.any(good == rows):
-            return np.empty((0, 0, WIDTH)), lambda: None
-        flat = np.empty((rows, sensors * WIDTH))
-        work = functools.partial(
-            filtered_columns, moved.reshape(rows, -1), sensors * WIDTH, OUTPUT_PERIOD, flat
-        )
-        wait = self._helper.submit(work).result if self._helper else work
-        return flat.reshape(rows, sensors, WIDTH), wait
+            return np.empty((0, 0, WIDTH))
+        flat = filtered_lanes(moved.reshape(rows, -1), sensors, OUTPUT_PERIOD, self._array)
+        return flat.reshape(rows, sensors, WIDTH)
 
     def _forces_of_mounts(
         self, key: BatchKey, samples: FloatArray, rows: int, size: int, p: FloatArray
@@ -241,18 +249,6 @@ class Runner:
         diverged = _divergence(schedule.time, run.samples, run.good)
         gap = run.gap[0] if run.gap else None
         return RunResult(item.number, item.case, values, diverged, record, gap)
-
-    def _spring_lengths(
-        self, key: BatchKey, p: FloatArray, samples: FloatArray, rows: int, size: int
-    ) -> FloatArray:
-        """Return the smallest length of each spring (springs, WIDTH), if it is measured. [m]"""
-        springs = key.layout.elements.springs
-        if "spring tensions" not in self.measures:
-            return np.empty((0, WIDTH))
-        smallest = self._array("spring lengths", len(springs))
-        bounds = (LARGEST_ANGLE, LARGEST_DISPLACEMENT)
-        smallest_lengths_lanes(samples, rows, size, bounds, p, springs, smallest)
-        return smallest.reshape(-1, WIDTH)
 
     def _record(self, item: WorkItem, schedule: Schedule, samples: FloatArray) -> Record:
         trajectory = trajectory_of(samples, schedule, item.packed, item.numbers.layout)
@@ -326,7 +322,8 @@ class Runner:
     def _amplitudes(
         self, _item: WorkItem, _schedule: Schedule, run: "_Run"
     ) -> Iterable[FloatArray]:
-        size, at = amplitudes(run.displacement)
+        is_complete = run.good == len(run.of_batch) > 0
+        size, at = (run.sizes.copy(), run.at) if is_complete else amplitudes(run.displacement)
         return size, np.where(np.isnan(size), np.nan, run.samples[at, DRUM_RATE])
 
     def _amplitudes_in_regions(
@@ -398,6 +395,13 @@ def _divergence(time: FloatArray, samples: FloatArray, good: int) -> str:
     return divergence_text(Divergence(float(time[good]), *reason), time[:good], samples[:good])
 
 
+def _peaks(filtered: FloatArray) -> tuple[FloatArray, np.ndarray]:
+    """Return the amplitudes (sensors, lanes) of filtered displacements (rows, sensors, lanes)."""
+    rows, sensors, lanes = filtered.shape
+    sizes, at = amplitudes(filtered.reshape(rows, sensors * lanes))
+    return sizes.reshape(sensors, lanes), at.reshape(sensors, lanes)
+
+
 @dataclass(frozen=True)
 class _Run:
     """The arrays of one run, one lane of the batch.
@@ -411,6 +415,9 @@ class _Run:
         spring_lengths: (springs) smallest lengths; empty if not needed. [m]
         of_batch: (n, sensors) filtered displacements, computed for all runs of the batch at once;
             empty if not needed. [m]
+        sizes, at: (sensors,) amplitudes of these displacements [m], and the numbers of their
+            samples.
+        all_poses: (n, 6) poses of the tub; empty if not needed. [rad, m]
         feet: Measures of the feet, filled when they are computed first.
         gap: The smallest gap, filled when it is computed first.
     """
@@ -422,20 +429,23 @@ class _Run:
     cabinet: FloatArray
     spring_lengths: FloatArray
     of_batch: FloatArray
+    sizes: FloatArray
+    at: np.ndarray
+    all_poses: FloatArray
     feet: dict[str, FloatArray] = field(default_factory=dict)
     gap: list[Gap | None] = field(default_factory=list)
 
     def poses(self, schedule: Schedule) -> tuple[FloatArray, FloatArray]:
         """Return the times (n,) [s] and the poses (n, 6) of the tub before the run diverged."""
-        return schedule.time[: self.good], self.samples[: self.good, :6]
+        return schedule.time[: self.good], self.all_poses[: self.good]
 
     @classmethod
-    def of_lane(cls, lane: int, *arrays: FloatArray) -> "_Run":
+    def of_lane(cls, lane: int, *arrays: np.ndarray) -> "_Run":
         """Return the run in a lane of the arrays, which are in the order of the attributes."""
-        samples, moved, extremes, mounts, cabinet, lengths, of_batch = (
+        samples, moved, extremes, mounts, cabinet, lengths, of_batch, sizes, at, poses = (
             array[..., lane] for array in arrays
         )
-        return cls(samples, moved, extremes, mounts, cabinet, lengths, of_batch)
+        return cls(samples, moved, extremes, mounts, cabinet, lengths, of_batch, sizes, at, poses)
 
     @property
     def good(self) -> int:

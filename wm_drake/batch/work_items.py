@@ -17,7 +17,7 @@ from wm_drake.parameters.machine import Integrator
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 
-KEPT_BODIES, KEPT_NUMBERS = 64, 2048
+KEPT_BODIES, KEPT_NUMBERS = 2048, 2048
 """How many sets of bodies with a load, and of other numbers, are cached."""
 
 
@@ -80,7 +80,7 @@ class Preparation:
         self.machine, self.step, self.integrator = machine, step, integrator
         self.sensors = list(machine.parameters.sensors)
         self._context: Context | None = None
-        self._known_bodies: list[tuple[object, FloatArray]] = []
+        self._known_bodies: dict[tuple[object, ...], FloatArray] = {}
         self._known_numbers: dict[tuple[int, bool, SpinProfile], PackedParameters] = {}
 
     def batches(self, cases: Iterable[Case]) -> Iterator[tuple[BatchKey, list[WorkItem]]]:
@@ -116,21 +116,20 @@ class Preparation:
     def _bodies(self, parameters: MachineParameters, load: Load | None) -> FloatArray:
         """Return the packed bodies, which cases with the same bodies, frames and load share."""
         key = (
-            parameters.bodies,
-            parameters.frames,
+            *parameters.bodies.items(),
+            *parameters.frames.items(),
             parameters.imperfections.residual_imbalance,
             load,
         )
-        for known, bodies in self._known_bodies:
-            if known == key:
-                return bodies
-        self._context = self.machine.set_up_bodies(load, parameters, self._context)
-        plant = self.machine.plant
-        bodies = pack_bodies(
-            plant, plant.GetMyContextFromRoot(self._context), parameters.drive.joint
-        )
-        self._known_bodies = [(key, bodies), *self._known_bodies[: KEPT_BODIES - 1]]
-        return bodies
+        if key not in self._known_bodies:
+            if len(self._known_bodies) >= KEPT_BODIES:
+                del self._known_bodies[next(iter(self._known_bodies))]
+            self._context = self.machine.set_up_bodies(load, parameters, self._context)
+            plant = self.machine.plant
+            self._known_bodies[key] = pack_bodies(
+                plant, plant.GetMyContextFromRoot(self._context), parameters.drive.joint
+            )
+        return self._known_bodies[key]
 
     def _numbers(self, case: Case) -> PackedParameters:
         """Return all other packed numbers of a case, which do not depend on its load."""

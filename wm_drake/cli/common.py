@@ -207,9 +207,11 @@ def check_buildable(file: str, parameters: "MachineParameters") -> "tuple[Proble
     from wm_drake.model.plausibility import unusual_values
     from wm_drake.model.scene import Scene
     from wm_drake.parameters import located, machine_path, measured_amplitudes, published_results
+    from wm_drake.parameters.files import check_tables
     from wm_drake.simulation.runs import checked_step
 
     with located_in(file):
+        check_tables(parameters)
         measured_amplitudes(parameters)
         published_results(parameters.published)
         step = checked_step(parameters, None)

@@ -1,6 +1,5 @@
 """The machine in a Drake diagram: its systems and ports, and the numbers set in a Context."""
 
-import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -60,6 +59,7 @@ class Setup:
             empty. (6,) [rad, m]
         cabinet: The cabinet on its feet if it moves, else None. Its frame then takes the place of W
             for the tub; at rest they coincide.
+        measured_points: The measured points as packed numbers, from the function of this name.
     """
 
     machine: "MachineSystems"
@@ -72,6 +72,7 @@ class Setup:
     tube_rest: FloatArray
     carrier_rest: FloatArray
     cabinet: CabinetOnFeet | None
+    measured_points: FloatArray
 
     @property
     def plant_context(self) -> Context:
@@ -127,11 +128,6 @@ class Setup:
     def accelerometer_points(self) -> dict[str, FloatArray]:
         """Return the points of the vibration sensors in T. [m]"""
         return self.points.accelerometers
-
-    @functools.cached_property
-    def measured_points(self) -> FloatArray:
-        """Return the measured points, see `measured_points`."""
-        return measured_points(self.parameters, self.points, self.rest_pose)
 
 
 def with_prescribed_speed(setup: Setup) -> Setup:
@@ -258,12 +254,13 @@ class MachineSystems:
         q = self.plant.GetPositions(plant_context)
         points = tub_points(poses, parameters)
         profile = profile or parameters.profile
-        self._set_systems(context, elements, measured_points(parameters, points, q[layout.tub]))
+        measured = measured_points(parameters, points, q[layout.tub])
+        self._set_systems(context, elements, measured)
         self._set_drive(context, parameters)
         self._set_feet(context, cabinet)
         self.set_profile(context, profile)
         rest = q[layout.tub], residual, q[layout.tubes], q[layout.carrier]
-        return Setup(self, parameters, context, elements, points, *rest, cabinet)
+        return Setup(self, parameters, context, elements, points, *rest, cabinet, measured)
 
     def set_up_bodies(
         self, load: Load | None, parameters: MachineParameters, context: Context

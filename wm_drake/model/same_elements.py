@@ -163,6 +163,6 @@ def _points(type_: BaseModel) -> dict[str, int]:
     """Return the number of points of each table of a type, by its field."""
     return {
         name: len(value.curve[0])
-        for name, value in type_
+        for name, value in vars(type_).items()
         if isinstance(value, ForceTable | TorqueTable)
     }

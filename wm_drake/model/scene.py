@@ -4,6 +4,7 @@ The simulated plant has no shapes, so that no result of a run depends on them. H
 read again with its shapes and set to the poses of a finished run.
 """
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -14,9 +15,10 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
+from wm_drake.compiler.lanes import WIDTH
 from wm_drake.model.bodies import add_bodies, sdf_path, set_bodies, unusable
 from wm_drake.model.cabinet import with_fixed_cabinet
-from wm_drake.model.outline import support_history
+from wm_drake.model.outline import find_near, lowest_points, measure_motion, raise_bounds
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 
@@ -28,9 +30,6 @@ _REFERENCE_GRID = 0.001
 
 _REFERENCES_KEPT = 64
 """Number of reference poses whose distances are cached."""
-
-_AT_ORIGIN = np.zeros((1, 6))
-"""Pose of the housing."""
 
 REPLAY_RATE = 32.0
 """Frames of a replay per simulated second. [Hz]"""
@@ -70,6 +69,11 @@ class Outline:
     half: FloatArray
     is_round: bool
 
+    @functools.cached_property
+    def numbers(self) -> FloatArray:
+        """The numbers that `wm_drake.model.outline.lowest_point` reads. (15,) [m]"""
+        return np.concatenate([self.centre, self.axes.ravel(), self.half])
+
     def lower_extent(self, direction: FloatArray, poses: FloatArray) -> FloatArray:
         """Return the smallest coordinate of any of its points along a direction.
 
@@ -81,9 +85,7 @@ class Outline:
             (n,) [m]
         """
         nearest = np.empty((len(poses), 1))
-        support_history(
-            poses, direction, self.centre, self.axes.ravel(), self.half, self.is_round, nearest
-        )
+        lowest_points(poses, direction, self.numbers, self.is_round, nearest)
         return nearest[:, 0]
 
 
@@ -97,14 +99,14 @@ class _Motion:
     """How far the tub moves from a reference pose; bounds of the distance of a pair of shapes.
 
     Attributes:
-        moved: Translation. (3, n) [m]
-        turned: Largest displacement of a point of the tub group by its rotation. (n,) [m]
+        count: Number of poses.
+        motion: From `measure_motion`.
         farthest: Pose with the largest displacement of any point.
         shift: This displacement. [m]
     """
 
-    moved: FloatArray
-    turned: FloatArray
+    count: int
+    motion: FloatArray
     farthest: int
     shift: float
 
@@ -117,13 +119,9 @@ class _Motion:
             reference: The same of the reference pose.
             reach: Largest distance of a point of the tub group from To. [m]
         """
-        moved = poses.T.copy()
-        moved -= np.array(reference)[:, None]
-        roll, pitch, yaw, x, y, z = moved
-        turned = (np.abs(roll) + np.abs(pitch) + np.abs(yaw)) * reach
-        shift = np.sqrt(x * x + y * y + z * z) + turned
-        farthest = int(np.argmax(shift))
-        return cls(moved[3:], turned, farthest, float(shift[farthest]))
+        motion = np.empty(-(-len(poses) // WIDTH) * WIDTH * 4)
+        farthest, shift = measure_motion(poses, np.array(reference), reach, motion)
+        return cls(len(poses), motion, farthest, shift)
 
     def nearer_than(
         self, limit: float, distance: float, direction: FloatArray, stride: int
@@ -136,8 +134,9 @@ class _Motion:
             direction: Direction at the reference in which the shape of the tub moves away. (3,)
             stride: Only every pose of this stride is looked at, from the first one.
         """
-        least = direction @ self.moved[:, ::stride] - self.turned[::stride]
-        return np.asarray(stride * np.flatnonzero(least < limit - distance))
+        near = np.empty(self.count, dtype=np.int64)
+        found = find_near(self.motion, self.count, direction, limit - distance, stride, near)
+        return near[:found]
 
 
 class Scene:
@@ -177,11 +176,12 @@ class Scene:
         self._context = self._diagram.CreateDefaultContext()
         self._plant_context = self.plant.GetMyContextFromRoot(self._context)
         set_bodies(self.plant, self._plant_context, parameters)
+        self._query_port = self._scene_graph.get_query_output_port()
+        self._query_context = self._scene_graph.GetMyContextFromRoot(self._context)
+        self._positions = np.zeros(self.plant.num_positions())
         self._pairs = [(a, b) for a in self._shapes("tub") for b in self._shapes("housing")]
         try:
-            query = self._scene_graph.get_query_output_port().Eval(
-                self._scene_graph.GetMyContextFromRoot(self._context)
-            )
+            query = self._query_port.Eval(self._query_context)
             for pair in self._pairs:
                 query.ComputeSignedDistancePairClosestPoints(*pair)
         except (RuntimeError, SystemExit) as error:  # Drake turns failed assertions into exits
@@ -266,10 +266,8 @@ class Scene:
         """
         # Drake's solver is accurate to about 1e-6 m; rounding gives poses that differ by rounding
         # errors only the same result
-        self._set_positions(np.append(np.round(pose, 9), 0.0))
-        query = self._scene_graph.get_query_output_port().Eval(
-            self._scene_graph.GetMyContextFromRoot(self._context)
-        )
+        self._set_positions(np.round(pose, 9))
+        query = self._query_port.Eval(self._query_context)
         nearest = query.ComputeSignedDistancePairClosestPoints(*pair)
         first = nearest.id_A == pair[0]  # Drake may swap the pair
         witness, away = (
@@ -293,8 +291,9 @@ class Scene:
 
     def _set_positions(self, positions: FloatArray) -> None:
         """Set the first positions of the plant; the others, of damper tubes, are 0 as drawn."""
-        drawn = np.zeros(self.plant.num_positions() - len(positions))
-        self.plant.SetPositions(self._plant_context, np.concatenate([positions, drawn]))
+        self._positions[: len(positions)] = positions
+        self._positions[len(positions) :] = 0.0
+        self.plant.SetPositions(self._plant_context, self._positions)
 
     def smallest_gap(
         self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray, near: Gap | None = None
@@ -413,12 +412,10 @@ class Scene:
         if not len(time):
             return best
         moving, fixed = (self._outlines[shape] for shape in pair)
+        numbers = moving.numbers, fixed.numbers, (moving.is_round, fixed.is_round)
         bound = np.full(len(time), -np.inf)
         while True:
-            gap_along = moving.lower_extent(direction, poses)
-            gap_along += fixed.lower_extent(-direction, _AT_ORIGIN)  # sum < 0 if they overlap
-            bound = np.maximum(bound, gap_along)
-            index = int(np.argmin(bound))
+            index = raise_bounds(poses, direction, *numbers, bound)
             if not bound[index] < best.distance:
                 return best
             gap, direction = self._gap(pair, time[index], poses[index])

@@ -1,6 +1,5 @@
-"""Check of the shapes in an SDF file, before Drake reads meshes or computes distances."""
+"""Check of the shapes and poses in an SDF file, before Drake reads meshes or computes distances."""
 
-import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,16 +13,22 @@ UNBOUNDED = ("plane", "heightmap")
 SIZES = ("size", "radius", "radii", "length")
 MESH_SUFFIXES = (".obj", ".vtk", ".gltf")
 
+LONGEST_LENGTH = 1000.0
+"""Largest length in an SDF file: far above any machine, and squares of it never overflow. [m]"""
+
+_LENGTHS = f"numbers up to {LONGEST_LENGTH:g} (metres)"
+
 
 def check_shapes(path: Path) -> None:
-    """Check that all shapes of an SDF file are bounded and that its meshes can be read.
+    """Check that all shapes and poses of an SDF file are bounded and that its meshes can be read.
 
     Args:
         path: The SDF file; names of meshes are relative to it.
 
     Raises:
         InputError: a shape is unbounded, or a mesh is missing, empty, of another type, has a corner
-            that is not finite, or is not a file. There is one problem per shape.
+            that is not finite, or is not a file; or a pose is too far away. There is one problem
+            per shape and pose.
     """
     text = read_text(path, key="model")
     try:
@@ -36,6 +41,13 @@ def check_shapes(path: Path) -> None:
         reason = _fault(shape, path)
         if reason:
             message = f"SDF '{path.name}': shape '{name}' {reason}"
+            problems.append(Problem("", "model", message))
+    for pose in root.iter("pose"):
+        words = (pose.text or "").split()
+        if not all(map(_is_length, words)):
+            message = (
+                f"SDF '{path.name}': a pose is '{' '.join(words)[:60]}'; allowed are {_LENGTHS}"
+            )
             problems.append(Problem("", "model", message))
     if problems:
         raise InputError(problems)
@@ -57,8 +69,10 @@ def _fault(shape: Element, path: Path) -> str:
         return _fault_of_mesh((shape.findtext("uri") or "").strip(), path)
     for part in shape.iter():
         words = (part.text or "").split()
-        if part.tag in SIZES and not all(_is_finite(word) and float(word) > 0.0 for word in words):
-            return f"has '{part.text}' as its {part.tag}; allowed are finite numbers above 0"
+        if part.tag in SIZES and not all(_is_length(word) and float(word) > 0.0 for word in words):
+            return (
+                f"has '{' '.join(words)[:60]}' as its {part.tag}; allowed are {_LENGTHS}, above 0"
+            )
     return ""
 
 
@@ -83,13 +97,13 @@ def _fault_of_mesh(uri: str, path: Path) -> str:
     ]
     if not corners:
         return f"has the mesh '{uri}', which has no corners"
-    if not all(len(corner) == 3 and all(map(_is_finite, corner)) for corner in corners):
-        return f"has the mesh '{uri}', which has a corner that is not three finite numbers"
+    if not all(len(corner) == 3 and all(map(_is_length, corner)) for corner in corners):
+        return f"has the mesh '{uri}', which has a corner that is not three {_LENGTHS}"
     return ""
 
 
-def _is_finite(text: str) -> bool:
+def _is_length(text: str) -> bool:
     try:
-        return math.isfinite(float(text))
+        return abs(float(text)) <= LONGEST_LENGTH  # false for nan
     except ValueError:
         return False

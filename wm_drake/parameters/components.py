@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 from pydantic import TypeAdapter, ValidationError
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
-from wm_drake.parameters.damper_laws import DamperType
+from wm_drake.parameters.damper_laws import DAMPER_LAWS, DamperType
 from wm_drake.parameters.elements import BushingType, Frozen, RubberBushingType
 from wm_drake.parameters.files import read_mapping
 from wm_drake.parameters.problems import problems_of
@@ -69,16 +69,27 @@ def load_component(name_or_path: str) -> Component:
     return Component(path.stem, _validated(plain, path), sources)
 
 
+def _is_damper(plain: dict[str, Any]) -> bool:
+    """Return whether a file is that of a damper, also where its law is missing or misspelt."""
+    of_dampers = {key for law in DAMPER_LAWS.values() for key in law.parameters.model_fields}
+    of_bushings = set(RubberBushingType.model_fields)
+    return "law" in plain or len(of_dampers & set(plain)) > len(of_bushings & set(plain))
+
+
 def _validated(plain: dict[str, Any], path: Path) -> ComponentParameters:
     context = {"units_required": True}
+    is_damper = _is_damper(plain)
+    if is_damper and "law" not in plain:
+        known = ", ".join(DAMPER_LAWS)
+        raise input_error(f"is missing; allowed are {known}", where=str(path), key="law")
     try:
-        if "law" in plain:
+        if is_damper:
             return (
                 TypeAdapter(_DamperFile).validate_python({"damper": plain}, context=context).damper
             )
         return RubberBushingType.model_validate(plain, context=context)
     except ValidationError as error:
-        root = _DamperFile if "law" in plain else RubberBushingType
+        root = _DamperFile if is_damper else RubberBushingType
         problems = problems_of(error, root)
         raise InputError(
             Problem(str(path), p.key.removeprefix("damper").lstrip("."), p.message)

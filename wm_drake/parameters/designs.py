@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.files import read_model
-from wm_drake.parameters.machine import Name
+from wm_drake.parameters.machine import MachineParameters, Name
 from wm_drake.parameters.text_files import is_file
 from wm_drake.parameters.tolerances import fraction
 
@@ -135,6 +135,18 @@ class DesignTask(Frozen):
         if bool(self.loads) == (self.robust is not None):
             raise ValueError("needs either loads, or robust with its tolerances")
         return self
+
+
+def check_loads(task: DesignTask, machine: MachineParameters) -> None:
+    """Raise an InputError for a load that the machine does not have, or that is named twice."""
+    for number, name in enumerate(task.loads):
+        key = f"loads.{number}"
+        if name not in machine.loads:
+            hint = nearest_names(name, machine.loads)
+            message = f"'{name}' is not a load of machine '{machine.name}'{hint}"
+            raise input_error(message, key=key)
+        if name in task.loads[:number]:
+            raise input_error(f"'{name}' is named twice", key=key)
 
 
 def check_over(text: str) -> None:

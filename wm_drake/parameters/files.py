@@ -20,13 +20,13 @@ from ruamel.yaml.error import ReusedAnchorWarning, YAMLError
 from ruamel.yaml.events import AliasEvent, ScalarEvent
 from ruamel.yaml.resolver import VersionedResolver
 
-from wm_drake.errors import InputError, input_error, nearest_names, reason_of
+from wm_drake.errors import InputError, Problem, input_error, nearest_names, reason_of
 from wm_drake.parameters.csv_files import read_csv
 from wm_drake.parameters.keys import is_index, quantities, source_of
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.spin import Load, SpinProfile
-from wm_drake.parameters.text_files import is_file, read_text
+from wm_drake.parameters.text_files import check_regular, is_file, read_text
 from wm_drake.parameters.units import comma_hint
 
 MACHINES_FOLDER = Path(__file__).parents[1] / "data" / "machines"
@@ -512,6 +512,25 @@ def _validated(model: type[Model], plain: Any, path: Path) -> Model:
         raise InputError(
             replace(p, where=_place(path, p.key)) for p in problems_of(error, model)
         ) from None
+
+
+def check_tables(machine: MachineParameters) -> None:
+    """Check that the tables of measured amplitudes and published results can be read as files.
+
+    Raises:
+        InputError: a file is missing, is not a regular file, or is too large. There is one problem
+            per file, with the key path of its name in the machine file.
+    """
+    problems = []
+    for key in OF_MEASURED_MACHINE:
+        for number, name in enumerate(getattr(machine, key)):
+            try:
+                check_regular(Path(name))
+            except InputError as error:
+                message = f"file '{Path(name).name[:80]}': {error.problems[0].message}"
+                problems.append(Problem("", f"{key}.{number}", message))
+    if problems:
+        raise InputError(problems)
 
 
 def located(error: InputError, path: Path) -> InputError:

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.files import read_model
-from wm_drake.parameters.machine import Name
+from wm_drake.parameters.machine import MachineParameters, Name
 from wm_drake.parameters.text_files import is_file
 
 TOLERANCES_FOLDER = Path(__file__).parents[1] / "data" / "tolerances"
@@ -249,6 +249,21 @@ def tolerances_path(name_or_path: str | Path) -> Path:
             f"no such file, and no shipped tolerance file of that name{hint}", where=str(path)
         )
     return path
+
+
+def check_load(tolerances: Tolerances, machine: MachineParameters, path: Path) -> None:
+    """Raise an InputError if the machine lacks the load that a tolerance file names.
+
+    Args:
+        tolerances: Content of the file.
+        machine: The machine.
+        path: The file, for the message.
+    """
+    name = tolerances.load
+    if name and name not in machine.loads:
+        hint = nearest_names(name, machine.loads)
+        message = f"'{name}' is not a load of machine '{machine.name}'{hint}"
+        raise input_error(message, where=str(path), key="load")
 
 
 def load_limits(path: Path) -> tuple[Limit, ...]:

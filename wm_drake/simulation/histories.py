@@ -10,7 +10,8 @@ from wm_drake.elements.friction_damper import friction_damper_force
 from wm_drake.elements.motion import PLANT_STATE_SIZE, read_pose, tub_motion
 from wm_drake.elements.rubber import bushing_wrench
 from wm_drake.elements.sensor import POINT_SIZE, displacement_at
-from wm_drake.elements.spring import spring_strut_wrench
+from wm_drake.elements.spring import read_spring, spring_strut_wrench
+from wm_drake.elements.strut import strut_line
 
 
 @long_running
@@ -116,7 +117,19 @@ def larger(largest, value, good):
 
 @long_running
 def measure_samples_lanes(
-    samples, rows, size, bounds, p, gasket, branches, points, count, moved, extremes
+    samples,
+    rows,
+    size,
+    bounds,
+    p,
+    gasket,
+    branches,
+    points,
+    count,
+    springs,
+    moved,
+    extremes,
+    lengths,
 ):
     """Measure `lanes.WIDTH` runs side by side, each up to its first sample out of bounds.
 
@@ -129,18 +142,24 @@ def measure_samples_lanes(
         p, gasket: Packed numbers and index of the gasket in them, -1 without one.
         branches: `Branches` of rubber bushings, None without them.
         points, count: Measured points, one after the other, and their number.
+        springs: Array of the indices of the springs whose lengths are measured.
         moved: Displacement at each sample and point, written. [m]
         extremes: Written: largest absolute displacement at each point [m]; largest absolute force
             and moment of the gasket on the housing, x, y, z [N, N m]; number of samples in bounds.
+        lengths: Written: smallest length of each spring; inf for a run without samples in bounds.
+            [m]
     """
     align_stack()
     end = PLANT_STATE_SIZE if branches is None else size
     x_numbers = np.empty(end * WIDTH)
     x, states, numbers = lane_array(x_numbers), lane_array(samples), lane_array(p)
     measured, values, largest = lane_array(points), lane_array(moved), lane_array(extremes)
+    shortest = lane_array(lengths)
     zero = 0.0 * numbers[0]
     for k in range(count + 7):
         largest[k] = zero
+    for k in range(len(springs)):
+        shortest[k] = zero + np.inf
     good = zero + 1.0
     for row in range(rows):
         for k in range(end):
@@ -155,5 +174,25 @@ def measure_samples_lanes(
             _, on_housing = bushing_wrench(motion, numbers, gasket, x, branches)
             for k in range(6):
                 largest[count + k] = larger(largest[count + k], on_housing[k], good)
+        for k in range(len(springs)):
+            spring = read_spring(numbers, springs[k])
+            arm = rotate(motion.rotation, spring.p_ToA_T)
+            length, _, _, _, _ = strut_line(motion, arm, spring.p_WH)
+            shortest[k] = where((good > 0.5) & (length < shortest[k]), length, shortest[k])
         largest[count + 6] = largest[count + 6] + good
     keep(x_numbers)
+
+
+@long_running
+def poses_of_runs(samples, rows, size, poses):
+    """Copy the poses of the tub of `lanes.WIDTH` runs, so that those of each run are contiguous.
+
+    Args:
+        samples: Flat array of lanes: samples, one after the other, each with the pose first.
+        rows, size: Number of samples, and of the numbers in each.
+        poses: (lanes.WIDTH, rows, 6) roll, pitch, yaw, x, y, z, written. [rad, m]
+    """
+    for row in range(rows):
+        for lane in range(WIDTH):
+            for k in range(6):
+                poses[lane, row, k] = samples[(row * size + k) * WIDTH + lane]

@@ -2,12 +2,15 @@
 
 import functools
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 from scipy.signal import butter, find_peaks, hilbert, sosfilt_zi
 
+from wm_drake.compiler.lanes import WIDTH
+from wm_drake.engines.compiled.packing import aligned
 from wm_drake.model.scene import REPLAY_RATE, Gap, Scene
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.cabinet import Cabinet
@@ -102,38 +105,45 @@ def filtered(displacement: FloatArray, period: float) -> FloatArray:
         (n, k) filtered displacements. [m] NaN if there are fewer samples than the filter needs, for
         example because the run diverged at once.
     """
-    return filtered_columns(np.ascontiguousarray(displacement), displacement.shape[1], period)
+    rows, columns = displacement.shape
+    groups = -(-columns // WIDTH)
+    lanes = aligned(rows * groups * WIDTH)
+    side_by_side = lanes.reshape(rows, groups * WIDTH)
+    side_by_side[:, :columns] = displacement
+    return filtered_lanes(side_by_side, groups, period)[:, :columns].copy()
 
 
-def filtered_columns(
-    signals: FloatArray, columns: int, period: float, answer: FloatArray | None = None
+def filtered_lanes(
+    signals: FloatArray,
+    groups: int,
+    period: float,
+    array: Callable[[str, int], FloatArray] = lambda name, size: aligned(size * WIDTH),
 ) -> FloatArray:
-    """Return the first columns of an array of signals, as from `filtered`.
+    """Return the first groups of `WIDTH` signals of an array, as from `filtered`.
 
     Args:
-        signals: (n, >= columns), contiguous. [m]
-        columns: Number of columns to filter.
+        signals: (n, >= groups * WIDTH), contiguous; the number of columns is a multiple of `WIDTH`.
+            [m]
+        groups: Number of groups to filter.
         period: Time between samples. [s]
-        answer: (n, columns) array to write to; None for a new one.
+        array: Function that returns an array of lanes, given a name and a size. A caller that
+            filters often can use the same memory again.
     """
-    rows, stride = signals.shape
-    answer = np.empty((rows, columns)) if answer is None else answer
+    rows, columns = signals.shape
     padding = min(round(PADDING / period), rows - 1)
     if padding <= 6 * FILTER_ORDER + 3:  # the padding that sosfiltfilt chooses by default
-        answer[:] = np.nan
-        return answer
-    work = np.empty((rows + 2 * padding, columns))
-    sections, settled = _band_pass(period)
-    shape = (rows, columns, stride)
-    filter_both_ways(signals.ravel(), shape, sections, settled, padding, work, answer)
-    return answer
+        return np.full((rows, groups * WIDTH), np.nan)
+    answer, work = array("filtered", rows * groups), array("filter", rows + 2 * padding)
+    shape = (rows, groups, columns // WIDTH)
+    filter_both_ways(signals.ravel(), shape, *_band_pass(period), padding, work, answer)
+    return answer.reshape(rows, groups * WIDTH)
 
 
 @functools.cache
 def _band_pass(period: float) -> tuple[FloatArray, FloatArray]:
-    """Return the sections of the filter (s, 6), and their states at a constant signal (s, 2)."""
+    """Return the sections of the filter, and their states at a constant signal, flat."""
     sections = butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=1.0 / period, output="sos")
-    return np.ascontiguousarray(sections), np.ascontiguousarray(sosfilt_zi(sections))
+    return sections.ravel(), sosfilt_zi(sections).ravel()
 
 
 def filtered_displacement(record: Record) -> xr.DataArray:

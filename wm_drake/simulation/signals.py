@@ -1,12 +1,16 @@
 """Signals side by side -> filtered signals and their largest peaks, as compiled code.
 
-It does what `scipy.signal.sosfiltfilt` and `find_peaks` do, one row of samples after the other, so
-that the signals of all runs of a batch are in one SIMD register: five times as fast.
+It does what `scipy.signal.sosfiltfilt` and `find_peaks` do, `lanes.WIDTH` signals in the lanes of
+the processor's vector units, so that the state of the filter stays in registers.
 """
 
 import numpy as np
 
-from wm_drake.compiler.compilation import long_running
+from wm_drake.compiler.compilation import law, long_running
+from wm_drake.compiler.lanes import align_stack, lane_array, number_array
+
+SECTIONS = 4
+"""Number of second-order sections: those of a band-pass filter of fourth order."""
 
 
 @long_running
@@ -18,58 +22,71 @@ def filter_both_ways(signals, shape, sections, settled, padding, work, answer):
         y = b0 x + z0;   z0 = b1 x - a1 y + z1;   z1 = b2 x - a2 y
 
     Args:
-        signals: Samples, row after row, flat.
-        shape: Number of rows, of columns to filter, and of columns of `signals`.
-        sections: (s, 6) b0, b1, b2, 1, a1, a2 of each section, as from `scipy.signal.butter`.
-        settled: (s, 2) z0 and z1 of a constant signal of 1, from `scipy.signal.sosfilt_zi`.
+        signals: Samples as a flat array of lanes, row after row.
+        shape: Number of rows, of groups of `lanes.WIDTH` signals to filter, and of groups in
+            `signals`.
+        sections: b0, b1, b2, 1, a1, a2 of each of the `SECTIONS` sections, as from
+            `scipy.signal.butter`, flat.
+        settled: z0 and z1 of a constant signal of 1 of each section, from
+            `scipy.signal.sosfilt_zi`, flat.
         padding: Number of rows by which the signals are mirrored at both ends.
-        work: (rows + 2 padding, columns), overwritten.
-        answer: (rows, columns), written.
+        work: Flat array of (rows + 2 padding) lanes, overwritten.
+        answer: The filtered signals, a flat array of lanes, written.
     """
-    rows, columns, stride = shape
-    value = np.empty(columns)
-    state = np.empty((2 * len(sections), columns))
+    align_stack()
+    rows, groups, stride = shape
+    given, kept, found = lane_array(signals), lane_array(work), lane_array(answer)
+    c, rest = number_array(sections), number_array(settled)
     padded = rows + 2 * padding
-    for at in range(padded):
-        row = abs(at - padding)  # mirrored at the first row
-        row = min(row, 2 * (rows - 1) - row)  # and at the last one
-        for k in range(columns):
-            value[k] = signals[row * stride + k]
-        if at == 0:
-            _settle(state, settled, value)
-        _pass_sections(value, state, sections)
-        work[at] = value
-    value[:] = work[padded - 1]
-    _settle(state, settled, value)
-    for at in range(padded - 1, padding - 1, -1):
-        value[:] = work[at]
-        _pass_sections(value, state, sections)
-        if at < padding + rows:
-            answer[at - padding] = value
+    for group in range(groups):
+        state = settled_state(rest, given[_mirrored(-padding, rows) * stride + group])
+        for at in range(padded):
+            row = _mirrored(at - padding, rows)
+            kept[at], state = pass_sections(given[row * stride + group], state, c)
+        state = settled_state(rest, kept[padded - 1])
+        for at in range(padded - 1, padding - 1, -1):
+            value, state = pass_sections(kept[at], state, c)
+            if at < padding + rows:
+                found[(at - padding) * groups + group] = value
 
 
-@long_running
-def _settle(state, settled, value):
-    """Set the state of each section to that of a constant signal. See `filter_both_ways`."""
-    for s in range(len(settled)):
-        for k in range(len(value)):
-            state[2 * s, k] = settled[s, 0] * value[k]
-            state[2 * s + 1, k] = settled[s, 1] * value[k]
+@law
+def _mirrored(row, rows):
+    """Return a row of a table, mirrored at the first row and at the last one."""
+    row = abs(row)
+    return min(row, 2 * (rows - 1) - row)
 
 
-@long_running
-def _pass_sections(value, state, sections):
-    """Replace a sample of each signal by the filtered one. See `filter_both_ways`."""
-    for s in range(len(sections)):
-        b0, b1, b2 = sections[s, 0], sections[s, 1], sections[s, 2]
-        a1, a2 = sections[s, 4], sections[s, 5]
-        first, second = state[2 * s], state[2 * s + 1]
-        for k in range(len(value)):
-            x = value[k]
-            y = b0 * x + first[k]
-            first[k] = b1 * x - a1 * y + second[k]
-            second[k] = b2 * x - a2 * y
-            value[k] = y
+@law
+def settled_state(settled, value):
+    """Return the state z0, z1 of each section at a constant signal. See `filter_both_ways`."""
+    return (
+        settled[0] * value,
+        settled[1] * value,
+        settled[2] * value,
+        settled[3] * value,
+        settled[4] * value,
+        settled[5] * value,
+        settled[6] * value,
+        settled[7] * value,
+    )
+
+
+@law
+def pass_sections(x, z, c):
+    """Return the filtered sample of each signal, and the new state. See `filter_both_ways`."""
+    x, z0, z1 = pass_section(x, z[0], z[1], c, 0)
+    x, z2, z3 = pass_section(x, z[2], z[3], c, 6)
+    x, z4, z5 = pass_section(x, z[4], z[5], c, 12)
+    x, z6, z7 = pass_section(x, z[6], z[7], c, 18)
+    return x, (z0, z1, z2, z3, z4, z5, z6, z7)
+
+
+@law
+def pass_section(x, first, second, c, at):
+    """Return the sample behind one section, and its new state. See `filter_both_ways`."""
+    y = c[at] * x + first
+    return y, c[at + 1] * x - c[at + 4] * y + second, c[at + 2] * x - c[at + 5] * y
 
 
 @long_running

@@ -6,7 +6,6 @@ number turned by a hundredth of its slider. They cost little, and give the sensi
 
 import math
 from collections.abc import Iterable, Sequence
-from concurrent.futures import Executor
 from dataclasses import replace
 from typing import Any
 
@@ -53,14 +52,9 @@ MS_PER_S = 1e3
 MICRO = 1e6
 
 
-def runner_of(machine: OpenMachine, helper: Executor | None = None) -> Runner:
-    """Return the runner of the pages of a machine: the first run of a batch has a history.
-
-    Args:
-        machine: The open machine.
-        helper: Threads that share the work of one answer.
-    """
-    return Runner(machine.parameters, MEASURES, histories={0}, helper=helper, are_alike=True)
+def runner_of(machine: OpenMachine) -> Runner:
+    """Return the runner of the pages of a machine: the first run of a batch has a history."""
+    return Runner(machine.parameters, MEASURES, histories={0}, are_alike=True)
 
 
 def answer(

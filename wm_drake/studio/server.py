@@ -82,7 +82,6 @@ class Studio:
         self._workers = os.cpu_count() or 1
         self._executor = ThreadPoolExecutor(self._workers, thread_name_prefix="studio")
         self.turns = Turns(self._executor, self._workers)
-        self._helper = ThreadPoolExecutor(self._workers, thread_name_prefix="helper")
         self._runners: WeakKeyDictionary[OpenMachine, Runner] = WeakKeyDictionary()
         self._rankings: dict[str, asyncio.Task[list[dict[str, Any]]]] = {}
 
@@ -90,7 +89,7 @@ class Studio:
         """Return an open machine and its runner."""
         machine = self.machines.open(identifier)
         if machine not in self._runners:
-            self._runners.setdefault(machine, runner_of(machine, self._helper))
+            self._runners.setdefault(machine, runner_of(machine))
             # a full collection over all that an open machine keeps takes as long as an answer
             gc.freeze()
         return machine, self._runners[machine]
@@ -127,8 +126,7 @@ class Studio:
     def end(self) -> None:
         """End all studies and threads."""
         self.jobs.end()
-        for threads in (self._executor, self._helper):
-            threads.shutdown(wait=False, cancel_futures=True)
+        self._executor.shutdown(wait=False, cancel_futures=True)
 
 
 def application(studio: Studio, token: str, port: int) -> Guard:

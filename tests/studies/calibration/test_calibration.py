@@ -61,7 +61,7 @@ RUN_UP = SpinProfile(time=(0.0, 20.0), speed=(4.0, 28.0))
 
 @pytest.fixture(scope="module")
 def short(tmp_path_factory):
-    """The reference machine with a table for the gasket and a short run-up, built."""
+    """Build the reference machine with a table for the gasket and a short run-up."""
     path = tmp_path_factory.mktemp("machine") / "short.yaml"
     path.write_text(
         "extends: reference\nname: short\n"

@@ -120,7 +120,7 @@ def test_progress_reports_evaluations_and_a_falling_cost():
 
 
 def kinked(points):
-    """The larger of two peaks, like an amplitude, and their power mean of order 20."""
+    """Return the larger of two peaks, like an amplitude, and their power mean of order 20."""
     x, y = points.T
     peaks = np.stack([np.exp(0.5 + x + 0.2 * y), np.exp(0.5 - x + 0.2 * y)])
     hard, smooth = peaks.max(axis=0), np.mean(peaks**20, axis=0) ** (1 / 20)

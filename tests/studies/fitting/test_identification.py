@@ -136,7 +136,7 @@ def test_points_of_a_region_keep_to_the_ranges_and_fill_it():
 
 
 def tone(phase=0.7):
-    """A frequency among many local minima."""
+    """Return the fit of a tone, whose frequency has many local minima."""
     model = lambda x: x[:, :1] * np.sin(x[:, 1:2] * TIME + x[:, 2:3])  # noqa: E731
     unknowns = (
         Unknown("amplitude", 0.0, 5.0),

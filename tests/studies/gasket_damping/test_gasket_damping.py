@@ -33,7 +33,7 @@ TRUTH = np.array([28.7, 4.98])  # N s/m, N m s/rad
 
 @pytest.fixture(scope="module")
 def fast(reference):
-    """The reference machine with five times the rate of its run-up.
+    """Return the reference machine with five times the rate of its run-up.
 
     The resonances are between 10 and 20 s; the rest is steady.
     """

@@ -178,7 +178,7 @@ def test_planted_numbers_are_recovered_within_one_percent(name, method):
 
 
 def held(name, search):
-    """In how many of 100 noisy repeats the interval of each number holds what was planted; one that is not claimed does not."""
+    """Count the noisy repeats of 100 in which the interval of each number holds what was planted."""
     make, truth = COMPONENTS[name]
     inside = dict.fromkeys(truth, 0)
     for seed in range(100):
@@ -189,7 +189,7 @@ def held(name, search):
 
 
 def mark_of(name, method):
-    """By the time of 100 fits: a second, half a minute, minutes to most of an hour."""
+    """Return the mark by the time of 100 fits: a second, half a minute, minutes to most of an hour."""
     if (name, method) == ("gasket, radial", "least-squares"):
         return ()
     long = {("bushing, axial table", "evolution")} | LONG

@@ -19,7 +19,7 @@ def elastic(x):
 
 
 def ramps(ends, *, noise=0.0, offset=0.0, friction=FRICTION, samples=2000, rotates=False):
-    """At constant rate from end to end, with friction that turns round over a fifth of a millimetre (Dahl)."""
+    """Return ramps at constant rate, with friction that reverses over a fifth of a millimetre (Dahl)."""
     ends = np.array(ends)
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(ends)))])
     place = np.linspace(0.0, way[-1], samples)

@@ -44,14 +44,14 @@ LINEAR = (
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
-    """The reference machine with numbers in place of tables."""
+    """Return the reference machine with numbers in place of tables."""
     path = tmp_path_factory.mktemp("machine") / "linear.yaml"
     path.write_text(LINEAR)
     return load_machine(path)
 
 
 def made_up(reference, seen):
-    """A model with a known answer: the last number changes the displacements only if `seen`."""
+    """Return a model with a known answer: the last number changes the displacements only if `seen`."""
     sought = tuple(sought_of(reference, keys) for keys in KEYS)
     labels = labels_of(reference, CASES, PROFILE)
     waves = np.sin(np.arange(3 * 2 * 5 * 9).reshape(3, 2, 5, 3, 3) ** 1.3)

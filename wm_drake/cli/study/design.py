@@ -186,13 +186,14 @@ def _designs(
     """Return the built machine and its designs."""
     from wm_drake.model.bodies import with_sdf_values
     from wm_drake.model.build import build_machine
-    from wm_drake.parameters.designs import design_path
-    from wm_drake.parameters.tolerances import load_tolerances
+    from wm_drake.parameters.designs import check_loads, design_path
+    from wm_drake.parameters.tolerances import check_load, load_tolerances, tolerances_path
     from wm_drake.studies.pareto.problem import machine_designs
     from wm_drake.studies.tolerance.distributions import base_samples
     from wm_drake.studies.tolerance.variables import uncertain_machine
 
-    tolerances = load_tolerances(task.robust.tolerances) if task.robust else None
+    tolerances_name = task.robust.tolerances if task.robust else ""
+    tolerances = load_tolerances(tolerances_name) if task.robust else None
     keys = [key for variable in task.variables.values() for key in variable.keys]
     keys += [
         k for choice in task.choices.values() for values in choice.options.values() for k in values
@@ -205,8 +206,10 @@ def _designs(
         own = [key for key in keys if key.startswith(("frames.", "bodies."))]
         full = with_sdf_values(build_machine(parameters).plant, parameters, own)
         if tolerances is None:
+            check_loads(task, full)
             cases = cases_of(full, list(task.loads), gasket=True, profile=profile)
             return build_machine(full), machine_designs(full, task, cases)
+        check_load(tolerances, full, tolerances_path(tolerances_name))
         load = tolerances.load or next(iter(full.loads))
         (case,) = cases_of(full, [load], gasket=True, profile=profile)
 

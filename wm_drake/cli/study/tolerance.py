@@ -34,7 +34,7 @@ from wm_drake.cli.study.common import (
     study_ledger,
 )
 from wm_drake.cli.terminal import Console, say
-from wm_drake.errors import InputError, input_error, nearest_names
+from wm_drake.errors import InputError
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
@@ -165,7 +165,7 @@ def _uncertain(
     from wm_drake.model.bodies import with_sdf_values
     from wm_drake.model.build import build_machine
     from wm_drake.parameters import load_profile
-    from wm_drake.parameters.tolerances import tolerances_path
+    from wm_drake.parameters.tolerances import check_load, tolerances_path
     from wm_drake.simulation.cases import Case
     from wm_drake.simulation.runs import checked_step
     from wm_drake.studies.tolerance.variables import uncertain_machine
@@ -174,13 +174,7 @@ def _uncertain(
         parameters.profile if profile is None else load_profile(existing_file(profile, "--profile"))
     )
     name = tolerances.load or "laundry"
-    if tolerances.load and name not in parameters.loads:
-        raise input_error(
-            f"machine '{parameters.name}' has no load '{name}'"
-            f"{nearest_names(name, parameters.loads)}",
-            where=str(tolerances_path(file)),
-            key="load",
-        )
+    check_load(tolerances, parameters, tolerances_path(file))
     load = parameters.loads[name] if tolerances.load else next(iter(parameters.loads.values()))
     keys = [key for quantity in tolerances.quantities.values() for key in quantity.keys]
     with problems_of_file(tolerances_path(file)):

@@ -1,5 +1,6 @@
 """Uncertain quantities of a machine: what each one changes, and its distribution in SI units."""
 
+import dataclasses
 import itertools
 import re
 from collections.abc import Callable, Sequence
@@ -37,6 +38,9 @@ from wm_drake.studies.tolerance.distributions import (
 PERCENT, VALUE, DISTANCE = "percent", "value", "distance"
 """Forms of the numbers of a distribution: in percent of the machine's number, a value with a unit,
 a distance from the machine's number."""
+
+KEPT_MACHINES = 2048
+"""How many machines are cached."""
 
 _NOMINAL = re.compile(r"nominal\s*(?:([+-])\s*(.+))?")
 
@@ -106,6 +110,9 @@ class UncertainMachine:
     variables: tuple[Variable, ...]
     joint: Joint
     case: Case
+    _known: dict[tuple[float, ...], MachineParameters] = dataclasses.field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def cases(self, scores: FloatArray, first: int = 1) -> list[Case]:
         """Return the case of each sample.
@@ -120,7 +127,7 @@ class UncertainMachine:
         found = []
         for number, values in enumerate(self.joint.values(scores), start=first):
             try:
-                found.append(self._case(f"sample {number}", values))
+                found.append(self._case(f"sample {number}", values.tolist()))
             except InputError as error:
                 raise InputError(
                     replace(p, where=f"sample {number}") for p in error.problems
@@ -130,14 +137,29 @@ class UncertainMachine:
     def _case(self, name: str, values: Sequence[float]) -> Case:
         changes: dict[str, Any] = {}
         laundry: dict[str, float] = {}
-        for variable, value in zip(self.variables, map(float, values), strict=True):
+        for variable, value in zip(self.variables, values, strict=True):
             if variable.is_laundry:
                 laundry[variable.name.removeprefix(f"{LAUNDRY}.")] = value
             for key in variable.keys:
-                changes[key] = self._changed(variable, key, value)
-        parameters = with_values(self.parameters, changes) if changes else self.parameters
+                changes[key] = value
+        parameters = self._machine_with(changes) if changes else self.parameters
         load = laundry_load(laundry) if laundry else parameters.loads[self.case.name]
         return Case(name, load, self.case.profile, parameters=parameters)
+
+    def _machine_with(self, drawn: dict[str, float]) -> MachineParameters:
+        """Return the machine with drawn values by key path, the same one for the same values.
+
+        The samples of Sobol indices exchange one quantity at a time: half of their machines differ
+        in the laundry only, and each machine is prepared once.
+        """
+        values = tuple(drawn.values())
+        if values not in self._known:
+            if len(self._known) >= KEPT_MACHINES:
+                del self._known[next(iter(self._known))]
+            forms = {key: variable for variable in self.variables for key in variable.keys}
+            changes = {key: self._changed(forms[key], key, v) for key, v in drawn.items()}
+            self._known[values] = with_values(self.parameters, changes)
+        return self._known[values]
 
     def _changed(self, variable: Variable, key: str, value: float) -> Any:
         if variable.form == VALUE:
@@ -163,7 +185,7 @@ class UncertainMachine:
                 values = self.joint.values(scores)[0]
                 values[index] = variable.marginal.values(np.array([score]))[0]
                 try:
-                    is_usable(self._case(f"{end} end of {variable.name}", values))
+                    is_usable(self._case(f"{end} end of {variable.name}", values.tolist()))
                 except InputError as error:
                     hint = "; truncate it with low and high" if "normal" in variable.text else ""
                     problems += [
