@@ -93,7 +93,7 @@ KINDS = {
     "gasket": _one("gasket/page.html", "study", "gasket", "--trials", "150", "--check", "C_L=120 %"),
     "gasket_of_one_load": _one(
         "gasket/page.html", "study", "gasket", "--design", "orthogonal", "--trials", "243",
-        "--model", "main", "--load", "back", "--response", "mounts", "--response", "amplitude",
+        "--model", "main", "--load", "back", "--response", "mount_force_peak", "--response", "amplitude",
     ),
     "gasket_effect": _one("gasket_effect/page.html", "study", "gasket-effect", "--load", "middle"),
     "gasket_damping": _one("gasket_damping/page.html", "study", "gasket-damping", "--mesh", "20"),

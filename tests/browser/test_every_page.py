@@ -30,7 +30,6 @@ def test_page_is_in_order_and_nothing_is_cut_off(browser, tmp_path, name):
     browser.media(media="print")
     browser.run("dispatchEvent(new Event('beforeprint'))")
     assert browser.run(LAYOUT) == [], "on paper"
-    browser.run("dispatchEvent(new Event('afterprint'))")
     loaded = browser.run("return performance.getEntriesByType('resource').map(one => one.name)")
     assert all(name.startswith(("blob:", "data:")) for name in loaded)
     assert browser.errors() == []

@@ -257,4 +257,7 @@ def test_nothing_is_cut_off(page, width, dark):
         .filter((e) => e.scrollWidth > e.clientWidth + 1 && e.clientWidth > 0)
         .map((e) => `${e.tagName} ${e.id} ${e.className} ${e.textContent.slice(0, 30)}`)"""
     assert page.run(wide) == []
+    if width == 1400:  # on a narrow screen the table of measures is scrolled
+        hidden = "return [...document.querySelectorAll('.scroll')].map(e => e.scrollWidth - e.clientWidth)"
+        assert max(page.run(hidden)) <= 1
     assert page.run("return document.documentElement.scrollWidth <= window.innerWidth")

@@ -187,9 +187,9 @@ class Runner:
         )
         runs = [_Run.of_lane(lane, *histories, *by_lane) for lane in range(len(work_items))]
         if self.are_alike and "gap" in self.measures:
-            first = self._smallest_gap(work_items[0], schedule, runs[0])
+            near = self._smallest_gap(work_items[0], schedule, runs[0])
             for item, run in zip(work_items[1:], runs[1:], strict=True):
-                self._smallest_gap(item, schedule, run, first)
+                self._smallest_gap(item, schedule, run, near)
         return [
             self._result(item, schedule, run) for item, run in zip(work_items, runs, strict=True)
         ]

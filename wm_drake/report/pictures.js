@@ -198,6 +198,10 @@ const Pictures = (() => {
       need.top = Math.max(need.top, need.inner + texts.length * px * HEIGHT + 4);
       return { ...title, px, texts };
     });
+    for (const part of panel.parts) {  // texts above the panel
+      if (part.kind !== "text" || part.in_data[1] || part.y < 1 || part.shift[1] <= 0) continue;
+      need.top = Math.max(need.top, part.shift[1] * (INCH / 72) * factor + size(part.size, factor) * HEIGHT + 4);
+    }
     if (twin) {
       const ticks = upTicks(twin.y, room, height, factor, total);
       const far = size(twin.y.label_size, factor);
@@ -777,7 +781,7 @@ const Pictures = (() => {
     target.closest("figure").dataset.drawn = "yes";
     if (picture.clicked && target.on && !picture.listens) {
       picture.listens = true;
-      target.on("plotly_click", ({ points: [point] }) => picture.clicked({ label: point.data.meta, number: point.pointNumber }));
+      target.on("plotly_click", ({ points: [point] }) => picture.clicked({ label: point.data.meta, number: point.pointNumber, x: point.x, y: point.y }));
     }
   }
 
@@ -788,7 +792,7 @@ const Pictures = (() => {
     if (picture.total) draw(picture);
   }
 
-  /* Calls a function with the label of a curve and the number of its point that a reader clicks. */
+  /* Calls a function with label of the curve, number and place of a point that a reader clicks. */
   function clicked(figure, action) {
     (drawn.get(figure) || prepare(figure)).clicked = action;
   }

@@ -65,7 +65,11 @@ def heat_map_figure(screening: Screening, words: Words) -> Figure:
     shown = table[table.max(axis=1) >= SMALLEST_PERCENT]
     values = shown.to_numpy()
     labels = list(screening.tables)
-    figure = Figure(figsize=(WIDTH, 0.27 * len(shown) + 1.5), layout="constrained")
+    longest = max(len(name) for _, name in labels)
+    is_long = longest > 4
+    names_height = 5.0 * longest if is_long else 0.0  # points
+    height = 0.27 * len(shown) + 1.5 + names_height / 72.0
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
     axes = figure.subplots()
     # the square root makes small contributions visible
     image = axes.imshow(values, cmap="Blues", norm=PowerNorm(0.5, 0.0, 100.0), aspect="auto")
@@ -81,7 +85,6 @@ def heat_map_figure(screening: Screening, words: Words) -> Figure:
         fontsize=8.5,
         parse_math=False,
     )
-    is_long = max(len(name) for _, name in labels) > 4
     axes.set_xticks(
         range(len(labels)),
         [name for _, name in labels],
@@ -98,7 +101,7 @@ def heat_map_figure(screening: Screening, words: Words) -> Figure:
             f"load {load}",
             (middle, 1.0),
             xycoords=("data", "axes fraction"),
-            xytext=(0, 22 + (5 * max(len(name) for _, name in labels) if is_long else 0)),
+            xytext=(0, 22 + names_height),
             textcoords="offset points",
             ha="center",
             fontsize=10,

@@ -28,7 +28,12 @@ const Picked = (() => {
   }
 
   if (front) {
-    Pictures.clicked(front, point => { if (point.label === labels.designs) pick(point.number); });
+    Pictures.clicked(front, point => {
+      // a chosen design has a second point above its own
+      const isAt = design => given.pairs.some(([i, j]) => Math.hypot(1 - design[i] / point.x, 1 - design[j] / point.y) < 1e-5);
+      const found = point.label === labels.designs ? point.number : given.objectives.findIndex(isAt);
+      if (found >= 0) pick(found);
+    });
     plot.addEventListener("keydown", event => {
       const step = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
       if (step) { event.preventDefault(); pick(picked + step); }
