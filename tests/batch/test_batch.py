@@ -133,6 +133,17 @@ def test_likeness_changes_no_bit(machine, reference, cases):
     assert [run.gap for run in alike] == [run.gap for run in plain]
 
 
+def test_scenes_are_used_again_and_change_no_bit(machine, cases):
+    built = build_machine(machine.parameters)
+    first = simulate_many(built, cases[:9], measures=["gap", "contacts"], workers=2)
+    count = len(built.scenes)
+    assert 1 <= count <= 2
+    xr.testing.assert_identical(
+        simulate_many(built, cases[:9], measures=["gap", "contacts"], workers=1), first
+    )
+    assert len(built.scenes) == count
+
+
 def recorded(machine, cases):
     """Run cases side by side; return their records in the order of the cases, and the table."""
     ended = []

@@ -1,7 +1,7 @@
 """simulate_many(machine, cases): run thousands of cases on all cores, with constant memory."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 
 import numpy as np
@@ -185,18 +185,21 @@ def simulate_many(
         progress(len(results))
 
     try:
-        runner = Runner(machine.parameters, wanted, histories)
+        runner = Runner(machine.parameters, wanted, histories, machine.scenes)
         preparation = Preparation(machine, step, chosen)
         _run_all(preparation, runner, cases, workers or os.cpu_count() or 1, collect)
     except KeyboardInterrupt:
         raise SimulationInterrupted(as_table(machine.parameters, wanted, results)) from None
-    return as_table(machine.parameters, wanted, results)
+    pairs = runner.scenes[0].pair_names() if runner.scenes else None
+    machine.scenes.extend(runner.scenes)
+    return as_table(machine.parameters, wanted, results, pairs)
 
 
 def as_table(
     parameters: MachineParameters,
     measures: tuple[str, ...],
     results: dict[int, tuple[str, str, list[FloatArray]]],
+    pairs: Sequence[str] | None = None,
 ) -> xr.Dataset:
     """Return the table of runs that `simulate_many` describes.
 
@@ -205,6 +208,7 @@ def as_table(
         measures: Names of measures, keys of `MEASURES`.
         results: For each number of a run: name of the case, text of `diverged`, and the values of
             the variables that the measures have in `MEASURES`, in this order.
+        pairs: Names of the pairs of shapes, if they are known already.
 
     Raises:
         InputError: the runs have different numbers of regions.
@@ -228,7 +232,7 @@ def as_table(
     if _IN_REGIONS & set(measures):
         labels["region"] = range(_region_count(measures, results))
     if "contacts" in measures:
-        labels["pair"] = Scene(parameters).pair_names()
+        labels["pair"] = list(pairs) if pairs is not None else Scene(parameters).pair_names()
     variables = {}
     for index, name in enumerate(name for measure in measures for name in MEASURES[measure]):
         dim, unit, text = _VARIABLES[name]

@@ -140,7 +140,7 @@ def simulate_remembered(
             progress(done)
 
     found: dict[str, Result] = {}
-    simulate_many(
+    table = simulate_many(
         machine,
         missing(),
         measures=wanted,
@@ -157,4 +157,5 @@ def simulate_remembered(
             result.note,
             [result.values[n] for measure in wanted for n in MEASURES[measure]],
         )
-    return as_table(machine.parameters, wanted, rows)
+    pairs = table.pair.values.tolist() if "pair" in table.coords and found else None
+    return as_table(machine.parameters, wanted, rows, pairs)

@@ -111,6 +111,7 @@ class Runner:
         parameters: MachineParameters,
         measures: tuple[str, ...],
         histories: bool | Container[int],
+        scenes: list[Scene] | None = None,
         *,
         are_alike: bool = False,
     ) -> None:
@@ -120,6 +121,7 @@ class Runner:
             parameters: Of the machine.
             measures: Keys of `MEASURES`.
             histories: Whether results have records, or the numbers of the cases that have one.
+            scenes: Scenes of the machine that no thread uses; the runner takes them from the list.
             are_alike: Whether the runs of a batch differ little, so that the smallest gap of the
                 first leads to those of the others.
         """
@@ -128,6 +130,8 @@ class Runner:
         self.measures, self.histories = measures, histories
         self.stopped = threading.Event()
         self._memory = threading.local()
+        self._spare = [] if scenes is None else scenes
+        self.scenes: list[Scene] = []
 
     def run(self, key: BatchKey, work_items: list[WorkItem]) -> list[RunResult]:
         """Run up to `WIDTH` work items side by side and measure them.
@@ -316,7 +320,11 @@ class Runner:
         """Return the shapes of the machine, those of the thread that calls."""
         kept = self._memory.__dict__
         if "scene" not in kept:  # one for each thread: a scene has one pose at a time
-            kept["scene"] = Scene(self.parameters)
+            try:
+                kept["scene"] = self._spare.pop()
+            except IndexError:
+                kept["scene"] = Scene(self.parameters)
+            self.scenes.append(kept["scene"])
         return cast(Scene, kept["scene"])
 
     def _amplitudes(

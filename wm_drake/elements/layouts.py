@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from pydantic import BaseModel
-from scipy.interpolate import PchipInterpolator
 
 from wm_drake.compiler.packed import SCALAR, PackedLayout
 from wm_drake.laws.table import CURVE, pack_number, pack_table
@@ -78,6 +77,8 @@ def packed_torque_limit(limit: TorqueLimit | TorqueLimitTable) -> FloatArray:
     """Return the table of a torque limit as a curve that is constant at its end; 0 without one."""
     if isinstance(limit, TorqueLimit):
         return pack_number(0.0)
+    from scipy.interpolate import PchipInterpolator  # slow to import: machines with tables
+
     cubics = PchipInterpolator(limit.speed, limit.torque).c[::-1].T
     return pack_table(limit.speed, cubics, 0.0)
 
@@ -85,6 +86,8 @@ def packed_torque_limit(limit: TorqueLimit | TorqueLimitTable) -> FloatArray:
 @functools.lru_cache(maxsize=256)  # a study packs the same curves for each run
 def _packed_curves(x: tuple[float, ...], ys: tuple[tuple[float, ...], ...]) -> FloatArray:
     """Return packed tables, a row for each: scipy's monotone cubics (PCHIP) through the points."""
+    from scipy.interpolate import PchipInterpolator  # slow to import: machines with tables
+
     cubics = PchipInterpolator(x, ys, axis=1).c[::-1]  # (4, pieces, curves)
     h, (_, a, b, c) = x[-1] - x[-2], cubics[:, -1]
     # rounding can make a flat end fall by 1e-11

@@ -5,7 +5,6 @@ velocity and velocity (n, 12). Accelerations are angular and of the origin (n, 6
 """
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from wm_drake.compiler.compilation import generic
 from wm_drake.compiler.vectors import rotation_from_rpy
@@ -23,6 +22,8 @@ def seen_from_cabinet(
         cabinet, cabinet_rates: Motion and accelerations of the cabinet, in W.
         body, rates: The same of the body.
     """
+    from scipy.spatial.transform import Rotation  # slow to import: cabinets that move
+
     moving, of_body = _motion(cabinet), _motion(body)
     found = generic(motion_in)(moving, of_body)
     accelerations = generic(rates_in)(moving, *_vectors(cabinet_rates), of_body, *_vectors(rates))

@@ -21,6 +21,7 @@ from wm_drake.model.equilibrium import preloaded, put_to_rest
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.placed_elements import AppliedForce, PlacedElements, placed_elements
 from wm_drake.model.same_elements import check_same_elements
+from wm_drake.model.scene import Scene
 from wm_drake.model.state_layout import StateLayout
 from wm_drake.model.tub_points import TubPoints, measured_points, tub_points
 from wm_drake.parameters import Drive, Load, MachineParameters, MotorDrive, Sensor, SpinProfile
@@ -184,6 +185,7 @@ class MachineSystems:
             "detergent_displacement", "drum_speed"; "motor_torque"; and for each element its own
             outputs, such as "spring_left_force", "damper_left_force", "gasket_force" and
             "gasket_moment"; of a cabinet that moves "feet_floor_force".
+        scenes: Scenes of the machine that no thread uses; many short batches share them.
     """
 
     parameters: MachineParameters
@@ -203,6 +205,7 @@ class MachineSystems:
     inputs: dict[str, InputPort]
     outputs: dict[str, OutputPort]
     _poses: list[FramePoses] = field(default_factory=list, repr=False, compare=False, kw_only=True)
+    scenes: list[Scene] = field(default_factory=list, repr=False, compare=False, kw_only=True)
 
     def set_up(
         self,

@@ -5,7 +5,6 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
-from scipy.interpolate import PchipInterpolator
 
 from wm_drake.parameters import units as u
 from wm_drake.parameters.rubber import RubberBranches
@@ -72,6 +71,8 @@ class TorqueTable(Frozen):
 
 def _curve_values(curve: tuple[tuple[float, ...], tuple[float, ...]], x: FloatArray) -> FloatArray:
     """Return the ordinates of a monotone cubic with straight ends at abscissas (n,)."""
+    from scipy.interpolate import PchipInterpolator  # half a second to import: machines with tables
+
     cubic = PchipInterpolator(*curve)
     inside = np.clip(x, curve[0][0], curve[0][-1])
     return np.asarray(cubic(inside) + cubic.derivative()(inside) * (x - inside))

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib import rc_context
-from matplotlib.backends import backend_mixed, backend_pdf
 from matplotlib.figure import Figure
 
 from wm_drake.report.describing import NotDescribableError, describe
@@ -90,6 +89,8 @@ def _svg(figure: Figure) -> str:
 
 def _pdf(figure: Figure) -> bytes:
     """Return a figure as PDF, scaled as a whole to the width of a journal."""
+    from matplotlib.backends import backend_mixed, backend_pdf  # slow to import: only --figures
+
     width, height = (float(size) for size in figure.get_size_inches())
     scale = JOURNAL_WIDTH / width
     buffer, dpi = io.BytesIO(), figure.dpi

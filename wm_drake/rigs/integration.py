@@ -1,20 +1,24 @@
-"""Steady motion of massless sponges on the bench: adaptive, stiff integration of many benches.
+"""Steady motion of massless sponges on the bench: adaptive integration of many benches.
 
-All benches of a call are one system of equations over the phase of their motion, states in units of
-their amplitudes: one pass of LSODA in C instead of one per bench, which makes a fit to many loops
-short. The Jacobian is diagonal. A sponge with mass is integrated by `wm_drake.rigs.heavy_sponge`.
+Each bench is an equation of one state over the phase of its motion, in units of its amplitude. An
+explicit method integrates it (`wm_drake.rigs.explicit_steps`), in threads. Stiff ones, few, are one
+system for LSODA, with a diagonal Jacobian. A sponge with mass is integrated by
+`wm_drake.rigs.heavy_sponge`.
 """
 
+import itertools
+import os
 import warnings
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from scipy.integrate import ODEintWarning, odeint
 
 from wm_drake.compiler.compilation import long_running
-from wm_drake.elements.damper_law import damper_response
 from wm_drake.errors import WmDrakeError
 from wm_drake.parameters.types import FloatArray
+from wm_drake.rigs.explicit_steps import explicit_periods, sponge_rate
 
 POINTS = 1440
 """Points of a period, equally spaced; reversals fall on points."""
@@ -33,7 +37,20 @@ STEADY = 1e-7
 """A period repeats the one before if no state differs by more, in amplitudes."""
 
 TOLERANCES = {"rtol": 2e-8, "atol": 2e-9}
-"""Tolerances of the integrator, in amplitudes."""
+"""Tolerances of LSODA, in amplitudes."""
+
+EXPLICIT_TOLERANCES = (2e-10, 2e-11)
+"""Relative and absolute tolerance of the explicit method, in amplitudes. It steps over the corners
+of friction, where the error of a step is larger than its estimate: these keep it below 2e-8."""
+
+LONGEST_STEP = 0.05
+"""Longest step: no stretch of slip is stepped over. [rad]"""
+
+MOST_STIFF = 32
+"""Stiff benches that are one system: all step as the stiffest one needs."""
+
+FEWEST_ROWS = 8
+"""Fewest benches that are worth a thread."""
 
 
 class NotSteadyError(WmDrakeError):
@@ -53,25 +70,60 @@ def steady_states(packed: FloatArray, amplitude: FloatArray, omega: FloatArray) 
     Raises:
         NotSteadyError: The motion is not steady within `MOST_PERIODS`, or cannot be integrated.
     """
+    count = len(packed)
+    motion = np.stack([amplitude, omega], axis=1)
+    states, stiff = np.full((count, POINTS + 1), np.nan), np.zeros(count, dtype=bool)
+    reversals = np.array([piece.stop - 1 for piece in PIECES])
+    control = np.array([*EXPLICIT_TOLERANCES, LONGEST_STEP])
+    threads = min(os.cpu_count() or 1, -(-count // FEWEST_ROWS))
+    ends = np.linspace(0, count, threads + 1, dtype=int)
+
+    def integrate(begin: FloatArray, rows: tuple[int, int]) -> None:
+        explicit_periods(rows, begin, packed, motion, reversals, PHASE, control, states, stiff)
+
+    with ThreadPoolExecutor(threads) as pool:
+
+        def period(begin: FloatArray) -> FloatArray:
+            list(pool.map(lambda rows: integrate(begin, rows), itertools.pairwise(ends)))
+            left = np.flatnonzero(stiff & (states[:, 0] != begin))
+            for at in range(0, len(left), MOST_STIFF):
+                rows = left[at : at + MOST_STIFF]
+                states[rows] = stiff_period(begin[rows], packed[rows], motion[rows]).T
+            return states.T
+
+        return closed_loop(period, np.zeros(count), STEADY, leaps=True)
+
+
+def stiff_period(begin: FloatArray, packed: FloatArray, motion: FloatArray) -> FloatArray:
+    """Return the deformations of sponges over a period by LSODA (POINTS + 1, r), in amplitudes.
+
+    Args:
+        begin: At its beginning (r,).
+        packed, motion: As for `explicit_periods`.
+
+    Raises:
+        NotSteadyError: They cannot be integrated.
+    """
     rates = np.empty(len(packed))
 
     def derivative(phase: float, state: FloatArray) -> FloatArray:
-        deformation_rates(phase, state, packed, amplitude, omega, rates)
+        deformation_rates(phase, state, packed, motion, rates)
         return rates
 
-    def integrate(state: FloatArray, phases: FloatArray) -> FloatArray:
+    parts = [begin[None]]
+    for piece in PIECES:
         with warnings.catch_warnings():
             warnings.simplefilter("error", ODEintWarning)
             try:
                 found = odeint(
                     derivative,
-                    state,
-                    phases,
+                    parts[-1][-1],
+                    PHASE[piece],
                     ml=0,
                     mu=0,
                     tfirst=True,
                     mxstep=200_000,
-                    hmax=0.05,  # no stretch of slip is stepped over
+                    hmax=LONGEST_STEP,
                     **TOLERANCES,
                 )
             except ODEintWarning as told:
@@ -80,15 +132,8 @@ def steady_states(packed: FloatArray, amplitude: FloatArray, omega: FloatArray) 
                 ) from None
         if not np.all(np.isfinite(found)):
             raise NotSteadyError("a sponge on the bench runs away")
-        return np.asarray(found)
-
-    def period(state: FloatArray) -> FloatArray:
-        parts = [state[None]]
-        for piece in PIECES:
-            parts.append(integrate(parts[-1][-1], PHASE[piece])[1:])
-        return np.concatenate(parts)
-
-    return closed_loop(period, np.zeros(len(packed)), STEADY, leaps=True)
+        parts.append(found[1:])
+    return np.concatenate(parts)
 
 
 def closed_loop(
@@ -117,7 +162,7 @@ def closed_loop(
     before: tuple[FloatArray, FloatArray] | None = None
     for _ in range(MOST_PERIODS):
         states = period(state)
-        end = states[-1]
+        end = states[-1].copy()
         slope = np.zeros(len(state))
         if before is not None:
             moved = state - before[0]
@@ -133,16 +178,17 @@ def closed_loop(
         )  # below it, a change is that of integration
         if np.max(np.abs(step)) <= tolerance:
             return states
-        before, state = (state, end), state + step
+        # a state that is closed stays, so that its period need not be computed again
+        moving = np.logical_not(leaps) | (np.abs(step) > tolerance)
+        before, state = (state, end), np.where(moving, state + step, state)
     raise NotSteadyError(f"no steady loop within {MOST_PERIODS} periods")
 
 
 @long_running
-def deformation_rates(phase, deformation, packed, amplitude, omega, rates):  # type: ignore[no-untyped-def]
+def deformation_rates(phase, deformation, packed, motion, rates):  # type: ignore[no-untyped-def]
     """Write the rates by phase of the deformations of massless sponges, both in amplitudes."""
-    for i in range(len(amplitude)):
-        speed = amplitude[i] * omega[i]
-        _, rate = damper_response(
-            speed * np.cos(phase), amplitude[i] * deformation[i], packed[i], 0
+    for i in range(len(motion)):
+        amplitude = motion[i, 0]
+        rates[i] = sponge_rate(
+            phase, deformation[i], packed[i], amplitude, amplitude * motion[i, 1]
         )
-        rates[i] = rate / speed

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from scipy.signal import butter, find_peaks, hilbert, sosfilt_zi
 
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.packing import aligned
@@ -142,6 +141,8 @@ def filtered_lanes(
 @functools.cache
 def _band_pass(period: float) -> tuple[FloatArray, FloatArray]:
     """Return the sections of the filter, and their states at a constant signal, flat."""
+    from scipy.signal import butter, sosfilt_zi  # slow to import: measures that filter
+
     sections = butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=1.0 / period, output="sos")
     return sections.ravel(), sosfilt_zi(sections).ravel()
 
@@ -239,6 +240,8 @@ def peak_line(time: FloatArray, signal: FloatArray) -> FloatArray:
     The line is constant before the first maximum and after the last one. A signal without a local
     maximum is returned unchanged.
     """
+    from scipy.signal import find_peaks  # slow to import: envelopes
+
     peaks = find_peaks(signal)[0]
     return np.interp(time, time[peaks], signal[peaks]) if len(peaks) else signal
 
@@ -251,6 +254,8 @@ def smooth_envelope(record: Record) -> xr.DataArray:
     parameters: a line jumps where a small peak appears. The record is mirrored at both ends,
     because the transform continues it periodically.
     """
+    from scipy.signal import hilbert  # slow to import: envelopes
+
     displacement = filtered_displacement(record)
     values = displacement.values
     padding = min(round(PADDING / _period(record)), len(values) - 1)

@@ -6,8 +6,6 @@ drum angle is known exactly, so a component of fixed order stays sharp while the
 
 import numpy as np
 import xarray as xr
-from scipy.signal import ShortTimeFFT
-from scipy.signal.windows import hann
 from threadpoolctl import threadpool_limits
 
 from wm_drake.parameters.types import FloatArray
@@ -141,6 +139,9 @@ def frequency_map(
         (time, frequency) or (time, frequency, signal) in the unit of the signal, up to half the
         sampling rate. [Hz] Only windows within the record are used; without one it has no times.
     """
+    from scipy.signal import ShortTimeFFT  # slow to import: orders
+    from scipy.signal.windows import hann
+
     columns = np.atleast_2d(np.asarray(signal, dtype=float).T).T
     spacing = float(time[1] - time[0]) if len(time) > 1 else 1.0
     length, hop = max(2, round(window / spacing)), max(1, round(period / spacing))

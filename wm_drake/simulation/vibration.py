@@ -11,8 +11,6 @@ from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
-from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
 
 from wm_drake.compiler.compilation import generic
 from wm_drake.compiler.vectors import rotation_from_rpy
@@ -183,6 +181,8 @@ def integrated_twice(acceleration: FloatArray, period: float) -> FloatArray:
 
 
 def _integral(signal: FloatArray, period: float) -> FloatArray:
+    from scipy.interpolate import CubicSpline  # slow to import: accelerations
+
     time = period * np.arange(len(signal))
     return np.asarray(CubicSpline(time, signal, axis=0).antiderivative()(time))
 
@@ -201,6 +201,8 @@ def high_passed(signal: FloatArray, period: float, corner_hz: float) -> FloatArr
     Returns:
         (n, k) in the unit of the signals. NaN if there are fewer than `FEWEST` samples.
     """
+    from scipy.signal import sosfiltfilt  # slow to import: accelerations
+
     if len(signal) < FEWEST:
         return np.full(signal.shape, np.nan)
     padding = round(PADDING_PERIODS / corner_hz / period)
@@ -213,6 +215,8 @@ def high_passed(signal: FloatArray, period: float, corner_hz: float) -> FloatArr
 
 @functools.cache
 def _high_pass(period: float, corner_hz: float) -> FloatArray:
+    from scipy.signal import butter  # slow to import: accelerations
+
     return np.asarray(butter(ORDER, corner_hz, btype="highpass", fs=1.0 / period, output="sos"))
 
 

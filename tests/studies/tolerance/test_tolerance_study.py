@@ -65,6 +65,19 @@ def test_one_draw_or_one_each(machine):
     assert found == pytest.approx({"left": k, "right": 1.05 * k, "rear": k})
 
 
+def test_samples_with_the_same_parts_share_a_machine(machine):
+    tree = {"quantities": {"k": normal(SPRING)}, "laundry": load_tolerances("laundry").laundry}
+    found = uncertain(machine, tree)
+    scores = np.zeros((3, len(found.variables)))
+    scores[1, 1:], scores[2, 0] = 0.5, 0.5  # another load; another spring
+    first, other_load, other_spring = found.cases(scores)
+    assert found.variables[0].name == "k"
+    assert first.parameters is other_load.parameters
+    assert first.load != other_load.load
+    k = [c.parameters.spring_types["suspension"].stiffness for c in (first, other_spring)]
+    assert k[1] == pytest.approx(1.025 * k[0])
+
+
 def test_table_is_scaled(machine):
     machine = with_gasket_tables(machine)
     key = "gasket.stiffness_x"

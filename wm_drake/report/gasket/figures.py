@@ -10,7 +10,7 @@ from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from scipy.stats import f as f_distribution
+from scipy.special import fdtri
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH, name_ticks
@@ -222,7 +222,7 @@ def significant_percent(table: AnovaTable) -> float | None:
     None without degrees of freedom or spread.
     """
     found = [
-        term.percent * float(f_distribution.isf(SIGNIFICANCE, term.df, table.residual_df)) / term.f
+        term.percent * float(fdtri(term.df, table.residual_df, 1.0 - SIGNIFICANCE)) / term.f
         for term in table.terms
         if len(term.factors) == 1 and table.residual_df > 0 and np.isfinite(term.f) and term.f > 0.0
     ]

@@ -1,7 +1,7 @@
 """Analysis of variance of factors at a few levels: contribution and effects of each term.
 
 The coding is sum-to-zero: the constant is the mean over all level combinations, and the effects of
-a term sum to zero over the levels of each of its factors. Fits and tests are done by statsmodels.
+a term sum to zero over the levels of each of its factors. Fits are least-squares fits.
 
 A contribution is the variance of a term's effects over the grid of all level combinations, as a
 fraction of the total variance there. On the full factorial it equals the ratio of the term's sum of
@@ -24,14 +24,14 @@ squares), by the leverages h of the hat matrix:
     R2_predicted = 1 - sum (e_i / (1 - h_i))^2 / SST
 """
 
+import functools
 import itertools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.stats import f as f_distribution
-from statsmodels.regression.linear_model import OLS, RegressionResults
+from scipy.special import fdtrc
 from threadpoolctl import threadpool_limits
 
 from wm_drake.parameters.types import FloatArray
@@ -112,6 +112,29 @@ class AnovaTable:
         return pd.Series({term.name: term.percent for term in self.terms})
 
 
+@dataclass(frozen=True)
+class LeastSquares:
+    """A least-squares fit of a model with a constant to a response.
+
+    Attributes:
+        params: Coefficients.
+        fitted, residual: (trials,) Fitted value and residual.
+        ssr, total: Sums of squares about the fit and about the mean.
+        df_resid: Degrees of freedom of the residual.
+    """
+
+    params: FloatArray
+    fitted: FloatArray
+    residual: FloatArray
+    ssr: float
+    total: float
+    df_resid: int
+
+    def adjusted_r2(self) -> float:
+        """Return the explained part of the variance, adjusted for the degrees of freedom."""
+        return 1.0 - (len(self.fitted) - 1) / self.df_resid * (self.ssr / self.total)
+
+
 class SumCoding:
     """Sum-coded columns of a design: main effects and, optionally, two-factor interactions."""
 
@@ -146,6 +169,39 @@ class SumCoding:
         self.residual_df = len(levels) - self.matrix.shape[1]
         self._is_repeated = bool(levels.duplicated().any())
         self._grid_size = math.prod(len(found) for found in self.levels.values())
+
+    @functools.cached_property
+    def _inverse(self) -> FloatArray:
+        """The pseudoinverse of the columns, which all responses share."""
+        return np.asarray(np.linalg.pinv(self.matrix))
+
+    @functools.cached_property
+    def covariance(self) -> FloatArray:
+        """The covariance of the coefficients for responses of unit variance."""
+        return np.asarray(self._inverse @ self._inverse.T)
+
+    @functools.cached_property
+    def leverages(self) -> FloatArray:
+        """The diagonal of the hat matrix. (trials,)"""
+        return np.asarray(np.einsum("ij,ji->i", self.matrix, self._inverse))
+
+    @functools.cached_property
+    def _rank(self) -> int:
+        return int(np.linalg.matrix_rank(self.matrix))
+
+    def fit(self, response: FloatArray) -> LeastSquares:
+        """Return the least-squares fit to a response (trials,)."""
+        params = self._inverse @ response
+        fitted = self.matrix @ params
+        residual = response - fitted
+        return LeastSquares(
+            params,
+            fitted,
+            residual,
+            float(residual @ residual),
+            float(np.sum((response - response.mean()) ** 2)),
+            len(response) - self._rank,
+        )
 
     def residual_variance(self, sum_sq: float) -> float:
         """Return the variance over the grid of what the model does not explain.
@@ -201,28 +257,25 @@ def anova(
 
 
 def _analysed(coding: SumCoding, response: FloatArray) -> AnovaTable:
-    fit = OLS(response, coding.matrix).fit()
-    noise = float(fit.ssr / fit.df_resid) if fit.df_resid > 0 else np.nan
+    fit = coding.fit(response)
+    noise = fit.ssr / fit.df_resid if fit.df_resid > 0 else np.nan
     effects = {
         term: coding.effects(term, fit.params[columns]) for term, columns in coding.columns.items()
     }
     variances = {
         term: float(np.mean(np.square(list(values.values())))) for term, values in effects.items()
     }
-    unexplained = coding.residual_variance(float(fit.ssr))
+    unexplained = coding.residual_variance(fit.ssr)
     variance = sum(variances.values()) + (0.0 if math.isnan(unexplained) else unexplained)
     # the variance of a constant response is not 0 but about 1e-32 of its square, by rounding
     scale = 100.0 / variance if variance > 1e-20 * float(np.mean(response**2)) else np.nan
-    identity = np.eye(coding.matrix.shape[1])
     terms = []
     for term, columns in coding.columns.items():
-        # with the covariance for unit variance, F * df is the sum of squares, also for an exact fit
-        test = fit.f_test(identity[columns], cov_p=fit.normalized_cov_params)
-        df = columns.stop - columns.start
-        sum_sq = float(test.fvalue) * df
+        df, own = columns.stop - columns.start, fit.params[columns]
+        sum_sq = float(own @ np.linalg.solve(coding.covariance[columns, columns], own))
         with np.errstate(divide="ignore", invalid="ignore"):
             f = float(np.divide(sum_sq / df, noise))
-        p = float(f_distribution.sf(f, df, fit.df_resid)) if fit.df_resid > 0 else np.nan
+        p = float(fdtrc(df, fit.df_resid, f)) if fit.df_resid > 0 else np.nan
         terms.append(Term(term, scale * variances[term], sum_sq, df, f, p, effects[term]))
     return AnovaTable(
         constant=float(fit.params[0]),
@@ -230,19 +283,18 @@ def _analysed(coding: SumCoding, response: FloatArray) -> AnovaTable:
         main_percent=sum(term.percent for term in terms if len(term.factors) == 1),
         interaction_percent=sum(term.percent for term in terms if len(term.factors) > 1),
         residual_percent=scale * unexplained,
-        total_sum_sq=float(fit.centered_tss),
-        residual_sum_sq=float(fit.ssr),
-        residual_df=int(fit.df_resid),
-        adjusted_r2=float(fit.rsquared_adj) if math.isfinite(scale) and fit.df_resid else math.nan,
-        predicted_r2=_predicted_r2(fit) if math.isfinite(scale) else math.nan,
-        fitted=np.asarray(fit.fittedvalues),
-        residual=np.asarray(fit.resid),
+        total_sum_sq=fit.total,
+        residual_sum_sq=fit.ssr,
+        residual_df=fit.df_resid,
+        adjusted_r2=fit.adjusted_r2() if math.isfinite(scale) and fit.df_resid else math.nan,
+        predicted_r2=_predicted_r2(fit, coding.leverages) if math.isfinite(scale) else math.nan,
+        fitted=fit.fitted,
+        residual=fit.residual,
     )
 
 
-def _predicted_r2(fit: RegressionResults) -> float:
+def _predicted_r2(fit: LeastSquares, leverages: FloatArray) -> float:
     """Return the predicted R2 of a fit; NaN if a trial alone determines a coefficient."""
-    influence = fit.get_influence()
-    if fit.df_resid == 0 or np.max(influence.hat_matrix_diag) > LARGEST_LEVERAGE:
+    if fit.df_resid == 0 or np.max(leverages) > LARGEST_LEVERAGE:
         return math.nan
-    return 1.0 - float(influence.ess_press / fit.centered_tss)
+    return 1.0 - float(np.sum((fit.residual / (1.0 - leverages)) ** 2)) / fit.total

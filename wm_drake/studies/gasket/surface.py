@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t as t_distribution
+from scipy.special import stdtrit
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.doe.anova import AnovaTable, SumCoding
@@ -117,7 +117,7 @@ def surfaces(screening: Screening) -> Surfaces:
     for label, table in screening.tables.items():
         df = table.residual_df
         deviations[label] = math.sqrt(table.residual_sum_sq / df) if df else math.nan
-        quantiles[label] = float(t_distribution.ppf(0.5 + 0.5 * CONFIDENCE, df)) if df else math.nan
+        quantiles[label] = float(stdtrit(df, 0.5 + 0.5 * CONFIDENCE)) if df else math.nan
     coefficients = {label: _coefficients(table) for label, table in screening.tables.items()}
     return Surfaces(
         tuple(design.factors), interactions, coefficients, deviations, quantiles, inverses

@@ -145,9 +145,12 @@ def _units(law: DamperLaw) -> dict[str, Unit]:
     return {name: unit for name, unit in units.items() if unit and name not in law.curves}
 
 
+_DAMPERS: TypeAdapter[DamperNumbers] = TypeAdapter(DamperType)
+
+
 def _damper(fields: dict[str, Any]) -> DamperNumbers:
     try:
-        return TypeAdapter(DamperType).validate_python(fields)
+        return _DAMPERS.validate_python(fields)
     except ValidationError as error:
         detail = error.errors()[0]
         message = str(detail.get("ctx", {}).get("error", detail["msg"]))
