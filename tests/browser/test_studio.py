@@ -65,13 +65,16 @@ def ready(browser):
 
 
 def typed(browser, key, text):
+    from selenium.webdriver.common.keys import Keys
+
     browser.run(
         "document.querySelector(arguments[0]).closest('details').open = true",
         ROW.format(key, ".text"),
     )
     field = browser.find(ROW.format(key, ".text"))
     browser.run("arguments[0].scrollIntoView({block: 'center'})", field)
-    field.clear()
+    # as a user does: selenium's clear() would leave the field, which sets it as it was
+    field.send_keys(Keys.CONTROL, "a")
     field.send_keys(text + "\n")
 
 
@@ -94,6 +97,20 @@ def test_value_typed_with_a_unit_changes_curve_and_numbers(page):
         == amplitude
     )
     assert page.errors() == []
+
+
+def test_answer_leaves_a_text_alone_that_is_being_typed(page):
+    from selenium.webdriver.common.keys import Keys
+
+    curve = page.run(CURVE)
+    typed(page, UNBALANCE, "700 g")
+    field = page.find(ROW.format(UNBALANCE, ".text"))
+    field.send_keys(Keys.CONTROL, "a")
+    field.send_keys("65")  # while the run with 700 g is under way
+    assert changed_from(page, CURVE, curve)
+    assert page.run("return arguments[0].value", field) == "65"
+    field.send_keys("0 g\n")
+    assert "650 g" in unquote(page.wait("return location.href.includes('650') && location.href"))
 
 
 def test_slider_moves_the_curve_and_ends_in_the_history(page):
