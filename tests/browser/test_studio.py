@@ -123,12 +123,14 @@ def test_slider_moves_the_curve_and_ends_in_the_history(page):
     )
     slider = page.find(ROW.format(UNBALANCE, "input[type=range]"))
     page.run("arguments[0].scrollIntoView({block: 'center'})", slider)
-    ActionChains(page.driver).click_and_hold(slider).move_by_offset(40, 0).perform()
+    mouse = ActionChains(page.driver)
+    mouse.click_and_hold(slider).move_to_element_with_offset(slider, 20, 0).perform()
     during = changed_from(page, CURVE, curve)
     assert "kg" in page.run(
         "return document.querySelector(arguments[0]).value", ROW.format(UNBALANCE, ".text")
     )
-    ActionChains(page.driver).move_by_offset(30, 0).release().perform()
+    mouse = ActionChains(page.driver)
+    mouse.move_to_element_with_offset(slider, 45, 0).release().perform()
     after = changed_from(page, CURVE, during)
     assert page.wait("return document.querySelectorAll('#history li').length") == 2
     page.find("#undo").click()
