@@ -5,12 +5,16 @@ The script fits the free quantities of reference_free.yaml to the 36 amplitudes 
 machine and of the predictions.
 With --write, the best machine is written to wm_drake/data/machines/reference.yaml and to its SDF
 model, with the uncertainty beside each number. `wm-drake calibrate` makes a report page of such a
-fit. The script takes about an hour.
+fit. Tables of the predictions and of the fits with fewer free quantities are written beside the
+result; write_validation.py reads them as reference_held_out.csv and reference_fewer.csv. The
+script takes about an hour.
 """
 
 import argparse
 from dataclasses import replace
 from pathlib import Path
+
+import pandas as pd
 
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.cli.progress import progress_bar
@@ -29,7 +33,7 @@ from wm_drake.parameters.published import CONSTANT, published_results
 from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate, identity_of
 from wm_drake.studies.calibration.fewer import fewer_table, fit_with_fewer
 from wm_drake.studies.calibration.outcome import mean_and_largest, solved_machine
-from wm_drake.studies.calibration.prediction import DRAWS, Prediction, predict
+from wm_drake.studies.calibration.prediction import DRAWS, Prediction, predict, prediction_table
 from wm_drake.studies.calibration.solutions import Solution
 from wm_drake.studies.calibration.targets import Targets, targets_of
 from wm_drake.studies.gasket.responses import known_responses
@@ -82,9 +86,17 @@ def main() -> None:
         if arguments.fewer:
             fits = fit_with_fewer(machine, calibration, FEWER, ledger)
         ledger.mark_finished()
+    tables = {
+        "held_out": prediction_table(predictions),
+        "fewer": fewer_table(fits) if fits else pd.DataFrame(),
+    }
+    for name, table in tables.items():
+        if len(table):
+            path = arguments.out.with_name(f"{arguments.out.stem}_{name}.csv")
+            table.to_csv(path, index=False, float_format="%.2f")
     text = "\n".join(_lines(calibration, predictions))
     if fits:
-        text += "\n" + fewer_table(fits).to_string(index=False, float_format="%.2f")
+        text += "\n" + tables["fewer"].to_string(index=False, float_format="%.2f")
     print(text)
     arguments.out.write_text(text + "\n", encoding="utf-8")
 

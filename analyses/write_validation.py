@@ -1,20 +1,30 @@
-"""What is fitted, what is predicted and what is missed, beside the published numbers?
+"""What is verified, fitted, predicted and missed, beside the published numbers?
 
 The script runs the shipped machines as they are: the machine `reference` over the run-up of [B]
 (amplitudes, effect of the gasket, steady state, grand means of the gasket study with linear tables
 as in [B]), the machine `free_stroke` over the spin cycle of [A], and Coulomb fits to loops of the
-MSTV damper of [C]. It writes one page in Markdown, which is docs/validation.md:
+MSTV damper of [C]. It writes three pages in Markdown, the second and third beside the first:
+docs/validation.md, docs/prediction.md and docs/verification.md.
 
-    python analyses/write_validation.py --out docs/validation.md
+    python analyses/write_validation.py --out docs/validation.md --fitted-means
 
-Explanations of results that are missed are in validation_reasons.yaml. It takes about two minutes.
+Explanations of results that are missed are in validation_reasons.yaml, the tests of the page of
+verification in verification.yaml. Loads held out of the calibration, and fits with fewer free
+quantities, take hours: calibrate_reference.py wrote them to reference_held_out.csv and
+reference_fewer.csv. The script takes about two minutes; with --tests, which runs the tests, ten.
 """
 
 import argparse
+import subprocess
+import sys
+import tempfile
 from functools import partial
 from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
 
 import pandas as pd
+from ruamel.yaml import YAML
 
 from wm_drake import Case, build_machine, load_machine, load_profile, simulate_many
 from wm_drake.parameters import (
@@ -28,7 +38,7 @@ from wm_drake.parameters import (
 from wm_drake.parameters.files import read_yaml
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.report.spin.report import amplitude_table
-from wm_drake.report.validation.page import validation_page
+from wm_drake.report.validation.page import Made, validation_page, verification_page
 from wm_drake.rigs import Harmonic
 from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket.screening import Screening, run_screening
@@ -44,7 +54,9 @@ from wm_drake.studies.spin_cycle.runs import compiled_runs
 from wm_drake.studies.spin_cycle.study import run_spin_cycle
 from wm_drake.studies.validation import rows
 
-REASONS = Path(__file__).with_name("validation_reasons.yaml")
+HERE = Path(__file__).parent
+REASONS, VERIFICATION = HERE / "validation_reasons.yaml", HERE / "verification.yaml"
+HELD_OUT, FEWER = HERE / "reference_held_out.csv", HERE / "reference_fewer.csv"
 SHOWN_BY_A = ("2", "5", "29")  # cases of [A] Table 9 that [A] describes
 
 
@@ -75,48 +87,126 @@ def coulomb(quick: bool) -> pd.DataFrame:
     return coulomb_fits(motions, damper.friction_force, damper.slider_damping)
 
 
-def main() -> None:
-    """Run the machines and write the page."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--quick", action="store_true", help="20 trials, no spin cycle, two loops")
-    parser.add_argument(
-        "--fitted-means",
-        action="store_true",
-        help="the grand means of [B] Table 5 were targets of the calibration",
-    )
-    parser.add_argument("--out", type=Path, help="also write the page to this file")
-    arguments = parser.parse_args()
-    reference = load_machine("reference")
+def compared(reference: MachineParameters, quick: bool, means_kind: str) -> list[rows.Row]:
+    """Return a row for each published number; with --quick, without the spin cycle."""
     cases = [Case(name, load, reference.profile) for name, load in reference.loads.items()]
     effect = run_gasket_effect(reference, cases)
     both = [amplitude_table(result) for result in (effect.without, effect.with_gasket)]
-    means_kind = rows.FITTED if arguments.fitted_means else rows.PREDICTED
-    screening = grand_means(reference, arguments.quick)
     found = rows.amplitude_rows(pd.concat(both))
+    found += rows.held_out_rows(pd.read_csv(HELD_OUT))
     found += rows.effect_rows(effect_table(effect))
-    found += rows.mean_rows(screening, published_results(reference.published), means_kind)
-    if not arguments.quick:
+    published = published_results(reference.published)
+    found += rows.mean_rows(grand_means(reference, quick), published, means_kind)
+    if not quick:
         chosen = [case for case in load_unbalance_cases() if case.name in SHOWN_BY_A]
         free = load_machine("free_stroke")
         runs = compiled_runs(build_machine(free))
         found += rows.spin_cycle_rows(
             run_spin_cycle(free, chosen, load_profile("spin_cycle"), runs)
         )
-    found += rows.coulomb_rows(coulomb(arguments.quick))
+    return found + rows.coulomb_rows(coulomb(quick))
+
+
+def simpler_machines() -> pd.DataFrame:
+    """Return the reference machine's fits with fewer free quantities, as a table of texts."""
+    table = pd.read_csv(FEWER, keep_default_na=False)
+    names = [str(text).replace(" ", ", ").replace("_", " ") for text in table.set_to_expected]
+    return pd.DataFrame(
+        {
+            "free quantities": table.free_quantities.astype(str),
+            "cost": table.cost.map("{:.0f}".format),
+            "amplitudes: mean difference": table.amplitudes_mean_percent.map("{:.1f} %".format),
+            "largest": table.amplitudes_largest_percent.map("{:.0f} %".format),
+            "means: mean difference": table.responses_mean_percent.map("{:.1f} %".format),
+            "largest of the means": table.responses_largest_percent.map("{:.0f} %".format),
+            "set to expected values here": names,
+        }
+    )
+
+
+def run_tests(groups: dict[str, list[dict[str, Any]]]) -> dict[str, str]:
+    """Run the tests of the page of verification and return what each gave."""
+    names = [name for group in groups.values() for row in group for name in row.get("tests", ())]
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "report.xml"
+        subprocess.run(
+            [
+                sys.executable,
+                "-m",
+                "pytest",
+                "-q",
+                "-m",
+                "not hours",
+                f"--junitxml={report}",
+                *names,
+            ],
+            cwd=HERE.parent,
+            check=False,
+            stdout=sys.stderr,
+        )
+        cases = list(ElementTree.parse(report).iter("testcase"))
+    outcomes = {}
+    for name in names:
+        path, _, function = name.partition("::")
+        module = path.removesuffix(".py").replace("/", ".")
+        own = [
+            case
+            for case in cases
+            if case.get("classname") == module
+            and (not function or str(case.get("name")).split("[")[0] == function)
+        ]
+        failed = sum(
+            case.find("failure") is not None or case.find("error") is not None for case in own
+        )
+        outcomes[name] = f"**{failed} of {len(own)} failed**" if failed else f"{len(own)} passed"
+    return outcomes
+
+
+def main() -> None:
+    """Run the machines and write the pages."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="20 trials, no spin cycle, two loops")
+    parser.add_argument("--tests", action="store_true", help="run the tests of the verification")
+    parser.add_argument(
+        "--fitted-means",
+        action="store_true",
+        help="the grand means of [B] Table 5 were targets of the calibration",
+    )
+    parser.add_argument("--out", type=Path, help="page of validation; the others go beside it")
+    arguments = parser.parse_args()
+    reference = load_machine("reference")
+    means_kind = rows.FITTED if arguments.fitted_means else rows.PREDICTED
+    found = compared(reference, arguments.quick, means_kind)
+    command = "python analyses/write_validation.py --out docs/validation.md"
+    command += " --fitted-means" if arguments.fitted_means else ""
     notes = [
         f"Machine `{reference.name}` ({reference.about}), machine `free_stroke`, component "
         "`mstv_damper`.",
-        f"Gasket study: {screening.design.trials} trials, {screening.design.kind}, tables linear.",
+        f"Gasket study: {20 if arguments.quick else 243} trials, tables linear.",
     ]
-    command = "python analyses/write_validation.py --out docs/validation.md"
-    command += " --fitted-means" if arguments.fitted_means else ""
     reasons = {str(key): str(text) for key, text in read_yaml(REASONS).items()}
-    page = validation_page(found, command, notes, reasons)
-    print(page)
-    if arguments.out:
-        arguments.out.write_text(page, encoding="utf-8")
+    made = Made(command, notes, reasons)
+    groups = YAML(typ="safe").load(VERIFICATION)
+    pages = {
+        "validation.md": validation_page(
+            found,
+            made,
+            rows.FITTED,
+            {"Reference machine with fewer free quantities": simpler_machines()},
+        ),
+        "prediction.md": validation_page(found, made, rows.PREDICTED),
+        "verification.md": verification_page(
+            groups, command, run_tests(groups) if arguments.tests else {}
+        ),
+    }
+    for name, page in pages.items():
+        print(page)
+        if arguments.out:
+            is_first = name == "validation.md"
+            path = arguments.out if is_first else arguments.out.with_name(name)
+            path.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ extensions = [
 exclude_patterns = ["_build", "README.md", "**/.ipynb_checkpoints"]
 source_suffix = {".md": "myst-nb", ".rst": "restructuredtext"}
 nitpicky = False
+default_role = "code"  # single backticks of docstrings
 
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3

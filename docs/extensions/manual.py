@@ -4,7 +4,8 @@ A page asks for a text by a mark:
 
 - `<!-- machine file keys -->`: the keys of a machine file;
 - `<!-- public names -->`: the public names of the package;
-- `<!-- functions of MODULE -->`: the functions of a module of laws.
+- `<!-- functions of MODULE -->`: the functions of a module of laws, or `MODULE: NAME NAME` of them;
+- `<!-- picture NAME -->`: a picture that is drawn from the code (`pictures.py`).
 """
 
 import importlib
@@ -14,14 +15,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from equations import mathml_of
+from pictures import svg_of
+from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
 
 import wm_drake
 from wm_drake.parameters.file_keys import FileKey, KeyGroup, key_groups
 
 KEYS, NAMES = "<!-- machine file keys -->", "<!-- public names -->"
-FUNCTIONS = re.compile(r"<!-- functions of ([\w.]+) -->")
+FUNCTIONS = re.compile(r"<!-- functions of ([\w.]+)(?:: ([\w ]+))? -->")
+PICTURE = re.compile(r"<!-- picture ([\w-]+) -->")
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s]+?)(#[^)\s]*)?\)")
+DECISION = re.compile(r"docs/decisions/(\d{4})")
 SECTION = re.compile(r"(Args|Returns|Raises|Yields|Attributes|Example):$")
 PAGES_OUTSIDE = {
     "README.md": "about/sources",
@@ -31,14 +37,36 @@ PAGES_OUTSIDE = {
     "analyses/README.md": "about/analyses",
 }
 """Pages of the manual that include documents of the checkout outside of `docs`."""
+PICTURES_OF_KEYS = {
+    "Frame override": "geometry",
+    "Force table": "table",
+    "Telescopic damper": "tubes",
+    "Cabinet": "cabinet",
+    "Unbalance": "load",
+    "Spin profile": "profile",
+    "Torque limit": "drive",
+}
+"""Picture of a group of keys, drawn from the models."""
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the extension."""
+    app.add_lexer("csv", TextLexer)
+    app.connect("env-before-read-docs", _spread)
     app.connect("source-read", _complete)
     app.connect("include-read", _complete_included)
     app.connect("autodoc-process-docstring", _plain_docstring, priority=400)  # before napoleon
     return {"parallel_read_safe": True}
+
+
+def _spread(_app: Sphinx, _env: Any, names: list[str]) -> None:
+    """Spread the notebooks evenly over the pages: processes read pages in blocks, in this order."""
+    notebooks = [name for name in names if name.startswith("tutorials/")]
+    others = [name for name in names if name not in notebooks]
+    step = len(others) / max(1, len(notebooks))
+    for number, name in reversed(list(enumerate(notebooks))):
+        others.insert(round(number * step), name)
+    names[:] = others
 
 
 def _complete(app: Sphinx, docname: str, source: list[str]) -> None:
@@ -48,7 +76,8 @@ def _complete(app: Sphinx, docname: str, source: list[str]) -> None:
         text = text.replace(KEYS, "\n".join(_keys()))
     if NAMES in text:
         text = text.replace(NAMES, _documented(_public_names()))
-    text = FUNCTIONS.sub(lambda found: _documented(_functions(found[1])), text)
+    text = FUNCTIONS.sub(lambda found: _documented(_functions(found[1], found[2])), text)
+    text = PICTURE.sub(lambda found: _drawn(found[1]), text)
     source[0] = _relinked(text, Path(app.srcdir), Path(app.srcdir, docname).parent, docname)
 
 
@@ -99,22 +128,37 @@ def _plain_docstring(
 ) -> None:
     """Turn a docstring in plain text into reStructuredText.
 
-    An indented block before the sections of arguments is an equation. Bars and stars are no markup.
+    An indented block before the sections of arguments is an equation, which is typeset. Bars and
+    stars are no markup.
     """
     new: list[str] = []
+    block: list[str] = []
     in_sections = False
     for line in lines:
         in_sections |= bool(SECTION.match(line))
-        is_equation = line.startswith("    ") and not in_sections
-        if is_equation and not (new and new[-1].startswith("    ")) and not _inside(new):
-            new += ["::", ""]
-        new.append(line if is_equation else line.replace("|", "\\|").replace("*", "\\*"))
-    lines[:] = new
+        if (line.startswith("    ") and not in_sections) or (block and not line):
+            block.append(line)
+            continue
+        new += _typeset(block)
+        block = []
+        new.append(DECISION.sub(_decision, line.replace("|", "\\|").replace("*", "\\*")))
+    lines[:] = new + _typeset(block)
 
 
-def _inside(lines: list[str]) -> bool:
-    """Return whether the last lines are an equation, apart from empty ones."""
-    return next((line.startswith("    ") for line in reversed(lines) if line.strip()), False)
+def _decision(found: re.Match[str]) -> str:
+    """Return a link to the decision that a docstring names by its number."""
+    (path,) = (Path(__file__).parents[1] / "decisions").glob(f"{found[1]}-*.md")
+    return f":doc:`decision {found[1]} </decisions/{path.stem}>`"
+
+
+def _typeset(block: list[str]) -> list[str]:
+    """Return an indented block as an equation; what is no equation stays as it is."""
+    if not block:
+        return []
+    html = mathml_of(block)
+    if html is None:
+        return ["::", "", *block, ""]
+    return [".. raw:: html", "", f'    <div class="equation">{html}</div>', ""]
 
 
 def _public_names() -> Iterator[tuple[str, str]]:
@@ -123,7 +167,16 @@ def _public_names() -> Iterator[tuple[str, str]]:
         yield kind, f"wm_drake.{name}"
 
 
-def _functions(module: str) -> Iterator[tuple[str, str]]:
+def _drawn(name: str) -> str:
+    """Return a picture as a block of HTML."""
+    return f"```{{raw}} html\n{svg_of(name)}\n```"
+
+
+def _functions(module: str, chosen: str | None) -> Iterator[tuple[str, str]]:
+    for name in (chosen or "").split():
+        yield "autofunction", f"{module}.{name}"
+    if chosen:
+        return
     for name, value in vars(importlib.import_module(module)).items():
         own = getattr(value, "py_func", value)
         if inspect.isfunction(own) and own.__module__ == module and not name.startswith("_"):
@@ -143,6 +196,8 @@ def _keys() -> Iterator[str]:
 def _section(group: KeyGroup) -> Iterator[str]:
     yield f"## {group.title}\n"
     yield f"{_escaped(group.about)}\n"
+    if group.title in PICTURES_OF_KEYS:
+        yield f"{_drawn(PICTURES_OF_KEYS[group.title])}\n"
     if group.places:
         yield f"In the file: {', '.join(f'`{place}`' for place in group.places)}.\n"
     if group.also:

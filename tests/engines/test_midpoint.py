@@ -39,7 +39,7 @@ def at_rest(setup, difference):
     """Return packed numbers, layout, state of rest and Jacobian there, in each lane."""
     packed, layout = pack(setup)
     rest, (free, _) = initial_state(setup, STANDSTILL), free_states(setup)
-    found = jacobians(packed, layout, np.tile(rest, (WIDTH, 1)), free, difference)
+    found, _ = jacobians(packed, layout, np.tile(rest, (WIDTH, 1)), free, difference)
     return packed, layout, rest, found
 
 

@@ -187,6 +187,33 @@ def test_a_fast_controller_asks_for_a_shorter_step_and_an_unstable_sample_time_i
         simulate(sampled, case)
 
 
+@pytest.mark.slow
+def test_a_run_on_a_cabinet_that_moves_is_as_in_drake():
+    """Motor and cabinet together, at a friction at which the feet slide."""
+    machine = build_machine(with_moving_cabinet(load_machine("motor"), friction=0.12))
+    case = Case("two", LOAD, SpinProfile(time=(0.0, 0.301, 1.0), speed=(8.0, 12.0, 20.0)))
+    drake, fine, usual = (
+        simulate(machine, case, "drake"),
+        simulate(machine, case, step=2.5e-3 / 16),
+        simulate(machine, case),
+    )
+    assert usual.attrs["integrator"] == "multistep"
+    assert list(drake.data_vars) == list(fine.data_vars)
+    assert float(np.abs(drake.foot_slip).max()) > 1e-4
+    assert float(np.abs(drake.drum_speed - case.profile.speed_at(drake.time)).max()) > 0.1
+    for variable in (
+        *("displacement", "drum_speed", "drum_angle", "motor_torque", "floor_force"),
+        *("cabinet_position", "foot_slip"),
+    ):
+        size = float(np.abs(drake[variable]).max())
+        np.testing.assert_allclose(
+            fine[variable], drake[variable], atol=1e-3 * size, err_msg=variable
+        )
+        np.testing.assert_allclose(
+            usual[variable], fine[variable], atol=1e-2 * size, err_msg=variable
+        )
+
+
 def test_derivatives_agree_with_a_cabinet_that_moves():
     machine = build_machine(with_moving_cabinet(load_machine("motor")))
     setup, rng = machine.set_up(LOAD), np.random.default_rng(7)

@@ -6,7 +6,7 @@ from simple_machines import constant_speed, isotropic_machine, unbalance
 
 from wm_drake.compiler.compilation import generic
 from wm_drake.compiler.lanes import WIDTH
-from wm_drake.engines.compiled.linear import is_followed
+from wm_drake.engines.compiled.linear import CABINET, SMOOTH, is_followed
 from wm_drake.engines.compiled.multistep import (
     PAST_INPUTS,
     PAST_RATES,
@@ -135,6 +135,96 @@ def test_machines_with_sponges_are_followed_where_the_whole_step_is_stable():
         wrong += followed != (size < 1.0)
     assert min(sides.values()) >= 10
     assert wrong == 0
+
+
+def amplification_of_block(jacobian, alone, first):
+    """Return the matrix of a step of length 1 of x' = jacobian x with a cabinet as its last part.
+
+    Args:
+        jacobian: Of all states.
+        alone: Of the last states, from `first` on, under a constant input.
+        first: Number of states of the multistep formula.
+    """
+    n, m = len(jacobian), len(alone)
+
+    def step(columns):
+        x = columns[:n]
+        past = [columns[n + j * first :][:first] for j in range(PAST_RATES - 1)]
+        u_1, u_2 = columns[-2 * m : -m], columns[-m:]
+        f = jacobian @ x
+        b, c = x[:first], x[first:]
+        u = f[first:] - alone @ c
+        moved = b + sum(w * rate for w, rate in zip(weights(), [f[:first], *past], strict=True))
+        middle, end = 1.875 * u - 1.25 * u_1 + 0.375 * u_2, 3.0 * (u - u_1) + u_2
+        k_1 = u + alone @ c
+        k_2 = middle + alone @ (c + 0.5 * k_1)
+        k_3 = middle + alone @ (c + 0.5 * k_2)
+        k_4 = end + alone @ (c + k_3)
+        after = c + (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4) / 6.0
+        return np.vstack([moved, after, f[:first], *past[:-1], u, u_1])
+
+    return step(np.eye(n + (PAST_RATES - 1) * first + 2 * m))
+
+
+def test_machines_with_a_cabinet_are_followed_where_the_whole_step_is_stable():
+    """A body on a random cabinet on stiff feet: the growth against the eigenvalues."""
+    rng = np.random.default_rng(4)
+    wrong, sides = 0, {True: 0, False: 0}
+    for _ in range(80):
+        n, m = 2, 2  # coordinates of the body and of the cabinet
+        a, c = rng.normal(size=(n + m, n + m)), rng.normal(size=(n + m, n + m))
+        stiffness = a @ a.T * 10.0 ** rng.uniform(-4.0, -1.0)
+        damping = c @ c.T * 10.0 ** rng.uniform(-4.0, -1.0)
+        feet = np.diag(10.0 ** rng.uniform(-1.0, 1.2, m))
+        rub = 0.3 * np.sqrt(feet)
+        of_feet, of_rub = np.zeros_like(stiffness), np.zeros_like(stiffness)
+        of_feet[n:, n:], of_rub[n:, n:] = feet, rub
+        whole = np.block(
+            [[np.zeros((n + m, n + m)), np.eye(n + m)], [-stiffness - of_feet, -damping - of_rub]]
+        )
+        order = [
+            *range(n),
+            *range(n + m, 2 * n + m),
+            *range(n, n + m),
+            *range(2 * n + m, 2 * n + 2 * m),
+        ]
+        whole = whole[np.ix_(order, order)]
+        alone = np.block([[np.zeros((m, m)), np.eye(m)], [-feet, -rub]])
+        size = np.abs(np.linalg.eigvals(amplification_of_block(whole, alone, 2 * n))).max()
+        if abs(size - 1.0) < 5e-3:  # too slow to be seen in a thousand steps
+            continue
+        kinds = np.repeat([SMOOTH, CABINET], [2 * n, 2 * m])
+        lanes = (np.tile(matrix, (WIDTH, 1, 1)) for matrix in (whole, alone))
+        found = next(lanes)
+        followed = is_followed(found, kinds, 1.0, next(lanes))
+        sides[followed] += 1
+        wrong += followed != (size < 1.0)
+    assert min(sides.values()) >= 8
+    assert wrong == 0
+
+
+def test_a_cabinet_that_grows_by_itself_may_grow():
+    growing = np.tile(np.array([[0.0, 1.0], [1e-4, 0.0]]), (WIDTH, 1, 1))
+    assert is_followed(growing, np.full(2, CABINET), 1.0, growing)
+    assert not is_followed(growing, np.full(2, SMOOTH), 1.0)
+
+
+@pytest.mark.parametrize("name", ["light_cabinet", "heavy_cabinet"])
+def test_a_cabinet_takes_steps_of_one_derivative_with_the_peaks_of_small_steps(name):
+    """Steps of 2.5 ms against steps of the Runge-Kutta scheme of a sixteenth, with the motor."""
+    drive = load_machine("motor").model_dump()["drive"]
+    tree = load_machine(name).model_dump() | {"drive": drive}
+    machine = build_machine(MachineParameters.model_validate(tree))
+    profile = SpinProfile(time=(0.0, 1.0, 8.0), speed=(0.0, 5.0, 24.0))
+    case = Case("front", machine.parameters.loads["front"], profile)
+    usual = simulate(machine, case)
+    fine = simulate(machine, case, step=2.5e-3 / 16, integrator="runge_kutta")
+    assert (usual.attrs["integrator"], usual.attrs["step_s"]) == ("multistep", 2.5e-3)
+    for variable in ("displacement", "cabinet_position", "cabinet_force", "floor_force"):
+        largest = np.abs(fine[variable].values).max()
+        assert np.abs(usual[variable].values).max() == pytest.approx(largest, rel=1e-3)
+    slid = float(np.abs(fine.foot_slip).max())
+    assert float(np.abs(usual.foot_slip).max()) == pytest.approx(slid, rel=1e-2, abs=1e-9)
 
 
 def test_a_corner_is_followed_by_steps_of_four_derivatives():

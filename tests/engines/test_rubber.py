@@ -77,7 +77,7 @@ def test_the_step_check_sees_branches():
 def test_states_are_named_and_treated_by_kind(rubber):
     assert "the Maxwell branch of bushing 'gasket'" in fastest_motions(rubber.set_up())
     setup = rubber.set_up()
-    _, kinds = linearised(setup, *pack(setup), DIFFERENCE)
+    kinds = linearised(setup, *pack(setup), DIFFERENCE).kinds
     assert list(kinds[-6:]) == [PATH, SPONGE, PATH, SPONGE, SPONGE, PATH]
 
 

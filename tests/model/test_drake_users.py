@@ -1,7 +1,10 @@
 """The machine in the hands of a Drake user: ports, Simulator, logs, Meshcat, linearization, AutoDiff."""
 
+import struct
+
 import numpy as np
 import pytest
+from moving_cabinet import with_moving_cabinet
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
 from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
@@ -269,6 +272,25 @@ def test_meshcat_shows_the_moving_machine_and_cannot_touch_the_dynamics(machine,
     np.testing.assert_array_equal(*rates)
     np.testing.assert_allclose(*ends, atol=1e-7)
     assert meshcat.HasPath("/drake/visualizer/oscillating_group/tub")
+
+
+def test_meshcat_moves_a_cabinet_that_moves():
+    """The picture at a time has the cabinet where the plant has it, and its floor stays."""
+    meshcat = Meshcat(MeshcatParams(host="localhost"))
+    shown = build_machine(with_moving_cabinet(friction=0.1), meshcat=meshcat)
+    context = shown.set_up("middle").context
+    simulator = Simulator(shown.diagram, context)
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", 1.0 / 800).set_fixed_step_mode(True)
+    simulator.AdvanceTo(0.25)
+    plant = shown.plant
+    poses = plant.GetPositions(plant.GetMyContextFromRoot(context))[shown.state_layout.cabinet]
+    assert np.abs(poses).max() > 1e-7
+    shown.diagram.ForcedPublish(context)
+    packed = meshcat._GetPackedTransform("/drake/visualizer")
+    columns = packed.partition(b"matrix")[2][3:]  # msgpack: 16 numbers of a type byte and a double
+    matrix = np.array([struct.unpack(">d", columns[k + 1 : k + 9])[0] for k in range(0, 144, 9)])
+    np.testing.assert_allclose(matrix[12:15], poses[3:], atol=1e-12)
+    assert meshcat.HasPath("/floor")
 
 
 def test_two_machines_in_one_diagram(reference):

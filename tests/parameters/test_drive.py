@@ -1,6 +1,7 @@
 """Drives of a machine file: compatible with old files, and one clear message for each mistake."""
 
 import pytest
+from machine_with_bearing import with_bearing
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import load_machine, machine_yaml, quantities
@@ -29,6 +30,11 @@ def test_the_shipped_motor_has_a_source_for_each_number_and_survives_a_file(tmp_
     assert all(machine.sources[key].startswith("assumption") for key in keys)
     again = read(tmp_path, machine_yaml(machine))
     assert again.drive == machine.drive
+
+
+def test_a_motor_with_a_compliant_bearing_is_refused():
+    with pytest.raises(ValueError, match=r"drive\.kind: 'motor' needs a rigid bearing .* remove"):
+        with_bearing(load_machine("motor"))
 
 
 @pytest.mark.parametrize(

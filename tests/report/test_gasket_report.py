@@ -247,6 +247,21 @@ def test_page_of_few_factors_and_failed_runs(trials, model):
     )
 
 
+def test_page_of_one_factor_has_no_interactions(reference):
+    """One factor with a model of interactions: as `--factor gasket.stiffness_x` gives."""
+
+    def evaluate(design):
+        frame = pd.DataFrame(dict.fromkeys(RESPONSES, 2.0 + design.levels[:, 0]))
+        return Responses({"middle": frame}, UNITS, {})
+
+    factors = levels_of(reference, {"C_L": load_factors(GASKET_FACTORS)["C_L"]})
+    case = Case("middle", reference.loads["middle"], reference.profile)
+    trials = GasketTrials(reference, factors, [case])
+    page = gasket_report(run_screening(make_design("full", ["C_L"]), evaluate), trials)
+    assert "Main effects, load middle" in page
+    assert "Strongest interaction" not in page
+
+
 @pytest.mark.parametrize(
     ("value", "text"),
     [(123.4, "123"), (12.34, "12.3"), (-1.234, "−1.23"), (0.01234, "0.0123"), (np.nan, "–")],

@@ -6,7 +6,8 @@ import xarray as xr
 
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.spin import Region
-from wm_drake.simulation.mount_forces import mount_forces, rms_table, speed_ranges
+from wm_drake.simulation.mount_forces import SpeedRange, mount_forces, rms_table, speed_ranges
+from wm_drake.simulation.mounts import force_measures
 
 RAD_S = np.pi / 30.0
 TIME = 5e-3 * np.arange(8000)
@@ -54,7 +55,7 @@ def test_peaks_and_values_at_rest():
     assert gasket.peak == pytest.approx(10.0)  # a circle of radius 5 N through zero
 
 
-def test_rms_is_that_of_the_change_from_rest():
+def test_rms_is_that_without_the_mean():
     forces, ranges = mount_forces(record()), speed_ranges(record(), profile())
     assert [part.name for part in ranges] == [
         "0 to 100 rpm",
@@ -64,8 +65,8 @@ def test_rms_is_that_of_the_change_from_rest():
     ]
     assert [part.samples.sum() for part in ranges] == [2000] * 4
     found = rms_table(forces, ranges)
-    # the gasket's |change|^2 is 50 (1 - cos), with the mean 50
-    expected = np.array([20.0 / np.sqrt(2.0), 30.0, np.sqrt(50.0)])
+    # the force of the gasket goes round a circle of 5 N about its mean
+    expected = np.array([20.0 / np.sqrt(2.0), 30.0, 5.0])
     np.testing.assert_allclose(found, np.repeat(expected[:, None], 4, axis=1), rtol=0.03)
     np.testing.assert_allclose(found[[0, 2]], expected[[0, 2], None] * np.ones(4), rtol=1e-9)
 
@@ -95,3 +96,10 @@ def test_range_that_the_run_did_not_reach_is_nan():
     found = rms_table(mount_forces(early), speed_ranges(early, profile()))
     assert np.isnan(found).tolist() == [[False, True, True, True]] * 3
     assert mount_forces(record().isel(time=slice(0))) == []
+
+
+def test_rms_over_the_whole_run_is_the_measure_of_the_json():
+    of_run = force_measures(record().mount_force.values)[2]
+    everything = [SpeedRange("all", np.ones(len(TIME), dtype=bool))]
+    found = rms_table(mount_forces(record()), everything)[:, 0]
+    np.testing.assert_allclose(found, of_run, rtol=1e-12)

@@ -1,5 +1,7 @@
 """A cabinet that moves: walking, limits of its feet, energy, rest, and what is refused."""
 
+import re
+
 import numpy as np
 import pytest
 from moving_cabinet import with_moving_cabinet
@@ -15,10 +17,13 @@ from wm_drake.simulation.cabinet import walk
 from wm_drake.simulation.cases import Case, case_of
 from wm_drake.simulation.measures import measure, walk_of
 from wm_drake.simulation.records import as_record
-from wm_drake.simulation.runs import simulate
+from wm_drake.simulation.runs import DivergenceWarning, simulate
+from wm_drake.studies.modes.study import modes, three_linearisations
+from wm_drake.studies.steady.response import steady_response
 
 RUN_UP = SpinProfile(time=(0.0, 1.0, 12.0, 15.0), speed=(0.0, 5.0, 24.0, 24.0))
 SHORT = SpinProfile(time=(0.0, 0.5, 2.0), speed=(4.0, 8.0, 20.0))
+FEET_PLACES = load_machine("reference").cabinet.feet
 TWO = Load(unbalances=(Unbalance(mass=0.8, radius=0.25, y=-0.1),))
 
 
@@ -230,6 +235,38 @@ def test_other_refusals():
     fixed = build_machine(load_machine("reference"))
     with pytest.raises(InputError, match=r"cabinet.moves: this cabinet moves"):
         fixed.set_up(parameters=with_moving_cabinet())
+
+
+def test_modes_and_steady_states_are_refused(light):
+    """One message that names the key and what to set, before anything is computed."""
+    message = r"^cabinet\.moves: the cabinet of machine 'light_cabinet' moves; .* set it to false$"
+    for refused in (
+        lambda: modes(light),
+        lambda: steady_response(light, "middle", [10.0, 20.0]),
+        lambda: three_linearisations(light, "middle"),
+    ):
+        with pytest.raises(InputError, match=message):
+            refused()
+
+
+def test_a_cabinet_that_tips_over_is_said_to():
+    """Both engines and a batch name the time and the side."""
+    feet = {n: {"x": 0.06 if "right" in n else -0.06, "y": f.y} for n, f in FEET_PLACES.items()}
+    machine = build_machine(with_moving_cabinet(feet=feet, friction=2.0, mass=14.0))
+    load = Load(unbalances=(Unbalance(mass=3.0, radius=0.25, y=0.0),))
+    case = Case("heavy", load, SpinProfile(time=(0.0, 4.0), speed=(5.0, 17.0)))
+    with pytest.warns(DivergenceWarning, match="the cabinet tips over to its"):
+        told = simulate(machine, case).attrs["diverged"]
+    assert re.match(
+        r"the run diverged at \d\.\d{3} s: the cabinet tips over to its (right|left), "
+        r"tilted by (29|3\d) deg, bound 29 deg; last good state at ",
+        told,
+    )
+    with pytest.warns(DivergenceWarning):
+        in_drake = simulate(machine, case, "drake").attrs["diverged"]
+    assert in_drake.partition(";")[0] == told.partition(";")[0]
+    table = simulate_many(machine, [case], measures=["extremes"], histories=False)
+    assert list(table.diverged) == [told]
 
 
 def test_a_step_too_long_for_stiff_feet_is_never_silent(moving):

@@ -1,10 +1,13 @@
 """Run-up of the reference machine in each engine: speed, energy, convergence, symmetry."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from energy_book import EnergyBook, dense_record
 from pydrake.systems.analysis import Simulator
 
+from wm_drake.batch import simulate_many
 from wm_drake.engines.compiled.stepping import Stepping
 from wm_drake.engines.drake import advance_to
 from wm_drake.errors import InputError
@@ -303,3 +306,12 @@ def test_parameters_of_a_case_replace_the_machines(machine, reference, engine):
         machine, Case("a", reference.loads["middle"], profile, parameters=softer), engine
     )
     assert not np.allclose(base.displacement, changed.displacement, atol=1e-6)
+
+
+def test_a_case_of_changed_parameters_runs_with_them(machine, reference):
+    softer = with_value(reference, "gasket.stiffness_y", 0.5 * reference.gasket.stiffness_y)
+    cases = [replace(case_of(one, "counter"), profile=FAST_RUN_UP) for one in (reference, softer)]
+    force = simulate_many(machine, cases).gasket_force.sel(axis="y").values
+    assert force[1] < 0.9 * force[0]
+    alone = measure(simulate(machine, cases[1])).gasket_force.sel(axis="y")
+    assert float(alone) == pytest.approx(force[1], rel=1e-9)

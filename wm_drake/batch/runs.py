@@ -250,7 +250,7 @@ class Runner:
         keeps = self.histories
         keeps = keeps if isinstance(keeps, bool) else item.number in keeps
         record = self._record(item, schedule, run.samples.copy()) if keeps else None
-        diverged = _divergence(schedule.time, run.samples, run.good)
+        diverged = _divergence(schedule.time, run.samples, run.good, item)
         gap = run.gap[0] if run.gap else None
         return RunResult(item.number, item.case, values, diverged, record, gap)
 
@@ -394,11 +394,13 @@ def _floor_forces(item: WorkItem, run: "_Run") -> FloatArray | None:
     return floor_forces(cabinet, item.numbers.setup.cabinet.packed())
 
 
-def _divergence(time: FloatArray, samples: FloatArray, good: int) -> str:
+def _divergence(time: FloatArray, samples: FloatArray, good: int, item: WorkItem) -> str:
     """Return why and when a run diverged, as its record has it; "" if it did not."""
     if good == len(time):
         return ""
-    reason = diverging_coordinate(samples[good])
+    states = samples[good : good + 1, : len(item.begin)]
+    cabinet = item.numbers.layout.cabinet_part(states)
+    reason = diverging_coordinate(samples[good], None if cabinet is None else cabinet[0, :2])
     assert reason is not None  # this is the first sample out of bounds
     return divergence_text(Divergence(float(time[good]), *reason), time[:good], samples[:good])
 

@@ -13,6 +13,7 @@ from wm_drake.cli.terminal import say
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    from wm_drake.model.machine import Machine
     from wm_drake.parameters import MachineParameters
     from wm_drake.parameters.keys import Tree
     from wm_drake.simulation.cases import Case
@@ -200,6 +201,15 @@ def check_buildable(file: str, parameters: "MachineParameters") -> "tuple[Proble
     Returns:
         Values of the machine that are legal but unusual, with file and line.
     """
+    return _built(file, parameters)[1]
+
+
+def build_checked(file: str, parameters: "MachineParameters") -> "Machine":
+    """Return the built machine, after the checks of `check_buildable`."""
+    return _built(file, parameters)[0]
+
+
+def _built(file: str, parameters: "MachineParameters") -> "tuple[Machine, tuple[Problem, ...]]":
     from wm_drake.engines.compiled.packing import pack
     from wm_drake.engines.compiled.stepping import choose_stepping
     from wm_drake.model.build import build_machine
@@ -215,8 +225,10 @@ def check_buildable(file: str, parameters: "MachineParameters") -> "tuple[Proble
         measured_amplitudes(parameters)
         published_results(parameters.published)
         step = checked_step(parameters, None)
-        setup = build_machine(parameters).set_up()
+        machine = build_machine(parameters)
+        setup = machine.set_up()
         choose_stepping(setup, *pack(setup), parameters.profile, step, parameters.integrator)
         scene = Scene(parameters)
     unusual = [*unusual_values(setup), *unexpected(setup, scene)]
-    return located(InputError(unusual), machine_path(file)).problems if unusual else ()
+    problems = located(InputError(unusual), machine_path(file)).problems if unusual else ()
+    return machine, problems

@@ -7,8 +7,16 @@ import typer
 from wm_drake.errors import input_error, nearest_names
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    import xarray as xr
+
     from wm_drake.parameters import MachineParameters
     from wm_drake.simulation.drive import DriveMeasures
+
+IN_BATCH = (
+    *("peak_torque", "mean_torque", "mean_torque_speed", "peak_power", "energy", "speed_ripple"),
+    *("caught_speed", "caught_torque"),
+)
+"""Measures of the drive in a batch that the JSON has, without `drive_`."""
 
 DRIVES = ("prescribed", "motor")
 
@@ -49,23 +57,46 @@ def with_drive(parameters: "MachineParameters", drive: str | None) -> "MachinePa
 
 def drive_as_json(drive: "DriveMeasures") -> dict[str, Any]:
     """Return the measures of the drive for JSON, which has no NaN."""
+    caught, nan = drive.capture, float("nan")
+    return {
+        "peak_torque_Nm": _number(drive.peak_torque),
+        "mean_torque_Nm": _number(drive.mean_torque),
+        "mean_torque_rpm": _rpm(drive.mean_torque_speed),
+        "peak_power_W": _number(drive.peak_power),
+        "energy_J": _number(drive.energy),
+        "speed_ripple_percent": _number(100.0 * drive.speed_ripple),
+        "caught_rpm": _rpm(caught.speed if caught else nan),
+        "caught_mean_torque_Nm": _number(caught.torque if caught else nan),
+    }
+
+
+def drive_of_run_as_json(measured: "xr.Dataset") -> dict[str, Any] | None:
+    """Return the measures of the drive of one run of a batch; None if they were not measured."""
+    if "drive_peak_torque" not in measured:
+        return None
+    of = {name: float(measured[f"drive_{name}"]) for name in IN_BATCH}
+    return {
+        "peak_torque_Nm": _number(of["peak_torque"]),
+        "mean_torque_Nm": _number(of["mean_torque"]),
+        "mean_torque_rpm": _rpm(of["mean_torque_speed"]),
+        "peak_power_W": _number(of["peak_power"]),
+        "energy_J": _number(of["energy"]),
+        "speed_ripple_percent": _number(100.0 * of["speed_ripple"]),
+        "caught_rpm": _rpm(of["caught_speed"]),
+        "caught_mean_torque_Nm": _number(of["caught_torque"]),
+    }
+
+
+def _number(value: float) -> float | None:
+    """Return a number, or None for NaN, which JSON does not have."""
+    return value if value == value else None
+
+
+def _rpm(speed: float) -> float | None:
+    """Return a speed in rpm, or None for NaN. [rad/s]"""
     from wm_drake.parameters.units import Unit
 
-    caught, rpm = drive.capture, Unit("rad/s", "rpm").from_si
-
-    def number(value: float) -> float | None:
-        return value if value == value else None
-
-    return {
-        "peak_torque_Nm": number(drive.peak_torque),
-        "mean_torque_Nm": number(drive.mean_torque),
-        "mean_torque_rpm": number(rpm(drive.mean_torque_speed)),
-        "peak_power_W": number(drive.peak_power),
-        "energy_J": number(drive.energy),
-        "speed_ripple_percent": number(100.0 * drive.speed_ripple),
-        "caught_rpm": rpm(caught.speed) if caught else None,
-        "caught_mean_torque_Nm": caught.torque if caught else None,
-    }
+    return _number(Unit("rad/s", "rpm").from_si(speed))
 
 
 def drive_text(drive: "DriveMeasures") -> str:

@@ -93,7 +93,7 @@ def run_drake(
             simulator.AdvancePendingEvents()  # a sampled controller acts before the sample is taken
             samples.take(row)
             if row % SAMPLES_BETWEEN_CHECKS == 0:
-                if diverging_coordinate(samples.tub_pose()) is not None:
+                if diverging_coordinate(*samples.poses()) is not None:
                     break
                 progress(time / profile.duration)
         progress(1.0)
@@ -148,14 +148,18 @@ class _Samples:
         self._motor_torque = np.full(len(time), np.nan)
         self._slips = np.full((len(time), SLIP_SIZE), np.nan)
 
-    def tub_pose(self) -> FloatArray:
-        """Return roll, pitch, yaw, x, y, z of the tub now, seen from the cabinet. [rad, m]"""
-        cabinet = self._machine.cabinet
+    def poses(self) -> tuple[FloatArray, FloatArray | None]:
+        """Return roll, pitch, yaw, x, y, z of the tub now, seen from the cabinet [rad, m].
+
+        Roll and pitch of the cabinet follow, None if it is fixed. [rad]
+        """
+        cabinet, layout = self._machine.cabinet, self._machine.state_layout
+        positions = np.asarray(self._machine.plant.GetPositions(self._plant_context))
         if cabinet is not None:
             seen = self._machine.outputs["tub_in_cabinet"]
-            return np.asarray(seen.Eval(cabinet.GetMyContextFromRoot(self._setup.context))[:6])
-        tub = self._machine.state_layout.tub
-        return np.asarray(self._machine.plant.GetPositions(self._plant_context)[tub])
+            tub = np.asarray(seen.Eval(cabinet.GetMyContextFromRoot(self._setup.context))[:6])
+            return tub, positions[layout.cabinet[:2]]
+        return positions[layout.tub], None
 
     def take(self, row: int) -> None:
         """Write the sample of the Context's state to a row."""

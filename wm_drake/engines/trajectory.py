@@ -12,6 +12,9 @@ LARGEST_DISPLACEMENT = 0.5
 LARGEST_ANGLE = 1.0
 """Bound of each angle of the tub; a run beyond it diverged. [rad]"""
 
+LARGEST_TILT = 0.5
+"""Bound of roll and pitch of a cabinet that moves; beyond it, it has tipped over. [rad]"""
+
 COORDINATES = ("roll", "pitch", "yaw", "x", "y", "z")
 _BOUNDS = np.repeat([LARGEST_ANGLE, LARGEST_DISPLACEMENT], 3)
 
@@ -22,8 +25,8 @@ class Divergence:
 
     Attributes:
         time: Simulated time of the first sample out of bounds. [s]
-        coordinate: Coordinate of the tub that is out of bounds, one of `COORDINATES`, or "state" if
-            the engine failed.
+        coordinate: Coordinate of the tub that is out of bounds, one of `COORDINATES`; "cabinet" if
+            a cabinet that moves tipped over; "state" if the engine failed.
         reason: Value and bound of the coordinate, or the message of the engine.
     """
 
@@ -80,11 +83,15 @@ def cut_at_divergence(trajectory: Trajectory, failure: str = "") -> Trajectory:
         trajectory: Samples of an engine; NaN behind the last sample that it reached.
         failure: Message of the engine if it failed, else "".
     """
-    inside = np.abs(trajectory.state[:, :6]) <= _BOUNDS  # false for NaN
+    cabinet = trajectory.cabinet
+    inside = (np.abs(trajectory.state[:, :6]) <= _BOUNDS).all(axis=1)  # false for NaN
+    if cabinet is not None:
+        inside &= (np.abs(cabinet[:, :2]) <= LARGEST_TILT).all(axis=1)
     if inside.all():
         return trajectory
-    index = int(np.argmin(inside.all(axis=1)))
-    reason = diverging_coordinate(trajectory.state[index])
+    index = int(np.argmin(inside))
+    tilt = None if cabinet is None else cabinet[index, :2]
+    reason = diverging_coordinate(trajectory.state[index], tilt)
     assert reason is not None  # this sample is out of bounds
     if failure and np.isnan(trajectory.state[index]).all():  # the engine took no such sample
         reason = "state", failure
@@ -107,12 +114,17 @@ def _cut(trajectory: Trajectory, length: int, divergence: Divergence) -> Traject
     )
 
 
-def diverging_coordinate(positions: FloatArray) -> tuple[str, str] | None:
+def diverging_coordinate(
+    positions: FloatArray, tilt: FloatArray | None = None
+) -> tuple[str, str] | None:
     """Return name of the first coordinate out of bounds and the reason; None if all are in bounds.
 
     Args:
         positions: At least roll, pitch, yaw, x, y, z of the tub. [rad, m]
+        tilt: Roll and pitch of a cabinet that moves; None for a fixed one. [rad]
     """
+    if tilt is not None and np.any(np.abs(tilt) > LARGEST_TILT):
+        return "cabinet", _tipping(*map(float, tilt))
     size = np.abs(positions[:6])
     bad = np.flatnonzero(~(size <= _BOUNDS))
     if not len(bad):
@@ -121,6 +133,18 @@ def diverging_coordinate(positions: FloatArray) -> tuple[str, str] | None:
     unit = "rad" if index < 3 else "m"
     name = COORDINATES[index]
     return name, f"{name} = {positions[index]:.4g} {unit}, bound {_BOUNDS[index]:g} {unit}"
+
+
+def _tipping(roll: float, pitch: float) -> str:
+    """Return how a cabinet tips over, from its roll and pitch. [rad]"""
+    side = "front" if roll > 0.0 else "rear"
+    if abs(pitch) > abs(roll):
+        side = "right" if pitch > 0.0 else "left"
+    angle = np.rad2deg(max(abs(roll), abs(pitch)))
+    return (
+        f"the cabinet tips over to its {side}, tilted by {angle:.0f} deg, "
+        f"bound {np.rad2deg(LARGEST_TILT):.0f} deg"
+    )
 
 
 def divergence_text(divergence: Divergence | None, time: FloatArray, state: FloatArray) -> str:

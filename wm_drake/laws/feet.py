@@ -101,7 +101,9 @@ def tilting_margin(down, moment_x, moment_y, x, y):
 
 @law
 def sliding_margin(force_x, force_y, holding):
-    """Return the horizontal force that friction can still take: sum mu N - |f|. [N]
+    """Return the horizontal force that friction can still take. [N]
+
+        margin = sum mu N_i - |f|
 
     Args:
         force_x, force_y: Horizontal load. [N]
@@ -134,7 +136,7 @@ def turning_margin(force_x, force_y, moment, holding, x, y):
         x, y: Positions of the feet. [m]
 
     Returns:
-        min(h(f) - m, h(-f) + m): smallest additional moment that makes the cabinet turn. [N m]
+        The smallest additional moment that makes the cabinet turn, h(f) - m or h(-f) + m. [N m]
         Below 0 it turns. If it slides already, minus the moment about the centre of pressure, which
         is the limit at the threshold of sliding.
     """

@@ -103,8 +103,8 @@ def mstv_friction(w, u, friction_force, friction_damping, regularisation_velocit
     """Return the friction force of the modified stick transition velocity model (MSTV).
 
         g = f_max + c_m |w|
-        f = -g sgn(w),               |w| >= |u|      [C] Eq. (7), [A] Eq. (4) corrected
-        f = -g w / (|u| + epsilon),  |w| <  |u|
+        f = -g sgn(w),                |w| >= |u|      [C] Eq. (7), [A] Eq. (4) corrected
+        f = -g w / (|u| + epsilon),   |w| <  |u|
 
     The stick transition velocity is the deformation rate of the sponge. Both papers print the
     second branch with the wrong sign (it would feed energy in), and [A] prints c_m w for c_m |w|

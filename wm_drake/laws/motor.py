@@ -44,7 +44,9 @@ def limited(demand, limit):
 
 @law
 def speed_controller(error, integral, controller):
-    """Return the torque that a PI controller demands: K_p e + I. [N m]
+    """Return the torque that a PI controller demands. [N m]
+
+        T_demand = K_p e + I
 
     Args:
         error: Speed that is wanted less speed of the motor [e]. [rad/s]
@@ -77,10 +79,12 @@ def integral_rate(error, demand, torque, controller):
 def drum_friction(rate, friction):
     """Return the friction torque of the drum's bearing and seal on the drum: HAVSIN and a dashpot.
 
+        T = HAVSIN(w) - c w
+
     Args:
-        rate: Speed of the drum against the tub. [rad/s]
+        rate: Speed of the drum against the tub [w]. [rad/s]
         friction: Named numbers: friction_torque [N m], full_friction_rate [rad/s] (see
-            `havsin_friction`), damping [N m s/rad].
+            `havsin_friction`), damping [c, N m s/rad].
 
     Returns:
         [N m] Its reaction acts on the tub.

@@ -38,8 +38,7 @@ def bending_moment(direction, rate, axis, stiffness, damping, friction_torque, f
 def transverse_couple(moment, direction, inverse_length):
     """Return the force on the tub end of a massless strut; that on its housing end is the opposite.
 
-    f = (m_tub + m_housing) x e / L      balance of moments of the strut, own derivation ([B]
-    section 3)
+        f = (m_tub + m_housing) x e / L      own derivation: moments on the strut, [B] section 3
 
     Args:
         moment: Moment of the bushings at both ends on the strut, transverse to e. [N m]

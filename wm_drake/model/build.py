@@ -149,7 +149,8 @@ def build_machine(parameters: MachineParameters, *, meshcat: Meshcat | None = No
     systems = add_washing_machine(builder, parameters)
     if meshcat is not None:
         shown = systems.outputs.get("tub_in_cabinet", systems.outputs["state"])
-        add_visualizer(builder, parameters, systems.state_layout, shown, meshcat)
+        state = systems.outputs["state"]
+        add_visualizer(builder, parameters, systems.state_layout, shown, meshcat, state)
     for name, port in systems.inputs.items():
         builder.ExportInput(port, name)
     for name, port in systems.outputs.items():

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.geometry import Box, Cylinder, Meshcat, MeshcatParams, Rgba, Sphere
-from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.math import RigidTransform, RotationMatrix
 
 from wm_drake.model.cabinet import with_fixed_cabinet
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.placed_elements import placed_elements
 from wm_drake.model.scene import Scene
+from wm_drake.model.visualization import SHAPES, add_floor, cabinet_pose
 from wm_drake.parameters import Load, MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
@@ -23,8 +24,6 @@ from wm_drake.parameters.units import Unit
 SPRING_COLOUR = Rgba(0.0, 0.447, 0.698, 1.0)
 DAMPER_COLOUR, ROD_COLOUR = Rgba(0.90, 0.62, 0.0, 1.0), Rgba(0.25, 0.25, 0.25, 1.0)
 GASKET_COLOUR, RING_COLOUR = Rgba(0.0, 0.62, 0.45, 0.35), Rgba(0.0, 0.45, 0.33, 1.0)
-FLOOR_COLOUR, FLOOR_SIZE = Rgba(0.72, 0.74, 0.77, 1.0), (1.6, 1.6, 0.005)
-"""Colour and size [m] of the drawn floor below a cabinet that moves."""
 UNBALANCE_COLOUR = Rgba(0.835, 0.369, 0.0, 1.0)
 
 COILS, COIL_RADIUS, WIRE_RADIUS = 9, 0.017, 0.0028
@@ -105,9 +104,7 @@ def replay_page(
         _move_cabinet(meshcat, motion, moment)
 
     if motion.cabinet is not None and parameters.cabinet is not None:
-        meshcat.SetObject("/floor", Box(*FLOOR_SIZE), FLOOR_COLOUR)
-        below = parameters.cabinet.floor - 0.5 * FLOOR_SIZE[2]
-        meshcat.SetTransform("/floor", RigidTransform([0.0, 0.0, below]))
+        add_floor(meshcat, parameters.cabinet.floor)
     scene.animate(meshcat, motion.time, motion.positions, move_parts)
     title = title or f"Machine {parameters.name}"
     return _with_caption(str(meshcat.StaticHtml()), motion, title, [part.kind for part in parts])
@@ -118,9 +115,8 @@ def _move_cabinet(meshcat: Meshcat, motion: Motion, moment: float) -> None:
     if motion.cabinet is None:
         return
     frame = int(np.argmin(np.abs(motion.time - motion.time[0] - moment)))
-    angles, position = np.split(motion.cabinet[frame], 2)
-    X_WC = RigidTransform(RollPitchYaw(angles), position)
-    for path in ("/drake/visualizer", "/elements"):
+    X_WC = cabinet_pose(motion.cabinet[frame])
+    for path in (SHAPES, "/elements"):
         meshcat.SetTransform(path, X_WC, moment)
 
 

@@ -1,16 +1,68 @@
 """Show the moving machine in Meshcat, with shapes on a second plant that is not simulated."""
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph
+from pydrake.geometry import Box, Meshcat, MeshcatVisualizer, Rgba, SceneGraph
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.framework import Context, DiagramBuilder, EventStatus, LeafSystem, OutputPort
 from pydrake.systems.primitives import MatrixGain
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
+from wm_drake.elements.motion import POSE
 from wm_drake.model.bodies import add_bodies
 from wm_drake.model.cabinet import with_fixed_cabinet
 from wm_drake.model.state_layout import StateLayout, state_layout_of
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.types import FloatArray
+
+SHAPES = "/drake/visualizer"
+"""Path in Meshcat of the shapes of a machine, seen from the cabinet if it moves."""
+
+FLOOR_COLOUR, FLOOR_SIZE = Rgba(0.72, 0.74, 0.77, 1.0), (1.6, 1.6, 0.005)
+"""Colour and size [m] of the drawn floor below a cabinet that moves."""
+
+PICTURE_PERIOD = 1.0 / 32.0
+"""Time between two pictures, as Drake's visualizer has it. [s]"""
+
+
+def add_floor(meshcat: Meshcat, floor: float) -> None:
+    """Draw the floor below a cabinet that moves.
+
+    Args:
+        meshcat: Where to draw it.
+        floor: Height of the floor. [m]
+    """
+    meshcat.SetObject("/floor", Box(*FLOOR_SIZE), FLOOR_COLOUR)
+    below = floor - 0.5 * FLOOR_SIZE[2]
+    meshcat.SetTransform("/floor", RigidTransform([0.0, 0.0, below]))
+
+
+def cabinet_pose(pose: FloatArray) -> RigidTransform:
+    """Return the pose of a cabinet in W from its roll, pitch, yaw and position. [rad, m]"""
+    angles, position = np.split(np.asarray(pose), 2)
+    return RigidTransform(RollPitchYaw(angles), position)
+
+
+class ShownCabinet(LeafSystem):
+    """Pose of a cabinet that moves, shown in Meshcat with all that is drawn in its frame.
+
+        pose (6) ──▶ [ ShownCabinet ]
+
+    The pose is roll, pitch, yaw and position of the cabinet in W. [rad, m]
+    """
+
+    def __init__(self, meshcat: Meshcat) -> None:
+        """Show the cabinet in a Meshcat."""
+        LeafSystem.__init__(self)
+        self._meshcat = meshcat
+        self._pose = self.DeclareVectorInputPort("pose", POSE.fixed_size)
+        self.DeclarePeriodicPublishEvent(PICTURE_PERIOD, 0.0, self._show)
+        self.DeclareForcedPublishEvent(self._show)
+
+    def _show(self, context: Context) -> EventStatus:
+        pose = cabinet_pose(self._pose.Eval(context))
+        self._meshcat.SetTransform(SHAPES, pose, context.get_time())
+        return EventStatus.Succeeded()
 
 
 def with_rigid_bearing(parameters: MachineParameters) -> MachineParameters:
@@ -25,11 +77,13 @@ def add_visualizer(
     state_layout: StateLayout,
     state: OutputPort,
     meshcat: Meshcat,
+    plant_state: OutputPort,
 ) -> None:
     """Add systems that show a machine in Meshcat while a simulation runs.
 
     The shapes belong to a second plant that only follows the positions, so they cannot touch the
-    dynamics. With a compliant bearing the drum is shown on the tub's axis.
+    dynamics. With a compliant bearing the drum is shown on the tub's axis. A cabinet that moves is
+    shown where it is, on a floor.
 
     Args:
         builder: The diagram that the machine is in.
@@ -38,6 +92,7 @@ def add_visualizer(
         state: Output port of the plant's state; for a cabinet that moves, port of the state of tub
             and drum seen from it.
         meshcat: Where to show it.
+        plant_state: Output port of the plant's state.
     """
     scene_graph = builder.AddNamedSystem("shapes", SceneGraph())
     plant = MultibodyPlant(time_step=0.0)
@@ -59,3 +114,10 @@ def add_visualizer(
         poses.get_output_port(), scene_graph.get_source_pose_port(plant.get_source_id())
     )
     MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
+    if parameters.cabinet_moves and parameters.cabinet is not None:
+        add_floor(meshcat, parameters.cabinet.floor)
+        pose = np.eye(plant_state.size())[state_layout.cabinet]
+        selected = builder.AddNamedSystem("cabinet_pose", MatrixGain(pose))
+        cabinet = builder.AddNamedSystem("shown_cabinet", ShownCabinet(meshcat))
+        builder.Connect(plant_state, selected.get_input_port())
+        builder.Connect(selected.get_output_port(), cabinet.GetInputPort("pose"))

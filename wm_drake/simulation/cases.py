@@ -57,8 +57,10 @@ def is_as_measured(parameters: MachineParameters, case: Case) -> bool:
 def case_of(parameters: MachineParameters, load: str, *, gasket: bool = True) -> Case:
     """Return the case that runs one of a machine's loads over the machine's own profile.
 
+    The case has the numbers of these parameters, whatever machine it is given to.
+
     Args:
-        parameters: Machine that defines the load and the profile.
+        parameters: Machine that defines load, profile and numbers.
         load: Name of the load.
         gasket: False removes the gasket from the machine.
 
@@ -76,4 +78,4 @@ def case_of(parameters: MachineParameters, load: str, *, gasket: bool = True) ->
             f"{nearest_names(load, parameters.loads)}",
             key="loads",
         )
-    return Case(load, parameters.loads[load], parameters.profile, gasket)
+    return Case(load, parameters.loads[load], parameters.profile, gasket, parameters)

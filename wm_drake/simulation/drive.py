@@ -7,9 +7,11 @@ whatever the motion needs.
 from dataclasses import dataclass
 
 import numpy as np
+import xarray as xr
 
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.records import Record
 
 SLOWEST = 2.0 * np.pi
 """Speed from which the ripple is measured: 60 rpm. [rad/s] Below it a turn is mostly start-up."""
@@ -251,3 +253,20 @@ def measured_drive(
         caught.torque if caught else np.nan,
     )
     return [*map(np.array, numbers), *orders_at_end(time, angle, speed, torque)]
+
+
+def drive_variables(record: Record, profile: SpinProfile) -> dict[str, xr.DataArray]:
+    """Return the measures of the drive of a record as a batch has them, by name.
+
+    Args:
+        record: Record of a run.
+        profile: Speed that is wanted.
+    """
+    angle, speed, torque = (
+        record[name].values for name in ("drum_angle", "drum_speed", "motor_torque")
+    )
+    values = measured_drive(record.time.values, angle, speed, torque, profile)
+    return {
+        name: xr.DataArray(value, dims=dims.split())
+        for (name, (dims, _, _)), value in zip(VARIABLES.items(), values, strict=True)
+    }

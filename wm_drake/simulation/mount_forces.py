@@ -9,6 +9,7 @@ import numpy as np
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
+from wm_drake.simulation.mounts import force_measures
 from wm_drake.simulation.records import Record
 
 BoolArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
@@ -40,13 +41,13 @@ class MountForce:
     peak: float
     peak_index: int
 
-    def rms(self, samples: BoolArray) -> float:
-        """Return the RMS of the change of the force from rest over some samples. [N]
+    def dynamic_rms(self, samples: BoolArray) -> float:
+        """Return the RMS of the force without its mean over some samples. [N]
 
-        It is the root of the mean square length of the vector. NaN without samples.
+        It is the measure `dynamic_rms` of `force_measures` over these samples. NaN without samples.
         """
-        change = self.force[samples] - self.force[0]
-        return float(np.sqrt(np.mean(np.sum(change**2, axis=1)))) if len(change) else np.nan
+        _, _, dynamic = force_measures(self.force[samples][:, None, :])
+        return float(dynamic[0])
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,7 @@ def speed_ranges(record: Record, profile: SpinProfile) -> list[SpeedRange]:
 
 
 def rms_table(forces: Sequence[MountForce], ranges: Sequence[SpeedRange]) -> FloatArray:
-    """Return the RMS of the change of each force from rest in each range. (forces, ranges) [N]"""
-    return np.array([[force.rms(part.samples) for part in ranges] for force in forces]).reshape(
-        len(forces), len(ranges)
-    )
+    """Return the RMS of each force without its mean in each range. (forces, ranges) [N]"""
+    return np.array(
+        [[force.dynamic_rms(part.samples) for part in ranges] for force in forces]
+    ).reshape(len(forces), len(ranges))

@@ -17,7 +17,7 @@ from wm_drake.studies.calibration.computed import Evaluation
 from wm_drake.studies.calibration.fewer import fewer_table, fit_with_fewer
 from wm_drake.studies.calibration.outcome import amplitude_rows, quantity_table, solved_machine
 from wm_drake.studies.calibration.parameter_map import parameter_map_of
-from wm_drake.studies.calibration.prediction import check_held_out, predict
+from wm_drake.studies.calibration.prediction import check_held_out, predict, prediction_table
 from wm_drake.studies.calibration.solutions import Solution, distinct
 from wm_drake.studies.calibration.targets import Targets, targets_of
 
@@ -349,6 +349,11 @@ def test_start_values_of_the_free_file_are_not_used_for_predictions(short, recov
 def test_held_out_loads_are_predicted_from_the_others(recovered):
     (prediction,) = recovered[5]
     assert prediction.loads == ("middle",)
+    (row,) = prediction_table([prediction]).to_dict("records")
+    assert (row["held_out"], row["amplitudes"]) == ("middle", prediction.predicted.size)
+    assert row["predicted_mean_percent"] == pytest.approx(
+        100.0 * np.abs(prediction.predicted).mean()
+    )
     assert prediction.predicted.shape == (1, 6)
     assert np.abs(prediction.predicted).max() < 0.05
     assert not np.array_equal(prediction.predicted, prediction.calibrated)

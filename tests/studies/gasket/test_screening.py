@@ -165,6 +165,7 @@ def test_any_measure_can_be_a_response(reference):
     )
     names = ("gap", "amplitude_Xr", "critical_speed", "power means", "region_displacement_R1_S1_z")
     names += ("mount_force_rms_springs.left", "cabinet_moment_peak")
+    names += ("turn_margin", "drive_mean_torque", "drive_speed_ripple", "drive_end_speed")
     chosen = chosen_responses(reference, profile, names)
     case = Case("middle", reference.loads["middle"], profile)
     table = simulate_many(build_machine(reference), [case], measures=measures_of(reference, chosen))
@@ -180,7 +181,12 @@ def test_any_measure_can_be_a_response(reference):
     assert found["mount_force_rms_springs.left"] == pytest.approx(rms)
     peak = table.cabinet_moment_peak.sel(axis="y").item()
     assert found["cabinet_moment_peak_y"] == pytest.approx(peak)
-    assert len(found) == 1 + 1 + 2 * len(reference.sensors) + 1 + 1 + 3
+    assert found["turn_margin"] == pytest.approx(table.turn_margin.item())
+    assert found["drive_mean_torque"] == pytest.approx(table.drive_mean_torque.item())
+    assert found["drive_speed_ripple"] == pytest.approx(100.0 * table.drive_speed_ripple.item())
+    # the last revolution is on the ramp, below the end of the profile
+    assert found["drive_end_speed"] == pytest.approx(12.0 * 30.0 / np.pi, rel=0.2)
+    assert len(found) == 1 + 1 + 2 * len(reference.sensors) + 1 + 1 + 3 + 4
 
 
 @pytest.mark.parametrize(

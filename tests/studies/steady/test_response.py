@@ -17,9 +17,10 @@ from wm_drake.simulation.outputs import tub_outputs
 from wm_drake.studies.steady.balance import HARMONICS, HarmonicBalance
 from wm_drake.studies.steady.condensed import Corrections
 from wm_drake.studies.steady.continuation import first_motion
+from wm_drake.studies.steady.products import write_derivative
 from wm_drake.studies.steady.response import branch_of, trajectory_of_period
 from wm_drake.studies.steady.series import Series
-from wm_drake.studies.steady.settled import settled_trajectory
+from wm_drake.studies.steady.settled import coefficients_of, settled_trajectory
 from wm_drake.studies.steady.stability import floquet_multipliers, is_stable
 
 RPM = np.pi / 30.0
@@ -418,7 +419,9 @@ def test_matrix_is_the_derivative_of_the_residual(machine):
     ahead, back = balance.residual(motion + change, speed), balance.residual(motion - change, speed)
     wanted = 0.5 * (ahead - back).ravel()
     np.testing.assert_allclose(
-        np.tensordot(at.matrix, change, 2).ravel(), wanted, atol=2e-3 * np.max(np.abs(wanted))
+        np.tensordot(balance.matrix(at.slopes, speed), change, 2).ravel(),
+        wanted,
+        atol=2e-3 * np.max(np.abs(wanted)),
     )
     faster, slower = balance.residual(motion, speed + 1e-5), balance.residual(motion, speed - 1e-5)
     by_speed = (faster - slower) / 2e-5
@@ -457,6 +460,43 @@ def test_telescopic_dampers_move_as_the_engine_moves_them():
     np.testing.assert_allclose(amplitudes(setup, own), amplitudes(setup, engine), rtol=2e-3)
 
 
+@pytest.mark.slow
+def test_response_follows_dampers_that_spin():
+    """Check 220 rpm, where the left damper turns by 2 degrees in a revolution of the drum.
+
+    The engine never settles: its amplitudes follow the angles of the dampers. At each of these
+    angles the harmonic balance has the same amplitudes.
+    """
+    machine = build_machine(wm.load_machine("free_stroke"))
+    setup, speed = machine.set_up("front"), 220.0 * RPM
+    balance = HarmonicBalance(setup, Series(HARMONICS, 128))
+    sizes = []
+    for revolutions in (71, 271, 371):
+        engine = settled_trajectory(setup, speed, 128, revolutions)
+        begin = coefficients_of(balance, setup, engine)
+        with threadpool_limits(1, "blas"):
+            motion = first_motion(balance, speed, iter([begin]))
+        own = trajectory_of_period(balance, motion, speed, 128)
+        sizes.append(amplitudes(setup, engine))
+        large = sizes[-1] > 1e-3
+        np.testing.assert_allclose(amplitudes(setup, own)[large], sizes[-1][large], rtol=5e-3)
+        rates = balance.derivative(balance.states(motion, speed))[:, balance.derivative.free]
+        spins = balance.kinematics.spin_rates(motion[0], rates.mean(axis=0))
+        assert 1.0 < 360.0 * abs(spins[0]) / speed < 3.0
+    assert np.ptp(sizes, axis=0).max() > 0.3e-3  # they vary by 3 % of 15 mm
+
+
+def test_telescopic_dampers_begin_at_any_speed():
+    """Check a first speed at which a sample is at a reversal of friction."""
+    machine = build_machine(wm.load_machine("free_stroke"))
+    balance = HarmonicBalance(machine.set_up("front"), Series(3, 64))
+    setup = machine.set_up("front")
+    with threadpool_limits(1, "blas"):
+        points = branch_of(balance, setup, np.array([200.0, 202.0]) * RPM)
+    assert points[0].speed == pytest.approx(200.0 * RPM)
+    assert len(points[0].spins) == 3
+
+
 def test_condensed_corrections_are_those_of_the_whole_system(machine):
     """Compare with a dense solution of the bordered system."""
     balance = HarmonicBalance(machine.set_up("front"), Series(2, 32))
@@ -464,11 +504,10 @@ def test_condensed_corrections_are_those_of_the_whole_system(machine):
     rng = np.random.default_rng(2)
     at = balance.linearised(balance.rest() + 1e-4 * rng.normal(size=balance.rest().shape), speed)
     row = rng.normal(size=at.residual.shape)
-    row[:, balance.kinematics.velocities] = 0.0
+    row[:, balance.kinematics.partition.velocities] = 0.0
     size = row.size
-    whole = np.block(
-        [[at.matrix.reshape(size, size), at.by_speed.reshape(-1, 1)], [row.reshape(1, -1), 0.3]]
-    )
+    matrix = balance.matrix(at.slopes, speed).reshape(size, size)
+    whole = np.block([[matrix, at.by_speed.reshape(-1, 1)], [row.reshape(1, -1), 0.3]])
     wanted = np.linalg.solve(whole, np.append(-at.residual.ravel(), 0.7))
     change, faster = Corrections(balance, at, row, 0.3)(at.residual, 0.7)
     np.testing.assert_allclose(change.ravel(), wanted[:-1], rtol=1e-6, atol=1e-9)
@@ -478,10 +517,14 @@ def test_condensed_corrections_are_those_of_the_whole_system(machine):
 def test_matrix_of_products_multiplies_series():
     """Compare with the product of samples; with few samples harmonics fold alike."""
     rng = np.random.default_rng(4)
+    one = np.zeros(1, dtype=int)
     for samples in (7, 9, 32):
         series = Series(3, samples)
-        factor, coefficients = rng.normal(size=(samples, 1, 1)), rng.normal(size=(7, 1))
-        matrix = np.zeros((7, 1, 7, 1))
-        series.minus_products(factor, matrix)
-        wanted = series.analysis @ (factor[:, 0] * (series.synthesis @ coefficients))
-        np.testing.assert_allclose(-matrix[:, 0, :, 0] @ coefficients, wanted, atol=1e-12)
+        factor, coefficients = rng.normal(size=(samples, 1, 1)), rng.normal(size=7)
+        matrix = np.empty((7, 7))
+        held = np.ones(1, dtype=bool)
+        write_derivative(series.factors(factor), one, one, 2.0, held, 0.3, matrix)
+        wanted = 2.0 * series.slope @ coefficients
+        wanted -= series.analysis @ (factor[:, 0, 0] * (series.synthesis @ coefficients))
+        wanted[0] += 0.3 * coefficients[0]
+        np.testing.assert_allclose(matrix @ coefficients, wanted, atol=1e-12)

@@ -6,7 +6,12 @@ import pytest
 import xarray as xr
 
 from wm_drake.parameters import PublishedTerm
-from wm_drake.report.validation.page import validation_page
+from wm_drake.report.validation.page import (
+    UNEXPLAINED,
+    Made,
+    validation_page,
+    verification_page,
+)
 from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket.screening import Responses, run_screening
 from wm_drake.studies.spin_cycle.study import SpinCycleResult
@@ -20,6 +25,7 @@ from wm_drake.studies.validation.rows import (
     coulomb_rows,
     counts,
     effect_rows,
+    held_out_rows,
     mean_rows,
     spin_cycle_rows,
 )
@@ -122,17 +128,63 @@ def test_coulomb_fits_are_judged_by_difference_and_ratio():
     assert [row.verdict for row in coulomb_rows(fits)] == [MET, MISSED, MISSED, MET]
 
 
+def test_held_out_loads_are_judged_by_their_mean_and_their_intervals():
+    table = pd.DataFrame(
+        {
+            "held_out": ["back front"],
+            "amplitudes": [12],
+            "calibrated_mean_percent": [8.5],
+            "predicted_mean_percent": [18.3],
+            "predicted_largest_percent": [48.9],
+            "in_intervals_percent": [100.0],
+        }
+    )
+    mean, covered = held_out_rows(table)
+    assert mean.quantity == "back and front: mean difference of 12 amplitudes"
+    assert (mean.ours, mean.verdict, mean.kind) == ("18.3 %", MISSED, PREDICTED)
+    assert (covered.ours, covered.verdict) == ("100 %", MET)
+
+
+def test_page_ends_with_tables_without_verdicts(amplitude_table):
+    table = pd.DataFrame({"free quantities": ["40"], "cost": ["137"]})
+    made = Made("x", reasons={"Fewer": "Why."})
+    page = validation_page(amplitude_rows(amplitude_table), made, FITTED, {"Fewer": table})
+    assert page.endswith(
+        "\n## Fewer\n\nWhy.\n\n| free quantities | cost |\n| --- | --- |\n| 40 | 137 |\n"
+    )
+
+
 def test_page_counts_and_explains(amplitude_table):
     rows = amplitude_rows(amplitude_table)
     table = counts(rows)
     assert table.iloc[0].tolist() == [1, 2, 0]
     section = rows[0].section
     reasons = {section: "About all.", f"{section} | {rows[1].quantity}": "the spring is soft"}
-    page = validation_page(rows, "python write.py", ["A note."], reasons)
+    reasons[f"{section} | command"] = "wm-drake spin; wm-drake spin --no-gasket"
+    made = Made("python write.py", ["A note."], reasons)
+    page = validation_page(rows, made, FITTED)
     assert "Of 3 fitted results, 2 are missed." in page
-    assert "Of 0 predicted results, 0 are missed." in page
     assert f"## {section}\n\nAbout all.\n" in page
+    assert "Command: `wm-drake spin`; `wm-drake spin --no-gasket`." in page
     assert "| **missed** | above 20 %; Adams model of [B]: −10.0 %; the spring is soft |" in page
+    assert f"; {UNEXPLAINED} |" in page  # the mean, which has no explanation
     assert "python write.py" in page
     assert "Written 20" in page
     assert "wm_drake" in page
+    other = validation_page(rows, made, PREDICTED)
+    assert other.startswith("# Prediction\n")
+    assert other.endswith("Nothing was compared.\n")
+
+
+def test_the_page_of_verification_has_a_row_per_comparison():
+    rows = [
+        {"what": "a law", "against": "hand values", "agreement": "1e-9", "tests": ["a.py", "b.py"]},
+        {"what": "a run", "against": "MuJoCo", "agreement": "1 %", "command": "python c.py"},
+    ]
+    page = verification_page({"Laws": rows}, "python write.py", {})
+    assert "| a law | hand values | 1e-9 | `a.py`<br>`b.py` |" in page
+    assert "| a run | MuJoCo | 1 % | `python c.py` |" in page
+    ran = verification_page(
+        {"Laws": rows}, "python write.py", {"a.py": "2 passed", "b.py": "2 passed"}
+    )
+    assert "| `a.py`<br>`b.py` | 2 passed |" in ran

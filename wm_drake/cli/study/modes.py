@@ -14,7 +14,7 @@ from wm_drake.cli.common import (
     OutOption,
     OverwriteOption,
     SetOption,
-    check_buildable,
+    build_checked,
     command_line,
     interruptible,
     load_parameters,
@@ -24,7 +24,7 @@ from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.terminal import Console
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.parameters import MachineParameters
+    from wm_drake.model.machine import Machine
     from wm_drake.studies.modes.study import MachineModes
 
 DEFAULT_OUT = Path("wm-drake-modes")
@@ -62,9 +62,9 @@ def modes(
 
     (size,) = quantities_of(amplitude, Unit("m", "mm"), "--amplitude")[:1]
     parameters = load_parameters(machine, sets)
-    check_buildable(machine, parameters)
+    built = build_checked(machine, parameters)
     with interruptible(), result_folder(out, Run("study modes", overwrite)) as folder:
-        result = _run(parameters, load, not no_gasket, size)
+        result = _run(built, load, not no_gasket, size)
         _write(result, folder, replay)
     if as_json:
         typer.echo(json.dumps(_as_json(result)))
@@ -72,13 +72,9 @@ def modes(
         _print_table(result, out)
 
 
-def _run(
-    parameters: "MachineParameters", load: str | None, gasket: bool, amplitude: float
-) -> "MachineModes":
-    from wm_drake.model.build import build_machine
+def _run(built: "Machine", load: str | None, gasket: bool, amplitude: float) -> "MachineModes":
     from wm_drake.studies.modes.study import modes as modes_of
 
-    built = build_machine(parameters)
     with progress_bars(["modes"]) as progress:
         return modes_of(
             built,

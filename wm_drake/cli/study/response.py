@@ -12,8 +12,8 @@ from wm_drake.cli.common import (
     OutOption,
     OverwriteOption,
     SetOption,
+    build_checked,
     cases_of,
-    check_buildable,
     command_line,
     interruptible,
     load_parameters,
@@ -27,6 +27,7 @@ from wm_drake.errors import input_error
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
 
+    from wm_drake.model.machine import Machine
     from wm_drake.parameters import Load, MachineParameters
     from wm_drake.parameters.types import FloatArray
     from wm_drake.studies.steady.study import SteadyStudy
@@ -87,10 +88,10 @@ def response(
     loads = [(case.name, case.load) for case in cases_of(parameters, load, True, None)]
     if not loads:
         raise input_error(f"machine '{parameters.name}' has no loads", key="loads")
-    check_buildable(machine, parameters)
+    built = build_checked(machine, parameters)
     gaskets = (False,) if no_gasket or parameters.gasket is None else (True, False)
     with interruptible(), result_folder(out, Run("study response", overwrite)) as folder:
-        study = _run(parameters, loads, speeds, gaskets, harmonics, rates, workers)
+        study = _run(built, loads, speeds, gaskets, harmonics, rates, workers)
         _write(study, folder)
     if as_json:
         typer.echo(json.dumps(_as_json(study)))
@@ -132,7 +133,7 @@ def _rate(text: str) -> float:
 
 
 def _run(
-    parameters: "MachineParameters",
+    built: "Machine",
     loads: "list[tuple[str, Load]]",
     speeds: "FloatArray",
     gaskets: tuple[bool, ...],
@@ -140,11 +141,9 @@ def _run(
     rates: tuple[float, ...],
     workers: int | None,
 ) -> "SteadyStudy":
-    from wm_drake.model.build import build_machine
     from wm_drake.studies.steady.balance import SAMPLES
     from wm_drake.studies.steady.study import run_steady_study
 
-    built = build_machine(parameters)
     with progress_bars(["response"]) as progress:
         return run_steady_study(
             built,
@@ -173,6 +172,7 @@ def _as_json(study: "SteadyStudy") -> dict[str, Any]:
     from wm_drake.parameters.units import Unit
 
     millimetre, rpm = Unit("m", "mm").from_si(1.0), Unit("rad/s", "rpm").from_si(1.0)
+    degree = Unit("rad/s", "deg/s").from_si(1.0)
 
     def columns(values: Any, dim: str, factor: float = 1.0) -> dict[str, list[float]]:
         return {
@@ -197,6 +197,7 @@ def _as_json(study: "SteadyStudy") -> dict[str, Any]:
                 "spring_tension_N": columns(case.response.spring_tension, "spring"),
                 "damper_tension_N": columns(case.response.damper_tension, "damper"),
                 "mount_force_N": _mount_forces(case.response),
+                "damper_spin_deg_s": columns(case.response.damper_spin, "spinning", degree),
                 "stable": case.response.stable.values.tolist(),
                 "wall_s": case.wall_s,
             }

@@ -23,6 +23,7 @@ from wm_drake.cli.common import (
 )
 from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import LEDGER, Run, result_folder
+from wm_drake.cli.spin_drive import drive_of_run_as_json
 from wm_drake.cli.spin_forces import forces_of_run_as_json
 from wm_drake.cli.study.common import WorkersOption
 from wm_drake.cli.terminal import Console
@@ -237,6 +238,7 @@ def _with(result: "SpinCycleResult", measured: "xr.DataArray") -> "SpinCycleResu
 
 
 def _write(result: "SpinCycleResult", folder: Path, engine: str) -> None:
+    from wm_drake.report.spin_cycle.drive import drive_frame
     from wm_drake.report.spin_cycle.floor import feet_table
     from wm_drake.report.spin_cycle.report import spin_cycle_report
     from wm_drake.report.spin_cycle.tables import case_table
@@ -246,6 +248,8 @@ def _write(result: "SpinCycleResult", folder: Path, engine: str) -> None:
     case_table(result).to_csv(folder / "cases.csv", index=False, float_format="%.4g")
     if "turn_margin" in result.forces:
         feet_table(result).to_csv(folder / "feet.csv", index=False, float_format="%.6g")
+    if (drive := drive_frame(result)) is not None:
+        drive.to_csv(folder / "drive.csv", index=False, float_format="%.6g")
     command = command_line()
     (folder / "report.html").write_text(
         spin_cycle_report(result, engine, command), encoding="utf-8"
@@ -270,8 +274,9 @@ def _print_table(result: "SpinCycleResult", out: Path) -> None:
         )
     console = Console()
     console.print(table)
-    feet = ", feet.csv" if "turn_margin" in result.forces else ""
-    console.print(f"Results in {out}: report.html, cases.csv, rms.csv{feet}")
+    more = ", feet.csv" if "turn_margin" in result.forces else ""
+    more += ", drive.csv" if "drive_peak_torque" in result.forces else ""
+    console.print(f"Results in {out}: report.html, cases.csv, rms.csv{more}")
 
 
 def _as_json(result: "SpinCycleResult", engine: str) -> dict[str, Any]:
@@ -310,6 +315,7 @@ def _as_json(result: "SpinCycleResult", engine: str) -> dict[str, Any]:
                     for name in result.smallest_tension.spring.values
                 },
                 **forces_of_run_as_json(result.forces.sel(case=case.name)),
+                "motor": drive_of_run_as_json(result.forces.sel(case=case.name)),
                 "diverged": diverged or None,
             }
             for case, diverged in zip(result.cases, result.diverged, strict=True)

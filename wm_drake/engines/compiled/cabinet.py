@@ -10,7 +10,7 @@ cabinet without its mounts, then those of the feet.
 
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import where
-from wm_drake.compiler.matrices import plus
+from wm_drake.compiler.matrices import plus, six
 from wm_drake.elements.cabinet import (
     FEET_SIZE,
     SLIP_SIZE,
@@ -30,6 +30,7 @@ from wm_drake.engines.compiled.bearing import (
     tub_accelerations,
     write_carrier_state,
 )
+from wm_drake.engines.trajectory import LARGEST_TILT
 
 FEET_BEGIN = TUB.fixed_size
 """Index of the feet in the packed numbers of a cabinet."""
@@ -39,12 +40,10 @@ SLIPS_BEGIN = CARRIER_STATE_SIZE
 """Index of the slips in the state of a cabinet."""
 CABINET_STATE_SIZE = CARRIER_STATE_SIZE + SLIP_SIZE
 """State of a cabinet."""
+WRENCH_SIZE = 6
+"""Numbers of a wrench."""
 VELOCITIES = range(CARRIER_STATE.offsets["angular_velocity"], CARRIER_STATE_SIZE)
 """Indices of the velocities in the state of a cabinet."""
-
-LARGEST_TILT = 0.5
-"""Largest angle of a cabinet about a horizontal axis; a run beyond it diverged: it has tipped over.
-[rad]"""
 
 
 @law
@@ -53,6 +52,14 @@ def cabinet_size(cabinet):
     if cabinet is None:
         return 0
     return CABINET_STATE_SIZE
+
+
+@law
+def cabinet_input_count(cabinet):
+    """Return the number of inputs of the cabinet: the wrench of its mounts; 0 for None."""
+    if cabinet is None:
+        return 0
+    return WRENCH_SIZE
 
 
 @law
@@ -72,11 +79,13 @@ def seen_from_cabinet(x, motion, cabinet, first):
 
 
 @law
-def with_cabinet(x, dx, motion, total, gravity, p, cabinet, first):
+def with_cabinet(x, dx, inputs, first_input, motion, total, gravity, p, cabinet, first):
     """Return the wrench of the mounts on the tub in W; write the derivative of the cabinet's state.
 
     Args:
         x, dx: State and its derivative.
+        inputs, first_input: Inputs of internal parts, and index in them of the wrench of the
+            mounts on the cabinet, written: moment about the origin of C and force, in W. [N m, N]
         motion: `TubMotion` of the tub in W.
         total: Moment about To and force of all mounts on the tub, in C. [N m, N]
         gravity: Acceleration in W. [m/s^2]
@@ -87,6 +96,8 @@ def with_cabinet(x, dx, motion, total, gravity, p, cabinet, first):
         return total
     moving, angle_rates = carrier_motion(x, first)
     on_tub, on_cabinet = wrenches_of_mounts(moving, motion, total)
+    for k in range(WRENCH_SIZE):
+        inputs[first_input + k] = on_cabinet[k]
     write_cabinet_rates(x, dx, moving, angle_rates, on_cabinet, gravity, p, cabinet, first)
     return on_tub
 
@@ -104,6 +115,65 @@ def write_cabinet_rates(x, dx, moving, angle_rates, on_cabinet, gravity, p, cabi
     feet = feet_on_floor(x, dx, first + SLIPS_BEGIN, moving, p, cabinet + FEET_BEGIN)
     w_rate, v_rate = tub_accelerations(moving, plus(on_cabinet, feet), gravity, p, cabinet)
     write_carrier_state(dx, first, angle_rates, moving.velocity, w_rate, v_rate)
+
+
+@law
+def cabinet_after_step(x, rate, stage, total, middle, end, h, gravity, p, cabinet, first):
+    """Advance the cabinet by a Runge-Kutta step of it alone, under a known wrench of its mounts.
+
+    Args:
+        x, rate: State at the start of the step, of which the cabinet is advanced, and its
+            derivative there; the part of the cabinet is overwritten.
+        stage, total: Arrays to work in.
+        middle, end: Wrench of the mounts on the cabinet in the middle and at the end of the step.
+            [N m, N]
+        h: Length of the step. [s]
+        gravity, p, cabinet, first: As for `with_cabinet`.
+    """
+    last = first + CABINET_STATE_SIZE
+    for k in range(first, last):
+        total[k] = x[k] + h / 6.0 * rate[k]
+        stage[k] = x[k] + 0.5 * h * rate[k]
+    for number in range(1, 4):
+        wrench = end if number == 3 else middle
+        moving, angle_rates = carrier_motion(stage, first)
+        write_cabinet_rates(stage, rate, moving, angle_rates, wrench, gravity, p, cabinet, first)
+        weight = h / 6.0 if number == 3 else h / 3.0
+        ahead = h if number == 2 else 0.5 * h
+        for k in range(first, last):
+            total[k] = total[k] + weight * rate[k]
+            stage[k] = x[k] + ahead * rate[k]
+    for k in range(first, last):
+        x[k] = total[k]
+
+
+@law
+def write_jacobian_alone(x, rate, inputs, first_input, difference, gravity, p, cabinet, first, own):
+    """Write the Jacobian of the cabinet under a constant wrench of its mounts, by rows.
+
+    Args:
+        x: State.
+        rate: Array to work in.
+        inputs, first_input: As for `with_cabinet`, the wrench.
+        difference: Half of the central difference.
+        gravity, p, cabinet, first: As for `with_cabinet`; nothing is done for a fixed one.
+        own: (`CABINET_STATE_SIZE`, `CABINET_STATE_SIZE`), written. [1/s]
+    """
+    if cabinet is None:
+        return
+    wrench = six(inputs, first_input)
+    for column in range(CABINET_STATE_SIZE):
+        at_rest = x[first + column]
+        for row in range(CABINET_STATE_SIZE):
+            own[row * CABINET_STATE_SIZE + column] = 0.0 * at_rest
+        for side in (-1.0, 1.0):
+            x[first + column] = at_rest + side * difference
+            moving, angle_rates = carrier_motion(x, first)
+            write_cabinet_rates(x, rate, moving, angle_rates, wrench, gravity, p, cabinet, first)
+            for row in range(CABINET_STATE_SIZE):
+                k = row * CABINET_STATE_SIZE + column
+                own[k] = own[k] + side * rate[first + row] / (2.0 * difference)
+        x[first + column] = at_rest
 
 
 @law

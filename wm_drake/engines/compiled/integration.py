@@ -76,7 +76,7 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
         remember(past.rates, i, PAST_RATES, rate, state_size(elements))
         remember(past.inputs, i, PAST_INPUTS, inputs, inputs_size(elements))
         if one_derivative[i]:
-            multistep_step(state, rate, past, i, length[i], numbers, elements)
+            multistep_step(state, rate, past, stage, total, i, length[i], numbers, elements)
         else:
             runge_kutta_step(
                 state, rate, inputs, stage, total, drum, i, length[i], acceleration[i],

@@ -11,10 +11,14 @@ import numpy as np
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import decay_factor, sine_cosine, where
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, write_jacobian_alone
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
+    cabinet_begin,
+    cabinet_input,
     mass_properties,
+    read_bodies,
     state_derivative,
     wanted_speed,
 )
@@ -28,9 +32,10 @@ from wm_drake.engines.compiled.multistep import (
 from wm_drake.engines.compiled.packing import Layout, aligned, fill_lanes
 from wm_drake.parameters.types import FloatArray
 
-SMOOTH, SPONGE, PATH = 0, 1, 2
+SMOOTH, SPONGE, PATH, CABINET = 0, 1, 2, 3
 """How the multistep integrator treats a state: with the explicit formula; as an internal state, by
-a step of the Runge-Kutta scheme of it alone; in closed form along its path."""
+a step of the Runge-Kutta scheme of it alone; in closed form along its path; with all states of the
+cabinet, by a step of the Runge-Kutta scheme of them."""
 
 STEPS = 1000
 """Steps of the linearised machine: growth of 0.2 % a step is seen."""
@@ -42,7 +47,7 @@ force, such as the spin of a damper tube, grows by 2."""
 
 def jacobians(
     packed: FloatArray, layout: Layout, states: FloatArray, free: list[int], difference: float
-) -> FloatArray:
+) -> tuple[FloatArray, FloatArray]:
     """Return the Jacobians of a machine at several states, by central differences.
 
     Args:
@@ -52,23 +57,35 @@ def jacobians(
         difference: Half of the difference. [m, rad, m/s, rad/s]
 
     Returns:
-        (WIDTH, n, n) [1/s]
+        (WIDTH, n, n), and that of a cabinet that moves under a constant wrench of its mounts
+        (WIDTH, m, m), m = 0 for a fixed one. [1/s]
     """
     p = fill_lanes(aligned(len(packed) * WIDTH), [packed])
     x = fill_lanes(aligned(states.size), list(states))
     n = len(free)
     found, work = aligned(n * n * WIDTH), aligned((states.shape[1] + layout.inputs_size) * WIDTH)
-    jacobian_lanes(x, work, np.array(free), difference, p, layout.elements, found)
-    return found.reshape(n, n, WIDTH).transpose(2, 0, 1)
+    m = CABINET_STATE_SIZE if layout.cabinet >= 0 else 0
+    own = aligned(m * m * WIDTH)
+    jacobian_lanes(x, work, np.array(free), difference, p, layout.elements, found, own)
+    of_all, of_cabinet = (
+        part.reshape(size, size, WIDTH).transpose(2, 0, 1) for part, size in ((found, n), (own, m))
+    )
+    return of_all, of_cabinet
 
 
-def is_followed(jacobians: FloatArray, internal: np.ndarray, step: float) -> bool:
+def is_followed(
+    jacobians: FloatArray, internal: np.ndarray, step: float, cabinet: FloatArray | None = None
+) -> bool:
     """Return whether steps with one derivative keep linearised machines from growing.
+
+    One with a cabinet that moves may grow as fast as it does by itself.
 
     Args:
         jacobians: (WIDTH, n, n) [1/s]
-        internal: (n,) `SMOOTH`, `SPONGE` or `PATH`: how each state is treated.
+        internal: (n,) `SMOOTH`, `SPONGE`, `PATH` or `CABINET`: how each state is treated.
         step: Step size. [s]
+        cabinet: (WIDTH, m, m) Jacobians of the m states `CABINET` under a constant wrench of the
+            mounts; None without any. [1/s]
     """
     if not np.all(np.isfinite(jacobians)):
         return False
@@ -79,15 +96,33 @@ def is_followed(jacobians: FloatArray, internal: np.ndarray, step: float) -> boo
     jacobian = aligned(n * n * WIDTH)
     jacobian[:] = jacobians.transpose(1, 2, 0).ravel()
     largest = aligned(4 * WIDTH)
-    growth_lanes(jacobian, internal, step, STEPS, numbers, largest)
+    m = int(np.count_nonzero(internal == CABINET))
+    own, work = aligned(m * m * WIDTH), aligned(3 * m * WIDTH)
+    if cabinet is not None:
+        own[:] = cabinet.transpose(1, 2, 0).ravel()
+    block = int(np.argmax(internal == CABINET)), m
+    growth_lanes(jacobian, internal, step, STEPS, numbers, own, block, work, largest)
     quarters = largest.reshape(4, WIDTH)
     if not np.all(np.isfinite(numbers)):  # also where no number was seen on the way to it
         return False
-    return bool(np.all(quarters[3] <= LARGEST_GROWTH * quarters[1]))
+    grown = quarters[3] > LARGEST_GROWTH * quarters[1]
+    if m and np.any(grown):
+        own_growth = np.exp(0.5 * STEPS * step * _fastest_growth(jacobians[grown]))
+        return bool(np.all(quarters[3, grown] <= LARGEST_GROWTH * own_growth * quarters[1, grown]))
+    return not np.any(grown)
+
+
+def _fastest_growth(jacobians: FloatArray) -> FloatArray:
+    """Return the largest real part of the eigenvalues of each matrix, at least 0. (n,) [1/s]
+
+    A cabinet that slides fast under a drum that spins grows by itself: friction that stays the same
+    does not brake it, and the floor tips it.
+    """
+    return np.maximum(np.linalg.eigvals(jacobians).real.max(axis=1), 0.0)
 
 
 @long_running
-def jacobian_lanes(x, work, free, difference, p, elements, jacobian):
+def jacobian_lanes(x, work, free, difference, p, elements, jacobian, own):
     """Write the Jacobians of `lanes.WIDTH` states, by rows.
 
     Args:
@@ -98,9 +133,11 @@ def jacobian_lanes(x, work, free, difference, p, elements, jacobian):
         p: Packed numbers.
         elements: `Elements`.
         jacobian: Square matrices, written.
+        own: The same of a cabinet that moves under a constant wrench of its mounts.
     """
     align_stack()
     state, numbers, found = lane_array(x), lane_array(p), lane_array(jacobian)
+    alone = lane_array(own)
     size = len(x) // WIDTH
     rate, inputs = lane_array(work[: size * WIDTH]), lane_array(work[size * WIDTH :])
     sine, cosine = sine_cosine(state[DRUM_ANGLE])
@@ -118,18 +155,25 @@ def jacobian_lanes(x, work, free, difference, p, elements, jacobian):
                 change = side * rate[free[row]] / (2.0 * difference)
                 found[row * n + column] = found[row * n + column] + change
         state[free[column]] = at_rest
+    write_jacobian_alone(
+        state, rate, inputs, cabinet_input(elements), difference, read_bodies(numbers, 0).gravity,
+        numbers, elements.cabinet, cabinet_begin(elements), alone
+    )  # fmt: skip
 
 
 @long_running
-def growth_lanes(jacobian, internal, h, steps, numbers, largest):
+def growth_lanes(jacobian, internal, h, steps, numbers, own, block, work, largest):
     """Take the steps of the multistep integrator with linear machines.
 
     Args:
         jacobian: Square matrices, by rows.
-        internal: How each state is treated: `SMOOTH`, `SPONGE` or `PATH`.
+        internal: How each state is treated: `SMOOTH`, `SPONGE`, `PATH` or `CABINET`.
         h: Step size. [s]
         steps: Number of steps.
         numbers: Anything to start from: state, its rate, past rates, past inputs.
+        own, block: Matrices of the states `CABINET` alone, by rows; the first of these states and
+            their number.
+        work: Array to work in, for three numbers of each of these states.
         largest: Largest number of the state in each quarter of the steps, written.
     """
     align_stack()
@@ -138,18 +182,20 @@ def growth_lanes(jacobian, internal, h, steps, numbers, largest):
     x, rate = lane_array(numbers[: n * WIDTH]), lane_array(numbers[n * WIDTH : 2 * n * WIDTH])
     begin, end = 2 * n * WIDTH, (2 + PAST_RATES) * n * WIDTH
     past_rates, past_inputs = lane_array(numbers[begin:end]), lane_array(numbers[end:])
+    b, stage = lane_array(own), lane_array(work)
+    first, m = block
     for quarter in range(4):
         top[quarter] = 0.0 * x[0]
     for i in range(steps):
-        for row in range(n):
-            total = 0.0 * x[0]
-            for column in range(n):
-                total = total + a[row * n + column] * x[column]
-            rate[row] = total
+        write_product(a, x, 0, n, rate, 0)
         remember(past_rates, i, PAST_RATES, rate, n)
         for row in range(n):  # the rate of an internal state without its own share is its input
-            own = a[row * n + row] * x[row]
-            past_inputs[i % PAST_INPUTS * n + row] = rate[row] - own
+            share = a[row * n + row] * x[row]
+            past_inputs[i % PAST_INPUTS * n + row] = rate[row] - share
+        write_product(b, x, first, m, stage, 0)
+        for row in range(m):
+            past_inputs[i % PAST_INPUTS * n + first + row] = rate[first + row] - stage[row]
+        block_after_step(x, rate, past_inputs, i, n, h, b, first, m, stage)
         for row in range(n):
             if internal[row] == SPONGE:
                 middle, ahead = extrapolated(past_inputs, i, row, n)
@@ -159,11 +205,52 @@ def growth_lanes(jacobian, internal, h, steps, numbers, largest):
                 start = past_inputs[i % PAST_INPUTS * n + row]
                 path = h / 6.0 * (start + 4.0 * middle + ahead)
                 x[row] = path_after_step(x[row], a[row * n + row], path, h)
-            else:
+            elif internal[row] == SMOOTH:
                 x[row] = explicit_multistep(x[row], past_rates, i, row, n, h)
             quarter = 4 * i // steps
             size = abs(x[row])
             top[quarter] = where(size > top[quarter], size, top[quarter])
+
+
+@law
+def write_product(a, x, first, size, product, at):
+    """Write the product of a square matrix, by rows, with the part of x from `first` on.
+
+    It begins at index `at` of `product`.
+    """
+    for row in range(size):
+        total = 0.0 * x[first]
+        for column in range(size):
+            total = total + a[row * size + column] * x[first + column]
+        product[at + row] = total
+
+
+@law
+def block_after_step(x, rate, inputs, i, n, h, b, first, m, work):
+    """Advance some states by a Runge-Kutta step of x' = u + B x, as `cabinet_after_step` does.
+
+    Args:
+        x, rate: State of a linear machine, of which these states are advanced, and its rate.
+        inputs, i, n: Past inputs u, number of the step, size of the state.
+        h: Length of the step. [s]
+        b: Matrix B, by rows.
+        first, m: The first of these states and their number.
+        work: Array to work in.
+    """
+    for k in range(m):
+        work[m + k] = x[first + k] + h / 6.0 * rate[first + k]
+        work[k] = x[first + k] + 0.5 * h * rate[first + k]
+    for number in range(1, 4):
+        write_product(b, work, 0, m, work, 2 * m)
+        weight = h / 6.0 if number == 3 else h / 3.0
+        ahead = h if number == 2 else 0.5 * h
+        for k in range(m):
+            middle, end = extrapolated(inputs, i, first + k, n)
+            total = work[2 * m + k] + (end if number == 3 else middle)
+            work[m + k] = work[m + k] + weight * total
+            work[k] = x[first + k] + ahead * total
+    for k in range(m):
+        x[first + k] = work[m + k]
 
 
 @law

@@ -54,6 +54,7 @@ from wm_drake.engines.compiled.bearing import (
     write_carrier_state,
 )
 from wm_drake.engines.compiled.cabinet import (
+    cabinet_input_count,
     cabinet_size,
     seen_from_cabinet,
     with_cabinet,
@@ -263,8 +264,9 @@ def state_derivative(x, dx, inputs, masses, rate, acceleration, p, elements):
     Args:
         x, dx: State and its derivative; a prescribed drum's angle and rate in x are not read.
         inputs: Elongation rate of each strut damper, then the rates of the six axes of each
-            bushing of rubber, written. The deformation of a sponge and the stretches of branches
-            depend on the motion through these numbers only. [m/s, rad/s]
+            bushing of rubber, then the wrench of the mounts on a cabinet that moves, written. The
+            deformation of a sponge, the stretches of branches and the cabinet depend on the other
+            parts through these numbers only. [m/s, rad/s, N m, N]
         masses, rate, acceleration, p: See `accelerations`. With a motor, the prescribed rate is the
             one that the controller wants, and the other two are not used.
         elements: `Elements`.
@@ -295,7 +297,8 @@ def state_derivative(x, dx, inputs, masses, rate, acceleration, p, elements):
     total = add_telescopic_dampers(
         x, dx, motion, gravity, p, elements.telescopes, elements.tubes, total
     )
-    total = with_cabinet(x, dx, in_world, total, gravity, p, cabinet, first)
+    wrench_input = cabinet_input(elements)
+    total = with_cabinet(x, dx, inputs, wrench_input, in_world, total, gravity, p, cabinet, first)
     bodies = in_world, masses, rate, acceleration, total, p
     w_rate, v_rate = tub_and_carrier_accelerations(
         x, dx, *bodies, elements.bearing, carrier_begin(elements)
@@ -420,6 +423,12 @@ def motor_begin(elements):
 @law
 def inputs_size(elements):
     """Return the number of inputs of internal states: see `state_derivative`."""
+    return cabinet_input(elements) + cabinet_input_count(elements.cabinet)
+
+
+@law
+def cabinet_input(elements):
+    """Return the index in the inputs of the wrench on the cabinet, if it moves."""
     return len(elements.dampers) + branch_input_count(elements.branches)
 
 

@@ -33,7 +33,6 @@ from wm_drake.engines.compiled.mechanics import (
     DRUM_RATE,
     STATE_SIZE,
     carrier_begin,
-    inputs_size,
     mass_properties,
     state_derivative,
     state_size,
@@ -117,7 +116,7 @@ def predict_middle(state, middle, past, h, elements):
     """
     predict_body(state, middle, past, 0, VELOCITIES, BODY, h)
     middle[DRUM_ANGLE], middle[DRUM_RATE] = state[DRUM_ANGLE], state[DRUM_RATE]
-    for k in range(STATE_SIZE, STATE_SIZE + inputs_size(elements)):
+    for k in range(STATE_SIZE, STATE_SIZE + len(elements.dampers)):
         middle[k] = state[k] + 0.5 * h * past[k]
     for i in range(telescopic_damper_count(elements.telescopes)):
         at = elements.tubes + TUBES_STATE_SIZE * i
@@ -179,7 +178,7 @@ def advance(state, middle, rate, past, change, h, relaxation, elements):
     """
     keep(past, rate, VELOCITIES, BODY)
     advance_body(state, middle, past, 0, VELOCITIES, BODY, h)
-    for k in range(STATE_SIZE, STATE_SIZE + inputs_size(elements)):
+    for k in range(STATE_SIZE, STATE_SIZE + len(elements.dampers)):
         past[k] = rate[k]
         state[k] = state[k] + h * rate[k]
     for i in range(telescopic_damper_count(elements.telescopes)):

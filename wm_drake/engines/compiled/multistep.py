@@ -27,10 +27,13 @@ in the first line, 1.1 ms would be the longest stable step.
 from wm_drake.compiler.compilation import law
 from wm_drake.elements.friction_damper import friction_damper_tension
 from wm_drake.elements.rubber import AXIS_COUNT, read_rubber, read_rubber_bushing
+from wm_drake.engines.compiled.cabinet import cabinet_after_step
 from wm_drake.engines.compiled.mechanics import (
     STATE_SIZE,
-    branches_begin,
+    cabinet_begin,
+    cabinet_input,
     inputs_size,
+    read_bodies,
     state_size,
 )
 from wm_drake.engines.compiled.rubber import branch_after_step
@@ -42,12 +45,13 @@ STEPS_BEFORE = 5
 
 
 @law
-def multistep_step(state, rate, past, i, h, p, elements):
+def multistep_step(state, rate, past, stage, total, i, h, p, elements):
     """Advance the state by a step.
 
     Args:
         state, rate: State at the start of the step, advanced, and its time derivative there.
         past: `Past` with the values at the start of this step and of those before it.
+        stage, total: Arrays to work in.
         i: Number of the step.
         h: Length of the step. [s]
         p, elements: See `state_derivative`.
@@ -55,13 +59,51 @@ def multistep_step(state, rate, past, i, h, p, elements):
     size, struts, inputs = state_size(elements), len(elements.dampers), inputs_size(elements)
     for k in range(STATE_SIZE):
         state[k] = explicit_multistep(state[k], past.rates, i, k, size, h)
-    for k in range(STATE_SIZE + struts, branches_begin(elements)):
+    for k in range(STATE_SIZE + struts, cabinet_begin(elements)):
         state[k] = explicit_multistep(state[k], past.rates, i, k, size, h)
     for d in range(struts):
         k, at = STATE_SIZE + d, elements.dampers[d]
         middle, end = extrapolated(past.inputs, i, d, inputs)
         state[k] = sponge_after_step(state[k], rate[k], middle, end, h, p, at)
     branches_after_step(state, past.inputs, i, h, p, elements.branches, struts, inputs)
+    step_cabinet(
+        state, rate, stage, total, past.inputs, i, cabinet_input(elements), inputs, h, p,
+        elements.cabinet, cabinet_begin(elements)
+    )  # fmt: skip
+
+
+@law
+def step_cabinet(state, rate, stage, total, inputs, i, first_input, size, h, p, cabinet, first):
+    """Advance a cabinet that moves by a step; nothing for a fixed one.
+
+    Args:
+        state, rate, stage, total, i, h, p: As for `multistep_step`; rate is overwritten.
+        inputs, first_input, size: As `extrapolated_wrench` uses them.
+        cabinet, first: Index of the cabinet in the packed numbers, None for a fixed one, and index
+            in the state where it begins.
+    """
+    if cabinet is None:
+        return
+    middle, end = extrapolated_wrench(inputs, i, first_input, size)
+    gravity = read_bodies(p, 0).gravity
+    cabinet_after_step(state, rate, stage, total, middle, end, h, gravity, p, cabinet, first)
+
+
+@law
+def extrapolated_wrench(inputs, i, first, size):
+    """Return the wrench on the cabinet in the middle and at the end of step i; see `extrapolated`.
+
+    Args:
+        inputs, i, size: As for `extrapolated`.
+        first: Number of the first of its six inputs.
+    """
+    m_x, n_x = extrapolated(inputs, i, first, size)
+    m_y, n_y = extrapolated(inputs, i, first + 1, size)
+    m_z, n_z = extrapolated(inputs, i, first + 2, size)
+    f_x, g_x = extrapolated(inputs, i, first + 3, size)
+    f_y, g_y = extrapolated(inputs, i, first + 4, size)
+    f_z, g_z = extrapolated(inputs, i, first + 5, size)
+    return (m_x, m_y, m_z, f_x, f_y, f_z), (n_x, n_y, n_z, g_x, g_y, g_z)
 
 
 @law

@@ -13,7 +13,7 @@ from wm_drake.elements.motion import POSE
 from wm_drake.elements.motor import MOTOR_STATE_SIZE, motor_structure, packed_motor
 from wm_drake.elements.rubber import AXIS_COUNT, Branches, RubberBushingParameters
 from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE, TUB, TUB_AND_BEARING
-from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE
+from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, WRENCH_SIZE
 from wm_drake.engines.compiled.mechanics import (
     BODIES,
     BODIES_SIZE,
@@ -108,7 +108,8 @@ class Layout:
     @property
     def inputs_size(self) -> int:
         """Number of inputs of internal states."""
-        return len(self.dampers) + AXIS_COUNT * len(self.rubber)
+        wrench = WRENCH_SIZE if self.cabinet >= 0 else 0
+        return len(self.dampers) + AXIS_COUNT * len(self.rubber) + wrench
 
     @property
     def rates_size(self) -> int:

@@ -17,6 +17,7 @@ from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.motor import MOTOR_STATE_SIZE
 from wm_drake.elements.rubber import FRICTION, RubberBushingParameters
 from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, VELOCITIES
+from wm_drake.engines.compiled.linear import CABINET as MOVING_CABINET
 from wm_drake.engines.compiled.linear import PATH, SMOOTH, SPONGE, jacobians
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
 from wm_drake.engines.compiled.packing import Layout, initial_state, pack
@@ -58,6 +59,22 @@ zero counts as constant on either side. [m, rad, m/s, rad/s]"""
 
 
 @dataclass(frozen=True)
+class Linearised:
+    """The linearised machine at states with slow and fast motion.
+
+    Attributes:
+        jacobians: Of the free states. (WIDTH, n, n) [1/s]
+        kinds: How the multistep integrator treats each: `SMOOTH`, `SPONGE`, `PATH` or `CABINET` of
+            `wm_drake.engines.compiled.linear`. (n,)
+        cabinet: Of a cabinet that moves, under a constant wrench of its mounts. (WIDTH, m, m) [1/s]
+    """
+
+    jacobians: FloatArray
+    kinds: np.ndarray
+    cabinet: FloatArray
+
+
+@dataclass(frozen=True)
 class FastestMotion:
     """The motion of a machine that changes fastest.
 
@@ -91,7 +108,7 @@ def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
     """
     free, parts = free_states(setup)
     followed = {parts[k] for k, kind in enumerate(_treatment(setup, free)) if kind == PATH}
-    matrices, _ = linearised(setup, *pack(setup), DIFFERENCE)
+    matrices = linearised(setup, *pack(setup), DIFFERENCE).jacobians
     if not np.all(np.isfinite(matrices)):
         return {"the machine": FastestMotion(np.inf, False, "the machine")}
     moving = np.isin(free, _velocities(setup))
@@ -116,29 +133,26 @@ def fastest_motion(setup: Setup) -> FastestMotion:
     return min(fastest_motions(setup).values(), key=lambda motion: motion.longest_step)
 
 
-def linearised(
-    setup: Setup, packed: FloatArray, layout: Layout, difference: float
-) -> tuple[FloatArray, np.ndarray]:
+def linearised(setup: Setup, packed: FloatArray, layout: Layout, difference: float) -> Linearised:
     """Return the Jacobians of the free states, and how the multistep integrator treats each.
 
     Args:
         setup: The machine.
         packed, layout: From `pack`.
         difference: Half a step of the central differences. [m, rad, m/s, rad/s]
-
-    Returns:
-        (WIDTH, n, n) at states with slow and fast motion [1/s], and (n,) `SMOOTH`, `SPONGE` or
-        `PATH` of `wm_drake.engines.compiled.linear`.
     """
     free, _ = free_states(setup)
-    matrices = jacobians(packed, layout, _states(setup, free), free, difference)
-    return matrices, _treatment(setup, free)
+    found, cabinet = jacobians(packed, layout, _states(setup, free), free, difference)
+    return Linearised(found, _treatment(setup, free), cabinet)
 
 
 def _treatment(setup: Setup, free: list[int]) -> np.ndarray:
     """Return how the multistep integrator treats the free states. (n,)"""
     kinds = np.full(free[-1] + 1, SMOOTH)
     kinds[STATE_SIZE : STATE_SIZE + len(setup.dampers)] = SPONGE
+    if setup.cabinet:
+        end = free[-1] + 1 - len(_branches(setup))
+        kinds[end - CABINET_STATE_SIZE : end] = MOVING_CABINET
     for index, (_, kind) in zip(reversed(free), reversed(_branches(setup)), strict=False):
         kinds[index] = PATH if kind == FRICTION else SPONGE
     return kinds[free]

@@ -106,16 +106,18 @@ def choose_stepping(
             key="integrator",
         )
     if integrator != "runge_kutta" and not layout.control_period:
-        jacobians, internal = linearised(setup, packed, layout, ACROSS_JUMPS)
+        linear = linearised(setup, packed, layout, ACROSS_JUMPS)
         fastest = max(abs(speed) for speed in profile.speed)
         if only_tubes and integrator != "multistep":
-            found = _midpoint(setup, layout, jacobians, fastest, step, integrator)
+            found = _midpoint(setup, layout, linear.jacobians, fastest, step, integrator)
             if found:
                 return found
         if integrator != "midpoint":
             for length in _lengths(step, integrator, LONGEST_STEP):
                 turn = fastest * length
-                if turn <= LARGEST_TURN and is_followed(jacobians, internal, MARGIN * length):
+                if turn <= LARGEST_TURN and is_followed(
+                    linear.jacobians, linear.kinds, MARGIN * length, linear.cabinet
+                ):
                     return Stepping("multistep", length)
     check_step(setup, step)
     check_sample_time(setup)

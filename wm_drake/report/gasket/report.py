@@ -208,7 +208,8 @@ def _pictures(screening: Screening, load: str, words: Words, models: Surfaces) -
             "intervals of the means.",
         ),
     ]
-    if screening.design.model != "main":
+    several = len(screening.design.factors) > 1
+    if several and screening.design.model != "main":
         shown.append(
             picture(
                 figures.interactions_figure(screening, load, words),
@@ -219,7 +220,7 @@ def _pictures(screening: Screening, load: str, words: Words, models: Surfaces) -
                 "interaction the lines would be parallel.",
             )
         )
-    if len(screening.design.factors) > 1:
+    if several:
         shown.append(
             picture(
                 figures.combinations_figure(screening, load, words),

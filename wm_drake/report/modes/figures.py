@@ -1,9 +1,11 @@
 """Figures of the modes of a machine."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -20,6 +22,9 @@ from wm_drake.studies.modes.study import ORDERS, SLIDING, STUCK, MachineModes
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a6a00", "#56b4e9")
 """Colours of Okabe and Ito, one a mode; the yellow is darkened."""
 
+VIEWS = (("front", 0, 2), ("side", 1, 2), ("top", 0, 1))
+"""Views of the tub, with the coordinate across and the one upwards."""
+
 SHOWN_MOTION = 0.18
 """Largest displacement of a drawn mode shape, as part of the tub's radius."""
 
@@ -35,62 +40,65 @@ def campbell_figure(result: MachineModes) -> Figure:
     panels = figure.subplots(1, 2, sharey=True)
     ratios = np.concatenate([d.damping_ratio.ravel() for d in result.diagrams.values()])
     norm = Normalize(0.0, max(0.05, float(np.nanmax(ratios))))
-    last = max(float(np.nanmax(d.frequency_hz)) for d in result.diagrams.values())
+    top = 1.08 * max(float(np.nanmax(d.frequency_hz)) for d in result.diagrams.values())
     for axes, name in zip(panels, (SLIDING, STUCK), strict=True):
-        diagram = result.diagrams[name]
-        rpm = RPM_PER_RAD_S * diagram.speed
-        for mode, column in enumerate(diagram.frequency_hz.T):
-            axes.plot(rpm, column, color=QUIET, linewidth=0.8, zorder=1)
-            points = axes.scatter(
-                rpm,
-                column,
-                c=diagram.damping_ratio[:, mode],
-                norm=norm,
-                cmap="viridis_r",
-                s=11,
-                zorder=2,
-            )
-        for order in ORDERS:
-            axes.plot(rpm, order * rpm / 60.0, "--", color=MARK, linewidth=1.0)
-            _label_order(axes, order, rpm[-1], 1.08 * last)
-        _mark_critical(axes, result, name)
-        _mark_run_up(axes, result)
-        axes.set_xlim(0.0, 1.16 * rpm[-1])
-        axes.set_ylim(0.0, 1.08 * last)
-        _label_modes(axes, result, name, float(rpm[-1]))
-        axes.set_title(TITLES[name], loc="left", fontsize=10.5, fontweight="bold")
-        axes.set_xlabel("drum speed, rpm", fontsize=9.5)
-        axes.grid(color=GRID)
-        style_axes(axes)
+        points = _draw_campbell(axes, result, name, norm, top)
     panels[0].set_ylabel("natural frequency, Hz", fontsize=9.5)
     figure.colorbar(points, ax=panels, label="damping ratio", pad=0.015, fraction=0.035)
+    order = "order of the drum speed"
     handles = [
-        Line2D([], [], color=MARK, linestyle="--", linewidth=1.0, label="order of the drum speed"),
-        Line2D(
-            [],
-            [],
-            marker="o",
-            color=MEASURED,
-            fillstyle="none",
-            linestyle="",
-            ms=7,
-            label="critical speed",
-        ),
+        Line2D([], [], color=MARK, linestyle="--", linewidth=1.0, label=order),
+        _key("o", MEASURED, "critical speed", ms=7, fillstyle="none"),
     ]
     if result.run_up is not None:
-        handles.append(
-            Line2D(
-                [],
-                [],
-                marker="v",
-                color=OURS,
-                linestyle="",
-                ms=6,
-                label="largest amplitude of a sensor in a run-up",
-            )
-        )
+        handles.append(_key("v", OURS, "largest amplitude of a sensor in a run-up", ms=6))
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     return figure
+
+
+def _key(marker: str, colour: str, text: str, **style: Any) -> Line2D:
+    """Return the entry of a marker in a legend."""
+    return Line2D([], [], marker=marker, color=colour, linestyle="", label=text, **style)
+
+
+def _draw_campbell(
+    axes: Axes, result: MachineModes, name: str, norm: Normalize, top: float
+) -> PathCollection:
+    """Draw the diagram of one linearisation; return its points, for the scale of colours.
+
+    Args:
+        axes: Panel.
+        result: The modes.
+        name: Linearisation.
+        norm: Damping ratios to colours.
+        top: Highest frequency. [Hz]
+    """
+    diagram = result.diagrams[name]
+    rpm = RPM_PER_RAD_S * diagram.speed
+    for mode, column in enumerate(diagram.frequency_hz.T):
+        axes.plot(rpm, column, color=QUIET, linewidth=0.8, zorder=1)
+        points = axes.scatter(
+            rpm,
+            column,
+            c=diagram.damping_ratio[:, mode],
+            norm=norm,
+            cmap="viridis_r",
+            s=11,
+            zorder=2,
+        )
+    for order in ORDERS:
+        axes.plot(rpm, order * rpm / 60.0, "--", color=MARK, linewidth=1.0)
+        _label_order(axes, order, rpm[-1], top)
+    _mark_critical(axes, result, name)
+    _mark_run_up(axes, result)
+    axes.set_xlim(0.0, 1.16 * rpm[-1])
+    axes.set_ylim(0.0, top)
+    _label_modes(axes, result, name, float(rpm[-1]))
+    axes.set_title(TITLES[name], loc="left", fontsize=10.5, fontweight="bold")
+    axes.set_xlabel("drum speed, rpm", fontsize=9.5)
+    axes.grid(color=GRID)
+    style_axes(axes)
+    return points
 
 
 def _label_order(axes: Axes, order: float, last_rpm: float, top: float) -> None:
@@ -171,20 +179,18 @@ def amplitude_figure(result: MachineModes) -> Figure:
 
 def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> Figure:
     """Draw the tub in each mode, in three views: at rest, and at both ends of the motion."""
-    views = (("front", 0, 2), ("side", 1, 2), ("top", 0, 1))
     figure = Figure(figsize=(WIDTH, 5.9), layout="constrained")
     panels = figure.subplots(3, len(modes), squeeze=False)
     lines = tub_lines(outlines)
     reach = max(float(np.abs(line).max()) for line in lines)
     for column, mode in enumerate(modes):
         ends = _ends_of_motion(mode, lines, reach)
-        for row, (view, across, up) in enumerate(views):
+        for row, (view, across, up) in enumerate(VIEWS):
             axes = panels[row, column]
             for pose, colour, width in zip(
                 ends, (QUIET, OURS, MEASURED), (0.8, 1.2, 1.2), strict=True
             ):
-                for line in pose:
-                    axes.plot(line[:, across], line[:, up], color=colour, linewidth=width)
+                axes.plot(pose[:, across], pose[:, up], color=colour, linewidth=width)
             limit = 1.35 * reach
             axes.set_xlim(-limit, limit)
             axes.set_ylim(-limit, limit)
@@ -218,7 +224,18 @@ def tub_lines(outlines: Mapping[str, Outline]) -> list[FloatArray]:
     return [largest.centre + (line * largest.half) @ largest.axes for line in (*ends, *sides)]
 
 
-def _ends_of_motion(mode: Mode, lines: list[FloatArray], reach: float) -> list[list[FloatArray]]:
+def joined(points: FloatArray, lines: list[FloatArray]) -> FloatArray:
+    """Return points of lines as one line with gaps, which is drawn faster than many lines.
+
+    Args:
+        points: Points of all lines, one line after the other. (n, k)
+        lines: Lines, for the number of points of each.
+    """
+    ends = np.cumsum([len(line) for line in lines])[:-1]
+    return np.insert(points, ends, np.nan, axis=0)
+
+
+def _ends_of_motion(mode: Mode, lines: list[FloatArray], reach: float) -> list[FloatArray]:
     """Return the lines at rest and at both ends of the motion, enlarged to be seen."""
     points = np.concatenate(lines)
     poses = np.outer([1e-3, 0.0], mode.real_shape)
@@ -226,8 +243,7 @@ def _ends_of_motion(mode: Mode, lines: list[FloatArray], reach: float) -> list[l
     largest = float(np.abs(moved[0] - moved[1]).max())
     scale = 1e-3 * SHOWN_MOTION * reach / largest
     poses = np.outer([0.0, scale, -scale], mode.real_shape)
-    cuts = np.cumsum([len(line) for line in lines])[:-1]
-    return [np.split(pose, cuts) for pose in point_positions(poses, points)]
+    return [joined(pose, lines) for pose in point_positions(poses, points)]
 
 
 def energy_figure(result: MachineModes) -> Figure:

@@ -255,6 +255,7 @@ def campbell_table(result: MachineModes) -> pd.DataFrame:
                         "mode": result.modes[name][mode].name,
                         "frequency_Hz": float(frequency),
                         "damping_ratio": float(diagram.damping_ratio[index, mode]),
+                        "mac": float(diagram.mac[index, mode]),
                     }
                 )
     return pd.DataFrame(rows)

@@ -53,8 +53,9 @@ def summary(result: Orders) -> str:
     values = result.orders.values
     time, order, signal = np.unravel_index(int(np.nanargmax(values)), values.shape)
     rpm = RPM_PER_RAD_S * float(result.orders.speed.values[time])
+    count = len(result.signals.names)
     return (
-        f"The largest component of {len(result.signals.names)} signals is order "
+        f"The largest component of {count} signal{'s' if count > 1 else ''} is order "
         f"{result.orders.order.values[order]:g} of {result.signals.names[signal]}: "
         f"{number(float(values[time, order, signal]), 2)} {result.signals.unit} at "
         f"{number(rpm, 0)} rpm."

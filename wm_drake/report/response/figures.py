@@ -11,7 +11,7 @@ from wm_drake.model.scene import Outline
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH, style_axes
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
-from wm_drake.report.modes.figures import COLOURS, tub_lines
+from wm_drake.report.modes.figures import COLOURS, VIEWS, joined, tub_lines
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.studies.steady.study import SteadyCase, SteadyStudy
 
@@ -203,44 +203,49 @@ def deflection_figure(case: SteadyCase, outlines: Mapping[str, Outline]) -> Figu
     points = peaks_of(case)
     if not points:
         return None
-    views = (("front", 0, 2), ("side", 1, 2), ("top", 0, 1))
     figure = Figure(figsize=(WIDTH, 0.5 + 3.0 * len(points)), layout="constrained")
-    panels = figure.subplots(len(points), len(views), squeeze=False)
+    panels = figure.subplots(len(points), len(VIEWS), squeeze=False)
     lines = tub_lines(outlines)
-    reach = max(float(np.abs(line).max()) for line in lines)
-    corners = np.concatenate(lines)
-    turn = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
-    shades = np.linspace(0.9, 0.25, len(turn))
-    for row, index in enumerate(points):
-        harmonic = case.response.first_harmonic.values[index]
-        poses = np.outer(np.cos(turn), harmonic[:, 0]) + np.outer(np.sin(turn), harmonic[:, 1])
-        moved = point_positions(poses, corners) - corners
-        scale = SHOWN_MOTION * reach / float(np.abs(moved).max())
-        shown = point_positions(scale * poses, corners)
-        cuts = np.cumsum([len(line) for line in lines])[:-1]
-        for column, (view, across, up) in enumerate(views):
-            axes = panels[row, column]
-            for line in lines:
-                axes.plot(line[:, across], line[:, up], color=QUIET, linewidth=0.7)
-            for shade, pose in zip(shades, shown, strict=True):
-                for line in np.split(pose, cuts)[:2]:
-                    axes.plot(line[:, across], line[:, up], color=OURS, alpha=shade, linewidth=1.0)
-            axes.set_xlim(-1.35 * reach, 1.35 * reach)
-            axes.set_ylim(-1.35 * reach, 1.35 * reach)
-            axes.set_aspect("equal")
-            axes.set_xticks([])
-            axes.set_yticks([])
-            axes.spines[:].set_color(GRID)
-            axes.set_xlabel(f"{view}: {'xyz'[up]} over {'xyz'[across]}", fontsize=8.5)
+    for row, index in zip(panels, points, strict=True):
+        _draw_deflection(row, case.response.first_harmonic.values[index], lines)
         rpm = RPM_PER_RAD_S * float(case.response.speed.values[index])
         largest = MM_PER_M * float(case.response.amplitude.values[index].max())
-        panels[row, 0].set_title(
+        row[0].set_title(
             f"{number(rpm, 0)} rpm, {number(largest, 1)} mm",
             loc="left",
             fontsize=10,
             fontweight="bold",
         )
     return figure
+
+
+def _draw_deflection(panels: FloatArray, harmonic: FloatArray, lines: list[FloatArray]) -> None:
+    """Draw the tub at rest, and its two ends at eight angles of the drum, in each view.
+
+    Args:
+        panels: One for each view.
+        harmonic: First harmonic of the pose of the tub. (6, 2)
+        lines: Lines that show the tub; the first two are its ends.
+    """
+    reach = max(float(np.abs(line).max()) for line in lines)
+    rest, ends = np.concatenate(lines), np.concatenate(lines[:2])
+    turn = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
+    poses = np.outer(np.cos(turn), harmonic[:, 0]) + np.outer(np.sin(turn), harmonic[:, 1])
+    moved = point_positions(poses, rest) - rest
+    scale = SHOWN_MOTION * reach / float(np.abs(moved).max())
+    shown = [joined(pose, lines[:2]) for pose in point_positions(scale * poses, ends)]
+    still = joined(rest, lines)
+    for axes, (view, across, up) in zip(panels, VIEWS, strict=True):
+        axes.plot(still[:, across], still[:, up], color=QUIET, linewidth=0.7)
+        for shade, pose in zip(np.linspace(0.9, 0.25, len(turn)), shown, strict=True):
+            axes.plot(pose[:, across], pose[:, up], color=OURS, alpha=shade, linewidth=1.0)
+        axes.set_xlim(-1.35 * reach, 1.35 * reach)
+        axes.set_ylim(-1.35 * reach, 1.35 * reach)
+        axes.set_aspect("equal")
+        axes.set_xticks([])
+        axes.set_yticks([])
+        axes.spines[:].set_color(GRID)
+        axes.set_xlabel(f"{view}: {'xyz'[up]} over {'xyz'[across]}", fontsize=8.5)
 
 
 def sweep_figure(study: SteadyStudy) -> Figure:

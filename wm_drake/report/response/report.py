@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.model.scene import Scene
+from wm_drake.parameters.types import FloatArray
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.response.figures import (
@@ -98,14 +99,41 @@ def summary(study: SteadyStudy) -> str:
     )
 
 
+SPIN_TOLD = 0.05
+"""Least spin of a telescopic damper that a page tells. [deg per revolution]"""
+
+
 def _warnings(study: SteadyStudy) -> list[str]:
-    return [
+    found = [_spin_warning(case) for case in study.cases]
+    return [text for text in found if text] + [
         f"Load {case.load}, {_gasket(case)}: the branch could be followed only up to "
         f"{number(RPM_PER_RAD_S * float(case.response.speed.values[-1]), 0)} rpm. More harmonics "
         "or samples may help."
         for case in study.cases
         if not bool(case.response.on_grid.values[-1])
     ]
+
+
+def _spin_warning(case: SteadyCase) -> str:
+    """Return a text about telescopic dampers that spin; "" if none does."""
+    turns = spin_per_revolution(case)
+    if not turns.size or np.max(np.abs(turns)) < SPIN_TOLD:
+        return ""
+    point, number_of = np.unravel_index(int(np.argmax(np.abs(turns))), turns.shape)
+    rpm = RPM_PER_RAD_S * float(case.response.speed.values[point])
+    return (
+        f"Load {case.load}, {_gasket(case)}: damper {case.response.spinning.values[number_of]} "
+        f"spins about its axis by {number(abs(float(turns[point, number_of])), 1)}° in a drum "
+        f"revolution at {number(rpm, 0)} rpm. The motion is then not periodic: the amplitudes "
+        "hold for dampers near the angle at which they are built, and vary by some percent as "
+        "they turn."
+    )
+
+
+def spin_per_revolution(case: SteadyCase) -> FloatArray:
+    """Return by how much telescopic dampers spin in a drum revolution. (points, dampers) [deg]"""
+    rates = case.response.damper_spin.values / case.response.speed.values[:, None]
+    return np.asarray(360.0 * rates)
 
 
 def _peaks_table(study: SteadyStudy) -> Table:
@@ -150,8 +178,10 @@ def _sweep_picture(study: SteadyStudy) -> Picture | None:
         return None
     caption = (
         "Sweeps at a constant rate, up and down, computed by the compiled engine. A faster sweep "
-        "passes a resonance later and lower. For each load the sensor with its largest steady "
-        "amplitude is shown. Where two peaks are about as high, a sweep may prefer the other one."
+        "passes a resonance later. A single resonance is also passed lower; where the machine "
+        "still moves in one mode when the next one is met, the sum of both may be above the steady "
+        "peak. For each load the sensor with its largest steady amplitude is shown. Where two "
+        "peaks are about as high, a sweep may prefer the other one."
     )
     return picture(sweep_figure(study), "Shift and height of peaks over the sweep rate.", caption)
 
@@ -185,6 +215,7 @@ def response_table(study: SteadyStudy) -> pd.DataFrame:
             ("gasket_moment", "axis", 1.0, "Nm"),
             ("spring_tension", "spring", 1.0, "N"),
             ("damper_tension", "damper", 1.0, "N"),
+            ("damper_spin", "spinning", 180.0 / np.pi, "deg_s"),
             *((f"mount_force_{kind}", "mount", 1.0, "N") for kind in KINDS),
         ):
             for label in response[dim].values:

@@ -214,7 +214,7 @@ def mount_force_tables(result: SpinResult) -> list[Table]:
     """Return the forces of the mounts on the cabinet, one table for each spin profile."""
     caption = (
         "Size of the force of each mount on the cabinet: at rest, largest with its drum speed, and "
-        "RMS of the change from rest in ranges of drum speed or in the regions of the profile."
+        "RMS without the mean in ranges of drum speed or in the regions of the profile."
     )
     by_ranges: dict[tuple[str, ...], list[Group]] = {}
     for case in result.results:

@@ -51,11 +51,14 @@ def floor_table(result: SpinCycleResult) -> Table | None:
         cells = [*(number(value) for value in values), where]
         alarm = "alarm" if min(values) <= 0.0 else ""
         groups.append(line(case.name, cells, alarm))
+    which, below = "which the model keeps in its place", "Below 0 the cabinet would slide, turn"
+    if result.parameters.cabinet_moves:
+        which, below = "which moves on them", "At 0 the cabinet slides or turns, or is about to"
     caption = (
-        "Feet of the rigid cabinet, which the model keeps in its place: smallest normal load of "
-        "any foot; horizontal force that friction can still take; vertical moment that friction "
-        "can still take beside it, and the region where this is smallest; moment that still keeps "
-        "the cabinet down. Below 0 the cabinet would slide, turn or tip. feet.csv has each region."
+        f"Feet of the rigid cabinet, {which}: smallest normal load of any foot; horizontal force "
+        "that friction can still take; vertical moment that friction can still take beside it, "
+        "and the region where this is smallest; moment that still keeps the cabinet down. "
+        f"{below} or tip. feet.csv has each region."
     )
     header = (
         "case",
@@ -80,6 +83,8 @@ def floor_warnings(result: SpinCycleResult) -> list[str]:
     ]
     if not moving:
         return []
+    if result.parameters.cabinet_moves:
+        return [f"The cabinet slides, turns or lifts a side in case {', '.join(moving)}."]
     return [
         f"The cabinet would slide, turn or tip over in case {', '.join(moving)}. The model keeps "
         "it in its place."

@@ -10,6 +10,7 @@ from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.report.formatting import MM_PER_M, number
 from wm_drake.report.page import Picture, picture, render
 from wm_drake.report.spin_cycle import tables
+from wm_drake.report.spin_cycle.drive import drive_table
 from wm_drake.report.spin_cycle.figures import bars_figure, heat_map_figure, profile_figure
 from wm_drake.report.spin_cycle.floor import floor_table, floor_warnings
 from wm_drake.report.springs import slack_warning
@@ -51,6 +52,7 @@ def spin_cycle_report(result: SpinCycleResult, engine: str, command: str = "") -
         worst_picture=_worst_picture(result),
         cases_table=tables.cases(result),
         floor_table=floor_table(result),
+        drive_table=drive_table(result),
         cases=[_case_view(result, case) for case in shown_cases(result)],
         facts=_facts(result, engine, command),
         numbers=parameter_table(result.parameters),

@@ -1,1 +1,1 @@
-"""Validation page in Markdown: docs/validation.md."""
+"""Pages in Markdown: docs/verification.md, docs/validation.md and docs/prediction.md."""

@@ -1,8 +1,12 @@
-"""Write the validation page: verdicts in Markdown, with date, version and a reason per row."""
+"""Write the pages of verification, validation and prediction in Markdown, with a reason per row."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import groupby
 from textwrap import fill
+from typing import Any
+
+import pandas as pd
 
 from wm_drake.report.provenance import now, program
 from wm_drake.studies.validation.rows import FITTED, MISSED, PREDICTED, Row, counts
@@ -10,25 +14,107 @@ from wm_drake.studies.validation.rows import FITTED, MISSED, PREDICTED, Row, cou
 WIDTH = 100
 """Largest length of a line of prose. [characters]"""
 
-COLUMNS = ("quantity", "kind", "published", "ours", "difference", "verdict", "reason")
+COLUMNS = ("quantity", "published", "ours", "difference", "verdict", "reason")
+
+UNEXPLAINED = "not explained yet"
+"""Reason of a row that is missed and has no explanation."""
+
+TITLES = {FITTED: "Validation", PREDICTED: "Prediction"}
+
+ABOUT = {
+    FITTED: "Do the equations describe the machines of [A], [B] and [C]? These published numbers "
+    "were targets of the calibration. Numbers that were not are on the page "
+    "[prediction](prediction.md).",
+    PREDICTED: "Does the model tell what it was not fitted to? These published numbers were no "
+    "targets of the calibration. Those that were are on the page [validation](validation.md).",
+}
+
+
+@dataclass(frozen=True)
+class Made:
+    """How a page was made.
+
+    Attributes:
+        command: Command that writes the page.
+        notes: Sentences on what was run.
+        reasons: Explanations by section, by `SECTION | QUANTITY`, and command and tolerance of a
+            section by `SECTION | command` and `SECTION | tolerance`.
+    """
+
+    command: str
+    notes: Sequence[str] = ()
+    reasons: Mapping[str, str] = field(default_factory=dict)
 
 
 def validation_page(
-    rows: Sequence[Row], command: str, notes: Sequence[str] = (), reasons: Mapping[str, str] = {}
+    rows: Sequence[Row], made: Made, kind: str, tables: Mapping[str, pd.DataFrame] = {}
 ) -> str:
-    """Return the page as Markdown.
+    """Return the page of the rows of one kind as Markdown.
 
     Args:
         rows: All rows; those of one section follow each other.
-        command: Command that writes the page.
-        notes: Sentences on what was run.
-        reasons: Explanations of missed rows, by section or by `SECTION | QUANTITY`.
+        made: How they were made.
+        kind: `FITTED` or `PREDICTED`.
+        tables: Tables without verdicts by heading, for the end of the page.
     """
+    own = [row for row in rows if row.kind == kind]
     text = [
-        "# Validation",
+        f"# {TITLES[kind]}",
         "",
-        "What the shipped machines are fitted to, what they predict, and what they miss. Each",
-        "result is beside the published number. A script writes the page; do not edit it:",
+        fill(ABOUT[kind], WIDTH),
+        "",
+        *_origin(made.command),
+        "Sources: [A], [B] and [C] are the papers in the [README](../README.md).",
+        "",
+        *(fill(f"- {note}", WIDTH, subsequent_indent="  ") for note in made.notes),
+        "",
+        "## Summary",
+        "",
+        *_summary(own, kind),
+    ]
+    for section, group in groupby(own, key=lambda row: row.section):
+        text += ["", f"## {section}", "", *_head_of_section(section, made.reasons)]
+        text += _line(COLUMNS), _line(["---"] * len(COLUMNS))
+        text += [_line(_cells(row, made.reasons)) for row in group]
+    for heading, table in tables.items():
+        text += ["", f"## {heading}", "", *_head_of_section(heading, made.reasons)]
+        text += _line(list(map(str, table.columns))), _line(["---"] * len(table.columns))
+        text += [_line(list(map(str, row))) for row in table.itertuples(index=False)]
+    return "\n".join(text) + "\n"
+
+
+def verification_page(
+    groups: Mapping[str, Sequence[Mapping[str, Any]]], command: str, outcomes: Mapping[str, str]
+) -> str:
+    """Return the page of verification as Markdown.
+
+    Args:
+        groups: Rows by heading, each with what, against, agreement, and tests or a command.
+        command: Command that writes the page.
+        outcomes: What a run of the tests gave, by test or file of tests; empty without a run.
+    """
+    about = (
+        "Does the program solve its equations? Each row is compared by tests, which run with the "
+        "test suite, or by a command. `pytest` followed by the name of a test runs it alone."
+    )
+    text = ["# Verification", "", fill(about, WIDTH), "", *_origin(command)]
+    columns = ["what", "against", "agreement", "run by", *(["last run"] if outcomes else [])]
+    for heading, rows in groups.items():
+        text += ["", f"## {heading}", "", _line(columns), _line(["---"] * len(columns))]
+        for row in rows:
+            tests = list(row.get("tests", ()))
+            run_by = [f"`{name}`" for name in tests]
+            run_by += [f"`{row['command']}`"] if "command" in row else []
+            cells = [row["what"], row["against"], row["agreement"], "<br>".join(run_by)]
+            if outcomes:
+                cells.append("; ".join(dict.fromkeys(outcomes.get(name, "") for name in tests)))
+            text.append(_line(cells))
+    return "\n".join(text) + "\n"
+
+
+def _origin(command: str) -> list[str]:
+    return [
+        "A script writes this page; do not edit it:",
         "",
         "```text",
         command,
@@ -36,38 +122,38 @@ def validation_page(
         "",
         f"Written {now()} by {program()}.",
         "",
-        "Fitted: the number was a target of the calibration. Predicted: it was not. Sources:",
-        "[A], [B] and [C] are the papers in the [README](../README.md).",
-        "",
-        *(fill(f"- {note}", WIDTH, subsequent_indent="  ") for note in notes),
-        "",
-        "## Summary",
-        "",
-        *_summary(rows),
     ]
-    for section, group in groupby(rows, key=lambda row: row.section):
-        text += ["", f"## {section}", ""]
-        if section in reasons:
-            text += [fill(reasons[section], WIDTH), ""]
-        text += _line(COLUMNS), _line(["---"] * len(COLUMNS))
-        for row in group:
-            known = reasons.get(f"{section} | {row.quantity}", "")
-            why = "; ".join(filter(None, [row.reason, known]))
-            verdict = f"**{row.verdict}**" if row.verdict == MISSED else row.verdict
-            cells = (row.quantity, row.kind, row.published, row.ours, row.difference, verdict, why)
-            text.append(_line(cells))
-    return "\n".join(text) + "\n"
 
 
-def _summary(rows: Sequence[Row]) -> list[str]:
-    table = counts(rows)
-    lines = [_line(["section", "kind", *table.columns]), _line(["---"] * (2 + len(table.columns)))]
-    lines += [_line(list(map(str, row))) for row in table.reset_index().itertuples(index=False)]
-    for kind in (FITTED, PREDICTED):
-        own = [row for row in rows if row.kind == kind]
-        missed = sum(row.verdict == MISSED for row in own)
-        lines += ["", f"Of {len(own)} {kind} results, {missed} are missed."]
+def _head_of_section(section: str, reasons: Mapping[str, str]) -> list[str]:
+    """Return explanation, command and tolerance of a section."""
+    lines = [fill(reasons[section], WIDTH), ""] if section in reasons else []
+    for name in ("command", "tolerance"):
+        words = reasons.get(f"{section} | {name}")
+        if words:
+            code = "; ".join(f"`{part}`" for part in words.split("; "))
+            sentence = f"{name.capitalize()}: {code if name == 'command' else words}."
+            lines += [sentence if name == "command" else fill(sentence, WIDTH), ""]
     return lines
+
+
+def _cells(row: Row, reasons: Mapping[str, str]) -> list[str]:
+    known = reasons.get(f"{row.section} | {row.quantity}", "")
+    if row.verdict == MISSED and not known:
+        known = UNEXPLAINED
+    why = "; ".join(filter(None, [row.reason, known if row.verdict == MISSED else ""]))
+    verdict = f"**{row.verdict}**" if row.verdict == MISSED else row.verdict
+    return [row.quantity, row.published, row.ours, row.difference, verdict, why]
+
+
+def _summary(rows: Sequence[Row], kind: str) -> list[str]:
+    if not rows:
+        return ["Nothing was compared."]
+    table = counts(rows).droplevel(1)
+    lines = [_line(["section", *table.columns]), _line(["---"] * (1 + len(table.columns)))]
+    lines += [_line(list(map(str, row))) for row in table.reset_index().itertuples(index=False)]
+    missed = sum(row.verdict == MISSED for row in rows)
+    return [*lines, "", f"Of {len(rows)} {kind} results, {missed} are missed."]
 
 
 def _line(cells: Sequence[str]) -> str:

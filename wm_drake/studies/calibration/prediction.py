@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from wm_drake.batch.ledger import Ledger
 from wm_drake.errors import input_error, nearest_names
@@ -17,6 +18,7 @@ from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate
 from wm_drake.studies.calibration.computed import Evaluation, StoredValues
+from wm_drake.studies.calibration.outcome import mean_and_largest
 from wm_drake.studies.calibration.targets import Targets
 
 
@@ -114,6 +116,22 @@ def predict(
             )
         )
     return found
+
+
+def prediction_table(predictions: Sequence[Prediction]) -> pd.DataFrame:
+    """Return a table with a row for each group of held-out loads; differences in percent."""
+    rows = []
+    for prediction in predictions:
+        row: dict[str, object] = {"held_out": " ".join(prediction.loads)}
+        row["amplitudes"] = prediction.predicted.size
+        for kind in ("calibrated", "predicted", "seen"):
+            mean, largest = mean_and_largest(getattr(prediction, kind))
+            row |= {
+                f"{kind}_mean_percent": 100.0 * mean,
+                f"{kind}_largest_percent": 100.0 * largest,
+            }
+        rows.append(row | {"in_intervals_percent": 100.0 * prediction.covered})
+    return pd.DataFrame(rows)
 
 
 def _interval(

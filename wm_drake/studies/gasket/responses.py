@@ -13,6 +13,7 @@ from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
+from wm_drake.simulation.drive import VARIABLES as DRIVE_VARIABLES
 from wm_drake.simulation.feet import BY_FOOT, FOOT_VARIABLES, WORDS, cabinet_of
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.outputs import AXES
@@ -23,6 +24,17 @@ NEWTON = Unit("N", "N")
 
 LOADS_OF_FEET = ("foot_normal_largest", "foot_tangential_largest")
 """Measures of the feet that are better when smaller."""
+
+OF_DRIVE: dict[str, tuple[Unit, Goal]] = {
+    "drive_peak_torque": (Unit("N*m", "N*m"), "smaller"),
+    "drive_mean_torque": (Unit("N*m", "N*m"), "smaller"),
+    "drive_mean_torque_speed": (Unit("rad/s", "rpm"), ""),
+    "drive_peak_power": (Unit("W", "W"), "smaller"),
+    "drive_energy": (Unit("J", "J"), "smaller"),
+    "drive_speed_ripple": (Unit("dimensionless", "percent"), "smaller"),
+    "drive_end_speed": (Unit("rad/s", "rpm"), "larger"),
+}
+"""Measures of the drive that every run has, with their units and goals."""
 
 KIND_TITLES = {"peak": "peak", "rms": "RMS", "dynamic_rms": "dynamic RMS"}
 """Title of each kind of measure of a force, `wm_drake.simulation.mounts.KINDS`."""
@@ -75,7 +87,8 @@ class Response:
 def known_responses(parameters: MachineParameters, profile: SpinProfile) -> tuple[Response, ...]:
     """Return all responses that a machine has over a spin profile."""
     found = [*_extremes(), _gap(), *_by_sensor(parameters), *_by_region(parameters, profile)]
-    found += [*_on_cabinet(parameters), *_of_feet(parameters, profile), *_by_spring(parameters)]
+    found += [*_on_cabinet(parameters), *_of_feet(parameters, profile), *_of_drive()]
+    found += _by_spring(parameters)
     return tuple(found)
 
 
@@ -258,6 +271,14 @@ def _of_feet(parameters: MachineParameters, profile: SpinProfile) -> Iterator[Re
             meaning = Meaning(f"{kind} {region.name}", f"{about}, in a region", kind, goal)
             name = f"{own}_{region.name}"
             yield Response(name, own, "feet regions", own, (index,), unit, meaning)
+
+
+def _of_drive() -> Iterator[Response]:
+    """Yield the measures of the drive; one with a prescribed speed has them too."""
+    for variable, (unit, goal) in OF_DRIVE.items():
+        about, kind = DRIVE_VARIABLES[variable][2], _words(variable.removeprefix("drive_"))
+        meaning = Meaning(f"{kind} of the drive", about, f"{kind} of the drive", goal)
+        yield Response(variable, variable, "drive", variable, (), unit, meaning)
 
 
 def _words(name: str) -> str:

@@ -132,7 +132,7 @@ class _Free:
         residual = omega * moved - series.analysis @ rates - damping
         residual = balance.with_hold(residual, coefficients)
         size = coefficients.size
-        matrix = balance.matrix(slopes, omega).reshape(size, size)
+        matrix = balance.matrix(series.factors(slopes), omega).reshape(size, size)
         matrix[np.arange(size), np.arange(size)] -= 2.0 * beta * np.tile(self.velocity, series.size)
         bordered = np.zeros((size + 2, size + 2))
         bordered[:size, :size] = matrix

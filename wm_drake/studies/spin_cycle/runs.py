@@ -1,6 +1,6 @@
 """Functions that run the cases of a spin-cycle study with the compiled or the Drake engine."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -12,9 +12,10 @@ from wm_drake.batch.ledger import Ledger
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.drive import drive_variables
 from wm_drake.simulation.vibration import record_region_displacements
 from wm_drake.studies.spin.study import CaseResult, run_spin
-from wm_drake.studies.spin_cycle.study import FEET, FORCES, Evaluate, measures_of
+from wm_drake.studies.spin_cycle.study import DRIVE, FEET, Evaluate, forces_measured, measures_of
 
 
 def compiled_runs(
@@ -65,13 +66,14 @@ def drake_runs(
             done[index] = fraction
             progress(int(done.sum()))
 
-        return _table(run_spin(parameters, runs, "drake", progress=report).results)
+        results = run_spin(parameters, runs, "drake", progress=report).results
+        return _table(results, forces_measured(parameters))
 
     return evaluate
 
 
-def _table(results: Iterable[CaseResult]) -> xr.Dataset:
-    """Return results as a table in the form of `simulate_many`."""
+def _table(results: Iterable[CaseResult], measures: Sequence[str]) -> xr.Dataset:
+    """Return results as a table in the form of `simulate_many`, with measures of the forces."""
     results = list(results)
     direct, integrated, gaps, tensions, diverged = [], [], [], [], []
     for result in results:
@@ -93,18 +95,28 @@ def _table(results: Iterable[CaseResult]) -> xr.Dataset:
             "smallest_spring_tension": (("run", "spring"), np.array(tensions)),
             "diverged": ("run", np.array(diverged, dtype=object)),
         }
-        | _forces(results)
+        | _forces(results, measures)
     )
 
 
-def _forces(results: Sequence[CaseResult]) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
-    """Return the variables of the forces of the mounts and of the loads of the feet."""
+def _measured(result: CaseResult, measure: str) -> Mapping[str, xr.DataArray]:
+    """Return the variables of a measure of the forces of a run, by name."""
+    if measure in DRIVE:
+        return drive_variables(result.record, result.case.profile)
+    own = result.measures.feet if measure in FEET else result.measures
+    return {name: getattr(own, name) for name in KNOWN_MEASURES[measure]}
+
+
+def _forces(
+    results: Sequence[CaseResult], measures: Sequence[str]
+) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    """Return the variables of the forces of mounts and feet, and of the drive with a motor."""
     found: dict[str, list[xr.DataArray]] = {}
     for result in results:
-        for measure in (*FORCES, *(FEET if result.measures.feet is not None else ())):
-            own = result.measures.feet if measure in FEET else result.measures
+        for measure in measures:
+            own = _measured(result, measure)
             for name in KNOWN_MEASURES[measure]:
-                found.setdefault(name, []).append(getattr(own, name))
+                found.setdefault(name, []).append(own[name])
     return {
         name: (("run", *map(str, values[0].dims)), np.array([value.values for value in values]))
         for name, values in found.items()

@@ -10,6 +10,7 @@ import xarray as xr
 from wm_drake.batch import MEASURES as KNOWN_MEASURES
 from wm_drake.errors import input_error
 from wm_drake.parameters import MachineParameters, SpinProfile
+from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.mounts import mount_names
@@ -24,6 +25,9 @@ MEASURES = ("regions", "gap", "spring tensions", *FORCES)
 
 FEET = ("feet", "feet regions")
 """Measures of each run of a machine with a cabinet."""
+
+DRIVE = ("drive",)
+"""Measures of each run of a machine with a motor."""
 
 DIMS = ("case", "region", "accelerometer", "axis")
 
@@ -47,7 +51,8 @@ class SpinCycleResult:
         smallest_tension: (case, spring) smallest tension of each spring. [N]
         diverged: (case) time and reason if a run diverged, else "".
         forces: Forces of the mounts and, if the machine has a cabinet, loads and margins of its
-            feet: the variables of `simulate_many` over case. SI.
+            feet; with a motor, measures of the drive: the variables of `simulate_many` over case.
+            SI.
         measured: (case, region, accelerometer, axis) measured RMS displacement; NaN where nothing
             was measured. None without a measurement. [m]
     """
@@ -66,7 +71,13 @@ class SpinCycleResult:
 
 def measures_of(parameters: MachineParameters) -> tuple[str, ...]:
     """Return the measures of each run of a machine, as for `simulate_many`."""
-    return (*MEASURES, *(FEET if parameters.cabinet else ()))
+    return (*MEASURES, *forces_measured(parameters)[len(FORCES) :])
+
+
+def forces_measured(parameters: MachineParameters) -> tuple[str, ...]:
+    """Return the measures of the forces of a machine: on cabinet and floor, and of its motor."""
+    feet = FEET if parameters.cabinet else ()
+    return (*FORCES, *feet, *(DRIVE if motor_of(parameters.drive) else ()))
 
 
 def forces_of(
@@ -83,11 +94,10 @@ def forces_of(
     coordinates["mount"] = list(mount_names(parameters))
     if parameters.cabinet:
         coordinates["foot"] = list(parameters.cabinet.corners)
-    names = [
-        name
-        for measure in (*FORCES, *(FEET if parameters.cabinet else ()))
-        for name in KNOWN_MEASURES[measure]
-    ]
+    measures = forces_measured(parameters)
+    if "drive" in measures:
+        coordinates["order"] = ["cosine", "sine"]
+    names = [name for measure in measures for name in KNOWN_MEASURES[measure]]
     variables = {name: (("case", *table[name].dims[1:]), table[name].values) for name in names}
     return xr.Dataset(variables, coordinates)
 

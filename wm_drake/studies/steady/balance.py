@@ -27,6 +27,7 @@ from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.modes.fixed_cabinet import check_fixed_cabinet
 from wm_drake.studies.steady.kinematics import kinematics_of
+from wm_drake.studies.steady.products import write_derivative
 from wm_drake.studies.steady.series import Series
 
 HARMONICS = 11
@@ -58,14 +59,15 @@ class Linearised:
     Attributes:
         speed: Omega. [rad/s]
         residual: (2 N + 1, n)
-        matrix: Derivative by the coefficients. (2 N + 1, n, 2 N + 1, n)
+        slopes: Fourier coefficients of the slope of each time derivative by each number, from which
+            `HarmonicBalance.matrix` follows. (4 N + 1, n, n)
         by_speed: Derivative by the speed. (2 N + 1, n)
         spins: Rates of the numbers by the spin of each damper tube that turns freely. (spins, n)
     """
 
     speed: float
     residual: FloatArray
-    matrix: FloatArray
+    slopes: FloatArray
     by_speed: FloatArray
     spins: FloatArray
 
@@ -79,6 +81,7 @@ class HarmonicBalance:
         scale: Factor of each number in the size of a motion: 1 for positions, `ANGLE_ARM` for
             angles, 0 for velocities, so that a size is in m. (n,)
         held: Indices of the numbers that `HOLD` is about.
+        is_held: Whether each number is one of them. (n,)
         kinematics: Positions, velocities and free spins among the numbers.
     """
 
@@ -92,6 +95,7 @@ class HarmonicBalance:
         self.derivative, self.series = SlopedDerivative(setup), series
         self.scale = _scale(self.derivative, setup)
         self.held = _held(self.derivative, setup)
+        self.is_held = np.isin(np.arange(self.size), self.held)
         self.kinematics = kinematics_of(self.derivative, setup)
 
     @property
@@ -138,26 +142,23 @@ class HarmonicBalance:
         rates, slopes = self.derivative.with_slopes(states, drum_rate=True)
         by_speed = self.series.slope @ coefficients - self.series.analysis @ slopes[:, -1]
         residual = self._residual(coefficients, speed, rates)
-        matrix = self.matrix(slopes[:, :-1], speed)
+        factors = self.series.factors(slopes[:, :-1])
         spins = [spin.direction(coefficients[0]) for spin in self.kinematics.spins]
         return Linearised(
-            speed, residual, matrix, by_speed, np.reshape(spins, (len(spins), self.size))
+            speed, residual, factors, by_speed, np.reshape(spins, (len(spins), self.size))
         )
 
     def matrix(self, slopes: FloatArray, speed: float) -> FloatArray:
         """Return the derivative of the residual by the coefficients. (2 N + 1, n, 2 N + 1, n)
 
         Args:
-            slopes: (samples, n, n) slope of the time derivative by each number k at the samples.
+            slopes: Fourier coefficients as in `Linearised`. (4 N + 1, n, n)
             speed: Omega. [rad/s]
         """
-        size, n = self.series.size, self.size
-        matrix = np.zeros((size, n, size, n))
-        each = np.arange(n)
-        matrix[:, each, :, each] = speed * self.series.slope
-        matrix[0, self.held, 0, self.held] += HOLD
-        self.series.minus_products(slopes, matrix)
-        return matrix
+        size, every = self.series.size * self.size, np.arange(self.size)
+        matrix = np.empty((size, size))
+        write_derivative(slopes, every, every, speed, self.is_held, HOLD, matrix)
+        return matrix.reshape(self.series.size, self.size, self.series.size, self.size)
 
     def extent(self, coefficients: FloatArray) -> float:
         """Return the size of a change of the coefficients. [m]"""

@@ -13,12 +13,33 @@ has little more than half the size. No term is left out.
 """
 
 import warnings
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
 
+from wm_drake.compiler.compilation import long_running
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.steady.balance import HarmonicBalance, Linearised
+from wm_drake.studies.steady.balance import HOLD, HarmonicBalance, Linearised
+from wm_drake.studies.steady.kinematics import Partition
+from wm_drake.studies.steady.products import write_derivative
+
+
+class Condensed(NamedTuple):
+    """What compiled code needs to put the velocities back.
+
+    Attributes:
+        by_velocity: Derivative of the rows that are no positions by velocities.
+            ((2 N + 1) m, (2 N + 1) p)
+        by_angles, by_rates: Derivative of the rows of angles by the angles of each body, and the
+            inverse of that by angular velocities. (bodies, 3 (2 N + 1), 3 (2 N + 1))
+        rates: K_v^-1 B. ((2 N + 1) p, b)
+    """
+
+    by_velocity: FloatArray
+    by_angles: FloatArray
+    by_rates: FloatArray
+    rates: FloatArray
 
 
 class Corrections:
@@ -38,65 +59,23 @@ class Corrections:
         Raises:
             numpy.linalg.LinAlgError: a body is turned so far that its angles are not defined.
         """
-        self._kinematics, self.at = balance.kinematics, at
-        self._slope = at.speed * balance.series.slope
+        self.at, self._partition = at, balance.kinematics.partition
         size, n = at.residual.shape
-        turned, shifted = balance.kinematics.turns, balance.kinematics.shifts
-        self._positions = np.concatenate([turned[0].ravel(), shifted[0]])
-        self._velocities = np.concatenate([turned[1].ravel(), shifted[1]])
-        self._kept = np.setdiff1d(np.arange(n), self._velocities)
-        self._rows = np.setdiff1d(np.arange(n), self._positions)
-        self._blocks = [
-            (_block(at.matrix, angles, angles), np.linalg.inv(_block(at.matrix, angles, rates)))
-            for angles, rates in zip(*turned, strict=True)
-        ]
         borders = np.zeros((size, n, len(at.spins) + 1))
         borders[0, :, :-1], borders[..., -1] = at.spins.T, at.by_speed
-        self._borders = borders[:, self._positions]
-        dynamic = at.matrix[:, self._rows]
-        by_velocity = np.ascontiguousarray(dynamic[..., self._velocities])
-        self._by_velocity = by_velocity.reshape(size * len(self._rows), -1)
-        self._factors = self._factored(dynamic, borders[:, self._rows], row, row_speed)
-
-    def _factored(
-        self, dynamic: FloatArray, borders: FloatArray, row: FloatArray, row_speed: float
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the factors of the condensed system."""
-        size, m, k = len(dynamic), len(self._rows), len(self._kept)
-        condensed = dynamic[..., self._kept]
-        shifts = 3 * len(self._blocks)
-        by_velocity = self._by_velocity.reshape(size, m, size, -1)
-        along = np.tensordot(by_velocity[..., shifts:], self._slope, axes=(2, 0))
-        condensed[..., np.searchsorted(self._kept, self._positions[shifts:])] += along.swapaxes(
-            2, 3
-        )
-        for i, (by_angles, inverse) in enumerate(self._blocks):
-            where = slice(3 * i, 3 * i + 3)
-            rates = by_velocity[..., where].reshape(size * m, -1) @ (inverse @ by_angles)
-            columns = np.searchsorted(self._kept, self._positions[where])
-            condensed[..., columns] -= rates.reshape(size, m, size, 3)
-        spins = self._borders.shape[2]
-        matrix = np.zeros((size * m + spins, size * k + spins))
-        matrix[: size * m, : size * k] = condensed.reshape(size * m, size * k)
-        flat = borders.reshape(size * m, spins)
-        matrix[: size * m, size * k :] = flat - self._by_velocity @ self._rates(self._borders)
-        matrix[size * m : -1, :k] = self.at.spins[:, self._kept]
-        matrix[-1, : size * k] = row[:, self._kept].ravel()
+        others = self._partition.others
+        m, spins = len(others), borders.shape[2]
+        matrix = np.zeros((size * m + spins, size * m + spins))
+        matrix[size * m : -1, :m] = at.spins[:, others]
+        matrix[-1, : size * m] = row[:, others].ravel()
         matrix[-1, -1] = row_speed
+        self._condensed = condense(
+            at.slopes, at.speed, balance.is_held, HOLD, self._partition, borders, matrix
+        )
         with warnings.catch_warnings():  # a singular matrix gives no finite correction
             warnings.simplefilter("ignore", LinAlgWarning)
-            factors, pivots = lu_factor(matrix, overwrite_a=True, check_finite=False)
-        return factors, pivots
-
-    def _rates(self, values: FloatArray) -> FloatArray:
-        """Return K_v^-1 times values of the rows of positions. (2 N + 1, positions, right sides)"""
-        size = len(values)
-        rates = -values
-        for i, (_, inverse) in enumerate(self._blocks):
-            where = slice(3 * i, 3 * i + 3)
-            right = values[:, where].reshape(3 * size, -1)
-            rates[:, where] = (inverse @ right).reshape(size, 3, -1)
-        return rates.reshape(size * values.shape[1], -1)
+            # the transpose has the order in memory that the factors need
+            self._factors = lu_factor(matrix.T, overwrite_a=True, check_finite=False)
 
     def __call__(self, residual: FloatArray | None, last: float) -> tuple[FloatArray, float]:
         """Return the correction of the coefficients (2 N + 1, n) and of the speed.
@@ -105,30 +84,198 @@ class Corrections:
             residual: Of the balance; None for zero.
             last: Value that the left side of the last equation takes.
         """
-        size, n = self.at.residual.shape
-        m, k, spins = len(self._rows), len(self._kept), self._borders.shape[2]
-        right = np.zeros(size * m + spins)
-        right[-1] = last
-        values = np.zeros((size, len(self._positions), 1))
-        if residual is not None:
-            values[..., 0] = residual[:, self._positions]
-            right[:-spins] = self._by_velocity @ self._rates(values)[:, 0]
-            right[:-spins] -= residual[:, self._rows].ravel()
-        solved = lu_solve(self._factors, right, check_finite=False)
-        change = np.zeros((size, n))
-        change[:, self._kept] = solved[: size * k].reshape(size, k)
-        shifts = 3 * len(self._blocks)
-        values[..., 0] += self._borders @ solved[size * k :]
-        values[:, shifts:, 0] += self._slope @ change[:, self._positions[shifts:]]
-        for i, (by_angles, _) in enumerate(self._blocks):
-            where = slice(3 * i, 3 * i + 3)
-            moved = by_angles @ change[:, self._positions[where]].ravel()
-            values[:, where, 0] += moved.reshape(size, 3)
-        change[:, self._velocities] = -self._rates(values).reshape(size, -1)
+        wanted = np.zeros(self.at.residual.shape) if residual is None else residual
+        right = right_side(wanted, last, self._partition, self._condensed)
+        solved = lu_solve(self._factors, right, trans=1, check_finite=False)
+        change = whole_change(solved, wanted, self.at.speed, self._partition, self._condensed)
         return change, float(solved[-1])
 
 
-def _block(matrix: FloatArray, rows: np.ndarray, columns: np.ndarray) -> FloatArray:
-    """Return the part of a matrix (2 N + 1, n, 2 N + 1, n) of some rows and columns."""
-    size = len(matrix)
-    return matrix[:, rows][..., columns].reshape(size * len(rows), size * len(columns))
+@long_running
+def condense(
+    slopes: FloatArray,
+    speed: float,
+    held: np.ndarray,
+    hold: float,
+    partition: Partition,
+    borders: FloatArray,
+    matrix: FloatArray,
+) -> Condensed:
+    """Write the rows of a system that is left without velocities, but for its last rows.
+
+    Args:
+        slopes, speed, held, hold: As for `write_derivative`.
+        partition: Which numbers are positions, velocities, others.
+        borders: Columns of spin rates and of the speed. (2 N + 1, n, b)
+        matrix: The first (2 N + 1) m rows are written, for m numbers that are no positions.
+
+    Returns:
+        `Condensed`.
+    """
+    size, p, m = (len(slopes) + 1) // 2, len(partition.positions), len(partition.dynamic)
+    bodies = len(partition.turned)
+    write_derivative(slopes, partition.dynamic, partition.others, speed, held, hold, matrix)
+    by_velocity = np.empty((size * m, size * p))
+    write_derivative(
+        slopes, partition.dynamic, partition.velocities, speed, held, hold, by_velocity
+    )
+    add_shifts(by_velocity, speed, partition, matrix)
+    by_angles = np.empty((bodies, 3 * size, 3 * size))
+    by_rates = np.empty((bodies, 3 * size, 3 * size))
+    block = np.empty((3 * size, 3 * size))
+    for b in range(bodies):
+        angles = partition.turned[b]
+        write_derivative(slopes, angles, angles, speed, held, hold, by_angles[b])
+        write_derivative(slopes, angles, partition.turning[b], speed, held, hold, block)
+        by_rates[b] = np.linalg.inv(block)
+        subtract_turns(by_velocity, np.dot(by_rates[b], by_angles[b]), b, partition, matrix)
+    rates = np.empty((size * p, borders.shape[2]))
+    for q in range(borders.shape[2]):
+        rates[:, q] = rates_of(borders[:, :, q], partition, by_rates)
+    beside = np.dot(by_velocity, rates)
+    for h in range(size):
+        for row in range(m):
+            for q in range(borders.shape[2]):
+                matrix[h * m + row, size * m + q] = (
+                    borders[h, partition.dynamic[row], q] - beside[h * m + row, q]
+                )
+    return Condensed(by_velocity, by_angles, by_rates, rates)
+
+
+@long_running
+def add_shifts(
+    by_velocity: FloatArray, speed: float, partition: Partition, matrix: FloatArray
+) -> None:
+    """Add the part of the velocities that are time derivatives of positions.
+
+        v_cos i = i Omega p_sin i,     v_sin i = -i Omega p_cos i
+
+    Args:
+        by_velocity: As in `Condensed`.
+        speed: Omega. [rad/s]
+        partition: Which numbers are positions, velocities, others.
+        matrix: Changed. Columns of numbers that are no velocities.
+    """
+    p, m, places = len(partition.positions), len(partition.others), partition.places
+    for row in range(len(by_velocity)):
+        for i in range(1, (by_velocity.shape[1] // p + 1) // 2):
+            cosine, sine, turn = 2 * i - 1, 2 * i, i * speed
+            for s in range(partition.turned.size, p):
+                matrix[row, cosine * m + places[s]] -= turn * by_velocity[row, sine * p + s]
+                matrix[row, sine * m + places[s]] += turn * by_velocity[row, cosine * p + s]
+
+
+@long_running
+def subtract_turns(
+    by_velocity: FloatArray, rates: FloatArray, b: int, partition: Partition, matrix: FloatArray
+) -> None:
+    """Subtract the part of the angular velocities of a body.
+
+    Args:
+        by_velocity: As in `Condensed`.
+        rates: Minus the angular velocities by the angles. (3 (2 N + 1), 3 (2 N + 1))
+        b: Number of the body.
+        partition: Which numbers are positions, velocities, others.
+        matrix: Changed. Columns of numbers that are no velocities.
+    """
+    p, m, places = len(partition.positions), len(partition.others), partition.places
+    own = np.empty((len(by_velocity), len(rates)))
+    for row in range(len(own)):
+        for c in range(len(rates) // 3):
+            for k in range(3):
+                own[row, 3 * c + k] = by_velocity[row, c * p + 3 * b + k]
+    moved = np.dot(own, rates)
+    for row in range(len(own)):
+        for c in range(len(rates) // 3):
+            for k in range(3):
+                matrix[row, c * m + places[3 * b + k]] -= moved[row, 3 * c + k]
+
+
+@long_running
+def rates_of(values: FloatArray, partition: Partition, by_rates: FloatArray) -> FloatArray:
+    """Return K_v^-1 times values of the rows of positions. ((2 N + 1) p,)
+
+    Args:
+        values: (2 N + 1, n), of which the rows of positions are read.
+        partition: Which numbers are positions.
+        by_rates: As in `Condensed`.
+    """
+    size, p, bodies = len(values), len(partition.positions), len(by_rates)
+    rates = np.empty((size, p))
+    for h in range(size):
+        for s in range(3 * bodies, p):
+            rates[h, s] = -values[h, partition.positions[s]]
+    for b in range(bodies):
+        turned = np.dot(by_rates[b], columns_of(values, partition.turned[b]).ravel())
+        rates[:, 3 * b : 3 * b + 3] = turned.reshape(size, 3)
+    return rates.ravel()
+
+
+@long_running
+def columns_of(values: FloatArray, numbers: np.ndarray) -> FloatArray:
+    """Return some columns of values. (2 N + 1, numbers)"""
+    found = np.empty((len(values), len(numbers)))
+    for h in range(len(values)):
+        for k in range(len(numbers)):
+            found[h, k] = values[h, numbers[k]]
+    return found
+
+
+@long_running
+def right_side(
+    residual: FloatArray, last: float, partition: Partition, condensed: Condensed
+) -> FloatArray:
+    """Return the right side of the condensed system.
+
+    Args:
+        residual: Residual of the balance. (2 N + 1, n)
+        last: Right side of the last equation.
+        partition: Which numbers are positions, velocities, others.
+        condensed: `Condensed`.
+    """
+    rows = len(condensed.by_velocity)
+    right = np.zeros(rows + condensed.rates.shape[1])
+    answer = np.dot(condensed.by_velocity, rates_of(residual, partition, condensed.by_rates))
+    right[:rows] = answer - columns_of(residual, partition.dynamic).ravel()
+    right[-1] = last
+    return right
+
+
+@long_running
+def whole_change(
+    solved: FloatArray,
+    residual: FloatArray,
+    speed: float,
+    partition: Partition,
+    condensed: Condensed,
+) -> FloatArray:
+    """Return the change of all numbers from that of those that are no velocities. (2 N + 1, n)
+
+    Args:
+        solved: Solution of the condensed system.
+        residual: Residual of the balance. (2 N + 1, n)
+        speed: Omega. [rad/s]
+        partition: Which numbers are positions, velocities, others.
+        condensed: `Condensed`.
+    """
+    size, m, p = len(residual), len(partition.others), len(partition.positions)
+    change, values = np.empty(residual.shape), residual.copy()
+    for h in range(size):
+        for k in range(m):
+            change[h, partition.others[k]] = solved[h * m + k]
+    for s in range(partition.turned.size, p):
+        at = partition.positions[s]
+        for i in range(1, (size + 1) // 2):
+            values[2 * i - 1, at] += i * speed * change[2 * i, at]
+            values[2 * i, at] -= i * speed * change[2 * i - 1, at]
+    for b in range(len(partition.turned)):
+        moved = columns_of(change, partition.turned[b]).ravel()
+        turned = np.dot(condensed.by_angles[b], moved).reshape(size, 3)
+        for k in range(3):
+            values[:, partition.turned[b, k]] += turned[:, k]
+    answer = rates_of(values, partition, condensed.by_rates)
+    answer += np.dot(condensed.rates, solved[size * m :])
+    for h in range(size):
+        for s in range(p):
+            change[h, partition.velocities[s]] = -answer[h * p + s]
+    return change

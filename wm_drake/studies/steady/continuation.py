@@ -22,7 +22,7 @@ LENGTH = 5e-3
 SPEEDS = 0.05
 """Part of the range of speeds that counts as much as `LENGTH`."""
 
-TOLERANCE = 1e-10
+TOLERANCE = 1e-9
 """Largest last correction of a motion. [m]"""
 
 STALLED = 1e-8
@@ -31,6 +31,10 @@ corrections may stop to converge there. [m]"""
 
 NEAR = 1e-6
 """Size of a correction below which it is made in part if corrections do not shrink. [m]"""
+
+STUCK = 5e-6
+"""Size of a correction at which a first motion is accepted although no part of the correction makes
+the residual smaller: a sample is at a reversal of friction. [m]"""
 
 SMALLEST_SHARE = 0.01
 """Smallest part of a correction that is tried."""
@@ -64,6 +68,7 @@ class Point:
         multiplier: The largest of their absolute values.
         on_grid: Whether the speed is one of those asked for.
         back: Whether the branch goes to lower speeds here.
+        spins: Rate of each spin of `Kinematics`. [rad/s]
     """
 
     speed: float
@@ -72,6 +77,7 @@ class Point:
     multiplier: float
     on_grid: bool
     back: bool
+    spins: FloatArray
 
 
 @dataclass
@@ -352,7 +358,7 @@ def _point(balance: HarmonicBalance, place: _Place, on_grid: bool, way: float) -
     # its steep slope would count for the whole distance to the next.
     phase = balance.series.phase + np.pi / balance.series.samples
     states = balance.states(place.coefficients, place.speed, phase)
-    _, slopes = balance.derivative.with_slopes(states)
+    rates, slopes = balance.derivative.with_slopes(states)
     multipliers = floquet_multipliers(slopes, 2.0 * np.pi / abs(place.speed))
     return Point(
         place.speed,
@@ -361,6 +367,7 @@ def _point(balance: HarmonicBalance, place: _Place, on_grid: bool, way: float) -
         float(np.max(np.abs(multipliers))),
         on_grid,
         place.speed_along * way < 0.0,
+        balance.kinematics.spin_rates(place.coefficients[0], rates.mean(axis=0)),
     )
 
 
@@ -382,6 +389,8 @@ def _at_speed(balance: HarmonicBalance, guess: FloatArray, speed: float) -> Floa
             if np.linalg.norm(balance.residual(trial, speed)) < (1.0 - 0.1 * share) * before:
                 break
             share *= 0.5
+        if share <= SMALLEST_SHARE and size < STUCK:
+            return coefficients
         coefficients = coefficients + share * change
         if size < TOLERANCE or FAST * last < size < STALLED:
             return coefficients

@@ -1,6 +1,8 @@
 """Which numbers of the state are positions and velocities of bodies, and which spins are free."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,16 +26,59 @@ class Kinematics:
         turns: Angles of each body (bodies, 3), and their angular velocities.
         shifts: Positions whose time derivative is a number of the state: (k,), and these numbers.
         spins: Damper tubes that nothing holds about their axis.
+        count: Number of free numbers.
     """
 
     turns: tuple[np.ndarray, np.ndarray]
     shifts: tuple[np.ndarray, np.ndarray]
     spins: tuple["Spin", ...]
+    count: int
 
-    @property
-    def velocities(self) -> np.ndarray:
-        """Return the indices of all velocities: of angles, then of positions."""
-        return np.concatenate([self.turns[1].ravel(), self.shifts[1]])
+    @cached_property
+    def partition(self) -> "Partition":
+        """Return positions, velocities and other numbers."""
+        positions = np.concatenate([self.turns[0].ravel(), self.shifts[0]])
+        velocities = np.concatenate([self.turns[1].ravel(), self.shifts[1]])
+        others = np.setdiff1d(np.arange(self.count), velocities)
+        return Partition(
+            *self.turns,
+            positions,
+            velocities,
+            others,
+            np.setdiff1d(np.arange(self.count), positions),
+            np.searchsorted(others, positions),
+        )
+
+    def spin_rates(self, mean: FloatArray, rates: FloatArray) -> FloatArray:
+        """Return the rate of each free spin of a steady motion. (spins,) [rad/s]
+
+        Args:
+            mean: Mean of each number over a revolution. (n,)
+            rates: Mean of its time derivative, which only a spin can make. (n,)
+        """
+        directions = [spin.direction(mean) for spin in self.spins]
+        return np.array([rates @ d / (d @ d) for d in directions])
+
+
+class Partition(NamedTuple):
+    """Indices among the free numbers of the state, for compiled code.
+
+    Attributes:
+        turned, turning: Angles of each body, and their angular velocities. (bodies, 3)
+        positions: Angles of all bodies, then other positions. (p,)
+        velocities: Angular velocities, then the time derivatives of the other positions. (p,)
+        others: All numbers but velocities.
+        dynamic: All numbers but positions.
+        places: Place of each of the positions in `others`. (p,)
+    """
+
+    turned: np.ndarray
+    turning: np.ndarray
+    positions: np.ndarray
+    velocities: np.ndarray
+    others: np.ndarray
+    dynamic: np.ndarray
+    places: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -41,11 +86,13 @@ class Spin:
     """Rotation of a telescopic damper about its axis.
 
     Attributes:
+        name: Of the damper.
         angles, position: Indices of roll, pitch, yaw and of the position of the outer tube.
         axis: Direction of the damper in the frame of the outer tube.
         point: Point of the axis in this frame. [m]
     """
 
+    name: str
     angles: np.ndarray
     position: np.ndarray
     axis: FloatArray
@@ -91,17 +138,19 @@ def kinematics_of(derivative: SlopedDerivative, setup: Setup) -> Kinematics:
 
     spins = [
         Spin(
+            name,
             indices([bodies[1 + i]], 0),
             indices([moves[1 + i]], 0),
             telescope.axis,
             telescope.tub_bushing.ground_side_point,
         )
-        for i, telescope in enumerate(setup.telescopes.values())
+        for i, (name, telescope) in enumerate(setup.telescopes.items())
     ]
     return Kinematics(
         (indices(bodies, 0).reshape(-1, 3), indices(bodies, 1).reshape(-1, 3)),
         (indices(moves + joints, 0), indices(moves + joints, 1)),
         tuple(spin for spin in spins if _is_neutral(spin, derivative)),
+        len(derivative.free),
     )
 
 

@@ -1,7 +1,7 @@
 """Steady unbalance response of a machine over the speed of its drum."""
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -56,7 +56,10 @@ def steady_response(
         largest absolute values as in `Measures`; `spring_tension`, `damper_tension` are half the
         range of a revolution; `mount_force_peak`, `mount_force_rms`, `mount_force_dynamic_rms`
         (mount) are largest size, RMS, and RMS without the mean, of the force of a mount on the
-        cabinet in a revolution; `first_harmonic` (coordinate, part) is the tub's pose. SI.
+        cabinet in a revolution; `first_harmonic` (coordinate, part) is the tub's pose;
+        `damper_spin` (spinning) is the mean rate of telescopic dampers about their axes. SI.
+        Where a damper spins, the motion is periodic only as long as it turns little: the values
+        hold for tubes near the angle at which they are built, and vary as they turn.
 
     Raises:
         InputError: an argument is wrong, or no periodic motion is found at the first speed.
@@ -148,84 +151,31 @@ def trajectory_of_period(
 
 
 def _measured(setup: Setup, balance: HarmonicBalance, points: list[Point]) -> xr.Dataset:
+    """Return the dataset of `steady_response`."""
     samples = balance.series.samples
-    periods = [
-        trajectory_of_period(balance, point.coefficients, point.speed, samples) for point in points
-    ]
-
-    def joined(name: str) -> FloatArray:
-        return np.concatenate([getattr(period, name) for period in periods])
-
-    whole = Trajectory(
-        joined("time"),
-        joined("state"),
-        joined("deformation"),
-        joined("motor_torque"),
-        joined("acceleration"),
-        joined("tubes"),
-        joined("carrier"),
-        joined("stretches"),
-    )
-    variables = variables_of(setup, whole)
+    variables = variables_of(setup, _joined(balance, points))
 
     def by_point(name: str) -> FloatArray:
         values = variables[name][1]
         return values.reshape(len(points), samples, *values.shape[1:])
 
-    def deviation(name: str) -> FloatArray:
-        values = by_point(name)
-        return np.abs(values - values.mean(axis=1, keepdims=True)).max(axis=1)
-
-    def half_range(name: str) -> FloatArray:
-        return 0.5 * np.ptp(by_point(name), axis=1)
-
-    names = list(setup.bushings)
-    gasket = names.index("gasket") if "gasket" in names else None
-
-    def largest_of_gasket(name: str) -> FloatArray:
-        if gasket is None:
-            return np.zeros((len(points), 3))
-        return np.abs(by_point(name)[:, :, gasket]).max(axis=1)
-
     first = np.stack([point.coefficients[1:3, :6].T for point in points])
-    dampers = [*setup.dampers, *setup.telescopes]
+    spins = np.stack([point.spins for point in points])
     return xr.Dataset(
         {
-            "amplitude": (
-                ("point", "sensor"),
-                deviation("displacement"),
-                {"units": "m", "long_name": "largest deviation from the mean of a revolution"},
-            ),
-            "detergent_displacement": (
-                ("point", "axis"),
-                np.abs(by_point("detergent_displacement")).max(axis=1),
-                {"units": "m", "long_name": "largest displacement nearest the detergent box"},
-            ),
-            "gasket_force": (
-                ("point", "axis"),
-                largest_of_gasket("bushing_force"),
-                {"units": "N", "long_name": "largest force of the gasket on the housing"},
-            ),
-            "gasket_moment": (
-                ("point", "axis"),
-                largest_of_gasket("bushing_moment"),
-                {"units": "N m", "long_name": "largest moment of the gasket on the housing"},
-            ),
-            "spring_tension": (
-                ("point", "spring"),
-                half_range("spring_tension"),
-                {"units": "N", "long_name": "half the range of the tension in a revolution"},
-            ),
-            "damper_tension": (
-                ("point", "damper"),
-                half_range("damper_tension"),
-                {"units": "N", "long_name": "half the range of the tension in a revolution"},
-            ),
+            **_displacements(by_point),
+            **_gasket_forces(by_point, list(setup.bushings)),
+            **_tensions(by_point),
             **_mount_forces(by_point("mount_force")),
             "first_harmonic": (
                 ("point", "coordinate", "part"),
                 first,
                 {"units": "rad, m", "long_name": "first harmonic of the pose of the tub"},
+            ),
+            "damper_spin": (
+                ("point", "spinning"),
+                spins,
+                {"units": "rad/s", "long_name": "mean rate of a damper about its axis"},
             ),
             "stable": ("point", [point.stable for point in points]),
             "multiplier": ("point", [point.multiplier for point in points]),
@@ -236,7 +186,8 @@ def _measured(setup: Setup, balance: HarmonicBalance, points: list[Point]) -> xr
             "sensor": list(setup.sensors),
             "axis": list(AXES),
             "spring": list(setup.springs),
-            "damper": dampers,
+            "damper": [*setup.dampers, *setup.telescopes],
+            "spinning": np.array([spin.name for spin in balance.kinematics.spins], dtype=object),
             "mount": list(mount_names(setup.parameters)),
             "coordinate": list(COORDINATES),
             "part": ["cosine", "sine"],
@@ -245,7 +196,75 @@ def _measured(setup: Setup, balance: HarmonicBalance, points: list[Point]) -> xr
     )
 
 
-def _mount_forces(forces: FloatArray) -> dict[str, tuple[tuple[str, str], FloatArray, Any]]:
+def _joined(balance: HarmonicBalance, points: list[Point]) -> Trajectory:
+    """Return the revolutions of all points, one after the other."""
+    samples = balance.series.samples
+    periods = [
+        trajectory_of_period(balance, point.coefficients, point.speed, samples) for point in points
+    ]
+    names = ("time", "state", "deformation", "motor_torque", "acceleration", "tubes", "carrier")
+    parts: dict[str, Any] = {
+        name: np.concatenate([getattr(period, name) for period in periods])
+        for name in (*names, "stretches")
+    }
+    return Trajectory(**parts)
+
+
+Variables: TypeAlias = dict[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]]
+ByPoint: TypeAlias = Callable[[str], FloatArray]
+"""Returns an output of the machine over points and samples. (points, samples, ...)"""
+
+
+def _displacements(by_point: ByPoint) -> Variables:
+    """Return the variables of displacements of the tub."""
+    values = by_point("displacement")
+    return {
+        "amplitude": (
+            ("point", "sensor"),
+            np.abs(values - values.mean(axis=1, keepdims=True)).max(axis=1),
+            {"units": "m", "long_name": "largest deviation from the mean of a revolution"},
+        ),
+        "detergent_displacement": (
+            ("point", "axis"),
+            np.abs(by_point("detergent_displacement")).max(axis=1),
+            {"units": "m", "long_name": "largest displacement nearest the detergent box"},
+        ),
+    }
+
+
+def _gasket_forces(by_point: ByPoint, bushings: list[str]) -> Variables:
+    """Return the variables of the force of the gasket; zeros without one."""
+    variables: Variables = {}
+    for name, unit, source in (
+        ("force", "N", "bushing_force"),
+        ("moment", "N m", "bushing_moment"),
+    ):
+        values = by_point(source)
+        largest = np.zeros((len(values), 3))
+        if "gasket" in bushings:
+            largest = np.abs(values[:, :, bushings.index("gasket")]).max(axis=1)
+        text = f"largest {name} of the gasket on the housing"
+        variables[f"gasket_{name}"] = (
+            ("point", "axis"),
+            largest,
+            {"units": unit, "long_name": text},
+        )
+    return variables
+
+
+def _tensions(by_point: ByPoint) -> Variables:
+    """Return the variables of the tensions of springs and dampers."""
+    return {
+        f"{kind}_tension": (
+            ("point", kind),
+            0.5 * np.ptp(by_point(f"{kind}_tension"), axis=1),
+            {"units": "N", "long_name": "half the range of the tension in a revolution"},
+        )
+        for kind in ("spring", "damper")
+    }
+
+
+def _mount_forces(forces: FloatArray) -> Variables:
     """Return the variables of the forces of mounts on the cabinet.
 
     Args:

@@ -6,7 +6,6 @@ from functools import cached_property
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.steady.products import subtract_products
 
 
 @dataclass(frozen=True)
@@ -69,13 +68,12 @@ class Series:
         """
         return Series(2 * self.order, self.samples).analysis
 
-    def minus_products(self, factors: FloatArray, matrix: FloatArray) -> None:
-        """Subtract the products with sampled factors from a matrix of coefficients.
+    def factors(self, samples: FloatArray) -> FloatArray:
+        """Return the coefficients of the factors of products, of twice the order. (4 N + 1, n, k)
 
         Args:
-            factors: (samples, k, n) samples of the factor of each number k in each sum n.
-            matrix: (2 N + 1, n, 2 N + 1, k), changed.
+            samples: (samples, k, n) samples of the factor of each number k in each sum n.
         """
-        flat = np.ascontiguousarray(factors).reshape(self.samples, -1)
-        harmonics = (self.double @ flat).reshape(-1, *factors.shape[1:])
-        subtract_products(np.ascontiguousarray(harmonics.transpose(0, 2, 1)), matrix)
+        flat = np.ascontiguousarray(samples).reshape(self.samples, -1)
+        found = (self.double @ flat).reshape(-1, *samples.shape[1:])
+        return np.ascontiguousarray(found.transpose(0, 2, 1))

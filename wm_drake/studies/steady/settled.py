@@ -53,6 +53,11 @@ def settled_coefficients(balance: HarmonicBalance, setup: Setup, speed: float) -
     run = settled_trajectory(setup, speed, balance.series.samples)
     if run.divergence is not None:
         return np.full((balance.series.size, balance.size), np.nan)
+    return coefficients_of(balance, setup, run)
+
+
+def coefficients_of(balance: HarmonicBalance, setup: Setup, run: Trajectory) -> FloatArray:
+    """Return the Fourier coefficients of a revolution at the samples of a balance."""
     tubes = np.concatenate(
         [run.tubes, run.deformation[:, len(setup.dampers) :, None]], axis=2
     ).reshape(len(run.time), -1)

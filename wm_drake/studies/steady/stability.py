@@ -3,9 +3,11 @@
 A small departure from a periodic motion obeys d' = J(t) d, with the slopes J of the compiled
 right-hand side along the motion. Over a period it becomes Phi d; the eigenvalues of Phi are the
 Floquet multipliers. The motion is stable if all are inside the unit circle. Phi is the product of
-the steps of the trapezoidal rule, which is stable for every motion that decays:
+the steps of the midpoint rule, which is stable for every motion that decays:
 
-    Phi = product of (1 - h/2 J_(j+1))^-1 (1 + h/2 J_j)
+    Phi = product of (1 - h/2 J_j)^-1 (1 + h/2 J_j) = product of 2 (1 - h/2 J_j)^-1 - 1
+
+The trapezoidal rule has the same factors in another order, and the same eigenvalues.
 """
 
 import numpy as np
@@ -27,9 +29,9 @@ def floquet_multipliers(slopes: FloatArray, period: float) -> FloatArray:
         period: [s]
     """
     samples, n, _ = slopes.shape
-    half = (0.5 * period / samples) * slopes.transpose(0, 2, 1)
-    unit = np.eye(n)
-    steps = np.linalg.solve(unit - np.roll(half, -1, axis=0), unit + half)
+    matrices = np.eye(n) - (0.5 * period / samples) * slopes.transpose(0, 2, 1)
+    steps = 2.0 * np.linalg.inv(matrices)
+    steps -= np.eye(n)
     while len(steps) > 1:
         if len(steps) % 2:
             steps = np.concatenate([steps[:-2], (steps[-1] @ steps[-2])[None]])

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
+from threadpoolctl import threadpool_limits
 
 from wm_drake.batch import simulate_many
 from wm_drake.batch.runs import RunResult
@@ -27,6 +28,9 @@ RATES_RPM_S = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 
 HOLD = 8.0
 """Time at the first speed of a sweep, so that the start has decayed. It is not measured. [s]"""
+
+RESPONSE_SHARE, RUN_SHARE = 1.0, 3.0
+"""Parts of the progress: one for each response, one for all runs of the engine."""
 
 RAD_S_PER_RPM = np.pi / 30.0
 
@@ -99,44 +103,71 @@ def run_steady_study(
     begin = time.perf_counter()
     pairs = [(name, load, gasket) for gasket in gaskets for name, load in loads]
     setups = [machine.set_up(load, gasket=gasket) for _, load, gasket in pairs]
-    done = [0.0] * len(pairs)
-    share = 0.6 if len(rates_rpm_s) else 0.9
+    threads = workers or os.cpu_count() or 1
+    done = _Progress(progress, [RESPONSE_SHARE] * len(pairs) + [RUN_SHARE])
 
-    def solve(index: int, setup: Setup) -> tuple[xr.Dataset, float]:
-        start = time.perf_counter()
+    def run() -> tuple[list[Record | None], xr.Dataset | None]:
+        cases = [Case(*pair[:2], machine.parameters.profile, pair[2]) for pair in pairs]
+        half = max(1, threads // 2)  # the responses use the other threads meanwhile
+        runs, sweeps = _records(machine, cases, half), None
+        if len(rates_rpm_s):
+            sweeps = _sweeps(machine, loads, gaskets, speeds, rates_rpm_s, half, done.of(-1))
+        done.of(-1)(1.0)
+        return runs, sweeps
 
-        def report(fraction: float) -> None:
-            done[index] = fraction
-            progress(share * sum(done) / len(done))
-
-        try:
-            found = response_of(setup, speeds, harmonics, samples, report)
-        except InputError as error:
-            raise InputError(
-                Problem(f"load '{pairs[index][0]}'", p.key, p.message) for p in error.problems
-            ) from None
+    def solve(index: int) -> tuple[xr.Dataset, float]:
+        start, name = time.perf_counter(), pairs[index][0]
+        found = _response(setups[index], name, speeds, harmonics, samples, done.of(index))
         return found, time.perf_counter() - start
 
-    with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
-        responses = list(pool.map(solve, range(len(pairs)), setups))
-    profile = machine.parameters.profile
-    runs = _records(machine, [Case(*pair[:2], profile, pair[2]) for pair in pairs], workers)
-    begun = share + (0.1 if len(rates_rpm_s) else 0.0)
-    progress(begun)
+    # the matrices are small: several threads each would be slower
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(threads) as pool:
+        try:
+            ran = pool.submit(run)
+            responses = list(pool.map(solve, range(len(pairs))))
+            runs, sweeps = ran.result()
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
     cases = [
         SteadyCase(name, gasket, response, _envelopes(run), wall)
         for (name, _, gasket), (response, wall), run in zip(pairs, responses, runs, strict=True)
     ]
-    sweeps = None
-    if len(rates_rpm_s):
-        count = 2 * len(rates_rpm_s) * len(pairs)
-
-        def report_sweeps(finished: int) -> None:
-            progress(begun + (1.0 - begun) * finished / count)
-
-        sweeps = _sweeps(machine, loads, gaskets, speeds, rates_rpm_s, workers, report_sweeps)
-    progress(1.0)
     return SteadyStudy(machine.parameters, cases, sweeps, time.perf_counter() - begin)
+
+
+def _response(
+    setup: Setup,
+    load: str,
+    speeds: FloatArray,
+    harmonics: int,
+    samples: int,
+    progress: Callable[[float], None],
+) -> xr.Dataset:
+    """Return the steady response of a setup; an error names its load."""
+    try:
+        return response_of(setup, speeds, harmonics, samples, progress)
+    except InputError as error:
+        raise InputError(
+            Problem(f"load '{load}'", p.key, p.message) for p in error.problems
+        ) from None
+
+
+class _Progress:
+    """Reports the fraction done of parts that are worked on at the same time."""
+
+    def __init__(self, report: Callable[[float], None], weights: Sequence[float]) -> None:
+        self._report, self._weights = report, np.array(weights) / np.sum(weights)
+        self._done = np.zeros(len(weights))
+
+    def of(self, part: int) -> Callable[[float], None]:
+        """Return what is called with the fraction done of a part."""
+
+        def report(fraction: float) -> None:
+            self._done[part] = fraction
+            self._report(float(self._weights @ self._done))
+
+        return report
 
 
 def _records(machine: Machine, cases: list[Case], workers: int | None) -> list[Record | None]:
@@ -180,7 +211,7 @@ def _sweeps(
     speeds: FloatArray,
     rates_rpm_s: Sequence[float],
     workers: int | None,
-    done: Callable[[int], None],
+    progress: Callable[[float], None],
 ) -> xr.Dataset:
     """Return the largest amplitudes of sweeps and their speeds."""
     low, high = float(min(speeds)), float(max(speeds))
@@ -195,8 +226,13 @@ def _sweeps(
                     places.append((k, g, r, d))
     shape = (len(loads), len(gaskets), len(rates_rpm_s), 2, len(machine.parameters.sensors))
     amplitude, speed = np.full(shape, np.nan), np.full(shape, np.nan)
-    measure = ["amplitudes in regions"]
-    table = simulate_many(machine, cases, measures=measure, workers=workers, progress=done)
+    table = simulate_many(
+        machine,
+        cases,
+        measures=["amplitudes in regions"],
+        workers=workers,
+        progress=lambda done: progress(done / len(cases)),
+    )
     complete = table.diverged.values == ""
     for place, kept, run in zip(places, complete, table.run.values, strict=True):
         if kept:

@@ -1,0 +1,170 @@
+"""Snippets of the manual: every fenced block, its command lines, and the files that they need."""
+
+import re
+import shutil
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from documents import CHECKOUT, MANUAL, README, name_of, text_of
+
+from wm_drake.model.build import build_machine
+from wm_drake.parameters import load_machine
+from wm_drake.parameters.components import load_component
+from wm_drake.rigs import Harmonic, bushing_bench, damper_bench, force_loops
+from wm_drake.simulation.runs import simulate
+
+PAGES = [README, *(path for path in MANUAL if path.parent.name != "decisions")]
+SHELL = ("text", "bash", "sh")
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block of a page: its language and its lines."""
+
+    page: str
+    language: str
+    lines: tuple[str, ...]
+
+    @property
+    def commands(self):
+        """Return its command lines without the remarks behind them, if it is for a shell."""
+        if self.language not in SHELL:
+            return []
+        return [re.split(r"\s{3,}|\s+#", line)[0].strip() for line in self.lines if line.strip()]
+
+
+def blocks_of(path):
+    """Return the fenced blocks of a page, in their order."""
+    found, language, lines = [], None, []
+    for line in text_of(path).splitlines():
+        if line.startswith("```"):
+            if language is None:
+                language, lines = line[3:].split(" ")[0], []
+            else:
+                found.append(Block(name_of(path), language, tuple(lines)))
+                language = None
+        elif language is not None:
+            lines.append(line)
+    assert language is None, f"{path}: a block has no end"
+    return found
+
+
+BLOCKS = [block for path in PAGES for block in blocks_of(path)]
+
+FILES = {  # what a block with a file is called in the commands of its page
+    "README.md": ["mine.yaml"],
+    "docs/how-to/bench-to-machine.md": ["mine.yaml"],
+    "docs/how-to/calibrate.md": ["free.yaml", "responses.csv", "relation.yaml"],
+    "docs/how-to/compliant-bearing.md": ["whirling.yaml"],
+    "docs/how-to/designs.md": ["mine.yaml"],
+    "docs/how-to/drive.md": ["drive.yaml"],
+    "docs/how-to/floor.md": ["on_my_floor.yaml", "on_soft_feet.yaml"],
+    "docs/how-to/own-machine.md": ["mine.yaml", "four_springs.yaml", "imperfect.yaml"],
+    "docs/how-to/rubber.md": ["rubber.yaml"],
+    "docs/how-to/tolerances.md": ["mine.yaml", "limits.yaml"],
+}
+"""Names of the YAML and CSV blocks of each page."""
+
+MINE = "name: mine\nextends: reference\nbodies: {upper_counterweight: {mass: 9.5 kg}}\n"
+TABLE_1 = CHECKOUT / "wm_drake" / "data" / "machines" / "sanchez_tabuenca_2020_table1.csv"
+TABLE_3 = TABLE_1.with_name("sanchez_tabuenca_2020_table3.csv")
+CYCLES = CHECKOUT / "wm_drake" / "data" / "cycles"
+
+
+def prepare(folder, page):
+    """Write the files that the commands of a page name: of its own blocks, and of a laboratory."""
+    (folder / "mine.yaml").write_text(MINE, encoding="utf-8")
+    for name, mass in (
+        ("a", "9 kg"),
+        ("b", "11 kg"),
+        ("my_machine", "10 kg"),
+        ("mine_machine", "10 kg"),
+    ):
+        text = MINE.replace("mine", name).replace("9.5 kg", mass)
+        (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
+    (folder / "spin.csv").write_text("time_s,speed_rpm\n0,30\n10,120\n12,120\n", encoding="utf-8")
+    (folder / "limits.yaml").write_text(
+        "limits:\n- {quantity: gap, at_least: 5 mm, allowed_share: 1 %}\n", encoding="utf-8"
+    )
+    amplitudes = pd.concat(pd.read_csv(path, comment="#") for path in (TABLE_1, TABLE_3))
+    amplitudes.to_csv(folder / "measured.csv", index=False)
+    amplitudes.to_csv(folder / "mine.csv", index=False)
+    write_laboratory(folder)
+    own = [block for block in BLOCKS if block.page == page and block.language in ("yaml", "csv")]
+    for name, block in zip(FILES.get(page, []), own, strict=True):
+        (folder / name).write_text("\n".join(block.lines) + "\n", encoding="utf-8")
+    if page == "docs/how-to/commands.md":
+        write_commands_page(folder)
+
+
+def write_laboratory(folder):
+    """Write measured loops of a damper and of a gasket, with noise, and quasi-static tests."""
+    damper = damper_bench(load_component("mstv_damper").parameters)
+    machine = load_machine("free_stroke")
+    bushing = machine.bushing_types["connecting"]
+    write_loops(folder / "bench", damper, [(1.0, 0.3), (1.0, 1.0), (3.0, 1.0), (10.0, 1.0)])
+    write_loops(folder / "fit", damper, [(1.0, 0.3), (3.0, 1.0), (10.0, 1.0)])
+    write_loops(folder / "held", damper, [(1.0, 1.0)])
+    write_loops(
+        folder / "rubber", bushing_bench(bushing, "y"), [(1.0, 0.4), (3.0, 0.4), (5.0, 0.4)]
+    )
+    there = np.concatenate(
+        [np.linspace(0, 20, 60), np.linspace(20, -20, 120), np.linspace(-20, 0, 60)]
+    )
+    time = np.arange(len(there)) / 4.0
+    for name, unit, size, rate in (
+        ("r", "mm", 1.0, 3.0), ("a", "mm", 1.0, 5.0), ("t", "deg", 0.25, 0.8), ("w", "deg", 0.25, 0.5)
+    ):  # fmt: skip
+        what, force = ("displacement", "force [N]") if unit == "mm" else ("angle", "moment [N m]")
+        table = {"time [s]": time, f"{what} [{unit}]": size * there, force: rate * size * there}
+        pd.DataFrame(table).to_csv(folder / f"{name}.csv", index=False)
+
+
+def write_loops(folder, bench, motions):
+    """Write force loops with 1 % of noise."""
+    folder.mkdir()
+    noise = np.random.default_rng(1)
+    harmonics = [Harmonic(frequency, 1e-3 * amplitude) for frequency, amplitude in motions]
+    for harmonic, loop in zip(harmonics, force_loops(bench, harmonics), strict=True):
+        force = loop.force + 0.01 * np.abs(loop.force).max() * noise.standard_normal(
+            len(loop.force)
+        )
+        table = {
+            "time [s]": loop.time,
+            "displacement [mm]": 1e3 * loop.displacement,
+            "force [N]": force,
+        }
+        name = f"loop_{harmonic.frequency:g}Hz_{1e3 * harmonic.amplitude:g}mm.csv"
+        pd.DataFrame(table).to_csv(folder / name, index=False)
+
+
+def write_commands_page(folder):
+    """Write the records, cases and designs that docs/how-to/commands.md names."""
+    from wm_drake.studies.doe import make_design
+
+    names = ("C_L", "C_T", "K_Lx", "K_Ly", "K_Lz", "K_Tx", "K_Ty", "K_Tz")
+    design = make_design("orthogonal", names, trials=243)
+    pd.DataFrame(design.levels, columns=names).to_csv(folder / "design.csv", index=False)
+    (folder / "tolerances.yaml").write_text(
+        "load: middle\nquantities:\n  friction: {keys: [damper_types.friction.friction_force], "
+        "distribution: uniform, low: 35 N, high: 45 N}\n",
+        encoding="utf-8",
+    )
+    shutil.copy(TABLE_1, folder / "amplitudes.csv")
+    shutil.copy(TABLE_1.with_name("sanchez_tabuenca_2020_table5_means.csv"), folder / "results.csv")
+    shutil.copy(CYCLES / "profile_spin_cycle.yaml", folder / "my_cycle.yaml")
+    cases = (CYCLES / "cases_table9.csv").read_text(encoding="utf-8").splitlines()
+    (folder / "my_cases.csv").write_text("\n".join(cases[:4]) + "\n", encoding="utf-8")
+    time = np.arange(0.0, 40.0, 2e-3)
+    rpm = 60.0 + 6.0 * time
+    angle = np.cumsum(rpm) * 2e-3 * np.pi / 30.0
+    pd.DataFrame({"time_s": time, "speed_rpm": rpm, "front": np.sin(angle)}).to_csv(
+        folder / "vibration.csv", index=False
+    )
+    machine = build_machine(load_machine("reference"))
+    for name, load in (("m", "middle"), ("c", "counter")):
+        record = simulate(machine, load)
+        table = (1e3 * record.displacement).to_pandas()
+        table.index.name = "time_s"
+        table.to_csv(folder / f"{name}.csv")

@@ -1,0 +1,158 @@
+"""Each snippet of the manual and the README is run, or the test says what else runs it.
+
+The Python snippets and YAML blocks of the how-to pages are in test_readme; the cells of tutorials are
+executed when the manual is built; the commands of the gallery by analyses/make_gallery.py.
+"""
+
+import re
+import shlex
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import pytest
+from snippets import BLOCKS, FILES, SHELL, prepare
+
+NOT_SHELL = {
+    "{code-cell}": "executed when the manual is built; a failure ends the build",
+    "mermaid": "compared with the diagram in test_readme",
+    "python": "run in test_readme",
+    "yaml": "read in test_readme",
+    "csv": "read by the commands of its page",
+    "{eval-rst}": "no snippet",
+    "{image}": "no snippet",
+    "{include}": "no snippet",
+    "{literalinclude}": "a piece of a test",
+    "{toctree}": "no snippet",
+}
+ELSEWHERE = {  # pages whose commands something else runs
+    "docs/gallery.md": "analyses/make_gallery.py runs them and takes pictures of what they write",
+}
+NOT_RUN = {  # beginning of a command, and why this test does not run it
+    "python3 -m venv": "installs into a new environment: .ci/run",
+    ".venv/bin/pip": "installs into a new environment: .ci/run",
+    "source .venv": "changes the shell only",
+    "pip install": "installs into a new environment: .ci/run",
+    "python analyses/write_validation.py": "tests/analyses runs it with --quick",
+    "sphinx-build": "builds the manual: .ci/run",
+    "wm-drake studio": "serves until it is stopped: tests/studio",
+    "wm-drake study gasket --cluster": "needs a cluster: tests/batch/test_cluster.py and a tutorial",
+    "wm-drake study tolerance laundry_and_parts": "minutes: as laundry",
+    "wm-drake study tolerance laundry --samples 8192": "minutes: the tutorial will-it-hit runs 256",
+    "wm-drake study design mine.yaml --evaluations 5000": "minutes: test_readme reads the file",
+    "wm-drake study gasket-damping --mesh 0.05": "minutes: --mesh 4 is in the gallery",
+    "wm-drake calibrate --free free.yaml --resume": "continues what was interrupted: test_cli_calibrate",
+}
+HOURS = (  # commands of more than ten seconds of processor time; the marker `hours` runs them
+    "wm-drake study tolerance",
+    "wm-drake study spin-cycle",
+    "wm-drake study spin-identify",
+    "wm-drake study gasket",
+    "wm-drake study drive",
+    "wm-drake study design",
+    "wm-drake study modes",
+    "wm-drake study response",
+    "wm-drake calibrate",
+    "wm-drake spin --engine drake",
+    "wm-drake identify gasket rubber/*.csv --axis radial --method",
+    "wm-drake identify damper bench/*.csv --law coulomb",
+    "wm-drake identify damper fit/*.csv",
+    "wm-drake identify table2",
+)
+SHORT = ("wm-drake study gasket-effect",)  # of those, the ones that are quick
+COMMANDS = {}
+for _block in BLOCKS:
+    if _block.page not in ELSEWHERE and _block.commands:
+        COMMANDS.setdefault(_block.page, []).extend(_block.commands)
+
+
+def reason_not_to_run(command):
+    """Return why a command is not run here, or None."""
+    return next((why for begin, why in NOT_RUN.items() if command.startswith(begin)), None)
+
+
+def is_long(command):
+    """Return whether a command takes longer than a slow test may."""
+    return command.startswith(HOURS) and not command.startswith(SHORT)
+
+
+def test_every_block_is_of_a_known_kind():
+    assert {block.language for block in BLOCKS} <= {*NOT_SHELL, *SHELL}
+
+
+def test_every_command_line_is_a_command():
+    for page, commands in COMMANDS.items():
+        for command in commands:
+            known = command.startswith(("wm-drake ", "printf ")) or reason_not_to_run(command)
+            assert known, f"{page}: {command}"
+
+
+def test_a_reason_and_a_mark_belong_to_a_command():
+    lines = [line for commands in COMMANDS.values() for line in commands]
+    for begin in (*NOT_RUN, *HOURS, *SHORT):
+        assert any(line.startswith(begin) for line in lines), begin
+
+
+def test_every_file_block_has_a_name():
+    counted = {}
+    for block in BLOCKS:
+        if block.language in ("yaml", "csv") and block.page not in ELSEWHERE:
+            counted[block.page] = counted.get(block.page, 0) + 1
+    assert counted == {page: len(names) for page, names in FILES.items()}
+
+
+def run_all(wm_drake, folder, page, chosen):
+    """Run commands of a page in its folder, one after the other, and return those that failed."""
+    prepare(folder, page)
+    failed = []
+    for command in chosen:
+        if command.startswith("printf "):
+            text, target = re.match(r"printf '(.*)' > (\S+)", command).groups()
+            (folder / target).write_text(text.replace("\\n", "\n"), encoding="utf-8")
+            continue
+        words = []
+        for word in shlex.split(command.split(" > ")[0])[1:]:
+            paths = sorted(path.relative_to(folder).as_posix() for path in folder.glob(word))
+            words += paths if "*" in word else [word]
+        replaces = words[0] != "machine" and "--resume" not in words
+        words += ["--overwrite"] if replaces else []
+        run = in_own_process if "--replay" in words else wm_drake
+        result = run(*words)
+        if result.code:
+            failed.append((command, result.code, result.err))
+    return failed
+
+
+def in_own_process(*words):
+    """Run a command alone: Drake's Meshcat ends a process that collects it in another thread."""
+    program = [sys.executable, "-c", "from wm_drake.cli import main; main()"]
+    done = subprocess.run([*program, *words], capture_output=True, text=True, check=False)
+    return SimpleNamespace(code=done.returncode, out=done.stdout, err=done.stderr)
+
+
+def pages_with(wanted):
+    return [
+        pytest.param(page, [line for line in lines if not reason_not_to_run(line)], id=page)
+        for page, lines in COMMANDS.items()
+        if any(not reason_not_to_run(line) and is_long(line) == wanted for line in lines)
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("page", "lines"), pages_with(False))
+def test_the_commands_of_a_page_run(page, lines, wm_drake, tmp_path):
+    """Commands that read what a long one of their page writes run with the long ones."""
+    reads_long = ("wm-drake-identify/", "wm-drake-design/")
+    short = [
+        line
+        for line in lines
+        if not is_long(line)
+        and not (any(word in line for word in reads_long) and any(map(is_long, lines)))
+    ]
+    assert run_all(wm_drake, tmp_path, page, short) == []
+
+
+@pytest.mark.hours
+@pytest.mark.parametrize(("page", "lines"), pages_with(True))
+def test_the_long_commands_of_a_page_run(page, lines, wm_drake, tmp_path):
+    assert run_all(wm_drake, tmp_path, page, lines) == []
