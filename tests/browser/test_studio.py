@@ -114,8 +114,6 @@ def test_answer_leaves_a_text_alone_that_is_being_typed(page):
 
 
 def test_slider_moves_the_curve_and_ends_in_the_history(page):
-    from selenium.webdriver.common.action_chains import ActionChains
-
     curve = page.run(CURVE)
     page.run(
         "document.querySelector(arguments[0]).closest('details').open = true",
@@ -123,14 +121,14 @@ def test_slider_moves_the_curve_and_ends_in_the_history(page):
     )
     slider = page.find(ROW.format(UNBALANCE, "input[type=range]"))
     page.run("arguments[0].scrollIntoView({block: 'center'})", slider)
-    mouse = ActionChains(page.driver)
-    mouse.click_and_hold(slider).move_to_element_with_offset(slider, 20, 0).perform()
+    page.mouse("mousePressed", slider, 0.5)
+    page.mouse("mouseMoved", slider, 0.65)
     during = changed_from(page, CURVE, curve)
     assert "kg" in page.run(
         "return document.querySelector(arguments[0]).value", ROW.format(UNBALANCE, ".text")
     )
-    mouse = ActionChains(page.driver)
-    mouse.move_to_element_with_offset(slider, 45, 0).release().perform()
+    page.mouse("mouseMoved", slider, 0.8)
+    page.mouse("mouseReleased", slider, 0.8)
     after = changed_from(page, CURVE, during)
     assert page.wait("return document.querySelectorAll('#history li').length") == 2
     page.find("#undo").click()
