@@ -1,5 +1,6 @@
 """Tables of the drive study: CSV files and plain data for JSON."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -78,11 +79,17 @@ def error_measures(result: DriveResult) -> dict[str, float] | None:
 
 
 def as_plain_data(result: DriveResult) -> dict[str, Any]:
-    """Return the result for JSON."""
+    """Return the result for JSON, with None for NaN, which JSON does not have."""
+    errors = error_measures(result)
     return {
         "machine": result.parameters.name,
         "runs": result.runs,
-        "thresholds": thresholds_table(result).to_dict("records"),
-        "map": map_table(result).to_dict("records"),
-        "estimation": error_measures(result),
+        "thresholds": [_plain(row) for row in thresholds_table(result).to_dict("records")],
+        "map": [_plain(row) for row in map_table(result).to_dict("records")],
+        "estimation": None if errors is None else _plain(errors),
     }
+
+
+def _plain(row: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return a row with None for NaN."""
+    return {str(name): value if value == value else None for name, value in row.items()}
