@@ -124,3 +124,46 @@ def test_wrong_files_are_refused(tmp_path):
     scipy.io.savemat(tmp_path / "x.mat", {"S1_x": ACCELERATIONS[0]})
     with pytest.raises(InputError, match="needs one channel speed_rpm or speed"):
         read_signals(tmp_path / "x.mat", "mm")
+
+
+def write_named_csv(path, channels):
+    """Write a CSV with units in its header and a column of words."""
+    head = ["Clock [s]", *(f"{name} [{unit}]" for name, (_, unit) in channels.items()), "remark"]
+    rows = np.column_stack([TIME, *(values for values, _ in channels.values())])
+    lines = [",".join([*(f"{value:.15g}" for value in row), "ok"]) for row in rows]
+    path.write_text("\n".join([",".join(head), *lines]) + "\n", encoding="utf-8")
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".mf4", ".mat"])
+def test_channels_are_chosen_by_name(tmp_path, suffix):
+    """Accelerations and records under names of the laboratory, some of them not wanted."""
+    named = {f"Acc {k}": (values / G, "g") for k, values in enumerate(ACCELERATIONS)}
+    named |= {"Drum": (SPEED, "rpm"), "Door": (np.sin(TIME), "V")}
+    if suffix == ".mat":  # names without blanks, no units
+        named = {name.replace(" ", "_"): value for name, value in named.items()}
+    names = dict(zip(NAMES, named, strict=False))
+    clock = {"time": "Clock"} if suffix == ".csv" else {}
+    write = {".csv": write_named_csv, **WRITERS}[suffix]
+    write(tmp_path / f"front{suffix}", named)
+    plain = tmp_path / "plain"
+    plain.mkdir()
+    write_csv(plain / "front.csv", {"time_s": TIME, **dict(zip(NAMES, ACCELERATIONS, strict=True))})
+    wanted = read_accelerations(plain, LABELS, PROFILE)
+    found = read_accelerations(tmp_path, LABELS, PROFILE, names | clock)
+    np.testing.assert_allclose(found, wanted, rtol=1e-9)
+    chosen = {"speed": "Drum", "side": names["S1_y"], **clock}
+    signals = read_signals(tmp_path / f"front{suffix}", "m/s^2", chosen)
+    assert signals.names == ["side"]
+    assert signals.unit == ("m/s^2" if suffix == ".mat" else "g")
+    size = np.max(np.abs(signals.values)) * (1.0 if suffix == ".mat" else G)
+    assert size == pytest.approx(3.0, rel=1e-3)
+    turns = np.trapezoid(SPEED, TIME) / 60.0
+    assert signals.angle[-1] / (2.0 * np.pi) == pytest.approx(turns, rel=1e-6)
+
+
+def test_wrong_names_of_channels_are_refused(tmp_path):
+    write_named_csv(tmp_path / "front.csv", {"Acc 0": (ACCELERATIONS[0], "g")})
+    with pytest.raises(InputError, match="no word 'S9_x'"):
+        read_accelerations(tmp_path, LABELS, PROFILE, {"S9_x": "Acc 0"})
+    with pytest.raises(InputError, match="has no channel 'Acc 7'"):
+        read_accelerations(tmp_path, LABELS, PROFILE, {"S1_x": "Acc 7"})

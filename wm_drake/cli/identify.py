@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from wm_drake.cli.channels import LOOP_WORDS, channels_of
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
@@ -423,7 +424,7 @@ def _motions(asked: _Asked, files: list[Path], *, rotates: bool) -> "list[Measur
         cutoff = quantities_of(asked.cutoff, Unit("Hz", "Hz"), "--cutoff")[0]
         if not cutoff > 0.0:
             raise input_error(f"is {cutoff:g} Hz; allowed is > 0", where="--cutoff")
-    loops = read_loops(existing_files(files), units, channels_of(asked.channels))
+    loops = read_loops(existing_files(files), units, channels_of(asked.channels, LOOP_WORDS))
     if loops[0].rotates != rotates:
         holds, needs = ("angles and moments", "displacements and forces")[
             :: 1 if loops[0].rotates else -1
@@ -460,23 +461,6 @@ def units_of(text: str | None) -> tuple[str, str, str] | None:
             f"'{text}' is not three units; write for example 's,mm,N'", where="--units"
         )
     return (parts[0], parts[1], parts[2])
-
-
-CHANNEL_WORDS = ("time", "displacement", "angle", "force", "moment")
-
-
-def channels_of(text: str | None) -> dict[str, str]:
-    """Return the names of the channels of the option `--channels`, by word."""
-    found = {}
-    for part in text.split(",") if text else []:
-        word, separator, name = (piece.strip() for piece in part.partition("="))
-        if not (separator and name and word in CHANNEL_WORDS):
-            raise input_error(
-                f"'{part.strip()}' is not WORD=NAME; words are {', '.join(CHANNEL_WORDS)}",
-                where="--channels",
-            )
-        found[word] = name
-    return found
 
 
 def _kept_fields(

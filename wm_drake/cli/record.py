@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from wm_drake.cli.channels import RecordChannelsOption, channels_of
 from wm_drake.cli.common import (
     JsonOption,
     OutOption,
@@ -37,8 +38,8 @@ def record_orders(
     file: Annotated[
         Path,
         typer.Argument(
-            help="netCDF record of the command spin; or CSV with time_s, speed_rpm and a column "
-            "for each signal, such as accelerations.",
+            help="netCDF record of the command spin; or CSV, MDF4, TDMS, UFF 58 or MAT with "
+            "time_s, speed_rpm and a column for each signal, such as accelerations.",
             metavar="FILE",
         ),
     ],
@@ -48,6 +49,7 @@ def record_orders(
     unit: Annotated[
         str, typer.Option(help="Unit of the signals of a CSV, for tables and axes.")
     ] = "m/s^2",
+    channels: RecordChannelsOption = None,
     out: OutOption = DEFAULT_OUT,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
@@ -55,7 +57,8 @@ def record_orders(
     """Compute waterfall and order map of the signals of a record."""
     from wm_drake.studies.steady.orders import orders_of, read_signals
 
-    result = orders_of(read_signals(existing_file(file, "FILE"), unit), highest)
+    signals = read_signals(existing_file(file, "FILE"), unit, channels_of(channels))
+    result = orders_of(signals, highest)
     with interruptible(), result_folder(out, Run("record orders", overwrite)) as folder:
         _write(result, folder)
     if as_json:

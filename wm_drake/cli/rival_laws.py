@@ -100,7 +100,7 @@ def _print(
 ) -> None:
     from rich.table import Table
 
-    from wm_drake.report.identify.comparison import law_cells, law_header
+    from wm_drake.report.identify.comparison import bounds_sentences, law_cells, law_header
     from wm_drake.report.identify.report import motion_sentences
 
     console = Console()
@@ -113,7 +113,7 @@ def _print(
     for cells in law_cells(comparison):
         table.add_row(*cells)
     console.print(table)
-    for sentence in told:
+    for sentence in (*bounds_sentences(comparison), *told):
         console.print(sentence, highlight=False)
     files = ", ".join(
         ["report.html", *written, "laws.csv", "parameters.csv", "errors.csv", "loops.csv"]

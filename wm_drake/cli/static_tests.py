@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from wm_drake.cli.channels import LOOP_WORDS, channels_of
 from wm_drake.cli.common import command_line, interruptible, pairs_of
 from wm_drake.cli.components import Target, axes_of, existing_files
 from wm_drake.cli.result_folder import Run, result_folder
@@ -101,10 +102,10 @@ def _files_by_axis(files: list[Path], axis: str | None) -> dict[tuple[str, ...],
 
 
 def _loops(paths: list[Path], units: str | None, channels: str | None, axis: str):  # type: ignore[no-untyped-def]
-    from wm_drake.cli.identify import channels_of, units_of
+    from wm_drake.cli.identify import units_of
     from wm_drake.parameters import read_loops
 
-    loops = read_loops(existing_files(paths), units_of(units), channels_of(channels))
+    loops = read_loops(existing_files(paths), units_of(units), channels_of(channels, LOOP_WORDS))
     if loops[0].rotates != axis.startswith("about"):
         needs = "angles and moments" if axis.startswith("about") else "displacements and forces"
         raise input_error(f"axis {axis} needs {needs}", where=loops[0].path)

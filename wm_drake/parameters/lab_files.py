@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from wm_drake.errors import InputError, input_error, shortened
+from wm_drake.parameters.csv_files import read_csv, read_header
 from wm_drake.parameters.text_files import check_regular
 from wm_drake.parameters.types import FloatArray
 
@@ -62,6 +64,25 @@ def read_channels(path: Path) -> list[Channel]:
         raise input_error(f"cannot be read by {package} ({reason})", where=str(path)) from None
     if not found:
         raise input_error("has no numeric channel", where=str(path))
+    return found
+
+
+def csv_channels(path: Path) -> list[Channel]:
+    """Return the columns of a CSV file as channels; a header `Acc 1 [g]` has name and unit.
+
+    A column without a number is left out; a value that is none is NaN.
+
+    Raises:
+        InputError: The file cannot be read.
+    """
+    table = read_csv(path, read_header(path))
+    found = []
+    for text in table.columns:
+        name, _, unit = str(text).partition("[")
+        values = pd.to_numeric(table[text], errors="coerce").to_numpy(dtype=float)
+        if np.isfinite(values).any():
+            unit = unit.strip().removesuffix("]").strip()
+            found.append(Channel(name.strip(), unit, values, None))
     return found
 
 

@@ -1,12 +1,19 @@
 """Signals over time from files of laboratories: records of a machine and of accelerometers."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from wm_drake.errors import input_error
-from wm_drake.parameters.lab_files import Channel, chosen, read_channels
+from wm_drake.parameters.lab_files import (
+    Channel,
+    chosen,
+    csv_channels,
+    is_lab_file,
+    read_channels,
+)
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit, convert
 
@@ -19,23 +26,45 @@ _WORDS = {"g": "g_0", "gn": "g_0", "m/s2": "m/s^2", "m/s²": "m/s^2", "1/min": "
 """Units as instruments write them, and what they mean here."""
 
 
+def available_channels(path: Path, channels: Mapping[str, str]) -> list[Channel]:
+    """Return the channels of a file; those that the user names have the words of this package.
+
+    Args:
+        path: CSV file, or file of a format of `wm_drake.parameters.lab_files`.
+        channels: Name in the file of a word such as ``time`` or ``S1_x``.
+
+    Raises:
+        InputError: the file cannot be read, or a channel is missing or there twice.
+    """
+    available = read_channels(path) if is_lab_file(path) else csv_channels(path)
+    named = {
+        word: replace(chosen(available, name, path), name=word) for word, name in channels.items()
+    }
+    used = set(channels.values())
+    others = [c for c in available if c.name not in used and c.name not in named]
+    if "time" in named:
+        others = [c for c in others if c.name.lower() not in TIME_NAMES]
+    return [*named.values(), *others]
+
+
 def lab_signals(
-    path: Path, units: Mapping[str, Unit], default: str
+    path: Path, units: Mapping[str, Unit], default: str, channels: Mapping[str, str] | None = None
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
     """Return time [s] and channels of a file, in SI, all at the time of the first channel.
 
     A channel with other times is interpolated.
 
     Args:
-        path: File of a format of `wm_drake.parameters.lab_files`.
+        path: CSV file, or file of a format of `wm_drake.parameters.lab_files`.
         units: Names of the wanted channels, with the unit each is converted to.
         default: Unit of a channel whose file has none.
+        channels: As for `available_channels`.
 
     Raises:
         InputError: the file cannot be read, a channel is missing or there twice, its unit does not
             fit, or it has a value that is not a finite number.
     """
-    available = read_channels(path)
+    available = available_channels(path, channels or {})
     found = {name: chosen(available, name, path) for name in units}
     time = clock_of(available, list(found.values()), path)
     return time, {

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import LEDGER, Run, check_is_folder, prepare_folder
 from wm_drake.errors import InputError, Problem
 
@@ -116,6 +117,26 @@ def batch_runner(
     else:
         with cluster_client(cluster) as client:
             yield partial(run, partial(simulate_on_cluster, client=client))
+
+
+def with_progress(
+    batch: "Callable[[Iterable[Case], Callable[[int], None]], xr.Dataset]",
+) -> "Callable[[Iterable[Case], str], xr.Dataset]":
+    """Return the function that runs cases behind a progress bar.
+
+    Args:
+        batch: Function of `batch_runner`.
+
+    Returns:
+        Function of cases and of the word beside the bar.
+    """
+
+    def run(cases: "Iterable[Case]", what: str) -> "xr.Dataset":
+        listed = list(cases)
+        with progress_bar(len(listed), what) as progress:
+            return batch(listed, progress)
+
+    return run
 
 
 @contextmanager

@@ -31,6 +31,7 @@ from wm_drake.cli.study.common import (
     problems_of_file,
     study_identity,
     study_ledger,
+    with_progress,
 )
 from wm_drake.cli.terminal import Console, say
 from wm_drake.errors import input_error, nearest_names
@@ -125,12 +126,7 @@ def _promises(
     """Return the check of a robust front on fresh samples."""
     from wm_drake.studies.pareto.robust import promises
 
-    def run(cases: "Iterable[Case]") -> "xr.Dataset":
-        listed = list(cases)
-        with progress_bar(len(listed), "fresh samples") as progress:
-            return batch(listed, progress)
-
-    return promises(front, run, seed)
+    return promises(front, lambda cases: with_progress(batch)(cases, "fresh samples"), seed)
 
 
 def _envelopes(front: "ParetoFront", built: "Machine", workers: int | None) -> "Envelopes | None":

@@ -1,7 +1,6 @@
 """Command `wm-drake study drive`: how strong a drive must be, and unbalance seen by the drive."""
 
 import time
-from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,7 +17,6 @@ from wm_drake.cli.common import (
     command_line,
     load_parameters,
 )
-from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.spin_drive import with_drive
 from wm_drake.cli.study.common import (
@@ -31,13 +29,11 @@ from wm_drake.cli.study.common import (
     batch_runner,
     study_identity,
     study_ledger,
+    with_progress,
 )
 from wm_drake.cli.terminal import Console, say
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    import xarray as xr
-
-    from wm_drake.simulation.cases import Case
     from wm_drake.studies.drive.study import DriveResult
 
 DEFAULT_OUT = Path("wm-drake-drive")
@@ -98,12 +94,7 @@ def drive(
     writer = Run("study drive", overwrite, identity)
     with study_ledger(out, writer, identity, resume) as ledger:
         with batch_runner(built, ledger, MEASURES, workers, cluster) as batch:
-
-            def run(listed: "Iterable[Case]", what: str) -> "xr.Dataset":
-                chosen = list(listed)
-                with progress_bar(len(chosen), what) as progress:
-                    return batch(chosen, progress)
-
+            run = with_progress(batch)
             result = run_drive(built, cases, run, (torques, unbalances), (loads, speed, seed))
         ledger.mark_finished()
         with result_folder(out, writer, RUNS_KEPT) as folder:

@@ -1,7 +1,7 @@
 """Command `wm-drake study spin-cycle`: vibration in a spin cycle for a table of unbalance cases."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from wm_drake.cli.channels import RecordChannelsOption, channels_of
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
@@ -89,6 +90,7 @@ def spin_cycle(
             metavar="DIR",
         ),
     ] = None,
+    channels: RecordChannelsOption = None,
     engine: Annotated[
         str,
         typer.Option(
@@ -113,7 +115,9 @@ def spin_cycle(
     parameters = load_parameters(machine, sets)
     spin_profile = load_profile(profile)
     table = cases_of_table(cases, case)
-    comparison = measurement(parameters, table, spin_profile, measured, accelerations)
+    comparison = measurement(
+        parameters, table, spin_profile, measured, accelerations, channels_of(channels)
+    )
     check_buildable(machine, parameters)
     kept = "finished cases are kept; repeat the command to continue"
     writer = Run(
@@ -156,6 +160,7 @@ def measurement(
     profile: "SpinProfile",
     measured: Path | None,
     accelerations: Path | None,
+    channels: Mapping[str, str],
 ) -> "xr.DataArray | None":
     """Return the measured RMS displacements of `--measured` or `--accelerations`, or None."""
     from wm_drake.studies.spin_cycle.measured import read_accelerations, read_rms
@@ -163,6 +168,8 @@ def measurement(
 
     if measured and accelerations:
         raise input_error("not allowed together with --measured", where="--accelerations")
+    if channels and not accelerations:
+        raise input_error("is about the files of --accelerations", where="--channels")
     try:
         runs_of(parameters, cases, profile)  # raises an error for cases that cannot be run
     except InputError as error:
@@ -173,7 +180,9 @@ def measurement(
     labels = labels_of(parameters, cases, profile)
     if measured:
         return read_rms(existing_file(measured, "--measured"), labels)
-    return read_accelerations(accelerations, labels, profile) if accelerations else None
+    if accelerations:
+        return read_accelerations(accelerations, labels, profile, channels)
+    return None
 
 
 def study_identity(

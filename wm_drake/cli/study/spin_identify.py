@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from wm_drake.cli.channels import RecordChannelsOption, channels_of
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
@@ -76,6 +77,7 @@ def spin_identify(
             help="Folder of measured accelerations, one file CASE.csv per case.", metavar="DIR"
         ),
     ] = None,
+    channels: RecordChannelsOption = None,
     noise: Annotated[
         float,
         typer.Option(
@@ -105,7 +107,9 @@ def spin_identify(
     parameters = load_parameters(machine, sets)
     spin_profile = load_profile(profile)
     table = cases_of_table(cases, case or (None if cases else list(DEFAULT_CASES)))
-    given = measurement(parameters, table, spin_profile, measured, accelerations)
+    given = measurement(
+        parameters, table, spin_profile, measured, accelerations, channels_of(channels)
+    )
     sought = unknowns_of(parameters, unknown)
     check_buildable(machine, parameters)
     model = partial(SpinModel, parameters, spin_profile, tuple(table), sought)

@@ -1,7 +1,6 @@
 """Command `wm-drake study tolerance`: how machine and laundry scatter, and whether it touches."""
 
 import time
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,7 +18,6 @@ from wm_drake.cli.common import (
     existing_file,
     load_parameters,
 )
-from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.study.common import (
     RUNS_KEPT,
@@ -32,17 +30,15 @@ from wm_drake.cli.study.common import (
     problems_of_file,
     study_identity,
     study_ledger,
+    with_progress,
 )
 from wm_drake.cli.terminal import Console, say
 from wm_drake.errors import InputError
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    import xarray as xr
-
     from wm_drake.model.machine import Machine
     from wm_drake.parameters import MachineParameters
     from wm_drake.parameters.tolerances import Tolerances
-    from wm_drake.simulation.cases import Case
     from wm_drake.studies.gasket.responses import Response
     from wm_drake.studies.tolerance.study import ToleranceResult
     from wm_drake.studies.tolerance.variables import UncertainMachine
@@ -132,13 +128,7 @@ def tolerance(
     writer = Run("study tolerance", overwrite, identity)
     with study_ledger(out, writer, identity, resume) as ledger:
         with batch_runner(built, ledger, measures, workers, cluster) as batch:
-
-            def run(cases: "Iterable[Case]", what: str) -> "xr.Dataset":
-                listed = list(cases)
-                with progress_bar(len(listed), what) as progress:
-                    return batch(listed, progress)
-
-            result = run_tolerances(uncertain, chosen, run, settings, known)
+            result = run_tolerances(uncertain, chosen, with_progress(batch), settings, known)
         ledger.mark_finished()
         with result_folder(out, writer, RUNS_KEPT) as folder:
             _write(result, tolerances, folder, time.perf_counter() - begin)

@@ -23,7 +23,7 @@ from wm_drake.engines.compiled.mechanics import (
 )
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES, multistep_step, remember
 from wm_drake.engines.compiled.packing import aligned
-from wm_drake.engines.compiled.rubber import end_paths, follow_paths, write_paths
+from wm_drake.engines.compiled.rubber import follow_paths, write_paths
 
 Work = namedtuple("Work", ("rate", "inputs", "stage", "total", "past_rates", "past_inputs"))
 """Arrays to work in. The past of a step with one derivative must stay from call to call."""
@@ -110,7 +110,7 @@ def runge_kutta_step(
         node = 2 * i + (number + 1) // 2
         if number == 3:
             masses = mass_properties(numbers, drum[node, 1], drum[node, 2])
-        follow_paths(stage, state, numbers, branches)
+        follow_paths(stage, state, numbers, branches, None, first, h)
         state_derivative(
             stage, rate, inputs, masses, drum[node, 0], acceleration, numbers, elements
         )
@@ -120,7 +120,7 @@ def runge_kutta_step(
         for k in range(size):
             total[k] = total[k] + weight * rate[k]
             stage[k] = state[k] + ahead * rate[k]
-    end_paths(total, state, inputs, first, h, numbers, branches)
+    follow_paths(total, state, numbers, branches, inputs, first, h)
     for k in range(size):
         state[k] = total[k]
 

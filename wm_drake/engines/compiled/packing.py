@@ -141,6 +141,11 @@ class Layout:
         return self.branches_begin - self.cabinet_size - self.motor_size
 
     @property
+    def carrier_begin(self) -> int:
+        """Index in the state where the drum's carrier begins, if the bearing is compliant."""
+        return self.motor_begin - CARRIER_STATE_SIZE
+
+    @property
     def motor_size(self) -> int:
         """Size of the state of the drive, before that of the cabinet; 0 for a prescribed speed."""
         return MOTOR_STATE_SIZE if self.motor >= 0 else 0

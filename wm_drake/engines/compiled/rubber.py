@@ -75,13 +75,17 @@ def write_paths(rate, inputs, first_input, p, branches):
 
 
 @law
-def follow_paths(stage, state, p, branches):
-    """Replace the path of each friction in a stage of the Runge-Kutta scheme by its stretch.
+def follow_paths(moved, state, p, branches, inputs, first_input, h):
+    """Replace the path of each friction in a Runge-Kutta step by its stretch.
 
     Args:
-        stage: State of the stage; its number for a friction is that of `state` plus the path.
+        moved: State of a stage or at the end of the step; its number for a friction is that of
+            `state` plus the path.
         state: State at the start of the step.
         p, branches: As for `write_branches`.
+        inputs: Inputs at the end of the step; None at a stage, whose path has no reversal.
+        first_input: As for `write_branches`.
+        h: Length of the step. [s]
     """
     if branches is None:
         return
@@ -91,33 +95,23 @@ def follow_paths(stage, state, p, branches):
             at = whole_number(rubber.dahl_state[axis])
             if at >= 0:
                 k = branches.states[j] + at
-                path = stage[k] - state[k]
-                stage[k] = dahl_after_path(state[k], path, rubber.dahl_displacement[axis])
+                rate_at = first_input + AXIS_COUNT * j + axis
+                moved[k] = _stretch_after(
+                    state[k],
+                    moved[k] - state[k],
+                    rubber.dahl_displacement[axis],
+                    inputs,
+                    rate_at,
+                    h,
+                )
 
 
 @law
-def end_paths(total, state, inputs, first_input, h, p, branches):
-    """Replace the path of each friction at the end of a Runge-Kutta step by its stretch.
-
-    Args:
-        total: State at the end; its number for a friction is that of `state` plus the path.
-        state: State at the start of the step.
-        inputs: Inputs at the end of the step.
-        h: Length of the step. [s]
-        first_input, p, branches: As for `write_branches`.
-    """
-    if branches is None:
-        return
-    for j in range(len(branches.at)):
-        rubber = read_rubber(*read_rubber_bushing(p, branches.at[j]).rubber)
-        for axis in range(AXIS_COUNT):
-            at = whole_number(rubber.dahl_state[axis])
-            if at >= 0:
-                k = branches.states[j] + at
-                rate = inputs[first_input + AXIS_COUNT * j + axis]
-                total[k] = dahl_after_step(
-                    state[k], total[k] - state[k], rate, h, rubber.dahl_displacement[axis]
-                )
+def _stretch_after(stretch, path, displacement, inputs, rate_at, h):
+    """Return the stretch of a friction after a path, or after a step whose last input is known."""
+    if inputs is None:
+        return dahl_after_path(stretch, path, displacement)
+    return dahl_after_step(stretch, path, inputs[rate_at], h, displacement)
 
 
 @law

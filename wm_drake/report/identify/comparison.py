@@ -296,10 +296,15 @@ def _warnings(comparison: Comparison, told: Sequence[str]) -> list[str]:
     found = [*supported.judgement.hints, *told]
     if supported.judgement.verdict == "poor":
         found.insert(0, "None of these laws describes the tests.")
-    found += [
-        f"{r.law}: the value of {e.name} is at its {e.at_bound} bound."
+    return [*found, *bounds_sentences(comparison)]
+
+
+def bounds_sentences(comparison: Comparison) -> list[str]:
+    """Return a sentence for each value at a bound of its search."""
+    return [
+        f"{r.law}: the value of {e.name} is at its {e.at_bound} bound; wider --bounds may fit "
+        "better."
         for r in comparison.results
         for e in r.fit.estimates
         if e.at_bound and ".rise_" not in e.name
     ]
-    return found

@@ -141,9 +141,11 @@ class Linearisation:
         """Return the state in which the mean force over a revolution vanishes, by Newton's method.
 
         A step is a least-squares solution, so that a tube that can spin freely stays where it is.
+        The branches of rubber stay relaxed: vibration takes the mean of their friction away.
         """
         self._equilibrium = self.derivative.rest
         free, still = self.derivative.free, ~self.derivative.is_velocity
+        still &= free < self.derivative.layout.branches_begin
         for _ in range(20):
             states = self._revolution(0.0)
             rates = self.derivative(states).mean(axis=0)[free]

@@ -117,7 +117,10 @@ def _slope(
     try:
         if value == 0.0:
             step = STEP_OF_ZERO / unit.from_si(1.0)
-            return (at(1.0, step) - at(1.0, 0.0)) / STEP_OF_ZERO, True
+            moved, plain = at(1.0, step), at(1.0, 0.0)
+            if moved.shape != plain.shape:  # a branch of rubber that is not in use
+                return None, False
+            return (moved - plain) / STEP_OF_ZERO, True
         both = at(1.0 + RELATIVE_STEP, 0.0) - at(1.0 - RELATIVE_STEP, 0.0)
         return both / (2.0 * RELATIVE_STEP), False
     except InputError:

@@ -71,7 +71,10 @@ def read_rms(path: Path, labels: Mapping[str, Sequence[str]]) -> xr.DataArray:
 
 
 def read_accelerations(
-    folder: Path, labels: Mapping[str, Sequence[str]], profile: SpinProfile
+    folder: Path,
+    labels: Mapping[str, Sequence[str]],
+    profile: SpinProfile,
+    channels: Mapping[str, str] | None = None,
 ) -> xr.DataArray:
     """Compute RMS displacements from records of acceleration, integrated twice.
 
@@ -84,6 +87,8 @@ def read_accelerations(
         folder: Folder with the files.
         labels: Names of the study along each dimension, from `labels_of`.
         profile: Spin profile with regions.
+        channels: Name in the files of ``time`` or of an accelerometer's axis, such as ``S1_x``. A
+            CSV may have the unit in its header then: ``Acc 1 [g]``.
 
     Returns:
         (case, region, accelerometer, axis). [m]
@@ -92,6 +97,10 @@ def read_accelerations(
         InputError: the folder has no file of a case, a file has other columns or values that are
             not finite numbers, or the samples are not evenly spaced.
     """
+    known = {"time", *_words(labels)}
+    for word in channels or {}:
+        if word not in known:
+            raise input_error(f"no word '{word}'{nearest_names(word, known)}", where="--channels")
     paths = {name: _file_of(folder, name) for name in labels["case"]}
     if not any(paths.values()):
         raise input_error(
@@ -100,7 +109,7 @@ def read_accelerations(
         )
     empty = np.full([len(labels[dim]) for dim in DIMS[1:]], np.nan)
     rows = [
-        empty if path is None else _from_acceleration(path, labels, profile)
+        empty if path is None else _from_acceleration(path, labels, profile, channels or {})
         for path in paths.values()
     ]
     return xr.DataArray(np.array(rows), labels, DIMS)
@@ -121,23 +130,31 @@ def _file_of(folder: Path, case: str) -> Path | None:
     return found[0] if found else None
 
 
-def _samples(path: Path, channels: list[str]) -> FloatArray:
+def _words(labels: Mapping[str, Sequence[str]]) -> list[str]:
+    """Return the words of the channels of all accelerometers."""
+    return [f"{sensor}_{axis}" for sensor in labels["accelerometer"] for axis in labels["axis"]]
+
+
+def _samples(path: Path, words: list[str], channels: Mapping[str, str]) -> FloatArray:
     """Return time [s] and accelerations [m/s^2] of a file, one row a sample."""
-    if is_lab_file(path):
-        time, found = lab_signals(path, dict.fromkeys(channels, ACCELERATION), "m/s^2")
+    if is_lab_file(path) or channels:
+        units = dict.fromkeys(words, ACCELERATION)
+        time, found = lab_signals(path, units, "m/s^2", channels)
         return np.column_stack([time, *found.values()])
     return (
-        read_csv(path, ["time_s", *channels])
+        read_csv(path, ["time_s", *words])
         .apply(pd.to_numeric, errors="coerce")
         .to_numpy(dtype=float)
     )
 
 
 def _from_acceleration(
-    path: Path, labels: Mapping[str, Sequence[str]], profile: SpinProfile
+    path: Path,
+    labels: Mapping[str, Sequence[str]],
+    profile: SpinProfile,
+    channels: Mapping[str, str],
 ) -> FloatArray:
-    channels = [f"{sensor}_{axis}" for sensor in labels["accelerometer"] for axis in labels["axis"]]
-    numbers = _samples(path, channels)
+    numbers = _samples(path, _words(labels), channels)
     if not np.isfinite(numbers).all() or len(numbers) < 2:
         raise input_error(
             "has a value that is not a finite number, or fewer than two rows; at least two rows of "

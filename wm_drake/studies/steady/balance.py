@@ -46,9 +46,10 @@ ANGLE_ARM = 0.25
 HOLD = 1e-6
 """Rate at which held numbers of the state return to their values at rest. [1/s]
 
-Held are the angles of damper tubes and the deformations of sponges. Nothing holds the spin of a
-tube about its axis in a free motion, nor a sponge within its free stroke, so that their mean would
-be undetermined. Other motions change by this rate over their angular frequency, less than one part
+Held are the angles of damper tubes, the deformations of sponges and the stretches of rubber.
+Nothing holds the spin of a tube about its axis in a free motion, nor a sponge within its free
+stroke, nor the friction of rubber along an axis that does not move, so that their mean would be
+undetermined. Other motions change by this rate over their angular frequency, less than one part
 in a million."""
 
 
@@ -172,14 +173,16 @@ def _scale(derivative: SlopedDerivative, setup: Setup) -> FloatArray:
     angles = [tubes + own * i + k for i in range(len(setup.telescopes)) for k in range(3)]
     scale[np.isin(derivative.free, angles)] = ANGLE_ARM
     if setup.bearing:
-        scale[len(scale) - 12 : len(scale) - 9] = ANGLE_ARM
+        begin = derivative.layout.carrier_begin
+        scale[np.isin(derivative.free, range(begin, begin + 3))] = ANGLE_ARM
     return scale
 
 
 def _held(derivative: SlopedDerivative, setup: Setup) -> np.ndarray:
-    """Return the indices among the free numbers of tube angles and of sponge deformations."""
+    """Return the indices among the free numbers of tube angles and of own states of elements."""
     tubes, own = derivative.layout.elements.tubes, TUBES_STATE_SIZE
     held = [STATE_SIZE + k for k in range(len(setup.dampers))]
     for i in range(len(setup.telescopes)):
         held += [tubes + own * i + k for k in (0, 1, 2, DEFORMATION)]
+    held += range(derivative.layout.branches_begin, len(derivative.rest))
     return np.flatnonzero(np.isin(derivative.free, held))

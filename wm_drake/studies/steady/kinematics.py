@@ -129,7 +129,7 @@ def kinematics_of(derivative: SlopedDerivative, setup: Setup) -> Kinematics:
         for at in begins
     ]
     if setup.bearing:
-        at, own = len(derivative.rest) - CARRIER_STATE.fixed_size, CARRIER_STATE.offsets
+        at, own = derivative.layout.carrier_begin, CARRIER_STATE.offsets
         bodies.append((at + own["angles"] + three, at + own["angular_velocity"] + three))
         moves.append((at + own["position"] + three, at + own["velocity"] + three))
 

@@ -1,5 +1,6 @@
 """Orders of a record or of a measurement: signals with the angle of the drum."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,9 +10,9 @@ from scipy.integrate import cumulative_trapezoid
 
 from wm_drake.errors import input_error
 from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header
-from wm_drake.parameters.lab_files import is_lab_file, read_channels
+from wm_drake.parameters.lab_files import is_lab_file
 from wm_drake.parameters.lab_signals import SPEED as DRUM_SPEED
-from wm_drake.parameters.lab_signals import TIME_NAMES, clock_of, on_clock
+from wm_drake.parameters.lab_signals import TIME_NAMES, available_channels, clock_of, on_clock
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.orders import REVOLUTIONS, frequency_map, order_map
 from wm_drake.simulation.records import read_measured
@@ -54,7 +55,7 @@ class Orders:
     frequencies: xr.DataArray
 
 
-def read_signals(path: Path, unit: str) -> Signals:
+def read_signals(path: Path, unit: str, channels: Mapping[str, str] | None = None) -> Signals:
     """Read signals from a record (netCDF), a CSV or a file of a laboratory.
 
     Args:
@@ -62,14 +63,18 @@ def read_signals(path: Path, unit: str) -> Signals:
             columns time_s, speed_rpm and a column for each signal; or MDF4, TDMS, UFF 58 or MAT
             with a channel speed_rpm or speed and one for each signal, in units of its own.
         unit: Unit of signals whose file has none, for reading.
+        channels: Name in the file of ``time``, ``speed`` or a signal, whose word is free; without a
+            named signal all others are signals. Not of a netCDF record.
 
     Raises:
         InputError: the file cannot be read or has too few columns or rows.
     """
+    if is_lab_file(path) or (channels and path.suffix.lower() == ".csv"):
+        return _read_lab(path, unit, channels or {})
     if path.suffix.lower() == ".csv":
         return _read_csv(path, unit)
-    if is_lab_file(path):
-        return _read_lab(path, unit)
+    if channels:
+        raise input_error("a netCDF record has no channels to choose", where="--channels")
     wanted = {"time": ("time",), "displacement": ("time", "sensor"), "drum_angle": ("time",)}
     record = read_measured(path, wanted)
     time, angle = record.time.values, record.drum_angle.values
@@ -91,14 +96,18 @@ def _read_csv(path: Path, unit: str) -> Signals:
     return _checked(Signals(path.name, names, unit, time, angle, numbers[:, 2:]), path)
 
 
-def _read_lab(path: Path, unit: str) -> Signals:
-    """Return the signals of a file of a laboratory: the channel of the speed, and all others."""
-    available = read_channels(path)
-    speeds = [channel for channel in available if channel.name in (SPEED, "speed")]
+def _read_lab(path: Path, unit: str, channels: Mapping[str, str]) -> Signals:
+    """Return the signals of a file with named channels: that of the speed, and all others."""
+    available = available_channels(path, channels)
+    words = (SPEED, "speed") if "speed" not in channels else ("speed",)
+    speeds = [channel for channel in available if channel.name in words]
+    chosen = set(channels) - {"time", "speed"}
     used = [
         channel
         for channel in available
-        if channel not in speeds and channel.name.lower() not in TIME_NAMES
+        if channel not in speeds
+        and channel.name.lower() not in TIME_NAMES
+        and (not chosen or channel.name in chosen)
     ]
     if len(speeds) != 1 or not used:
         raise input_error(
