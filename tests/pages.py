@@ -11,7 +11,11 @@ def without_scripts(page: str) -> str:
     return SCRIPT.sub("", page)
 
 
+def data_of(page: str) -> list[dict]:
+    """Return the data in a page: descriptions of pictures, and what its scripts show."""
+    return [json.loads(text) for kind, text in SCRIPT.findall(page) if "application/json" in kind]
+
+
 def drawings(page: str) -> list[dict]:
     """Return the descriptions of the pictures of a page."""
-    found = [json.loads(text) for kind, text in SCRIPT.findall(page) if kind.endswith('json"')]
-    return [one for one in found if "panels" in one]
+    return [one for one in data_of(page) if "panels" in one]

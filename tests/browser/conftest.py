@@ -60,6 +60,17 @@ class Browser:
         """Return the first element of a CSS selector."""
         return self.driver.find_element("css selector", selector)
 
+    def mouse(self, kind, element, part):
+        """Press, move or release the mouse over an element, at a part of its width.
+
+        Selenium's chains lose a pressed button between two calls.
+        """
+        box = "const b = arguments[0].getBoundingClientRect(); return [b.left, b.width, b.top + b.height / 2]"
+        left, width, y = self.run(box, element)
+        place = {"x": left + part * width, "y": y, "button": "left", "clickCount": 1}
+        held = 0 if kind == "mouseReleased" else 1
+        self._command("Input.dispatchMouseEvent", {"type": kind, "buttons": held, **place})
+
     def wait(self, script, *arguments, timeout=20.0):
         """Wait until a script in the page returns something true, and return it."""
         from selenium.webdriver.support.ui import WebDriverWait
@@ -93,6 +104,7 @@ def started_browser(tmp_path_factory):
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     service = webdriver.ChromeService(shutil.which("chromedriver"))
     driver = webdriver.Chrome(options=options, service=service)
+    driver.set_script_timeout(120.0)  # on a computer that has other work
     yield driver
     driver.quit()
 

@@ -1,5 +1,6 @@
-/* Returns what is wrong with the layout of a page: text cut off, beyond the page, over other text. */
-const faults = [];
+/* Returns what is wrong with the layout of a page: text cut off, beyond the page, over other text.
+   On paper nothing can be scrolled: there no table may be wider than the page. */
+const faults = [], isPaper = matchMedia("print").matches;
 const room = document.documentElement.clientWidth;
 if (document.documentElement.scrollWidth > room) faults.push(`page is ${document.documentElement.scrollWidth} wide in ${room}`);
 const said = node => (node.textContent || node.value || node.tagName).trim().slice(0, 40);
@@ -9,11 +10,13 @@ for (const node of document.querySelectorAll("main h1, main h2, main h3, main p,
   if (!shown(node)) continue;
   const r = node.getBoundingClientRect(), scroller = node.closest(".scroll");
   if (!scroller && (r.right > room + 1 || r.left < -1)) faults.push(`beyond the page: ${said(node)}`);
+  if (node.tagName === "INPUT" && !["range", "checkbox"].includes(node.type) && node.scrollWidth > node.clientWidth + 1) faults.push(`value is clipped: ${said(node)}`);
   if (node.scrollWidth > node.clientWidth + 1 && getComputedStyle(node).display !== "inline" && !["SELECT", "INPUT"].includes(node.tagName)) faults.push(`wider than its box: ${said(node)}`);
 }
 for (const scroller of document.querySelectorAll(".scroll")) {
   const r = scroller.getBoundingClientRect();
   if (r.right > room + 1) faults.push(`scrolled region beyond the page: ${said(scroller)}`);
+  if ((isPaper || scroller.closest("figure")) && scroller.scrollWidth > 0 && [...scroller.children].some(node => node.getBoundingClientRect().right > room + 1)) faults.push(`wider than the paper: ${said(scroller)}`);
   if (scroller.closest("figure") && scroller.scrollWidth > scroller.clientWidth + 1) faults.push(`picture is cut off: ${scroller.scrollWidth} in ${scroller.clientWidth}`);
 }
 // texts of pictures: inside the picture, and apart from each other

@@ -114,6 +114,18 @@ def test_drakes_engine_runs_a_case_too(study):
     )
 
 
+def test_a_machine_with_a_motor_has_its_measures_in_json_table_and_page(study):
+    ended = study("--json", "--case", "front", "--machine", "motor")
+    assert ended.code == 0
+    case = json.loads(ended.out)["cases"][0]
+    table = pd.read_csv("out/drive.csv").set_index("case").loc["front"]
+    for key in ("peak_torque_Nm", "mean_torque_Nm", "speed_ripple_percent"):
+        assert table[key] == pytest.approx(case["motor"][key], rel=1e-5)
+        assert case["motor"][key] > 0.0
+    assert case["motor"]["caught_rpm"] is None
+    assert "speed ripple" in Path("out/report.html").read_text(encoding="utf-8")
+
+
 def test_interrupted_it_keeps_what_had_ended(study, monkeypatch):
     with monkeypatch.context() as patched:
         patched.setattr("wm_drake.report.spin_cycle.report.spin_cycle_report", interrupted)

@@ -68,6 +68,15 @@ def test_smallest_gap_is_that_of_brute_force(scene):
     assert (gap.moving, gap.fixed) == (scene._name(pair[0]), scene._name(pair[1]))
 
 
+def test_gap_of_a_similar_motion_changes_nothing_but_the_time_it_takes(scene):
+    poses, time = random_poses(60, 3), np.arange(60.0)
+    expected = scene.smallest_gap(time, poses, REST)
+    for seed in range(3):
+        near = scene.smallest_gap(time, random_poses(60, seed), REST)
+        assert scene.smallest_gap(time, poses, REST, near) == expected
+    assert scene.smallest_gap(time[:9], poses[:9], REST, near).time < 9.0  # of a longer motion
+
+
 def test_overlap_is_a_negative_gap_and_no_samples_are_no_gap(scene):
     gap = scene.smallest_gap(np.array([1.5]), np.array([[0, 0, 0, 0.06, 0, 0]]), REST)
     assert gap.distance == pytest.approx(0.038 - 0.06, abs=1e-4)

@@ -46,7 +46,7 @@ def test_tables_have_the_measures(result):
         *("front left", "front right", "rear right", "rear left")
     ]
     assert "friction 0.4" in view.about
-    assert view.picture is not None
+    assert len(view.pictures) == 1
 
 
 def test_a_slippery_floor_is_warned_of(machine, reference):
@@ -67,7 +67,7 @@ def test_without_cabinet_the_section_says_so(machine, reference):
     view = floor_view(spin_result(machine, bare))
     assert len(view.tables) == 1
     assert "has no cabinet" in view.about
-    assert view.picture is None
+    assert view.pictures == ()
 
 
 def test_figure_shows_the_smallest_values(result):

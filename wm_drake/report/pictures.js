@@ -5,7 +5,7 @@
    and before printing. Sizes of texts are measured, so that no label lies over another. Every text
    is escaped here: in a description nothing is markup. */
 const Pictures = (() => {
-  const DESIGN_WIDTH = 1060, INCH = 100, GAP = 16, BAR = 20, PRINT_WIDTH = 690, MINUS = "\u2212";
+  const DESIGN_WIDTH = 1060, INCH = 100, GAP = 16, BAR = 20, PRINT_WIDTH = 686, MINUS = "\u2212";
   const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Liberation Sans", Arial, sans-serif';
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const pen = document.createElement("canvas").getContext("2d");
@@ -40,6 +40,9 @@ const Pictures = (() => {
   }
 
   // ---- texts -------------------------------------------------------------------------------
+  /* A text may be broken after a blank, a dash, a slash and, as names of responses, at _ and dots. */
+  const BREAK = /(?<=[\s/\u2013_-]|\.(?=[a-z]))/;
+
   function width(text, size, bold) {
     pen.font = `${bold ? "bold " : ""}${size}px ${FONT}`;
     return Math.max(0, ...String(text).split("\n").map(line => pen.measureText(line).width));
@@ -49,7 +52,7 @@ const Pictures = (() => {
     const found = [];
     for (const line of String(text).split("\n")) {
       let now = "";
-      for (const word of line.split(/(?<=[ /\u2013-])/)) {
+      for (const word of line.split(BREAK)) {
         if (now && width((now + word).trimEnd(), size, bold) > room) {
           found.push(now.trimEnd());
           now = word;
@@ -95,16 +98,18 @@ const Pictures = (() => {
 
   const upCount = height => Math.max(3, Math.round(height / 34));
 
-  /* Texts that a plain axis is likely to show: their widths make room for them. */
-  function likelyTexts(axis, most) {
-    if (axis.ticks) return axis.ticks.map(([, text]) => text);
+  /* First and last tick that a plain axis is likely to show, [place, text]: they need room. */
+  function likelyTicks(axis, most) {
+    if (axis.ticks) return axis.ticks;
     const [a, b] = axis.range, low = Math.min(a, b), high = Math.max(a, b);
-    if (axis.is_log) return ["10\u221288"];
-    if (!(high > low)) return [String(low)];
+    if (axis.is_log) return [[low, "10\u221288"]];
+    if (!(high > low)) return [[low, String(low)]];
     const step = niceStep(high - low, most), decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
     return [Math.ceil(low / step) * step, Math.floor(high / step) * step]
-      .map(value => value.toFixed(Math.min(8, decimals)));
+      .map(value => [value, value.toFixed(Math.min(8, decimals)).replace("-", MINUS)]);
   }
+
+  const likelyTexts = (axis, most) => likelyTicks(axis, most).map(([, text]) => text);
 
   // ---- room around a panel -----------------------------------------------------------------
   const size = (points, factor) => Math.max(9.5, points * (INCH / 72) * factor);
@@ -120,7 +125,7 @@ const Pictures = (() => {
     let cell = room;
     for (let i = 1; i < places.length; i++)
       cell = Math.min(cell, room * Math.abs(places[i] - places[i - 1]) / span);
-    const words = axis.ticks.flatMap(([, text]) => text.split(/[\s]+/));
+    const words = axis.ticks.flatMap(([, text]) => text.split(BREAK).map(word => word.trimEnd()));
     if (Math.max(0, ...words.map(word => width(word, px))) <= cell - 4) {
       const texts = axis.ticks.map(([, text]) => wrapped(text, px, cell - 4));
       return { px, texts, angle: 0, height: Math.max(...texts.map(t => t.length)) * px * HEIGHT + 5 };
@@ -146,6 +151,21 @@ const Pictures = (() => {
     return { px, texts, width: Math.max(0, ...texts.flat().map(text => width(text, px))) + 8 };
   }
 
+  /* How far the first and the last tick across reach beyond the axes. [px] */
+  function overhang(axis, { px, height, texts, angle }, room) {
+    const found = { left: 0, right: 0 };
+    if (!height) return found;
+    const scale = axis.is_log ? Math.log10 : value => value, [a, b] = axis.range.map(scale);
+    likelyTicks(axis, Math.max(3, Math.round(room / 62))).forEach(([place, text], i) => {
+      const at = room * (scale(place) - a) / (b - a || 1), own = texts ? texts[i] : [text];
+      const half = angle ? 0.5 * own.length * px * HEIGHT : 0.5 * Math.max(...own.map(line => width(line, px)));
+      if (at < -1 || at > room + 1) return;
+      found.left = Math.max(found.left, half - at);
+      found.right = Math.max(found.right, at + half - room);
+    });
+    return found;
+  }
+
   /* Room that a panel needs outside its axes. [px] */
   function around(panel, twin, room, height, factor, isSolo, total) {
     const need = { left: 0, right: 4, top: 6, bottom: 4 };
@@ -156,6 +176,9 @@ const Pictures = (() => {
     need.upLabel = y.label ? wrapped(y.label, label, Math.max(60, height)) : [];
     need.left = need.upTicks.width + (need.upLabel.length ? need.upLabel.length * label * HEIGHT + 6 : 0);
     need.acrossTicks = acrossTicks(x, room, factor);
+    const beyond = overhang(x, need.acrossTicks, room);
+    need.left = Math.max(need.left, beyond.left + 2);
+    need.right = Math.max(need.right, beyond.right + 4);
     const under = size(x.label_size, factor);
     need.acrossLabel = x.label ? wrapped(x.label, under, Math.max(80, room)) : [];
     const outside = need.acrossTicks.height
@@ -175,6 +198,10 @@ const Pictures = (() => {
       need.top = Math.max(need.top, need.inner + texts.length * px * HEIGHT + 4);
       return { ...title, px, texts };
     });
+    for (const part of panel.parts) {  // texts above the panel
+      if (part.kind !== "text" || part.in_data[1] || part.y < 1 || part.shift[1] <= 0) continue;
+      need.top = Math.max(need.top, part.shift[1] * (INCH / 72) * factor + size(part.size, factor) * HEIGHT + 4);
+    }
     if (twin) {
       const ticks = upTicks(twin.y, room, height, factor, total);
       const far = size(twin.y.label_size, factor);
@@ -468,6 +495,7 @@ const Pictures = (() => {
       },
     });
     if (panel.x.ticks) {
+      across.ticklabeloverflow = "allow";
       across.tickvals = panel.x.ticks.map(([at]) => at);
       across.ticktext = panel.x.ticks.map(([, text], i) => lines(ticks.texts ? ticks.texts[i] : [text]));
     }
@@ -565,25 +593,22 @@ const Pictures = (() => {
       const label = part.label || (entry !== null ? entries(d)[entry].label : null);
       if (part.kind === "rule" || part.kind === "span") {
         if (hidden) return;
-        const other = part.along === "x" ? "y" : "x", is = part.kind === "rule";
-        const across = part.along === "x";
-        const shape = { type: is ? "line" : "rect", layer: is ? "above" : "below", xref: names.x, yref: names.y };
-        if (is) {
-          Object.assign(shape, { [`${other}0`]: part.at, [`${other}1`]: part.at, line: { color: hue(part.color), width: Math.max(1, part.width), dash: dashes(part.dash) } });
-          Object.assign(shape, { [`${part.along}0`]: 0, [`${part.along}1`]: 1, [`${part.along}ref`]: `${names[part.along]} domain` });
-        } else {
-          Object.assign(shape, { fillcolor: hue(part.color), line: { width: 0 } });
-          Object.assign(shape, { [`${part.along}0`]: part.range[0], [`${part.along}1`]: part.range[1] });
-          Object.assign(shape, { [`${other}0`]: 0, [`${other}1`]: 1, [`${other}ref`]: `${names[other]} domain` });
-        }
-        shapes.push(shape);
+        const { along } = part, other = along === "x" ? "y" : "x", isRule = part.kind === "rule";
+        const [begin, end] = isRule ? [part.at, part.at] : part.range;
+        shapes.push({
+          type: isRule ? "line" : "rect", layer: isRule ? "above" : "below",
+          [`${other}ref`]: names[other], [`${other}0`]: begin, [`${other}1`]: end,
+          [`${along}ref`]: `${names[along]} domain`, [`${along}0`]: 0, [`${along}1`]: 1,
+          ...(isRule ? { line: { color: hue(part.color), width: Math.max(1, part.width), dash: dashes(part.dash) } }
+            : { fillcolor: hue(part.color), line: { width: 0 } }),
+        });
       } else if (part.kind === "text") {
         const isPlain = part.in_data.every(Boolean) && !part.arrow && !part.shift.some(Boolean) && !part.angle;
         if (isPlain) texts.push(part);
         else notes.push([part, note(part, names, factor, overCells)]);
       } else {
         for (const trace of curves(part, panel, label, factor))
-          traces.push({ ...trace, xaxis: names.x, yaxis: names.y, visible: !hidden, showlegend: false });
+          traces.push({ ...trace, xaxis: names.x, yaxis: names.y, visible: !hidden, showlegend: false, meta: part.label });
       }
     });
     lowered(notes, room, factor);
@@ -639,7 +664,7 @@ const Pictures = (() => {
 
   function outerTexts(d, arrangement, annotations, look) {
     const px = size(9.5, arrangement.factor), base = { showarrow: false, xref: "paper", yref: "paper", font: { size: px, color: look.ink } };
-    if (d.up) annotations.push({ ...base, text: escaped(d.up), textangle: -90, x: 0, xanchor: "left", y: 0.5, yanchor: "middle" });
+    if (d.up) annotations.push({ ...base, text: lines(wrapped(d.up, px, arrangement.height - 8)), textangle: -90, x: 0, xanchor: "left", y: 0.5, yanchor: "middle" });
     if (d.across) annotations.push({ ...base, text: escaped(d.across), x: 0.5, xanchor: "center", y: 0, yanchor: "bottom" });
     if (d.title) annotations.push({ ...base, text: escaped(d.title), x: 0.5, xanchor: "center", y: 1, yanchor: "top" });
     for (const part of d.notes) annotations.push({ ...base, ...anchor(part), text: lines(part.text.split("\n")), x: part.x, y: part.y });
@@ -754,6 +779,22 @@ const Pictures = (() => {
     legendOf(picture);
     panelButtons(picture);
     target.closest("figure").dataset.drawn = "yes";
+    if (picture.clicked && target.on && !picture.listens) {
+      picture.listens = true;
+      target.on("plotly_click", ({ points: [point] }) => picture.clicked({ label: point.data.meta, number: point.pointNumber, x: point.x, y: point.y }));
+    }
+  }
+
+  /* Changes the description of a picture, and draws it again if it is drawn. */
+  function change(figure, edit) {
+    const picture = drawn.get(figure) || prepare(figure);
+    edit(picture.d);
+    if (picture.total) draw(picture);
+  }
+
+  /* Calls a function with label of the curve, number and place of a point that a reader clicks. */
+  function clicked(figure, action) {
+    (drawn.get(figure) || prepare(figure)).clicked = action;
   }
 
   function prepare(figure) {
@@ -815,7 +856,7 @@ const Pictures = (() => {
   });
 
   return {
-    draw: show, all: () => figures().forEach(show), hue, theme, escaped, short, niceStep, font: FONT, isDark, started,
+    draw: show, change, clicked, all: () => figures().forEach(show), hue, theme, escaped, short, niceStep, font: FONT, isDark, started,
     library: () => plotly, ready: () => plotly !== null,
   };
 })();

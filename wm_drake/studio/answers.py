@@ -54,7 +54,7 @@ MICRO = 1e6
 
 def runner_of(machine: OpenMachine) -> Runner:
     """Return the runner of the pages of a machine: the first run of a batch has a history."""
-    return Runner(machine.parameters, MEASURES, histories={0})
+    return Runner(machine.parameters, MEASURES, histories={0}, are_alike=True)
 
 
 def answer(

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import gc
 import json
 import os
 import time
@@ -87,7 +88,11 @@ class Studio:
     def opened(self, identifier: str) -> tuple[OpenMachine, Runner]:
         """Return an open machine and its runner."""
         machine = self.machines.open(identifier)
-        return machine, self._runners.setdefault(machine, runner_of(machine))
+        if machine not in self._runners:
+            self._runners.setdefault(machine, runner_of(machine))
+            # a full collection over all that an open machine keeps takes as long as an answer
+            gc.freeze()
+        return machine, self._runners[machine]
 
     def run(self, state: State, keys: list[str]) -> dict[str, Any]:
         """Return the answer to a page."""

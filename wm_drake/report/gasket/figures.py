@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from scipy.special import fdtri
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH
+from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH, name_ticks
 from wm_drake.report.formatting import number
 from wm_drake.report.gasket.words import LEVELS, Words
 from wm_drake.studies.doe.anova import AnovaTable, Term
@@ -65,7 +65,11 @@ def heat_map_figure(screening: Screening, words: Words) -> Figure:
     shown = table[table.max(axis=1) >= SMALLEST_PERCENT]
     values = shown.to_numpy()
     labels = list(screening.tables)
-    figure = Figure(figsize=(WIDTH, 0.27 * len(shown) + 1.5), layout="constrained")
+    longest = max(len(name) for _, name in labels)
+    is_long = longest > 4
+    names_height = 5.0 * longest if is_long else 0.0  # points
+    height = 0.27 * len(shown) + 1.5 + names_height / 72.0
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
     axes = figure.subplots()
     # the square root makes small contributions visible
     image = axes.imshow(values, cmap="Blues", norm=PowerNorm(0.5, 0.0, 100.0), aspect="auto")
@@ -81,7 +85,6 @@ def heat_map_figure(screening: Screening, words: Words) -> Figure:
         fontsize=8.5,
         parse_math=False,
     )
-    is_long = max(len(name) for _, name in labels) > 4
     axes.set_xticks(
         range(len(labels)),
         [name for _, name in labels],
@@ -98,7 +101,7 @@ def heat_map_figure(screening: Screening, words: Words) -> Figure:
             f"load {load}",
             (middle, 1.0),
             xycoords=("data", "axes fraction"),
-            xytext=(0, 22 + (5 * max(len(name) for _, name in labels) if is_long else 0)),
+            xytext=(0, 22 + names_height),
             textcoords="offset points",
             ha="center",
             fontsize=10,
@@ -189,9 +192,7 @@ def pareto_figure(screening: Screening, load: str, words: Words) -> Figure:
         significant = significant_percent(table)
         if significant is not None:
             axes.axvline(significant, color=MARK, linewidth=1.0, linestyle=":")
-        axes.set_yticks(
-            places, [term.name.replace(":", " × ") for term in ranked], fontsize=8, parse_math=False
-        )
+        name_ticks(axes, "y", places, [term.name.replace(":", " × ") for term in ranked])
         axes.set_ylim(len(ranked) - 0.5, -0.5)
         _style_panel(axes, "x")
         axes.tick_params(axis="y", labelsize=8, length=0)
@@ -259,12 +260,7 @@ def main_effects_figure(
                 x, y = means[chosen, column], at[chosen, column]
                 axes.plot(x, y, mark, color=colour, markersize=size)
         is_first = axes.get_subplotspec().is_first_col()  # type: ignore[union-attr]
-        axes.set_yticks(
-            range(len(names)),
-            titles if is_first else [""] * len(names),
-            fontsize=7.5,
-            parse_math=False,
-        )
+        name_ticks(axes, "y", range(len(names)), titles if is_first else [""] * len(names))
         axes.set_ylim(len(names) - 0.5, -0.5)
         _style_panel(axes, "x")
         axes.tick_params(axis="y", labelsize=7.5, length=0)
@@ -360,7 +356,7 @@ def residuals_figure(screening: Screening, load: str, words: Words) -> Figure:
 
 def _label_pair(axes: Axes, first: str, second: str, words: Words, more: str = "") -> None:
     """Label a panel of two factors: the first on the axis, the second, by colour, above it."""
-    axes.set_xticks(LEVELS, [words.number(first, level) for level in LEVELS])
+    name_ticks(axes, "x", LEVELS, [words.number(first, level) for level in LEVELS])
     axes.set_xlabel(words.axis(first), fontsize=8.5, parse_math=False)
     values = ", ".join(words.number(second, level) for level in LEVELS)
     axes.set_title(

@@ -30,8 +30,7 @@ def static_report(title: str, curves: Sequence[StaticCurve], command: str = "") 
         title=f"Quasi-static tests of {title}",
         about=f"{len(curves)} {'axis' if len(curves) == 1 else 'axes'}.",
         warnings=fallen,
-        summary="Force table and hysteresis of each axis. The table is the mean of loading and "
-        "unloading, without the offset of the instrument.",
+        summary=summary(curves),
         pictures=[
             picture(
                 static_figure(curves),
@@ -47,6 +46,16 @@ def static_report(title: str, curves: Sequence[StaticCurve], command: str = "") 
             ("Command", command),
         ],
     )
+
+
+def summary(curves: Sequence[StaticCurve]) -> str:
+    """Return stiffness and hysteresis of each axis as one paragraph."""
+    found = [
+        f"Axis {axis}: {stiffness} from {reach}, with a hysteresis of ±{friction}."
+        for axis, reach, stiffness, friction, *_ in static_cells(curves)
+    ]
+    table = "The force table is the mean of loading and unloading, without the instrument's offset."
+    return " ".join([*found, table])
 
 
 def static_figure(curves: Sequence[StaticCurve]) -> Figure:

@@ -4,12 +4,19 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, WIDTH, style_axes
 from wm_drake.report.formatting import MISSING, MM_PER_M, significant
-from wm_drake.report.page import Picture, picture, render
+from wm_drake.report.page import Picture, as_json, picture, render
+from wm_drake.report.pareto.figures import (
+    DESIGNS,
+    PICKED,
+    envelopes_figure,
+    first_picked,
+    front_figure,
+    history_figure,
+    pairs_of,
+)
 from wm_drake.report.tables import Group, Table, line
 from wm_drake.studies.pareto.envelopes import Envelopes
 from wm_drake.studies.pareto.robust import FRESH, Promise
@@ -18,9 +25,6 @@ from wm_drake.studies.pareto.tables import machine_file_name
 
 DIGITS = 4
 """Significant digits of a number on the page."""
-
-LEFT, RIGHT, TOP, BOTTOM = 80.0, 700.0, 20.0, 320.0
-"""Edges of the front that is drawn for picking. [px]"""
 
 
 def pareto_report(
@@ -55,9 +59,9 @@ def pareto_report(
         about=about,
         summary=summary(front, kept),
         warnings=[] if has_front else ["No design meets all constraints."],
-        plot=_plot(front) if has_front and len(designs.objectives) > 1 else None,
-        picked=_picked(front, shown) if has_front and shown else None,
-        envelopes_of=shown.of if shown else "",
+        front=_front(front) if has_front and len(designs.objectives) > 1 else None,
+        picked=as_json(_picked(front, shown)) if has_front and shown else None,
+        envelopes=_envelopes(front, shown) if has_front and shown else None,
         chosen=_chosen(front) if has_front else None,
         promises=_promises(kept) if kept else None,
         history=_history(front),
@@ -99,56 +103,46 @@ def _text(value: float) -> str:
     return significant(float(value), DIGITS) if np.isfinite(value) else MISSING
 
 
-def _plot(front: ParetoFront) -> dict[str, Any]:
-    """Return positions of the designs in a plot of the first two objectives, and its ticks."""
-    designs = front.designs
-    names = [f"{g.given.quantity}, {g.unit.shown.replace('*', ' ')}" for g in designs.objectives]
-    both = np.vstack([front.objectives[:, :2], front.nominal_objectives[None, :2]])
-    both = both[np.isfinite(both).all(axis=1)]
-    low, high = both.min(axis=0), both.max(axis=0)
-    margin = 0.05 * np.where(high > low, high - low, 1.0)
-    low, high = low - margin, high + margin
+def _front(front: ParetoFront) -> Picture:
+    """Return the picture of the front, in which a design can be picked."""
+    caption = (
+        "Each point is a design; no other design is better in every objective. The circle is the "
+        "picked design; the cross is the machine itself."
+    )
+    count = len(front.objectives)
+    return picture(front_figure(front), f"Front of {count} designs.", caption)
 
-    def at(point: Any) -> tuple[float, float]:
-        x, y = (np.asarray(point[:2]) - low) / (high - low)
-        return round(LEFT + x * (RIGHT - LEFT), 1), round(BOTTOM - y * (BOTTOM - TOP), 1)
 
-    fractions = np.linspace(0.0, 1.0, 5)
-    return {
-        "points": [at(point) for point in front.objectives],
-        "nominal": at(front.nominal_objectives)
-        if np.isfinite(front.nominal_objectives).all()
-        else None,
-        "chosen": sorted(set(front.chosen.values())),
-        "x_ticks": [(at(p)[0], _text3(p[0])) for p in low + fractions[:, None] * (high - low)],
-        "y_ticks": [(at(p)[1], _text3(p[1])) for p in low + fractions[:, None] * (high - low)],
-        "names": names[:2],
-        "edges": (LEFT, RIGHT, TOP, BOTTOM),
-    }
+def _envelopes(front: ParetoFront, shown: Envelopes) -> Picture:
+    """Return the picture of the envelopes of the picked design."""
+    caption = (
+        f"Largest envelope of the filtered displacements over time: {shown.of}. Coloured: the "
+        "picked design; grey: the machine itself."
+    )
+    alternative = "Envelopes of the picked design at each sensor."
+    return picture(envelopes_figure(shown, first_picked(front)), alternative, caption)
 
 
 def _picked(front: ParetoFront, shown: Envelopes) -> dict[str, Any]:
-    """Return the numbers that the page shows of the picked design."""
-    both = np.concatenate([shown.designs.ravel(), shown.nominal.ravel(), [0.0]])
-    scale = MM_PER_M * float(np.nanmax(both))
+    """Return the numbers of each design that the page needs to show it when it is picked."""
+    places = [[_finite(value) for value in design] for design in front.objectives]
     return {
         "rows": _rows(front),
-        "picked": front.chosen.get(COMPROMISE, next(iter(front.chosen.values()))),
-        "time": [round(float(t), 2) for t in shown.time],
-        "sensors": list(shown.sensors),
-        "designs": [[_in_mm(line) for line in design] for design in shown.designs],
-        "nominal": [_in_mm(line) for line in shown.nominal],
-        "largest": scale or 1.0,
+        "picked": first_picked(front),
+        "pairs": pairs_of(front),
+        "objectives": places,
+        "envelopes": [[_in_mm(line) for line in design] for design in shown.designs],
+        "labels": {"picked": PICKED, "designs": DESIGNS},
     }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _in_mm(line: FloatArray) -> list[float | None]:
     """Return an envelope in mm, rounded; None where there is none."""
     return [round(MM_PER_M * float(v), 2) if np.isfinite(v) else None for v in line]
-
-
-def _text3(value: float) -> str:
-    return significant(float(value), 3)
 
 
 def _rows(front: ParetoFront) -> list[list[tuple[str, str, str]]]:
@@ -209,17 +203,9 @@ def _promises(kept: Sequence[Promise]) -> Table:
 
 
 def _history(front: ParetoFront) -> Picture:
-    figure = Figure(figsize=(WIDTH, 3.0), layout="constrained")
-    axes = figure.add_subplot()
-    evaluations, volume = np.array(front.found.history).T
-    axes.plot(evaluations, volume, color=OURS, linewidth=1.6)
-    axes.plot(evaluations[-1], volume[-1], "o", color=MEASURED, markeredgecolor=MARK)
-    axes.set_xlabel("evaluated designs", fontsize=9.5)
-    axes.set_ylabel("hypervolume", fontsize=9.5)
-    axes.grid(color=GRID)
-    style_axes(axes)
     caption = (
         "Hypervolume of the front after each generation. Objectives are scaled so that the first "
         "population reaches from 0 to 1. A level curve means that more evaluations find little."
     )
-    return picture(figure, "Hypervolume over the number of evaluated designs.", caption)
+    alternative = "Hypervolume over the number of evaluated designs."
+    return picture(history_figure(front), alternative, caption)

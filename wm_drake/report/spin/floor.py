@@ -10,7 +10,7 @@ from wm_drake.report.figures import GRID, MARK, WIDTH, style_axes
 from wm_drake.report.formatting import number
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.spin.cases import case_title
-from wm_drake.report.spin.walk import WALKING, WalkView, walk_view, walk_warning
+from wm_drake.report.spin.walk import WALKING, walk_view, walk_warning
 from wm_drake.report.tables import Group, Row, Table
 from wm_drake.simulation.feet import MARGINS
 from wm_drake.simulation.measures import foot_loads_of
@@ -39,14 +39,12 @@ class FloorView:
     Attributes:
         about: Sentences about the model.
         tables: Tables, the resultant on the cabinet first.
-        picture: Loads and margins over time; None without feet.
-        walk: Where a cabinet that moves goes; None for a fixed one.
+        pictures: Path of a cabinet that moves; loads and margins over time. None without feet.
     """
 
     about: str
     tables: tuple[Table, ...]
-    picture: Picture | None
-    walk: WalkView | None = None
+    pictures: tuple[Picture, ...]
 
 
 def floor_view(result: SpinResult) -> FloorView:
@@ -58,17 +56,19 @@ def floor_view(result: SpinResult) -> FloorView:
             "The machine file has no cabinet, so the loads of its feet are unknown. They are shown "
             "if it has mass, centre of mass, floor, friction and feet under the key 'cabinet'."
         )
-        return FloorView(about, (resultant_table(result),), None)
+        return FloorView(about, (resultant_table(result),), ())
     tables = (resultant_table(result), margins_table(standing), feet_table(standing))
+    pictures = _pictures(standing)
     if any(case.measures.walk for case in standing):
-        return FloorView(WALKING, tables, _picture(standing), walk_view(standing))
+        walk = walk_view(standing)
+        return FloorView(WALKING, (*tables, walk.table), (*walk.pictures, *pictures))
     about = (
         "Loads of the feet of a rigid cabinet that does not move, on a rigid level floor. Normal "
         "loads: four feet of equal vertical stiffness that do not pull. Margins: what is missing "
         f"until the cabinet slides or turns at friction {cabinet.friction:g}, or tips over; below "
         "0 it does. The model does not let it move, so what happens after that is not computed."
     )
-    return FloorView(about, tables, _picture(standing))
+    return FloorView(about, tables, pictures)
 
 
 def floor_warnings(result: SpinResult) -> list[str]:
@@ -162,10 +162,10 @@ def feet_table(cases: list[CaseResult]) -> Table:
     return Table(caption, header, tuple(groups), text_columns=2)
 
 
-def _picture(cases: list[CaseResult]) -> Picture | None:
+def _pictures(cases: list[CaseResult]) -> tuple[Picture, ...]:
     shown = [case for case in cases if case.record.sizes["time"] > 1]
     if not shown:
-        return None
+        return ()
     caption = (
         "Smallest load of a foot and margins of sliding and turning over time: the smallest value "
         f"in each {WINDOW:g} s. Where a line is at 0 or below, a foot lifts off or the cabinet "
@@ -176,9 +176,8 @@ def _picture(cases: list[CaseResult]) -> Picture | None:
         for case in shown
         if case.measures.feet is not None
     )
-    return picture(
-        floor_figure(shown), f"Smallest margin of turning for each load. {smallest}.", caption
-    )
+    alternative = f"Smallest margin of turning for each load. {smallest}."
+    return (picture(floor_figure(shown), alternative, caption),)
 
 
 def floor_figure(cases: list[CaseResult]) -> Figure:

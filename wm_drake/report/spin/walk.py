@@ -43,16 +43,16 @@ class WalkView:
 
     Attributes:
         table: Table.
-        picture: Path of the feet and of the cabinet; None without samples.
+        pictures: Path of the feet and of the cabinet; none without samples.
     """
 
     table: Table
-    picture: Picture | None
+    pictures: tuple[Picture, ...]
 
 
 def walk_view(cases: list[CaseResult]) -> WalkView:
     """Return the part of the page for cases of a machine whose cabinet moves."""
-    return WalkView(walk_table(cases), _picture(cases))
+    return WalkView(walk_table(cases), _pictures(cases))
 
 
 def walk_warning(case: CaseResult) -> list[str]:
@@ -86,10 +86,10 @@ def walk_table(cases: list[CaseResult]) -> Table:
     return Table(caption, header, tuple(groups), text_columns=1)
 
 
-def _picture(cases: list[CaseResult]) -> Picture | None:
+def _pictures(cases: list[CaseResult]) -> tuple[Picture, ...]:
     shown = [case for case in cases if case.measures.walk and case.record.sizes["time"] > 1]
     if not shown:
-        return None
+        return ()
     distances = [case.measures.walk.distance for case in shown if case.measures.walk]
     farthest = shown[int(np.argmax(distances))]
     caption = (
@@ -101,7 +101,7 @@ def _picture(cases: list[CaseResult]) -> Picture | None:
         f"{case_title(case)}: {number(MM.from_si(distance))} mm"
         for case, distance in zip(shown, distances, strict=True)
     )
-    return picture(walk_figure(shown, farthest), f"Distance walked. {walked}.", caption)
+    return (picture(walk_figure(shown, farthest), f"Distance walked. {walked}.", caption),)
 
 
 def walk_figure(cases: list[CaseResult], farthest: CaseResult) -> Figure:

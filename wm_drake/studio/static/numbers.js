@@ -49,7 +49,12 @@ export class NumberList {
       this.moved(number.key, text.value, false);
     });
     slider.addEventListener('change', () => this.moved(number.key, sliderText(), true));
-    text.addEventListener('change', () => this.moved(number.key, text.value.trim() || null, true));
+    text.addEventListener('input', () => { row.isTyping = true; });
+    text.addEventListener('blur', () => { row.isTyping = false; });
+    text.addEventListener('change', () => {
+      row.isTyping = false;
+      this.moved(number.key, text.value.trim() || null, true);
+    });
     back.addEventListener('click', () => this.moved(number.key, null, true));
     this.rows.set(number.key, row);
     return element;
@@ -61,7 +66,8 @@ export class NumberList {
       const isMoved = key in values;
       row.element.classList.toggle('moved', isMoved);
       const value = key in shown ? shown[key] : row.number.value;
-      if (document.activeElement !== row.text || isMoved) {
+      // an answer that comes while the user types leaves the text alone
+      if (!row.isTyping && (document.activeElement !== row.text || isMoved)) {
         row.text.value = isMoved ? values[key] : `${digits(row.number.value, 6).replace('−', '-')} ${row.number.unit}`.trim();
       }
       if (document.activeElement !== row.slider && (key in shown || !isMoved)) {

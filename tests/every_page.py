@@ -1,0 +1,207 @@
+"""Every kind of page that the commands write, each from a small run.
+
+`KINDS` has the commands of each page; `tests/report/test_every_page.py` holds the list to the
+templates of `wm_drake/report`.
+"""
+
+import contextlib
+import io
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+FREE = """quantities:
+  friction: {bounds: "(10, 60) N", prior: "(30, 10) N", sets: damper_types.friction.friction_force, source: test}
+  radius: {bounds: "(230, 250) mm", prior: "(240, 5) mm", sets: loads.middle.unbalances.0.radius, source: test}
+"""
+SHORT = "extends: reference\nname: short\n"
+DAMPER = ("--component", "mstv_damper")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of page.
+
+    Attributes:
+        template: Template of the page in `wm_drake/report`.
+        commands: Commands that write it, one after the other, in one folder. The last one writes
+            to the folder `out`. `*` stands for the loops of the folder `bench`.
+        page: Its path in the folder `out`.
+    """
+
+    template: str
+    commands: tuple[tuple[str, ...], ...]
+    page: str = "report.html"
+
+
+def _one(template: str, *words: str, page: str = "report.html") -> Kind:
+    return Kind(template, (words,), page)
+
+
+def _fit(template: str, bench: tuple[str, ...], *words: str) -> Kind:
+    return Kind(template, (("rig", *bench, "--out", "bench"), ("identify", *words)))
+
+
+KINDS = {
+    "spin": _one("spin/page.html", "spin"),
+    "spin_of_motor": _one(
+        "spin/page.html", "spin", "--machine", "motor", "--load", "middle", "--detail"
+    ),
+    "spin_of_cabinet": _one(
+        "spin/page.html", "spin", "--machine", "light_cabinet", "--load", "middle"
+    ),
+    "comparison": _one(
+        "spin/comparison.html", "spin", "--compare-gasket", "--load", "middle", "--load", "front",
+    ),
+    "rig_damper": _one(
+        "rig/page.html", "rig", "damper", *DAMPER, "-f", "1,10 Hz", "-a", "0.3,1 mm"
+    ),
+    "rig_gasket": _one("rig/page.html", "rig", "gasket", "--axis", "axial", "--matrix", "A"),
+    "rig_bushing": _one(
+        "rig/page.html", "rig", "bushing", "--machine", "free_stroke", "--axis", "radial",
+        "-f", "1,5 Hz", "-a", "1 mm",
+    ),
+    "identify_damper": _fit(
+        "identify/page.html", ("damper", *DAMPER, "-f", "1,10 Hz", "-a", "0.3,1 mm"), "damper", "*"
+    ),
+    "identify_gasket": _fit(
+        "identify/page.html",
+        ("gasket", "--machine", "free_stroke", "--axis", "radial", "-f", "1,5 Hz", "-a", "1,10 mm"),
+        "gasket", "*", "--axis", "radial",
+    ),
+    "identify_table": _fit(
+        "identify/page.html", ("gasket", "--axis", "axial", "-f", "1,5 Hz", "-a", "1,10 mm"),
+        "gasket", "*", "--axis", "axial", "--law", "table",
+    ),
+    "identify_rivals": _fit(
+        "identify/comparison.html",
+        ("damper", *DAMPER, "-f", "1,5,10 Hz", "-a", "0.3,1 mm"),
+        "damper", "*", "--law", "mstv,stv,coulomb",
+    ),
+    "identify_static": _one(
+        "identify/static.html", "identify", "gasket", "--static", "radial=r.csv", "axial=a.csv"
+    ),
+    "identify_table2": _one("identify/table2.html", "identify", "table2"),
+    "calibration": _one(
+        "calibration/page.html", "calibrate", "--machine", "short.yaml", "--free", "free.yaml",
+        "--targets", "measured.csv", "--starts", "1", "--iterations", "3",
+        "--leave-out", "back", "--fewer", "1",
+    ),
+    "gasket": _one("gasket/page.html", "study", "gasket", "--trials", "150", "--check", "C_L=120 %"),
+    "gasket_of_one_load": _one(
+        "gasket/page.html", "study", "gasket", "--design", "orthogonal", "--trials", "243",
+        "--model", "main", "--load", "back", "--response", "mount_force_peak", "--response", "amplitude",
+    ),
+    "gasket_effect": _one("gasket_effect/page.html", "study", "gasket-effect", "--load", "middle"),
+    "gasket_damping": _one("gasket_damping/page.html", "study", "gasket-damping", "--mesh", "20"),
+    "spin_cycle": _one(
+        "spin_cycle/page.html", "study", "spin-cycle", "--case", "2", "--case", "29"
+    ),
+    "spin_identify": _one(
+        "spin_identify/page.html", "study", "spin-identify", "--case", "2",
+        "--unknown", "gasket.stiffness_y=(1, 4) N/mm", "--profile", "short_cycle.yaml",
+    ),
+    "modes": _one("modes/page.html", "study", "modes"),
+    "response": _one(
+        "response/page.html", "study", "response", "--load", "middle", "--points", "15",
+        "--harmonics", "3", "--rate", "20 rpm/s", "--rate", "50 rpm/s",
+    ),
+    "orders": Kind(
+        "orders/page.html",
+        (("spin", "--load", "middle", "--out", "bench"), ("record", "orders", "record")),
+    ),
+    "tolerance": _one(
+        "tolerance/page.html", "study", "tolerance", "laundry", "--samples", "64",
+        "--sensitivity", "16", "--subset", "100", "--limits", "limits.yaml",
+    ),
+    "design": _one(
+        "pareto/page.html", "study", "design", "gasket", "--evaluations", "48", "--population", "16"
+    ),
+    "drive": _one(
+        "drive/page.html", "study", "drive", "--load", "middle", "--torques", "3",
+        "--unbalances", "2", "--loads", "4",
+    ),
+}  # fmt: skip
+
+
+def write_page(name: str, folder: Path) -> Path:
+    """Run the commands of a kind of page in a folder, and return the page.
+
+    Args:
+        name: Name in `KINDS`.
+        folder: Empty folder.
+    """
+    kind = KINDS[name]
+    _write_inputs(folder)
+    with contextlib.chdir(folder):
+        for command in kind.commands:
+            _run([*_with_files(command, folder), "--quiet"])
+    return folder / "out" / kind.page
+
+
+def _with_files(command: tuple[str, ...], folder: Path) -> list[str]:
+    words = []
+    for word in command:
+        if word == "*":
+            words += [str(path) for path in sorted((folder / "bench").glob("loop_*.csv"))]
+        elif word == "record":
+            words.append(str(next((folder / "bench").glob("*.nc"))) if words else word)
+        else:
+            words.append(word)
+    return words if "--out" in words else [*words, "--out", "out"]
+
+
+def _run(words: list[str]) -> None:
+    from wm_drake.cli import main
+
+    before, sys.argv = sys.argv, ["wm-drake", *words]
+    said, code = io.StringIO(), None
+    try:
+        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
+            main()
+    except SystemExit as ended:
+        code = ended.code
+    finally:
+        sys.argv = before
+    assert not code, f"{words}: {said.getvalue()}"
+
+
+def _write_inputs(folder: Path) -> None:
+    (folder / "free.yaml").write_text(FREE)
+    (folder / "short.yaml").write_text(SHORT)
+    (folder / "limits.yaml").write_text(
+        "limits:\n  - {quantity: gap, at_least: 10 mm, allowed_share: 1 %}\n"
+    )
+    (folder / "short_cycle.yaml").write_text(
+        "time: (0, 4, 6) s\nspeed: (60, 250, 250) rpm\n"
+        "regions: [{name: R1, begin: 0 s, end: 3 s}, {name: R2, begin: 3 s, end: 6 s}]\n"
+    )
+    rows = [
+        ["middle", "yes", "experiment", 16.0, 5.0, 12.0, 17.0, 5.0, 13.0],
+        ["back", "yes", "experiment", 15.0, 4.0, 11.0, 9.0, 4.0, 7.0],
+    ]
+    sensors = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
+    pd.DataFrame(rows, columns=["load", "gasket", "source", *sensors]).to_csv(
+        folder / "measured.csv", index=False
+    )
+    for name, stiffness in (("r", 3.0), ("a", 5.0)):
+        _write_ramp(folder / f"{name}.csv", stiffness)
+
+
+def _write_ramp(path: Path, stiffness: float) -> None:
+    """Write a quasi-static test with 3 N of friction: to both ends and back. [N/mm]"""
+    ends = np.array([0.0, 10.0, -10.0, 10.0, -10.0, 0.0])
+    displacement = np.interp(np.linspace(0, len(ends) - 1, 4000), range(len(ends)), ends)
+    rate = np.gradient(displacement)
+    force = stiffness * displacement + 3.0 * np.sign(rate) + 0.02 * displacement**3
+    noise = np.random.default_rng(0).normal(scale=0.2, size=len(force))
+    pd.DataFrame(
+        {
+            "time_s": np.linspace(0.0, 200.0, len(force)),
+            "displacement_mm": displacement,
+            "force_N": force + noise,
+        }
+    ).to_csv(path, index=False)

@@ -1,0 +1,19 @@
+"""The list of all kinds of pages is complete."""
+
+from pathlib import Path
+
+from every_page import KINDS
+
+import wm_drake.report
+
+FOLDER = Path(wm_drake.report.__file__).parent
+
+
+def test_each_template_of_a_page_has_a_kind():
+    """Each file that extends page.html is a kind of page, and is drawn in the browser tests."""
+    templates = {
+        path.relative_to(FOLDER).as_posix()
+        for path in FOLDER.rglob("*.html")
+        if '{% extends "page.html" %}' in path.read_text(encoding="utf-8")
+    }
+    assert {kind.template for kind in KINDS.values()} == templates
