@@ -41,7 +41,7 @@ def test_study_writes_front_and_machines_and_continues(study, wm_drake, monkeypa
     assert list(front["Dx_mm"]) == sorted(front["Dx_mm"])
     assert wm_drake("machine", "check", "out/machine_best_Dx.yaml").code == 0
     # a design that is not in the ledger would fail; only the envelopes run again
-    monkeypatch.setattr("wm_drake.batch.ledger.Ledger.put", None)
+    monkeypatch.setattr("wm_drake.batch.ledger.Ledger.put_all", None)
     again = json.loads(study("--evaluations", "16", "--json").out)
     assert again["front"] == printed["front"]
 

@@ -202,14 +202,14 @@ def test_faults_are_refused_in_one_line_and_leave_nothing(study, fault):
 
 
 def interrupted_after(count, monkeypatch, mishap):
-    put = Ledger.put
+    put_all = Ledger.put_all
 
-    def failing(self, *values):
-        put(self, *values)
-        if len(self) == count:
+    def failing(self, results):
+        put_all(self, results)
+        if len(self) >= count:
             raise mishap
 
-    monkeypatch.setattr(Ledger, "put", failing)
+    monkeypatch.setattr(Ledger, "put_all", failing)
 
 
 def test_interrupt_keeps_what_had_finished(study_without_page, monkeypatch):
