@@ -114,8 +114,11 @@ def run_all(wm_drake, folder, page, chosen):
         for word in shlex.split(command.split(" > ")[0])[1:]:
             paths = sorted(path.relative_to(folder).as_posix() for path in folder.glob(word))
             words += paths if "*" in word else [word]
-        replaces = words[0] != "machine" and "--resume" not in words
-        words += ["--overwrite"] if replaces else []
+        if words[:2] == ["machine", "new"]:  # never over a file
+            (folder / f"{words[2]}.yaml").unlink(missing_ok=True)
+        if words[0] != "machine" and "--resume" not in words:
+            first = next((n for n, word in enumerate(words) if word.startswith("-")), len(words))
+            words.insert(first, "--overwrite")  # before an option that takes several values
         run = in_own_process if "--replay" in words else wm_drake
         result = run(*words)
         if result.code:

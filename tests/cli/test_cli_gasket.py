@@ -354,7 +354,8 @@ def test_ten_kills_leave_identical_tables(tmp_path):
 @pytest.mark.slow
 def test_second_study_on_the_folder_is_refused_while_the_first_runs(tmp_path):
     first = start(tmp_path, "--out", "out")
-    while not (tmp_path / "out" / "ledger.sqlite").exists():
+    ledger = tmp_path / "out" / "ledger.sqlite"
+    while not (ledger.exists() and ledger.stat().st_size):  # locked once it holds something
         time.sleep(0.01)
     first.send_signal(signal.SIGSTOP)
     second = start(tmp_path, "--out", "out", "--resume")

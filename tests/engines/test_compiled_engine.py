@@ -71,7 +71,7 @@ def test_without_gasket_and_with_other_numbers(machine, reference):
         assert compiled.attrs["gasket"] == drake.attrs["gasket"]
 
 
-@pytest.mark.slow
+@pytest.mark.hours
 @pytest.mark.parametrize(("load", "gasket"), [("middle", True), ("counter", False)])
 def test_70_s_trajectories_agree_to_a_micrometre_when_both_are_refined(
     machine, reference, load, gasket

@@ -105,7 +105,7 @@ def test_energy_balances_over_a_fast_run_up(machine, reference):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.hours
 def test_energy_balances_over_the_run_up_of_70_s(machine, reference):
     assert check_energy(machine, case_of(reference, "middle"), 2.5e-4) < 1e-5
 

@@ -99,7 +99,7 @@ def with_noise(records, seed):
     }
 
 
-@pytest.mark.slow
+@pytest.mark.hours
 @pytest.mark.parametrize("pair", PLANTED)
 def test_grid_recovers_planted_damping_for_five_seeds_of_noise(reference, pair):
     truth = si(pair)
@@ -197,7 +197,7 @@ ENGINES = 1e-3
 """Relative difference of peaks between the two engines at their default steps (tested)."""
 
 
-@pytest.mark.slow
+@pytest.mark.hours
 def test_command_recovers_its_virtual_experiment_and_names_it_so(wm_drake):
     ended = wm_drake("study", "gasket-damping", "--out", "out", "--json")
     assert ended.code == 0
