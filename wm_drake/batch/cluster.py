@@ -164,8 +164,9 @@ def simulate_on_cluster(
     keys: list[str] = []
 
     def missing() -> Iterator[tuple[str, Case]]:
-        for case in cases:
-            (key,) = run_keys(machine.parameters, [case], measures=wanted, step=step)
+        given, hashed = itertools.tee(cases)
+        known = run_keys(machine.parameters, hashed, measures=wanted, step=step)
+        for case, key in zip(given, known, strict=True):
             names.append(case.name)
             keys.append(key)
             if key not in ledger:

@@ -2,6 +2,7 @@
 
 import functools
 import hashlib
+import itertools
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
@@ -113,8 +114,9 @@ def simulate_remembered(
 
     def missing() -> Iterator[Case]:
         nonlocal done
-        for case in cases:
-            (key,) = run_keys(machine.parameters, [case], measures=wanted, step=step)
+        given, hashed = itertools.tee(cases)
+        known = run_keys(machine.parameters, hashed, measures=wanted, step=step)
+        for case, key in zip(given, known, strict=True):
             names.append(case.name)
             keys.append(key)
             if key in ledger:

@@ -129,8 +129,9 @@ class AppliedForce:
 
 def _as_slice(indices: np.ndarray) -> np.ndarray | slice:
     """Return indices as a slice, which numpy reads faster, if they follow one another."""
-    if len(indices) and np.array_equal(indices, indices[0] + np.arange(len(indices))):
-        return slice(int(indices[0]), int(indices[-1]) + 1)
+    numbers = indices.tolist()
+    if numbers and numbers == list(range(numbers[0], numbers[0] + len(numbers))):
+        return slice(numbers[0], numbers[-1] + 1)
     return indices
 
 

@@ -464,14 +464,13 @@ def _drum_harmonics(
         "double_cosine": 0.5 * (cosine_squared - sine_squared),
         "double_sine": 0.5 * (product(across, turned) + product(turned, across)),
     }
+    entries = {part: _six(matrix) for part, matrix in matrices.items()}
     moments = {
         f"drum_moment_{letter}": FIRST_HARMONIC.pack(**{part: v[k] for part, v in moment.items()})
         for k, letter in enumerate("xyz")
     }
     inertias = {
-        f"drum_inertia_{entry}": SECOND_HARMONIC.pack(
-            **{part: _six(matrix)[k] for part, matrix in matrices.items()}
-        )
+        f"drum_inertia_{entry}": SECOND_HARMONIC.pack(**{part: v[k] for part, v in entries.items()})
         for k, entry in enumerate(("xx", "yy", "zz", "xy", "xz", "yz"))
     }
     return moments | inertias

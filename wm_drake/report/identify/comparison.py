@@ -272,6 +272,7 @@ def _pictures(
     if not motions:
         return []
     laws = [r.law for r in comparison.results]
+    best = laws.index(comparison.supported.law)
     chosen = measured_files(motions)
     number = (
         f"{len(chosen)} of {len(motions)} tests, evenly chosen; all are in loops.csv. "
@@ -282,10 +283,10 @@ def _pictures(
     assert len(chosen) <= MOST_PANELS
     return [
         picture(
-            rival_loops_figure(laws, fits, motions, chosen, over=over),
+            rival_loops_figure(laws, fits, motions, chosen, best=best, over=over),
             f"Measured samples and the loop of each law over {over}, {what}.",
-            f"Force over {over}, {what} (form of [C] Figs. 13, 15-20). {number}Offset and drift of "
-            "the instrument are removed; each law has its own.",
+            f"Force over {over}, {what} (form of [C] Figs. 13, 15-20). {number}The offset and "
+            f"drift that {laws[best]} finds for the instrument are removed.",
         )
         for over in ("displacement", "velocity")
     ]

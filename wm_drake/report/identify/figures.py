@@ -86,15 +86,20 @@ def rival_loops_figure(
     motions: Sequence[MeasuredMotion],
     chosen: Sequence[int],
     *,
+    best: int,
     over: str,
 ) -> Figure:
     """Draw measured samples and the loop of each law, one panel per test.
+
+    The offset and drift that the best law finds are taken from the samples and from all laws, so
+    that each law lies beside the samples as its error says.
 
     Args:
         laws: Names of the laws.
         fits: Fit or evaluation of each law on all motions.
         motions: Measured motions.
         chosen: Indices of the motions that are drawn.
+        best: Index of the best law.
         over: Abscissa: displacement or velocity.
     """
     columns = min(COLUMNS, max(2, len(chosen)))
@@ -111,7 +116,7 @@ def rival_loops_figure(
         measured = motions[index]
         x = factor * (measured.position if over == "displacement" else measured.rate)
         order = drawing_order(measured)
-        shown = measured.baseline @ fits[0].baselines[index]
+        shown = measured.baseline @ fits[best].baselines[index]
         axes.plot(
             x,
             measured.loop.force - shown,
@@ -122,8 +127,7 @@ def rival_loops_figure(
             rasterized=True,
         )
         for k, fit in enumerate(fits):
-            own = fit.computed[fit.problem.slices[index]]
-            computed = own - measured.baseline @ fit.baselines[index]
+            computed = fit.computed[fit.problem.slices[index]] - shown
             axes.plot(x[order], computed[order], color=_law_colour(k), linewidth=1.3)
         style_panel(axes)
         axes.set_title(
