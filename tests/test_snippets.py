@@ -113,7 +113,7 @@ def run_all(wm_drake, folder, page, chosen):
         words = []
         for word in shlex.split(command.split(" > ")[0])[1:]:
             paths = sorted(path.relative_to(folder).as_posix() for path in folder.glob(word))
-            words += paths if "*" in word else [word]
+            words += paths or [word]  # a word such as N*m names no files
         if words[:2] == ["machine", "new"]:  # never over a file
             (folder / f"{words[2]}.yaml").unlink(missing_ok=True)
         if words[0] != "machine" and "--resume" not in words:
