@@ -23,9 +23,9 @@ def motion_text(measured: MeasuredMotion) -> str:
     """
     factor, _, unit = motion_scale(measured.loop.rotates)
     if not isinstance(measured, HarmonicMotion):
-        low, high = (factor * side(measured.position) for side in (np.min, np.max))
-        negligible = 1e-9 * (high - low)  # rounding of an end at zero
-        low, high = (0.0 if abs(end) < negligible else end for end in (low, high))
+        ends = [float(factor * side(measured.position)) for side in (np.min, np.max)]
+        negligible = 1e-9 * (ends[1] - ends[0])  # rounding of an end at zero
+        low, high = (0.0 if abs(end) < negligible else end for end in ends)
         return f"as recorded, {low:.3g} to {high:.3g} {unit}"
     return f"{measured.motion.frequency:.3g} Hz, {factor * measured.motion.amplitude:.3g} {unit}"
 
