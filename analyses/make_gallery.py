@@ -49,8 +49,8 @@ quantities:
 """
 BENCH = 'wm-drake rig damper --component mstv_damper -f "1,3,10 Hz" -a "0.3,1 mm" --out bench'
 RUBBER = (
-    'wm-drake rig gasket --axis axial --set "gasket.dahl_force_y=4 N" '
-    '--set "gasket.dahl_displacement_y=0.5 mm" -f "1,3,5 Hz" -a "1,5,10 mm" --out rubber'
+    'wm-drake rig gasket --axis axial --set "gasket.dahl_displacement_y=0.5 mm" '
+    '--set "gasket.dahl_force_y=4 N" -f "1,3,5 Hz" -a "1,5,10 mm" --out rubber'
 )
 
 
