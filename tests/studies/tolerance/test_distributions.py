@@ -176,3 +176,11 @@ def test_intervals_of_percentiles_contain_the_truth():
     found = [percentile_of(random.random(200), 95.0) for _ in range(400)]
     inside = np.mean([p.lower <= 0.95 <= p.upper for p in found])
     assert 0.92 <= inside <= 0.995
+
+
+def test_a_single_quantity_that_hardly_varies_has_indices():
+    at_a = np.zeros(8)
+    at_a[0] = 1.0  # most resamples do not vary
+    at_exchanged = np.concatenate([np.zeros(8), at_a[::-1]])
+    (index,) = sobol_indices(at_a, at_exchanged)
+    assert np.isfinite([index.first, index.total]).all()

@@ -75,12 +75,12 @@ def sobol_indices(
         return None
     random = np.random.default_rng(seed)
     rows = [np.arange(n), *(random.integers(n, size=n) for _ in range(RESAMPLES))]
+    twice = np.concatenate([parts[1:], parts[-1:]])  # scipy fails on a single quantity
     found = []
     for row in rows:
-        values = {"f_A": at_a[None, row], "f_B": parts[:1, row], "f_AB": parts[1:, None, row]}
+        values = {"f_A": at_a[None, row], "f_B": parts[:1, row], "f_AB": twice[:, None, row]}
         result = stats.sobol_indices(func=values, n=n)
-        # scipy drops the dimension of a single quantity
-        found.append([np.reshape(r, -1) for r in (result.first_order, result.total_order)])
+        found.append([result.first_order[:-1], result.total_order[:-1]])
     indices = np.array(found)  # (resample, first or total, quantity)
     lower, upper = np.percentile(indices[1:], PERCENTILES, axis=0)
     return [
