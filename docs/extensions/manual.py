@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from equations import mathml_of
+from jupyter_cache import get_cache
+from jupyter_cache.cache.db import create_db
 from pictures import svg_of
 from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
@@ -52,11 +54,17 @@ PICTURES_OF_KEYS = {
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the extension."""
     app.add_lexer("csv", TextLexer)
+    app.connect("builder-inited", _open_cache)
     app.connect("env-before-read-docs", _spread)
     app.connect("source-read", _complete)
     app.connect("include-read", _complete_included)
     app.connect("autodoc-process-docstring", _plain_docstring, priority=400)  # before napoleon
     return {"parallel_read_safe": True}
+
+
+def _open_cache(app: Sphinx) -> None:
+    """Make the database of executed notebooks before processes that read pages race to make it."""
+    create_db(get_cache(app.config.nb_execution_cache_path).path).dispose()
 
 
 def _spread(_app: Sphinx, _env: Any, names: list[str]) -> None:
