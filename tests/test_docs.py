@@ -69,6 +69,40 @@ def test_decisions_are_numbered_without_gaps_and_listed():
     ]
 
 
+def test_the_list_of_decisions_has_the_status_of_each():
+    listed = re.findall(r"^\| \[\d{4}\].*?\| .*? \| (.*?) \|$", text_of(INDEX), re.MULTILINE)
+    heads = (
+        re.search(r"^- Status: (.*?)\n- Date", text_of(path), re.MULTILINE | re.DOTALL)[1]
+        for path in DECISIONS
+    )
+    assert listed == [" ".join(head.split()) for head in heads]
+
+
+@pytest.mark.parametrize("path", PAGES, ids=name_of)
+def test_a_decision_that_a_page_names_exists(path):
+    """Look for numbers of four digits that begin with 0, outside of blocks and decimals."""
+    known = {decision.name[:4] for decision in DECISIONS}
+    assert [
+        number
+        for number in re.findall(r"(?<![\d.,:+])0\d{3}(?!\d)", "\n".join(prose(path)))
+        if number not in known
+    ] == []
+
+
+def test_a_decision_that_the_sources_name_exists():
+    known = {decision.name[:4] for decision in DECISIONS}
+    named = {
+        (path.name, number)
+        for folder in ("wm_drake", "tests", "analyses", "sdf")
+        for path in (CHECKOUT / folder).rglob("*.*")
+        if path.suffix in (".py", ".yaml", ".md", ".sdf")
+        for sentence in re.findall(r"decisions?[/ ]\d{4}(?:(?:,| and) \d{4})*", text_of(path))
+        for number in re.findall(r"\d{4}", sentence)
+    }
+    assert len(named) > 5
+    assert {(name, number) for name, number in named if number not in known} == set()
+
+
 def test_a_superseded_decision_and_its_successor_name_each_other():
     for path in DECISIONS:
         for name in re.findall(r"superseded by\s+\[\d{4}\]\((.*?)\)", text_of(path)):

@@ -37,7 +37,7 @@ and by less than 0.1 % in the Drake engine (tested). See docs/decisions/0007.
 Integrator = Literal["auto", "multistep", "midpoint", "runge_kutta"]
 """Integrator of the compiled engine: one derivative a step (the midpoint rule is for telescopic
 dampers), or the Runge-Kutta scheme with four; "auto" takes the first where it suits the machine.
-See docs/decisions/0087 and 0201."""
+See docs/decisions/0087 and docs/decisions/0105."""
 
 
 class BodyOverride(Frozen):
