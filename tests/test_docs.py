@@ -156,7 +156,7 @@ def test_the_citation_has_the_fields_of_its_format():
 
 
 def test_the_table_on_friction_over_frequency_repeats():
-    """docs/misprints.md, C11: energy per cycle and peak force of the damper of [C]."""
+    """Repeat docs/misprints.md, C11: energy per cycle and peak force of the damper of [C]."""
     printed = load_component("mstv_damper").parameters
     rows = re.findall(
         r"^\| ([\d.]+) mm, (energy|peak force) \| ([\d.]+).*?\| (.*) \|$",

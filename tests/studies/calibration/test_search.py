@@ -14,7 +14,7 @@ TRUTH = np.array([0.8, -0.5, 0.3])
 
 
 def curved(points):
-    """Nonlinear residuals of a known point, with small deviations compared to the prior."""
+    """Return nonlinear residuals of a known point; deviations are small beside the prior."""
     offset = points - TRUTH
     return 200.0 * np.column_stack(
         [offset[:, 0], offset[:, 1] + offset[:, 0] ** 2, offset[:, 2] - 0.5 * offset[:, 1] ** 2]
