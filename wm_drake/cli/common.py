@@ -34,6 +34,23 @@ SetOption = Annotated[
     ),
 ]
 
+ProfileOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Spin profile, YAML or CSV (time_s, speed_rpm). Default: that of the machine.",
+        metavar="FILE",
+    ),
+]
+MeasuredOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        help="Measured amplitudes to compare with: load, gasket, source, and a column per sensor "
+        "in mm. Repeatable. Default: those of the machine file, for its own numbers, loads and "
+        "profile.",
+        metavar="CSV",
+    ),
+]
+
 
 def _out_folder(text: str) -> Path:
     """Return the path of a result folder; refuse an empty text, which is the current folder."""
