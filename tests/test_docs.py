@@ -3,13 +3,26 @@
 import re
 
 import pytest
-from documents import CHECKOUT, DECISIONS, PAGES, README, anchors, name_of, prose, text_of
+from documents import (
+    CHECKOUT,
+    DECISIONS,
+    PAGES,
+    README,
+    anchors,
+    blocks,
+    name_of,
+    prose,
+    text_of,
+)
 from ruamel.yaml import YAML
 
 from wm_drake.parameters.components import load_component
 from wm_drake.rigs import Harmonic, damper_bench, force_loops, measures_of
 
 INDEX = CHECKOUT / "docs" / "decisions" / "README.md"
+TUTORIALS = [
+    path for path in sorted((CHECKOUT / "docs" / "tutorials").glob("*.md")) if path.stem != "index"
+]
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 STATUS = re.compile(
     r"^- Status: (?:accepted|superseded by|accepted for [\w ]+; for [\w ]+ superseded by)"
@@ -133,6 +146,14 @@ def test_files_named_in_code_exist(path):
 def test_lines_of_prose_are_short(path):
     long = [line for line in prose(path) if len(line) > 100 and not line.startswith(("|", "!["))]
     assert long == []
+
+
+@pytest.mark.parametrize("path", TUTORIALS, ids=name_of)
+def test_a_tutorial_is_short(path):
+    """Check the lengths that docs/tutorials/index.md states."""
+    cells = "\n".join(blocks(path, r"\{code-cell\}[^\n]*"))
+    assert 5 < len(cells.splitlines()) <= 70
+    assert 50 < len(re.findall(r"\w+", "\n".join(prose(path)))) <= 250
 
 
 def test_the_readme_is_short_and_begins_with_a_picture():
