@@ -178,14 +178,9 @@ def residuals_of(
         points = parameter_map.expected + coordinates * parameter_map.deviation
         found = values(points)
         known = parameter_map.prior_residuals(points, found.preload, found.elongation)
+        beyond = BEYOND_LIMIT * targets.excesses(found.amplitude, found.responses, spread)
         exact, smooth = (
-            np.hstack(
-                [
-                    targets.residuals(amplitude, found.responses, spread),
-                    BEYOND_LIMIT * targets.excesses(amplitude, found.responses, spread),
-                    known,
-                ]
-            )
+            np.hstack([targets.residuals(amplitude, found.responses, spread), beyond, known])
             for amplitude in (found.amplitude, found.power_mean)
         )
         return exact, smooth
