@@ -74,8 +74,7 @@ def test_changes_that_need_each_other_come_in_any_order(wm_drake):
     ended = wm_drake(*bench, *stiffness, *force)
     assert ended.code == 2
     assert ended.err == (
-        "error: --set: gasket.dahl_force_y: dahl_displacement_y: must be above 0 where "
-        "dahl_force_y is\n"
+        "--set: gasket.dahl_force_y: dahl_displacement_y: must be above 0 where dahl_force_y is\n"
     )
 
 
