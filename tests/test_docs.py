@@ -148,6 +148,12 @@ def test_lines_of_prose_are_short(path):
     assert long == []
 
 
+@pytest.mark.parametrize("path", PAGES, ids=name_of)
+def test_no_line_of_prose_is_a_comment_to_myst(path):
+    """Look for lines that the site would leave out: MyST takes a % at the start as a comment."""
+    assert [line for line in prose(path) if re.match(r"\s*(%|\+\+\+)", line)] == []
+
+
 @pytest.mark.parametrize("path", TUTORIALS, ids=name_of)
 def test_a_tutorial_is_short(path):
     """Check the lengths that docs/tutorials/index.md states."""
