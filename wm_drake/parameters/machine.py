@@ -162,9 +162,9 @@ class MachineParameters(Frozen):
             folder of the machine file.
         gravity: Acceleration of free fall.
         step: Largest step of the integrator.
-        integrator: `multistep` takes one derivative a step, `runge_kutta` four; `auto` takes the
-            first where it suits the machine.
-        drive: The motor.
+        integrator: `multistep` and `midpoint` (telescopic dampers) take one derivative a step,
+            `runge_kutta` four; `auto` takes one of the first two where it suits the machine.
+        drive: Prescribed speed of the drum, or a motor.
         bodies: Changes of the bodies of the SDF, by name.
         frames: Changes of frames of the SDF, and new frames, by name.
         spring_types, damper_types, bushing_types: Elements as bought, by name.
@@ -173,7 +173,7 @@ class MachineParameters(Frozen):
         sensors: Displacement sensors, by name.
         accelerometers: Vibration sensors, by name.
         clearance: The point whose distance to the detergent box counts.
-        cabinet: The cabinet on its feet; null if foot loads are not asked for.
+        cabinet: The cabinet on its feet; null for no loads of the feet.
         unbalance_planes: Positions of the masses of a spin cycle.
         imperfections: Imperfections of the drum and its bearing.
         loads: The loads, by name.
