@@ -157,7 +157,7 @@ class Preparation:
 
     def _set_up(self, case: Case) -> Setup:
         setup = self.machine.set_up(
-            parameters=case.parameters, gasket=case.gasket, context=self._context
+            parameters=case.parameters, gasket=case.gasket, context=self._context, systems=False
         )
         if list(setup.sensors) != self.sensors:
             raise input_error(

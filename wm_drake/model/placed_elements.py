@@ -46,6 +46,10 @@ LARGEST_OWN_SIZE = FORCE_SIZE
 """Most own numbers that an element writes beside its generalized force: the telescopic damper's."""
 
 
+ON_TUB = ("springs", "dampers", "bushings")
+"""Kinds of elements whose forces depend on the motion of the tub only, in packed order."""
+
+
 @dataclass(frozen=True)
 class PlacedElements:
     """All elements of a machine at their frames, by name; `bearing` is None for a rigid bearing."""
@@ -77,6 +81,23 @@ class PlacedElements:
             bushings={name: bushing.without_friction() for name, bushing in self.bushings.items()},
             telescopes={name: tubes.sliding() for name, tubes in self.telescopes.items()},
         )
+
+    def packed_on_tub(self, size: int = 0) -> tuple[FloatArray, dict[str, tuple[int, ...]]]:
+        """Return the packed elements `ON_TUB`, and by kind the index of each element.
+
+        Args:
+            size: Number of packed numbers before these.
+        """
+        packed: list[FloatArray] = []
+        indices: dict[str, tuple[int, ...]] = {}
+        for kind in ON_TUB:
+            begins = []
+            for element in getattr(self, kind).values():
+                begins.append(size)
+                packed.append(element.packed())
+                size += len(packed[-1])
+            indices[kind] = tuple(begins)
+        return np.concatenate([[], *packed]), indices
 
     def links(self) -> Iterator[tuple[Any, Callable[..., None], int]]:
         """Yield each element, its law and the tree it acts on beside tub and drum; 0 for none."""

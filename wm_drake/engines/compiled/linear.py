@@ -97,8 +97,9 @@ def is_followed(
     jacobian[:] = jacobians.transpose(1, 2, 0).ravel()
     largest = aligned(4 * WIDTH)
     m = int(np.count_nonzero(internal == CABINET))
-    own, work = aligned(m * m * WIDTH), aligned(3 * m * WIDTH)
-    if cabinet is not None:
+    own = work = None
+    if m and cabinet is not None:
+        own, work = aligned(m * m * WIDTH), aligned(3 * m * WIDTH)
         own[:] = cabinet.transpose(1, 2, 0).ravel()
     block = int(np.argmax(internal == CABINET)), m
     growth_lanes(jacobian, internal, step, STEPS, numbers, own, block, work, largest)
@@ -142,7 +143,7 @@ def jacobian_lanes(x, work, free, difference, p, elements, jacobian, own):
     rate, inputs = lane_array(work[: size * WIDTH]), lane_array(work[size * WIDTH :])
     sine, cosine = sine_cosine(state[DRUM_ANGLE])
     masses = mass_properties(numbers, cosine, sine)
-    n, reference = len(free), state[DRUM_RATE]
+    n, reference, zero = len(free), state[DRUM_RATE], 0.0 * state[DRUM_RATE]
     for column in range(n):
         at_rest = state[free[column]]
         for row in range(n):
@@ -150,7 +151,7 @@ def jacobian_lanes(x, work, free, difference, p, elements, jacobian, own):
         for side in (-1.0, 1.0):
             state[free[column]] = at_rest + side * difference
             wanted = wanted_speed(state, reference, elements.motor)
-            state_derivative(state, rate, inputs, masses, wanted, 0.0, numbers, elements)
+            state_derivative(state, rate, inputs, masses, wanted, zero, numbers, elements)
             for row in range(n):
                 change = side * rate[free[row]] / (2.0 * difference)
                 found[row * n + column] = found[row * n + column] + change
@@ -171,9 +172,9 @@ def growth_lanes(jacobian, internal, h, steps, numbers, own, block, work, larges
         h: Step size. [s]
         steps: Number of steps.
         numbers: Anything to start from: state, its rate, past rates, past inputs.
-        own, block: Matrices of the states `CABINET` alone, by rows; the first of these states and
-            their number.
-        work: Array to work in, for three numbers of each of these states.
+        own, block: Matrices of the states `CABINET` alone, by rows, None without such states; the
+            first of them and their number.
+        work: Array to work in, for three numbers of each of these states; None without them.
         largest: Largest number of the state in each quarter of the steps, written.
     """
     align_stack()
@@ -182,8 +183,7 @@ def growth_lanes(jacobian, internal, h, steps, numbers, own, block, work, larges
     x, rate = lane_array(numbers[: n * WIDTH]), lane_array(numbers[n * WIDTH : 2 * n * WIDTH])
     begin, end = 2 * n * WIDTH, (2 + PAST_RATES) * n * WIDTH
     past_rates, past_inputs = lane_array(numbers[begin:end]), lane_array(numbers[end:])
-    b, stage = lane_array(own), lane_array(work)
-    first, m = block
+    b, stage, (first, m) = as_lanes(own), as_lanes(work), block
     for quarter in range(4):
         top[quarter] = 0.0 * x[0]
     for i in range(steps):
@@ -192,9 +192,6 @@ def growth_lanes(jacobian, internal, h, steps, numbers, own, block, work, larges
         for row in range(n):  # the rate of an internal state without its own share is its input
             share = a[row * n + row] * x[row]
             past_inputs[i % PAST_INPUTS * n + row] = rate[row] - share
-        write_product(b, x, first, m, stage, 0)
-        for row in range(m):
-            past_inputs[i % PAST_INPUTS * n + first + row] = rate[first + row] - stage[row]
         block_after_step(x, rate, past_inputs, i, n, h, b, first, m, stage)
         for row in range(n):
             if internal[row] == SPONGE:
@@ -210,6 +207,14 @@ def growth_lanes(jacobian, internal, h, steps, numbers, own, block, work, larges
             quarter = 4 * i // steps
             size = abs(x[row])
             top[quarter] = where(size > top[quarter], size, top[quarter])
+
+
+@law
+def as_lanes(array):
+    """Return an array as an array of lanes; None stays."""
+    if array is None:
+        return None
+    return lane_array(array)
 
 
 @law
@@ -231,12 +236,18 @@ def block_after_step(x, rate, inputs, i, n, h, b, first, m, work):
 
     Args:
         x, rate: State of a linear machine, of which these states are advanced, and its rate.
-        inputs, i, n: Past inputs u, number of the step, size of the state.
+        inputs, i, n: Past inputs u, those of this step written; number of the step, size of the
+            state.
         h: Length of the step. [s]
-        b: Matrix B, by rows.
+        b: Matrix B, by rows; None without such states.
         first, m: The first of these states and their number.
-        work: Array to work in.
+        work: Array to work in; None without such states.
     """
+    if b is None:
+        return
+    write_product(b, x, first, m, work, 0)
+    for row in range(m):
+        inputs[i % PAST_INPUTS * n + first + row] = rate[first + row] - work[row]
     for k in range(m):
         work[m + k] = x[first + k] + h / 6.0 * rate[first + k]
         work[k] = x[first + k] + 0.5 * h * rate[first + k]

@@ -32,11 +32,10 @@ from wm_drake.engines.compiled.tubes import (
 )
 from wm_drake.errors import InputError, input_error
 from wm_drake.model.machine import Setup
+from wm_drake.model.placed_elements import ON_TUB
 from wm_drake.model.state_layout import CABINET, CARRIER
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
-
-_ON_TUB = ("springs", "dampers", "bushings")
 
 
 @dataclass(frozen=True)
@@ -176,11 +175,11 @@ def pack(setup: Setup) -> tuple[FloatArray, Layout]:
 
 def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
     """Return the packed numbers behind the bodies, which no load changes, and the layout of all."""
-    on_tub, indices = pack_on_tub(setup, BODIES_SIZE)
+    on_tub, indices = setup.elements.packed_on_tub(BODIES_SIZE)
     parts, size = [on_tub], BODIES_SIZE + len(on_tub)
     structure = [
         number
-        for kind in _ON_TUB
+        for kind in ON_TUB
         for element in getattr(setup, kind).values()
         for number in element.structure
     ]
@@ -225,27 +224,6 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
         structure=tuple(structure),
         rubber=rubber,
     )
-
-
-def pack_on_tub(setup: Setup, size: int = 0) -> tuple[FloatArray, dict[str, tuple[int, ...]]]:
-    """Return the packed springs, dampers and bushings, and by kind the index of each element.
-
-    Their forces depend on the motion of the tub only.
-
-    Args:
-        setup: The machine.
-        size: Number of packed numbers before these.
-    """
-    packed: list[FloatArray] = []
-    indices: dict[str, tuple[int, ...]] = {}
-    for kind in _ON_TUB:
-        begins = []
-        for element in getattr(setup, kind).values():
-            begins.append(size)
-            packed.append(element.packed())
-            size += len(packed[-1])
-        indices[kind] = tuple(begins)
-    return np.concatenate([[], *packed]), indices
 
 
 def aligned(size: int) -> FloatArray:
