@@ -60,8 +60,11 @@ class InlinedLibrary(JITCodeLibrary):
         self._finalized = True
 
 
-def has_array(kind: Any) -> bool:
-    """Return whether a type is a tuple with an array in it, which no Python code gives a law."""
-    if isinstance(kind, BaseTuple):
-        return any(isinstance(part, types.Array) or has_array(part) for part in kind.types)
-    return False
+def has_indices(kind: Any) -> bool:
+    """Return whether a type is a tuple with an array of whole numbers in it.
+
+    Such are the indices of elements, which no Python code gives a law.
+    """
+    if isinstance(kind, types.Array):
+        return isinstance(kind.dtype, types.Integer)
+    return isinstance(kind, BaseTuple) and any(map(has_indices, kind.types))

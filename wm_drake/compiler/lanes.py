@@ -23,7 +23,7 @@ from numba.core.types.containers import BaseTuple
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
-from wm_drake.compiler.inlined import InlinedLibrary, has_array
+from wm_drake.compiler.inlined import InlinedLibrary, has_indices
 
 WIDTH = 8
 """Runs side by side: one register of 512 bits, two of 256."""
@@ -318,7 +318,7 @@ class LawCompiler(Compiler):
     def define_pipelines(self) -> Any:
         """Return numba's passes."""
         state = self.state
-        if any(_is_internal(kind) or has_array(kind) for kind in state.args):
+        if any(_is_internal(kind) or has_indices(kind) for kind in state.args):
             state.flags.no_cpython_wrapper = True
             codegen = state.targetctx.codegen()
             state.library = InlinedLibrary(codegen, state.func_id.func_qualname)
