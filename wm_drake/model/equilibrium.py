@@ -143,7 +143,8 @@ def rest_pose(elements: PlacedElements, weight: Weight) -> tuple[FloatArray, Flo
     remaining = about_tub(wrench, pose)
     if not _is_at_rest(elements, pose, remaining, EQUILIBRIUM_TOLERANCE):
         pose, remaining = _search(statics, elements)
-    _check_rest(elements, pose, remaining, EQUILIBRIUM_TOLERANCE, statics.wrench(np.zeros(6)))
+        as_drawn = statics.wrench(np.zeros(6))
+        _check_rest(elements, pose, remaining, EQUILIBRIUM_TOLERANCE, as_drawn)
     return pose, remaining
 
 

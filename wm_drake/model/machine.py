@@ -260,7 +260,9 @@ class MachineSystems:
             as_drawn = TubStatics(unloaded, weight).wrench(np.zeros(6))
         else:
             as_drawn = force_as_drawn(self.plant, plant_context, layout, unloaded)
-        elements = preloaded(unloaded, as_drawn)
+        balanced = (*unloaded.springs.values(), as_drawn.tobytes())
+        springs = poses.placed("springs", balanced, lambda: preloaded(unloaded, as_drawn).springs)
+        elements = replace(unloaded, springs=springs)
         elements = elements if gasket else elements.without_gasket()
         elements = elements if dampers else elements.without_dampers()
         elements = elements if friction else elements.without_friction()
@@ -270,8 +272,9 @@ class MachineSystems:
         else:
             residual = put_to_rest(self.plant, plant_context, layout, elements)
             q = self.plant.GetPositions(plant_context)
-        points = tub_points(poses, parameters)
-        measured = measured_points(parameters, points, q[layout.tub])
+        parts = parameters.sensors, parameters.clearance, parameters.accelerometers
+        points = poses.placed("points", parts, lambda: tub_points(poses, parameters))
+        measured = measured_points(points, q[layout.tub])
         cabinet = None
         if systems:
             self.plant.SetPositions(plant_context, q)

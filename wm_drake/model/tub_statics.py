@@ -133,4 +133,7 @@ class TubStatics:
 
 def about_tub(wrench: FloatArray, pose: FloatArray) -> FloatArray:
     """Return a wrench with its moment about To in place of the origin of W. (6,) [N m, N]"""
-    return np.concatenate([wrench[:3] - np.cross(pose[3:], wrench[3:]), wrench[3:]])
+    m_x, m_y, m_z, f_x, f_y, f_z = wrench.tolist()
+    x, y, z = pose[3:].tolist()
+    moment = m_x - y * f_z + z * f_y, m_y - z * f_x + x * f_z, m_z - x * f_y + y * f_x
+    return np.array([*moment, f_x, f_y, f_z])

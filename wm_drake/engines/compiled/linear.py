@@ -6,6 +6,8 @@ linearised machine takes the same steps, from numbers at random: whatever the co
 an unstable step makes the numbers grow. `WIDTH` Jacobians go side by side in the lanes.
 """
 
+import functools
+
 import numpy as np
 
 from wm_drake.compiler.compilation import law, long_running
@@ -46,7 +48,7 @@ force, such as the spin of a damper tube, grows by 2."""
 
 
 def jacobians(
-    packed: FloatArray, layout: Layout, states: FloatArray, free: list[int], difference: float
+    packed: FloatArray, layout: Layout, states: FloatArray, free: np.ndarray, difference: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return the Jacobians of a machine at several states, by central differences.
 
@@ -66,7 +68,7 @@ def jacobians(
     found, work = aligned(n * n * WIDTH), aligned((states.shape[1] + layout.inputs_size) * WIDTH)
     m = CABINET_STATE_SIZE if layout.cabinet >= 0 else 0
     own = aligned(m * m * WIDTH)
-    jacobian_lanes(x, work, np.array(free), difference, p, layout.elements, found, own)
+    jacobian_lanes(x, work, np.asarray(free), difference, p, layout.elements, found, own)
     of_all, of_cabinet = (
         part.reshape(size, size, WIDTH).transpose(2, 0, 1) for part, size in ((found, n), (own, m))
     )
@@ -90,9 +92,9 @@ def is_followed(
     if not np.all(np.isfinite(jacobians)):
         return False
     n = len(internal)
-    start = np.random.default_rng(0).uniform(-1.0, 1.0, (n * (2 + PAST_RATES + PAST_INPUTS), 1))
-    numbers = aligned(start.size * WIDTH)
-    numbers.reshape(-1, WIDTH)[:] = start
+    start = _start(n * (2 + PAST_RATES + PAST_INPUTS))
+    numbers = aligned(len(start) * WIDTH)
+    numbers.reshape(-1, WIDTH)[:] = start[:, None]
     jacobian = aligned(n * n * WIDTH)
     jacobian[:] = jacobians.transpose(1, 2, 0).ravel()
     largest = aligned(4 * WIDTH)
@@ -111,6 +113,12 @@ def is_followed(
         own_growth = np.exp(0.5 * STEPS * step * _fastest_growth(jacobians[grown]))
         return bool(np.all(quarters[3, grown] <= LARGEST_GROWTH * own_growth * quarters[1, grown]))
     return not np.any(grown)
+
+
+@functools.cache
+def _start(count: int) -> FloatArray:
+    """Return the same numbers at random between -1 and 1 for all machines of a size. (count,)"""
+    return np.random.default_rng(0).uniform(-1.0, 1.0, count)
 
 
 def _fastest_growth(jacobians: FloatArray) -> FloatArray:
@@ -223,7 +231,19 @@ def write_product(a, x, first, size, product, at):
 
     It begins at index `at` of `product`.
     """
-    for row in range(size):
+    whole = size - size % 4
+    for row in range(0, whole, 4):  # four rows side by side: one sum would wait for itself
+        r = row * size
+        s_0 = s_1 = s_2 = s_3 = 0.0 * x[first]
+        for column in range(size):
+            number = x[first + column]
+            s_0 = s_0 + a[r + column] * number
+            s_1 = s_1 + a[r + size + column] * number
+            s_2 = s_2 + a[r + 2 * size + column] * number
+            s_3 = s_3 + a[r + 3 * size + column] * number
+        product[at + row], product[at + row + 1] = s_0, s_1
+        product[at + row + 2], product[at + row + 3] = s_2, s_3
+    for row in range(whole, size):
         total = 0.0 * x[first]
         for column in range(size):
             total = total + a[row * size + column] * x[first + column]

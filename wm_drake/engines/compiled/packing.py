@@ -32,7 +32,6 @@ from wm_drake.engines.compiled.tubes import (
 )
 from wm_drake.errors import InputError, input_error
 from wm_drake.model.machine import Setup
-from wm_drake.model.placed_elements import ON_TUB
 from wm_drake.model.state_layout import CABINET, CARRIER
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
@@ -177,12 +176,7 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
     """Return the packed numbers behind the bodies, which no load changes, and the layout of all."""
     on_tub, indices = setup.elements.packed_on_tub(BODIES_SIZE)
     parts, size = [on_tub], BODIES_SIZE + len(on_tub)
-    structure = [
-        number
-        for kind in ON_TUB
-        for element in getattr(setup, kind).values()
-        for number in element.structure
-    ]
+    structure = list(setup.elements.structure_on_tub)
     begins = []
     for name, telescope in setup.telescopes.items():
         begins.append(size)
@@ -261,11 +255,11 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     x[DRUM_RATE] = profile.speed[0]
     tubes = np.zeros((len(setup.telescopes), TUBES_STATE_SIZE))
     tubes[:, : setup.tube_rest.shape[1]] = setup.tube_rest
-    carrier = np.append(setup.carrier_rest, np.zeros_like(setup.carrier_rest))
-    motor = np.zeros(MOTOR_STATE_SIZE if setup.motor else 0)
-    cabinet = np.zeros(CABINET_STATE_SIZE if setup.cabinet else 0)
-    stretches = np.zeros(sum(bushing.state_size for bushing in setup.bushings.values()))
-    return np.concatenate([x, tubes.ravel(), carrier, motor, cabinet, stretches])
+    size = sum(bushing.state_size for bushing in setup.bushings.values())
+    size += MOTOR_STATE_SIZE if setup.motor else 0
+    size += CABINET_STATE_SIZE if setup.cabinet else 0
+    carrier = setup.carrier_rest, np.zeros_like(setup.carrier_rest)
+    return np.concatenate([x, tubes.ravel(), *carrier, np.zeros(size)])
 
 
 def pack_tubes(setup: Setup, name: str) -> FloatArray:
