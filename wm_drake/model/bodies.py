@@ -1,5 +1,6 @@
 """Bodies of a machine: the plant built from its SDF, with overrides and load set in a Context."""
 
+import copy
 import functools
 from collections.abc import Iterable
 from pathlib import Path
@@ -448,7 +449,7 @@ def add_load(plant: MultibodyPlant, context: Any, load: Load) -> None:
 
 def with_load(drum: SpatialInertia, load: Load) -> SpatialInertia:
     """Return the inertia of the drum about Do in D with the point masses of a load."""
-    loaded = SpatialInertia(drum)
+    loaded = copy.copy(drum)
     for unbalance in load.unbalances:
         p_DoU_D = unbalance.position()
         loaded += SpatialInertia(unbalance.mass, p_DoU_D, UnitInertia.PointMass(p_DoU_D))
