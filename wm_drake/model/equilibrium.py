@@ -6,7 +6,6 @@ import numpy as np
 from pydrake.math import RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
-from scipy.optimize import root
 
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.model.placed_elements import AppliedForce, PlacedElements
@@ -150,6 +149,7 @@ def rest_pose(elements: PlacedElements, weight: Weight) -> tuple[FloatArray, Flo
 
 def _search(statics: TubStatics, elements: PlacedElements) -> tuple[FloatArray, FloatArray]:
     """Return the pose at rest and what remains there, for springs that may be slack on the way."""
+    from scipy.optimize import root  # slow to import, and seldom needed
 
     def residual(pose: FloatArray) -> FloatArray:
         if not np.abs(pose).max() < 10.0:
