@@ -317,7 +317,7 @@ def _lines(plots: dict[str, list[str]], made: set[str]) -> list[str]:
         if titles:
             lines.append("")
             lines += [
-                f"![{title[:40]}](pictures/gallery/{entry.name}_{number}.png)"
+                f"![{title}](pictures/gallery/{entry.name}_{number}.png)"
                 for number, title in enumerate(titles, start=1)
             ]
     return lines

@@ -9,10 +9,14 @@ import pandas as pd
 from documents import CHECKOUT, MANUAL, README, name_of, text_of
 
 from wm_drake.model.build import build_machine
-from wm_drake.parameters import load_machine
+from wm_drake.parameters import load_machine, load_profile
 from wm_drake.parameters.components import load_component
+from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.rigs import Harmonic, bushing_bench, damper_bench, force_loops
 from wm_drake.simulation.runs import simulate
+from wm_drake.studies.spin_cycle.measured import rms_table
+from wm_drake.studies.spin_cycle.runs import compiled_runs
+from wm_drake.studies.spin_cycle.study import run_spin_cycle
 
 PAGES = [README, *(path for path in MANUAL if path.parent.name != "decisions")]
 SHELL = ("text", "bash", "sh")
@@ -139,6 +143,15 @@ def write_loops(folder, bench, motions):
         pd.DataFrame(table).to_csv(folder / name, index=False)
 
 
+def write_spin_cycle(path):
+    """Write RMS displacements of the case that both commands with `--measured rms.csv` have."""
+    machine = load_machine("free_stroke")
+    cases = [case for case in load_unbalance_cases() if case.name == "2"]
+    runs = compiled_runs(build_machine(machine))
+    result = run_spin_cycle(machine, cases, load_profile("spin_cycle"), runs)
+    rms_table(result.displacement).to_csv(path, index=False)
+
+
 def write_commands_page(folder):
     """Write the records, cases and designs that docs/how-to/commands.md names."""
     from wm_drake.studies.doe import make_design
@@ -156,6 +169,7 @@ def write_commands_page(folder):
     shutil.copy(CYCLES / "profile_spin_cycle.yaml", folder / "my_cycle.yaml")
     cases = (CYCLES / "cases_table9.csv").read_text(encoding="utf-8").splitlines()
     (folder / "my_cases.csv").write_text("\n".join(cases[:4]) + "\n", encoding="utf-8")
+    write_spin_cycle(folder / "rms.csv")
     time = np.arange(0.0, 40.0, 2e-3)
     rpm = 60.0 + 6.0 * time
     angle = np.cumsum(rpm) * 2e-3 * np.pi / 30.0

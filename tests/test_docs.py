@@ -3,13 +3,26 @@
 import re
 
 import pytest
-from documents import CHECKOUT, DECISIONS, PAGES, README, anchors, name_of, prose, text_of
+from documents import (
+    CHECKOUT,
+    DECISIONS,
+    PAGES,
+    README,
+    anchors,
+    blocks,
+    name_of,
+    prose,
+    text_of,
+)
 from ruamel.yaml import YAML
 
 from wm_drake.parameters.components import load_component
 from wm_drake.rigs import Harmonic, damper_bench, force_loops, measures_of
 
 INDEX = CHECKOUT / "docs" / "decisions" / "README.md"
+TUTORIALS = [
+    path for path in sorted((CHECKOUT / "docs" / "tutorials").glob("*.md")) if path.stem != "index"
+]
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 STATUS = re.compile(
     r"^- Status: (?:accepted|superseded by|accepted for [\w ]+; for [\w ]+ superseded by)"
@@ -69,6 +82,40 @@ def test_decisions_are_numbered_without_gaps_and_listed():
     ]
 
 
+def test_the_list_of_decisions_has_the_status_of_each():
+    listed = re.findall(r"^\| \[\d{4}\].*?\| .*? \| (.*?) \|$", text_of(INDEX), re.MULTILINE)
+    heads = (
+        re.search(r"^- Status: (.*?)\n- Date", text_of(path), re.MULTILINE | re.DOTALL)[1]
+        for path in DECISIONS
+    )
+    assert listed == [" ".join(head.split()) for head in heads]
+
+
+@pytest.mark.parametrize("path", PAGES, ids=name_of)
+def test_a_decision_that_a_page_names_exists(path):
+    """Look for numbers of four digits that begin with 0, outside of blocks and decimals."""
+    known = {decision.name[:4] for decision in DECISIONS}
+    assert [
+        number
+        for number in re.findall(r"(?<![\d.,:+])0\d{3}(?!\d)", "\n".join(prose(path)))
+        if number not in known
+    ] == []
+
+
+def test_a_decision_that_the_sources_name_exists():
+    known = {decision.name[:4] for decision in DECISIONS}
+    named = {
+        (path.name, number)
+        for folder in ("wm_drake", "tests", "analyses", "sdf")
+        for path in (CHECKOUT / folder).rglob("*.*")
+        if path.suffix in (".py", ".yaml", ".md", ".sdf")
+        for sentence in re.findall(r"decisions?[/ ]\d{4}(?:(?:,| and) \d{4})*", text_of(path))
+        for number in re.findall(r"\d{4}", sentence)
+    }
+    assert len(named) > 5
+    assert {(name, number) for name, number in named if number not in known} == set()
+
+
 def test_a_superseded_decision_and_its_successor_name_each_other():
     for path in DECISIONS:
         for name in re.findall(r"superseded by\s+\[\d{4}\]\((.*?)\)", text_of(path)):
@@ -97,8 +144,22 @@ def test_files_named_in_code_exist(path):
 
 @pytest.mark.parametrize("path", [path for path in PAGES if path.parent.name != "sdf"], ids=name_of)
 def test_lines_of_prose_are_short(path):
-    long = [line for line in prose(path) if len(line) > 100 and not line.startswith("|")]
+    long = [line for line in prose(path) if len(line) > 100 and not line.startswith(("|", "!["))]
     assert long == []
+
+
+@pytest.mark.parametrize("path", PAGES, ids=name_of)
+def test_no_line_of_prose_is_a_comment_to_myst(path):
+    """Look for lines that the site would leave out: MyST takes a % at the start as a comment."""
+    assert [line for line in prose(path) if re.match(r"\s*(%|\+\+\+)", line)] == []
+
+
+@pytest.mark.parametrize("path", TUTORIALS, ids=name_of)
+def test_a_tutorial_is_short(path):
+    """Check the lengths that docs/tutorials/index.md states."""
+    cells = "\n".join(blocks(path, r"\{code-cell\}[^\n]*"))
+    assert 5 < len(cells.splitlines()) <= 70
+    assert 50 < len(re.findall(r"\w+", "\n".join(prose(path)))) <= 250
 
 
 def test_the_readme_is_short_and_begins_with_a_picture():
@@ -122,7 +183,7 @@ def test_the_citation_has_the_fields_of_its_format():
 
 
 def test_the_table_on_friction_over_frequency_repeats():
-    """docs/misprints.md, C11: energy per cycle and peak force of the damper of [C]."""
+    """Repeat docs/misprints.md, C11: energy per cycle and peak force of the damper of [C]."""
     printed = load_component("mstv_damper").parameters
     rows = re.findall(
         r"^\| ([\d.]+) mm, (energy|peak force) \| ([\d.]+).*?\| (.*) \|$",

@@ -70,6 +70,22 @@ def test_there_are_equations():
 @pytest.mark.parametrize(
     ("text", "shown"),
     [
+        ("until x_c.", r"until \ *x*\ :sub:`c`\ ."),
+        ("F_max (1 + x)^2", r"\ *F*\ :sub:`max`\  (1 + x)\ :sup:`2`\ "),
+        ("|v_0|^2", r"|\ *v*\ :sub:`0`\ |\ :sup:`2`\ "),
+        ("x_c^2", r"\ *x*\ :sub:`c`\ \ :sup:`2`\ "),
+        ("[N s^2/m]", r"[N s\ :sup:`2`\ /m]"),
+        ("`x_c` and ``m^2``", "`x_c` and ``m^2``"),
+        ("gasket.stiffness_x, p_ToA_T, a.x_c", "gasket.stiffness_x, p_ToA_T, a.x_c"),
+    ],
+)
+def test_indices_and_powers_of_a_sentence_are_typeset(text, shown):
+    assert equations.with_indices(text) == shown
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
         ("a/b c", "<mfrac><mrow><mi>a</mi></mrow><mrow><mi>b</mi></mrow></mfrac>"),
         ("a b / (c + d)", "<mrow><mi>c</mi><mo>+</mo><mi>d</mi></mrow></mfrac>"),
         ("a b / c", "<mfrac><mrow><mi>a</mi><mspace width='0.12em'/><mi>b</mi></mrow>"),

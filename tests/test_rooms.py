@@ -42,7 +42,7 @@ WITHOUT_DRAKE = {
 
 
 def imported(name, source, is_package=False):
-    """Full names of what a module imports, wherever in it; `from a import b` gives a.b."""
+    """Return full names of what a module imports, anywhere in it; `from a import b` gives a.b."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)

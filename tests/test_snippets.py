@@ -145,7 +145,7 @@ def pages_with(wanted):
 @pytest.mark.slow
 @pytest.mark.parametrize(("page", "lines"), pages_with(False))
 def test_the_commands_of_a_page_run(page, lines, wm_drake, tmp_path):
-    """Commands that read what a long one of their page writes run with the long ones."""
+    """Run the short commands; those that read what a long one writes run with the long ones."""
     reads_long = ("wm-drake-identify/", "wm-drake-design/")
     short = [
         line

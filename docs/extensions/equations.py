@@ -44,6 +44,9 @@ SOURCE = re.compile(r"\[[ABC]\]")
 CITATION = re.compile(r'<mtext class="source">(\[[ABC]\]|own derivation)')
 WORDS = re.compile(r"(?!for\b|min\b|max\b|sum\b|curve\b)[A-Za-z]{3,}[-' :,]")
 COLUMN = re.compile(r"\s{3,}")
+CODE = re.compile(r"(`+[^`]*`+)")
+INDEX = re.compile(r"(?<![\w./])([A-Za-z])_([A-Za-z0-9]+)(?!\w)")
+POWER = re.compile(r"(?<=[\w)|])\^(-?\w+)")
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,22 @@ def mathml_of(block: list[str]) -> str | None:
         return equations(block)
     except ValueError:
         return None
+
+
+def with_indices(text: str) -> str:
+    """Return the text of a sentence, in reStructuredText, with its indices and powers typeset.
+
+    A formula in a sentence has no mark, so where it ends cannot be told; `x_c` and `m^2` can. A
+    name of code has several underscores or letters before the first, or stands in backticks.
+    """
+
+    def index(found: re.Match[str]) -> str:
+        return rf"\ *{found[1]}*\ :sub:`{found[2]}`\ "
+
+    parts = CODE.split(text)
+    raised = [POWER.sub(r"\\ :sup:`\1`\\ ", part) for part in parts[::2]]
+    parts[::2] = [INDEX.sub(index, part) for part in raised]
+    return "".join(parts)
 
 
 def equations(lines: list[str]) -> str:

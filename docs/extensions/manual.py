@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from equations import mathml_of
+from equations import mathml_of, with_indices
 from jupyter_cache import get_cache
 from jupyter_cache.cache.db import create_db
 from pictures import svg_of
@@ -31,6 +31,7 @@ PICTURE = re.compile(r"<!-- picture ([\w-]+) -->")
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s]+?)(#[^)\s]*)?\)")
 DECISION = re.compile(r"docs/decisions/(\d{4})")
 SECTION = re.compile(r"(Args|Returns|Raises|Yields|Attributes|Example):$")
+NAME_OF_FIELD = re.compile(r" {4}(?! )[\w*, ]+:")
 PAGES_OUTSIDE = {
     "README.md": "about/sources",
     "CHANGELOG.md": "about/changelog",
@@ -136,20 +137,25 @@ def _plain_docstring(
 ) -> None:
     """Turn a docstring in plain text into reStructuredText.
 
-    An indented block before the sections of arguments is an equation, which is typeset. Bars and
-    stars are no markup.
+    An indented block before the sections of arguments is an equation, which is typeset; of formulas
+    in sentences, indices and powers are. Bars and stars are no markup.
     """
     new: list[str] = []
     block: list[str] = []
-    in_sections = False
+    section = ""
     for line in lines:
-        in_sections |= bool(SECTION.match(line))
-        if (line.startswith("    ") and not in_sections) or (block and not line):
+        found = SECTION.match(line)
+        section = found[1] if found else section
+        if (line.startswith("    ") and not section) or (block and not line):
             block.append(line)
             continue
         new += _typeset(block)
         block = []
-        new.append(DECISION.sub(_decision, line.replace("|", "\\|").replace("*", "\\*")))
+        name = NAME_OF_FIELD.match(line) if section in ("Args", "Attributes") else None
+        head = name[0] if name else ""
+        text = line[len(head) :].replace("|", "\\|").replace("*", "\\*")
+        text = text if section == "Example" else with_indices(text)
+        new.append(DECISION.sub(_decision, head.replace("*", "\\*") + text))
     lines[:] = new + _typeset(block)
 
 

@@ -58,7 +58,7 @@ def test_every_miss_has_its_reason_and_every_section_its_command(name):
 
 @pytest.mark.slow
 def test_the_amplitudes_on_the_page_are_those_of_the_machine(reference):
-    """The fast part of analyses/write_validation.py: [B] Tables 1 to 3."""
+    """Run the fast part of analyses/write_validation.py: [B] Tables 1 to 3."""
     cases = [Case(name, load, reference.profile) for name, load in reference.loads.items()]
     effect = run_gasket_effect(reference, cases)
     both = pd.concat(amplitude_table(result) for result in (effect.without, effect.with_gasket))

@@ -328,7 +328,7 @@ def test_memory_does_not_grow_with_the_number_of_runs(reference, machine):
 
 
 def test_machines_whose_tables_are_elsewhere_do_not_run_side_by_side(reference):
-    """A table on x and a number on z take as much room as the other way round, but are not read alike."""
+    """Swap the axes of a table and a number: they take as much room, but are not read alike."""
     table = {"displacement": (-0.05, 0.0, 0.05), "force": (-150.0, 0.0, 300.0)}
     cases = []
     for axis in "xz":

@@ -62,7 +62,17 @@ ARGUMENTS = (
 
 @pytest.mark.usefixtures("folder")
 def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
-    arguments = (*ARGUMENTS, "--deviation", "1", "--leave-out", "back", "--fewer", "1")
+    arguments = (
+        *ARGUMENTS,
+        "--deviation",
+        "1",
+        "--leave-out",
+        "back",
+        "--fewer",
+        "1",
+        "--limit",
+        "20",
+    )
     ended = wm_drake(*arguments, "--json", "--out", "out")
     assert ended.code == 0, ended.err
     result = json.loads(ended.out)
@@ -123,6 +133,8 @@ FAULTS = {
     "all loads left out": (["--leave-out", "back,middle"], "leaves no load"),
     "as many as are free": (["--fewer", "2"], "--fewer: 2: needs falling numbers"),
     "fewer that is no number": (["--fewer", "one"], "--fewer: 'one' is not a whole number"),
+    "limit of nothing": (["--limit", "Q=2"], "--limit: 'Q' is no load, sensor"),
+    "limit of zero": (["--limit", "0"], "--limit: '0' is not allowed"),
     "weight of nothing": (["--weight", "Q=2"], "'Q' is no load, sensor"),
     "weight that is no number": (
         ["--weight", "Xr=much"],

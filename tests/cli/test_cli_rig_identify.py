@@ -61,6 +61,23 @@ def test_the_machine_may_be_changed_on_the_command_line(wm_drake):
     assert "sponge of 10 g" in changed["component"]
 
 
+def test_changes_that_need_each_other_come_in_any_order(wm_drake):
+    force = ("--set", "gasket.dahl_force_y=4 N")
+    displacement = ("--set", "gasket.dahl_displacement_y=0.5 mm")
+    stiffness = ("--set", "gasket.stiffness_y=3 N/mm")
+    bench = ("rig", "gasket", "--axis", "axial", "-f", "1 Hz", "-a", "5 mm", "--json")
+    loops = [
+        json.loads(wm_drake(*bench, *sets, "--overwrite").out)
+        for sets in ((*force, *displacement), (*displacement, *force))
+    ]
+    assert loops[0] == loops[1]
+    ended = wm_drake(*bench, *stiffness, *force)
+    assert ended.code == 2
+    assert ended.err == (
+        "--set: gasket.dahl_force_y: dahl_displacement_y: must be above 0 where dahl_force_y is\n"
+    )
+
+
 def test_a_whole_matrix_writes_loops_and_one_page(wm_drake):
     ended = wm_drake("rig", "damper", "--component", "mstv_damper", "--matrix", "C", "--out", "out")
     assert ended.code == 0
@@ -85,7 +102,7 @@ def test_matrices_of_bushing_and_gasket(wm_drake, arguments):
 
 @pytest.fixture
 def loops_of(wm_drake):
-    """Files of loops of a component, as a bench would write them."""
+    """Return files of loops of a component, as a bench would write them."""
 
     def run(*arguments):
         assert wm_drake("rig", *arguments, "--out", "bench").code == 0
@@ -173,7 +190,7 @@ def test_a_radial_axis_serves_x_and_z_and_a_component_file_serves_the_bench(wm_d
 
 
 def test_fixed_numbers_are_written_with_the_identified_ones(wm_drake, loops_of):
-    """On one axis, on the axes that are copied from it, and with a law that is new to the machine."""
+    """Fix on one axis, on the axes copied from it, and with a law that is new to the machine."""
     files = loops_of("gasket", "--axis", "x", "-f", "1,5 Hz", "-a", "5 mm")
     fix = ("--fix", "damping_x=0.06 N s/mm")
     for axis in ("x", "radial"):

@@ -84,7 +84,7 @@ def test_wrong_options_are_refused(wm_drake, tmp_path, options, word):
 
 
 def test_orders_of_measured_accelerations(wm_drake, tmp_path):
-    """A planted order 2 of 3 m/s^2 while the drum speeds up."""
+    """Plant order 2 of 3 m/s^2 while the drum speeds up."""
     time = np.arange(0.0, 40.0, 5e-3)
     rpm = 100.0 + 5.0 * time
     angle = (100.0 * time + 2.5 * time**2) * np.pi / 30.0

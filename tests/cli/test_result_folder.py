@@ -282,7 +282,7 @@ def test_deeply_nested_run_file_is_refused():
 
 @pytest.mark.slow
 def test_calibrate_whose_files_cannot_grow_keeps_its_runs_and_ends_with_a_message(tmp_path):
-    """The ledger fits on the disk, the results do not."""
+    """Limit the disk so that the ledger fits and the results do not."""
     (tmp_path / "short.yaml").write_text(
         "extends: reference\nname: short\nmeasured: []\n"
         "profile: {time: '(0, 6) s', speed: '(40, 200) rpm'}\n"

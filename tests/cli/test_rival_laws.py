@@ -14,7 +14,7 @@ LAWS = "coulomb,mstv,havsin"
 
 @pytest.fixture
 def bench(wm_drake):
-    """Loops of the MSTV damper: four to fit, two to predict."""
+    """Write loops of the MSTV damper: four to fit, two to predict."""
     loops = ("rig", "damper", "--component", "mstv_damper", "-a", "0.5,2 mm")
     assert wm_drake(*loops, "-f", "1,10 Hz", "--out", "fitted").code == 0
     assert wm_drake(*loops, "-f", "3 Hz", "--out", "held").code == 0
@@ -79,7 +79,7 @@ def test_all_numbers_may_be_fixed_and_are_only_evaluated(wm_drake, bench):
 
 @pytest.mark.parametrize("law", ["stv", "havsin"])
 def test_a_law_with_numbers_that_one_loop_does_not_show_reports_its_error(wm_drake, law):
-    """A loop of a dashpot shows no number of a friction that grows with velocity."""
+    """Fit a loop of a dashpot, which shows no number of a friction that grows with velocity."""
     Path("dashpot.yaml").write_text("law: coulomb\nfriction_force: 0 N\ndamping: 0.5 N s/mm\n")
     bench = ("rig", "damper", "--component", "dashpot.yaml", "-f", "2 Hz", "-a", "5 mm")
     assert wm_drake(*bench, "--out", "bench").code == 0
@@ -123,7 +123,7 @@ def test_bad_comparisons_get_one_message(wm_drake, arguments, message):
 
 
 def test_all_names_after_validate_are_held_out(wm_drake, bench):
-    """A shell expands held/*.csv to several names: none of them may reach the fit."""
+    """Expand held/*.csv to several names, as a shell does: none of them may reach the fit."""
     files, held = bench
     ended = wm_drake(
         "identify", "damper", "--validate", *held, "--law", "coulomb", *files[:0], "--json"

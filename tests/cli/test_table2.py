@@ -17,7 +17,7 @@ def test_force_grows_with_frequency_because_of_the_dashpots_alone():
 
 
 def test_measured_files_are_fitted_one_by_one_beside_the_printed_values(wm_drake):
-    """A damper of Coulomb friction with known k1 and c1 gives them back."""
+    """Find k1 and c1 of a damper of Coulomb friction again."""
     Path("coulomb.yaml").write_text(
         "law: stv_sponge\nfriction_force: 45 N\nsponge_stiffness: 140 N/mm\n"
         "sponge_damping: 3 N s/mm\nslider_damping: 0.4 N s/mm\n"

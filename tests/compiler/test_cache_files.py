@@ -20,7 +20,7 @@ print(spring(2.0, 3.0), sum(spring.stats.cache_hits.values()))
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """Runs a law in a process of its own, with a cache of its own."""
+    """Run a law in a process of its own, with a cache of its own."""
     folder = tmp_path_factory.mktemp("law")
     (folder / "spring.py").write_text(LAW, encoding="utf-8")
 

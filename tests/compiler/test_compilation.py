@@ -50,7 +50,7 @@ def three(x, begin):
 
 
 def unit(a):
-    """Unit vector of three scalars of any type."""
+    """Return the unit vector of three scalars of any type."""
     length = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
     return (a[0] / length, a[1] / length, a[2] / length)
 
@@ -154,7 +154,7 @@ def flat(answer):
 
 
 def random_inputs(count, seed, cases):
-    """Numbers with sizes between 0.15 and 0.9 and any sign: away from the kinks at zero."""
+    """Draw numbers with sizes between 0.15 and 0.9 and any sign: away from the kinks at zero."""
     rng = np.random.default_rng(seed)
     return rng.uniform(0.15, 0.9, (cases, count)) * rng.choice([-1.0, 1.0], (cases, count))
 

@@ -28,7 +28,7 @@ def first_after_new_array():
 
 
 def test_kept_array_is_not_freed_before():
-    """Without `keep`, the other array takes its memory."""
+    """Show that without `keep` the other array takes its memory."""
     first, other = first_after_new_array()
     assert first == 1.0
     assert np.all(other == 2.0)
@@ -56,7 +56,7 @@ def names_to_the_end(function: ast.FunctionDef) -> set[str]:
 
 
 def test_arrays_of_compiled_loops_are_kept():
-    """A local array is used in the last loop, where its lanes are, or kept behind it."""
+    """Check that a local array is used in the last loop, where its lanes are, or kept behind it."""
     freed, found = [], 0
     for source in sorted(Path(wm_drake.__file__).parent.rglob("*.py")):
         for function in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):

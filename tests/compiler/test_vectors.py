@@ -29,7 +29,7 @@ def random_axis(rng):
 
 
 def matrix_of(r):
-    """Rotation matrix of a rotation vector."""
+    """Return the rotation matrix of a rotation vector."""
     angle = np.linalg.norm(r)
     return AngleAxis(angle, r / angle).rotation()
 

@@ -124,7 +124,7 @@ print(json.dumps(found))
 
 @pytest.fixture(scope="module")
 def with_new_law(tmp_path_factory):
-    """Folder of a copy of the package with the law in it, and its environment."""
+    """Return a copy of the package with the law in it, and its environment."""
     root = tmp_path_factory.mktemp("with_new_law")
     shutil.copytree(PACKAGE, root / "wm_drake", ignore=shutil.ignore_patterns("__pycache__"))
     if not (root / "wm_drake" / "sdf").is_dir():

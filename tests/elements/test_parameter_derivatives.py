@@ -131,7 +131,7 @@ def test_derivatives_by_packed_numbers_agree_with_finite_differences(name):
 
 
 def test_every_whole_number_of_an_element_is_found():
-    """Number of a law and of the points of each table; all other packed numbers have a derivative."""
+    """Check numbers of laws and of table points; all other packed numbers have a derivative."""
     packed = damper("free_stroke")
     whole = set()
     counted = np.array(

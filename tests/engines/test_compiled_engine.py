@@ -38,7 +38,7 @@ TWO = Load(
 
 @pytest.mark.parametrize("name", names_of_each_kind())
 def test_every_kind_of_machine_moves_as_in_drake(name):
-    """Drake at its default accuracy, the compiled engine at a fine step."""
+    """Compare Drake at its default accuracy with the compiled engine at a fine step."""
     machine = build_machine(MACHINES[name])
     case = Case("two", TWO, SHORT if name in JUMPS + SLACK else RUN_UP)
     drake = simulate(machine, case, "drake")
@@ -76,7 +76,7 @@ def test_without_gasket_and_with_other_numbers(machine, reference):
 def test_70_s_trajectories_agree_to_a_micrometre_when_both_are_refined(
     machine, reference, load, gasket
 ):
-    """The compiled engine at a fine step, Drake at tight accuracy. [m]"""
+    """Compare the compiled engine at a fine step with Drake at tight accuracy. [m]"""
     case = case_of(reference, load, gasket=gasket)
     setups = [machine.set_up(case.load, gasket=gasket) for _ in range(2)]
     drake = run_drake(setups[0], case.profile, 2.5e-3, lambda fraction: None, accuracy=4e-7)
@@ -94,7 +94,7 @@ def test_70_s_trajectories_agree_to_a_micrometre_when_both_are_refined(
     + [("middle", False), ("counter", False)],
 )
 def test_peaks_at_default_steps_agree(machine, reference, load, gasket):
-    """The default step of 2.5 ms holds peaks to 0.05 % with gasket and to 0.2 % without."""
+    """Check the default step of 2.5 ms: 0.05 % in peaks with gasket, 0.2 % without."""
     case = case_of(reference, load, gasket=gasket)
     drake, compiled = (measure(simulate(machine, case, engine)) for engine in ("drake", "compiled"))
     for peak in PEAKS:

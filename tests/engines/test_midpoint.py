@@ -61,7 +61,7 @@ def after_a_step(packed, layout, relaxation, states, kept):
 
 
 def test_a_small_motion_takes_the_step_of_the_linearised_machine(setup):
-    """The compiled step against the matrix of the check, along random motions."""
+    """Compare the compiled step with the matrix of the check, along random motions."""
     size = 1e-8
     packed, layout, rest, jacobian = at_rest(setup, size)
     relaxation = relaxation_matrices(setup, layout, jacobian, STEP)
@@ -91,7 +91,7 @@ def _kept(setup):
 
 
 def test_with_its_own_jacobian_the_step_is_the_implicit_midpoint_rule(setup):
-    """A motion of the tubes alone is multiplied by (1 + z/2) / (1 - z/2)."""
+    """Check that a motion of the tubes alone is multiplied by (1 + z/2) / (1 - z/2)."""
     _, layout, _, jacobian = at_rest(setup, 1e-8)
     free, _ = free_states(setup)
     tubes = np.array([place for place, k in enumerate(free) if 14 <= k < 14 + 14])

@@ -106,7 +106,7 @@ def test_a_run_moves_as_in_drake(changes):
 
 
 def test_the_prescribed_speed_is_the_limit_of_strong_drives():
-    """A controller twice as strong leaves half the error of the motion: order 1 of its strength."""
+    """Check that twice the controller gain halves the error of the motion: order 1 of the gain."""
     profile, load = SpinProfile(time=(0.0, 2.0), speed=(6.0, 12.0)), unbalance(0.5)
     gains, errors = (0.1, 0.2, 0.4, 0.8), []  # times 144: 14 to 115 N m s/rad at the drum
     prescribed = build_machine(load_machine("reference"))
@@ -136,7 +136,7 @@ def test_the_prescribed_speed_is_the_limit_of_strong_drives():
 
 
 def test_the_work_of_the_motor_is_stored_or_dissipated(driven):
-    """The book knows bodies, springs, gasket and dampers; the friction of the drum is written out here."""
+    """Use the book of bodies, springs, gasket and dampers; add the friction of the drum here."""
     load = driven.parameters.loads["middle"]
     profile = SpinProfile(time=(0.0, 1.2), speed=(6.0, 20.0))
     setup = driven.set_up(load)
@@ -189,7 +189,7 @@ def test_a_fast_controller_asks_for_a_shorter_step_and_an_unstable_sample_time_i
 
 @pytest.mark.slow
 def test_a_run_on_a_cabinet_that_moves_is_as_in_drake():
-    """Motor and cabinet together, at a friction at which the feet slide."""
+    """Run motor and cabinet together, at a friction at which the feet slide."""
     machine = build_machine(with_moving_cabinet(load_machine("motor"), friction=0.12))
     case = Case("two", LOAD, SpinProfile(time=(0.0, 0.301, 1.0), speed=(8.0, 12.0, 20.0)))
     drake, fine, usual = (

@@ -113,7 +113,7 @@ def amplification(bodies, pull, drive, decay):
 
 
 def test_machines_with_sponges_are_followed_where_the_whole_step_is_stable():
-    """Random masses on springs, dashpots and sponges: the growth against the eigenvalues."""
+    """Compare growth with eigenvalues of random masses on springs, dashpots and sponges."""
     rng = np.random.default_rng(3)
     wrong, sides = 0, {True: 0, False: 0}
     for _ in range(120):
@@ -167,7 +167,7 @@ def amplification_of_block(jacobian, alone, first):
 
 
 def test_machines_with_a_cabinet_are_followed_where_the_whole_step_is_stable():
-    """A body on a random cabinet on stiff feet: the growth against the eigenvalues."""
+    """Compare growth with eigenvalues of a body on a random cabinet on stiff feet."""
     rng = np.random.default_rng(4)
     wrong, sides = 0, {True: 0, False: 0}
     for _ in range(80):
@@ -211,7 +211,7 @@ def test_a_cabinet_that_grows_by_itself_may_grow():
 
 @pytest.mark.parametrize("name", ["light_cabinet", "heavy_cabinet"])
 def test_a_cabinet_takes_steps_of_one_derivative_with_the_peaks_of_small_steps(name):
-    """Steps of 2.5 ms against steps of the Runge-Kutta scheme of a sixteenth, with the motor."""
+    """Compare steps of 2.5 ms with a sixteenth of it by Runge-Kutta, with the motor."""
     drive = load_machine("motor").model_dump()["drive"]
     tree = load_machine(name).model_dump() | {"drive": drive}
     machine = build_machine(MachineParameters.model_validate(tree))

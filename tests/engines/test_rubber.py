@@ -42,7 +42,7 @@ def test_peaks_at_the_default_step_are_those_of_a_fine_one(rubber):
 
 
 def test_friction_over_a_short_path_needs_no_short_step():
-    """The gasket moves by several times 0.1 mm in a step of 2.5 ms."""
+    """Move the gasket by several times 0.1 mm in a step of 2.5 ms."""
     machine = with_rubber(dahl_force_x=8.0, dahl_displacement_x=1e-4)
     case = case_of(machine.parameters, "middle")
     record = simulate(machine, case, step=2.5e-3 / 16, integrator="runge_kutta")

@@ -41,7 +41,7 @@ def test_a_mass_on_a_strong_dashpot_decays():
 
 
 def test_friction_counts_with_its_steepest_slope():
-    """HAVSIN about x: p pi / (2 v_t) over the moment of inertia of all bodies."""
+    """Check HAVSIN about x: p pi / (2 v_t) over the moment of inertia of all bodies."""
     parameters = with_values(
         isotropic_machine(stiffness=10.0, damping=0.0, rotational_stiffness=1.0),
         {"gasket.friction_torque_x": 500.0, "gasket.full_friction_rate_x": 0.5},
@@ -53,7 +53,7 @@ def test_friction_counts_with_its_steepest_slope():
 
 
 def test_the_sponge_of_a_damper_decays_with_stiffness_over_damping(machine):
-    """k1 / (c1 + c2) while it slips, from [C] Eq. (3) without mass."""
+    """Check k1 / (c1 + c2) while it slips, from [C] Eq. (3) without mass."""
     kind = machine.parameters.damper_types["friction"]
     expected = kind.sponge_stiffness / (kind.sponge_damping + kind.slider_damping)
     sponges = [m for part, m in fastest_motions(machine.set_up()).items() if "sponge" in part]

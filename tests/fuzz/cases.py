@@ -249,7 +249,7 @@ NUMBERS = [
     "-9223372036854775809", "1e300", "1e-300", "0x10", "[/b]", "a" * 2000,
 ]  # fmt: skip
 OPTIONS = [
-    ("calibrate --free FREE", ["--starts", "--iterations", "--seed", "--deviation", "--resolution", "--workers", "--weight", "--leave-out", "--method"]),
+    ("calibrate --free FREE", ["--starts", "--iterations", "--seed", "--deviation", "--resolution", "--workers", "--weight", "--limit", "--leave-out", "--method"]),
     ("study gasket --trials 200", ["--seed", "--workers", "--design", "--model", "--tables", "--factor", "--load"]),
     ("study gasket", ["--trials"]),
     ("study spin-cycle", ["--workers", "--engine", "--profile", "--case"]),

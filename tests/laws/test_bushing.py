@@ -59,7 +59,7 @@ def angular_velocity(r, r_rate):
 
 
 def closed_path(count=400):
-    """Displacement and rotation vector, with rates, over one turn of a closed path with angles up to 2 rad. [m, rad, 1/s]"""
+    """Return displacement, rotation vector and rates over a closed path, up to 2 rad. [m, rad, 1/s]"""
     s = 2.0 * np.pi * np.arange(count) / count
     d = 0.008 * np.column_stack([np.sin(s), np.cos(2 * s), np.sin(s + 1.0)])
     d_rate = 0.008 * np.column_stack([np.cos(s), -2 * np.sin(2 * s), np.cos(s + 1.0)])

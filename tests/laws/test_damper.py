@@ -41,7 +41,7 @@ epsilons = st.floats(1e-8, 1e-3)  # m/s
 
 @st.composite
 def sliders(draw):
-    """Velocity, dashpot, friction parameters of a slider whose rate is finite."""
+    """Draw velocity, dashpot, friction parameters of a slider whose rate is finite."""
     v, c, f_max, c_m, epsilon = (
         draw(s) for s in (velocities, dampings, full_forces, dampings, epsilons)
     )
@@ -50,7 +50,7 @@ def sliders(draw):
 
 
 def least_and_largest_load(w, v, c, f_max, c_m, epsilon):
-    """Loads b that hold the slider at w; they differ only where MSTV friction jumps, at |w| = |v - w|."""
+    """Return the loads b that hold the slider at w; two where MSTV friction jumps, |w| = |v - w|."""
     loads = [
         c * w - mstv_friction(w, (v - w) * (1.0 + turn), f_max, c_m, epsilon)
         for turn in (-1e-12, 1e-12)
@@ -176,7 +176,7 @@ PACKED = {  # law -> its numbers in the order of its class
 
 
 def direct_response(law, v, deformation):
-    """Tension and deformation rate, typed from the papers."""
+    """Return tension and deformation rate, typed from the papers."""
     if law == "coulomb":
         return 25.0 * v + 60.0 * np.sign(v), 0.0
     if law == "stv":
@@ -301,7 +301,7 @@ def test_derivatives_of_a_free_stroke_damper_without_main_friction_are_finite():
     f_max=full_forces,
 )
 def test_step_of_heavy_sponge_keeps_momentum(deformation, v, w_before, step, mass, f_max):
-    """m (w - w0) / h is tension, air resistance and friction at the end of the step, [C] (2), (3)."""
+    """Check m (w - w0) / h: all forces at the end of the step, [C] (2), (3)."""
     tension, w = mstv_sponge_with_mass(
         deformation, v, w_before, step, mass, f_max, 0.0, EPSILON, K1, C1, C2
     )

@@ -34,7 +34,7 @@ def test_weight_at_the_centre_is_shared_equally():
 
 
 def test_weight_is_shared_linearly():
-    """A foot at the corner of a square of half side s carries W/4 (1 +- x/s +- y/s)."""
+    """Check a corner of a square of half side s: it carries W/4 (1 +- x/s +- y/s)."""
     found = load_at(400.0, 0.1, -0.05)
     expected = [100.0 * (1 + 0.4 * i - 0.2 * j) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     assert found == pytest.approx(expected, rel=1e-13)
@@ -42,7 +42,7 @@ def test_weight_is_shared_linearly():
 
 @pytest.mark.parametrize("feet", [SQUARE, SKEW])
 def test_loads_are_those_of_springs_that_do_not_pull(feet):
-    """Against non-negative least squares with equilibrium as a stiff constraint."""
+    """Compare with non-negative least squares, equilibrium as a stiff constraint."""
     equations = np.array([np.ones(4), feet[0], feet[1]])
     rng = np.random.default_rng(3)
     lifted = 0
@@ -61,7 +61,7 @@ def test_loads_are_those_of_springs_that_do_not_pull(feet):
 
 
 def test_rigid_block_tips_where_the_closed_form_says():
-    """Force f at height h tips a block of weight W and half side s at f h = W s."""
+    """Check that a force f at height h tips a block of weight W and half side s at f h = W s."""
     weight, height, s = 600.0, 0.8, 0.25
     threshold = weight * s / height
     for share in (0.5, 0.99, 1.01):
@@ -99,7 +99,7 @@ def test_square_of_feet_turns_at_mu_w_r():
 
 
 def test_an_eccentric_force_turns_before_it_slides():
-    """Papadopoulos and Papadimitriou: rotational slip comes first."""
+    """Check the theorem of Papadopoulos and Papadimitriou: rotational slip comes first."""
     holding = (60.0,) * 4
     first = brentq(lambda f: turning_margin(0.0, f, 0.1 * f, holding, *SQUARE), 1.0, 239.0)
     assert first < 0.95 * 240.0
@@ -108,7 +108,7 @@ def test_an_eccentric_force_turns_before_it_slides():
 
 
 def test_two_feet_in_closed_form():
-    """With load on two feet only, a foot is the centre: force f across at one end, w there."""
+    """Load two feet only: a foot is then the centre, with force f across at one end, w there."""
     holding = (50.0, 50.0, 0.0, 0.0)
     # two feet at distance 0.5: pure moment 50 * 0.5; with a force along the line the limit shrinks
     assert least_turning_resistance(0.0, 0.0, holding, *SQUARE) == pytest.approx(25.0)
@@ -141,7 +141,7 @@ def brute_force(f, holding, x, y):
 
 @pytest.mark.parametrize("feet", [SQUARE, SKEW])
 def test_limit_of_turning_is_that_of_the_static_theorem(feet):
-    """The least upper bound by motions is the greatest lower bound by forces."""
+    """Check that the least upper bound by motions is the greatest lower bound by forces."""
     rng = np.random.default_rng(8)
     for shares in rng.dirichlet(np.ones(4), size=3):
         holding = tuple(240.0 * shares)

@@ -46,7 +46,7 @@ def test_it_is_continuous_where_sliding_begins():
 
 
 def test_power_goes_to_spring_damper_and_friction():
-    """-F . v = d(k s^2 / 2)/dt + c |s'|^2 + mu N |w|, at any state."""
+    """Check -F . v = d(k s^2 / 2)/dt + c |s'|^2 + mu N |w| at any state."""
     for _ in range(200):
         shear, v = RNG.uniform(-2e-3, 2e-3, 2), RNG.uniform(-0.5, 0.5, 2)
         limit = RNG.uniform(0.0, 500.0)

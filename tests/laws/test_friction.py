@@ -22,7 +22,7 @@ epsilons = st.floats(1e-9, 1e-3)  # m/s
 
 
 def havsin_of_the_paper(x, x0, h0, x1, h1):
-    """[A] Eq. (3), with pi inside the sine and (h1 - h0)/2 before it."""
+    """Return [A] Eq. (3), with pi inside the sine and (h1 - h0)/2 before it."""
     if x <= x0:
         return h0
     if x >= x1:

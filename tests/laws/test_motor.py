@@ -62,7 +62,7 @@ def test_a_demand_is_cut_at_the_limit_in_both_directions():
 
 
 def test_the_integral_part_follows_a_limited_torque_instead_of_winding_up():
-    """With a constant error e at the limit L, I' = K_i e + (L - K_p e - I) K_i / K_p has the rest point I = L."""
+    """Hold the error e and the limit L: I' = K_i e + (L - K_p e - I) K_i / K_p rests at I = L."""
     controller = SimpleNamespace(proportional_gain=0.02, integral_gain=0.05, tracking_rate=2.5)
     error, limit, integral, step = 50.0, 0.6, 0.0, 1e-3
     for _ in range(int(5.0 / step)):
@@ -84,7 +84,7 @@ def test_friction_of_the_drum_opposes_it_and_saturates():
 
 
 def test_all_numbers_of_motor_and_controller_are_those_of_the_motors_shaft():
-    """A drum that lags by 0.5 rad/s: e = 5 rad/s at the motor; T = 10 (0.02 * 5 + I) at the drum."""
+    """Let the drum lag by 0.5 rad/s: e = 5 rad/s at the motor, T = 10 (0.02 * 5 + I) at the drum."""
     packed = packed_motor(DRIVE)
     state = MOTOR_STATE.unpack(np.array([0.03, 0.0]))
     torque, growth = generic(motor_response)(state, 20.0, 20.5, packed, 0)

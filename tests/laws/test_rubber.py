@@ -31,7 +31,7 @@ def test_the_decay_factor_is_the_exponential_function():
 
 @given(st.floats(-0.99, 0.99), st.floats(-5.0, 5.0))
 def test_the_path_in_closed_form_solves_the_differential_equation(start, path):
-    """dz/dx = 1 - sgn(dx) z / x_c over a path without reversal, at any speed."""
+    """Integrate dz/dx = 1 - sgn(dx) z / x_c over a path without reversal, at any speed."""
     end = dahl_after_path(start * X_C, path * X_C, X_C)
     sign = np.sign(path)
     expected = sign + (start - sign) * np.exp(-abs(path))
@@ -45,7 +45,7 @@ def test_the_path_in_closed_form_solves_the_differential_equation(start, path):
 
 
 def test_a_loop_has_the_force_and_the_area_of_its_closed_form():
-    """F(A) = F_max tanh(A / x_c); area 4 F_max (A - x_c tanh(A / x_c)); both at any frequency."""
+    """Check F(A) = F_max tanh(A / x_c), area 4 F_max (A - x_c tanh(A / x_c)) at any frequency."""
     amplitude, force = 4e-3, 25.0
     x = amplitude * np.sin(np.linspace(0.0, 6.0 * np.pi, 6001))
     z = np.zeros_like(x)
@@ -66,7 +66,7 @@ def test_a_loop_has_the_force_and_the_area_of_its_closed_form():
     st.sampled_from([0.2, 1.0, 30.0]),
 )
 def test_a_step_follows_a_linear_rate_through_a_reversal(start, first, last, length):
-    """The plain equation by scipy, at steps that no explicit scheme could take (length 30)."""
+    """Solve the plain equation by scipy, at steps too long for an explicit scheme (length 30)."""
     h = length * X_C
     first, last = first, last  # m/s
     expected = solve_ivp(

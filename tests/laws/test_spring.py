@@ -51,7 +51,7 @@ def test_a_taut_spring_has_the_same_bits_as_one_that_pushes(length):
 
 @given(st.floats(-0.02, 0.03), st.sampled_from([K, TABLE]))
 def test_tension_and_stiffness_are_continuous(x, stiffness):
-    """By central differences over h the slope changes by no more than its largest curvature times h.
+    """Check that the slope changes over h by no more than its largest curvature times h.
 
     The second derivative of the cubic is at most 4 k / transition; that of the tables is far less.
     """

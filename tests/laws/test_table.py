@@ -18,7 +18,7 @@ PROGRESSIVE = ForceTable(
 
 @st.composite
 def tables(draw):
-    """Rising displacements from -10 mm on, never falling forces, some of them flat."""
+    """Draw rising displacements from -10 mm on, never falling forces, some of them flat."""
     n = draw(st.integers(2, 7))
     steps = draw(st.lists(st.floats(1e-4, 5e-3), min_size=n - 1, max_size=n - 1))  # m
     rises = draw(

@@ -46,7 +46,7 @@ def whirling():
 
 @pytest.fixture(scope="module")
 def balls():
-    """Tub and drum with their centres of mass on To, and the bearing there; the drum is slimmer across its axis."""
+    """Return tub and drum with centres of mass and bearing on To; the drum is slimmer across."""
     tree = isotropic_machine().model_dump()
     drum = tree["bodies"]["drum"] | {"inertia": {"xx": 0.2, "yy": 0.3, "zz": 0.2}}
     damped = {f"rotational_damping_{axis}": 40.0 for axis in "xyz"}
@@ -88,7 +88,7 @@ def test_preloads_balance_the_machine_with_its_drum_sagged(whirling, machine, up
 
 
 def response(record, values, along, across):
-    """Complex amplitude of what turns with the drum: the first part as the cosine of its angle, the second as its sine."""
+    """Return the complex amplitude of what turns with the drum: parts as cosine and as sine."""
     angle = record.drum_angle.values
     basis = np.column_stack([np.cos(angle), np.sin(angle), np.ones(len(angle))])
     in_phase, ahead, _ = np.linalg.lstsq(basis, values.sel(axis=along).values, rcond=None)[0]
@@ -99,7 +99,7 @@ def response(record, values, along, across):
 
 
 def two_bodies(mass, stiffness, damping, inner, inner_stiffness, inner_damping, speed, force):
-    """Complex amplitude of the inner body against the outer one, which hangs on a spring; the force turns with the inner."""
+    """Return the complex amplitude of the inner body in the outer one, which hangs on a spring."""
     own, between = stiffness + 1j * speed * damping, inner_stiffness + 1j * speed * inner_damping
     matrix = [[own + between - mass * speed**2, -between], [-between, between - inner * speed**2]]
     outer, moved = np.linalg.solve(matrix, [0.0, force])

@@ -20,7 +20,7 @@ CORNERED = SpinProfile(time=(0.0, 0.3337, 0.7, 1.0), speed=(0.0, 300 * RPM, 100 
 
 
 def speed_error_rpm(machine, simulator, end, profile):
-    """Largest difference of drum speed and profile at any step of a plain AdvanceTo."""
+    """Return the largest difference of drum speed and profile in a plain AdvanceTo."""
     port, errors = machine.diagram.GetOutputPort("drum_speed"), []
 
     def monitor(context):
@@ -67,7 +67,7 @@ def test_the_helper_is_exact_across_sharp_corners(machine):
 
 
 def test_a_plain_step_across_a_sharp_corner_is_not_exact(machine):
-    """What the helper is for: fixed steps of 5 ms miss this corner by much more."""
+    """Show what the helper is for: fixed steps of 5 ms miss this corner by much more."""
     setup = machine.set_up("middle", profile=CORNERED)
     simulator = Simulator(machine.diagram, setup.context)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 5e-3).set_fixed_step_mode(True)
@@ -92,7 +92,7 @@ def test_outputs_can_be_logged(reference):
 
 
 def test_a_user_system_closes_a_loop_around_the_motor(reference):
-    """A proportional speed controller holds 60 rpm in place of the spin profile."""
+    """Hold 60 rpm by a proportional speed controller in place of the spin profile."""
 
     class Controller(LeafSystem):
         def __init__(self):
@@ -156,7 +156,7 @@ def test_a_fixed_drum_acceleration_replaces_the_profile(machine):
 
 
 def test_two_contexts_of_one_diagram_in_alternation(machine):
-    """What one Context holds does not reach the other."""
+    """Check that what one Context holds does not reach the other."""
     alone = []
     for load in ("middle", "counter"):
         context = machine.set_up(load).context
@@ -174,7 +174,7 @@ def test_two_contexts_of_one_diagram_in_alternation(machine):
 
 
 def test_linearize_with_motor_in_and_sensors_out(machine):
-    """At rest with the dampers out: the drum integrates its acceleration, and a sensor moves with it."""
+    """Linearize at rest without dampers: the drum integrates its acceleration, sensors follow."""
     setup = machine.set_up("middle", dampers=False)
     machine.diagram.GetInputPort("drum_acceleration").FixValue(setup.context, [0.0])
     machine.diagram.GetInputPort("tub_force").FixValue(setup.context, np.zeros(6))
@@ -275,7 +275,7 @@ def test_meshcat_shows_the_moving_machine_and_cannot_touch_the_dynamics(machine,
 
 
 def test_meshcat_moves_a_cabinet_that_moves():
-    """The picture at a time has the cabinet where the plant has it, and its floor stays."""
+    """Compare the picture with the plant: the cabinet is where it is there, and its floor stays."""
     meshcat = Meshcat(MeshcatParams(host="localhost"))
     shown = build_machine(with_moving_cabinet(friction=0.1), meshcat=meshcat)
     context = shown.set_up("middle").context
@@ -313,7 +313,7 @@ def test_a_cloned_context_keeps_its_profile(machine):
 
 
 def test_motor_torque_of_a_run_is_that_of_the_port(machine):
-    """At constant drum acceleration and a locked tub pose the port gives inertia times acceleration."""
+    """Compare with inertia times acceleration, both constant, and a locked tub."""
     setup = machine.set_up()
     machine.set_drum_acceleration(setup.context, 2.0)
     torque = machine.diagram.GetOutputPort("motor_torque").Eval(setup.context)[0]

@@ -50,7 +50,7 @@ def test_preloads_carry_the_weight_and_its_moments(machine, upright):
 
 
 def test_only_a_spring_that_pushes_may_have_a_compressive_preload(machine, reference):
-    """The hook of the left spring is below the tub: it has to push upwards."""
+    """Put the hook of the left spring below the tub: it has to push upwards."""
     below = with_value(reference, "frames.spring_left_housing.position", (-0.25, 0.0, -0.6))
     with pytest.raises(InputError, match=r"springs.left: would be slack at rest \(preload -"):
         machine.set_up(parameters=below)
@@ -143,7 +143,7 @@ def test_gasket_out_means_no_gasket_force(machine):
 
 
 def mass_and_finite_difference_stiffness(machine, setup):
-    """6 x 6 mass matrix of the tub with the drum locked, and stiffness by central differences of the static force.
+    """Return mass matrix of tub with locked drum, and stiffness by differences of static force.
 
     Both are those of the velocities (angular velocity in W), not of the derivatives of roll, pitch and yaw.
     """

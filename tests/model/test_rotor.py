@@ -65,7 +65,7 @@ def explicit_plant(setup):
 
 
 def test_masses_and_velocity_terms_are_those_of_a_rotor_that_is_a_body(driven):
-    """The belt makes the rotor's rate n times the drum's: M and C v of the constrained plant."""
+    """Compare M and C v with the plant whose belt turns the rotor n times as fast as the drum."""
     machine, setup = driven
     plant, n = explicit_plant(setup), setup.motor.belt_ratio
     tied = np.zeros((8, 7))

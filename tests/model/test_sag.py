@@ -47,7 +47,7 @@ def test_preloads_of_the_equilibrium_give_no_sag(machine, bare):
 
 
 def test_free_lengths_of_the_equilibrium_give_no_sag(machine, bare):
-    """Each spring gets a type of its own."""
+    """Give each spring a type of its own."""
     solved = set_up(machine, bare)
     plain = bare.model_dump()
     kind = plain["spring_types"]["suspension"]
@@ -70,7 +70,7 @@ def test_springs_carry_the_weight_where_the_machine_rests(machine, bare, change)
 
 
 def test_less_preload_lets_the_machine_sag_by_force_over_stiffness(machine, bare):
-    """For small changes: sag = force over stiffness, of the generalized coordinates."""
+    """Check sag = force over stiffness of the generalized coordinates, for small changes."""
     solved = set_up(machine, bare)
     loss = 0.02  # N in each spring
     less = {f"springs.{name}.preload": s.preload - loss for name, s in solved.springs.items()}

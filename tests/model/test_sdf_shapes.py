@@ -11,7 +11,7 @@ CUBE = "".join(f"v {x} {y} {z}\n" for x in (0, 0.1) for y in (0, 0.1) for z in (
 
 @pytest.fixture
 def machine(tmp_path):
-    """Writes a machine whose link has one more shape, and returns its file."""
+    """Write a machine whose link has one more shape, and return its file."""
 
     def write(shape, link="tub", tag="collision"):
         text = (SDF_FOLDER / "oscillating_group.sdf").read_text(encoding="utf-8")

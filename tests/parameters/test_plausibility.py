@@ -73,7 +73,7 @@ def test_every_range_belongs_to_a_number_and_has_its_unit(tmp_path):
 
 
 def test_spring_too_soft_for_its_weight_has_no_free_length(reference):
-    """Free length = length - preload / stiffness; the limit is stiffness = preload / length."""
+    """Check free length = length - preload / stiffness: 0 at stiffness = preload / length."""
     setup = build_machine(reference).set_up()
     limits = {
         f"springs.{name}": spring.preload / spring.rest_length

@@ -43,7 +43,7 @@ def test_means_contributions_and_effects_are_read(write):
 
 
 def test_effects_at_two_levels_are_completed_to_a_sum_of_zero(write):
-    """[B] Table 5 gives the levels -1 and 0 of each factor."""
+    """Take the levels -1 and 0 of each factor, as [B] Table 5 gives them."""
     path = write("middle,Dx,C_L,40,2 -0.5\nmiddle,Dx,C_L:C_T,6,1 2 3 5\n")
     terms = published_results([path])["middle", "Dx"]
     assert terms["C_L"].effects == (2.0, -0.5, -1.5)

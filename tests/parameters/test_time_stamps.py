@@ -25,7 +25,7 @@ def test_other_samples_are_untouched():
 
 
 def test_a_loop_with_a_coarse_clock_is_that_of_the_fine_one(tmp_path):
-    """Every second stamp repeats the one before it; means of neighbours are half a step later."""
+    """Repeat every second stamp; means of neighbours are half a step later."""
     time = 0.01 * np.arange(200)
     rows = [f"{t:.6f},{np.sin(7 * t):.9f},{np.cos(7 * t):.9f}" for t in time]
     coarse = [f"{time[k - k % 2]:.6f}{row[row.index(',') :]}" for k, row in enumerate(rows)]

@@ -10,7 +10,7 @@ FOLDER = Path(wm_drake.report.__file__).parent
 
 
 def test_each_template_of_a_page_has_a_kind():
-    """Each file that extends page.html is a kind of page, and is drawn in the browser tests."""
+    """Find all files that extend page.html: each is a kind, drawn in the browser tests."""
     templates = {
         path.relative_to(FOLDER).as_posix()
         for path in FOLDER.rglob("*.html")

@@ -193,7 +193,7 @@ def test_slack_springs_are_counted_by_spring_and_load(words):
 
 
 def test_spread_shows_all_points_of_all_loads(screening, words):
-    """Shared limits once ended with the first panel and cut the points of the others."""
+    """Check shared limits; once they were those of the first panel and cut points of the others."""
     figure = figures.spread_figure(screening, ["Dx", "Dy", "Dz"], "displacement", words)
     for axes, load in zip(figure.axes, screening.loads, strict=True):
         values = screening.responses.values[load][["Dx", "Dy", "Dz"]].to_numpy()
@@ -248,7 +248,7 @@ def test_page_of_few_factors_and_failed_runs(trials, model):
 
 
 def test_page_of_one_factor_has_no_interactions(reference):
-    """One factor with a model of interactions: as `--factor gasket.stiffness_x` gives."""
+    """Take one factor with a model of interactions, as `--factor gasket.stiffness_x` gives."""
 
     def evaluate(design):
         frame = pd.DataFrame(dict.fromkeys(RESPONSES, 2.0 + design.levels[:, 0]))

@@ -208,7 +208,7 @@ def test_ten_grams_of_sponge_change_the_loop_by_less_than_three_parts_in_ten_tho
 
 @pytest.mark.parametrize("motion", MATRICES["damper"]["C"], ids=str)
 def test_a_sponge_of_a_milligram_is_massless_in_all_tests_of_c(motion):
-    """At the two reversals the friction of a massless slider jumps; a mass smooths the jump."""
+    """Leave out both reversals: the friction of a massless slider jumps, a mass smooths the jump."""
     heavy, massless = (force_loop(damper_bench(MSTV, m), motion).force for m in (1e-6, 0.0))
     inside = np.delete(np.arange(len(massless)), [len(massless) // 4, 3 * len(massless) // 4])
     assert heavy[inside] == pytest.approx(massless[inside], abs=2e-5 * np.max(massless))
@@ -231,7 +231,7 @@ def test_all_tests_of_c_run_with_a_sponge_of_ten_grams():
 @pytest.mark.parametrize("mass", [0.01, 0.5])  # kg
 @pytest.mark.parametrize("frequency", [1.0, 10.0, 50.0])  # Hz
 def test_heavy_sponge_without_friction_has_its_complex_stiffness(mass, frequency):
-    """m X'' + c2 X' = k1 (Y - X) + c1 (Y' - X'): a complex stiffness in closed form."""
+    """Solve m X'' + c2 X' = k1 (Y - X) + c1 (Y' - X') in closed form: a complex stiffness."""
     bench = damper_bench(MSTV.model_copy(update={"friction_force": 0.0}), mass)
     motion = Harmonic(frequency, 1e-3)
     s = 1j * motion.angular_frequency
@@ -243,7 +243,7 @@ def test_heavy_sponge_without_friction_has_its_complex_stiffness(mass, frequency
 
 
 def test_sponge_without_friction_is_a_linear_solid():
-    """Force k1 delta + c1 delta' with c2 w = k1 delta + c1 delta': a complex stiffness in closed form."""
+    """Solve c2 w = k1 delta + c1 delta' in closed form: a complex stiffness."""
     bench = damper_bench(MSTV.model_copy(update={"friction_force": 0.0}))
     motion = Harmonic(10.0, 1e-3)
     s = 1j * motion.angular_frequency
@@ -255,7 +255,7 @@ def test_sponge_without_friction_is_a_linear_solid():
 
 
 def test_coulomb_friction_behind_a_spring_is_masings_loop():
-    """Slider with hardly a dashpot: sticks, then slips at f_max; energy 4 f_max (A - f_max / k)."""
+    """Take hardly a dashpot: stick, then slip at f_max; energy 4 f_max (A - f_max / k)."""
     damper = StvSpongeDamper(
         law="stv_sponge", friction_force=60.0, sponge_stiffness=176e3, sponge_damping=1.0
     )
@@ -290,7 +290,7 @@ def test_free_stroke_loop_has_basic_friction_inside_and_sponge_beyond():
 
 @pytest.mark.parametrize("frequency", [1.0, 3.0, 6.67, 10.0])
 def test_mstv_smaller_amplitude_smaller_loop(frequency):
-    """[C] section 2.3 on its Fig. 6."""
+    """Check [C] section 2.3 on its Fig. 6."""
     loops = force_loops(
         damper_bench(MSTV), [Harmonic(frequency, a) for a in (0.3e-3, 0.5e-3, 1e-3, 1.5e-3)]
     )
@@ -312,7 +312,7 @@ def test_motions_side_by_side_are_motions_alone():
     "damper", [MSTV, FREE_STROKE, CoulombDamper(law="coulomb", friction_force=60.0, damping=20.0)]
 )
 def test_the_dampers_system_under_drakes_integrator_gives_the_loop_of_the_bench(damper):
-    """The tub moves up and down above an upright damper; the rig is no part of the system, nor the system of the rig."""
+    """Move the tub above an upright damper; rig and system have no code in common."""
     motion = Harmonic(3.0, 9e-3)
     parameters = FrictionDamperParameters(
         np.zeros(3), np.array([0.0, 0.0, -0.3]), EndBushing(), packed_damper_law(damper)
@@ -371,7 +371,7 @@ def test_bad_input_is_told(make, message):
 
 @pytest.mark.parametrize("amplitude", [0.3e-3, 0.5e-3, 1e-3])
 def test_mstv_higher_frequency_lower_friction(amplitude):
-    """[C] section 4.1 on its Figs. 7 and 12: faster deformation of the sponge, less friction and less of its work.
+    """Check [C] section 4.1, Figs. 7 and 12: a faster sponge has less friction and work of it.
 
     The measured force less the air resistance is the friction on the massless sponge; air resistance itself grows.
     """

@@ -63,7 +63,7 @@ def test_a_sine_with_a_third_harmonic_of_three_percent_is_taken_as_recorded():
 
 
 def test_dry_friction_of_a_triangle_has_two_values():
-    """A sine of the same file would give a viscous force that is wrong by -16 to +21 %."""
+    """Take a triangle; a sine of the same file would give a force wrong by -16 to +21 %."""
     found = recorded_forces(COULOMB, recorded(TRIANGLE))
     speed = 4.0 * 2e-3 * 1.5
     inside = np.abs(np.abs(TRIANGLE) - 2e-3) > 1e-4

@@ -17,7 +17,7 @@ HOLD = SpinProfile(time=(0.0, 20.0), speed=(20.0, 20.0))
 
 
 def test_ripple_and_torques_of_a_speed_that_swings_once_a_revolution():
-    """w = 20 + 0.4 sin(20 t): a spread of 0.8 in 20; T = 3 + 2 cos(20 t) has the mean 3."""
+    """Take w = 20 + 0.4 sin(20 t): a spread of 0.8 in 20; T = 3 + 2 cos(20 t) has the mean 3."""
     speed = 20.0 + 0.4 * np.sin(20.0 * TIME)
     angle = 20.0 * TIME + 0.02 * (1.0 - np.cos(20.0 * TIME))
     torque = 3.0 + 2.0 * np.cos(20.0 * TIME)
@@ -104,7 +104,7 @@ def test_a_weak_drive_is_caught_where_the_whirl_takes_all_of_its_torque(slow_run
 
 
 def test_a_drive_passes_if_its_torque_is_above_the_largest_of_the_whirl(slow_runs):
-    """The threshold of capture is the peak of the closed form; a slow run-up passes at 2 % more, not at 6 % less."""
+    """Compare with the peak of the closed form: a slow run-up passes at +2 %, not at -6 %."""
     _, _, runs = slow_runs
     assert measure(runs[1.02]).drive.capture is None
     assert float(runs[1.02].drum_speed[-1]) == pytest.approx(18.0, abs=1e-6)

@@ -55,7 +55,7 @@ def test_feet_are_ordered_counterclockwise():
 
 
 def test_rotating_force_at_the_centre():
-    """N = W/4 (1 -+ ...): smallest W/4 - F/4 sqrt(1 + (h/s)^2); slide mu W - F sqrt(1 + mu^2)."""
+    """Check least N = W/4 - F/4 sqrt(1 + (h/s)^2) and slide margin mu W - F sqrt(1 + mu^2)."""
     size, weight = 150.0, 70.0 * G
     found = foot_measures(SQUARE, G, rotating(size), PROFILE, 5e-3)
     least = 0.25 * (weight - size * np.hypot(1.0, H / S))
@@ -98,7 +98,7 @@ def test_machine_at_rest_stands_with_its_weight(machine, reference):
 
 
 def test_smallest_values_are_those_of_the_history(machine, reference):
-    """The lower bound by which samples are skipped loses none."""
+    """Check that the lower bound by which samples are skipped loses none."""
     record = simulate(machine, Case("one", LOAD, PROFILE))
     wrenches = wrenches_on_cabinet(record)
     loads = foot_loads(reference.cabinet, reference.gravity, wrenches)

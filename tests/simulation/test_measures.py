@@ -115,7 +115,7 @@ def test_smooth_envelope_is_the_size_of_an_oscillation_and_of_a_beat():
 
 
 def test_small_peaks_do_not_make_the_smooth_envelope_jump():
-    """A second harmonic gets peaks of its own above half of the fundamental."""
+    """Add a second harmonic, which has peaks of its own above half of the fundamental."""
     time = np.arange(8000) / RATE
     first, second = np.sin(2 * np.pi * 2.0 * time), np.sin(2 * np.pi * 4.0 * time)
 
@@ -153,7 +153,7 @@ def test_percent_difference_is_equation_1_of_B():
 
 
 def test_moment_of_largest_amplitude_is_that_of_the_amplitudes():
-    """A slow drift far outside of the band is larger, but it is no amplitude."""
+    """Add a slow drift far outside of the band: it is larger, but it is no amplitude."""
     time = np.arange(8000) / RATE
     burst = 0.01 * np.exp(-(((time - 25.0) / 2.0) ** 2)) * np.sin(2.0 * np.pi * 3.0 * time)
     record = record_of(burst + 0.1 * np.sin(2.0 * np.pi * 0.01 * time))

@@ -72,7 +72,7 @@ def balances(machine, trajectory, setup):
 
 @pytest.mark.parametrize("kind", ["struts", "tubes"])
 def test_forces_on_cabinet_balance_momentum_and_gravity(kind, machine):
-    """Newton and Euler for all moving bodies: dP/dt = gravity - force on the cabinet."""
+    """Check Newton and Euler for all moving bodies: dP/dt = gravity - force on the cabinet."""
     built = machine if kind == "struts" else build_machine(telescopic())
     setup = built.set_up(LOAD)
     trajectory = dense_run(setup, SpinProfile(time=(0.0, 0.5), speed=(15.0, 25.0)), 5e-4)

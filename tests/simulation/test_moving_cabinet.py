@@ -67,7 +67,7 @@ def test_a_light_cabinet_walks_and_a_heavy_one_does_not(light):
 
 
 def test_the_distance_is_no_artefact_of_step_or_regularisation(light):
-    """Half the damping, which regularises the friction: the change halves as well."""
+    """Halve the damping, which regularises the friction: the change halves as well."""
     base, finer = walked(light), walked(light, step=2.5e-3 / 8)
     assert base == pytest.approx(finer, rel=2e-3)
     half, quarter = (
@@ -79,7 +79,7 @@ def test_the_distance_is_no_artefact_of_step_or_regularisation(light):
 
 
 def test_stiff_feet_give_back_the_fixed_housing(moving):
-    """The deviation falls as 1 / stiffness."""
+    """Check that the deviation falls as 1 / stiffness."""
     reference = load_machine("reference")
     case = Case("middle", reference.loads["middle"], SHORT)
     how = {"step": 2.5e-3 / 8, "integrator": "runge_kutta"}
@@ -100,7 +100,7 @@ def test_stiff_feet_give_back_the_fixed_housing(moving):
 
 
 def test_both_engines_move_alike(moving):
-    """At a friction at which the feet slide."""
+    """Run at a friction at which the feet slide."""
     parameters = with_value(moving.parameters, "cabinet.friction", 0.12)
     profile = SpinProfile(time=(0.0, 0.301, 1.0), speed=(8.0, 12.0, 20.0))
     case = Case("two", TWO, profile, parameters=parameters)
@@ -131,7 +131,7 @@ def test_at_rest_the_feet_carry_the_weight_and_nothing_moves(light):
 
 
 def test_energy_of_bodies_is_the_work_of_all_forces(moving):
-    """Kinetic energy and weight of cabinet, tub and drum against the work of motor, mounts, floor.
+    """Compare kinetic energy and weight of cabinet, tub and drum with the work of all forces.
 
     It is computed from the record in W, without the mechanics of the engine.
     """
@@ -238,7 +238,7 @@ def test_other_refusals():
 
 
 def test_modes_and_steady_states_are_refused(light):
-    """One message that names the key and what to set, before anything is computed."""
+    """Check for one message, before any computation, that names the key and what to set."""
     message = r"^cabinet\.moves: the cabinet of machine 'light_cabinet' moves; .* set it to false$"
     for refused in (
         lambda: modes(light),
@@ -250,7 +250,7 @@ def test_modes_and_steady_states_are_refused(light):
 
 
 def test_a_cabinet_that_tips_over_is_said_to():
-    """Both engines and a batch name the time and the side."""
+    """Check that both engines and a batch name the time and the side."""
     feet = {n: {"x": 0.06 if "right" in n else -0.06, "y": f.y} for n, f in FEET_PLACES.items()}
     machine = build_machine(with_moving_cabinet(feet=feet, friction=2.0, mass=14.0))
     load = Load(unbalances=(Unbalance(mass=3.0, radius=0.25, y=0.0),))

@@ -83,7 +83,7 @@ def test_drum_at_rest_and_short_records_give_no_windows():
 
 
 def test_pause_of_the_drum_is_left_out(angle):
-    """The drum turns, rests for 20 s, and turns on."""
+    """Turn the drum, rest for 20 s, and turn on."""
     rest = np.full(4000, angle[-1])
     long = np.concatenate([angle, rest, angle[-1] + angle])
     time = 5e-3 * np.arange(len(long))

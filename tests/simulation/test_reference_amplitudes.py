@@ -86,7 +86,7 @@ def test_springs_stay_taut_and_the_tub_does_not_touch(table):
 
 @pytest.mark.parametrize("load", ["middle", "counter"])
 def test_gasket_hardly_matters_in_the_steady_state(machine, reference, load):
-    """[B] section 2.2; amplitudes below 1 mm change by less than 0.4 mm."""
+    """Check [B] section 2.2; amplitudes below 1 mm change by less than 0.4 mm."""
     with_it, without = (
         steady_amplitudes(
             simulate(machine, case_of(reference, load, gasket=gasket)),

@@ -213,7 +213,7 @@ def test_phase_shift_of_the_load_is_a_shift_of_the_start_angle(machine):
 
 
 def test_moving_the_world_moves_the_machine_with_it(machine, upright, engine):
-    """A machine shifted along y has the same displacements.
+    """Shift a machine along y: it has the same displacements.
 
     Every frame and centre of mass of tub and housing and the load are shifted by the same amount.
     """

@@ -72,7 +72,7 @@ def test_light_tubes_converge_to_the_strut_machine(built, tmp_path):
 
 
 def test_larger_spin_inertia_of_the_tubes_changes_little(built):
-    """The reference uses small explicit steps and the inertia of the SDF.
+    """Compare with small explicit steps and the inertia of the SDF.
 
     analyses/check_spin_of_tubes.py makes the same comparison with an implicit method.
     """

@@ -101,7 +101,7 @@ def test_accelerations_of_points_are_the_second_differences_of_their_positions(m
 
 
 def test_acceleration_at_a_sensor_of_a_spinning_tub():
-    """A tub that turns about z with 3 rad/s and speeds up: a = a_To + alpha r - w^2 r."""
+    """Turn a tub about z with 3 rad/s, speeding up: a = a_To + alpha r - w^2 r."""
     sensors = {"A": Sensor(frame="f", axis="x"), "B": Sensor(frame="f", axis="y")}
     vector, count = np.array([[0.0, 0.0, 1.0]]), 4
     rows = dict.fromkeys(("tub_position", "tub_velocity"), np.zeros((count, 3)))

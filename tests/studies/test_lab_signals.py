@@ -136,7 +136,7 @@ def write_named_csv(path, channels):
 
 @pytest.mark.parametrize("suffix", [".csv", ".mf4", ".mat"])
 def test_channels_are_chosen_by_name(tmp_path, suffix):
-    """Accelerations and records under names of the laboratory, some of them not wanted."""
+    """Read accelerations and records under names of the laboratory, some of them not wanted."""
     named = {f"Acc {k}": (values / G, "g") for k, values in enumerate(ACCELERATIONS)}
     named |= {"Drum": (SPEED, "rpm"), "Door": (np.sin(TIME), "V")}
     if suffix == ".mat":  # names without blanks, no units

@@ -32,7 +32,7 @@ def test_compiled_modes_are_drakes(rubber, friction):
 
 
 def test_stuck_friction_is_a_spring():
-    """F / x_c in place of the friction gives the same modes; sliding, no friction does.
+    """Put F / x_c in place of the friction: the same modes; sliding, none does the same.
 
     The springs hold a part of the weight, as the friction does not, so that the rest pose moves:
     this changes the modes by up to 6e-4.
@@ -59,7 +59,7 @@ def test_stuck_friction_is_a_spring():
 
 
 def test_branches_stay_relaxed_under_a_load(rubber):
-    """The weight of a load is carried by springs: friction holds none of it."""
+    """Check that springs carry the weight of a load: friction holds none of it."""
     loaded = Linearisation(rubber.set_up("middle"), loaded=True)
     begin = loaded.derivative.layout.branches_begin
     assert not loaded.equilibrium[begin:].any()

@@ -52,7 +52,7 @@ def drake_plant(stiffness_only):
 
 
 def wrench_of_drake(plant, x):
-    """Moment about To and force of Drake's bushing on the tub, in W."""
+    """Return moment about To and force of Drake's bushing on the tub, in W."""
     context = plant.CreateDefaultContext()
     plant.SetPositionsAndVelocities(context, np.delete(x, [6, 13]))
     forces = MultibodyForces(plant)
@@ -81,7 +81,7 @@ def our_wrench(bushing, x):
 
 
 def relative_difference(amplitude, stiffness_only):
-    """Largest, of moment or force, in ten random motions of tub angles [rad] and displacements [10 cm] of an amplitude."""
+    """Return the largest of ten random motions with angles [rad] and displacements [10 cm] of it."""
     rng = np.random.default_rng(41)
     sizes = np.array(
         [1.0] * 3 + [0.1] * 3 + [0.0] + [1.0] * 3 + [0.1] * 3 + [0.0]

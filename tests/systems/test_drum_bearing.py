@@ -25,7 +25,7 @@ def system():
 
 
 def states(count, seed):
-    """Tub anywhere near rest, carrier within 0.02 rad and 0.3 mm of it; any rates."""
+    """Draw a tub near rest and a carrier within 0.02 rad and 0.3 mm of it, with any rates."""
     rng = np.random.default_rng(seed)
     tub = rng.uniform(-1.0, 1.0, (count, 14)) * (
         [0.1] * 3 + [0.01] * 3 + [3.0] + [1.0] * 3 + [0.3] * 3 + [40.0]

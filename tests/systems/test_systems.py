@@ -138,14 +138,14 @@ def bushing_parameters(engaged=1.0):
 
 
 def random_plant_states(count, seed):
-    """Poses within 0.1 rad and 10 mm, rates of about 1 rad/s and 0.3 m/s, any drum angle and speed."""
+    """Draw poses within 0.1 rad and 10 mm, rates of 1 rad/s and 0.3 m/s, any drum motion."""
     rng = np.random.default_rng(seed)
     sizes = [0.1] * 3 + [0.01] * 3 + [3.0] + [1.0] * 3 + [0.3] * 3 + [40.0]
     return rng.uniform(-1.0, 1.0, (count, 14)) * sizes
 
 
 def tub_motion(x, p_ToA_T):
-    """Rotation of the tub, arm from To to A, position and velocity of A, all in W."""
+    """Return rotation of the tub, arm from To to A, position and velocity of A, all in W."""
     R_WT = RotationMatrix(RollPitchYaw(x[0:3])).matrix()
     arm = R_WT @ p_ToA_T
     return R_WT, arm, x[3:6] + arm, x[10:13] + np.cross(x[7:10], arm)
@@ -223,7 +223,7 @@ def test_a_spring_at_rest_has_its_preload():
 
 
 def line_of(damper, x):
-    """Arm and direction of a damper, length, elongation rate, velocity of its tub end, rotation of the tub."""
+    """Return arm, direction, length, elongation rate of a damper, tub end velocity, tub rotation."""
     R_WT, arm, p_WA, v_WA = tub_motion(x, damper.p_ToA_T)
     line = p_WA - damper.p_WH
     length = np.linalg.norm(line)
@@ -426,7 +426,7 @@ def test_autodiff_gives_the_same_values_and_the_derivatives_of_finite_difference
 
 
 def moved_on_the_tub(element):
-    """Its packed parameters, of which the first three are the point on the tub, with that elsewhere. [m]"""
+    """Return packed parameters with the point on the tub, their first three, elsewhere. [m]"""
     return element.packed + np.pad([0.01, -0.02, 0.03], (0, len(element.packed) - 3))
 
 

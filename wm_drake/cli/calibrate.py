@@ -103,6 +103,15 @@ def calibrate(
             metavar="NAME=NUMBER",
         ),
     ] = None,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Largest accepted difference of all amplitudes, in percent, or that of a load, a "
+            "sensor, a response, a kind of response or LOAD:NAME, such as moment=50. A value "
+            "beyond its limit costs much more. Repeatable.",
+            metavar="PERCENT|NAME=PERCENT",
+        ),
+    ] = None,
     leave_out: Annotated[
         list[str] | None,
         typer.Option(
@@ -136,6 +145,10 @@ def calibrate(
     parameters = with_measured(load_parameters(machine, sets), targets, "--targets")
     amplitudes, responses = _deviations(deviation)
     wanted = _targets(parameters, responses).weighted(_weights(weight))
+    try:
+        wanted = wanted.limited(_fractions(limit, "--limit"))
+    except InputError as error:
+        raise InputError(replace(p, where="--limit", key="") for p in error.problems) from None
     check_buildable(machine, parameters)
     warn_of_phase_error(parameters)
     plan = Plan(method, starts, seed, iterations, amplitudes, 1e-3 * resolution)
@@ -177,6 +190,15 @@ def _targets(parameters: "MachineParameters", deviations: dict[str, float]) -> "
 def _deviations(entries: list[str] | None) -> tuple[float, dict[str, float]]:
     """Return the relative standard deviations of amplitudes, and of other responses by name."""
     from wm_drake.studies.calibration.calibration import RELATIVE_DEVIATION
+    from wm_drake.studies.calibration.targets import AMPLITUDE
+
+    responses = _fractions(entries, "--deviation")
+    return responses.pop(AMPLITUDE, RELATIVE_DEVIATION), responses
+
+
+def _fractions(entries: list[str] | None, option: str) -> dict[str, float]:
+    """Return the numbers of NAME=PERCENT entries; one without a name is that of all amplitudes."""
+    from wm_drake.studies.calibration.targets import AMPLITUDE
 
     named = [entry for entry in entries or [] if "=" in entry]
     plain = [entry for entry in entries or [] if "=" not in entry]
@@ -184,12 +206,12 @@ def _deviations(entries: list[str] | None) -> tuple[float, dict[str, float]]:
         raise input_error(
             f"{' and '.join(plain)} are given; one number without a name is allowed, that of the "
             "amplitudes",
-            where="--deviation",
+            where=option,
         )
-    entries = [*named, *(f"amplitudes={entry}" for entry in plain)]
-    numbers = _numbers(entries, "--deviation", zero=False)
-    responses = {name: percent / 100.0 for name, percent in numbers.items()}
-    return responses.pop("amplitudes", RELATIVE_DEVIATION), responses
+    entries = [*named, *(f"{AMPLITUDE}={entry}" for entry in plain)]
+    return {
+        name: percent / 100.0 for name, percent in _numbers(entries, option, zero=False).items()
+    }
 
 
 def _numbers(entries: list[str] | None, option: str, zero: bool = True) -> dict[str, float]:
@@ -387,7 +409,7 @@ def _shown(
 
 
 def _print(found: Found, out: Path) -> None:
-    from wm_drake.studies.calibration.outcome import mean_and_largest
+    from wm_drake.studies.calibration.outcome import mean_and_largest, values_beyond
 
     calibration, predictions = found.calibration, found.predictions
     _print_values(calibration)
@@ -403,6 +425,8 @@ def _print(found: Found, out: Path) -> None:
         mean, largest = mean_and_largest(best.response_errors(calibration.targets))
         say("Absolute differences of the other responses:")
         say(f"  best solution: mean {100 * mean:.1f} %, largest {100 * largest:.1f} %")
+    for text in values_beyond(best, calibration.targets):
+        say(f"  beyond its limit: {text}")
     for prediction in predictions:
         pairs = [
             mean_and_largest(errors)

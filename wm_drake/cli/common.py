@@ -34,6 +34,23 @@ SetOption = Annotated[
     ),
 ]
 
+ProfileOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Spin profile, YAML or CSV (time_s, speed_rpm). Default: that of the machine.",
+        metavar="FILE",
+    ),
+]
+MeasuredOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        help="Measured amplitudes to compare with: load, gasket, source, and a column per sensor "
+        "in mm. Repeatable. Default: those of the machine file, for its own numbers, loads and "
+        "profile.",
+        metavar="CSV",
+    ),
+]
+
 
 def _out_folder(text: str) -> Path:
     """Return the path of a result folder; refuse an empty text, which is the current folder."""
@@ -110,17 +127,24 @@ def load_parameters(
 def with_sets(
     parameters: "Tree", sources: Mapping[str, str], sets: list[str] | None
 ) -> "tuple[Tree, dict[str, str]]":
-    """Return parameters and the sources of their numbers, changed by the `--set` options."""
-    from wm_drake.parameters import with_value
+    """Return parameters and the sources of their numbers, changed by the `--set` options.
 
-    changed = dict(sources)
+    All changes are applied before the result is checked, so their order does not matter: two
+    numbers may need each other. Of two values of one key the last one counts.
+    """
+    from wm_drake.parameters import with_values
+
+    changes: dict[str, str | None] = {}
     for key, text in pairs_of(sets, "--set"):
-        try:
-            parameters = with_value(parameters, key, None if text in ("null", "~") else text)
-        except InputError as error:
-            raise InputError(Problem("--set", p.key, p.message) for p in error.problems) from None
-        changed[key] = "set on the command line"
-    return parameters, changed
+        changes.pop(key, None)
+        changes[key] = None if text in ("null", "~") else text
+    if not changes:
+        return parameters, dict(sources)
+    try:
+        changed = with_values(parameters, changes)
+    except InputError as error:
+        raise InputError(Problem("--set", p.key, p.message) for p in error.problems) from None
+    return changed, {**sources, **dict.fromkeys(changes, "set on the command line")}
 
 
 def pairs_of(entries: list[str] | None, option: str) -> list[tuple[str, str]]:

@@ -47,6 +47,18 @@ ArmOption = Annotated[
         metavar="LENGTH",
     ),
 ]
+OuterMassOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Mass of the outer tube, at the driven end ([A] Eq. 6), e.g. '150 g'.", metavar="MASS"
+    ),
+]
+JigMassOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Mass of the jig, at the driven end ([C] Eq. 2), e.g. '2 kg'.", metavar="MASS"
+    ),
+]
 
 AXIS_WORDS = {
     "radial": ("x", "z"),

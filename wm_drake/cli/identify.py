@@ -22,7 +22,9 @@ from wm_drake.cli.common import (
 from wm_drake.cli.components import (
     ArmOption,
     ComponentOption,
+    JigMassOption,
     NameOption,
+    OuterMassOption,
     Target,
     ValidatingCommand,
     axes_of,
@@ -167,14 +169,8 @@ def identify_damper(
         str | None,
         typer.Option(help="Mass of the sponge on the bench, under sines, e.g. '10 g'."),
     ] = None,
-    outer_mass: Annotated[
-        str | None,
-        typer.Option(help="Mass of the outer tube, at the driven end ([A] Eq. 6), e.g. '150 g'."),
-    ] = None,
-    jig_mass: Annotated[
-        str | None,
-        typer.Option(help="Mass of the jig, at the driven end ([C] Eq. 2), e.g. '2 kg'."),
-    ] = None,
+    outer_mass: OuterMassOption = None,
+    jig_mass: JigMassOption = None,
     out: OutOption = DEFAULT_OUT,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,

@@ -21,7 +21,9 @@ from wm_drake.cli.components import (
     AxisOption,
     ComponentOption,
     DamperCommand,
+    JigMassOption,
     NameOption,
+    OuterMassOption,
     axes_of,
     quantities_of,
     target_of,
@@ -80,19 +82,8 @@ def rig_damper(
             metavar="MASS",
         ),
     ] = None,
-    outer_mass: Annotated[
-        str | None,
-        typer.Option(
-            help="Mass of the outer tube, at the driven end ([A] Eq. 6), e.g. '150 g'.",
-            metavar="MASS",
-        ),
-    ] = None,
-    jig_mass: Annotated[
-        str | None,
-        typer.Option(
-            help="Mass of the jig, at the driven end ([C] Eq. 2), e.g. '2 kg'.", metavar="MASS"
-        ),
-    ] = None,
+    outer_mass: OuterMassOption = None,
+    jig_mass: JigMassOption = None,
     out: OutOption = DEFAULT_OUT,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,

@@ -10,8 +10,10 @@ import typer
 
 from wm_drake.cli.common import (
     JsonOption,
+    MeasuredOption,
     OutOption,
     OverwriteOption,
+    ProfileOption,
     SetOption,
     cases_of,
     check_buildable,
@@ -65,13 +67,7 @@ def spin(
         bool,
         typer.Option("--compare-gasket", help="Compare with and without the gasket on one page."),
     ] = False,
-    profile: Annotated[
-        Path | None,
-        typer.Option(
-            help="Spin profile, YAML or CSV (time_s, speed_rpm). Default: that of the machine.",
-            metavar="FILE",
-        ),
-    ] = None,
+    profile: ProfileOption = None,
     engine: Annotated[
         str | None,
         typer.Option(
@@ -95,15 +91,7 @@ def spin(
             "with the largest amplitude.",
         ),
     ] = False,
-    measured: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="Measured amplitudes to compare with: load, gasket, source, and a column per "
-            "sensor in mm. Repeatable. Default: those of the machine file, for its own numbers, "
-            "loads and profile.",
-            metavar="CSV",
-        ),
-    ] = None,
+    measured: MeasuredOption = None,
     drive: DriveOption = None,
     as_json: JsonOption = False,
     sets: SetOption = None,

@@ -3,7 +3,7 @@
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,6 +19,9 @@ from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.terminal import Console
 from wm_drake.errors import input_error
+
+if TYPE_CHECKING:
+    from wm_drake.rigs.measured import HarmonicMotion
 
 FREQUENCIES = (1.0, 3.0, 6.67, 10.0)
 """Frequencies of [C] Table 1. [Hz]"""
@@ -50,54 +53,18 @@ def identify_table2(
     as_json: JsonOption = False,
 ) -> None:
     """Fit k1 and c1 of the Coulomb model to each test alone, beside [C] Table 2."""
-    from wm_drake.cli.identify import units_of
-    from wm_drake.parameters import read_loops
-    from wm_drake.parameters.units import Unit
-    from wm_drake.report.identify.table2 import (
-        HEADER,
-        fit_cells,
-        sentences,
-        table2_report,
-    )
-    from wm_drake.rigs import Harmonic
-    from wm_drake.rigs.measured import HarmonicMotion, measured_motion
-    from wm_drake.studies.identification.drift import (
-        MM,
-        coulomb_fits,
-        frequency_trend,
-        mstv_motions,
-        mstv_of_c,
-        printed_table,
-    )
+    from wm_drake.report.identify.table2 import HEADER, fit_cells, sentences, table2_report
+    from wm_drake.studies.identification.drift import coulomb_fits, frequency_trend
 
-    damper = mstv_of_c()
-    if friction_force is not None:
-        force = quantities_of(friction_force, Unit("N", "N"), "--friction-force")[0]
-        if not force > 0.0:
-            raise input_error(f"is {force:g} N; allowed is > 0", where="--friction-force")
-        damper = damper.model_copy(update={"friction_force": force})
-    f_max = float(damper.friction_force)  # type: ignore[attr-defined]
-    slider_damping = float(damper.slider_damping)  # type: ignore[attr-defined]
+    damper = _damper(friction_force)
+    f_max = float(damper.friction_force)
+    slider_damping = float(damper.slider_damping)
     if files:
         source = f"{len(files)} measured tests, f_max = {f_max:g} N."
-        motions = []
-        for loop in read_loops(existing_files(files), units_of(units)):
-            motion = measured_motion(loop)
-            if not isinstance(motion, HarmonicMotion) or loop.rotates:
-                raise input_error(
-                    "is no sine of displacement; [C] Table 2 is of sines", where=loop.path
-                )
-            motions.append(motion)
+        motions = _measured_motions(files, units)
     else:
         source = f"Loops of the MSTV damper of [C] section 4.2, f_max = {f_max:g} N."
-        table = printed_table()
-        motions = mstv_motions(
-            damper,
-            [
-                Harmonic(f, a * MM)
-                for f, a in zip(table.frequency_hz, table.amplitude_mm, strict=True)
-            ],
-        )
+        motions = _printed_motions(damper)
     with interruptible(), result_folder(out, Run("identify table2", overwrite)) as folder:
         with progress_bar(len(motions), "fits") as progress:
             fits = coulomb_fits(motions, f_max, slider_damping, progress)
@@ -110,6 +77,47 @@ def identify_table2(
         typer.echo(json.dumps({"tests": rows, "peak_force_over_frequency": asdict(trend)}))
         return
     _print(source, HEADER, fit_cells(fits), sentences(fits, trend), out)
+
+
+def _damper(friction_force: str | None) -> Any:
+    """Return the MSTV damper of [C], with f_max of the option `--friction-force` if it is given."""
+    from wm_drake.parameters.units import Unit
+    from wm_drake.studies.identification.drift import mstv_of_c
+
+    damper = mstv_of_c()
+    if friction_force is None:
+        return damper
+    force = quantities_of(friction_force, Unit("N", "N"), "--friction-force")[0]
+    if not force > 0.0:
+        raise input_error(f"is {force:g} N; allowed is > 0", where="--friction-force")
+    return damper.model_copy(update={"friction_force": force})
+
+
+def _measured_motions(files: list[Path], units: str | None) -> "list[HarmonicMotion]":
+    """Return the motions of measured files, which have to be sines of displacement."""
+    from wm_drake.cli.identify import units_of
+    from wm_drake.parameters import read_loops
+    from wm_drake.rigs.measured import HarmonicMotion, measured_motion
+
+    motions = []
+    for loop in read_loops(existing_files(files), units_of(units)):
+        motion = measured_motion(loop)
+        if not isinstance(motion, HarmonicMotion) or loop.rotates:
+            raise input_error(
+                "is no sine of displacement; [C] Table 2 is of sines", where=loop.path
+            )
+        motions.append(motion)
+    return motions
+
+
+def _printed_motions(damper: Any) -> "list[HarmonicMotion]":
+    """Return loops of the MSTV damper at the tests of [C] Table 2."""
+    from wm_drake.rigs import Harmonic
+    from wm_drake.studies.identification.drift import MM, mstv_motions, printed_table
+
+    table = printed_table()
+    pairs = zip(table.frequency_hz, table.amplitude_mm, strict=True)
+    return mstv_motions(damper, [Harmonic(f, a * MM) for f, a in pairs])
 
 
 def _print(

@@ -14,7 +14,7 @@ from wm_drake.elements.rubber import RubberBushingParameters
 from wm_drake.model.bodies import add_bodies
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.machine import Machine, MachineSystems, MotorSystems
-from wm_drake.model.placed_elements import placed_elements
+from wm_drake.model.placed_elements import PlacedElements, placed_elements
 from wm_drake.model.state_layout import state_layout_of
 from wm_drake.model.tub_points import measured_points, tub_points
 from wm_drake.model.visualization import add_visualizer
@@ -66,23 +66,8 @@ def add_washing_machine(
     placed = placed_elements(plant, poses, parameters)
     points = measured_points(tub_points(poses, parameters), np.zeros(6))
     wiring = Wiring(builder, plant, layout, prefix)
-    springs = {key: SpringStrut(spring.packed()) for key, spring in placed.springs.items()}
-    dampers = {
-        key: FrictionDamper(damper.packed(), int(damper.has_sponge))
-        for key, damper in placed.dampers.items()
-    }
-    bushings = {
-        key: SixComponentBushing(
-            bush.packed(), isinstance(bush, RubberBushingParameters), bush.state_size
-        )
-        for key, bush in placed.bushings.items()
-    }
-    telescopes = {
-        key: TelescopicDamper(telescope.packed(), int(telescope.has_sponge))
-        for key, telescope in placed.telescopes.items()
-    }
-    bearing = DrumBearing(placed.bearing.packed()) if placed.bearing else None
-    on_tub, links = _labelled(springs, dampers, bushings, telescopes, bearing)
+    elements = _element_systems(placed)
+    on_tub, links = _labelled(*elements)
     drive = motor_of(parameters.drive)
     friction = DrumFriction(packed_friction(drive)) if drive else None
     tub_force, sensors = TubForce(), Sensors(points)
@@ -113,14 +98,11 @@ def add_washing_machine(
     if friction:
         outputs["drum_friction_torque"] = friction.GetOutputPort("torque")
     if feet:
-        outputs["tub_in_cabinet"], outputs["feet_floor_force"] = (
-            seen,
-            feet.GetOutputPort("floor_force"),
-        )
+        outputs["tub_in_cabinet"] = seen
+        outputs["feet_floor_force"] = feet.GetOutputPort("floor_force")
     for label, system in [*on_tub, *((link.label, link.system) for link in links)]:
-        for port in _own_outputs(system):
-            outputs[f"{label}_{port}"] = system.GetOutputPort(port)
-    systems = springs, dampers, bushings, telescopes, bearing, cabinet, feet
+        outputs |= _own_outputs(label, system)
+    systems = *elements, cabinet, feet
     return MachineSystems(
         parameters, plant, layout, profile, source, motor, sensors, *systems, inputs, outputs
     )
@@ -159,6 +141,35 @@ def build_machine(parameters: MachineParameters, *, meshcat: Meshcat | None = No
     diagram.set_name(parameters.name)
     values = {key: value for key, value in vars(systems).items() if key != "_poses"}
     return Machine(**values, diagram=diagram)
+
+
+def _element_systems(
+    placed: PlacedElements,
+) -> tuple[
+    dict[str, SpringStrut],
+    dict[str, FrictionDamper],
+    dict[str, SixComponentBushing],
+    dict[str, TelescopicDamper],
+    DrumBearing | None,
+]:
+    """Return a system for each element in its place, by kind and name."""
+    springs = {key: SpringStrut(spring.packed()) for key, spring in placed.springs.items()}
+    dampers = {
+        key: FrictionDamper(damper.packed(), int(damper.has_sponge))
+        for key, damper in placed.dampers.items()
+    }
+    bushings = {
+        key: SixComponentBushing(
+            bush.packed(), isinstance(bush, RubberBushingParameters), bush.state_size
+        )
+        for key, bush in placed.bushings.items()
+    }
+    telescopes = {
+        key: TelescopicDamper(telescope.packed(), int(telescope.has_sponge))
+        for key, telescope in placed.telescopes.items()
+    }
+    bearing = DrumBearing(placed.bearing.packed()) if placed.bearing else None
+    return springs, dampers, bushings, telescopes, bearing
 
 
 def _labelled(
@@ -238,7 +249,11 @@ def _add_speed_source(wiring: Wiring, profile: SpinProfileSource) -> tuple[Speed
     return source, torque.GetOutputPort("torque")
 
 
-def _own_outputs(system: Any) -> list[str]:
-    """Return the names of the element's own output ports."""
-    names = [system.get_output_port(i).get_name() for i in range(system.num_output_ports())]
-    return [name for name in names if name not in ("generalized_force", "state")]
+def _own_outputs(label: str, system: Any) -> dict[str, OutputPort]:
+    """Return the element's own output ports, their names behind its label."""
+    ports = [system.get_output_port(i) for i in range(system.num_output_ports())]
+    return {
+        f"{label}_{port.get_name()}": port
+        for port in ports
+        if port.get_name() not in ("generalized_force", "state")
+    }

@@ -1,5 +1,6 @@
 """Key paths such as ``gasket.stiffness_x``: change numbers, and list all that can be changed."""
 
+import re
 import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -206,15 +207,16 @@ def _inside(node: Any, name: str, path: list[str]) -> Any:
 
 
 def _with_key_of_change(problem: Problem, changes: list[_Change]) -> Problem:
-    """Return a problem of a group of values with the key of the change that caused it."""
-    return next(
-        (
-            replace(problem, key=change.key)
-            for change in changes
-            if change.key.startswith(problem.key)
-        ),
-        problem,
-    )
+    """Return a problem of a group of values with the key of the change that caused it.
+
+    Of several changes in the group it is the one that the message names; if it names none of them,
+    the key stays that of the group.
+    """
+    inside = [change for change in changes if change.key.startswith(problem.key)]
+    words = re.findall(r"\w+", problem.message)
+    causes = [change for change in inside if change.key.split(".")[-1] in words]
+    found = causes or (inside if len(inside) == 1 else [])
+    return replace(problem, key=found[0].key) if found else problem
 
 
 def _changed_field(node: BaseModel, name: str, changes: list[_Change]) -> Any:

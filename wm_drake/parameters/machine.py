@@ -37,7 +37,7 @@ and by less than 0.1 % in the Drake engine (tested). See docs/decisions/0007.
 Integrator = Literal["auto", "multistep", "midpoint", "runge_kutta"]
 """Integrator of the compiled engine: one derivative a step (the midpoint rule is for telescopic
 dampers), or the Runge-Kutta scheme with four; "auto" takes the first where it suits the machine.
-See docs/decisions/0087 and 0201."""
+See docs/decisions/0087 and docs/decisions/0105."""
 
 
 class BodyOverride(Frozen):
@@ -162,9 +162,9 @@ class MachineParameters(Frozen):
             folder of the machine file.
         gravity: Acceleration of free fall.
         step: Largest step of the integrator.
-        integrator: `multistep` takes one derivative a step, `runge_kutta` four; `auto` takes the
-            first where it suits the machine.
-        drive: The motor.
+        integrator: `multistep` and `midpoint` (telescopic dampers) take one derivative a step,
+            `runge_kutta` four; `auto` takes one of the first two where it suits the machine.
+        drive: Prescribed speed of the drum, or a motor.
         bodies: Changes of the bodies of the SDF, by name.
         frames: Changes of frames of the SDF, and new frames, by name.
         spring_types, damper_types, bushing_types: Elements as bought, by name.
@@ -173,7 +173,7 @@ class MachineParameters(Frozen):
         sensors: Displacement sensors, by name.
         accelerometers: Vibration sensors, by name.
         clearance: The point whose distance to the detergent box counts.
-        cabinet: The cabinet on its feet; null if foot loads are not asked for.
+        cabinet: The cabinet on its feet; null for no loads of the feet.
         unbalance_planes: Positions of the masses of a spin cycle.
         imperfections: Imperfections of the drum and its bearing.
         loads: The loads, by name.

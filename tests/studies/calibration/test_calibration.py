@@ -15,7 +15,12 @@ from wm_drake.parameters.free import Measured, load_free
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
 from wm_drake.studies.calibration.computed import Evaluation
 from wm_drake.studies.calibration.fewer import fewer_table, fit_with_fewer
-from wm_drake.studies.calibration.outcome import amplitude_rows, quantity_table, solved_machine
+from wm_drake.studies.calibration.outcome import (
+    amplitude_rows,
+    quantity_table,
+    solved_machine,
+    values_beyond,
+)
 from wm_drake.studies.calibration.parameter_map import parameter_map_of
 from wm_drake.studies.calibration.prediction import check_held_out, predict, prediction_table
 from wm_drake.studies.calibration.solutions import Solution, distinct
@@ -288,6 +293,59 @@ def test_weights_go_by_load_by_sensor_and_by_both():
     ):
         with pytest.raises(InputError, match=message):
             targets.weighted({key: factor})
+
+
+def limited_pair():
+    targets = Targets(
+        (("a", False), ("b", True)), ("X", "Y"), np.ones((2, 2)), np.array([[1.0, 1.0], [1.0, 0.0]])
+    )
+    return targets.limited({"amplitudes": 0.2, "X": 0.1, "b:X": 0.5})
+
+
+def test_limit_that_fits_the_fewest_values_counts():
+    assert limited_pair().limit_of_each().tolist() == [0.1, 0.2, 0.5]  # b:Y is not used
+    assert np.isinf(limited_pair().limited({"b": 0.3}).limit_of_each()[:2]).all()
+
+
+def test_excess_is_the_logarithm_beyond_the_limit_on_both_sides():
+    spread = np.full((2, 2), 0.05)
+    found = limited_pair().excesses(np.array([[1.2, 0.7], [1.4, 9.0]]), np.empty(0), spread)
+    assert found == pytest.approx([np.log(1.2 / 1.1) / 0.05, np.log(0.7 / 0.8) / 0.05, 0.0])
+    everything = limited_pair().limited({"amplitudes": 1.5})
+    tiny = everything.excesses(np.full((2, 2), 1e-9), np.empty(0), spread)
+    assert tiny.tolist() == [0.0, 0.0, 0.0]  # more than 100 % is no limit below
+
+
+@pytest.mark.parametrize(
+    ("limits", "message"),
+    [({"Q": 0.2}, "'Q' is no load, sensor"), ({"X": 0.0}, "limit of 'X': 0 is not allowed")],
+)
+def test_wrong_limits_are_refused(limits, message):
+    with pytest.raises(InputError, match=message):
+        limited_pair().limited(limits)
+
+
+def test_values_beyond_their_limits_are_named():
+    found = solution([0.0], [1.0], np.zeros((1, 1)))
+    found = replace(found, amplitude=np.array([[1.05, 0.7], [1.4, 9.0]]))
+    assert values_beyond(found, limited_pair()) == ["a without gasket Y -30 % (20 %)"]
+
+
+def test_search_keeps_a_limit_that_the_cost_alone_does_not(short, tmp_path):
+    free = free_file(tmp_path, FREE)
+    parameter_map = parameter_map_of(short, free)
+    targets = planted(short, parameter_map, parameter_map.expected, (("middle", True),))
+    place = targets.sensors.index("Xr")
+    targets.amplitude[0, place] *= 1.2  # no machine has this amplitude and the others
+    errors = []
+    for number, limits in enumerate(({}, {"Xr": 0.03})):
+        with open_ledger(tmp_path / f"{number}.sqlite", {"study": "test"}) as ledger:
+            (found,) = calibrate(
+                short, free, targets.limited(limits), Plan(starts=1, iterations=20), ledger
+            ).ended
+        errors.append(abs(found.errors(targets)[0, place]))
+    assert errors[0] > 0.05
+    assert errors[1] < 0.035
 
 
 def test_gasket_effect_is_the_relative_change():

@@ -14,7 +14,7 @@ TRUTH = np.array([0.8, -0.5, 0.3])
 
 
 def curved(points):
-    """Nonlinear residuals of a known point, with small deviations compared to the prior."""
+    """Return nonlinear residuals of a known point; deviations are small beside the prior."""
     offset = points - TRUTH
     return 200.0 * np.column_stack(
         [offset[:, 0], offset[:, 1] + offset[:, 0] ** 2, offset[:, 2] - 0.5 * offset[:, 1] ** 2]
@@ -77,6 +77,19 @@ def test_evolution_with_one_seed_is_reproducible():
     first, again, other = (evolution_search(problem(), np.zeros(3), 20, seed) for seed in (7, 7, 8))
     assert np.array_equal(first.point, again.point)
     assert not np.array_equal(first.point, other.point)
+
+
+def test_evolution_follows_a_kink_at_which_least_squares_stops():
+    def kinked(points):
+        x, y = points.T
+        return np.column_stack([100.0 * np.abs(x - 2.0 * y), 3.0 * (x - 1.5)])
+
+    # along x = 2 y the cost is 4.5 (x - 1.5)^2 + x^2 / 2 + x^2 / 8
+    lowest = 13.5 / (9.0 + 1.25)
+    found = evolution_search(problem(kinked, size=2), np.zeros(2), 100, 0)
+    assert found.point == pytest.approx([lowest, lowest / 2.0], abs=0.01)
+    stopped = least_squares_search(problem(kinked, size=2), np.zeros(2), 60)
+    assert stopped.cost > 2.0 * found.cost
 
 
 def test_hops_leave_a_local_minimum():

@@ -138,7 +138,7 @@ def test_imperfections_and_points_are_described(reference):
 
 
 def test_neutral_direction_is_that_of_the_drawing_not_of_rest():
-    """A spring hook out of place tilts the rest pose; the end bushings stay neutral as drawn."""
+    """Put a spring hook out of place: the rest pose tilts, end bushings stay neutral as drawn."""
     parameters = with_values(
         load_machine("reference"),
         {"frames.spring_left_housing.position": "(-270, -20, 330) mm"},

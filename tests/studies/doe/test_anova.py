@@ -97,7 +97,7 @@ def test_reference_case_of_statsmodels(dropped):
 
 
 def test_balanced_reference_case_as_r_prints_it():
-    """R: anova(lm(log(Days+1) ~ Duration*Weight)): sums of squares as in statsmodels' test file."""
+    """Compare with R: anova(lm(log(Days+1) ~ Duration*Weight)), as in statsmodels' test file."""
     data = kidney()
     table = anova(data[["Duration", "Weight"]], data[["log_days"]])["log_days"]
     assert [term.sum_sq for term in table.terms] == pytest.approx(
@@ -250,7 +250,7 @@ def test_predicted_r2_is_that_of_fits_without_each_trial():
 
 
 def test_residual_share_is_that_of_the_grid_for_any_number_of_trials():
-    """The fit to a part of the grid gives, on average, the share that the whole grid has."""
+    """Fit parts of the grid: on average they give the share that the whole grid has."""
     rng = np.random.default_rng(8)
     full = level_matrix(5)
     response = 2.0 * full[:, 0] + full[:, 1] * full[:, 2] + rng.normal(size=len(full))

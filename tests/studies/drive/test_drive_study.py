@@ -61,7 +61,7 @@ def test_bisection_finds_planted_limits_and_says_what_is_out_of_range():
 
 
 def test_the_smallest_torque_is_the_largest_of_the_whirl():
-    """Closed form: T = c w X^2 of an unbalanced rotor on an isotropic support, see test_drive."""
+    """Compare with T = c w X^2 of an unbalanced rotor on an isotropic support, see test_drive."""
     machine = build_machine(
         isotropic_motor(
             torque_limit={"torque": 0.2},
@@ -94,7 +94,7 @@ def test_a_map_scales_the_masses():
 
 
 def test_unbalance_is_the_part_of_torque_and_acceleration_that_goes_round():
-    """Planted: J w' = T - m r g sin(phi + phase), the controller answers with any T of order one."""
+    """Plant J w' = T - m r g sin(phi + phase); the controller answers with any T of order one."""
     inertia, g, rng = 0.4, 9.81, np.random.default_rng(1)
     machine = load_machine("motor").model_copy(update={"gravity": g})
     loads = random_loads(20, 3, unbalance(1.0))

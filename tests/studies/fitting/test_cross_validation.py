@@ -46,7 +46,7 @@ def test_they_are_the_errors_of_fits_without_each_test(model):
 
 
 def test_a_test_that_alone_shows_an_unknown_is_predicted_by_a_new_search():
-    """Only the last test shows b; without it, b goes where its bounds let it."""
+    """Show b in the last test only; without it, b goes where its bounds let it."""
     part = problem(
         lambda x, size: x[:, :1] * TIME + np.where(size > 2.0, x[:, 1:2], 0.0),
         (Unknown("a", 0.0, 10.0), Unknown("b", 0.0, 10.0)),

@@ -90,7 +90,7 @@ def test_intervals_hold_the_truth_in_95_of_100_noisy_repeats(method):
 
 
 def straight_valley(p):
-    """Seen through p combinations of the numbers, of which one moves what is measured a hundred times less than the others."""
+    """Return a valley of p combinations, of which one moves the measurement a hundredth as much."""
     axes = np.linalg.qr(np.random.default_rng(0).normal(size=(p, p)))[0]
     strength = np.where(np.arange(p) == 0, 0.01, 1.0)
     unknowns = tuple(Unknown(f"x{k}", 0.0, 2.0, start=1.8) for k in range(p))
@@ -99,7 +99,7 @@ def straight_valley(p):
 
 
 def bent_valley(p):
-    """Rosenbrock's, whose floor is ten times flatter than its sides; least at 1."""
+    """Return Rosenbrock's valley, whose floor is ten times flatter than its sides; least at 1."""
     unknowns = tuple(Unknown(f"x{k}", -2.0, 2.0, start=(-1.2, 1.0)[k % 2]) for k in range(p))
     measured = (Measurement("zero", np.zeros(2 * (p - 1))),)
     model = lambda x: np.concatenate([10.0 * (x[:, 1:] - x[:, :-1] ** 2), 1.0 - x[:, :-1]], axis=1)  # noqa: E731
@@ -196,7 +196,7 @@ def test_rmse_per_test_is_absolute_and_normalised_by_the_largest_measured_value(
 
 @pytest.mark.parametrize("method", METHODS)
 def test_what_the_data_cannot_determine_is_named(method):
-    """a + b alone counts, c does not at all."""
+    """Measure a + b alone; c does not count at all."""
     unknowns = (
         Unknown("a", 0.0, 10.0),
         Unknown("b", 0.0, 10.0),
@@ -254,7 +254,7 @@ def test_a_model_that_fails_in_places_is_searched_elsewhere():
 
 @pytest.mark.parametrize("slope", [1.0, -1.0])
 def test_an_unknown_that_the_data_limit_to_one_side_is_not_determined(slope):
-    """A search ends at the corner beyond which the unknown has no effect, or anywhere beyond it."""
+    """End at the corner beyond which the unknown has no effect, or anywhere beyond it."""
     corner, unknowns = 0.655, (Unknown("level", 0.0, 2.0), Unknown("limit", 0.0, 1.0))
 
     def model(points):

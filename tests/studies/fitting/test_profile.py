@@ -43,7 +43,7 @@ def test_an_interval_that_would_leave_the_bounds_ends_at_them():
 
 
 def test_the_profile_of_a_curved_model_ends_where_its_sum_of_squares_has_risen():
-    """A rate that is seen through a decay: far from its value the profile is not a parabola."""
+    """Take a rate seen through a decay: far from its value the profile is not a parabola."""
     rng = np.random.default_rng(4)
     model = lambda x: np.exp(-x[:, :1] * TIME)  # noqa: E731
     values = model(np.array([[0.5]]))[0] + 1.0 * rng.normal(size=TIME.size)
@@ -59,7 +59,7 @@ def test_the_profile_of_a_curved_model_ends_where_its_sum_of_squares_has_risen()
 
 
 def test_intervals_near_a_bound_hold_the_truth_in_at_least_90_of_100_noisy_repeats():
-    """The truth lies 2.2 standard errors above its bound: nearly half of the intervals are cut."""
+    """Put the truth 2.2 standard errors above its bound: nearly half of the intervals are cut."""
     friction = 2.2 * np.sqrt(np.linalg.inv([[60.0, 30.0], [30.0, np.sum(TIME**2)]])[0, 0])
     held = cut = 0
     for seed in range(100):

@@ -32,7 +32,7 @@ UNITS = {"y": "mm", "z": "N"}
 
 
 def additive(design):
-    """y = 10 + 3 a + b^2 - 2/3, z = a b for load one, twice that for load two."""
+    """Return y = 10 + 3 a + b^2 - 2/3, z = a b for load one, twice that for load two."""
     a, b, _ = design.levels.T.astype(float)
     frame = pd.DataFrame({"y": 10.0 + 3.0 * a + b**2 - 2.0 / 3.0, "z": 5.0 + a * b})
     return Responses({"one": frame, "two": 2.0 * frame}, UNITS, {})

@@ -27,7 +27,7 @@ NAMES = ("a", "b", "c")
 
 
 def truth(x):
-    """Polynomial that the model with interactions contains."""
+    """Return a polynomial that the model with interactions contains."""
     a, b, c = np.asarray(x, dtype=float).T
     return 3.0 + 2.0 * a - 1.5 * a * a + b + 0.5 * a * b * b - 0.25 * a * a * c * c + 0.1 * c
 

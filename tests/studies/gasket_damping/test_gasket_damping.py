@@ -112,7 +112,7 @@ def test_grid_recovers_planted_damping_for_five_seeds_of_noise(reference, pair):
 
 
 def test_grid_recovers_planted_damping_in_a_short_run(fast, monkeypatch):
-    """The same with one pair, one load and the resonances only."""
+    """Repeat with one pair, one load and the resonances only."""
     monkeypatch.setattr("wm_drake.studies.gasket_damping.study.WINDOW", (9.0, 21.0))
     monkeypatch.setattr("wm_drake.studies.gasket_damping.study.AFTER", 2.0)
     truth = si(PLANTED[0])

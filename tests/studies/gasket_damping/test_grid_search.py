@@ -65,7 +65,7 @@ def valley(best, angle, ratio, noise=0.0):
 @pytest.mark.parametrize("ratio", [4.0, 20.0])
 @pytest.mark.parametrize("angle", [-60.0, -45.0, -20.0, 8.0, 35.0])
 def test_diagonal_valley_is_followed_to_its_bottom(angle, ratio, noise):
-    """A grid that is halved in every round stops far from the bottom, on the side of the valley."""
+    """Follow a valley on whose side a grid that is halved in every round stops."""
     best = np.array([1.1, 3.7])
     found = grid_search(valley(best, angle, ratio, noise), LOWER, UPPER, 1e-4)
     assert np.all(np.abs(found.best - best) <= 0.01 * (UPPER - LOWER))

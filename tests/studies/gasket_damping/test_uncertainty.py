@@ -14,7 +14,7 @@ from wm_drake.studies.gasket_damping.uncertainty import (
 
 
 def test_interval_of_a_mean_is_that_of_the_textbook():
-    """Each curve measures one number; the optimum is their mean, with standard error s / sqrt(m)."""
+    """Measure one number by each curve; the optimum is their mean, standard error s / sqrt(m)."""
     values = np.array([1.0, 2.0, 4.0, 3.0, 7.0, 2.5])
     lower, upper = np.array([-100.0]), np.array([100.0])
     best = np.array([values.mean()])
@@ -25,7 +25,7 @@ def test_interval_of_a_mean_is_that_of_the_textbook():
 
 
 def test_interval_of_two_loads_is_that_of_repeated_searches():
-    """For linear curves, each optimum without a curve is found by minimizing the norms directly."""
+    """Find each optimum without a curve by minimizing the norms directly, for linear curves."""
     rng = np.random.default_rng(4)
     lower, upper = np.array([0.0, -1.0]), np.array([4.0, 3.0])
     matrix = {load: rng.normal(size=(3, 40, 2)) for load in ("a", "b")}

@@ -144,7 +144,7 @@ def axial(noise=0.0, seed=0):
 
 
 def tilt(noise=0.0, seed=0):
-    """Turned faster than the rate of full friction, which [A] does not reach; below it friction and damping look alike."""
+    """Turn faster than full friction, which [A] does not; below it, friction looks like damping."""
     motions = [Harmonic(f, a) for f, a in ((1.0, 0.1), (3.0, 0.2), (7.0, 0.2))]
     rubber = BUSHING.model_copy(update={"rotational_damping_x": 0.01})
     loops = measured(bushing_bench(rubber, "about_x"), motions, noise=noise, seed=seed)
@@ -214,7 +214,7 @@ def test_intervals_hold_the_truth_in_at_least_90_of_100_noisy_repeats(name, meth
     ("name", "method"), marked((name, "response-surface") for name in COMPONENTS)
 )
 def test_response_surfaces_end_where_least_squares_does(name, method):
-    """Within a tenth of a standard error, a fortieth of the interval: what is shown of the intervals of one holds for the other."""
+    """Compare within a tenth of a standard error, so that intervals of one hold for the other."""
     make, truth = COMPONENTS[name]
     problem = fit_problem(*make(noise=0.03, seed=1))
     fit, reference = identify(problem, method, seed=1), identify(problem, seed=2)
@@ -225,7 +225,7 @@ def test_response_surfaces_end_where_least_squares_does(name, method):
 
 
 def test_what_no_loop_shows_is_named_and_not_invented():
-    """A sponge under Coulomb friction that never slips shows neither its friction nor the air resistance."""
+    """Fit a sponge that never slips: it shows neither its friction nor the air resistance."""
     stuck = StvSpongeDamper(
         law="stv_sponge",
         friction_force=60.0,
@@ -254,7 +254,7 @@ def test_what_no_loop_shows_is_named_and_not_invented():
 
 
 def test_friction_of_a_bushing_turned_too_slowly_is_not_told_from_its_damping():
-    """[A] section 2.2: 4 mm at an arm of 100 mm and 7 Hz are 1.8 rad/s, below its full friction rate of 2 rad/s."""
+    """Turn as in [A] section 2.2: 4 mm at 100 mm and 7 Hz, 1.8 rad/s; full friction is at 2."""
     motions = motions_mm(*((f, a) for f in (1.0, 3.0, 5.0, 7.0) for a in (2.0, 4.0)))
     loops = measured(bushing_bench(BUSHING, "about_x", arm=0.1), motions, noise=0.02)
     fit = least_squares(

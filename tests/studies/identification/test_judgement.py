@@ -18,7 +18,7 @@ MOTIONS = [Harmonic(1.0, 1e-3), Harmonic(5.0, 3e-3)]
 
 
 def recorded(bench, *, sign=1.0, noise=0.0, delay=0.0, periods=3.1, samples=400):
-    """Loops of a bench, unevenly sampled; noise is a part of the largest force, delay an angle."""
+    """Record loops, unevenly sampled; noise is a part of the largest force, delay an angle."""
     rng, found = np.random.default_rng(3), []
     for k, (motion, loop) in enumerate(zip(MOTIONS, force_loops(bench, MOTIONS), strict=True)):
         t = np.sort(rng.uniform(0.0, periods / motion.frequency, samples))
@@ -57,7 +57,7 @@ def test_noise_is_found_under_a_smooth_loop_with_jumps(sigma, size, jump, seed):
 
 
 def test_noise_that_is_slow_in_time_counts_with_several_periods():
-    """A drifting error looks smooth within one period; the next period shows it."""
+    """Add a drifting error: smooth within one period, shown by the next."""
     rng = np.random.default_rng(0)
     t = np.sort(rng.uniform(0.0, 20.0, 4000))
     slow = np.sin(0.37 * t) + np.sin(0.81 * t + 1.0)
@@ -95,7 +95,7 @@ def test_a_law_without_sponge_on_a_damper_with_one_is_a_poor_fit(noise):
 
 
 def test_lack_of_fit_below_the_noise_is_not_claimed():
-    """A small friction under a linear law is lost in the noise, and seen without it."""
+    """Lose a small friction under a linear law in the noise; without noise it is seen."""
     rubber = CoulombDamper(law="coulomb", friction_force=0.5, damping=2000.0)
     found = []
     for noise in (0.1, 0.0):

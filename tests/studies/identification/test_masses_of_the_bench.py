@@ -48,7 +48,7 @@ def test_inertia_of_a_recorded_motion_is_that_of_its_second_derivative():
 
 @pytest.mark.slow
 def test_a_sponge_with_mass_is_followed_in_a_fit():
-    """10 g at 10 Hz move the loop little; 1 kg is seen, and its friction is found."""
+    """Move 10 g at 10 Hz, which changes the loop little, and 1 kg, which is seen."""
     loops = measured(damper_bench(MSTV, 1.0), MOTIONS[2:])
     kept = {name: value for name, value in TRUTH.items() if name != "friction_force"}
     with_mass = damper_model("mstv", loops, fixed=kept, sponge_mass=1.0)

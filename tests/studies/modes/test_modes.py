@@ -53,7 +53,7 @@ def test_compiled_linearisation_is_drakes(name, options):
 
 
 def test_gyroscopic_splitting_is_that_of_the_closed_form(isotropic):
-    """Rotation across the axis: I a'' +- J Omega b' + k a = 0, so w = sqrt(k/I + g^2) +- g."""
+    """Solve I a'' +- J Omega b' + k a = 0 across the axis: w = sqrt(k/I + g^2) +- g."""
     linear = linearised(isotropic)
     inertia, stiffness = BALLS * BALL_INERTIA, 4000.0
     for rpm in (0.0, 300.0, 1200.0):
@@ -66,7 +66,7 @@ def test_gyroscopic_splitting_is_that_of_the_closed_form(isotropic):
 
 
 def test_modes_that_cross_keep_their_curves():
-    """The forward whirl rises through the bounce: neither may continue the other."""
+    """Let the forward whirl rise through the bounce: neither may continue the other."""
     parameters = isotropic_machine(rotational_stiffness=200.0 * BALLS * BALL_INERTIA * 0.8)
     linear = linearised(build_machine(parameters))
     speeds = np.linspace(0.0, 40.0, 41)
@@ -86,7 +86,7 @@ def test_modes_that_cross_keep_their_curves():
 
 
 def test_modes_are_joined_by_shape_where_frequencies_cross():
-    """Two planted uncoupled oscillators whose frequencies cross."""
+    """Plant two uncoupled oscillators whose frequencies cross."""
 
     def spectrum_at(speed):
         matrix = np.zeros((4, 4))
@@ -101,7 +101,7 @@ def test_modes_are_joined_by_shape_where_frequencies_cross():
 
 
 def test_coupled_modes_veer_and_are_joined_all_the_same():
-    """With coupling the frequencies do not cross; curves stay smooth and apart."""
+    """Couple them: the frequencies do not cross, and curves stay smooth and apart."""
 
     def spectrum_at(speed):
         a, b, c = (10.0 + speed) ** 2, (15.0 - speed) ** 2, 25.0
@@ -150,7 +150,7 @@ def overhung_disc(disc_effect):
 
 
 def test_overhung_disc_has_the_published_frequencies_and_critical_speed():
-    """Gyroscopic disc on a cantilever shaft, disc effect D = 1.
+    """Take a gyroscopic disc on a cantilever shaft, disc effect D = 1.
 
     Source: J. P. Den Hartog, Mechanical Vibrations, 4th ed., section on gyroscopic effects: the
     forward critical speeds satisfy K^4 + K^2 (4/D - 4) - 4/D = 0, so K = sqrt(2) at D = 1. R.
@@ -187,7 +187,7 @@ def test_names_energies_and_participation_of_one_mass(isotropic):
 
 
 def test_energy_is_shared_as_the_stiffness_is(isotropic):
-    """Two springs in parallel: along x, the part of each is its stiffness over the sum."""
+    """Put two springs in parallel: along x, the part of each is its stiffness over the sum."""
     stiff = with_values(isotropic.parameters, {"spring_types.suspension.stiffness": 0.0})
     assert stiff.gasket is not None
     linear = linearised(isotropic)
@@ -198,7 +198,7 @@ def test_energy_is_shared_as_the_stiffness_is(isotropic):
 
 
 def test_sensitivities_of_one_mass_are_those_of_the_closed_form(isotropic):
-    """f is as the root of k, and zeta as c over the root of k."""
+    """Check that f is as the root of k, and zeta as c over the root of k."""
     linear = linearised(isotropic)
     spectrum = linear.spectrum()
     named = modes_of(spectrum.first(6), linear.wrench_slopes())
@@ -220,7 +220,7 @@ def test_sensitivities_of_one_mass_are_those_of_the_closed_form(isotropic):
 
 
 def test_sensitivity_is_the_difference_of_modes(machine):
-    """The derivative predicts the modes of a machine with stiffer springs."""
+    """Predict the modes of a machine with stiffer springs by the derivative."""
     key = "spring_types.suspension.stiffness"
     parameters = machine.parameters
     before = linearised(machine).spectrum().first(6)
@@ -270,7 +270,7 @@ def vertical_friction_damper(force, transition):
 
 
 def test_friction_damps_a_mode_as_the_energy_of_a_cycle_says():
-    """Coulomb friction F dissipates 4 F A in a cycle: zeta = 2 F / (pi k A).
+    """Dissipate 4 F A in a cycle of Coulomb friction F: zeta = 2 F / (pi k A).
 
     The formula neglects higher harmonics, which change it by about (F / (k A))^2, 0.1 % here.
     """

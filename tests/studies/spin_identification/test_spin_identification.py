@@ -116,7 +116,7 @@ def test_numbers_that_the_data_do_not_determine_are_named(reference):
 
 
 def test_verdict_is_that_of_the_displacements_not_of_the_intervals(reference):
-    """A model that cannot reproduce the measurement still determines its numbers."""
+    """Fit a model that cannot reproduce the measurement: it still determines its numbers."""
     model = made_up(reference, seen=True)
     planted = planted_values(model.sought, seed=3)
     measured = virtual_experiment(model, planted, noise=0.0, seed=3)

@@ -254,6 +254,8 @@ def test_correlated_quantities_have_no_sobol_indices(study):
     result = study(Settings(64, 64, 0), {"quantities": ("k", "f"), "matrix": ((1, 0.5), (0.5, 1))})
     assert not result.indices
     assert "correlated" in result.refused
+    assert "Shapley effects" in result.refused
+    assert "samples.csv" in result.refused  # they need no other runs
 
 
 @pytest.mark.parametrize(

@@ -31,14 +31,6 @@ WorkersOption = Annotated[
 ResumeOption = Annotated[
     bool, typer.Option("--resume", help="Continue an unfinished study in the same folder.")
 ]
-ProfileOption = Annotated[
-    Path | None,
-    typer.Option(
-        help="Spin profile, YAML or CSV (time_s, speed_rpm). Default: that of the machine.",
-        metavar="FILE",
-    ),
-]
-
 ClusterOption = Annotated[
     str | None,
     typer.Option(

@@ -12,6 +12,7 @@ from wm_drake.cli.common import (
     MachineOption,
     OutOption,
     OverwriteOption,
+    ProfileOption,
     SetOption,
     cases_of,
     check_buildable,
@@ -23,7 +24,6 @@ from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.study.common import (
     RUNS_KEPT,
     ClusterOption,
-    ProfileOption,
     ResumeOption,
     SeedOption,
     WorkersOption,

@@ -11,6 +11,7 @@ from wm_drake.cli.common import (
     JsonOption,
     OutOption,
     OverwriteOption,
+    ProfileOption,
     SetOption,
     cases_of,
     check_buildable,
@@ -22,7 +23,6 @@ from wm_drake.cli.spin_drive import with_drive
 from wm_drake.cli.study.common import (
     RUNS_KEPT,
     ClusterOption,
-    ProfileOption,
     ResumeOption,
     SeedOption,
     WorkersOption,

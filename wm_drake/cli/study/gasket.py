@@ -15,6 +15,7 @@ from wm_drake.cli.common import (
     MachineOption,
     OutOption,
     OverwriteOption,
+    ProfileOption,
     SetOption,
     cases_of,
     check_buildable,
@@ -28,7 +29,6 @@ from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.study.common import (
     RUNS_KEPT,
     ClusterOption,
-    ProfileOption,
     ResumeOption,
     WorkersOption,
     study_ledger,

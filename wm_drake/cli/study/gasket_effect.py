@@ -9,8 +9,10 @@ import typer
 from wm_drake.cli.common import (
     JsonOption,
     MachineOption,
+    MeasuredOption,
     OutOption,
     OverwriteOption,
+    ProfileOption,
     SetOption,
     cases_of,
     check_buildable,
@@ -22,7 +24,6 @@ from wm_drake.cli.common import (
 from wm_drake.cli.progress import progress_bars
 from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.spin_results import compared_cases
-from wm_drake.cli.study.common import ProfileOption
 from wm_drake.cli.terminal import Console, say
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -44,15 +45,7 @@ def gasket_effect(
         ),
     ] = None,
     profile: ProfileOption = None,
-    measured: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="Measured amplitudes to compare with: load, gasket, source, and a column per "
-            "sensor in mm. Repeatable. Default: those of the machine file, for its own numbers, "
-            "loads and profile.",
-            metavar="CSV",
-        ),
-    ] = None,
+    measured: MeasuredOption = None,
     out: OutOption = DEFAULT_OUT,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,

@@ -39,6 +39,36 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.studies.spin_cycle.study import SpinCycleResult
 
 DEFAULT_OUT = Path("wm-drake-spin-cycle")
+CycleProfileOption = Annotated[
+    str,
+    typer.Option(
+        help="Name of a shipped profile (spin_cycle, run_up, ifb_9kg), or file with regions.",
+        metavar="NAME|FILE",
+    ),
+]
+CasesOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="CSV file of cases: case, front_g, rear_g, phase_deg. Default: the 33 cases of "
+        "[A] Table 9.",
+        metavar="FILE",
+    ),
+]
+MeasuredRmsOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="CSV file of measured RMS displacements: case, region, sensor, axis, rms_mm.",
+        metavar="FILE",
+    ),
+]
+AccelerationsOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Folder of measured accelerations, one file CASE.csv per case: "
+        "time_s, S1_x, S1_y, ... in m/s^2.",
+        metavar="DIR",
+    ),
+]
 TERMINAL_HEADS = {
     "case": "case",
     "front_g": "front, g",
@@ -57,39 +87,13 @@ TERMINAL_HEADS = {
 
 def spin_cycle(
     machine: MachineOption = "free_stroke",
-    profile: Annotated[
-        str,
-        typer.Option(
-            help="Name of a shipped profile (spin_cycle, run_up, ifb_9kg), or file with regions.",
-            metavar="NAME|FILE",
-        ),
-    ] = "spin_cycle",
-    cases: Annotated[
-        Path | None,
-        typer.Option(
-            help="CSV file of cases: case, front_g, rear_g, phase_deg. Default: the 33 cases of "
-            "[A] Table 9.",
-            metavar="FILE",
-        ),
-    ] = None,
+    profile: CycleProfileOption = "spin_cycle",
+    cases: CasesOption = None,
     case: Annotated[
         list[str] | None, typer.Option(help="Run only this case. Repeatable.", metavar="NAME")
     ] = None,
-    measured: Annotated[
-        Path | None,
-        typer.Option(
-            help="CSV file of measured RMS displacements: case, region, sensor, axis, rms_mm.",
-            metavar="FILE",
-        ),
-    ] = None,
-    accelerations: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder of measured accelerations, one file CASE.csv per case: "
-            "time_s, S1_x, S1_y, ... in m/s^2.",
-            metavar="DIR",
-        ),
-    ] = None,
+    measured: MeasuredRmsOption = None,
+    accelerations: AccelerationsOption = None,
     channels: RecordChannelsOption = None,
     engine: Annotated[
         str,

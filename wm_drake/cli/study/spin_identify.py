@@ -22,7 +22,16 @@ from wm_drake.cli.common import (
 from wm_drake.cli.progress import progress_bar
 from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.study.common import WorkersOption
-from wm_drake.cli.study.spin_cycle import cases_of_table, measurement, open_runs, study_identity
+from wm_drake.cli.study.spin_cycle import (
+    AccelerationsOption,
+    CasesOption,
+    CycleProfileOption,
+    MeasuredRmsOption,
+    cases_of_table,
+    measurement,
+    open_runs,
+    study_identity,
+)
 from wm_drake.cli.terminal import Console, say
 from wm_drake.errors import input_error
 
@@ -46,37 +55,18 @@ def spin_identify(
             metavar="KEYS[=RANGE]",
         ),
     ] = None,
-    profile: Annotated[
-        str,
-        typer.Option(
-            help="Name of a shipped profile (spin_cycle, run_up, ifb_9kg), or file with regions.",
-            metavar="NAME|FILE",
-        ),
-    ] = "spin_cycle",
-    cases: Annotated[
-        Path | None,
-        typer.Option(help="CSV file of cases: case, front_g, rear_g, phase_deg.", metavar="FILE"),
-    ] = None,
+    profile: CycleProfileOption = "spin_cycle",
+    cases: CasesOption = None,
     case: Annotated[
         list[str] | None,
         typer.Option(
-            help="Use only this case. Repeatable. Default: cases 2, 5 and 29 of [A] Table 9.",
+            help="Use only this case. Repeatable. Default: those of --cases, or 2, 5 and 29 of [A] "
+            "Table 9.",
             metavar="NAME",
         ),
     ] = None,
-    measured: Annotated[
-        Path | None,
-        typer.Option(
-            help="CSV file of measured RMS displacements: case, region, sensor, axis, rms_mm.",
-            metavar="FILE",
-        ),
-    ] = None,
-    accelerations: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder of measured accelerations, one file CASE.csv per case.", metavar="DIR"
-        ),
-    ] = None,
+    measured: MeasuredRmsOption = None,
+    accelerations: AccelerationsOption = None,
     channels: RecordChannelsOption = None,
     noise: Annotated[
         float,

@@ -12,6 +12,7 @@ from wm_drake.cli.common import (
     MachineOption,
     OutOption,
     OverwriteOption,
+    ProfileOption,
     SetOption,
     check_buildable,
     command_line,
@@ -22,7 +23,6 @@ from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.study.common import (
     RUNS_KEPT,
     ClusterOption,
-    ProfileOption,
     ResumeOption,
     SeedOption,
     WorkersOption,

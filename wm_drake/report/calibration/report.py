@@ -13,9 +13,13 @@ from wm_drake.report.spin import tables
 from wm_drake.report.spin.cases import case_title
 from wm_drake.report.spin.figures import envelopes_figure
 from wm_drake.report.tables import Group, Row, Table, line
-from wm_drake.studies.calibration.calibration import Calibration
+from wm_drake.studies.calibration.calibration import BEYOND_LIMIT, Calibration
 from wm_drake.studies.calibration.fewer import Simpler
-from wm_drake.studies.calibration.outcome import mean_and_largest, quantity_table
+from wm_drake.studies.calibration.outcome import (
+    mean_and_largest,
+    quantity_table,
+    values_beyond,
+)
 from wm_drake.studies.calibration.prediction import Prediction
 from wm_drake.studies.calibration.response_targets import TRIALS
 from wm_drake.studies.description.modal import Modes
@@ -69,6 +73,11 @@ def calibration_report(
             for i, case in enumerate(best.results)
         ],
         deviation=number(calibration.plan.deviation, 3),
+        limits=", ".join(
+            f"{name} {number(100.0 * limit)} %"
+            for name, limit in calibration.targets.limits.items()
+        ),
+        beyond=number(BEYOND_LIMIT, 0),
         facts=_facts(calibration, best, command),
     )
 
@@ -98,6 +107,8 @@ def summary(calibration: Calibration, predictions: Sequence[Prediction]) -> str:
             f" Of {len(targets.responses)} other responses, the mean absolute difference is "
             f"{number(100 * mean)} % and the largest {number(100 * largest)} %."
         )
+    if beyond := values_beyond(best, targets):
+        text += f" Beyond their limits: {', '.join(beyond)}."
     if predictions:
         covered = float(np.mean([p.covered for p in predictions]))
         worst = max(predictions, key=lambda p: mean_and_largest(p.predicted)[0])

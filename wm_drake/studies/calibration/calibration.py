@@ -24,6 +24,13 @@ It covers the scatter between machines and the error of a rigid-body model. It d
 of the data against the priors.
 """
 
+BEYOND_LIMIT = 30.0
+"""Factor of the residual of a value beyond its limit.
+
+One standard deviation beyond the limit costs as much as 30 standard deviations of other values, so
+that a limit gives way only where no machine within the bounds keeps it.
+"""
+
 RESOLUTION = 1e-4
 """Resolution of the published amplitudes. [m]"""
 
@@ -162,8 +169,8 @@ def residuals_of(
 ) -> Residuals:
     """Return the residuals as a function of points in units of the prior.
 
-    The first `targets.count` residuals are those of the data; the others belong to what is known
-    beside the priors of the quantities.
+    The first `targets.count` residuals are those of the data; the others belong to the limits of
+    the data, and to what is known beside the priors of the quantities.
     """
     spread = plan.spread(targets.amplitude)
 
@@ -171,11 +178,12 @@ def residuals_of(
         points = parameter_map.expected + coordinates * parameter_map.deviation
         found = values(points)
         known = parameter_map.prior_residuals(points, found.preload, found.elongation)
+        beyond = BEYOND_LIMIT * targets.excesses(found.amplitude, found.responses, spread)
         exact, smooth = (
-            targets.residuals(amplitude, found.responses, spread)
+            np.hstack([targets.residuals(amplitude, found.responses, spread), beyond, known])
             for amplitude in (found.amplitude, found.power_mean)
         )
-        return np.hstack([exact, known]), np.hstack([smooth, known])
+        return exact, smooth
 
     return residuals
 

@@ -11,7 +11,7 @@ from wm_drake.parameters.units import from_base, to_base
 from wm_drake.studies.calibration.calibration import Calibration
 from wm_drake.studies.calibration.parameter_map import ParameterMap
 from wm_drake.studies.calibration.solutions import AT_BOUND, DETERMINED, UNDETERMINED, Solution
-from wm_drake.studies.calibration.targets import EXPERIMENT, MILLIMETRE
+from wm_drake.studies.calibration.targets import EXPERIMENT, MILLIMETRE, Targets
 
 
 def solved_machine(
@@ -71,6 +71,20 @@ def _rounded(parameter_map: ParameterMap, solution: Solution) -> np.ndarray:
 
 def _short(number: float) -> str:
     return f"{number:.0f}" if abs(number) >= 100.0 else f"{number:.2g}"
+
+
+def values_beyond(solution: Solution, targets: Targets) -> list[str]:
+    """Return a text for each value beyond its limit, such as ``middle Xf +23 % (20 %)``."""
+    loads = [f"{name}{'' if gasket else ' without gasket'}" for name, gasket in targets.loads]
+    names = [f"{load} {sensor}" for load in loads for sensor in targets.sensors]
+    names += [f"{target.load} {target.response.name}" for target in targets.responses]
+    errors = [solution.errors(targets).ravel(), solution.response_errors(targets)]
+    used = [(name, e) for name, e in zip(names, np.concatenate(errors), strict=True) if e == e]
+    return [
+        f"{name} {100.0 * error:+.0f} % ({100.0 * limit:g} %)"
+        for (name, error), limit in zip(used, targets.limit_of_each(), strict=True)
+        if abs(error) > limit
+    ]
 
 
 def fit_text(

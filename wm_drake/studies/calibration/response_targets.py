@@ -68,10 +68,6 @@ class ResponseTarget:
             self.load,
         )
 
-    def spread(self) -> float:
-        """Return the standard deviation of the logarithm, divided by the root of the weight."""
-        return self.deviation / np.sqrt(self.weight)
-
 
 def response_targets_of(
     parameters: MachineParameters, values: Iterable[NamedValue]

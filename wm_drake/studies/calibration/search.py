@@ -215,7 +215,11 @@ def evolution_search(
 ) -> Found:
     """Search by CMA-ES from one start, then by least squares from its end point.
 
-    CMA-ES: [Hansen, The CMA Evolution Strategy: A Tutorial, 2016].
+    CMA-ES: [Hansen, The CMA Evolution Strategy: A Tutorial, 2016]. The first points are drawn from
+    the normal distribution around the start that the slopes there give to the quantities, so that
+    combinations which the data determine well are changed by small steps. A point beyond the bounds
+    is evaluated at the nearest one within, and costs more by `OUTSIDE` times the square of the
+    distance.
 
     Args:
         problem: The least-squares problem.
@@ -225,22 +229,31 @@ def evolution_search(
     """
     before = problem.evaluations
     options = {
-        "bounds": [problem.lower.tolist(), problem.upper.tolist()],
+        "popsize": DRAWS,
         "seed": seed + 1,  # 0 would mean a seed from the clock
         "maxiter": iterations,
         "verbose": -9,
         "tolfun": 1e-2,
         "tolx": 1e-3,
     }
-    strategy = cma.CMAEvolutionStrategy(start.tolist(), 0.5 * START_SPREAD, options)
+    slopes = problem.jacobian(start)
+    spread = np.linalg.cholesky(np.linalg.inv(slopes.T @ slopes + np.eye(len(start))))
+    best, least = start, np.inf
+    strategy = cma.CMAEvolutionStrategy([0.0] * len(start), START_SPREAD, options)
     while not strategy.stop():
-        points = np.array(strategy.ask())
-        strategy.tell(points, problem.evaluate(points)[1].tolist())
-    found = least_squares_search(
-        problem, np.clip(strategy.result.xbest, problem.lower, problem.upper), POLISH
-    )
+        drawn = strategy.ask()
+        wanted = start + np.array(drawn) @ spread.T
+        points = np.clip(wanted, problem.lower, problem.upper)
+        costs = problem.evaluate(points)[1]
+        if costs.min() < least:
+            best, least = points[int(np.argmin(costs))], float(costs.min())
+        strategy.tell(drawn, (costs + OUTSIDE * np.sum((wanted - points) ** 2, axis=1)).tolist())
+    found = least_squares_search(problem, best, POLISH)
     return Found(found.point, found.cost, problem.evaluations - before)
 
+
+OUTSIDE = 10.0
+"""Cost of a point at a distance of one prior deviation beyond the bounds."""
 
 POLISH = 10
 """Limit of iterations of least squares after CMA-ES or a hop."""

@@ -1,7 +1,7 @@
 """Targets of a calibration: measured amplitudes and other responses."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
@@ -19,6 +19,9 @@ from wm_drake.studies.calibration.response_targets import (
 
 MILLIMETRE = Unit("m", "mm")
 
+AMPLITUDE = "amplitudes"
+"""Name of all amplitudes, for limits."""
+
 
 @dataclass(frozen=True)
 class Targets:
@@ -30,6 +33,7 @@ class Targets:
         amplitude: (case, sensor) measured amplitudes. [m]
         weight: (case, sensor) weights of the squared log ratios; 0 for values that are not used.
         responses: Targets that are no amplitudes of sensors.
+        limits: Largest accepted relative differences, by names as in `limited`.
     """
 
     loads: tuple[tuple[str, bool], ...]
@@ -37,6 +41,7 @@ class Targets:
     amplitude: FloatArray
     weight: FloatArray
     responses: tuple[ResponseTarget, ...] = ()
+    limits: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -62,12 +67,62 @@ class Targets:
         Returns:
             (..., n) residuals of the values that are used, in standard deviations.
         """
-        logarithms = np.log(amplitude / self.amplitude) * np.sqrt(self.weight) / spread
-        used = [i for i, target in enumerate(self.responses) if target.weight > 0.0]
-        wanted = np.array([self.responses[i].value for i in used])
-        scale = np.array([self.responses[i].spread() for i in used])
-        others = np.log(responses[..., used] / wanted) / scale
-        return np.concatenate([logarithms[..., self.weight > 0.0], others], axis=-1)
+        weights = np.concatenate([self.weight[self.weight > 0.0], self.response_weight[self._used]])
+        return self._logarithms(amplitude, responses) * np.sqrt(weights) / self._deviations(spread)
+
+    def excesses(
+        self, amplitude: FloatArray, responses: FloatArray, spread: FloatArray
+    ) -> FloatArray:
+        """Return how far logarithms lie beyond their limits, in standard deviations.
+
+        Arguments as in `residuals`.
+
+        Returns:
+            (..., k) excesses of the used values that have a limit; 0 within the limits.
+        """
+        limit = self.limit_of_each()
+        limited = np.isfinite(limit)
+        logarithms, limit = self._logarithms(amplitude, responses)[..., limited], limit[limited]
+        with np.errstate(divide="ignore"):  # no value is 100 % too small
+            above, below = np.log1p(limit), np.log1p(-np.minimum(limit, 1.0))
+        beyond = np.maximum(logarithms - above, 0.0) + np.minimum(logarithms - below, 0.0)
+        return np.asarray(beyond / self._deviations(spread)[limited])
+
+    @property
+    def _used(self) -> np.ndarray:
+        """Whether each of the other responses is used. (response)"""
+        return self.response_weight > 0.0
+
+    def _logarithms(self, amplitude: FloatArray, responses: FloatArray) -> FloatArray:
+        """Return the logarithms of the ratios of computed to wanted values that are used."""
+        wanted = np.array([target.value for target in self.responses])
+        ratios = (amplitude / self.amplitude)[..., self.weight > 0.0]
+        others = (responses / wanted)[..., self._used]
+        return np.asarray(np.log(np.concatenate([ratios, others], axis=-1)))
+
+    def _deviations(self, spread: FloatArray) -> FloatArray:
+        """Return the standard deviations of the logarithms of the values that are used. (n)"""
+        others = np.array([target.deviation for target in self.responses])
+        return np.concatenate([spread[self.weight > 0.0], others[self._used]])
+
+    def limit_of_each(self) -> FloatArray:
+        """Return the limits of the values that are used, infinite where there is none. (n)
+
+        Of several limits that fit a value, the one that fits the fewest counts.
+        """
+        amplitudes = [
+            (f"{load}:{sensor}", sensor, load, AMPLITUDE)
+            for load, _ in self.loads
+            for sensor in self.sensors
+        ]
+        names = [*amplitudes, *(target.names for target in self.responses)]
+        limit = np.array(
+            [
+                next((self.limits[name] for name in own if name in self.limits), np.inf)
+                for own in names
+            ]
+        )
+        return limit[np.concatenate([self.weight.ravel() > 0.0, self._used])]
 
     def of(self, *loads: str) -> np.ndarray:
         """Return for each case whether its load is one of these. (case)"""
@@ -81,6 +136,34 @@ class Targets:
             for target in self.responses
         )
         return replace(self, weight=kept, responses=responses)
+
+    def limited(self, limits: Mapping[str, float]) -> "Targets":
+        """Return the targets with limits of the relative differences.
+
+        A calibration gives values beyond their limits a much higher cost.
+
+        Args:
+            limits: Limits by name: `AMPLITUDE` for all amplitudes, or a name as in `weighted`. They
+                are fractions of the wanted value.
+
+        Raises:
+            InputError: a name is none of these, or a limit is not above 0.
+        """
+        known = [AMPLITUDE, *dict.fromkeys(name for name, _ in self.loads), *self.sensors]
+        known += [f"{load}:{sensor}" for load, _ in self.loads for sensor in self.sensors]
+        known += [name for target in self.responses for name in target.names]
+        for name, limit in limits.items():
+            if name not in known:
+                raise input_error(
+                    f"'{name}' is no load, sensor, response or LOAD:NAME"
+                    f"{nearest_names(name, known)}",
+                    key="limit",
+                )
+            if not 0.0 < limit < np.inf:
+                raise input_error(
+                    f"{limit:g} is not allowed; must be > 0 and finite", key=f"limit of '{name}'"
+                )
+        return replace(self, limits=dict(limits))
 
     def weighted(self, weights: Mapping[str, float]) -> "Targets":
         """Return the targets with weights multiplied by factors.

@@ -293,7 +293,9 @@ def _indices(
     if machine.joint.factor is not None:
         reason = (
             "Sobol indices divide the variance among independent quantities. Here quantities are "
-            "correlated, so the shares would overlap and are not computed."
+            "correlated, so the shares would overlap and are not computed. Shapley effects divide "
+            "it in this case, too: shapleysobol_knn of the R package 'sensitivity' estimates them "
+            "from samples.csv."
         )
         return {}, reason, 0
     others = exchanged(scores[0][:count], scores[1][:count])

@@ -28,6 +28,7 @@ let variants = [];     // {name, state, answer}
 let turned = [];       // keys of the seven numbers
 let ranking = [];      // arrows of all numbers
 let asked = 0;         // number of the latest request
+let settled = 0;       // number of the latest request that has an answer or a problem
 let drawn = 0;         // number of the request that is drawn
 
 /* ---- what is chosen ---- */
@@ -118,6 +119,7 @@ function chooseLoad(what) {
 
 async function run() {
   const number = ++asked;
+  showBusy();
   const begin = performance.now();
   try {
     const found = await post('run', {page: PAGE, state, keys: turned});
@@ -131,7 +133,15 @@ async function run() {
     if (number !== asked) return;
     showProblems(error instanceof Problems ? error.problems : [{key: '', message: error.message}]);
     status('not run');
+  } finally {
+    settled = Math.max(settled, number);
+    showBusy();
   }
+}
+
+/** Tell readers of the page, also those of a screen reader, whether an answer is under way. */
+function showBusy() {
+  document.body.setAttribute('aria-busy', String(settled < asked));
 }
 
 async function runGhost() {
