@@ -1,6 +1,9 @@
 """Check that numbers fit a machine that is built already."""
 
+import functools
+import typing
 from collections.abc import Iterator
+from typing import Any
 
 from pydantic import BaseModel
 
@@ -170,8 +173,22 @@ def _types_of_elements(machine: MachineParameters) -> Iterator[tuple[str, BaseMo
 
 def _points(type_: BaseModel) -> dict[str, int]:
     """Return the number of points of each table of a type, by its field."""
+    values = ((name, getattr(type_, name)) for name in _fields_of_tables(type(type_)))
     return {
         name: len(value.curve[0])
-        for name, value in vars(type_).items()
+        for name, value in values
         if isinstance(value, ForceTable | TorqueTable)
     }
+
+
+@functools.cache
+def _fields_of_tables(kind: type[BaseModel]) -> tuple[str, ...]:
+    """Return the names of the fields of a type that may be tables."""
+    fields = kind.model_fields.items()
+    return tuple(name for name, field in fields if _may_be_table(field.annotation))
+
+
+def _may_be_table(annotation: Any) -> bool:
+    return annotation in (ForceTable, TorqueTable) or any(
+        map(_may_be_table, typing.get_args(annotation))
+    )
