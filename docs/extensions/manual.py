@@ -4,6 +4,7 @@ A page asks for a text by a mark:
 
 - `<!-- machine file keys -->`: the keys of a machine file;
 - `<!-- public names -->`: the public names of the package;
+- `<!-- pages of decisions -->`: the decisions, below their list in the navigation;
 - `<!-- functions of MODULE -->`: the functions of a module of laws, or `MODULE: NAME NAME` of them;
 - `<!-- picture NAME -->`: a picture that is drawn from the code (`pictures.py`).
 """
@@ -26,6 +27,8 @@ import wm_drake
 from wm_drake.parameters.file_keys import FileKey, KeyGroup, key_groups
 
 KEYS, NAMES = "<!-- machine file keys -->", "<!-- public names -->"
+BELOW = "<!-- pages of decisions -->"
+TREE_BELOW = "```{toctree}\n:hidden:\n:glob:\n\n0*\n```"
 FUNCTIONS = re.compile(r"<!-- functions of ([\w.]+)(?:: ([\w ]+))? -->")
 PICTURE = re.compile(r"<!-- picture ([\w-]+) -->")
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s]+?)(#[^)\s]*)?\)")
@@ -85,6 +88,7 @@ def _complete(app: Sphinx, docname: str, source: list[str]) -> None:
         text = text.replace(KEYS, "\n".join(_keys()))
     if NAMES in text:
         text = text.replace(NAMES, _documented(_public_names()))
+    text = text.replace(BELOW, TREE_BELOW)
     text = FUNCTIONS.sub(lambda found: _documented(_functions(found[1], found[2])), text)
     text = PICTURE.sub(lambda found: _drawn(found[1]), text)
     source[0] = _relinked(text, Path(app.srcdir), Path(app.srcdir, docname).parent, docname)

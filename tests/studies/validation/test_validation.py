@@ -184,7 +184,11 @@ def test_the_page_of_verification_has_a_row_per_comparison():
     page = verification_page({"Laws": rows}, "python write.py", {})
     assert "| a law | hand values | 1e-9 | `a.py`<br>`b.py` |" in page
     assert "| a run | MuJoCo | 1 % | `python c.py` |" in page
-    ran = verification_page(
-        {"Laws": rows}, "python write.py", {"a.py": "2 passed", "b.py": "2 passed"}
-    )
-    assert "| `a.py`<br>`b.py` | 2 passed |" in ran
+    for outcomes, words in (
+        ({"a.py": (2, 0), "b.py": (3, 0)}, "5 passed"),
+        ({"a.py": (2, 0), "b.py": (3, 1)}, "**1 of 5 failed**"),
+        ({"a.py": (2, 0)}, "**not run**"),
+    ):
+        ran = verification_page({"Laws": rows}, "python write.py", outcomes)
+        assert f"| `a.py`<br>`b.py` | {words} |" in ran
+        assert "| `python c.py` |  |" in ran

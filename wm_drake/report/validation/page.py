@@ -84,14 +84,17 @@ def validation_page(
 
 
 def verification_page(
-    groups: Mapping[str, Sequence[Mapping[str, Any]]], command: str, outcomes: Mapping[str, str]
+    groups: Mapping[str, Sequence[Mapping[str, Any]]],
+    command: str,
+    outcomes: Mapping[str, tuple[int, int]],
 ) -> str:
     """Return the page of verification as Markdown.
 
     Args:
         groups: Rows by heading, each with what, against, agreement, and tests or a command.
         command: Command that writes the page.
-        outcomes: What a run of the tests gave, by test or file of tests; empty without a run.
+        outcomes: How many tests ran and how many of them failed, by test or file of tests; empty
+            if they were not run.
     """
     about = (
         "Does the program solve its equations? Each row is compared by tests, which run with the "
@@ -107,9 +110,19 @@ def verification_page(
             run_by += [f"`{row['command']}`"] if "command" in row else []
             cells = [row["what"], row["against"], row["agreement"], "<br>".join(run_by)]
             if outcomes:
-                cells.append("; ".join(dict.fromkeys(outcomes.get(name, "") for name in tests)))
+                cells.append(_outcome([outcomes.get(name, (0, 0)) for name in tests]))
             text.append(_line(cells))
     return "\n".join(text) + "\n"
+
+
+def _outcome(of_row: Sequence[tuple[int, int]]) -> str:
+    """Return what the tests of a row gave, in words; empty for a row without tests."""
+    if not of_row:
+        return ""
+    if not all(ran for ran, _ in of_row):
+        return "**not run**"
+    ran, failed = map(sum, zip(*of_row, strict=True))
+    return f"**{failed} of {ran} failed**" if failed else f"{ran} passed"
 
 
 def _origin(command: str) -> list[str]:
