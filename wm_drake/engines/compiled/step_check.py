@@ -164,12 +164,14 @@ class StateKinds:
 
 
 _KNOWN_KINDS: dict[Layout, StateKinds] = {}
+"""Kinds by layout, of the last `_MOST_KNOWN` layouts."""
 _MOST_KNOWN = 64
 
 
 def _state_kinds(setup: Setup, layout: Layout) -> StateKinds:
     """Return the kinds of the state; the machines of a design share theirs with their layout."""
-    if layout not in _KNOWN_KINDS:
+    kinds = _KNOWN_KINDS.get(layout)
+    if kinds is None:
         free, _ = free_states(setup)
         velocities = sorted(set(free) & set(_velocities(setup)))
         kinds = StateKinds(
@@ -178,8 +180,7 @@ def _state_kinds(setup: Setup, layout: Layout) -> StateKinds:
         if len(_KNOWN_KINDS) >= _MOST_KNOWN:
             _KNOWN_KINDS.clear()
         _KNOWN_KINDS[layout] = kinds
-        return kinds
-    return _KNOWN_KINDS[layout]
+    return kinds
 
 
 def _treatment(setup: Setup, free: list[int]) -> np.ndarray:
