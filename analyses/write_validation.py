@@ -11,7 +11,8 @@ docs/validation.md, docs/prediction.md and docs/verification.md.
 Explanations of results that are missed are in validation_reasons.yaml, the tests of the page of
 verification in verification.yaml. Loads held out of the calibration, and fits with fewer free
 quantities, take hours: calibrate_reference.py wrote them to reference_held_out.csv and
-reference_fewer.csv. The script takes about two minutes; with --tests, which runs the tests, ten.
+reference_fewer.csv. The script takes about two minutes; with --tests, which runs the tests
+except those marked `hours`, three to five more.
 """
 
 import argparse

@@ -227,3 +227,32 @@ def test_none_removes_as_null_in_a_file(reference, tmp_path, key, text):
     removed = with_value(reference, key, None).model_dump(exclude=NOT_COMPARED)
     assert removed == in_file
     assert removed != reference.model_dump(exclude=NOT_COMPARED)
+
+
+def test_parts_that_do_not_change_stay_the_same_objects():
+    """A study recognises them by identity, and prepares them once."""
+    parameters = load_machine("reference")
+    changed = with_values(parameters, {"gasket.damping_x": 30.0})
+    assert changed.gasket.damping_x == 30.0
+    assert changed.springs is parameters.springs
+    assert changed.loads is parameters.loads
+    whole = type(parameters).model_validate(changed.model_dump(exclude_unset=True))
+    assert changed == whole
+
+
+def test_number_that_was_not_there_is_checked_against_the_other_parts():
+    """A spring has a preload or a type with a free length, not both."""
+    parameters = load_machine("reference")
+    name, spring = next(iter(parameters.springs.items()))
+    given = with_values(
+        parameters,
+        {f"springs.{name}.preload": None, f"spring_types.{spring.type}.free_length": 0.2},
+    )
+    with pytest.raises(InputError, match="give only one of them"):
+        with_values(given, {f"springs.{name}.preload": 50.0})
+
+
+def test_number_that_is_not_allowed_is_told_with_its_key():
+    """The part of the changed number is checked in any case."""
+    with pytest.raises(InputError, match=r"gasket\.damping_x"):
+        with_values(load_machine("reference"), {"gasket.damping_x": -1.0})

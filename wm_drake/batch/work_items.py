@@ -8,7 +8,12 @@ from pydrake.systems.framework import Context
 
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.mechanics import DRUM_RATE
-from wm_drake.engines.compiled.packing import Layout, initial_state, pack_bodies, pack_elements
+from wm_drake.engines.compiled.packing import (
+    DrawnBodies,
+    Layout,
+    initial_state,
+    pack_elements,
+)
 from wm_drake.engines.compiled.stepping import Stepping, choose_stepping
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.model.machine import Machine, Setup
@@ -80,7 +85,8 @@ class Preparation:
         self.machine, self.step, self.integrator = machine, step, integrator
         self.sensors = list(machine.parameters.sensors)
         self._context: Context | None = None
-        self._known_bodies: dict[tuple[object, ...], FloatArray] = {}
+        self._drawn: list[tuple[object, DrawnBodies]] = []
+        self._known_bodies: dict[tuple[Load, ...], FloatArray] = {}
         self._known_numbers: dict[tuple[int, bool, SpinProfile], PackedParameters] = {}
 
     def batches(self, cases: Iterable[Case]) -> Iterator[tuple[BatchKey, list[WorkItem]]]:
@@ -115,21 +121,20 @@ class Preparation:
 
     def _bodies(self, parameters: MachineParameters, load: Load | None) -> FloatArray:
         """Return the packed bodies, which cases with the same bodies, frames and load share."""
-        key = (
-            *parameters.bodies.items(),
-            *parameters.frames.items(),
-            parameters.imperfections.residual_imbalance,
-            load,
-        )
-        if key not in self._known_bodies:
+        drawn = parameters.bodies, parameters.frames
+        if not self._drawn or self._drawn[0][0] != drawn:
+            self._context = self.machine.set_up_bodies(None, parameters, self._context)
+            plant_context = self.machine.plant.GetMyContextFromRoot(self._context)
+            bodies = DrawnBodies(self.machine.plant, plant_context, parameters.drive.joint)
+            self._drawn[:] = [(drawn, bodies)]
+            self._known_bodies.clear()
+        imbalance = parameters.imperfections.residual_imbalance
+        loads = () if load is None else (load, Load(unbalances=(imbalance,)))
+        if loads not in self._known_bodies:
             if len(self._known_bodies) >= KEPT_BODIES:
                 del self._known_bodies[next(iter(self._known_bodies))]
-            self._context = self.machine.set_up_bodies(load, parameters, self._context)
-            plant = self.machine.plant
-            self._known_bodies[key] = pack_bodies(
-                plant, plant.GetMyContextFromRoot(self._context), parameters.drive.joint
-            )
-        return self._known_bodies[key]
+            self._known_bodies[loads] = self._drawn[0][1].packed(*loads)
+        return self._known_bodies[loads]
 
     def _numbers(self, case: Case) -> PackedParameters:
         """Return all other packed numbers of a case, which do not depend on its load."""
@@ -157,7 +162,7 @@ class Preparation:
 
     def _set_up(self, case: Case) -> Setup:
         setup = self.machine.set_up(
-            parameters=case.parameters, gasket=case.gasket, context=self._context
+            parameters=case.parameters, gasket=case.gasket, context=self._context, systems=False
         )
         if list(setup.sensors) != self.sensors:
             raise input_error(

@@ -8,10 +8,14 @@ import functools
 import hashlib
 import pickle
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from numba.core.caching import IndexDataCacheFile
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.compiler import CompileResult
+
+from wm_drake.compiler.inlined import INLINED, InlinedLibrary
 
 _DIGEST = hashlib.sha256().digest_size
 
@@ -50,6 +54,53 @@ class CheckedCacheFile(IndexDataCacheFile):
                 file.write(hashlib.sha256(content).digest() + content)
         except OSError as error:
             say_once(f"compiled code cannot be kept in {self._cache_path} ({error.strerror})")
+
+
+class _LawCacheImpl(CompileResultCacheImpl):
+    """How laws are read from files of compiled code; those with an `InlinedLibrary` too."""
+
+    def rebuild(self, target_context: Any, payload: tuple[Any, ...]) -> CompileResult:
+        """Return the compiled law of a file."""
+        library, fndesc, environment, signature, objectmode, lifted, types, reload, envs = payload
+        if library[1] != INLINED:
+            return super().rebuild(target_context, payload)
+        read = InlinedLibrary.read(target_context.codegen(), library)
+        return CompileResult(
+            typing_context=target_context.typing_context,
+            target_context=target_context,
+            entry_point=target_context.get_executable(read, fndesc, environment),
+            typing_error=None,
+            type_annotation=types,
+            signature=signature,
+            objectmode=objectmode,
+            lifted=lifted,
+            fndesc=fndesc,
+            library=read,
+            call_helper=None,
+            environment=environment,
+            metadata=None,
+            reload_init=reload,
+            referenced_envs=envs,
+        )
+
+
+class LawCache(FunctionCache):
+    """The compiled forms of a function on disk, in `CheckedCacheFile`s."""
+
+    _impl_class = _LawCacheImpl
+    _cache_file: IndexDataCacheFile
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        """Choose the files of a function.
+
+        Raises:
+            RuntimeError: the folder cannot be written to.
+        """
+        super().__init__(function)
+        files = self._cache_file
+        self._cache_file = CheckedCacheFile(
+            files._cache_path, self._impl.filename_base, files._source_stamp
+        )
 
 
 def _read(path: Path) -> Any:

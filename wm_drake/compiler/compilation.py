@@ -24,7 +24,7 @@ import numba
 from numba.core import config
 from numba.core.dispatcher import Dispatcher
 
-from wm_drake.compiler.cache_files import CheckedCacheFile, say_once
+from wm_drake.compiler.cache_files import LawCache, say_once
 from wm_drake.compiler.lanes import LawCompiler
 
 _PACKAGE = Path(__file__).parents[1]
@@ -81,21 +81,18 @@ def long_running(function: Callable[..., Any]) -> Any:
 
 def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     options |= {"no_cfunc_wrapper": True}  # no C code calls these; a tenth of the time to compile
+    compiled = numba.njit(**options)(function)
     if not _CACHE_FOLDER:
         # numba would choose a folder beside the sources, where an edit of a called law goes unseen
-        return numba.njit(**options)(function)
+        return compiled
     chosen_by_user = config.CACHE_DIR
     config.CACHE_DIR = _CACHE_FOLDER
     try:
-        compiled = numba.njit(cache=True, **options)(function)
+        compiled._cache = LawCache(function)
     except RuntimeError:  # the folder cannot be written to any more
-        return numba.njit(**options)(function)
+        return compiled
     finally:
         config.CACHE_DIR = chosen_by_user
-    files = compiled._cache._cache_file
-    compiled._cache._cache_file = CheckedCacheFile(
-        files._cache_path, compiled._cache._impl.filename_base, files._source_stamp
-    )
     return compiled
 
 

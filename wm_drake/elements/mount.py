@@ -5,7 +5,11 @@ A mount is everything that connects the oscillating group to the cabinet (the ho
 
 from collections import namedtuple
 
-from wm_drake.compiler.compilation import law
+import numpy as np
+
+from wm_drake.compiler.compilation import law, long_running
+from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes
+from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.compiler.vectors import add, cross, scale
 from wm_drake.elements.bushing import six_component_bushing_wrench
 from wm_drake.elements.friction_damper import (
@@ -115,3 +119,24 @@ def _write_telescopic_dampers(x, p, telescopes, tubes, wrenches, column):
         for i in range(len(telescopes)):
             wrench = telescopic_damper_on_cabinet(x, tubes[i], p, telescopes[i])
             column = write_wrench(wrenches, column, wrench)
+
+
+@long_running
+def mount_wrench_history(states, p, mounts, wrenches):
+    """Evaluate the wrench of each mount on the cabinet at each sample.
+
+    Args:
+        states: (n, size) states as `write_mount_wrenches` reads them.
+        p: Packed numbers of the mounts.
+        mounts: `Mounts`.
+        wrenches: (n, 6 mounts), written. [N m, N]
+    """
+    align_stack()
+    x_numbers, p_numbers = np.empty(states.shape[1] * WIDTH), in_each_lane(p)
+    numbers = np.empty(wrenches.shape[1] * WIDTH)
+    x, q, found = lane_array(x_numbers), lane_array(p_numbers), lane_array(numbers)
+    for begin in range(0, len(states), WIDTH):
+        rows_to_lanes(states, begin, x_numbers)
+        write_mount_wrenches(x, q, mounts, found)
+        lanes_to_rows(numbers, begin, wrenches)
+    keep(p_numbers)

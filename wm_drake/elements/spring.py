@@ -3,8 +3,6 @@
 import math
 from dataclasses import dataclass
 
-from scipy.optimize import brentq
-
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import numbers
 from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
@@ -66,6 +64,8 @@ class SpringStrutParameters:
     @property
     def free_length(self) -> float | None:
         """Length without tension; None if it is not between 0 and twice the drawn length. [m]"""
+        from scipy.optimize import brentq  # slow to import, and seldom needed
+
         ends = 0.0, 2.0 * self.rest_length
         if not self._tension(ends[0], -math.inf) < 0.0 <= self._tension(ends[1], -math.inf):
             return None

@@ -1,5 +1,6 @@
 """Bodies of a machine: the plant built from its SDF, with overrides and load set in a Context."""
 
+import copy
 import functools
 from collections.abc import Iterable
 from pathlib import Path
@@ -73,6 +74,10 @@ def unusable(path: Path, error: BaseException) -> InputError:
     return input_error(
         f"SDF '{path.name}' cannot be read: {shortened(reason, LONGEST_REASON)}", key="model"
     )
+
+
+DRUM = "drum"
+"""Name of the link that carries the load."""
 
 
 def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
@@ -437,12 +442,18 @@ def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameter
 
 def add_load(plant: MultibodyPlant, context: Any, load: Load) -> None:
     """Add the point masses of a load to the drum in a plant Context."""
-    drum = plant.GetBodyByName("drum")
-    loaded = drum.CalcSpatialInertiaInBodyFrame(context)
+    drum = plant.GetBodyByName(DRUM)
+    loaded = with_load(drum.CalcSpatialInertiaInBodyFrame(context), load)
+    drum.SetSpatialInertiaInBodyFrame(context, loaded)
+
+
+def with_load(drum: SpatialInertia, load: Load) -> SpatialInertia:
+    """Return the inertia of the drum about Do in D with the point masses of a load."""
+    loaded = copy.copy(drum)
     for unbalance in load.unbalances:
         p_DoU_D = unbalance.position()
         loaded += SpatialInertia(unbalance.mass, p_DoU_D, UnitInertia.PointMass(p_DoU_D))
-    drum.SetSpatialInertiaInBodyFrame(context, loaded)
+    return loaded
 
 
 def _overridden(inertia: SpatialInertia, override: BodyOverride) -> SpatialInertia:

@@ -64,7 +64,7 @@ def add_washing_machine(
     layout = state_layout_of(plant, parameters)
     poses = FramePoses(plant, parameters)
     placed = placed_elements(plant, poses, parameters)
-    points = measured_points(parameters, tub_points(poses, parameters), np.zeros(6))
+    points = measured_points(tub_points(poses, parameters), np.zeros(6))
     wiring = Wiring(builder, plant, layout, prefix)
     elements = _element_systems(placed)
     on_tub, links = _labelled(*elements)

@@ -6,11 +6,11 @@ import numpy as np
 from pydrake.math import RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
-from scipy.optimize import root
 
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.model.placed_elements import AppliedForce, PlacedElements
 from wm_drake.model.state_layout import Indices, StateLayout
+from wm_drake.model.tub_statics import TubStatics, Weight, about_tub
 from wm_drake.parameters.types import FloatArray
 
 EQUILIBRIUM_TOLERANCE = 1e-9
@@ -61,29 +61,43 @@ class Statics:
         return self.generalized_force()[self.state_layout.tub]
 
 
-def preloaded(
+def force_as_drawn(
     plant: MultibodyPlant, context: Context, state_layout: StateLayout, elements: PlacedElements
-) -> PlacedElements:
+) -> FloatArray:
+    """Return the wrench on the tub as drawn, with the bodies attached to it at their equilibrium.
+
+    Args:
+        plant, context: The plant and its Context, at the drawn pose; attached bodies (damper tubes,
+            drum in a compliant bearing) are moved, so that their weight is on the tub.
+        state_layout: State layout of the plant.
+        elements: All elements, springs without the preloads to find.
+
+    Returns:
+        Moment about To and force, in W. (6,) [N m, N]
+
+    Raises:
+        InputError: the attached bodies have no equilibrium.
+    """
+    statics = Statics(plant, context, state_layout, elements)
+    _balance(statics, state_layout.attached)
+    return statics.force_on_tub()
+
+
+def preloaded(elements: PlacedElements, force: FloatArray) -> PlacedElements:
     """Return the elements with the spring preloads that balance the empty machine as drawn (T = W).
 
     The balance is a least-squares one of the force [N] and the moment about To [N m]: fewer than
     six springs cannot balance both. What remains moves the machine to its rest pose. Given
-    preloads stay; the others balance what these leave. If all are given, the machine sags
-    (`put_to_rest`). Bodies attached to the tub (damper tubes, drum in a compliant bearing) are
-    moved to their equilibrium.
+    preloads stay; the others balance what these leave. If all are given, the machine sags.
 
     Args:
-        plant, context: The plant and its Context, at the drawn pose.
-        state_layout: State layout of the plant.
         elements: All elements, springs without the preloads to find.
+        force: Moment about To and force of these elements and of gravity on the tub as drawn, in W.
+            (6,) [N m, N]
 
     Raises:
-        InputError: a tension-only spring would have to push, or the attached bodies have no
-            equilibrium.
+        InputError: a tension-only spring would have to push.
     """
-    statics = Statics(plant, context, state_layout, elements)
-    if state_layout.attached.size:
-        _balance(statics, state_layout.attached)  # so that their weight is on the tub
     springs = {name: spring for name, spring in elements.springs.items() if not spring.is_given}
     if not springs:
         return elements
@@ -91,7 +105,7 @@ def preloaded(
     lines = np.stack([spring.p_WH for spring in springs.values()]) - hooks
     pulls = lines / np.linalg.norm(lines, axis=1, keepdims=True)
     wrenches = np.column_stack([np.cross(hooks, pulls), pulls]).T
-    solution = np.linalg.lstsq(wrenches, -statics.force_on_tub(), rcond=None)[0]
+    solution = np.linalg.lstsq(wrenches, -force, rcond=None)[0]
     preloads = dict(zip(springs, map(float, solution), strict=True))
     slack = [name for name in springs if preloads[name] <= 0.0 and not springs[name].pushes]
     if slack:
@@ -108,13 +122,58 @@ def preloaded(
     return replace(elements, springs=elements.springs | loaded)
 
 
+def rest_pose(elements: PlacedElements, weight: Weight) -> tuple[FloatArray, FloatArray]:
+    """Return the pose of the tub at rest, near the drawn pose (T = W).
+
+    Args:
+        elements: All elements, springs with preload, none with bodies of its own.
+        weight: Weight of tub and drum.
+
+    Returns:
+        Roll, pitch, yaw, x, y, z (6,) [rad, m]; moment about To and force that remain on the tub,
+        in W (6,) [N m, N].
+
+    Raises:
+        InputError: there is no equilibrium near the drawn pose, or a tension-only spring is slack
+            there.
+    """
+    statics = TubStatics(elements, weight)
+    pose, wrench = statics.balance(np.zeros(6), 0.1 * EQUILIBRIUM_TOLERANCE)
+    remaining = about_tub(wrench, pose)
+    if not _is_at_rest(elements, pose, remaining, EQUILIBRIUM_TOLERANCE):
+        pose, remaining = _search(statics, elements)
+        as_drawn = statics.wrench(np.zeros(6))
+        _check_rest(elements, pose, remaining, EQUILIBRIUM_TOLERANCE, as_drawn)
+    return pose, remaining
+
+
+def _search(statics: TubStatics, elements: PlacedElements) -> tuple[FloatArray, FloatArray]:
+    """Return the pose at rest and what remains there, for springs that may be slack on the way."""
+    from scipy.optimize import root  # slow to import, and seldom needed
+
+    def residual(pose: FloatArray) -> FloatArray:
+        if not np.abs(pose).max() < 10.0:
+            return np.full(6, 1e9)
+        return about_tub(statics.wrench(pose), pose)
+
+    pose = np.zeros(6)
+    remaining = residual(pose)
+    _check_finite(remaining)
+    for height in _STARTS if _sags(elements) else (0.0,):
+        pose = np.asarray(root(residual, [*np.zeros(5), height], tol=1e-12).x)
+        remaining = residual(pose)
+        if np.max(np.abs(remaining)) <= EQUILIBRIUM_TOLERANCE:
+            break
+    return pose, remaining
+
+
 def put_to_rest(
     plant: MultibodyPlant, context: Context, state_layout: StateLayout, elements: PlacedElements
 ) -> FloatArray:
     """Move all positions but the drum angle to equilibrium, near the drawn pose (T = W).
 
     Args:
-        plant, context: The plant and its Context.
+        plant, context: The plant and its Context, with bodies attached to the tub.
         state_layout: State layout of the plant.
         elements: All elements, springs with preload.
 
@@ -126,51 +185,68 @@ def put_to_rest(
             there.
     """
     statics = Statics(plant, context, state_layout, elements)
-    sags = any(spring.is_given for spring in elements.springs.values())
-    tolerance = EQUILIBRIUM_TOLERANCE
-    if state_layout.attached.size:
-        every = np.union1d(state_layout.tub, state_layout.attached)
-        tolerance = max(tolerance, _balance(statics, every))
+    every = np.union1d(state_layout.tub, state_layout.attached)
+    tolerance = max(EQUILIBRIUM_TOLERANCE, _balance(statics, every))
     q = plant.GetPositions(context)
-
-    def residual(pose: FloatArray) -> FloatArray:
-        if not np.abs(pose).max() < 10.0:  # Drake aborts at poses this far
-            return np.full(6, 1e9)
-        q[state_layout.tub] = pose
+    remaining, pose = statics.force_on_tub(), q[state_layout.tub]
+    _check_finite(remaining)
+    if not _is_at_rest(elements, pose, remaining, tolerance):
+        plant.SetPositions(context, np.zeros(state_layout.size))
+        as_drawn = statics.force_on_tub()
         plant.SetPositions(context, q)
-        return statics.force_on_tub()
+        _check_rest(elements, pose, remaining, tolerance, as_drawn)
+    return remaining
 
-    pose = q[state_layout.tub]
-    remaining = residual(pose)
-    if not np.all(np.isfinite(remaining)):
+
+def _check_finite(force: FloatArray) -> None:
+    """Raise InputError if a force is not a number."""
+    if not np.all(np.isfinite(force)):
         raise input_error(
             "forces at rest are not finite numbers: a mass, a stiffness or a distance is out of "
             "range"
         )
-    if np.max(np.abs(remaining)) > EQUILIBRIUM_TOLERANCE and not state_layout.attached.size:
-        for height in _STARTS if sags else (0.0,):
-            pose = np.asarray(root(residual, [*np.zeros(5), height], tol=1e-12).x)
-            remaining = residual(pose)
-            if np.max(np.abs(remaining)) <= tolerance:
-                break
-    angle, position = (
-        (_LARGEST_SAG_ANGLE, _LARGEST_SAG)
-        if sags
-        else (_LARGEST_REST_ANGLE, _LARGEST_REST_POSITION)
-    )
-    far = np.max(np.abs(pose[:3])) > angle or np.max(np.abs(pose[3:])) > position
-    balanced = np.max(np.abs(remaining)) <= tolerance
-    if balanced and sags:
-        _check_sag(elements, pose, far=bool(far))
+
+
+def _sags(elements: PlacedElements) -> bool:
+    """Return whether preloads are given, so that the tub rests away from its drawn pose."""
+    return any(spring.is_given for spring in elements.springs.values())
+
+
+def _is_far(elements: PlacedElements, pose: FloatArray) -> bool:
+    """Return whether a pose is too far from the drawn one, or not finite."""
+    largest = (_LARGEST_REST_ANGLE, _LARGEST_REST_POSITION)
+    if _sags(elements):
+        largest = (_LARGEST_SAG_ANGLE, _LARGEST_SAG)
+    near = np.abs(pose[:3]).max() <= largest[0] and np.abs(pose[3:]).max() <= largest[1]
+    return not near
+
+
+def _is_at_rest(
+    elements: PlacedElements, pose: FloatArray, remaining: FloatArray, tolerance: float
+) -> bool:
+    """Return whether the tub is balanced near the drawn pose, without a slack spring."""
+    balanced = np.abs(remaining).max() <= tolerance and not _is_far(elements, pose)
+    return bool(balanced and not (_sags(elements) and _slack_at(elements, pose)))
+
+
+def _check_rest(
+    elements: PlacedElements,
+    pose: FloatArray,
+    remaining: FloatArray,
+    tolerance: float,
+    as_drawn: FloatArray,
+) -> None:
+    """Raise InputError if a pose is not one of rest; `as_drawn` is the wrench at the drawn pose."""
+    far, balanced = _is_far(elements, pose), np.abs(remaining).max() <= tolerance
+    if balanced and _sags(elements):
+        _check_sag(elements, pose, far=far)
     if not balanced or far:
-        plant.SetPositions(context, np.zeros(state_layout.size))
-        m_x, m_y, m_z, f_x, f_y, f_z = statics.force_on_tub()
+        m_x, m_y, m_z, f_x, f_y, f_z = as_drawn
         raise input_error(
             "the springs cannot hold the empty machine near its drawn pose; force "
             f"({f_x:.3g}, {f_y:.3g}, {f_z:.3g}) N and moment ({m_x:.3g}, {m_y:.3g}, {m_z:.3g}) N m "
             "remain; move spring frames or masses"
         )
-    return remaining
 
 
 def weight_on_cabinet(
@@ -230,11 +306,7 @@ def _check_sag(elements: PlacedElements, pose: FloatArray, *, far: bool) -> None
             f"{np.rad2deg(_LARGEST_SAG_ANGLE):g} deg",
             key="springs",
         )
-    slack = [
-        name
-        for name, tension in tensions_at(elements, pose).items()
-        if tension <= 0.0 and not elements.springs[name].pushes
-    ]
+    slack = _slack_at(elements, pose)
     if slack:
         raise InputError(
             Problem(
@@ -244,6 +316,15 @@ def _check_sag(elements: PlacedElements, pose: FloatArray, *, far: bool) -> None
             )
             for name in slack
         )
+
+
+def _slack_at(elements: PlacedElements, pose: FloatArray) -> list[str]:
+    """Return the names of the springs that are slack at a pose of the tub."""
+    return [
+        name
+        for name, tension in tensions_at(elements, pose).items()
+        if tension <= 0.0 and not elements.springs[name].pushes
+    ]
 
 
 def _balance(statics: Statics, chosen: Indices) -> float:

@@ -52,11 +52,16 @@ class FramePoses:
 
         Args:
             key: Key path of the element.
-            parts: Frozen parameters that the element is made of.
+            parts: Frozen parameters that the element is made of, always as many, or numbers as
+                bytes.
             place: Places the element.
         """
         known = self._placed.get(key)
-        if known is None or any(a is not b for a, b in zip(known[0], parts, strict=True)):
+        if known is None or not all(map(_are_same, known[0], parts)):
             known = self._placed[key] = parts, place()
         found: Placed = known[1]
         return found
+
+
+def _are_same(a: Any, b: Any) -> bool:
+    return a is b or (type(a) is bytes and a == b)

@@ -17,13 +17,14 @@ from wm_drake.elements.telescopic_damper import TelescopicDamperParameters
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.bodies import add_load, set_bodies
 from wm_drake.model.cabinet import cabinet_at_rest
-from wm_drake.model.equilibrium import preloaded, put_to_rest
+from wm_drake.model.equilibrium import force_as_drawn, preloaded, put_to_rest, rest_pose
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.placed_elements import AppliedForce, PlacedElements, placed_elements
 from wm_drake.model.same_elements import check_same_elements
 from wm_drake.model.scene import Scene
 from wm_drake.model.state_layout import StateLayout
 from wm_drake.model.tub_points import TubPoints, measured_points, tub_points
+from wm_drake.model.tub_statics import TubStatics, Weight, weight_of
 from wm_drake.parameters import Drive, Load, MachineParameters, MotorDrive, Sensor, SpinProfile
 from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.types import FloatArray
@@ -205,6 +206,9 @@ class MachineSystems:
     inputs: dict[str, InputPort]
     outputs: dict[str, OutputPort]
     _poses: list[FramePoses] = field(default_factory=list, repr=False, compare=False, kw_only=True)
+    _weights: list[tuple[Any, Weight]] = field(
+        default_factory=list, repr=False, compare=False, kw_only=True
+    )
     scenes: list[Scene] = field(default_factory=list, repr=False, compare=False, kw_only=True)
 
     def set_up(
@@ -217,6 +221,7 @@ class MachineSystems:
         gasket: bool = True,
         dampers: bool = True,
         friction: bool = True,
+        systems: bool = True,
     ) -> Setup:
         """Set numbers and load in a Context, at the rest pose and the first speed of the profile.
 
@@ -234,6 +239,8 @@ class MachineSystems:
             gasket, dampers: False disengages them.
             friction: False takes the dry friction out of all elements, as for a small motion on top
                 of steady sliding.
+            systems: False for the compiled engine, which reads the `Setup`: it may leave the
+                Context as it is, without these numbers and at another pose.
 
         Raises:
             InputError: the elements are not those that were built, a name is not in the SDF, or
@@ -242,26 +249,41 @@ class MachineSystems:
         parameters = parameters or self.parameters
         check_same_elements(self.parameters, parameters)
         load = self._load(load, parameters)
-        context = self.set_up_bodies(None, parameters, context)
-        plant_context = self.plant.GetMyContextFromRoot(context)
-        poses = self._frame_poses(parameters)
+        layout, poses = self.state_layout, self._frame_poses(parameters)
+        systems = systems or bool(layout.attached.size or self.motor or self.cabinet)
         unloaded = placed_elements(self.plant, poses, parameters)
-        layout = self.state_layout
-        elements = preloaded(self.plant, plant_context, layout, unloaded)
+        weight = self._weight(parameters, context)
+        plant_context = self.plant.GetMyContextFromRoot(context)
+        if systems:
+            self.set_up_bodies(None, parameters, context)
+        if weight:
+            as_drawn = TubStatics(unloaded, weight).wrench(np.zeros(6))
+        else:
+            as_drawn = force_as_drawn(self.plant, plant_context, layout, unloaded)
+        balanced = (*unloaded.springs.values(), as_drawn.tobytes())
+        springs = poses.placed("springs", balanced, lambda: preloaded(unloaded, as_drawn).springs)
+        elements = replace(unloaded, springs=springs)
         elements = elements if gasket else elements.without_gasket()
         elements = elements if dampers else elements.without_dampers()
         elements = elements if friction else elements.without_friction()
-        residual = put_to_rest(self.plant, plant_context, layout, elements)
-        cabinet = cabinet_at_rest(self.plant, plant_context, layout, parameters)
-        self._add_load(plant_context, parameters, load)
-        q = self.plant.GetPositions(plant_context)
-        points = tub_points(poses, parameters)
-        profile = profile or parameters.profile
-        measured = measured_points(parameters, points, q[layout.tub])
-        self._set_systems(context, elements, measured)
-        self._set_drive(context, parameters)
-        self._set_feet(context, cabinet)
-        self.set_profile(context, profile)
+        q = np.zeros(layout.size)
+        if weight:
+            q[layout.tub], residual = rest_pose(elements, weight)
+        else:
+            residual = put_to_rest(self.plant, plant_context, layout, elements)
+            q = self.plant.GetPositions(plant_context)
+        parts = parameters.sensors, parameters.clearance, parameters.accelerometers
+        points = poses.placed("points", parts, lambda: tub_points(poses, parameters))
+        measured = measured_points(points, q[layout.tub])
+        cabinet = None
+        if systems:
+            self.plant.SetPositions(plant_context, q)
+            cabinet = cabinet_at_rest(self.plant, plant_context, layout, parameters)
+            self._add_load(plant_context, parameters, load)
+            self._set_systems(context, elements, measured)
+            self._set_drive(context, parameters)
+            self._set_feet(context, cabinet)
+            self.set_profile(context, profile or parameters.profile)
         rest = q[layout.tub], residual, q[layout.tubes], q[layout.carrier]
         return Setup(self, parameters, context, elements, points, *rest, cabinet, measured)
 
@@ -343,6 +365,23 @@ class MachineSystems:
             self._poses[:] = [FramePoses(self.plant, parameters)]
         return self._poses[0]
 
+    def _weight(self, parameters: MachineParameters, context: Context) -> Weight | None:
+        """Return the weight on the springs; that of the last set-up if its bodies were the same.
+
+        None with bodies attached to the tub, whose weight depends on their pose. The Context is
+        changed.
+        """
+        if self.state_layout.attached.size:
+            return None
+        bodies = parameters.bodies, parameters.frames
+        for known, weight in self._weights:
+            if known == bodies:
+                return weight
+        self.set_up_bodies(None, parameters, context)
+        weight = weight_of(self.plant, self.plant.GetMyContextFromRoot(context))
+        self._weights[:] = [(bodies, weight)]
+        return weight
+
     def _set_systems(self, context: Context, elements: PlacedElements, points: FloatArray) -> None:
         """Set the parameters of elements and sensors in a root Context, and relax the sponges."""
         pairs: list[tuple[Mapping[str, Any], Mapping[str, Any]]] = [
@@ -395,6 +434,7 @@ class Machine(MachineSystems):
         gasket: bool = True,
         dampers: bool = True,
         friction: bool = True,
+        systems: bool = True,
     ) -> Setup:
         """Set numbers and load in a Context, at rest; a fresh Context at time 0 if None is given.
 
@@ -408,6 +448,7 @@ class Machine(MachineSystems):
             gasket=gasket,
             dampers=dampers,
             friction=friction,
+            systems=systems,
         )
 
     def set_up_bodies(

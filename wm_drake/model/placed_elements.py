@@ -46,6 +46,10 @@ LARGEST_OWN_SIZE = FORCE_SIZE
 """Most own numbers that an element writes beside its generalized force: the telescopic damper's."""
 
 
+ON_TUB = ("springs", "dampers", "bushings")
+"""Kinds of elements whose forces depend on the motion of the tub only, in packed order."""
+
+
 @dataclass(frozen=True)
 class PlacedElements:
     """All elements of a machine at their frames, by name; `bearing` is None for a rigid bearing."""
@@ -77,6 +81,34 @@ class PlacedElements:
             bushings={name: bushing.without_friction() for name, bushing in self.bushings.items()},
             telescopes={name: tubes.sliding() for name, tubes in self.telescopes.items()},
         )
+
+    def packed_on_tub(self, size: int = 0) -> tuple[FloatArray, dict[str, tuple[int, ...]]]:
+        """Return the packed elements `ON_TUB`, and by kind the index of each element.
+
+        Args:
+            size: Number of packed numbers before these.
+        """
+        packed, indices = self._packed_on_tub
+        moved = {kind: tuple(size + at for at in begins) for kind, begins in indices.items()}
+        return packed.copy(), moved
+
+    @functools.cached_property
+    def _packed_on_tub(self) -> tuple[FloatArray, dict[str, list[int]]]:
+        packed: list[FloatArray] = []
+        size, indices = 0, dict[str, list[int]]()
+        for kind in ON_TUB:
+            indices[kind] = []
+            for element in getattr(self, kind).values():
+                indices[kind].append(size)
+                packed.append(element.packed())
+                size += len(packed[-1])
+        return np.concatenate([[], *packed]), indices
+
+    @functools.cached_property
+    def structure_on_tub(self) -> tuple[int, ...]:
+        """Number of each damper's law and number of points of every table of these elements."""
+        elements = (element for kind in ON_TUB for element in getattr(self, kind).values())
+        return tuple(number for element in elements for number in structure_of(element))
 
     def links(self) -> Iterator[tuple[Any, Callable[..., None], int]]:
         """Yield each element, its law and the tree it acts on beside tub and drum; 0 for none."""
@@ -125,6 +157,15 @@ class AppliedForce:
             evaluate(parts[part], relaxed, packed, force, own, rate)
             total[of_force] += force  # no index occurs twice
         return total
+
+
+def structure_of(element: Any) -> list[int]:
+    """Return the structure of a placed element, which is found once."""
+    kept = vars(element)
+    if "_structure" not in kept:
+        kept["_structure"] = element.structure
+    found: list[int] = kept["_structure"]
+    return found
 
 
 def _as_slice(indices: np.ndarray) -> np.ndarray | slice:
@@ -222,7 +263,8 @@ def _bushings(
     placed = {}
     for name, bushing in parameters.all_bushings().items():
         ends = poses("tub", bushing.tub_frame), poses("world", bushing.housing_frame)
-        placed[name] = placed_bushing(bushing, *ends)
+        place = functools.partial(placed_bushing, bushing, *ends)
+        placed[name] = poses.placed(f"bushings.{name}", (bushing,), place)
     return placed
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.parameters.elements import ForceTable, TorqueTable
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.units import Unit
@@ -165,6 +166,9 @@ def _replaced_in_model(node: BaseModel, parts: dict[str, list[_Change]]) -> Base
         values[name] = _changed_field(node, name, changes)
         if values[name] is None:
             del values[name]
+    if isinstance(node, MachineParameters) and _only_numbers_inside(node, parts):
+        # the part is checked; the rules between parts of a machine are about names and choices
+        return node.model_copy(update={name: values[name] for name in parts})
     try:
         return type(node).model_validate(values)
     except ValidationError as error:
@@ -174,6 +178,32 @@ def _replaced_in_model(node: BaseModel, parts: dict[str, list[_Change]]) -> Base
             _with_key_of_change(problem, changes)
             for problem in problems_of(error, type(node), here)
         ) from None
+
+
+def _only_numbers_inside(node: BaseModel, parts: dict[str, list[_Change]]) -> bool:
+    """Return whether numbers and tables inside the fields of a node take the place of others."""
+    return all(
+        change.path and _is_number(change.value) and _is_number(_inside(node, name, change.path))
+        for name, changes in parts.items()
+        for change in changes
+    )
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, float | int | ForceTable | TorqueTable) and not isinstance(value, bool)
+
+
+def _inside(node: Any, name: str, path: list[str]) -> Any:
+    """Return the value at a path in a field of a node; None if there is none."""
+    for part in (name, *path):
+        if isinstance(node, BaseModel):
+            node = getattr(node, part, None)
+        elif isinstance(node, dict):
+            node = node.get(part)
+        else:
+            known = isinstance(node, tuple) and is_index(part) and int(part) < len(node)
+            node = node[int(part)] if known else None
+    return node
 
 
 def _with_key_of_change(problem: Problem, changes: list[_Change]) -> Problem:

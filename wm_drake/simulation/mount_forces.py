@@ -17,8 +17,6 @@ BoolArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 SPEED_STEP_RPM = 100.0
 """Width of the ranges of drum speed for a profile without regions. [rpm]"""
 
-RPM_PER_RAD_S = Unit("rad/s", "rpm").from_si(1.0)
-
 MOST_RANGES = 8
 """Largest number of ranges of drum speed; with a higher speed they are wider."""
 
@@ -92,8 +90,9 @@ def speed_ranges(record: Record, profile: SpinProfile) -> list[SpeedRange]:
             SpeedRange(region.name, (time >= region.begin) & (time < region.end))
             for region in profile.regions
         ]
-    speed = RPM_PER_RAD_S * np.abs(record.drum_speed.values)
-    highest = RPM_PER_RAD_S * float(np.max(np.abs(profile.speed)))
+    in_rpm = Unit("rad/s", "rpm").from_si(1.0)
+    speed = in_rpm * np.abs(record.drum_speed.values)
+    highest = in_rpm * float(np.max(np.abs(profile.speed)))
     width = SPEED_STEP_RPM * max(1.0, np.ceil(highest / SPEED_STEP_RPM / MOST_RANGES))
     count = max(1, int(np.ceil(highest / width * (1.0 - 1e-9))))
     place = np.minimum((speed / width * (1.0 + 1e-9)).astype(int), count - 1)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from wm_drake.compiler.compilation import law, long_running
-from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, where
+from wm_drake.compiler.elementary import where
 from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import dot, subtract
@@ -22,27 +22,6 @@ SIGNAL_SUMS = PackedLayout(
 VECTOR_SIZE, SIGNAL_SIZE = VECTOR_SUMS.fixed_size, SIGNAL_SUMS.fixed_size
 read_vector_sums, write_vector_sums = VECTOR_SUMS.read, VECTOR_SUMS.write
 read_signal_sums, write_signal_sums = SIGNAL_SUMS.read, SIGNAL_SUMS.write
-
-
-@long_running
-def wrench_history(states, p, mounts, wrenches):
-    """Evaluate the wrench of each mount on the cabinet at each sample.
-
-    Args:
-        states: (n, size) states as `write_mount_wrenches` reads them.
-        p: Packed numbers of the mounts.
-        mounts: `Mounts`.
-        wrenches: (n, 6 mounts), written. [N m, N]
-    """
-    align_stack()
-    x_numbers, p_numbers = np.empty(states.shape[1] * WIDTH), in_each_lane(p)
-    numbers = np.empty(wrenches.shape[1] * WIDTH)
-    x, q, found = lane_array(x_numbers), lane_array(p_numbers), lane_array(numbers)
-    for begin in range(0, len(states), WIDTH):
-        rows_to_lanes(states, begin, x_numbers)
-        write_mount_wrenches(x, q, mounts, found)
-        lanes_to_rows(numbers, begin, wrenches)
-    keep(p_numbers)
 
 
 @law

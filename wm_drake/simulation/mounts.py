@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from wm_drake.elements.motion import PLANT_STATE_SIZE
-from wm_drake.elements.mount import WRENCH_SIZE, Mounts
+from wm_drake.elements.mount import WRENCH_SIZE, Mounts, mount_wrench_history
 from wm_drake.elements.rubber import branches_of
 from wm_drake.engines.compiled.mechanics import STATE_SIZE
-from wm_drake.engines.compiled.packing import Layout, pack_on_tub
+from wm_drake.engines.compiled.packing import Layout
 from wm_drake.engines.compiled.tubes import TUBES_AND_DAMPER, TUBES_STATE_SIZE
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.machine import Setup
@@ -20,7 +20,6 @@ from wm_drake.simulation.mount_histories import (
     SIGNAL_SUMS,
     VECTOR_SIZE,
     VECTOR_SUMS,
-    wrench_history,
 )
 
 POINT = "the origin of W: the drum axis at drum mid-depth, as drawn"
@@ -70,7 +69,7 @@ def mount_wrenches(setup: Setup, trajectory: Trajectory) -> FloatArray:
     Returns:
         (n, mounts, 6) moment about the origin of W and force, in W. [N m, N]
     """
-    p, indices = pack_on_tub(setup)
+    p, indices = setup.elements.packed_on_tub()
     begins, parts = [], [p]
     for telescope in setup.telescopes.values():
         begins.append(sum(map(len, parts)))
@@ -104,7 +103,7 @@ def mount_wrenches(setup: Setup, trajectory: Trajectory) -> FloatArray:
     )
     count = sum(map(len, indices.values())) + telescopes
     wrenches = np.empty((n, count * WRENCH_SIZE), order="F")  # measures read columns
-    wrench_history(states, np.concatenate(parts), mounts, wrenches)
+    mount_wrench_history(states, np.concatenate(parts), mounts, wrenches)
     return wrenches.reshape(n, count, WRENCH_SIZE)
 
 

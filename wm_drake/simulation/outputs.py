@@ -6,7 +6,6 @@ from wm_drake.elements.bearing import FORCE_SIZE as BEARING_FORCE_SIZE
 from wm_drake.elements.bearing import drum_bearing_history
 from wm_drake.elements.rubber import branches_of
 from wm_drake.elements.telescopic_damper import FORCE_SIZE, telescopic_damper_history
-from wm_drake.engines.compiled.packing import pack_on_tub
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
@@ -261,7 +260,7 @@ def tub_outputs(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, ...]:
         and of the strut dampers (n, dampers) [N]; force and moment of the bushings on the housing
         (n, bushings, 6) [N, N m].
     """
-    points, (p, indices) = setup.measured_points, pack_on_tub(setup)
+    points, (p, indices) = setup.measured_points, setup.elements.packed_on_tub()
     begins = [np.array(of_kind, dtype=np.int64) for of_kind in indices.values()]
     sizes = [len(points), len(begins[0]), len(begins[1]), 6 * len(begins[2])]
     columns = np.empty((len(trajectory.time), sum(sizes)), order="F")

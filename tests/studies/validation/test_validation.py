@@ -187,7 +187,7 @@ def test_the_page_of_verification_has_a_row_per_comparison():
     for outcomes, words in (
         ({"a.py": (2, 0), "b.py": (3, 0)}, "5 passed"),
         ({"a.py": (2, 0), "b.py": (3, 1)}, "**1 of 5 failed**"),
-        ({"a.py": (2, 0)}, "**not run**"),
+        ({"a.py": (2, 0)}, "not run: marked `hours`, or skipped"),
     ):
         ran = verification_page({"Laws": rows}, "python write.py", outcomes)
         assert f"| `a.py`<br>`b.py` | {words} |" in ran

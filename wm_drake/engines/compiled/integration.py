@@ -67,10 +67,9 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
         sample_controller(
             state, drum[2 * i, 0], controls[i], numbers, elements.motor, motor_begin(elements)
         )
-        masses = mass_properties(numbers, drum[2 * i, 1], drum[2 * i, 2])
-        state_derivative(
-            state, rate, inputs, masses, drum[2 * i, 0], acceleration[i], numbers, elements
-        )
+        masses = mass_properties(numbers, zero + drum[2 * i, 1], zero + drum[2 * i, 2])
+        speed, speed_rate = zero + drum[2 * i, 0], zero + acceleration[i]
+        state_derivative(state, rate, inputs, masses, speed, speed_rate, numbers, elements)
         if row[i] >= 0:
             write_sample(samples, row[i], state, rate, elements)
         remember(past.rates, i, PAST_RATES, rate, state_size(elements))
@@ -79,8 +78,7 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
             multistep_step(state, rate, past, stage, total, i, length[i], numbers, elements)
         else:
             runge_kutta_step(
-                state, rate, inputs, stage, total, drum, i, length[i], acceleration[i],
-                numbers, elements
+                state, rate, inputs, stage, total, drum, i, length[i], speed_rate, numbers, elements
             )  # fmt: skip
         angle, speed = zero + drum[2 * i + 2, 3], zero + drum[2 * i + 2, 0]
         follow_profile(state, angle, speed, elements.motor)
@@ -101,7 +99,8 @@ def runge_kutta_step(
         acceleration, numbers, elements: See `state_derivative`.
     """
     size, branches, first = state_size(elements), elements.branches, len(elements.dampers)
-    masses = mass_properties(numbers, drum[2 * i + 1, 1], drum[2 * i + 1, 2])
+    zero = 0.0 * acceleration
+    masses = mass_properties(numbers, zero + drum[2 * i + 1, 1], zero + drum[2 * i + 1, 2])
     write_paths(rate, inputs, first, numbers, branches)
     for k in range(size):
         total[k] = state[k] + h / 6.0 * rate[k]
@@ -109,10 +108,10 @@ def runge_kutta_step(
     for number in range(1, 4):
         node = 2 * i + (number + 1) // 2
         if number == 3:
-            masses = mass_properties(numbers, drum[node, 1], drum[node, 2])
+            masses = mass_properties(numbers, zero + drum[node, 1], zero + drum[node, 2])
         follow_paths(stage, state, numbers, branches, None, first, h)
         state_derivative(
-            stage, rate, inputs, masses, drum[node, 0], acceleration, numbers, elements
+            stage, rate, inputs, masses, zero + drum[node, 0], acceleration, numbers, elements
         )
         write_paths(rate, inputs, first, numbers, branches)
         weight = h / 6.0 if number == 3 else h / 3.0
@@ -140,14 +139,14 @@ def derivative_lanes(x, dx, inputs, reference, acceleration, p, elements):
     align_stack()
     state, numbers = lane_array(x), lane_array(p)
     sine, cosine = sine_cosine(state[DRUM_ANGLE])
-    masses = mass_properties(numbers, cosine, sine)
+    masses, zero = mass_properties(numbers, cosine, sine), 0.0 * state[0]
     state_derivative(
         state,
         lane_array(dx),
         lane_array(inputs),
         masses,
-        wanted_speed(state, reference, elements.motor),
-        acceleration,
+        wanted_speed(state, zero + reference, elements.motor),
+        zero + acceleration,
         numbers,
         elements,
     )

@@ -6,6 +6,8 @@ linearised machine takes the same steps, from numbers at random: whatever the co
 an unstable step makes the numbers grow. `WIDTH` Jacobians go side by side in the lanes.
 """
 
+import functools
+
 import numpy as np
 
 from wm_drake.compiler.compilation import law, long_running
@@ -46,7 +48,7 @@ force, such as the spin of a damper tube, grows by 2."""
 
 
 def jacobians(
-    packed: FloatArray, layout: Layout, states: FloatArray, free: list[int], difference: float
+    packed: FloatArray, layout: Layout, states: FloatArray, free: np.ndarray, difference: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return the Jacobians of a machine at several states, by central differences.
 
@@ -66,7 +68,7 @@ def jacobians(
     found, work = aligned(n * n * WIDTH), aligned((states.shape[1] + layout.inputs_size) * WIDTH)
     m = CABINET_STATE_SIZE if layout.cabinet >= 0 else 0
     own = aligned(m * m * WIDTH)
-    jacobian_lanes(x, work, np.array(free), difference, p, layout.elements, found, own)
+    jacobian_lanes(x, work, np.asarray(free), difference, p, layout.elements, found, own)
     of_all, of_cabinet = (
         part.reshape(size, size, WIDTH).transpose(2, 0, 1) for part, size in ((found, n), (own, m))
     )
@@ -90,15 +92,16 @@ def is_followed(
     if not np.all(np.isfinite(jacobians)):
         return False
     n = len(internal)
-    start = np.random.default_rng(0).uniform(-1.0, 1.0, (n * (2 + PAST_RATES + PAST_INPUTS), 1))
-    numbers = aligned(start.size * WIDTH)
-    numbers.reshape(-1, WIDTH)[:] = start
+    start = _start(n * (2 + PAST_RATES + PAST_INPUTS))
+    numbers = aligned(len(start) * WIDTH)
+    numbers.reshape(-1, WIDTH)[:] = start[:, None]
     jacobian = aligned(n * n * WIDTH)
     jacobian[:] = jacobians.transpose(1, 2, 0).ravel()
     largest = aligned(4 * WIDTH)
     m = int(np.count_nonzero(internal == CABINET))
-    own, work = aligned(m * m * WIDTH), aligned(3 * m * WIDTH)
-    if cabinet is not None:
+    own = work = None
+    if m and cabinet is not None:
+        own, work = aligned(m * m * WIDTH), aligned(3 * m * WIDTH)
         own[:] = cabinet.transpose(1, 2, 0).ravel()
     block = int(np.argmax(internal == CABINET)), m
     growth_lanes(jacobian, internal, step, STEPS, numbers, own, block, work, largest)
@@ -110,6 +113,12 @@ def is_followed(
         own_growth = np.exp(0.5 * STEPS * step * _fastest_growth(jacobians[grown]))
         return bool(np.all(quarters[3, grown] <= LARGEST_GROWTH * own_growth * quarters[1, grown]))
     return not np.any(grown)
+
+
+@functools.cache
+def _start(count: int) -> FloatArray:
+    """Return the same numbers at random between -1 and 1 for all machines of a size. (count,)"""
+    return np.random.default_rng(0).uniform(-1.0, 1.0, count)
 
 
 def _fastest_growth(jacobians: FloatArray) -> FloatArray:
@@ -142,7 +151,7 @@ def jacobian_lanes(x, work, free, difference, p, elements, jacobian, own):
     rate, inputs = lane_array(work[: size * WIDTH]), lane_array(work[size * WIDTH :])
     sine, cosine = sine_cosine(state[DRUM_ANGLE])
     masses = mass_properties(numbers, cosine, sine)
-    n, reference = len(free), state[DRUM_RATE]
+    n, reference, zero = len(free), state[DRUM_RATE], 0.0 * state[DRUM_RATE]
     for column in range(n):
         at_rest = state[free[column]]
         for row in range(n):
@@ -150,7 +159,7 @@ def jacobian_lanes(x, work, free, difference, p, elements, jacobian, own):
         for side in (-1.0, 1.0):
             state[free[column]] = at_rest + side * difference
             wanted = wanted_speed(state, reference, elements.motor)
-            state_derivative(state, rate, inputs, masses, wanted, 0.0, numbers, elements)
+            state_derivative(state, rate, inputs, masses, wanted, zero, numbers, elements)
             for row in range(n):
                 change = side * rate[free[row]] / (2.0 * difference)
                 found[row * n + column] = found[row * n + column] + change
@@ -171,9 +180,9 @@ def growth_lanes(jacobian, internal, h, steps, numbers, own, block, work, larges
         h: Step size. [s]
         steps: Number of steps.
         numbers: Anything to start from: state, its rate, past rates, past inputs.
-        own, block: Matrices of the states `CABINET` alone, by rows; the first of these states and
-            their number.
-        work: Array to work in, for three numbers of each of these states.
+        own, block: Matrices of the states `CABINET` alone, by rows, None without such states; the
+            first of them and their number.
+        work: Array to work in, for three numbers of each of these states; None without them.
         largest: Largest number of the state in each quarter of the steps, written.
     """
     align_stack()
@@ -182,8 +191,7 @@ def growth_lanes(jacobian, internal, h, steps, numbers, own, block, work, larges
     x, rate = lane_array(numbers[: n * WIDTH]), lane_array(numbers[n * WIDTH : 2 * n * WIDTH])
     begin, end = 2 * n * WIDTH, (2 + PAST_RATES) * n * WIDTH
     past_rates, past_inputs = lane_array(numbers[begin:end]), lane_array(numbers[end:])
-    b, stage = lane_array(own), lane_array(work)
-    first, m = block
+    b, stage, (first, m) = as_lanes(own), as_lanes(work), block
     for quarter in range(4):
         top[quarter] = 0.0 * x[0]
     for i in range(steps):
@@ -192,9 +200,6 @@ def growth_lanes(jacobian, internal, h, steps, numbers, own, block, work, larges
         for row in range(n):  # the rate of an internal state without its own share is its input
             share = a[row * n + row] * x[row]
             past_inputs[i % PAST_INPUTS * n + row] = rate[row] - share
-        write_product(b, x, first, m, stage, 0)
-        for row in range(m):
-            past_inputs[i % PAST_INPUTS * n + first + row] = rate[first + row] - stage[row]
         block_after_step(x, rate, past_inputs, i, n, h, b, first, m, stage)
         for row in range(n):
             if internal[row] == SPONGE:
@@ -213,12 +218,32 @@ def growth_lanes(jacobian, internal, h, steps, numbers, own, block, work, larges
 
 
 @law
+def as_lanes(array):
+    """Return an array as an array of lanes; None stays."""
+    if array is None:
+        return None
+    return lane_array(array)
+
+
+@law
 def write_product(a, x, first, size, product, at):
     """Write the product of a square matrix, by rows, with the part of x from `first` on.
 
     It begins at index `at` of `product`.
     """
-    for row in range(size):
+    whole = size - size % 4
+    for row in range(0, whole, 4):  # four rows side by side: one sum would wait for itself
+        r = row * size
+        s_0 = s_1 = s_2 = s_3 = 0.0 * x[first]
+        for column in range(size):
+            number = x[first + column]
+            s_0 = s_0 + a[r + column] * number
+            s_1 = s_1 + a[r + size + column] * number
+            s_2 = s_2 + a[r + 2 * size + column] * number
+            s_3 = s_3 + a[r + 3 * size + column] * number
+        product[at + row], product[at + row + 1] = s_0, s_1
+        product[at + row + 2], product[at + row + 3] = s_2, s_3
+    for row in range(whole, size):
         total = 0.0 * x[first]
         for column in range(size):
             total = total + a[row * size + column] * x[first + column]
@@ -231,12 +256,18 @@ def block_after_step(x, rate, inputs, i, n, h, b, first, m, work):
 
     Args:
         x, rate: State of a linear machine, of which these states are advanced, and its rate.
-        inputs, i, n: Past inputs u, number of the step, size of the state.
+        inputs, i, n: Past inputs u, those of this step written; number of the step, size of the
+            state.
         h: Length of the step. [s]
-        b: Matrix B, by rows.
+        b: Matrix B, by rows; None without such states.
         first, m: The first of these states and their number.
-        work: Array to work in.
+        work: Array to work in; None without such states.
     """
+    if b is None:
+        return
+    write_product(b, x, first, m, work, 0)
+    for row in range(m):
+        inputs[i % PAST_INPUTS * n + first + row] = rate[first + row] - work[row]
     for k in range(m):
         work[m + k] = x[first + k] + h / 6.0 * rate[first + k]
         work[k] = x[first + k] + 0.5 * h * rate[first + k]

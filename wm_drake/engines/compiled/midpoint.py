@@ -82,10 +82,9 @@ def integrate_midpoint_lanes(steps, begin, end, p, elements, relaxation, x, work
     zero = 0.0 * state[0]
     for i in range(begin, end):
         if row[i] >= 0 or i == 0:
-            masses = mass_properties(numbers, drum[2 * i, 1], drum[2 * i, 2])
-            state_derivative(
-                state, rate, inputs, masses, drum[2 * i, 0], acceleration[i], numbers, elements
-            )
+            masses = mass_properties(numbers, zero + drum[2 * i, 1], zero + drum[2 * i, 2])
+            speed, speed_rate = zero + drum[2 * i, 0], zero + acceleration[i]
+            state_derivative(state, rate, inputs, masses, speed, speed_rate, numbers, elements)
             if row[i] >= 0:
                 write_sample(samples, row[i], state, rate, elements)
             if i == 0:
@@ -94,10 +93,9 @@ def integrate_midpoint_lanes(steps, begin, end, p, elements, relaxation, x, work
         h = length[i]
         predict_middle(state, middle, past, h, elements)
         node = 2 * i + 1
-        masses = mass_properties(numbers, drum[node, 1], drum[node, 2])
-        state_derivative(
-            middle, rate, inputs, masses, drum[node, 0], acceleration[i], numbers, elements
-        )
+        masses = mass_properties(numbers, zero + drum[node, 1], zero + drum[node, 2])
+        speed, speed_rate = zero + drum[node, 0], zero + acceleration[i]
+        state_derivative(middle, rate, inputs, masses, speed, speed_rate, numbers, elements)
         advance(state, middle, rate, past, change, h, matrices, elements)
         state[DRUM_ANGLE] = zero + drum[2 * i + 2, 3]
         state[DRUM_RATE] = zero + drum[2 * i + 2, 0]

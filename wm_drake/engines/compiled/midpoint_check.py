@@ -5,7 +5,6 @@ states with slow and fast motion. It must not grow faster than the linearised ma
 """
 
 import numpy as np
-from scipy.linalg import expm
 
 from wm_drake.engines.compiled.mechanics import STATE_SIZE
 from wm_drake.engines.compiled.midpoint import BODY, CARRIER_VELOCITIES, TUBES, VELOCITIES
@@ -60,6 +59,8 @@ def midpoint_follows(setup: Setup, layout: Layout, jacobians: FloatArray, step: 
     Args:
         setup, layout, jacobians, step: As for `relaxation_matrices`.
     """
+    from scipy.linalg import expm  # slow to import, for tubes only
+
     if not np.all(np.isfinite(jacobians)):
         return False
     steps = step_matrices(setup, layout, jacobians, step)

@@ -1,5 +1,6 @@
 """`Setup` -> flat numbers and indices for the compiled engine, all read from the built machine."""
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,12 +32,11 @@ from wm_drake.engines.compiled.tubes import (
     TUBES_STATE_SIZE,
 )
 from wm_drake.errors import InputError, input_error
+from wm_drake.model.bodies import DRUM, with_load
 from wm_drake.model.machine import Setup
 from wm_drake.model.state_layout import CABINET, CARRIER
-from wm_drake.parameters import SpinProfile
+from wm_drake.parameters import Load, SpinProfile
 from wm_drake.parameters.types import FloatArray
-
-_ON_TUB = ("springs", "dampers", "bushings")
 
 
 @dataclass(frozen=True)
@@ -176,14 +176,9 @@ def pack(setup: Setup) -> tuple[FloatArray, Layout]:
 
 def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
     """Return the packed numbers behind the bodies, which no load changes, and the layout of all."""
-    on_tub, indices = pack_on_tub(setup, BODIES_SIZE)
+    on_tub, indices = setup.elements.packed_on_tub(BODIES_SIZE)
     parts, size = [on_tub], BODIES_SIZE + len(on_tub)
-    structure = [
-        number
-        for kind in _ON_TUB
-        for element in getattr(setup, kind).values()
-        for number in element.structure
-    ]
+    structure = list(setup.elements.structure_on_tub)
     begins = []
     for name, telescope in setup.telescopes.items():
         begins.append(size)
@@ -227,27 +222,6 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
     )
 
 
-def pack_on_tub(setup: Setup, size: int = 0) -> tuple[FloatArray, dict[str, tuple[int, ...]]]:
-    """Return the packed springs, dampers and bushings, and by kind the index of each element.
-
-    Their forces depend on the motion of the tub only.
-
-    Args:
-        setup: The machine.
-        size: Number of packed numbers before these.
-    """
-    packed: list[FloatArray] = []
-    indices: dict[str, tuple[int, ...]] = {}
-    for kind in _ON_TUB:
-        begins = []
-        for element in getattr(setup, kind).values():
-            begins.append(size)
-            packed.append(element.packed())
-            size += len(packed[-1])
-        indices[kind] = tuple(begins)
-    return np.concatenate([[], *packed]), indices
-
-
 def aligned(size: int) -> FloatArray:
     """Return zeros at an address that is aligned to the size of a vector of lanes. (size,)"""
     raw = np.zeros(size + WIDTH)
@@ -283,11 +257,11 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     x[DRUM_RATE] = profile.speed[0]
     tubes = np.zeros((len(setup.telescopes), TUBES_STATE_SIZE))
     tubes[:, : setup.tube_rest.shape[1]] = setup.tube_rest
-    carrier = np.append(setup.carrier_rest, np.zeros_like(setup.carrier_rest))
-    motor = np.zeros(MOTOR_STATE_SIZE if setup.motor else 0)
-    cabinet = np.zeros(CABINET_STATE_SIZE if setup.cabinet else 0)
-    stretches = np.zeros(sum(bushing.state_size for bushing in setup.bushings.values()))
-    return np.concatenate([x, tubes.ravel(), carrier, motor, cabinet, stretches])
+    size = sum(bushing.state_size for bushing in setup.bushings.values())
+    size += MOTOR_STATE_SIZE if setup.motor else 0
+    size += CABINET_STATE_SIZE if setup.cabinet else 0
+    carrier = setup.carrier_rest, np.zeros_like(setup.carrier_rest)
+    return np.concatenate([x, tubes.ravel(), *carrier, np.zeros(size)])
 
 
 def pack_tubes(setup: Setup, name: str) -> FloatArray:
@@ -343,48 +317,81 @@ def pack_rigid(setup: Setup, name: str) -> FloatArray:
 
 
 def pack_bodies(plant: MultibodyPlant, context: Context, drive: str) -> FloatArray:
-    """Return the packed bodies (`BODIES`) of a plant Context with its load.
+    """Return the packed bodies (`BODIES`) of a plant Context with its load; see `DrawnBodies`."""
+    return DrawnBodies(plant, context, drive).packed()
+
+
+class DrawnBodies:
+    """The bodies of a plant Context at the drawn pose, to which loads are added.
 
     With a compliant bearing these are the carrier and the drum, without the tub. They are computed
     at the drawn pose, so that the last bits do not depend on the pose of the Context, which stays.
-
-    Args:
-        plant: The plant.
-        context: Its Context.
-        drive: Name of the joint that the drive turns.
-
-    Raises:
-        InputError: the plant has something that the compiled engine does not represent.
     """
-    positions = plant.GetPositions(context)
-    plant.SetPositions(context, np.zeros(len(positions)))
-    try:
-        return _bodies_as_drawn(plant, context, drive)
-    finally:
-        plant.SetPositions(context, positions)
 
+    def __init__(self, plant: MultibodyPlant, context: Context, drive: str) -> None:
+        """Read the bodies.
 
-def _bodies_as_drawn(plant: MultibodyPlant, context: Context, drive: str) -> FloatArray:
-    joint = drum_joint(plant, drive)
-    tub = plant.GetBodyByName(CARRIER if plant.HasBodyNamed(CARRIER) else "tub")
-    X_TF = plant.CalcRelativeTransform(context, tub.body_frame(), joint.frame_on_parent())
-    axis, origin = X_TF.rotation() @ joint.revolute_axis(), X_TF.translation()
-    tub_group, drum_group = (
-        [part.index() for part in plant.GetBodiesWeldedTo(body)]
-        for body in (tub, joint.child_body())
-    )
-    tub_inertia = plant.CalcSpatialInertia(context, tub.body_frame(), tub_group).Shift(origin)
-    drum_inertia = plant.CalcSpatialInertia(context, tub.body_frame(), drum_group).Shift(origin)
-    return BODIES.pack(
-        gravity=plant.gravity_field().gravity_vector(),
-        inverse_mass=1.0 / (tub_inertia.get_mass() + drum_inertia.get_mass()),
-        axis=axis,
-        origin=origin,
-        tub_moment=_moment(tub_inertia),
-        tub_inertia=_six(_matrix(tub_inertia)),
-        **_drum_harmonics(drum_inertia, axis, joint.get_angle(context)),
-        joint_damping=joint.GetDampingVector(context),
-    )
+        Args:
+            plant: The plant.
+            context: Its Context.
+            drive: Name of the joint that the drive turns.
+
+        Raises:
+            InputError: the plant has something that the compiled engine does not represent.
+        """
+        positions = plant.GetPositions(context)
+        plant.SetPositions(context, np.zeros(len(positions)))
+        try:
+            self._read(plant, context, drum_joint(plant, drive))
+        finally:
+            plant.SetPositions(context, positions)
+
+    def _read(self, plant: MultibodyPlant, context: Context, joint: RevoluteJoint) -> None:
+        tub = plant.GetBodyByName(CARRIER if plant.HasBodyNamed(CARRIER) else "tub")
+        X_TF = plant.CalcRelativeTransform(context, tub.body_frame(), joint.frame_on_parent())
+        axis, origin = X_TF.rotation() @ joint.revolute_axis(), X_TF.translation()
+        drum = plant.GetBodyByName(DRUM)
+        groups = (
+            [part.index() for part in plant.GetBodiesWeldedTo(body) if part.index() != drum.index()]
+            for body in (tub, joint.child_body())
+        )
+        of_tub, self._beside_drum = (
+            plant.CalcSpatialInertia(context, tub.body_frame(), group).Shift(origin)
+            if group
+            else SpatialInertia.Zero()
+            for group in groups
+        )
+        self._drum = drum.CalcSpatialInertiaInBodyFrame(context)
+        X_TD = plant.CalcRelativeTransform(context, tub.body_frame(), drum.body_frame())
+        self._R_TD = X_TD.rotation()
+        self._p_DoO_T = np.asarray(origin - X_TD.translation())
+        self._tub_mass = of_tub.get_mass()
+        self._harmonics = _harmonics_operator(tuple(axis), joint.get_angle(context))
+        self._numbers = BODIES.pack(
+            gravity=plant.gravity_field().gravity_vector(),
+            inverse_mass=0.0,
+            axis=axis,
+            origin=origin,
+            tub_moment=_moment(of_tub),
+            tub_inertia=_six(_matrix(of_tub)),
+            **_drum_harmonics(np.zeros(3), np.zeros((3, 3)), axis, 0.0),
+            joint_damping=joint.GetDampingVector(context),
+        )
+
+    def packed(self, *loads: Load) -> FloatArray:
+        """Return the packed bodies (`BODIES`) with loads in the drum."""
+        drum = self._drum
+        for load in loads:
+            drum = with_load(drum, load)
+        in_tub = drum.ReExpress(self._R_TD).Shift(self._p_DoO_T)
+        mass = in_tub.get_mass() + self._beside_drum.get_mass()
+        moment = _moment(in_tub) + _moment(self._beside_drum)
+        six = _six(_matrix(in_tub)) + _six(_matrix(self._beside_drum))
+        numbers = self._numbers.copy()
+        numbers[BODIES.offsets["inverse_mass"]] = 1.0 / (self._tub_mass + mass)
+        begin, end = BODIES.offsets["drum_moment_x"], BODIES.offsets["joint_damping"]
+        numbers[begin:end] = self._harmonics @ np.concatenate([moment, six])
+        return numbers
 
 
 def drum_joint(plant: MultibodyPlant, name: str) -> RevoluteJoint:
@@ -433,8 +440,25 @@ def _six(matrix: FloatArray) -> FloatArray:
     return matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
 
 
+@functools.lru_cache(maxsize=64)
+def _harmonics_operator(axis: tuple[float, float, float], angle: float) -> FloatArray:
+    """Return the matrix from first moment and inertia of the drum to its packed harmonics. (k, 9)
+
+    Args:
+        axis: Unit vector.
+        angle: Drum angle at which moment (x, y, z) and inertia (xx, yy, zz, xy, xz, yz) are given.
+    """
+    columns = []
+    for unit in np.eye(9):
+        xx, yy, zz, xy, xz, yz = unit[3:]
+        matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        parts = _drum_harmonics(unit[:3], matrix, np.array(axis), angle)
+        columns.append(np.concatenate([parts[name] for name in BODIES.fields if name in parts]))
+    return np.column_stack(columns)
+
+
 def _drum_harmonics(
-    inertia: SpatialInertia, axis: FloatArray, angle: float
+    moment: FloatArray, inertia: FloatArray, axis: FloatArray, angle: float
 ) -> dict[str, FloatArray]:
     """Return first moment and inertia of the drum as packed harmonics of the drum angle, by name.
 
@@ -442,7 +466,7 @@ def _drum_harmonics(
     cosine and sine are written in the double angle.
 
     Args:
-        inertia: About a point of the axis, at `angle`.
+        moment, inertia: About a point of the axis, at `angle`. (3,) [kg m], (3, 3) [kg m^2]
         axis: Unit vector.
         angle: Drum angle. [rad]
     """
@@ -450,13 +474,13 @@ def _drum_harmonics(
     across = np.eye(3) - along
     turned = np.cross(axis, np.eye(3)).T  # axis x .
     back = along + across * np.cos(angle) - turned * np.sin(angle)
-    s, j = back @ _moment(inertia), back @ _matrix(inertia) @ back.T
+    s, j = back @ moment, back @ inertia @ back.T
 
     def product(left: FloatArray, right: FloatArray) -> FloatArray:
         return left @ j @ right.T
 
     cosine_squared, sine_squared = product(across, across), product(turned, turned)
-    moment = {"mean": along @ s, "cosine": across @ s, "sine": turned @ s}
+    first = {"mean": along @ s, "cosine": across @ s, "sine": turned @ s}
     matrices = {
         "mean": product(along, along) + 0.5 * (cosine_squared + sine_squared),
         "cosine": product(along, across) + product(across, along),
@@ -466,7 +490,7 @@ def _drum_harmonics(
     }
     entries = {part: _six(matrix) for part, matrix in matrices.items()}
     moments = {
-        f"drum_moment_{letter}": FIRST_HARMONIC.pack(**{part: v[k] for part, v in moment.items()})
+        f"drum_moment_{letter}": FIRST_HARMONIC.pack(**{part: v[k] for part, v in first.items()})
         for k, letter in enumerate("xyz")
     }
     inertias = {

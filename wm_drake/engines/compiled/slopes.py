@@ -185,7 +185,7 @@ def derivatives_at(states, columns, steps, p, elements, rates, moved):
                 x_numbers[columns[move - 1] * WIDTH + lane] += steps[move - 1]
         sine, cosine = sine_cosine(x[DRUM_ANGLE])
         masses = mass_properties(numbers, cosine, sine)
-        state_derivative(x, dx, inputs, masses, x[DRUM_RATE], 0.0, numbers, elements)
+        state_derivative(x, dx, inputs, masses, x[DRUM_RATE], 0.0 * x[0], numbers, elements)
         for lane in range(min(WIDTH, total - begin)):
             at = begin + lane
             row, move = at // (moves + 1), at % (moves + 1)

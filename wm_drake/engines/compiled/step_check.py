@@ -141,9 +141,46 @@ def linearised(setup: Setup, packed: FloatArray, layout: Layout, difference: flo
         packed, layout: From `pack`.
         difference: Half a step of the central differences. [m, rad, m/s, rad/s]
     """
-    free, _ = free_states(setup)
-    found, cabinet = jacobians(packed, layout, _states(setup, free), free, difference)
-    return Linearised(found, _treatment(setup, free), cabinet)
+    kinds = _state_kinds(setup, layout)
+    found, cabinet = jacobians(packed, layout, _states(setup, kinds), kinds.free, difference)
+    return Linearised(found, kinds.treatment, cabinet)
+
+
+@dataclass(frozen=True)
+class StateKinds:
+    """What the numbers of the state of a machine are.
+
+    Attributes:
+        free: Indices of those that are not prescribed.
+        treatment: How the multistep integrator treats these. (free,)
+        velocities: Indices of the free velocities.
+        sponges: Indices of the deformations of sponges.
+    """
+
+    free: np.ndarray
+    treatment: np.ndarray
+    velocities: np.ndarray
+    sponges: np.ndarray
+
+
+_KNOWN_KINDS: dict[Layout, StateKinds] = {}
+"""Kinds by layout, of the last `_MOST_KNOWN` layouts."""
+_MOST_KNOWN = 64
+
+
+def _state_kinds(setup: Setup, layout: Layout) -> StateKinds:
+    """Return the kinds of the state; the machines of a design share theirs with their layout."""
+    kinds = _KNOWN_KINDS.get(layout)
+    if kinds is None:
+        free, _ = free_states(setup)
+        velocities = sorted(set(free) & set(_velocities(setup)))
+        kinds = StateKinds(
+            np.array(free), _treatment(setup, free), np.array(velocities), np.array(_sponges(setup))
+        )
+        if len(_KNOWN_KINDS) >= _MOST_KNOWN:
+            _KNOWN_KINDS.clear()
+        _KNOWN_KINDS[layout] = kinds
+    return kinds
 
 
 def _treatment(setup: Setup, free: list[int]) -> np.ndarray:
@@ -267,16 +304,13 @@ def free_states(setup: Setup) -> tuple[list[int], list[str]]:
     return free, [parts[index] for index in free]
 
 
-def _states(setup: Setup, free: list[int]) -> FloatArray:
+def _states(setup: Setup, kinds: StateKinds) -> FloatArray:
     """Return the states to look at (WIDTH, size): the rest pose, with speeds of each size."""
     rest = initial_state(setup, _STANDSTILL)
-    states = np.tile(rest, (WIDTH, 1))
-    directions = _directions(len(rest))
-    speeds = np.resize(SPEEDS, WIDTH)
-    for index in set(free) & set(_velocities(setup)):
-        states[:, index] += speeds * directions[index]
-    for index in _sponges(setup):
-        states[:, index] += DEFORMATION * directions[index]
+    states, directions = np.tile(rest, (WIDTH, 1)), _directions(len(rest))
+    speeds, sponges = np.resize(SPEEDS, WIDTH), kinds.sponges.astype(int)
+    states[:, kinds.velocities] += speeds[:, None] * directions[kinds.velocities]
+    states[:, sponges] += DEFORMATION * directions[sponges]
     return states
 
 

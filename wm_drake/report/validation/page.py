@@ -97,8 +97,10 @@ def verification_page(
             if they were not run.
     """
     about = (
-        "Does the program solve its equations? Each row is compared by tests, which run with the "
-        "test suite, or by a command. `pytest` followed by the name of a test runs it alone."
+        "Does the program solve its equations? Each row is compared by tests or by a command. The "
+        "tests are part of the test suite: some have the marker `slow`, those with the marker "
+        "`hours` are run by hand. `pytest -m ''` followed by the name of a test runs it alone, "
+        "whatever its marker."
     )
     text = ["# Verification", "", fill(about, WIDTH), "", *_origin(command)]
     columns = ["what", "against", "agreement", "run by", *(["last run"] if outcomes else [])]
@@ -120,7 +122,7 @@ def _outcome(of_row: Sequence[tuple[int, int]]) -> str:
     if not of_row:
         return ""
     if not all(ran for ran, _ in of_row):
-        return "**not run**"
+        return "not run: marked `hours`, or skipped"
     ran, failed = map(sum, zip(*of_row, strict=True))
     return f"**{failed} of {ran} failed**" if failed else f"{ran} passed"
 
