@@ -169,8 +169,8 @@ def residuals_of(
 ) -> Residuals:
     """Return the residuals as a function of points in units of the prior.
 
-    The first `targets.count` residuals are those of the data; the others belong to the limits of
-    the data, and to what is known beside the priors of the quantities.
+    The first `targets.count` residuals are those of the data. Those of values that have a limit
+    follow, then those of what is known beside the priors of the quantities.
     """
     spread = plan.spread(targets.amplitude)
 
@@ -217,6 +217,9 @@ def _search(
         0.5 * float(np.sum(squares[targets.count :]) + np.sum(found.point**2)),
     )
     computed = values(point[None])
+    # a limit is a wish: it does not make a quantity more certain
+    limited = int(np.isfinite(targets.limit_of_each()).sum())
+    limits = slice(targets.count, targets.count + limited)
     return Solution(
         number,
         point,
@@ -225,7 +228,7 @@ def _search(
         computed.responses[0],
         data,
         prior,
-        problem.jacobian(found.point),
+        np.delete(problem.jacobian(found.point), limits, axis=0),
         targets.count,
         problem.evaluations,
     )
