@@ -169,8 +169,15 @@ def redrawn(parameters: MachineParameters, move) -> MachineParameters:
         "front_counterweight_left",
         "front_counterweight_right",
     ):
-        centre = plant.GetBodyByName(name).CalcCenterOfMassInBodyFrame(context)
+        body = plant.GetBodyByName(name)
+        centre = body.CalcCenterOfMassInBodyFrame(context)
         tree["bodies"][name] = {"centre_of_mass": tuple(move(centre))}
+        about_centre = body.CalcSpatialInertiaInBodyFrame(context).Shift(centre)
+        turn = np.array([move(axis) - move(np.zeros(3)) for axis in np.eye(3)])
+        inertia = turn @ about_centre.CalcRotationalInertia().CopyToFullMatrix3() @ turn.T
+        tree["bodies"][name]["inertia"] = {
+            f"{'xyz'[i]}{'xyz'[j]}": inertia[i, j] for i in range(3) for j in range(i, 3)
+        }
     return MachineParameters.model_validate(tree)
 
 
