@@ -344,7 +344,7 @@ def test_search_keeps_a_limit_that_the_cost_alone_does_not(short, tmp_path):
                 short, free, targets.limited(limits), Plan(starts=1, iterations=20), ledger
             ).ended
         errors.append(abs(found.errors(targets)[0, place]))
-    assert errors[0] > 0.04
+    assert errors[0] > 0.05
     assert errors[1] < 0.035
 
 
