@@ -620,6 +620,17 @@ def test_diverging_run_exits_1_says_when_and_what_and_keeps_its_record(wm_drake,
     assert "diverged" in Path("out/report.html").read_text(encoding="utf-8")
 
 
+def test_coulomb_friction_is_warned_of(wm_drake):
+    Path("dry.yaml").write_text(
+        "extends: reference\nname: dry\nprofile: {time: '(0, 0.2) s', speed: '(0, 10) rpm'}\n"
+        "damper_types: {dry: {law: coulomb, friction_force: 22 N}}\ndampers: {left: {type: dry}}\n"
+    )
+    ended = wm_drake("spin", "--machine", "dry.yaml", "--load", "middle", "--out", "out")
+    assert ended.code == 0
+    assert "warning: Coulomb friction jumps where a damper reverses" in ended.err
+    assert "Coulomb" not in wm_drake("machine", "check", "reference").err
+
+
 def test_a_machine_too_stiff_for_the_step_is_refused(wm_drake):
     ended = wm_drake("spin", "--set", "spring_types.suspension.stiffness=4e4 N/mm", "--out", "out")
     assert (ended.code, ended.out) == (2, "")
