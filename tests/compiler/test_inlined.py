@@ -60,7 +60,7 @@ def divide(x, parts):
 
 
 def test_law_for_lanes_is_part_of_its_caller_only():
-    """The caller has the right answer, and none of the two laws has machine code."""
+    """Check that the caller is right, and that none of the two laws has machine code."""
     x, parts = np.full(WIDTH, 6.0), Parts(np.arange(3), 1)
     divide(x, parts)
     np.testing.assert_array_equal(x, 2.0)
@@ -79,7 +79,7 @@ def test_python_call_of_such_a_law_is_refused():
 
 
 def test_another_caller_reads_the_law_from_disk(tmp_path):
-    """The second process compiles another loop with the law of the first one."""
+    """Compile another loop in a second process, with the law of the first one."""
     (tmp_path / "spring.py").write_text(SCRIPT, encoding="utf-8")
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     environment["PYTHONPATH"] = os.pathsep.join(sys.path)

@@ -9,7 +9,7 @@ from wm_drake.model.tub_statics import TubStatics, about_tub, weight_of
 
 @pytest.fixture(scope="module")
 def machine():
-    """The reference machine."""
+    """Build the reference machine."""
     return build_machine(load_machine("reference"))
 
 
@@ -50,7 +50,7 @@ def test_rest_pose_is_one_of_drake(machine):
 
 
 def test_setup_for_the_compiled_engine_has_the_same_numbers(machine):
-    """What leaves the diagram alone differs in nothing that the compiled engine reads."""
+    """Compare what the compiled engine reads, with and without changes to the diagram."""
     changed = with_values(machine.parameters, {"gasket.damping_x": 30.0})
     whole, lean = (machine.set_up(parameters=changed, systems=systems) for systems in (True, False))
     np.testing.assert_array_equal(lean.rest_pose, whole.rest_pose)

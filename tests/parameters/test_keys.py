@@ -253,6 +253,6 @@ def test_number_that_was_not_there_is_checked_against_the_other_parts():
 
 
 def test_number_that_is_not_allowed_is_told_with_its_key():
-    """The part of the changed number is checked in any case."""
+    """Check that the part of the changed number is validated in any case."""
     with pytest.raises(InputError, match=r"gasket\.damping_x"):
         with_values(load_machine("reference"), {"gasket.damping_x": -1.0})
