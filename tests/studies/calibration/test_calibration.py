@@ -11,6 +11,7 @@ from wm_drake.batch.ledger import open_ledger
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile, load_machine
+from wm_drake.parameters.files import yaml_text
 from wm_drake.parameters.free import Measured, load_free
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
 from wm_drake.studies.calibration.computed import Evaluation
@@ -242,6 +243,23 @@ def test_point_without_a_machine_is_nan_and_does_not_change_others(short, tmp_pa
         assert np.isfinite(array[0]).all()
 
 
+def test_point_that_only_the_gasket_holds_is_nan_for_loads_without_it(short, tmp_path):
+    hooks = {f"frames.spring_{n}_housing.position.y": s for n, s in short.set_up().springs.items()}
+    quantity = {"bounds": "(-20, 20) mm", "prior": "(0, 10) mm", "sets": dict.fromkeys(hooks, 1)}
+    known = {
+        f"hook_{number}": {"value": f"{spring.p_WH[1]} m", "sets": key, "source": "test"}
+        for number, (key, spring) in enumerate(hooks.items())
+    }
+    tree = {"quantities": {"forward": {**quantity, "source": "test"}}, "known": known}
+    parameter_map = parameter_map_of(short, free_file(tmp_path, yaml_text(tree)))
+    with_gasket = one_case(short)
+    without = replace(with_gasket, loads=(("middle", False),))
+    points = np.array([[0.0], [0.01]])
+    for targets, finite in ((with_gasket, [True, True]), (without, [True, False])):
+        amplitude = Evaluation(short, parameter_map, targets)(points).amplitude
+        assert np.isfinite(amplitude).all(axis=(1, 2)).tolist() == finite
+
+
 def test_preload_residuals_compare_with_the_prior(short, tmp_path):
     parameter_map = parameter_map_of(short, free_file(tmp_path, PRELOAD + FREE))
     points = np.array(
@@ -336,7 +354,7 @@ def test_search_keeps_a_limit_that_the_cost_alone_does_not(short, tmp_path):
     parameter_map = parameter_map_of(short, free)
     targets = planted(short, parameter_map, parameter_map.expected, (("middle", True),))
     place = targets.sensors.index("Xr")
-    targets.amplitude[0, place] *= 1.2  # no machine has this amplitude and the others
+    targets.amplitude[0, place] *= 1.3  # no machine has this amplitude and the others
     errors = []
     for number, limits in enumerate(({}, {"Xr": 0.03})):
         with open_ledger(tmp_path / f"{number}.sqlite", {"study": "test"}) as ledger:
@@ -344,7 +362,7 @@ def test_search_keeps_a_limit_that_the_cost_alone_does_not(short, tmp_path):
                 short, free, targets.limited(limits), Plan(starts=1, iterations=20), ledger
             ).ended
         errors.append(abs(found.errors(targets)[0, place]))
-    assert errors[0] > 0.05
+    assert errors[0] > 0.04
     assert errors[1] < 0.035
 
 

@@ -102,12 +102,17 @@ class Evaluation:
     def _set_up(self, points: FloatArray) -> Iterator[tuple[int, Setup]]:
         """Yield the index of each point and the machine set up there, always in the same Context.
 
-        Points with values that are not allowed or without static equilibrium are omitted.
+        Points with values that are not allowed or without static equilibrium, with the gasket or
+        without it where the targets ask for it, are omitted.
         """
         context = None
+        without_gasket = any(not gasket for _, gasket in self.targets.loads)
         for index, point in enumerate(points):
             try:
                 parameters = self.parameter_map.parameters_at(point)
+                if without_gasket:
+                    bare = self.machine.set_up(parameters=parameters, gasket=False, context=context)
+                    context = bare.context
                 setup = self.machine.set_up(parameters=parameters, context=context)
             except InputError:
                 continue
