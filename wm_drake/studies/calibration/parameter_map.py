@@ -140,6 +140,8 @@ class ParameterMap:
         tree = dict(self._tree)
         for value in self.values:
             set_to = value.constant + np.asarray(point) @ value.factors
+            if np.count_nonzero(value.factors) > set_to.size:
+                set_to = np.array([float(f"{sum_:.15g}") for sum_ in set_to])  # short in a file
             _set(tree, value, tuple(map(float, set_to)) if value.is_list else float(set_to[0]))
         try:
             return MachineParameters.model_validate(tree)
