@@ -147,7 +147,7 @@ def gaps_figure(results: Sequence[CaseResult]) -> Figure:
     Args:
         results: Cases, each with a smallest gap.
     """
-    figure = Figure(figsize=(WIDTH, 0.75 + 0.42 * len(results)), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 0.75 + 0.5 * len(results)), layout="constrained")
     axes = figure.subplots()
     gaps = [gap for gap in (result.measures.smallest_gap for result in results) if gap is not None]
     distances = [MM_PER_M * gap.distance for gap in gaps]
@@ -161,7 +161,7 @@ def gaps_figure(results: Sequence[CaseResult]) -> Figure:
         axes.plot(distance, place, "o", color=colour, markersize=8)
         speed = number(speed_rpm(result, gap.time), 0)
         parts = f"{shape_name(gap.moving)} to {shape_name(gap.fixed)}"
-        text = f"{number(distance)} mm   {parts}, {speed} rpm"
+        text = f"{number(distance)} mm at {speed} rpm\n{parts}"
         axes.text(
             max(distance, 0.0) + 0.025 * span,
             place,
@@ -181,7 +181,7 @@ def gaps_figure(results: Sequence[CaseResult]) -> Figure:
             if low - 0.1 * span <= tick <= high + 0.1 * span
         ]
     )
-    axes.set(xlim=(low - 0.02 * span, high + 0.9 * span), ylim=(len(results) - 0.4, -0.6))
+    axes.set(xlim=(low - 0.02 * span, high + 1.1 * span), ylim=(len(results) - 0.4, -0.6))
     axes.set_xlabel("smallest gap, mm (0: the parts touch)", fontsize=9.5, loc="left")
     axes.grid(axis="x", color=GRID)
     style_axes(axes)
