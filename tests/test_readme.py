@@ -174,9 +174,9 @@ def test_the_example_of_a_relation_is_that_of_a_ring(machine):
     assert relation.at(np.array([[torsion, radial]])) == pytest.approx([0.9])
 
 
-@pytest.mark.parametrize("name", ["reference_free.yaml", "reference_free_limits.yaml"])
-def test_the_free_files_of_the_calibration_fit_the_reference_machine(machine, name):
-    parameter_map = parameter_map_of(machine, load_free(CHECKOUT / "analyses" / name))
+def test_the_free_file_of_the_calibration_fits_the_reference_machine(machine):
+    free = load_free(CHECKOUT / "analyses" / "reference_free.yaml")
+    parameter_map = parameter_map_of(machine, free)
     made = parameter_map.parameters_at(parameter_map.start)
     tilts = made.gasket.rotational_stiffness_x + made.gasket.rotational_stiffness_z
     assert tilts < made.gasket.stiffness_y * 0.18**2

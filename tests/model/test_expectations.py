@@ -53,7 +53,7 @@ PLANTED = {
         {"loads.middle.unbalances.0.radius": "245 mm"},
         "loads.middle.unbalances.0.radius",
     ),
-    "concrete": ({"bodies.upper_counterweight.mass": "12 kg"}, "bodies.upper_counterweight.mass"),
+    "concrete": ({"bodies.upper_counterweight.mass": "15 kg"}, "bodies.upper_counterweight.mass"),
     "steel": (
         {
             "bodies.motor.mass": "60 kg",

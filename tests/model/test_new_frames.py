@@ -14,10 +14,8 @@ NEW = """
 extends: reference
 name: four_springs
 frames:
-  spring_left_housing: {position: "(-213.67, -91.68, 399.28) mm"}
-  spring_right_housing: {position: "(213.67, -91.68, 399.28) mm"}
-  spring_front_tub: {attached_to: tub, position: "(10, -180, 200) mm"}
-  spring_front_housing: {attached_to: housing, position: "(10, -180, 400) mm"}
+  spring_front_tub: {attached_to: tub, position: "(120, -120, 200) mm"}
+  spring_front_housing: {attached_to: housing, position: "(120, -120, 400) mm"}
   gasket_ring: {attached_to: housing, position: "(0, -300, 0) mm", angles: "(0, 0, 30) deg"}
   gasket_ring_tub: {attached_to: tub, position: "(0, -300, 0) mm", angles: "(0, 0, 30) deg"}
 springs:
@@ -41,8 +39,8 @@ def four(tmp_path_factory):
 def test_elements_attach_to_new_frames(four):
     _, machine = four
     setup = machine.set_up()
-    np.testing.assert_allclose(setup.springs["front"].p_ToA_T, [0.01, -0.18, 0.2])
-    np.testing.assert_allclose(setup.springs["front"].p_WH, [0.01, -0.18, 0.4])
+    np.testing.assert_allclose(setup.springs["front"].p_ToA_T, [0.12, -0.12, 0.2])
+    np.testing.assert_allclose(setup.springs["front"].p_WH, [0.12, -0.12, 0.4])
     assert setup.springs["front"].preload > 0.0
     ring = setup.bushings["gasket"]
     np.testing.assert_allclose(ring.ground_side_point, [0.0, -0.3, 0.0])
@@ -53,10 +51,10 @@ def test_elements_attach_to_new_frames(four):
 
 def test_a_new_frame_moves_in_the_context(four):
     parameters, machine = four
-    moved = with_value(parameters, "frames.spring_front_housing.position", "(0, -180, 420) mm")
+    moved = with_value(parameters, "frames.spring_front_housing.position", "(110, -120, 420) mm")
     in_context = machine.set_up(parameters=moved)
     rebuilt = build_machine(moved).set_up()
-    np.testing.assert_array_equal(in_context.springs["front"].p_WH, [0.0, -0.18, 0.42])
+    np.testing.assert_array_equal(in_context.springs["front"].p_WH, [0.11, -0.12, 0.42])
     assert in_context.springs["front"].preload == rebuilt.springs["front"].preload
     for key, value in {"attached_to": "tub", "angles": (0.0, 0.1, 0.0)}.items():
         changed = with_value(parameters, f"frames.gasket_ring.{key}", value)

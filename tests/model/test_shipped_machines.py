@@ -148,7 +148,8 @@ def test_springs_carry_the_weight(machine, built):
         built.plant.GetBodyByName(f"damper_{name}_outer").default_mass()
         for name in machine.telescopic_dampers
     )
-    assert lift == pytest.approx((oscillating_mass(setup) + tubes) * machine.gravity, rel=1e-3)
+    # springs that lean pull sideways; the gasket holds against it and carries a newton too
+    assert lift == pytest.approx((oscillating_mass(setup) + tubes) * machine.gravity, rel=3e-3)
     assert all(spring.preload > 0.0 for spring in setup.springs.values())
     assert abs(setup.residual).max() <= EQUILIBRIUM_TOLERANCE
     # m: the drawn pose, but for a lateral force of 5 N of springs that lean over 4 N/mm

@@ -55,7 +55,7 @@ def test_a_light_cabinet_walks_and_a_heavy_one_does_not(light):
     assert float(found.feet.slide_margin) > 100.0
     record = simulate(light, case_of(light.parameters, "middle"))
     found = measure(record)
-    assert found.walk.distance > 0.05
+    assert found.walk.distance > 0.02
     assert abs(found.walk.turn) > np.deg2rad(2.0)
     assert 0.0 <= float(found.feet.turn_margin) < 0.1  # friction is at its limit, never above it
     # the smallest distance of feet from each other stays: they move as a rigid body
@@ -67,15 +67,16 @@ def test_a_light_cabinet_walks_and_a_heavy_one_does_not(light):
 
 
 def test_the_distance_is_no_artefact_of_step_or_regularisation(light):
-    """Halve the damping, which regularises the friction: the change halves as well."""
+    """Halve the damping, which regularises the friction: in the end the change halves as well."""
     base, finer = walked(light), walked(light, step=2.5e-3 / 8)
     assert base == pytest.approx(finer, rel=2e-3)
-    half, quarter = (
-        walked(light, foot_type__horizontal_damping=damping, step=2.5e-3 / 8)
-        for damping in (60.0, 30.0)
-    )
-    assert half == pytest.approx(base, rel=0.1)
-    assert 0.3 < (quarter - half) / (half - base) < 0.7
+    distances = [
+        walked(light, foot_type__horizontal_damping=damping, step=2.5e-3 / 32)
+        for damping in (30.0, 15.0, 7.5)
+    ]
+    assert distances == pytest.approx([base] * 3, rel=0.15)
+    first, second = np.diff(distances)
+    assert 0.3 < second / first < 0.7
 
 
 def test_stiff_feet_give_back_the_fixed_housing(moving):
@@ -85,7 +86,7 @@ def test_stiff_feet_give_back_the_fixed_housing(moving):
     how = {"step": 2.5e-3 / 8, "integrator": "runge_kutta"}
     fixed = simulate(build_machine(reference), case, **how).displacement.values
     errors = []
-    for k in (2.0, 4.0):
+    for k in (4.0, 8.0):
         feet = {
             "vertical_stiffness": 200e3 * k,
             "horizontal_stiffness": 60e3 * k,
@@ -95,7 +96,7 @@ def test_stiff_feet_give_back_the_fixed_housing(moving):
         parameters = with_moving_cabinet(friction=5.0, foot_type=feet)
         same = Case("middle", case.load, SHORT, parameters=parameters)
         errors.append(np.abs(simulate(moving, same, **how).displacement.values - fixed).max())
-    assert errors[0] < 0.05 * np.abs(fixed).max()
+    assert errors[0] < 0.03 * np.abs(fixed).max()
     assert errors[0] / errors[1] == pytest.approx(2.0, abs=0.15)
 
 

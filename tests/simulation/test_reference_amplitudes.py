@@ -2,7 +2,7 @@
 
 The limits are those that the calibration of this machine reached (analyses/calibrate_reference.py).
 It used all 36 amplitudes and all 18 means, so these tests pin a fit; they do not test a prediction.
-One amplitude and one mean miss the goal of 20 % and 50 % (docs/decisions/0030).
+See docs/decisions/0030.
 """
 
 import numpy as np
@@ -32,15 +32,14 @@ def table(machine, reference, targets):
     return simulate_many(machine, cases, measures=("amplitudes", "gap", "spring tensions"))
 
 
-def test_amplitudes_are_within_the_goal_but_for_one(table, targets):
+def test_amplitudes_are_within_the_limits(table, targets):
     errors = np.abs(table.amplitude.values / targets.amplitude - 1.0)
     assert errors.size == 36
     assert errors.mean() <= 0.078
-    assert np.sort(errors.ravel())[-2] <= 0.20
-    assert errors.max() <= 0.30
+    assert errors.max() <= 0.20
 
 
-def test_means_of_the_gasket_study_are_within_the_goal_but_for_one(machine, reference):
+def test_means_of_the_gasket_study_are_within_the_limits(machine, reference):
     units = {"D": "mm", "F": "N", "M": "N*m"}
     published = {
         key: terms["constant"].effects[0]
@@ -55,8 +54,7 @@ def test_means_of_the_gasket_study_are_within_the_goal_but_for_one(machine, refe
     errors = dict(zip(published, np.abs(computed / list(published.values()) - 1.0), strict=True))
     assert len(errors) == 18
     assert np.mean(list(errors.values())) <= 0.15
-    assert sorted(errors.values())[-2] <= 0.50
-    assert max(errors.values()) <= 0.80
+    assert max(errors.values()) <= 0.50
     assert max(error for (_, name), error in errors.items() if name == "My") <= 0.25
 
 

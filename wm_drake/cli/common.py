@@ -173,7 +173,7 @@ def warn_of_jumping_friction(parameters: "MachineParameters") -> None:
     if any(parameters.damper_types[name].law == "coulomb" for name in types):
         say(
             "warning: Coulomb friction jumps where a damper reverses. Amplitudes of the compiled "
-            "engine were 7 to 80 % off in tests (docs/performance.md); the law mstv does not jump.",
+            "engine were 5 to 80 % off in tests (docs/performance.md); the law mstv does not jump.",
             err=True,
         )
 

@@ -316,7 +316,7 @@ def measure(record: Record, scene: Scene | None = None) -> Measures:
         >>> record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
         >>> amplitude = wm.measure(record).amplitude  # m
         >>> round(1e3 * float(amplitude.sel(sensor="Xr")))
-        24
+        23
     """
     # a dictionary of arrays is faster than attribute access of a dataset
     values = {name: variable.values for name, variable in record.variables.items()}

@@ -308,7 +308,7 @@ def revolutions_of(balance, start, speed, count, steps=256):
 
 
 def test_a_machine_without_gasket_leaves_its_unstable_motions_and_keeps_its_stable_ones(machine):
-    """Check load middle: unstable from 169 to 190 rpm, with a pair of complex multipliers.
+    """Check load middle: unstable from 171 to 196 rpm, with a pair of complex multipliers.
 
     A run that starts on the harmonic balance misses the motion by the cut harmonics, 0.01 mm. This
     distance stays on a stable motion and grows on an unstable one.
@@ -318,7 +318,7 @@ def test_a_machine_without_gasket_leaves_its_unstable_motions_and_keeps_its_stab
     with threadpool_limits(1, "blas"):
         points = branch_of(balance, setup, np.linspace(150.0, 205.0, 12) * RPM)
     unstable = max(points, key=lambda point: point.multiplier)
-    assert 175.0 < unstable.speed / RPM < 185.0
+    assert 179.0 < unstable.speed / RPM < 186.0
     for point, count in ((points[2], 20), (unstable, 40), (points[-2], 20)):
         begin = balance.series.synthesis[0] @ point.coefficients
         states = revolutions_of(balance, [begin], point.speed, count)[:, 0]
