@@ -1,6 +1,7 @@
 """Studies that a page starts: options, folders, processes, reports."""
 
 import json
+import signal
 import sys
 import time
 
@@ -37,9 +38,12 @@ def jobs(tmp_path, monkeypatch):
     program.write_text(f"#!{sys.executable}\n{PROGRAM}")
     program.chmod(0o755)
     monkeypatch.setattr(jobs_module.sys, "executable", str(program))
+    # a shell that starts the tests with & makes them, and what they start, ignore this signal
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     found = Jobs(tmp_path / "studies")
     yield found
     found.end(timeout=5.0)
+    signal.signal(signal.SIGINT, before)
 
 
 def waited(jobs, identifier, wanted):
