@@ -87,11 +87,16 @@ def test_70_s_trajectories_agree_to_a_micrometre_when_both_are_refined(
         np.testing.assert_allclose(found[:, columns], expected[:, columns], rtol=0.0, atol=1e-6)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("load", "gasket"),
-    [(load, True) for load in ("middle", "counter", "back", "front")]
-    + [("middle", False), ("counter", False)],
+    [
+        pytest.param("middle", True, marks=pytest.mark.slow),
+        pytest.param("counter", True, marks=pytest.mark.hours),
+        pytest.param("back", True, marks=pytest.mark.slow),
+        pytest.param("front", True, marks=pytest.mark.hours),
+        pytest.param("middle", False, marks=pytest.mark.hours),
+        pytest.param("counter", False, marks=pytest.mark.slow),
+    ],
 )
 def test_peaks_at_default_steps_agree(machine, reference, load, gasket):
     """Check the default step of 2.5 ms: 0.05 % in peaks with gasket, 0.2 % without."""
