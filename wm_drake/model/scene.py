@@ -71,7 +71,7 @@ class Outline:
 
     @functools.cached_property
     def numbers(self) -> FloatArray:
-        """The numbers that `wm_drake.model.outline.lowest_point` reads. (15,) [m]"""
+        """Return the numbers that `wm_drake.model.outline.lowest_point` reads. (15,) [m]"""
         return np.concatenate([self.centre, self.axes.ravel(), self.half])
 
     def lower_extent(self, direction: FloatArray, poses: FloatArray) -> FloatArray:

@@ -354,7 +354,7 @@ def test_search_keeps_a_limit_that_the_cost_alone_does_not(short, tmp_path):
     parameter_map = parameter_map_of(short, free)
     targets = planted(short, parameter_map, parameter_map.expected, (("middle", True),))
     place = targets.sensors.index("Xr")
-    targets.amplitude[0, place] *= 1.3  # no machine has this amplitude and the others
+    targets.amplitude[0, place] *= 1.4  # no machine has this amplitude and the others
     errors = []
     for number, limits in enumerate(({}, {"Xr": 0.03})):
         with open_ledger(tmp_path / f"{number}.sqlite", {"study": "test"}) as ledger:
@@ -362,7 +362,7 @@ def test_search_keeps_a_limit_that_the_cost_alone_does_not(short, tmp_path):
                 short, free, targets.limited(limits), Plan(starts=1, iterations=20), ledger
             ).ended
         errors.append(abs(found.errors(targets)[0, place]))
-    assert errors[0] > 0.04
+    assert errors[0] > 0.05
     assert errors[1] < 0.035
 
 

@@ -308,7 +308,7 @@ def revolutions_of(balance, start, speed, count, steps=256):
 
 
 def test_a_machine_without_gasket_leaves_its_unstable_motions_and_keeps_its_stable_ones(machine):
-    """Check load middle: unstable from 171 to 196 rpm, with a pair of complex multipliers.
+    """Check load middle: unstable from 172 to 195 rpm, with a pair of complex multipliers.
 
     A run that starts on the harmonic balance misses the motion by the cut harmonics, 0.01 mm. This
     distance stays on a stable motion and grows on an unstable one.

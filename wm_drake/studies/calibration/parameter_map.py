@@ -141,7 +141,8 @@ class ParameterMap:
         for value in self.values:
             set_to = value.constant + np.asarray(point) @ value.factors
             if np.count_nonzero(value.factors) > set_to.size:
-                set_to = np.array([float(f"{sum_:.15g}") for sum_ in set_to])  # short in a file
+                # 15 digits, so that the sum is short in a file
+                set_to = np.array([float(f"{number:.15g}") for number in set_to])
             _set(tree, value, tuple(map(float, set_to)) if value.is_list else float(set_to[0]))
         try:
             return MachineParameters.model_validate(tree)
