@@ -17,7 +17,6 @@ from pathlib import Path
 import pandas as pd
 
 from wm_drake.batch.ledger import open_ledger
-from wm_drake.cli.progress import progress_bar
 from wm_drake.model.bodies import sdf_path
 from wm_drake.model.build import build_machine
 from wm_drake.model.sdf_text import sdf_with
@@ -30,13 +29,15 @@ from wm_drake.parameters import (
 from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.measured import DESIGN, NamedValue, measured_amplitudes
 from wm_drake.parameters.published import CONSTANT, published_results
+from wm_drake.report.progress import progress_bar
+from wm_drake.simulation.measures.responses import known_responses
 from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate, identity_of
+from wm_drake.studies.calibration.computed import Runner
 from wm_drake.studies.calibration.fewer import fewer_table, fit_with_fewer
 from wm_drake.studies.calibration.outcome import mean_and_largest, solved_machine
-from wm_drake.studies.calibration.prediction import DRAWS, Prediction, predict, prediction_table
+from wm_drake.studies.calibration.prediction import Prediction, predict, prediction_table
 from wm_drake.studies.calibration.solutions import Solution
 from wm_drake.studies.calibration.targets import Targets, targets_of
-from wm_drake.studies.gasket.responses import known_responses
 
 FREE = Path(__file__).with_name("reference_free.yaml")
 HELD_OUT = (("back", "front"), ("middle",), ("counter",), ("back",), ("front",))
@@ -79,32 +80,30 @@ def main() -> None:
     if arguments.quick:
         few = dict(list(free.quantities.items())[:3])
         free, held_out = FreeFile(quantities=few), HELD_OUT[:1]
-        plan = prediction_plan = Plan(starts=1, iterations=1)
+        plan = Plan(starts=1, iterations=1)
+        prediction_plan = replace(plan, draws=QUICK_DRAWS)
     targets = _targets(machine.parameters, with_means=not arguments.quick)
     if not (arguments.quick or arguments.fewer):
         targets = targets.limited(LIMITS)
-    draws = QUICK_DRAWS if arguments.quick else DRAWS
     ledger_path = arguments.out.with_suffix(".sqlite")
     if arguments.fewer:
         held_out = ()
     with open_ledger(ledger_path, identity_of(machine, free, targets, plan), resume=True) as ledger:
+        runner = Runner(machine, ledger)
         with progress_bar(plan.starts, "searches") as done:
-            calibration = calibrate(
-                machine, free, targets, plan, ledger, report=lambda start, *_: done(start)
-            )
+            shown = replace(runner, report=lambda start, *_: done(start))
+            calibration = calibrate(shown, free, targets, plan)
         if arguments.write:
             _write(calibration)
         predictions = []
         with progress_bar(len(held_out), "predictions") as done:
             for number, group in enumerate(held_out, start=1):
-                predictions += predict(
-                    machine, free, calibration, [group], ledger, plan=prediction_plan, draws=draws
-                )
+                predictions += predict(runner, free, calibration, [group], prediction_plan)
                 done(number)
         fits = []
         if arguments.fewer:
             searched = replace(calibration, plan=FEWER_PLAN)
-            fits = fit_with_fewer(machine, searched, FEWER, ledger)
+            fits = fit_with_fewer(runner, searched, FEWER)
         ledger.mark_finished()
     tables = {
         "held_out": prediction_table(predictions),
@@ -140,8 +139,8 @@ def _targets(parameters: MachineParameters, *, with_means: bool) -> Targets:
         for (load, name), terms in published_results(parameters.published).items()
     ]
     targets = targets_of(parameters, measured_amplitudes(parameters), responses=means)
-    wanted = tuple(replace(target, deviation=MEANS_DEVIATION) for target in targets.responses)
-    return replace(targets, responses=wanted)
+    responses = tuple(replace(target, deviation=MEANS_DEVIATION) for target in targets.responses)
+    return replace(targets, responses=responses)
 
 
 def _arguments() -> argparse.Namespace:
@@ -225,10 +224,10 @@ def _lines_of_means(targets: Targets, best: Solution) -> list[str]:
 def _write(calibration: Calibration) -> None:
     solved = solved_machine(calibration.parameter_map, calibration.solutions[0])
     path, model = machine_path("reference"), sdf_path(solved.model)
-    keys = [".".join(value.path) for value in calibration.parameter_map.values]
-    own = [key for key in dict.fromkeys(keys) if not key.startswith(("bodies.", "frames."))]
+    keys = [value.key for value in calibration.parameter_map.values]
+    file_keys = [key for key in dict.fromkeys(keys) if not key.startswith(("bodies.", "frames."))]
     texts = {
-        path: machine_file_with(path, solved, own),
+        path: machine_file_with(path, solved, file_keys),
         model: sdf_with(model.read_text(encoding="utf-8"), solved),
     }
     for file, text in texts.items():

@@ -135,11 +135,11 @@ def errors_percent(
         except InputError as refused:
             print(f"{integrator} at {step_ms:g} ms is left out: {refused}")
             continue
-        found = {}
+        largest = {}
         for run, case in enumerate(cases):
             ratio = peaks(table, run, case.gasket) / peaks(converged, run, case.gasket)
-            found[case.name] = 100.0 * float(np.abs(ratio - 1.0).max())
-        rows[f"{integrator} {step_ms:g} ms"] = found
+            largest[case.name] = 100.0 * float(np.abs(ratio - 1.0).max())
+        rows[f"{integrator} {step_ms:g} ms"] = largest
     return pd.DataFrame(rows).T
 
 

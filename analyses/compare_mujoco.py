@@ -20,7 +20,7 @@ from pathlib import Path
 import mujoco
 import numba
 import numpy as np
-from benchmark_engines import gasket_cases
+from compare_speed import gasket_cases
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
@@ -175,14 +175,14 @@ def compared(profile: SpinProfile, count: int) -> list[str]:
     apart = np.abs(positions[: len(moved)] - moved).max()
     simulate_many(machine, [case] * 8)  # compiles
     begin = time.process_time()
-    simulate_many(machine, gasket_cases(machine, profile, count), measures=("extremes",))
-    own = (time.process_time() - begin) / count
+    simulate_many(machine, gasket_cases(count, profile), measures=("extremes",))
+    batch_s = (time.process_time() - begin) / count
     return [
         f"one run of {profile.duration:g} s in MuJoCo {mujoco.__version__}: "
         f"{1e3 * spent:.0f} ms of one core",
         f"a run in a batch of {count}, two loads for each gasket, with D, F, M: "
-        f"{1e3 * own:.2f} ms of one core; "
-        f"ratio {spent / own:.0f}",
+        f"{1e3 * batch_s:.2f} ms of one core; "
+        f"ratio {spent / batch_s:.0f}",
         f"largest difference of the tub position: {1e6 * apart:.1f} um of {1e3 * largest:.2f} mm",
     ]
 

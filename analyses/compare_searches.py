@@ -21,29 +21,29 @@ from wm_drake.parameters.designs import load_design
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.pareto.problem import MachineDesigns, machine_designs
-from wm_drake.studies.pareto.search import Found
+from wm_drake.studies.pareto.search import SearchResult
 from wm_drake.studies.pareto.study import SEARCHES
 
 
 def searched(
     designs: MachineDesigns, costs: Callable[..., object], evaluations: int, seed: int, name: str
-) -> tuple[Found, float]:
+) -> tuple[SearchResult, float]:
     """Return what a search finds, and its processor time without the runs. [s]"""
     running = 0.0
 
     def evaluate(x: FloatArray) -> object:
         nonlocal running
         begin = time.process_time()
-        found = costs(x)
+        result = costs(x)
         running += time.process_time() - begin
-        return found
+        return result
 
     begin = time.process_time()
     search = SEARCHES[name]
     goals, limits = len(designs.objectives), len(designs.constraints)
     settings = {"evaluations": evaluations, "population": min(64, evaluations), "seed": seed}
-    found = search(evaluate, designs.nominal(), goals, limits, **settings)
-    return found, time.process_time() - begin - running
+    result = search(evaluate, designs.nominal(), goals, limits, **settings)
+    return result, time.process_time() - begin - running
 
 
 def main() -> None:
@@ -67,17 +67,17 @@ def main() -> None:
         def costs(x: FloatArray) -> object:
             nonlocal done
             measures = ("extremes", "gap")
-            found = designs.costs(x, lambda c: simulate_many(machine, c, measures=measures))
+            result = designs.costs(x, lambda c: simulate_many(machine, c, measures=measures))
             done += len(x)
             progress(done)
-            return found
+            return result
 
         for name in SEARCHES:
             for seed in range(seeds):
-                found, own_s = searched(designs, costs, count, seed, name)
+                result, search_s = searched(designs, costs, count, seed, name)
                 rows += [
-                    {"search": name, "seed": seed, "designs": n, "volume": v, "search_s": own_s}
-                    for n, v in found.history
+                    {"search": name, "seed": seed, "designs": n, "volume": v, "search_s": search_s}
+                    for n, v in result.history
                 ]
     table = pd.DataFrame(rows)
     marks = [n for n in 64 * 2 ** np.arange(8) if n <= count] or [count]

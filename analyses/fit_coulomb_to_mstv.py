@@ -32,29 +32,29 @@ def fits_of(table: pd.DataFrame, f_max: float) -> pd.DataFrame:
     """Return the fits of the Coulomb model to MSTV loops at each point of a table."""
     mstv = mstv_of_c().model_copy(update={"friction_force": f_max})
     motions = [Harmonic(row.frequency_hz, row.amplitude_mm * MM) for row in table.itertuples()]
-    found = coulomb_fits(mstv_motions(mstv, motions), f_max, mstv.slider_damping)
-    return found.assign(
+    fitted = coulomb_fits(mstv_motions(mstv, motions), f_max, mstv.slider_damping)
+    return fitted.assign(
         frequency_hz=table.frequency_hz.to_numpy(), amplitude_mm=table.amplitude_mm.to_numpy()
     )
 
 
-def agreement(found: pd.DataFrame) -> dict[str, float]:
+def agreement(fitted: pd.DataFrame) -> dict[str, float]:
     """Return measures of the agreement with the printed table.
 
     These are the rank correlations, the root mean square of ln(fitted / printed), and the
     percentage of steps in frequency or amplitude over which c1 falls.
     """
-    c1 = found.pivot_table(
+    c1 = fitted.pivot_table(
         index="frequency_hz", columns="amplitude_mm", values="c1 fitted"
     ).to_numpy()
     falls = np.concatenate([np.diff(c1, axis=0).ravel(), np.diff(c1, axis=1).ravel()]) <= 1e-3
     ratio = {
-        name: np.log(found[f"{name} fitted"].clip(lower=1e-3) / found[name])
+        name: np.log(fitted[f"{name} fitted"].clip(lower=1e-3) / fitted[name])
         for name in ("k1", "c1")
     }
     return {
-        "rank correlation c1": float(spearmanr(found["c1"], found["c1 fitted"])[0]),
-        "rank correlation k1": float(spearmanr(found["k1"], found["k1 fitted"])[0]),
+        "rank correlation c1": float(spearmanr(fitted["c1"], fitted["c1 fitted"])[0]),
+        "rank correlation k1": float(spearmanr(fitted["k1"], fitted["k1 fitted"])[0]),
         "log error c1": float(np.sqrt(np.mean(ratio["c1"] ** 2))),
         "log error k1": float(np.sqrt(np.mean(ratio["k1"] ** 2))),
         "c1 falls, %": 100.0 * float(np.mean(falls)),
@@ -78,10 +78,10 @@ def main() -> None:
     if arguments.quick:
         table = table[table.frequency_hz.isin([1.0, 10.0]) & table.amplitude_mm.isin([0.3, 1.0])]
         candidates = (40.0, 80.0)
-    found = {f_max: fits_of(table, f_max) for f_max in candidates}
-    scores = pd.DataFrame({f"{f_max:g} N": agreement(fits) for f_max, fits in found.items()}).T
+    fitted = {f_max: fits_of(table, f_max) for f_max in candidates}
+    scores = pd.DataFrame({f"{f_max:g} N": agreement(fits) for f_max, fits in fitted.items()}).T
     best = candidates[int(np.argmax(scores["rank correlation c1"]))]
-    shown = found[best]
+    shown = fitted[best]
     text = [
         "agreement of Coulomb fits to MSTV loops with [C] Table 2, by f_max",
         scores.round(3).to_string(),

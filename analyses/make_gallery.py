@@ -222,9 +222,9 @@ def _write_pictures(pictures: Path, only: list[str] | None) -> None:
         for entry in ENTRIES:
             if only is None or entry.name in only:
                 print(entry.command, file=sys.stderr)
-                own = Path(folder).resolve() / entry.name
-                own.mkdir()
-                with _page(entry, own) as address:
+                entry_folder = Path(folder).resolve() / entry.name
+                entry_folder.mkdir()
+                with _page(entry, entry_folder) as address:
                     browser.get(address)
                     if not entry.page:  # the first run compiles the laws
                         WebDriverWait(browser, 600.0).until(_is_open)
@@ -232,7 +232,7 @@ def _write_pictures(pictures: Path, only: list[str] | None) -> None:
                     _thumbnail(browser.get_screenshot_as_png(), SHOWN).save(
                         pictures / f"{entry.name}.png", optimize=True
                     )
-                titles[entry.name] = _write_plots(entry, own / "figures", pictures)
+                titles[entry.name] = _write_plots(entry, entry_folder / "figures", pictures)
                 (pictures / PLOTS).write_text(json.dumps(titles, indent=1) + "\n", encoding="utf-8")
 
 
@@ -268,8 +268,8 @@ def _words(command: str, folder: Path) -> list[str]:
     """Return the arguments of a command; patterns of file names are those in a folder."""
     words = [sys.executable, "-c", "from wm_drake.cli import main; main()"]
     for word in shlex.split(command)[1:]:
-        found = sorted(path.relative_to(folder).as_posix() for path in folder.glob(word))
-        words += found if "*" in word else [word]
+        files = sorted(path.relative_to(folder).as_posix() for path in folder.glob(word))
+        words += files if "*" in word else [word]
     return words
 
 

@@ -3,12 +3,11 @@
 The script runs the shipped machines as they are: the machine `reference` over the run-up of [B]
 (amplitudes, effect of the gasket, steady state, grand means of the gasket study with linear tables
 as in [B]), the machine `free_stroke` over the spin cycle of [A], and Coulomb fits to loops of the
-MSTV damper of [C]. It writes three pages in Markdown, the second and third beside the first:
-docs/validation.md, docs/prediction.md and docs/verification.md.
+MSTV damper of [C]. It renews verification, validation and prediction on a page:
 
-    python analyses/write_validation.py --out docs/validation.md --fitted-means
+    python analyses/write_validation.py --page docs/validation.md --fitted-means
 
-Explanations of results that are missed are in validation_reasons.yaml, the tests of the page of
+Explanations of results that are missed are in validation_reasons.yaml, the tests of the
 verification in verification.yaml. Loads held out of the calibration, and fits with fewer free
 quantities, take hours: calibrate_reference.py wrote them to reference_held_out.csv and
 reference_fewer.csv. The script takes about two minutes; with --tests, which runs the tests
@@ -39,7 +38,6 @@ from wm_drake.parameters import (
 from wm_drake.parameters.files import read_yaml
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.report.spin.report import amplitude_table
-from wm_drake.report.validation.page import Made, validation_page, verification_page
 from wm_drake.rigs import Harmonic
 from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket.screening import Screening, run_screening
@@ -53,7 +51,7 @@ from wm_drake.studies.identification.drift import (
 )
 from wm_drake.studies.spin_cycle.runs import compiled_runs
 from wm_drake.studies.spin_cycle.study import run_spin_cycle
-from wm_drake.studies.validation import rows
+from wm_drake.studies.validation import page, rows
 
 HERE = Path(__file__).parent
 REASONS, VERIFICATION = HERE / "validation_reasons.yaml", HERE / "verification.yaml"
@@ -93,19 +91,19 @@ def compared(reference: MachineParameters, quick: bool, means_kind: str) -> list
     cases = [Case(name, load, reference.profile) for name, load in reference.loads.items()]
     effect = run_gasket_effect(reference, cases)
     both = [amplitude_table(result) for result in (effect.without, effect.with_gasket)]
-    found = rows.amplitude_rows(pd.concat(both))
-    found += rows.held_out_rows(pd.read_csv(HELD_OUT))
-    found += rows.effect_rows(effect_table(effect))
+    table = rows.amplitude_rows(pd.concat(both))
+    table += rows.held_out_rows(pd.read_csv(HELD_OUT))
+    table += rows.effect_rows(effect_table(effect))
     published = published_results(reference.published)
-    found += rows.mean_rows(grand_means(reference, quick), published, means_kind)
+    table += rows.mean_rows(grand_means(reference, quick), published, means_kind)
     if not quick:
         chosen = [case for case in load_unbalance_cases() if case.name in SHOWN_BY_A]
         free = load_machine("free_stroke")
         runs = compiled_runs(build_machine(free))
-        found += rows.spin_cycle_rows(
+        table += rows.spin_cycle_rows(
             run_spin_cycle(free, chosen, load_profile("spin_cycle"), runs)
         )
-    return found + rows.coulomb_rows(coulomb(quick))
+    return table + rows.coulomb_rows(coulomb(quick))
 
 
 def simpler_machines() -> pd.DataFrame:
@@ -126,7 +124,7 @@ def simpler_machines() -> pd.DataFrame:
 
 
 def run_tests(groups: dict[str, list[dict[str, Any]]]) -> dict[str, tuple[int, int]]:
-    """Run the tests of the page of verification; return how many ran and failed, by their name."""
+    """Run the tests of the verification; return how many ran and failed, by their name."""
     names = [name for group in groups.values() for row in group for name in row.get("tests", ())]
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.xml"
@@ -150,7 +148,7 @@ def run_tests(groups: dict[str, list[dict[str, Any]]]) -> dict[str, tuple[int, i
     for name in names:
         path, _, function = name.partition("::")
         module = path.removesuffix(".py").replace("/", ".")
-        own = [
+        of_name = [
             case
             for case in cases
             if f"{case.get('classname')}.".startswith(f"{module}.")  # perhaps with a class behind
@@ -158,9 +156,9 @@ def run_tests(groups: dict[str, list[dict[str, Any]]]) -> dict[str, tuple[int, i
             and case.find("skipped") is None
         ]
         failed = sum(
-            case.find("failure") is not None or case.find("error") is not None for case in own
+            case.find("failure") is not None or case.find("error") is not None for case in of_name
         )
-        outcomes[name] = len(own), failed
+        outcomes[name] = len(of_name), failed
     return outcomes
 
 
@@ -176,12 +174,13 @@ def main() -> None:
         action="store_true",
         help="the grand means of [B] Table 5 were targets of the calibration",
     )
-    parser.add_argument("--out", type=Path, help="page of validation; the others go beside it")
+    parser.add_argument("--page", type=Path, help="page to renew between its marks")
+    parser.add_argument("--out", type=Path, help="also write the text to this file")
     arguments = parser.parse_args()
     reference = load_machine("reference")
     means_kind = rows.FITTED if arguments.fitted_means else rows.PREDICTED
-    found = compared(reference, arguments.quick, means_kind)
-    command = "python analyses/write_validation.py --out docs/validation.md"
+    table = compared(reference, arguments.quick, means_kind)
+    command = "python analyses/write_validation.py --page docs/validation.md"
     command += " --fitted-means" if arguments.fitted_means else ""
     command += " --tests" if arguments.tests else ""
     notes = [
@@ -190,26 +189,18 @@ def main() -> None:
         f"Gasket study: {20 if arguments.quick else 243} trials, tables linear.",
     ]
     reasons = {str(key): str(text) for key, text in read_yaml(REASONS).items()}
-    made = Made(command, notes, reasons)
     groups = YAML(typ="safe").load(VERIFICATION)
-    pages = {
-        "validation.md": validation_page(
-            found,
-            made,
-            rows.FITTED,
-            {"Reference machine with fewer free quantities": simpler_machines()},
-        ),
-        "prediction.md": validation_page(found, made, rows.PREDICTED),
-        "verification.md": verification_page(
-            groups, command, run_tests(groups) if arguments.tests else {}
-        ),
-    }
-    for name, page in pages.items():
-        print(page)
-        if arguments.out:
-            is_first = name == "validation.md"
-            path = arguments.out if is_first else arguments.out.with_name(name)
-            path.write_text(page, encoding="utf-8")
+    fewer = {"Reference machine with fewer free quantities": simpler_machines()}
+    text = page.origin(command, notes)
+    text += page.verified(groups, run_tests(groups) if arguments.tests else {})
+    text += page.compared(table, rows.FITTED, reasons, fewer)
+    text += page.compared(table, rows.PREDICTED, reasons)
+    print(text)
+    if arguments.out:
+        arguments.out.write_text(text, encoding="utf-8")
+    if arguments.page:
+        before = arguments.page.read_text(encoding="utf-8")
+        arguments.page.write_text(page.renewed(before, text), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,8 @@
 Property tests run the same examples every time.
 """
 
+import functools
+import shlex
 import sys
 from dataclasses import dataclass
 
@@ -25,9 +27,15 @@ def reference():
 
 
 @pytest.fixture(scope="session")
-def machine(reference):
+def shipped():
+    """Return a function that builds a shipped machine, each once; tests set up their own Context."""
+    return functools.cache(lambda name: build_machine(load_machine(name)))
+
+
+@pytest.fixture(scope="session")
+def machine(shipped):
     """Build the reference machine once; every test sets up its own Context."""
-    return build_machine(reference)
+    return shipped("reference")
 
 
 @pytest.fixture(scope="session")
@@ -54,16 +62,23 @@ class CommandResult:
 def wm_drake(monkeypatch, capsys, tmp_path):
     """Return a function that runs `wm-drake` in this process, in a temporary folder.
 
-    For example, ``wm_drake("machine", "check", "reference").code == 0``.
+    For example, ``wm_drake("machine check", "reference").code == 0``: the first argument may be
+    several words, as in a shell.
     """
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setattr("wm_drake.cli.progress.LINE_PERIOD", float("inf"))
+    monkeypatch.setattr("wm_drake.report.progress.LINE_PERIOD", float("inf"))
 
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["wm-drake", *map(str, arguments)])
+    def run(words, *arguments):
+        monkeypatch.setattr(sys, "argv", ["wm-drake", *shlex.split(words), *map(str, arguments)])
         with pytest.raises(SystemExit) as ended:
             main()
         return CommandResult(ended.value.code or 0, *capsys.readouterr())
 
     return run
+
+
+@pytest.fixture
+def no_runs(monkeypatch):
+    """Return a function after whose call every simulation of several cases fails in this process."""
+    return lambda: monkeypatch.setattr("wm_drake.batch.runs.integrate_runs", None)

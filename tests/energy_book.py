@@ -5,6 +5,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
+from tube_energy import rotation_vector_rate
 
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.bodies import add_bodies, add_load, set_bodies
@@ -89,10 +90,7 @@ class EnergyBook:
         r = self.rotation.as_rotvec()
         c = np.array([g.damping_x, g.damping_y, g.damping_z])
         cr = np.array([g.rotational_damping_x, g.rotational_damping_y, g.rotational_damping_z])
-        # rate of the rotation vector, by the inverse of the series for the angular velocity
-        r_rate = np.array(
-            [self._rotation_vector_rate(a, b) for a, b in zip(r, self.w, strict=True)]
-        )
+        r_rate = rotation_vector_rate(r, self.w)
         branch_stored, branch_power = self._branches(
             g, np.hstack([d, r]), np.hstack([d_rate, r_rate])
         )
@@ -129,14 +127,6 @@ class EnergyBook:
                 )  # the dashpot carries the force of the spring
             stored = stored + 0.5 * stiffness * z**2
         return stored, power
-
-    @staticmethod
-    def _rotation_vector_rate(r, w):
-        x = np.array([[0, -r[2], r[1]], [r[2], 0, -r[0]], [-r[1], r[0], 0]])
-        left_jacobian = (
-            np.eye(3) + x / 2 + x @ x / 6 + x @ x @ x / 24 + x @ x @ x @ x / 120
-        )  # w = J r'
-        return np.linalg.solve(left_jacobian, w)
 
     def dampers(self):
         """Return stored energy [J] and dissipated power [W] of sponges and end bushings."""

@@ -57,36 +57,36 @@ KINDS = {
         "spin/comparison.html", "spin", "--compare-gasket", "--load", "middle", "--load", "front",
     ),
     "rig_damper": _one(
-        "rig/page.html", "rig", "damper", *DAMPER, "-f", "1,10 Hz", "-a", "0.3,1 mm"
+        "sections.html", "rig", "damper", *DAMPER, "-f", "1,10 Hz", "-a", "0.3,1 mm"
     ),
-    "rig_gasket": _one("rig/page.html", "rig", "gasket", "--axis", "axial", "--matrix", "A"),
+    "rig_gasket": _one("sections.html", "rig", "gasket", "--axis", "axial", "--matrix", "A"),
     "rig_bushing": _one(
-        "rig/page.html", "rig", "bushing", "--machine", "free_stroke", "--axis", "radial",
+        "sections.html", "rig", "bushing", "--machine", "free_stroke", "--axis", "radial",
         "-f", "1,5 Hz", "-a", "1 mm",
     ),
     "identify_damper": _fit(
-        "identify/page.html", ("damper", *DAMPER, "-f", "1,10 Hz", "-a", "0.3,1 mm"), "damper", "*"
+        "sections.html", ("damper", *DAMPER, "-f", "1,10 Hz", "-a", "0.3,1 mm"), "damper", "*"
     ),
     "identify_gasket": _fit(
-        "identify/page.html",
+        "sections.html",
         ("gasket", "--machine", "free_stroke", "--axis", "radial", "-f", "1,5 Hz", "-a", "1,10 mm"),
         "gasket", "*", "--axis", "radial",
     ),
     "identify_table": _fit(
-        "identify/page.html", ("gasket", "--axis", "axial", "-f", "1,5 Hz", "-a", "1,10 mm"),
+        "sections.html", ("gasket", "--axis", "axial", "-f", "1,5 Hz", "-a", "1,10 mm"),
         "gasket", "*", "--axis", "axial", "--law", "table",
     ),
     "identify_rivals": _fit(
-        "identify/comparison.html",
+        "sections.html",
         ("damper", *DAMPER, "-f", "1,5,10 Hz", "-a", "0.3,1 mm"),
         "damper", "*", "--law", "mstv,stv,coulomb",
     ),
     "identify_static": _one(
-        "identify/static.html", "identify", "gasket", "--static", "radial=r.csv", "axial=a.csv"
+        "sections.html", "identify", "gasket", "--static", "radial=r.csv", "axial=a.csv"
     ),
-    "identify_table2": _one("identify/table2.html", "identify", "table2"),
+    "identify_table2": _one("sections.html", "identify", "table2"),
     "calibration": _one(
-        "calibration/page.html", "calibrate", "--machine", "short.yaml", "--free", "free.yaml",
+        "sections.html", "calibrate", "--machine", "short.yaml", "--free", "free.yaml",
         "--targets", "measured.csv", "--starts", "1", "--iterations", "3",
         "--leave-out", "back", "--fewer", "1",
     ),
@@ -96,17 +96,17 @@ KINDS = {
         "--model", "main", "--load", "back", "--response", "mount_force_peak", "--response", "amplitude",
     ),
     "gasket_effect": _one("gasket_effect/page.html", "study", "gasket-effect", "--load", "middle"),
-    "gasket_damping": _one("gasket_damping/page.html", "study", "gasket-damping", "--mesh", "20"),
+    "gasket_damping": _one("sections.html", "study", "gasket-damping", "--mesh", "20"),
     "spin_cycle": _one(
-        "spin_cycle/page.html", "study", "spin-cycle", "--case", "2", "--case", "29"
+        "sections.html", "study", "spin-cycle", "--case", "2", "--case", "29"
     ),
     "spin_identify": _one(
-        "spin_identify/page.html", "study", "spin-identify", "--case", "2",
+        "sections.html", "study", "spin-identify", "--case", "2",
         "--unknown", "gasket.stiffness_y=(1, 4) N/mm", "--profile", "short_cycle.yaml",
     ),
     "modes": _one("modes/page.html", "study", "modes"),
     "response": _one(
-        "response/page.html", "study", "response", "--load", "middle", "--points", "15",
+        "steady/page.html", "study", "response", "--load", "middle", "--points", "15",
         "--harmonics", "3", "--rate", "20 rpm/s", "--rate", "50 rpm/s",
     ),
     "orders": Kind(
@@ -114,14 +114,14 @@ KINDS = {
         (("spin", "--load", "middle", "--out", "bench"), ("record", "orders", "record")),
     ),
     "tolerance": _one(
-        "tolerance/page.html", "study", "tolerance", "laundry", "--samples", "64",
+        "sections.html", "study", "tolerance", "laundry", "--samples", "64",
         "--sensitivity", "16", "--subset", "100", "--limits", "limits.yaml",
     ),
     "design": _one(
         "pareto/page.html", "study", "design", "gasket", "--evaluations", "48", "--population", "16"
     ),
     "drive": _one(
-        "drive/page.html", "study", "drive", "--load", "middle", "--torques", "3",
+        "sections.html", "study", "drive", "--load", "middle", "--torques", "3",
         "--unbalances", "2", "--loads", "4",
     ),
 }  # fmt: skip

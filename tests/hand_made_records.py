@@ -105,9 +105,10 @@ def case_result(
     **record: int,
 ) -> CaseResult:
     made = harmonic_record(parameters, load, gasket, size, **record)
-    measures = replace(
-        measure(made), smallest_gap=Gap(gap, 0.5, "tub_shell", "wall_right", (0.28, 0.16, 0.0))
-    )
+    smallest = Gap(gap, 0.5, "tub_shell", "wall_right", (0.28, 0.16, 0.0))
+    measures = measure(made)
+    table = measures.table.assign(smallest_gap=smallest.distance)
+    measures = replace(measures, table=table, smallest_gap=smallest)
     return CaseResult(
         Case(load, parameters.loads[load], parameters.profile, gasket), made, measures, 1.5
     )

@@ -1,8 +1,11 @@
 """Variants of the reference machine with each kind of element, for comparisons of both engines."""
 
-import pytest
+import functools
 
-from wm_drake.parameters import MachineParameters, load_machine
+import pytest
+from pydantic import TypeAdapter
+
+from wm_drake.parameters import DamperType, MachineParameters, load_machine
 
 END_BUSHING = {
     "stiffness": 90.0,
@@ -70,9 +73,17 @@ TABLES = {f"stiffness_{axis}": LINEAR_TABLE for axis in "xyz"} | {
 }
 
 
+reference = functools.cache(functools.partial(load_machine, "reference"))
+
+
 def changed(**parts):
     """Return the reference machine with some of its top-level parts replaced."""
-    return MachineParameters.model_validate(load_machine("reference").model_dump() | parts)
+    return MachineParameters.model_validate(reference().model_dump() | parts)
+
+
+def damper_of(law, **changes):
+    """Return a damper type of a law, with some of its numbers replaced."""
+    return TypeAdapter(DamperType).validate_python({"law": law} | DAMPERS[law] | changes)
 
 
 def names_of_each_kind():
@@ -83,11 +94,11 @@ def names_of_each_kind():
     ]
 
 
+@functools.cache
 def machines_of_each_kind():
     """Return all variants by name."""
-    reference = load_machine("reference").model_dump()
-    end_bushing = {"end_bushing": END_BUSHING}
-    machines = {"reference": load_machine("reference")}
+    machines = {"reference": reference()}
+    drawn, end_bushing = reference().model_dump(), {"end_bushing": END_BUSHING}
     for law, numbers in DAMPERS.items():
         machines[law] = changed(
             damper_types={"friction": {"law": law, **numbers, **end_bushing}}, gasket=None
@@ -96,8 +107,8 @@ def machines_of_each_kind():
     machines["spring tables"] = changed(
         spring_types={"suspension": {"stiffness": LINEAR_TABLE}}, dampers={}, gasket=None
     )
-    machines["gasket tables"] = changed(gasket=reference["gasket"] | TABLES | FRICTION, dampers={})
-    second = reference["gasket"] | {"stiffness_x": LINEAR_TABLE} | FRICTION
+    machines["gasket tables"] = changed(gasket=drawn["gasket"] | TABLES | FRICTION, dampers={})
+    second = drawn["gasket"] | {"stiffness_x": LINEAR_TABLE} | FRICTION
     machines["two bushings, five dampers of three laws"] = changed(
         bushings={"rear": second},
         damper_types={
@@ -105,7 +116,7 @@ def machines_of_each_kind():
             for law in ("coulomb", "mstv", "free_stroke")
         },
         dampers={
-            f"{place}_{law}": reference["dampers"][place] | {"type": law}
+            f"{place}_{law}": drawn["dampers"][place] | {"type": law}
             for place, law in (
                 ("left", "mstv"),
                 ("left", "coulomb"),
@@ -117,13 +128,13 @@ def machines_of_each_kind():
     )
     machines["eight springs, seven dampers of two laws"] = changed(
         gasket=None,
-        spring_types=reference["spring_types"] | {"table": {"stiffness": LINEAR_TABLE}},
+        spring_types=drawn["spring_types"] | {"table": {"stiffness": LINEAR_TABLE}},
         springs={
-            f"{name}_{k}": spring for k in range(2) for name, spring in reference["springs"].items()
+            f"{name}_{k}": spring for k in range(2) for name, spring in drawn["springs"].items()
         }
         | {
             f"{name}_table": spring | {"type": "table"}
-            for name, spring in list(reference["springs"].items())[:2]
+            for name, spring in list(drawn["springs"].items())[:2]
         },
         damper_types={
             law: {"law": law, **DAMPERS[law], **end_bushing} for law in ("mstv", "havsin")
@@ -131,13 +142,13 @@ def machines_of_each_kind():
         dampers={
             f"{name}_{k}": damper | {"type": "mstv"}
             for k in range(2)
-            for name, damper in reference["dampers"].items()
+            for name, damper in drawn["dampers"].items()
         }
         | {
             f"{name}_havsin": damper | {"type": "havsin"}
-            for name, damper in list(reference["dampers"].items())[:1]
+            for name, damper in list(drawn["dampers"].items())[:1]
         },
     )
-    rubber = reference["gasket"] | {"stiffness_x": LINEAR_TABLE} | FRICTION | RUBBER
+    rubber = drawn["gasket"] | {"stiffness_x": LINEAR_TABLE} | FRICTION | RUBBER
     machines["two bushings of rubber"] = changed(gasket=rubber, bushings={"rear": second | RUBBER})
     return machines

@@ -18,4 +18,4 @@ def data_of(page: str) -> list[dict]:
 
 def drawings(page: str) -> list[dict]:
     """Return the descriptions of the pictures of a page."""
-    return [one for one in data_of(page) if "panels" in one]
+    return [one for one in data_of(page) if "layout" in one]

@@ -9,6 +9,14 @@ STIFFNESS = 7000.0  # N/m
 DAMPING = 55.0  # N s/m
 MASS = 6 * 7.0  # kg, six bodies
 
+BODIES = (
+    "tub",
+    "drum",
+    "motor",
+    "upper_counterweight",
+    "front_counterweight_left",
+    "front_counterweight_right",
+)
 STEPS = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])  # displacements of a gasket table, in its half range
 HARDENING = np.array([-3.0, -1.0, 0.0, 1.0, 3.0])  # forces there, in force of the half range
 
@@ -22,14 +30,6 @@ def isotropic_machine(stiffness=STIFFNESS, damping=DAMPING, rotational_stiffness
     ball = BodyOverride(
         mass=7.0, centre_of_mass=(0.0, 0.0, 0.0), inertia=InertiaMatrix(xx=0.3, yy=0.3, zz=0.3)
     )
-    bodies = (
-        "tub",
-        "drum",
-        "motor",
-        "upper_counterweight",
-        "front_counterweight_left",
-        "front_counterweight_right",
-    )
     origin = {"position": (0.0, 0.0, 0.0)}
     linear = {f"stiffness_{axis}": stiffness for axis in "xyz"} | {
         f"damping_{axis}": damping for axis in "xyz"
@@ -37,7 +37,7 @@ def isotropic_machine(stiffness=STIFFNESS, damping=DAMPING, rotational_stiffness
     rotational = {f"rotational_stiffness_{axis}": rotational_stiffness for axis in "xyz"}
     tree = reference.model_dump() | {
         "gravity": 0.0,
-        "bodies": dict.fromkeys(bodies, ball.model_dump()),
+        "bodies": dict.fromkeys(BODIES, ball.model_dump()),
         "frames": {"gasket_tub": origin, "gasket_housing": origin},
         "spring_types": {"suspension": {"stiffness": 0.0, "action": "tension-compression"}},
         "dampers": {},

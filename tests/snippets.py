@@ -40,18 +40,18 @@ class Block:
 
 def blocks_of(path):
     """Return the fenced blocks of a page, in their order."""
-    found, language, lines = [], None, []
+    collected, language, lines = [], None, []
     for line in text_of(path).splitlines():
         if line.startswith("```"):
             if language is None:
                 language, lines = line[3:].split(" ")[0], []
             else:
-                found.append(Block(name_of(path), language, tuple(lines)))
+                collected.append(Block(name_of(path), language, tuple(lines)))
                 language = None
         elif language is not None:
             lines.append(line)
     assert language is None, f"{path}: a block has no end"
-    return found
+    return collected
 
 
 BLOCKS = [block for path in PAGES for block in blocks_of(path)]
@@ -95,8 +95,8 @@ def prepare(folder, page):
     amplitudes.to_csv(folder / "measured.csv", index=False)
     amplitudes.to_csv(folder / "mine.csv", index=False)
     write_laboratory(folder)
-    own = [block for block in BLOCKS if block.page == page and block.language in ("yaml", "csv")]
-    for name, block in zip(FILES.get(page, []), own, strict=True):
+    files = [block for block in BLOCKS if block.page == page and block.language in ("yaml", "csv")]
+    for name, block in zip(FILES.get(page, []), files, strict=True):
         (folder / name).write_text("\n".join(block.lines) + "\n", encoding="utf-8")
     if page == "docs/how-to/commands.md":
         write_commands_page(folder)

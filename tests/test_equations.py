@@ -33,8 +33,8 @@ WRITTEN = {  # how the plain text has what MathML shows
 def blocks_of(path):
     """Return the indented blocks before the sections of each docstring of a file."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    found = [tree, *(node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef))]
-    for node in found:
+    nodes = [tree, *(node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef))]
+    for node in nodes:
         lines = (ast.get_docstring(node) or "").splitlines()
         end = next((i for i, line in enumerate(lines) if SECTION.match(line)), len(lines))
         text = "\n".join(lines[:end])

@@ -7,7 +7,9 @@ import pytest
 import typer
 import yaml
 from documents import CHECKOUT, HOW_TO, README, blocks, commands, name_of
+from drag_damper import DRAG_DAMPER
 
+import wm_drake
 from wm_drake.cli import app
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile, load_machine
@@ -235,6 +237,12 @@ def test_the_gasket_with_branches_of_the_page_is_one(tmp_path):
     assert gasket.cross_stiffness_y_z == 300.0
 
 
+def test_the_machine_with_an_element_of_another_package_is_one(tmp_path):
+    wm_drake.register_element(DRAG_DAMPER)
+    machine = load_machine(written(tmp_path, page("extend")))
+    assert machine.elements["slow"].coefficient == 400.0
+
+
 def test_every_yaml_block_is_one_of_those_above():
     counted = {name_of(path): len(blocks(path, "yaml")) for path in PAGES if blocks(path, "yaml")}
     assert counted == {
@@ -244,6 +252,7 @@ def test_every_yaml_block_is_one_of_those_above():
         "docs/how-to/compliant-bearing.md": 1,
         "docs/how-to/designs.md": 1,
         "docs/how-to/drive.md": 1,
+        "docs/how-to/extend.md": 1,
         "docs/how-to/floor.md": 2,
         "docs/how-to/own-machine.md": 3,
         "docs/how-to/rubber.md": 1,

@@ -20,12 +20,14 @@ NOT_SHELL = {
     "yaml": "read in test_readme",
     "csv": "read by the commands of its page",
     "{eval-rst}": "no snippet",
+    "toml": "metadata of a package of a user: tests/extension",
     "{image}": "no snippet",
     "{include}": "no snippet",
     "{literalinclude}": "a piece of a test",
     "{toctree}": "no snippet",
 }
-ELSEWHERE = {  # pages whose commands something else runs
+ELSEWHERE = {  # pages whose commands and files something else runs
+    "docs/how-to/extend.md": "tests/extension runs what it shows, and test_readme reads its file",
     "docs/gallery.md": "analyses/make_gallery.py runs them and takes pictures of what they write",
 }
 NOT_RUN = {  # beginning of a command, and why this test does not run it
@@ -33,7 +35,7 @@ NOT_RUN = {  # beginning of a command, and why this test does not run it
     ".venv/bin/pip": "installs into a new environment: .ci/run",
     "source .venv": "changes the shell only",
     "pip install": "installs into a new environment: .ci/run",
-    "python analyses/write_validation.py": "tests/analyses runs it with --quick",
+    "python analyses/": "tests/analyses runs it with --quick",
     "sphinx-build": "builds the manual: .ci/run",
     "wm-drake studio": "serves until it is stopped: tests/studio",
     "wm-drake study gasket --cluster": "needs a cluster: tests/batch/test_cluster.py and a tutorial",
@@ -120,25 +122,25 @@ def run_all(wm_drake, folder, page, chosen):
         if words[0] != "machine" and "--resume" not in words:
             first = next((n for n, word in enumerate(words) if word.startswith("-")), len(words))
             words.insert(first, "--overwrite")  # before an option that takes several values
-        run = in_own_process if "--replay" in words else wm_drake
+        run = in_another_process if "--replay" in words else wm_drake
         result = run(*words)
         if result.code:
             failed.append((command, result.code, result.err))
     return failed
 
 
-def in_own_process(*words):
+def in_another_process(*words):
     """Run a command alone: Drake's Meshcat ends a process that collects it in another thread."""
     program = [sys.executable, "-c", "from wm_drake.cli import main; main()"]
     done = subprocess.run([*program, *words], capture_output=True, text=True, check=False)
     return SimpleNamespace(code=done.returncode, out=done.stdout, err=done.stderr)
 
 
-def pages_with(wanted):
+def pages_with(long):
     return [
         pytest.param(page, [line for line in lines if not reason_not_to_run(line)], id=page)
         for page, lines in COMMANDS.items()
-        if any(not reason_not_to_run(line) and is_long(line) == wanted for line in lines)
+        if any(not reason_not_to_run(line) and is_long(line) == long for line in lines)
     ]
 
 

@@ -35,12 +35,9 @@ def still(count):
 
 def rotation_vector_rate(r, w):
     """Return the time derivative of a rotation vector at an angular velocity, from a series."""
-    rates = np.empty_like(r)
-    for k, (a, b) in enumerate(zip(r, w, strict=True)):
-        x = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
-        left = np.eye(3) + x / 2 + x @ x / 6 + x @ x @ x / 24 + x @ x @ x @ x / 120
-        rates[k] = np.linalg.solve(left, b)
-    return rates
+    x = np.swapaxes(np.cross(r[:, None], np.eye(3)), 1, 2)  # x @ b is the cross product r x b
+    left = np.eye(3) + x / 2 + x @ x / 6 + x @ x @ x / 24 + x @ x @ x @ x / 120
+    return np.linalg.solve(left, w[..., None])[..., 0]
 
 
 def havsin(v, v_t, p):
@@ -89,6 +86,52 @@ def bushing(kind, a, p_a, r_a, b, p_b, r_b):
     return stored, power
 
 
+def energy_of_bushings(parts):
+    """Return stored energy [J] and dissipated power [W] of bushings.
+
+    Args:
+        parts: Numbers, motion of the first body, place, motion of the second body of each bushing.
+    """
+    stored, power = 0.0, 0.0
+    for kind, a, placed, b in parts:
+        more_stored, more_power = bushing(
+            kind,
+            a,
+            placed.tub_side_point,
+            placed.tub_side_rotation,
+            b,
+            placed.ground_side_point,
+            placed.ground_side_rotation,
+        )
+        stored, power = stored + more_stored, power + more_power
+    return stored, power
+
+
+def energies_of_bodies(machine, parameters, load, states):
+    """Return kinetic plus potential energy of all bodies at some states. [J]
+
+    Args:
+        machine, parameters, load: What is in the bodies.
+        states: At each time, the state of each tree in the order of the machine's layout.
+    """
+    plant = MultibodyPlant(0.0)
+    add_bodies(plant, parameters)
+    context = plant.CreateDefaultContext()
+    set_bodies(plant, context, parameters)
+    add_load(plant, context, load)
+    # the reflected inertia of the drive is numerical and stores no energy of the machine
+    plant.get_joint_actuator(plant.GetJointActuatorIndices()[0]).SetRotorInertia(context, 0.0)
+    energies = []
+    for blocks in states:
+        state = np.zeros(plant.num_multibody_states())
+        trees = list(zip(machine.state_layout.states(), blocks, strict=True))
+        for tree, block in reversed(trees):  # a drum carrier shares the joint of the first tree
+            state[tree] = block
+        plant.SetPositionsAndVelocities(context, state)
+        energies.append(plant.CalcKineticEnergy(context) + plant.CalcPotentialEnergy(context))
+    return energies
+
+
 def balance(machine, setup, load, profile, step):
     """Return work of the drive, change of stored energy and dissipated energy of a run. [J]"""
     parameters = setup.parameters
@@ -125,32 +168,9 @@ def balance(machine, setup, load, profile, step):
             + havsin(v, law.basic_full_friction_velocity, law.basic_friction_force) * v
             + sponge(delta) * slider
         )
-    for kind, a, placed, b in parts:
-        more_stored, more_power = bushing(
-            kind,
-            a,
-            placed.tub_side_point,
-            placed.tub_side_rotation,
-            b,
-            placed.ground_side_point,
-            placed.ground_side_rotation,
-        )
-        stored, power = stored + more_stored, power + more_power
-    plant = MultibodyPlant(0.0)
-    add_bodies(plant, parameters)
-    context = plant.CreateDefaultContext()
-    set_bodies(plant, context, parameters)
-    add_load(plant, context, load)
-    # the reflected inertia of the drive is numerical and stores no energy of the machine
-    plant.get_joint_actuator(plant.GetJointActuatorIndices()[0]).SetRotorInertia(context, 0.0)
-    bodies = []
-    for sample in (0, -1):
-        state = np.zeros(plant.num_multibody_states())
-        for tree, block in zip(
-            machine.state_layout.states(), (motion[sample], *tubes[sample]), strict=True
-        ):
-            state[tree] = block
-        plant.SetPositionsAndVelocities(context, state)
-        bodies.append(plant.CalcKineticEnergy(context) + plant.CalcPotentialEnergy(context))
+    more_stored, more_power = energy_of_bushings(parts)
+    stored, power = stored + more_stored, power + more_power
+    states = [(motion[sample], *tubes[sample]) for sample in (0, -1)]
+    bodies = energies_of_bodies(machine, parameters, load, states)
     drive = np.trapezoid(run.motor_torque * motion[:, 13], time)
     return drive, bodies[1] - bodies[0] + stored[-1] - stored[0], np.trapezoid(power, time)

@@ -5,7 +5,7 @@
     wm.envelopes(record).upper.sel(sensor="Xr").plot()
 
 The rooms, in the order of the data flow: `parameters`, `laws`, `elements`, `systems`, `model`,
-`engines`, `simulation`, `batch`, `rigs`, `studies`, `report`, `cli`.
+`engines`, `simulation`, `batch`, `rigs`, `report`, `studies`, `studio`, `cli`.
 """
 
 import importlib
@@ -14,14 +14,18 @@ from typing import Any
 
 _HOMES = {
     "Case": "simulation.cases",
+    "Element": "parameters.element_kinds",
+    "ElementKind": "elements.kind",
+    "Output": "elements.kind",
     "Scene": "model.scene",
+    "State": "elements.kind",
     "add_washing_machine": "model.build",
     "advance_to": "engines.drake",
     "build_machine": "model.build",
     "case_of": "simulation.cases",
     "describe": "studies.description.description",
-    "envelopes": "simulation.measures",
-    "filtered_displacement": "simulation.measures",
+    "envelopes": "simulation.displacements",
+    "filtered_displacement": "simulation.displacements",
     "load_load": "parameters",
     "load_machine": "parameters",
     "load_profile": "parameters",
@@ -29,8 +33,12 @@ _HOMES = {
     "measure": "simulation.measures",
     "modes": "studies.modes.study",
     "natural_modes": "studies.description.modal",
-    "progress_bar": "cli.progress",
+    "progress_bar": "report.progress",
+    "register_element": "elements.kind",
+    "register_study": "studies.study",
+    "register_measure": "simulation.measures",
     "run_spin": "studies.spin.study",
+    "run_study": "studies.run",
     "save_record": "simulation.records",
     "simulate": "simulation.runs",
     "simulate_many": "batch",

@@ -4,6 +4,7 @@ import difflib
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 LONGEST_LINE = 480
 """Largest number of characters of a problem; a longer one is shortened."""
@@ -56,6 +57,10 @@ class InputError(WmDrakeError):
         if len(self.problems) > MOST_LINES:
             lines.append(f"and {len(self.problems) - MOST_LINES} more problems")
         super().__init__("\n".join(lines))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the problems; the default would pass the message to `__init__`."""
+        return type(self), (self.problems,), self.__dict__
 
 
 def input_error(message: str, *, where: str = "", key: str = "") -> InputError:

@@ -86,8 +86,8 @@ def with_indices(text: str) -> str:
     name of code has several underscores or letters before the first, or stands in backticks.
     """
 
-    def index(found: re.Match[str]) -> str:
-        return rf"\ *{found[1]}*\ :sub:`{found[2]}`\ "
+    def index(match: re.Match[str]) -> str:
+        return rf"\ *{match[1]}*\ :sub:`{match[2]}`\ "
 
     parts = CODE.split(text)
     raised = [POWER.sub(r"\\ :sup:`\1`\\ ", part) for part in parts[::2]]
@@ -112,8 +112,8 @@ def _indent(line: str) -> int:
 
 def _second_column(line: str) -> int:
     """Return where the second column of a line begins, 0 if there is none."""
-    found = COLUMN.search(line, _indent(line))
-    return found.end() if found else 0
+    match = COLUMN.search(line, _indent(line))
+    return match.end() if match else 0
 
 
 def _table(lines: list[str]) -> str:
@@ -142,16 +142,16 @@ def _column(text: str) -> str:
 def _tokens(text: str) -> Iterator[Token]:
     at, spaced = 0, True
     while at < len(text):
-        found = TOKEN.match(text, at)
-        if found is None:
+        match = TOKEN.match(text, at)
+        if match is None:
             message = f"no token of an equation: {text[at:]!r} in {text!r}"
             raise ValueError(message)
-        at = found.end()
-        if found["space"]:
+        at = match.end()
+        if match["space"]:
             spaced = True
             continue
-        kind = found.lastgroup if found.lastgroup != "digits" else "word"
-        yield Token(str(kind), found[0], spaced, text[at : at + 1].isspace() or at == len(text))
+        kind = match.lastgroup if match.lastgroup != "digits" else "word"
+        yield Token(str(kind), match[0], spaced, text[at : at + 1].isspace() or at == len(text))
         spaced = False
 
 

@@ -3,19 +3,26 @@
 A page asks for a text by a mark:
 
 - `<!-- machine file keys -->`: the keys of a machine file;
+- `<!-- command options -->`: the commands with their options;
+- `<!-- measures -->`: the measures of a run;
 - `<!-- public names -->`: the public names of the package;
 - `<!-- pages of decisions -->`: the decisions, below their list in the navigation;
 - `<!-- functions of MODULE -->`: the functions of a module of laws, or `MODULE: NAME NAME` of them;
-- `<!-- picture NAME -->`: a picture that is drawn from the code (`pictures.py`).
+- `<!-- picture NAME -->`: a picture that is drawn from the code (`pictures.py`);
+- `<!-- architecture -->`: the rooms of the package and their imports (`architecture.py`).
 """
 
+import contextlib
 import importlib
 import inspect
+import io
 import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import architecture
+import typer
 from equations import mathml_of, with_indices
 from jupyter_cache import get_cache
 from jupyter_cache.cache.db import create_db
@@ -25,14 +32,16 @@ from sphinx.application import Sphinx
 
 import wm_drake
 from wm_drake.parameters.file_keys import FileKey, KeyGroup, key_groups
+from wm_drake.simulation.measures import MEASURES
 
 KEYS, NAMES = "<!-- machine file keys -->", "<!-- public names -->"
-BELOW = "<!-- pages of decisions -->"
+COMMANDS, MEASURED = "<!-- command options -->", "<!-- measures -->"
+BELOW, ROOMS = "<!-- pages of decisions -->", "<!-- architecture -->"
 TREE_BELOW = "```{toctree}\n:hidden:\n:glob:\n\n0*\n```"
 FUNCTIONS = re.compile(r"<!-- functions of ([\w.]+)(?:: ([\w ]+))? -->")
 PICTURE = re.compile(r"<!-- picture ([\w-]+) -->")
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s]+?)(#[^)\s]*)?\)")
-DECISION = re.compile(r"docs/decisions/(\d{4})")
+PAGE_OF_MANUAL = re.compile(r"`?docs/([\w/-]+)\.md`?")
 SECTION = re.compile(r"(Args|Returns|Raises|Yields|Attributes|Example):$")
 NAME_OF_FIELD = re.compile(r" {4}(?! )[\w*, ]+:")
 PAGES_OUTSIDE = {
@@ -86,11 +95,17 @@ def _complete(app: Sphinx, docname: str, source: list[str]) -> None:
     text = source[0]
     if KEYS in text:
         text = text.replace(KEYS, "\n".join(_keys()))
+    if COMMANDS in text:
+        text = text.replace(COMMANDS, "\n".join(_commands()))
+    if MEASURED in text:
+        text = text.replace(MEASURED, "\n".join(_measures()))
     if NAMES in text:
         text = text.replace(NAMES, _documented(_public_names()))
     text = text.replace(BELOW, TREE_BELOW)
-    text = FUNCTIONS.sub(lambda found: _documented(_functions(found[1], found[2])), text)
-    text = PICTURE.sub(lambda found: _drawn(found[1]), text)
+    if ROOMS in text:
+        text = text.replace(ROOMS, f"```{{raw}} html\n{architecture.svg()}\n```")
+    text = FUNCTIONS.sub(lambda match: _documented(_functions(match[1], match[2])), text)
+    text = PICTURE.sub(lambda match: _drawn(match[1]), text)
     source[0] = _relinked(text, Path(app.srcdir), Path(app.srcdir, docname).parent, docname)
 
 
@@ -148,8 +163,8 @@ def _plain_docstring(
     block: list[str] = []
     section = ""
     for line in lines:
-        found = SECTION.match(line)
-        section = found[1] if found else section
+        match = SECTION.match(line)
+        section = match[1] if match else section
         if (line.startswith("    ") and not section) or (block and not line):
             block.append(line)
             continue
@@ -159,14 +174,8 @@ def _plain_docstring(
         head = name[0] if name else ""
         text = line[len(head) :].replace("|", "\\|").replace("*", "\\*")
         text = text if section == "Example" else with_indices(text)
-        new.append(DECISION.sub(_decision, head.replace("*", "\\*") + text))
+        new.append(PAGE_OF_MANUAL.sub(r":doc:`/\1`", head.replace("*", "\\*") + text))
     lines[:] = new + _typeset(block)
-
-
-def _decision(found: re.Match[str]) -> str:
-    """Return a link to the decision that a docstring names by its number."""
-    (path,) = (Path(__file__).parents[1] / "decisions").glob(f"{found[1]}-*.md")
-    return f":doc:`decision {found[1]} </decisions/{path.stem}>`"
 
 
 def _typeset(block: list[str]) -> list[str]:
@@ -196,14 +205,53 @@ def _functions(module: str, chosen: str | None) -> Iterator[tuple[str, str]]:
     if chosen:
         return
     for name, value in vars(importlib.import_module(module)).items():
-        own = getattr(value, "py_func", value)
-        if inspect.isfunction(own) and own.__module__ == module and not name.startswith("_"):
+        function = getattr(value, "py_func", value)
+        if (
+            inspect.isfunction(function)
+            and function.__module__ == module
+            and not name.startswith("_")
+        ):
             yield "autofunction", f"{module}.{name}"
 
 
 def _documented(names: Iterator[tuple[str, str]]) -> str:
     directives = "\n\n".join(f".. {kind}:: {name}" for kind, name in names)
     return f"```{{eval-rst}}\n{directives}\n```"
+
+
+def _commands() -> Iterator[str]:
+    """Yield a section for each command: its help, and a table of its arguments and options."""
+    app = typer.main.get_command(importlib.import_module("wm_drake.cli").app)
+    contexts = [type(app).context_class(app, info_name="wm-drake")]
+    while contexts:
+        context = contexts.pop()
+        command: Any = context.command
+        if hasattr(command, "list_commands"):
+            for name in reversed(command.list_commands(context)):
+                below = command.get_command(context, name)
+                contexts.append(type(below).context_class(below, parent=context, info_name=name))
+            continue
+        with contextlib.redirect_stdout(io.StringIO()):
+            command.get_help(context)  # completes the help of its options
+        yield f"## {context.command_path.removeprefix('wm-drake ')}\n\n{_escaped(command.help)}\n"
+        yield "| option | meaning |\n|---|---|"
+        for option in command.params:
+            names, meaning = option.get_help_record(context)
+            cells = (f"`{names}`", _escaped(meaning).replace("<", "&lt;").replace("*", "\\*"))
+            yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+        yield ""
+
+
+def _measures() -> Iterator[str]:
+    """Yield the rows of a table of the variables of all measures."""
+    yield "| measure | variable | for each | unit | what it is | response |"
+    yield "|---|---|---|---|---|---|"
+    for measure in MEASURES.values():
+        for variable in measure.variables:
+            places = ", ".join(variable.dims)
+            cells = (f"`{measure.name}`", f"`{variable.name}`", places, variable.units)
+            response = f"`{variable.group_name}`" if variable.is_response else ""
+            yield f"| {' | '.join(cells)} | {_escaped(variable.about)} | {response} |"
 
 
 def _keys() -> Iterator[str]:

@@ -259,12 +259,12 @@ def drive_curves() -> Figure:
         xlabel="speed of the motor, rpm", ylabel="N m", title="torque limit T_max", ylim=(0, None)
     )
     rate = np.linspace(-5.0, 5.0, 401)
-    own = SimpleNamespace(
+    values = SimpleNamespace(
         friction_torque=drive.bearing_friction.friction_torque,
         full_friction_rate=drive.bearing_friction.full_friction_rate,
         damping=drive.bearing_friction.damping,
     )
-    right.plot(rate, [motor.drum_friction.py_func(x, own) for x in rate])
+    right.plot(rate, [motor.drum_friction.py_func(x, values) for x in rate])
     right.set(xlabel="rate of the drum, rad/s", ylabel="N m", title="friction of bearing and seal")
     return figure
 
@@ -420,12 +420,12 @@ def tubes() -> Figure:
 @picture("cabinet", "Feet, centre of mass and floor of the cabinet of the reference machine")
 def cabinet() -> Figure:
     """Draw the cabinet of the reference machine on its feet."""
-    own = described("reference")["cabinet"]
-    centre = 1e3 * np.array(own["centre_of_mass_W"])
-    floor = 1e3 * own["floor_z_W"]
+    values = described("reference")["cabinet"]
+    centre = 1e3 * np.array(values["centre_of_mass_W"])
+    floor = 1e3 * values["floor_z_W"]
     figure = Figure(figsize=(9.0, 3.6))
     above, front = figure.subplots(1, 2)
-    for name, foot in own["feet"].items():
+    for name, foot in values["feet"].items():
         place = 1e3 * foot["x"], 1e3 * foot["y"]
         above.plot(*place, "o", color=ORANGE, ms=8)
         _named(above, name, place, ORANGE)
@@ -448,8 +448,8 @@ def cabinet() -> Figure:
 @picture("profile", "Spin profile of the reference machine")
 def profile() -> Figure:
     """Draw the spin profile of the reference machine."""
-    own = described("reference")["profile"]
+    values = described("reference")["profile"]
     figure, axes = _axes(height=2.4)
-    axes.plot(own["time"], np.array(own["speed"]) * 30.0 / np.pi, "o-")
+    axes.plot(values["time"], np.array(values["speed"]) * 30.0 / np.pi, "o-")
     axes.set(xlabel="time, s", ylabel="drum speed, rpm")
     return figure

@@ -1,6 +1,8 @@
 """Test that every analysis script runs with --quick and writes its result."""
 
+import importlib.util
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -9,9 +11,6 @@ import pytest
 
 ANALYSES = Path(__file__).parents[2] / "analyses"
 LONG = {  # more than five seconds
-    "benchmark_engines.py",
-    "benchmark_rival_laws.py",
-    "benchmark_tolerances.py",
     "calibrate_reference.py",
     "check_spin_of_tubes.py",
     "choose_step.py",
@@ -19,8 +18,8 @@ LONG = {  # more than five seconds
     "compare_designs.py",
     "compare_mujoco.py",
     "compare_searches.py",
+    "compare_speed.py",
     "fit_coulomb_to_mstv.py",
-    "measure_studio.py",
     "write_validation.py",
 }
 SCRIPTS = [
@@ -39,3 +38,18 @@ def test_script_runs_quickly_and_writes_its_output(script, tmp_path):
     assert done.returncode == 0, done.stderr
     assert out.read_text().strip() in done.stdout
     assert script in (ANALYSES / "README.md").read_text()
+
+
+def test_renewing_the_table_of_times_changes_the_measured_rows_only():
+    path = ANALYSES / "compare_speed.py"
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    compare_speed = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(compare_speed)
+    page = (ANALYSES.parent / "docs" / "performance.md").read_text()
+    rows = re.findall(r"^\| ((?!task|---).*?) \|.*$", page, re.MULTILINE)
+    assert set(rows) <= set(compare_speed.TASKS)
+    assert compare_speed.renewed(page, {}) == page
+    renewed = compare_speed.renewed(page, {"`spin`": "| `spin` | 1 | 2 | 0.5 |  | today |"})
+    before, after = (text.splitlines() for text in (page, renewed))
+    assert [line for line in after if line not in before] == ["| `spin` | 1 | 2 | 0.5 |  | today |"]
+    assert [line for line in before if line not in after and not line.startswith("| `spin`")] == []

@@ -1,19 +1,22 @@
 """simulate_many: the numbers of a run are its own, whatever runs beside it; interruptions, divergence, faults, memory."""
 
 import itertools
+import sys
 import tracemalloc
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 import xarray as xr
+from machines_of_each_kind import machines_of_each_kind
 from simple_machines import with_gasket_tables
 
 from wm_drake.batch import SimulationInterrupted, simulate_many
 from wm_drake.batch.runs import Runner
 from wm_drake.batch.work_items import KEPT_NUMBERS, Preparation
 from wm_drake.compiler.lanes import WIDTH
-from wm_drake.errors import InputError
+from wm_drake.errors import InputError, InputNotice
 from wm_drake.model.build import build_machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, with_value
@@ -136,12 +139,12 @@ def test_likeness_changes_no_bit(machine, reference, cases):
 def test_scenes_are_used_again_and_change_no_bit(machine, cases):
     built = build_machine(machine.parameters)
     first = simulate_many(built, cases[:9], measures=["gap", "contacts"], workers=2)
-    count = len(built.scenes)
+    count = len(built.cache.scenes)
     assert 1 <= count <= 2
     xr.testing.assert_identical(
         simulate_many(built, cases[:9], measures=["gap", "contacts"], workers=1), first
     )
-    assert len(built.scenes) == count
+    assert len(built.cache.scenes) == count
 
 
 def recorded(machine, cases):
@@ -345,8 +348,6 @@ def test_machines_whose_tables_are_elsewhere_do_not_run_side_by_side(reference):
 
 
 def test_machines_with_tables_and_sponges_run_side_by_side():
-    from machines_of_each_kind import machines_of_each_kind
-
     for name in (
         "gasket tables",
         "spring tables",
@@ -365,3 +366,32 @@ def test_machines_with_tables_and_sponges_run_side_by_side():
                 np.testing.assert_allclose(
                     told[variable].values[index], getattr(alone, variable).values, rtol=1e-9
                 )
+
+
+def test_overlapping_batches_leave_the_turns_of_threads_alone(machine, cases):
+    before = sys.getswitchinterval()
+    during = []
+    with ThreadPoolExecutor(2) as pool:
+        ended = [
+            pool.submit(
+                simulate_many,
+                machine,
+                cases[:2],
+                progress=lambda _: during.append(sys.getswitchinterval()),
+            )
+            for _ in range(2)
+        ]
+    assert ended[0].result().identical(ended[1].result())
+    assert {*during, sys.getswitchinterval()} == {before}
+
+
+def test_friction_that_jumps_is_noticed_once_a_call(machine):
+    jumping = build_machine(machines_of_each_kind()["coulomb"])
+    case = Case("one", Load(unbalances=()), SpinProfile(time=(0.0, 0.2), speed=(5.0, 5.0)))
+    for run in (lambda: simulate_many(jumping, [case] * 2), lambda: simulate(jumping, case)):
+        with pytest.warns(InputNotice, match="Coulomb friction jumps") as issued:
+            run()
+        assert len(issued) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        simulate_many(machine, [case])

@@ -18,6 +18,7 @@ from wm_drake.batch.cluster import (
 )
 from wm_drake.batch.ledger import Ledger, open_ledger
 from wm_drake.errors import InputError, WmDrakeError
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile, with_value
 from wm_drake.simulation.cases import Case
 
@@ -53,6 +54,24 @@ def test_work_item_returns_results_by_key(reference, machine):
     table = simulate_many(machine, cases, measures=("extremes",))
     assert list(results) == ["a", "b", "c"]
     assert results["b"].values["gasket_force"].tolist() == table.gasket_force.values[1].tolist()
+
+
+def test_cluster_uses_step_and_integrator_of_the_machine(reference, tmp_path):
+    """The results of a machine with numbers of its own are those of this computer, bit by bit."""
+    from distributed import Client
+
+    fine = with_value(with_value(reference, "step", 0.5e-3), "integrator", "runge_kutta")
+    built = build_machine(fine)
+    (case,) = cases_of(fine, 1)
+    here = simulate_many(built, [case], measures=("extremes",))
+    with (
+        Client(processes=False, dashboard_address=None, n_workers=1) as client,
+        open_ledger(tmp_path / "ledger.sqlite", {}, resume=False) as ledger,
+    ):
+        there = simulate_on_cluster(built, [case], ledger, client, measures=("extremes",))
+    assert there.equals(here)
+    of_default = simulate_many(built, [case], measures=("extremes",), step=2.5e-3)
+    assert not of_default.equals(here)
 
 
 class Running:
@@ -149,14 +168,16 @@ def test_tables_are_the_same_if_a_worker_is_killed(reference, machine, tmp_path)
 
 
 @pytest.mark.slow
-def test_command_writes_the_same_tables_if_the_cluster_loses_a_worker(wm_drake, monkeypatch):
+def test_command_writes_the_same_tables_if_the_cluster_loses_a_worker(
+    wm_drake, monkeypatch, no_runs
+):
     from distributed import LocalCluster
 
     Path("p.yaml").write_text("time: (0, 8) s\nspeed: (0, 60) rpm\n")
     factors = ("--factor", "K_Lx", "--factor", "C_L", "--factor", "K_Ty", "--factor", "C_T")
     study = ("study", "gasket", "--design", "full", *factors, "--profile", "p.yaml")
     assert wm_drake(*study, "--out", "here").code == 0
-    monkeypatch.setattr("wm_drake.batch.runs.integrate_runs", None)  # this process runs nothing
+    no_runs()
     put_all, killed = Ledger.put_all, []
 
     def put_and_kill(ledger, results):

@@ -35,12 +35,12 @@ def plain(machine, reference):
 
 
 def test_nothing_is_run_the_second_time_and_the_table_is_the_same(
-    machine, reference, plain, tmp_path, monkeypatch
+    machine, reference, plain, tmp_path, no_runs
 ):
     path = tmp_path / "ledger"
     first, run = remembered(path, machine, cases_of(reference))
     assert run == 20
-    monkeypatch.setattr("wm_drake.batch.runs.integrate_runs", None)  # a run would fail now
+    no_runs()
     second, run = remembered(path, machine, cases_of(reference))
     assert run == 0
     xr.testing.assert_identical(first, plain)

@@ -8,9 +8,9 @@ from pages import data_of
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 PICKED = """return document.querySelector('#plot .plot').data
-    .filter(trace => trace.meta === 'picked design').map(trace => [trace.x[0], trace.y[0]])[0]"""
+    .filter(trace => trace.meta && trace.meta.name === 'picked design').map(trace => [trace.x[0], trace.y[0]])[0]"""
 ENVELOPE = """return [...document.querySelector('#envelopes .plot').data
-    .filter(trace => trace.meta === 'picked design')[0].y]"""
+    .filter(trace => trace.meta && trace.meta.name === 'picked design')[0].y]"""
 
 
 def test_picked_design_shows_its_numbers_and_envelopes(browser, tmp_path):

@@ -256,7 +256,11 @@ def test_hostile_machine_name_is_text(page, folder):
 
 def test_study_shows_progress_and_its_report_opens(page):
     page.wait("return document.querySelector('#study-options input')")
-    for option, text in {"--trials": "27", "--design": "orthogonal", "--model": "main"}.items():
+    page.run(
+        "const select = document.querySelector('#study'); select.value = 'gasket'; "
+        "select.dispatchEvent(new Event('change'))"
+    )
+    for option, text in {"trials": "27", "design": "orthogonal", "model": "main"}.items():
         page.find(f"[data-option='{option}']").send_keys(text)
     page.find("#start").click()
     page.wait("return document.querySelector('.study a')", timeout=240.0)

@@ -14,9 +14,8 @@ import pytest
 
 from wm_drake import load_record
 from wm_drake.cli import main
-from wm_drake.cli.result_folder import Run, result_folder
-from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
+from wm_drake.studies.result_folder import Run, result_folder
 
 SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
 PROFILE = "time: (0, 2) s\nspeed: (0, 100) rpm\n"
@@ -266,7 +265,7 @@ def test_failed_run_keeps_older_results(monkeypatch, tmp_path):
 def test_check_of_the_reference(wm_drake):
     ended = wm_drake("machine", "check", "reference")
     assert (ended.code, ended.out) == (0, "reference: machine 'reference' is valid\n")
-    # what an expert doubts of it is said (docs/decisions/0080), and nothing else
+    # warnings of what is unusual (wm_drake/model/expectations.py), and nothing else
     assert all(line.startswith("warning: ") and " unusual" in line for line in ended.messages)
 
 
@@ -325,25 +324,17 @@ def test_shown_machine_is_complete(wm_drake, reference):
 
 def test_shown_machine_obeys_set(wm_drake):
     shown = json.loads(
-        wm_drake(
-            "machine",
-            "show",
-            "--json",
-            "--set",
-            "bodies.tub.mass=11 kg",
-            "--set",
-            "gravity = 1 m/s^2",
-        ).out
+        wm_drake("machine show --json --set 'bodies.tub.mass=11 kg' --set 'gravity = 1 m/s^2'").out
     )
     assert shown["bodies"]["tub"]["mass"] == 11.0
     assert shown["gravity_W"] == [0.0, 0.0, -1.0]
 
 
-def test_machine_is_shown_as_text(wm_drake):
+def test_machine_is_shown_as_text(wm_drake, machine):
     ended = wm_drake("machine", "show", "reference")
     assert ended.code == 0
     assert ended.out.startswith("machine: reference\nunits: SI: m, kg, s, rad, N;")
-    tub = build_machine(load_machine("reference")).plant.GetBodyByName("tub")
+    tub = machine.plant.GetBodyByName("tub")
     assert f"    mass: {tub.default_mass():.6g}\n" in ended.out
 
 
@@ -451,7 +442,8 @@ def test_spin_prints_one_json_object(plain):
 
 def test_nothing_else_is_printed(plain):
     assert len(plain.ended.stdout.splitlines()) == 1
-    assert plain.ended.stderr.strip() == ""
+    lines = plain.ended.stderr.strip().splitlines()
+    assert all(re.fullmatch(r"middle: \d+ %, .*", line) for line in lines)  # of a slow run
 
 
 def test_result_files_are_there_and_nothing_beside_them(plain):
@@ -627,7 +619,7 @@ def test_coulomb_friction_is_warned_of(wm_drake):
     )
     ended = wm_drake("spin", "--machine", "dry.yaml", "--load", "middle", "--out", "out")
     assert ended.code == 0
-    assert "warning: Coulomb friction jumps where a damper reverses" in ended.err
+    assert ended.err.count("notice: Coulomb friction jumps where a damper reverses") == 1
     assert "Coulomb" not in wm_drake("machine", "check", "reference").err
 
 
@@ -670,22 +662,15 @@ def test_faulty_input_in_a_process_of_its_own(tmp_path):
     )
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [("--help",), ("spin", "--help"), ("machine", "--help"), ("machine", "check", "--help")],
-)
-def test_help(wm_drake, arguments):
-    ended = wm_drake(*arguments)
-    assert ended.code == 0
-    assert "Usage: " in ended.out
-
-
-def test_help_does_not_wait_for_drake(tmp_path):
-    code = "import sys, wm_drake.cli; print('pydrake' in sys.modules, 'matplotlib' in sys.modules)"
+def test_help_does_not_wait_for_slow_libraries(tmp_path):
+    code = (
+        "import sys, wm_drake.cli; "
+        "print({'pydrake', 'pandas', 'scipy', 'xarray', 'plotly', 'matplotlib'} & set(sys.modules))"
+    )
     ended = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
     )
-    assert ended.stdout == "False False\n"
+    assert ended.stdout == "set()\n"
 
 
 def test_interrupt_says_so_and_leaves_nothing(wm_drake, monkeypatch):

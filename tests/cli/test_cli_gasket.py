@@ -14,7 +14,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wm_drake.batch.ledger import Ledger
 from wm_drake.parameters import load_machine
 
 WITH_TABLE = """extends: reference
@@ -51,16 +50,12 @@ def study(wm_drake):
 @pytest.fixture
 def study_without_page(study, monkeypatch):
     """Return the small study without its figures, which take most of its time."""
-    monkeypatch.setattr("wm_drake.report.gasket.report.gasket_report", lambda *_: "")
+    monkeypatch.setattr("wm_drake.studies.gasket.page.gasket_page", lambda *_: "")
     return study
 
 
 def tables(folder="out"):
     return {name: (Path(folder) / name).read_bytes() for name in TABLES}
-
-
-def no_runs(monkeypatch):
-    monkeypatch.setattr("wm_drake.batch.runs.integrate_runs", None)  # whoever runs now, fails
 
 
 def test_study_writes_tables_and_prints_them(study):
@@ -116,10 +111,10 @@ def test_json_is_one_object_of_the_promised_form(study):
     assert set(response["terms"][0]["effects"]) == {"-1", "0", "1"}
 
 
-def test_finished_study_is_not_run_again(study_without_page, monkeypatch):
+def test_finished_study_is_not_run_again(study_without_page, no_runs):
     study_without_page()
     before = tables()
-    no_runs(monkeypatch)
+    no_runs()
     assert study_without_page().code == 0
     assert study_without_page("--resume").code == 0
     assert tables() == before
@@ -205,44 +200,17 @@ def test_faults_are_refused_in_one_line_and_leave_nothing(study, fault):
     assert [path.name for path in Path().iterdir()] == ["p.yaml"]
 
 
-def interrupted_after(count, monkeypatch, mishap):
-    put_all = Ledger.put_all
-
-    def failing(self, results):
-        put_all(self, results)
-        if len(self) >= count:
-            raise mishap
-
-    monkeypatch.setattr(Ledger, "put_all", failing)
-
-
-def test_interrupt_keeps_what_had_finished(study_without_page, monkeypatch):
-    with monkeypatch.context() as changed:
-        interrupted_after(10, changed, KeyboardInterrupt())
-        ended = study_without_page()
-    assert ended.code == 130
-    assert "finished runs are kept in out/ledger.sqlite; continue with --resume" in ended.err
-    assert [path.name for path in Path("out").iterdir()] == ["ledger.sqlite"]
-    ended = study_without_page()
-    assert ended.code == 2
-    assert "go on from there with --resume" in ended.err
-    assert study_without_page("--resume").code == 0
-    resumed = tables()
-    assert study_without_page("--out", "whole").code == 0
-    assert tables("whole") == resumed
-
-
-def test_disk_that_is_full_at_the_end_costs_no_run(study_without_page, monkeypatch):
+def test_disk_that_is_full_at_the_end_costs_no_run(study_without_page, monkeypatch, no_runs):
     def full(*_):
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as changed:
-        changed.setattr("wm_drake.studies.gasket.tables.write_tables", full)
+        changed.setattr("wm_drake.studies.gasket.tables.all_tables", full)
         ended = study_without_page()
     assert (ended.code, len(ended.err.strip().splitlines())) == (2, 1)
     assert "out: cannot be written to: No space left on device; all runs are kept" in ended.err
     assert [path.name for path in Path("out").iterdir()] == ["ledger.sqlite"]
-    no_runs(monkeypatch)
+    no_runs()
     assert study_without_page().code == 0
 
 

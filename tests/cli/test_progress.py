@@ -1,7 +1,7 @@
 """Test of the progress bar."""
 
-from wm_drake.cli import progress as progress_module
-from wm_drake.cli.terminal import Console
+from wm_drake.report import progress as progress_module
+from wm_drake.report.terminal import Console
 
 
 def test_progress_bar_counts_up_to_the_total_on_standard_error(monkeypatch, capsys):

@@ -41,7 +41,7 @@ def test_rival_laws_are_fitted_compared_and_predict_blind(wm_drake, bench):
     assert set(pd.read_csv(out / "laws.csv").law) == {"coulomb", "mstv", "havsin"}
     assert {"measured", "coulomb", "mstv", "havsin"} < set(pd.read_csv(out / "loops.csv").columns)
     page = (out / "report.html").read_text()
-    assert page.count("<figure data-picture>") == 4
+    assert page.count("<figure data-picture") == 4
     assert re.findall(r'(?:src|href)="(?!data:|#|https://doi.org/)', page) == []
     damper = load_machine(str(out / "identified_mstv.yaml")).damper_types["friction"]
     assert damper.sponge_stiffness == pytest.approx(176e3, rel=0.01)

@@ -98,7 +98,7 @@ def test_machines_that_cannot_be_compared_are_refused(wm_drake, fault):
 
 @pytest.mark.usefixtures("machine_files")
 def test_two_machines_on_one_page(wm_drake, monkeypatch):
-    monkeypatch.setattr("wm_drake.report.page.describe", lambda figure: {"panels": []})
+    monkeypatch.setattr("wm_drake.report.page.plotly_of", lambda figure: {})
     ended = spin(wm_drake, *of_machines("reference", "soft.yaml"), "--json", "--replay")
     assert (ended.code, ended.err) == (0, "")
     printed = json.loads(ended.out, parse_constant=pytest.fail)
@@ -140,7 +140,7 @@ def test_two_machines_on_one_page(wm_drake, monkeypatch):
 
 
 def test_with_and_without_gasket(wm_drake, monkeypatch):
-    monkeypatch.setattr("wm_drake.report.page.describe", lambda figure: {"panels": []})
+    monkeypatch.setattr("wm_drake.report.page.plotly_of", lambda figure: {})
     ended = spin(wm_drake, "--compare-gasket", "--load", "middle")
     assert ended.code == 0
     assert "with gasket, middle: smallest gap" in ended.out

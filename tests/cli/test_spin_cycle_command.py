@@ -81,9 +81,9 @@ def test_prints_one_json_object_and_writes_what_it_says(study):
     assert versions()["drake"] in page
 
 
-def test_second_time_nothing_is_run_and_its_own_table_is_a_perfect_measurement(study, monkeypatch):
+def test_second_time_nothing_is_run_and_its_own_table_is_a_perfect_measurement(study, no_runs):
     first = json.loads(study("--json").out)
-    monkeypatch.setattr("wm_drake.batch.runs.integrate_runs", None)  # whoever runs now, fails
+    no_runs()
     again = study("--json", "--measured", "out/rms.csv", "--overwrite")
     assert again.code == 0
     shown = json.loads(again.out)
@@ -124,20 +124,6 @@ def test_a_machine_with_a_motor_has_its_measures_in_json_table_and_page(study):
         assert case["motor"][key] > 0.0
     assert case["motor"]["caught_rpm"] is None
     assert "speed ripple" in Path("out/report.html").read_text(encoding="utf-8")
-
-
-def test_interrupted_it_keeps_what_had_ended(study, monkeypatch):
-    with monkeypatch.context() as patched:
-        patched.setattr("wm_drake.report.spin_cycle.report.spin_cycle_report", interrupted)
-        ended = study()
-        assert ended.code == 130
-        assert [path.name for path in Path("out").iterdir()] == ["ledger.sqlite"]
-    monkeypatch.setattr("wm_drake.batch.runs.integrate_runs", None)
-    assert study().code == 0
-
-
-def interrupted(*_):
-    raise KeyboardInterrupt
 
 
 @pytest.mark.parametrize(

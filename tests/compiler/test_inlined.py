@@ -4,12 +4,12 @@ import os
 import subprocess
 import sys
 from collections import namedtuple
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from wm_drake.compiler.compilation import law, long_running
-from wm_drake.compiler.inlined import InlinedLibrary
 from wm_drake.compiler.lanes import WIDTH, lane_array
 
 SCRIPT = """
@@ -59,14 +59,31 @@ def divide(x, parts):
     lanes[0] = share(lanes[0], parts)
 
 
-def test_law_for_lanes_is_part_of_its_caller_only():
-    """Check that the caller is right, and that none of the two laws has machine code."""
-    x, parts = np.full(WIDTH, 6.0), Parts(np.arange(3), 1)
-    divide(x, parts)
-    np.testing.assert_array_equal(x, 2.0)
-    for inner in (share, count):
-        for compiled in inner.overloads.values():  # none if the caller was read from disk
-            assert isinstance(compiled.library, InlinedLibrary)
+LIBRARIES = """
+from test_inlined import count, divide, share, Parts
+import numpy as np
+from wm_drake.compiler.lanes import WIDTH
+x = np.full(WIDTH, 6.0)
+divide(x, Parts(np.arange(3), 1))
+print(*x)
+for inner in (share, count):
+    print(*[type(compiled.library).__name__ for compiled in inner.overloads.values()])
+"""
+
+
+def test_law_for_lanes_is_part_of_its_caller_only(tmp_path):
+    """Check that the caller is right, and that none of the two laws has machine code.
+
+    A new process without compiled code on disk compiles all three.
+    """
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    folders = [str(Path(__file__).parent), *sys.path]
+    environment["PYTHONPATH"] = os.pathsep.join(folders)
+    command = [sys.executable, "-c", LIBRARIES]
+    printed = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    quotients, *libraries = printed.stdout.splitlines()
+    assert quotients.split() == ["2.0"] * WIDTH
+    assert libraries == ["InlinedLibrary"] * 2
 
 
 def test_python_call_of_such_a_law_is_refused():
@@ -83,7 +100,7 @@ def test_another_caller_reads_the_law_from_disk(tmp_path):
     (tmp_path / "spring.py").write_text(SCRIPT, encoding="utf-8")
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     environment["PYTHONPATH"] = os.pathsep.join(sys.path)
-    told = [
+    printed = [
         subprocess.run(
             [sys.executable, tmp_path / "spring.py", loop],
             env=environment,
@@ -93,4 +110,4 @@ def test_another_caller_reads_the_law_from_disk(tmp_path):
         ).stdout.split()
         for loop in ("once", "twice")
     ]
-    assert told == [["-3.0", "0"], ["9.0", "1"]]
+    assert printed == [["-3.0", "0"], ["9.0", "1"]]

@@ -68,8 +68,10 @@ from wm_drake.rigs import Harmonic, damper_bench, force_loops, measures_of
 from wm_drake.parameters.loop_files import MeasuredLoop
 from wm_drake.rigs.measured import measured_motion
 from wm_drake.studies.fitting import least_squares
-from wm_drake.studies.identification import damper_model, fit_problem
-from test_mechanics import LOAD, changed, worst_difference
+from wm_drake.studies.identification.models import Given, damper_model
+from wm_drake.studies.identification.problem import fit_problem
+from both_engines import difference
+from machines_of_each_kind import changed
 
 assert wm_drake.__file__.startswith(ROOT), wm_drake.__file__
 X = (-0.03, -0.01, 0.0, 0.01, 0.03)
@@ -77,7 +79,7 @@ numbers = {"law": "relaxation", "leak_damping": 300.0, "sponge_stiffness": 4000.
            "guard": {"displacement": X, "force": (-90.0, -10.0, 0.0, 10.0, 90.0)}}
 parameters = changed(damper_types={"friction": numbers}, gasket=None)
 machine = build_machine(parameters)
-found = {"derivatives": worst_difference(machine, machine.set_up(LOAD), 50)}
+found = {"derivatives": difference(machine, 50)}
 
 quick = with_value(parameters, "profile", {"time": (0.0, 2.0), "speed": (0.0, 9.0)})
 load = next(iter(quick.loads))
@@ -108,7 +110,7 @@ for motion, loop in zip(motions, force_loops(damper_bench(planted), motions)):
     twice = lambda values: np.tile(values, 2)[::20]
     loops.append(measured_motion(MeasuredLoop(
         f"{motion.frequency}", "", time, twice(loop.displacement), twice(loop.force), False)))
-fit = least_squares(fit_problem(damper_model("relaxation", loops, knots=2), loops), starts=3)
+fit = least_squares(fit_problem(damper_model("relaxation", loops, Given(knots=2)), loops), starts=3)
 found["fit"] = {estimate.name: estimate.value for estimate in fit.estimates}
 try:
     damper_model("relax", loops)

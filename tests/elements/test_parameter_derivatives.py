@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from machines_of_each_kind import DAMPERS, END_BUSHING, LINEAR_TABLE, TORQUE_TABLE
-from pydantic import TypeAdapter
+from machines_of_each_kind import DAMPERS, END_BUSHING, LINEAR_TABLE, TORQUE_TABLE, damper_of
 from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoDiff
 from scipy.spatial.transform import Rotation
 
@@ -24,7 +23,7 @@ from wm_drake.elements.telescopic_damper import (
     TelescopicDamperParameters,
     evaluate_telescopic_damper,
 )
-from wm_drake.parameters import DAMPER_LAWS, BushingType, DamperType, EndBushing, ForceTable
+from wm_drake.parameters import DAMPER_LAWS, BushingType, EndBushing, ForceTable
 
 HOOK, GROUND = np.array([0.2, 0.05, 0.3]), np.array([0.3, 0.1, 0.6])  # m
 R_TB, R_WG = (Rotation.from_rotvec(r).as_matrix() for r in ((0.3, -0.1, 0.2), (0.1, 0.2, -0.4)))
@@ -44,7 +43,7 @@ PLACED = SixComponentBushingParameters(HOOK, R_TB, GROUND, R_WG, packed_bushing_
 
 
 def law(name):
-    return packed_damper_law(TypeAdapter(DamperType).validate_python({"law": name} | DAMPERS[name]))
+    return packed_damper_law(damper_of(name))
 
 
 def spring(stiffness, **changes):

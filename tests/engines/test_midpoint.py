@@ -26,8 +26,8 @@ STEP = 2.5e-4
 
 
 @pytest.fixture(scope="module")
-def machine():
-    return build_machine(telescopic())
+def machine(shipped):
+    return shipped("free_stroke")
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def setup(machine):
 def at_rest(setup, difference):
     """Return packed numbers, layout, state of rest and Jacobian there, in each lane."""
     packed, layout = pack(setup)
-    rest, (free, _) = initial_state(setup, STANDSTILL), free_states(setup)
+    rest, (free, _) = initial_state(setup, STANDSTILL), free_states(setup, layout.states)
     found, _ = jacobians(packed, layout, np.tile(rest, (WIDTH, 1)), free, difference)
     return packed, layout, rest, found
 
@@ -66,7 +66,7 @@ def test_a_small_motion_takes_the_step_of_the_linearised_machine(setup):
     packed, layout, rest, jacobian = at_rest(setup, size)
     relaxation = relaxation_matrices(setup, layout, jacobian, STEP)
     matrix = step_matrices(setup, layout, jacobian, STEP)[0]
-    free, _ = free_states(setup)
+    free, _ = free_states(setup, layout.states)
     free, n = np.array(free), len(free)
     velocities = _kept(setup)
     rng = np.random.default_rng(1)
@@ -93,7 +93,7 @@ def _kept(setup):
 def test_with_its_own_jacobian_the_step_is_the_implicit_midpoint_rule(setup):
     """Check that a motion of the tubes alone is multiplied by (1 + z/2) / (1 - z/2)."""
     _, layout, _, jacobian = at_rest(setup, 1e-8)
-    free, _ = free_states(setup)
+    free, _ = free_states(setup, layout.states)
     tubes = np.array([place for place, k in enumerate(free) if 14 <= k < 14 + 14])
     alone = np.zeros_like(jacobian)
     alone[:, tubes[:, None], tubes] = jacobian[:, tubes[:, None], tubes]
@@ -127,13 +127,13 @@ def test_auto_chooses_the_midpoint_rule_for_tubes(setup, rpm, step, chosen, leng
     assert stepping.relaxation.shape == (3 * 49,)
 
 
-def test_the_midpoint_rule_is_refused_where_it_does_not_follow(setup, reference):
+def test_the_midpoint_rule_is_refused_where_it_does_not_follow(setup, shipped):
     _, layout, _, jacobian = at_rest(setup, 1e-8)
     assert midpoint_follows(setup, layout, jacobian, STEP)
     steep = jacobian.copy()
     steep[1:] *= 30.0  # far steeper than at rest, where R is from
     assert not midpoint_follows(setup, layout, steep, STEP)
-    plain = build_machine(reference).set_up()
+    plain = shipped("reference").set_up()
     with pytest.raises(InputError, match="'midpoint' needs telescopic dampers"):
         choose_stepping(plain, *pack(plain), STANDSTILL, 2.5e-3, "midpoint")
     fast = constant_speed(300.0, 1.0)

@@ -215,7 +215,7 @@ def test_a_cabinet_takes_steps_of_one_derivative_with_the_peaks_of_small_steps(n
     drive = load_machine("motor").model_dump()["drive"]
     tree = load_machine(name).model_dump() | {"drive": drive}
     machine = build_machine(MachineParameters.model_validate(tree))
-    profile = SpinProfile(time=(0.0, 1.0, 8.0), speed=(0.0, 5.0, 24.0))
+    profile = SpinProfile(time=(0.0, 0.5, 4.5), speed=(0.0, 5.0, 24.0))
     case = Case("front", machine.parameters.loads["front"], profile)
     usual = simulate(machine, case)
     fine = simulate(machine, case, step=2.5e-3 / 16, integrator="runge_kutta")

@@ -6,7 +6,7 @@ from energy_book import EnergyBook, dense_record
 from machines_of_each_kind import RUBBER, changed
 from upright_springs import with_upright_springs
 
-from wm_drake.engines.compiled.linear import PATH, SPONGE
+from wm_drake.engines.compiled.linear import INTERNAL, PATH
 from wm_drake.engines.compiled.packing import pack
 from wm_drake.engines.compiled.step_check import DIFFERENCE, fastest_motions, linearised
 from wm_drake.errors import InputError
@@ -79,7 +79,7 @@ def test_states_are_named_and_treated_by_kind(rubber):
     assert "the Maxwell branch of bushing 'gasket'" in fastest_motions(rubber.set_up())
     setup = rubber.set_up()
     kinds = linearised(setup, *pack(setup), DIFFERENCE).kinds
-    assert list(kinds[-6:]) == [PATH, SPONGE, PATH, SPONGE, SPONGE, PATH]
+    assert list(kinds[-6:]) == [PATH, INTERNAL, PATH, INTERNAL, INTERNAL, PATH]
 
 
 def test_rubber_at_rest_has_no_force(machine, rubber):

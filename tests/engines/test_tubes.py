@@ -1,88 +1,25 @@
 """Tubes of telescopic dampers: the compiled machine against the Drake diagram, at random states and along a run."""
 
-import re
-
 import numpy as np
 import pytest
+from both_engines import LOAD, difference, redrawn
 from telescopic_machine import RUN_UP, changed, telescopic, with_bushing
 
-from wm_drake.engines.compiled.derivative import StateDerivative
-from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.errors import InputError
-from wm_drake.model.bodies import sdf_path
 from wm_drake.model.build import build_machine
-from wm_drake.parameters import Load, SpinProfile, Unbalance
+from wm_drake.parameters import SpinProfile
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
 
-LOAD = Load(
-    unbalances=(
-        Unbalance(mass=0.6, radius=0.24, y=-0.1, phase=0.7),
-        Unbalance(mass=0.4, radius=0.2, y=0.12, phase=2.9),
-    )
-)
-TUB = np.array(
-    [1.0, 1.2, 1.0] + [0.15] * 3 + [30.0] + [8.0] * 3 + [3.0] * 3 + [150.0]
-)  # rad, m, rad/s, m/s
-TUBES = np.array([1.0, 1.2, 1.0] + [0.15] * 3 + [0.05] + [8.0] * 3 + [3.0] * 3 + [2.0])
-VECTORS = (
-    slice(0, 3),
-    slice(3, 6),
-    slice(6, 7),
-    slice(7, 10),
-    slice(10, 13),
-    slice(13, 14),
-    slice(14, None),
-)
-
 
 @pytest.fixture(scope="module")
-def built():
-    return build_machine(telescopic())
+def built(shipped):
+    return shipped("free_stroke")
 
 
-def worst_difference(machine, setup, count, seed=5):
-    """Return the largest relative difference between the time derivatives of both engines, per vector."""
-    rng, context, trees = np.random.default_rng(seed), setup.context, machine.state_layout.states()
-    derivative, tubes = StateDerivative(setup), len(setup.telescopes)
-    worst = 0.0
-    for _ in range(count):
-        blocks = [
-            rng.uniform(-1.0, 1.0, 14) * TUB,
-            *(rng.uniform(-1.0, 1.0, 14) * TUBES for _ in range(tubes)),
-        ]
-        sponges = rng.uniform(-0.01, 0.01, tubes)
-        state = np.zeros(context.num_continuous_states())
-        for tree, block in zip(trees, blocks, strict=True):
-            state[tree] = block
-        state[-tubes:] = sponges
-        context.SetContinuousState(state)
-        machine.set_drum_acceleration(context, rng.uniform(-20.0, 20.0))
-        told = machine.diagram.EvalTimeDerivatives(context).CopyToVector()
-        drake = [
-            told[trees[0]],
-            *(np.append(told[tree], told[k - tubes]) for k, tree in enumerate(trees[1:])),
-        ]
-        x = np.concatenate(
-            [
-                blocks[0],
-                *(
-                    np.append(block, delta)
-                    for block, delta in zip(blocks[1:], sponges, strict=True)
-                ),
-            ]
-        )
-        dx = derivative(x, told[trees[0]][DRUM_RATE])
-        for mine, its in zip(np.split(dx, 14 + 15 * np.arange(tubes)), drake, strict=True):
-            for part in VECTORS:
-                scale = np.max(np.abs(its[part]), initial=1e-3)
-                worst = max(worst, np.max(np.abs(mine[part] - its[part]), initial=0.0) / scale)
-    return worst
-
-
-def test_derivatives_are_those_of_the_diagram_at_1000_random_states(built):
-    assert worst_difference(built, built.set_up(LOAD), 1000) < 1e-10
+def test_derivatives_are_those_of_the_diagram_at_random_states(built):
+    assert difference(built, 500) < 1e-10
 
 
 def test_they_agree_for_crooked_tubes_and_without_friction(built):
@@ -107,8 +44,8 @@ def test_they_agree_for_crooked_tubes_and_without_friction(built):
     with pytest.raises(InputError, match="telescopic_dampers: the bushings cannot hold the tubes"):
         built.set_up(LOAD, parameters=crooked)
     held = with_bushing(crooked, rotational_stiffness_y=20.0)  # N m/rad
-    assert worst_difference(built, built.set_up(LOAD, parameters=held), 200) < 1e-10
-    assert worst_difference(built, built.set_up(LOAD, dampers=False), 200) < 1e-10
+    assert difference(built, 200, parameters=held) < 1e-10
+    assert difference(built, 200, dampers=False) < 1e-10
 
 
 def test_they_agree_for_other_laws_along_the_joint_and_tables_in_the_bushings():
@@ -124,7 +61,7 @@ def test_they_agree_for_other_laws_along_the_joint_and_tables_in_the_bushings():
         with_bushing(telescopic(), rotational_stiffness_x=table), damper_types={"free_stroke": mstv}
     )
     machine = build_machine(other)
-    assert worst_difference(machine, machine.set_up(LOAD), 200) < 1e-10
+    assert difference(machine, 200) < 1e-10
 
 
 @pytest.mark.slow
@@ -167,6 +104,7 @@ def test_tubes_stay_between_their_bushings(built):
     )
 
 
+SDF = "free_stroke.sdf"
 REVOLUTE = (
     r'<joint name="damper_left_telescope" type="prismatic">',
     '<joint name="damper_left_telescope" type="revolute">',
@@ -178,18 +116,12 @@ DAMPED = (
 DRIVEN = (r"(damper_left_telescope.*?)<effort>0</effort>", r"\1")
 
 
-def redrawn(tmp_path, pattern, replacement):
-    text, count = re.subn(
-        pattern, replacement, sdf_path("free_stroke.sdf").read_text(), count=1, flags=re.DOTALL
-    )
-    assert count == 1
-    (tmp_path / "redrawn.sdf").write_text(text)
-    return changed(telescopic(), model=str(tmp_path / "redrawn.sdf"))
+def machine_of(sdf):
+    return changed(telescopic(), model=sdf)
 
 
 def test_a_joint_with_damping_of_its_own_is_refused_by_the_compiled_engine_only(tmp_path):
-    machine = build_machine(redrawn(tmp_path, *DAMPED))
-    setup = machine.set_up()
+    setup = build_machine(machine_of(redrawn(tmp_path, SDF, DAMPED))).set_up()
     with pytest.raises(
         InputError,
         match="joint 'damper_left_telescope' has damping of its own; use the drake engine",
@@ -209,7 +141,7 @@ def test_a_joint_with_damping_of_its_own_is_refused_by_the_compiled_engine_only(
 )
 def test_other_joints_are_refused(tmp_path, change, message):
     with pytest.raises(InputError, match=message):
-        build_machine(redrawn(tmp_path, *change))
+        build_machine(machine_of(redrawn(tmp_path, SDF, change)))
 
 
 @pytest.mark.parametrize(
@@ -242,4 +174,4 @@ def test_dampers_may_come_in_any_order():
     parameters = telescopic()
     dampers = dict(reversed(parameters.model_dump()["telescopic_dampers"].items()))
     machine = build_machine(changed(parameters, telescopic_dampers=dampers))
-    assert worst_difference(machine, machine.set_up(LOAD), 50) < 1e-10
+    assert difference(machine, 50) < 1e-10

@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 from element_ports import own_outputs
 from machine_with_bearing import BEARING, stiffer, with_bearing
-from pydrake.multibody.plant import MultibodyPlant
 from simple_machines import DAMPING, STIFFNESS, constant_speed, isotropic_machine, unbalance
-from tube_energy import Motion, bushing, dense_run, still
+from tube_energy import Motion, dense_run, energies_of_bodies, energy_of_bushings, still
 
 from wm_drake.batch import simulate_many
 from wm_drake.engines.compiled.step_check import fastest_motion
 from wm_drake.errors import InputError
-from wm_drake.model.bodies import add_bodies, add_load, set_bodies
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import (
     Load,
@@ -174,43 +172,17 @@ def test_energy_of_a_run_is_balanced():
     run = dense_run(setup, profile, 1e-4)
     time, motion, carrier, torque = run.time, run.state, run.carrier, run.motor_torque
     tub, drum = Motion(motion), Motion(np.insert(carrier, (6, 12), 0.0, axis=1))
-    stored, power = 0.0, 0.0
-    for kind, a, placed, b in (
-        (parameters.gasket, tub, setup.bushings["gasket"], still(len(time))),
-        (parameters.imperfections.bearing.as_bushing(), drum, setup.bearing, tub),
-    ):
-        more_stored, more_power = bushing(
-            kind,
-            a,
-            placed.tub_side_point,
-            placed.tub_side_rotation,
-            b,
-            placed.ground_side_point,
-            placed.ground_side_rotation,
-        )
-        stored, power = stored + more_stored, power + more_power
-    plant = MultibodyPlant(0.0)
-    add_bodies(plant, parameters)
-    context = plant.CreateDefaultContext()
-    set_bodies(plant, context, parameters)
-    add_load(plant, context, load)
-    plant.get_joint_actuator(plant.GetJointActuatorIndices()[0]).SetRotorInertia(
-        context, 0.0
-    )  # a device, no energy
-    places, kinetic = machine.state_layout.states(), []
-    for sample in (0, -1):
-        state = np.zeros(plant.num_multibody_states())
-        state[places[1]] = np.insert(carrier[sample], (6, 12), 0.0)
-        state[places[0]] = motion[sample]
-        plant.SetPositionsAndVelocities(context, state)
-        kinetic.append(plant.CalcKineticEnergy(context))
+    bearing = (parameters.imperfections.bearing.as_bushing(), drum, setup.bearing, tub)
+    gasket = (parameters.gasket, tub, setup.bushings["gasket"], still(len(time)))
+    stored, power = energy_of_bushings([gasket, bearing])
+    of_bearing = energy_of_bushings([bearing])[1]
+    states = [(motion[k], np.insert(carrier[k], (6, 12), 0.0)) for k in (0, -1)]
+    bodies = energies_of_bodies(machine, parameters, load, states)
     drive = np.trapezoid(torque * motion[:, 13], time)
     dissipated = np.trapezoid(power, time)
-    assert np.trapezoid(more_power, time) > 0.3 * dissipated > 1.0  # J; the bearing's share
-    assert (
-        abs(drive - (kinetic[1] - kinetic[0]) - (stored[-1] - stored[0]) - dissipated)
-        < 1e-5 * dissipated
-    )
+    assert np.trapezoid(of_bearing, time) > 0.3 * dissipated > 1.0  # J; the bearing's share
+    change = bodies[1] - bodies[0] + stored[-1] - stored[0]
+    assert abs(drive - change - dissipated) < 1e-5 * dissipated
 
 
 @pytest.mark.parametrize("name", ["reference", pytest.param("free_stroke", marks=pytest.mark.slow)])

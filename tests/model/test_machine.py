@@ -249,8 +249,8 @@ def test_a_compliant_bearing_needs_a_joint_between_tub_and_drum(tmp_path):
         ),
     ],
 )
-def test_a_table_with_other_points_is_refused_by_its_name(key, message):
-    machine = build_machine(load_machine("free_stroke"))
+def test_a_table_with_other_points_is_refused_by_its_name(key, message, shipped):
+    machine = shipped("free_stroke")
     table = {"displacement": "(-20, -5, 5, 20) mm", "force": "(-100, 0, 0, 100) N"}
     changed = with_values(machine.parameters, {key: table})
     with pytest.raises(InputError, match=message):

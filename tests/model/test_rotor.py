@@ -22,8 +22,8 @@ PLACE = np.array([0.12, 0.09, -0.28])  # of the motor on the tub
 
 
 @pytest.fixture(scope="module")
-def driven():
-    machine = build_machine(load_machine("motor"))
+def driven(shipped):
+    machine = shipped("motor")
     return machine, machine.set_up(LOAD)
 
 

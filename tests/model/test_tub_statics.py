@@ -1,16 +1,9 @@
 """Forces on a tub at rest: the compiled mounts and the weight against Drake's gravity."""
 
 import numpy as np
-import pytest
 
-from wm_drake import build_machine, load_machine, with_values
+from wm_drake import with_values
 from wm_drake.model.tub_statics import TubStatics, about_tub, weight_of
-
-
-@pytest.fixture(scope="module")
-def machine():
-    """Build the reference machine."""
-    return build_machine(load_machine("reference"))
 
 
 def test_wrench_is_that_of_drake_at_any_pose(machine):

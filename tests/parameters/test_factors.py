@@ -14,7 +14,6 @@ from wm_drake.parameters import (
     factor_of_text,
     levels_of,
     load_factors,
-    nominal_stiffness,
     quantities,
     with_value,
 )
@@ -107,15 +106,15 @@ def test_any_number_can_be_a_factor(reference, text, key, expected):
 
 def test_nominal_stiffness_is_the_slope_of_the_first_fifth():
     line = ForceTable(displacement=(-0.02, 0.0, 0.02), force=(-60.0, 0.0, 60.0))
-    assert nominal_stiffness(line) == pytest.approx(3000.0)
+    assert line.nominal_stiffness == pytest.approx(3000.0)
     x = np.linspace(-0.006, 0.006, 4001)
     forces = [stiffness_force(float(point), packed_stiffness(HARDENING), 0) for point in x]
-    assert nominal_stiffness(HARDENING) == pytest.approx(float(x @ forces / (x @ x)), rel=1e-3)
+    assert HARDENING.nominal_stiffness == pytest.approx(float(x @ forces / (x @ x)), rel=1e-3)
 
 
 def test_tables_become_numbers_or_are_scaled(reference):
     parameters = with_value(reference, "gasket.stiffness_x", HARDENING)
-    nominal = nominal_stiffness(HARDENING)
+    nominal = HARDENING.nominal_stiffness
     (linear,), (scaled,) = one(parameters, "K_Lx"), one(parameters, "K_Lx", "scaled")
     assert [setting["gasket.stiffness_x"] for setting in linear.settings] == pytest.approx(
         [0.5 * nominal, nominal, 1.5 * nominal]
@@ -125,7 +124,7 @@ def test_tables_become_numbers_or_are_scaled(reference):
     assert low.force == pytest.approx([0.5 * force for force in HARDENING.force])
     assert high.displacement == HARDENING.displacement
     (absolute,) = one(parameters, "K_Lx=2 N/mm..6 N/mm", "scaled")
-    assert nominal_stiffness(absolute.settings[0]["gasket.stiffness_x"]) == pytest.approx(2000.0)
+    assert absolute.settings[0]["gasket.stiffness_x"].nominal_stiffness == pytest.approx(2000.0)
     assert "gasket.stiffness_x" in scaled.nominal
     with pytest.raises(InputError, match=r"stiffness_x: '-.*' is out of range"):
         one(parameters, "K_Lx=-10 %..50 %", "scaled")
@@ -152,17 +151,12 @@ def test_curve_that_cannot_be_a_number_is_scaled(reference):
 
 
 FAULTS = {
-    "unknown key": ("gasket.stifness_x", "unknown key 'stifness_x' (did you mean 'stiffness_x'?"),
-    "unknown name": ("K_Lw", "unknown key 'K_Lw'"),
-    "no number": ("gasket.tub_frame", "is not a number"),
-    "group": ("gasket", "is not a number"),
     "falling": ("K_Lx=150 %..50 %", "do not rise"),
     "zero": ("damper_types.friction.friction_damping", "do not rise (the value is 0)"),
     "unit": ("K_Lx=1 N..2 N", "unit 'N' does not fit"),
     "form": ("K_Lx=1 N/mm", "is not of the form NAME=LOW..HIGH"),
     "range": ("K_Lx=-50 %..50 %", "out of range"),
     "percent of the SDF's": ("bodies.tub.mass", "is in the SDF"),
-    "list": ("profile.time", "is a list of numbers"),
 }
 
 

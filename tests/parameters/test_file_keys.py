@@ -5,9 +5,12 @@ import json
 import jsonschema
 import pytest
 from documents import CHECKOUT, HOW_TO, blocks, name_of
+from pydantic import ValidationError
 from ruamel.yaml import YAML
 
+from wm_drake.parameters import MachineParameters, load_machine, quantities
 from wm_drake.parameters.file_keys import file_schema, key_groups
+from wm_drake.parameters.files import machine_tree
 
 MACHINES = sorted((CHECKOUT / "wm_drake" / "data" / "machines").glob("*.yaml"))
 GROUPS = {group.title: group for group in key_groups()}
@@ -72,6 +75,91 @@ def test_machine_files_of_the_how_to_pages_fit_the_schema(validator):
 )
 def test_a_planted_fault_does_not_fit_the_schema(fault, validator):
     assert not validator.is_valid({"extends": "reference", **fault})
+
+
+GROUPS_OF_MACHINES = (
+    "gasket",
+    "loads.middle.unbalances.0",
+    "spring_types.suspension",
+    "springs.left",
+    "profile",
+    "sensors.Xr",
+    "clearance",
+    "drive",
+)
+FAULTS = {
+    "no unit": lambda text: text.partition(" ")[0] if text[0] != "(" else f"{text.split(')')[0]})",
+    "number of YAML": lambda text: 1.5,
+    "words": lambda text: "a lot",
+    "empty text": lambda text: "",
+    "decimal comma": lambda text: f"1,5 {text.split()[-1]}",
+    "list of YAML": lambda text: [1.0, 2.0],
+    "unknown group": lambda text: {"amount": text},
+}
+"""Values of a number that no file may have, by what is wrong with them."""
+
+
+def changed(tree, key, value):
+    """Return a tree with one value replaced, and the groups that lead to it copied."""
+    part, _, rest = key.partition(".")
+    copy = list(tree) if isinstance(tree, list) else dict(tree)
+    place = int(part) if isinstance(tree, list) else part
+    copy[place] = changed(tree[place], rest, value) if rest else value
+    return copy
+
+
+def is_refused(tree):
+    """Return whether the loader refuses the tree of a file without sources."""
+    try:
+        MachineParameters.model_validate(tree, context={"units_required": True})
+    except ValidationError:
+        return True
+    return False
+
+
+def tree_of(name):
+    return machine_tree(load_machine(name).model_copy(update={"sources": {}}))
+
+
+@pytest.mark.parametrize("name", ["reference", "free_stroke", "heavy_cabinet"])
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_number_that_the_loader_refuses_does_not_fit_the_schema(fault, name, validator):
+    tree = tree_of(name)
+    assert not is_refused(tree)
+    assert validator.is_valid(tree)
+    listed = [key for key, _, unit in quantities(load_machine(name)) if unit.si]
+    keys = [key for key in listed if isinstance(value_in(tree, key), str)]
+    assert len(keys) > 30
+    for index, key in enumerate(keys):
+        faulty = changed(tree, key, FAULTS[fault](value_in(tree, key)))
+        section = key.split(".")[0]
+        assert index % 5 or is_refused(faulty), key  # it takes 0.1 s
+        assert not validator.is_valid({section: faulty[section]}), key
+
+
+def value_in(tree, key):
+    for part in key.split("."):
+        tree = tree[int(part)] if isinstance(tree, list) else tree.get(part)
+        if tree is None:
+            return None
+    return tree
+
+
+@pytest.mark.parametrize("group", GROUPS_OF_MACHINES)
+@pytest.mark.parametrize("value", ["text", 7, ["a"], {"misspelt": "1 mm"}])
+def test_a_group_that_the_loader_refuses_does_not_fit_the_schema(group, value, validator):
+    faulty = changed(tree_of("motor"), group, value)
+    assert is_refused(faulty)
+    assert not validator.is_valid(faulty)
+
+
+@pytest.mark.parametrize("name", ["two words", "1st", "a" * 65, "dot.ted"])
+@pytest.mark.parametrize("table", ["springs", "loads", "sensors", "bodies"])
+def test_a_name_that_the_loader_refuses_does_not_fit_the_schema(table, name, validator):
+    tree = tree_of("reference")
+    faulty = tree | {table: {**tree.get(table, {}), name: {}}}
+    assert is_refused(faulty)
+    assert not validator.is_valid(faulty)
 
 
 def test_null_removes_and_sources_are_allowed(validator):

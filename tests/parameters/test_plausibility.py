@@ -72,9 +72,9 @@ def test_every_range_belongs_to_a_number_and_has_its_unit(tmp_path):
     assert [usual.pattern for usual in RANGES if usual not in used] == []
 
 
-def test_spring_too_soft_for_its_weight_has_no_free_length(reference):
+def test_spring_too_soft_for_its_weight_has_no_free_length(machine, reference):
     """Check free length = length - preload / stiffness: 0 at stiffness = preload / length."""
-    setup = build_machine(reference).set_up()
+    setup = machine.set_up()
     limits = {
         f"springs.{name}": spring.preload / spring.rest_length
         for name, spring in setup.springs.items()

@@ -4,8 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from wm_drake.errors import InputError
-from wm_drake.model.build import build_machine
-from wm_drake.parameters import load_machine, with_value
+from wm_drake.parameters import with_value
 from wm_drake.parameters.elements import Bushing
 from wm_drake.parameters.rubber import CROSS_FIELDS, DAHL_FIELDS, MAXWELL_FIELDS, RubberBranches
 
@@ -51,12 +50,11 @@ def test_cross_stiffness_up_to_its_limit_and_units_of_files():
     assert friction.dahl_angle_y == pytest.approx(0.0174533, rel=1e-5)
 
 
-def test_a_built_machine_keeps_its_branches():
-    reference = load_machine("reference")
+def test_a_built_machine_keeps_its_branches(machine, reference):
     other = with_value(
         with_value(reference, "gasket.dahl_displacement_x", 1e-3), "gasket.dahl_force_x", 9.0
     )
     with pytest.raises(
         InputError, match=r"gasket.*other branches of rubber \(dahl_force_x\).*\(none\)"
     ):
-        build_machine(reference).set_up(parameters=other)
+        machine.set_up(parameters=other)

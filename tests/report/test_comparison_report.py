@@ -10,6 +10,7 @@ from pages import without_scripts
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import SpinProfile, load_machine, with_value
+from wm_drake.report.figure import Area, Rule
 from wm_drake.report.spin.comparison import (
     COLOURS,
     comparison_report,
@@ -132,22 +133,21 @@ def test_figure_has_a_colour_per_variant_and_their_measurements(variants):
     cases = {variant.name: variant.result.results[0] for variant in variants}
     measured = {"with gasket": dict.fromkeys(variants[0].result.parameters.sensors, 29.0)}
     figure = overlaid_envelopes_figure(cases, measured)
-    panels = [axes for axes in figure.axes if axes.get_visible()]
-    assert len(panels) == 6
-    lines = {line.get_color() for line in panels[0].lines}
-    assert {*COLOURS[:2]} <= lines
-    dashed = [line for line in panels[0].lines if line.is_dashed()]
-    assert [line.get_color() for line in dashed] == [COLOURS[0]] * 2
-    assert sorted(line.get_ydata()[0] for line in dashed) == [-29.0, 29.0]
-    assert panels[0].get_ylim()[1] > 29.0
+    assert len(figure.panels) == 6
+    panel = figure.panels[0]
+    areas = {mark.color for mark in panel.marks if isinstance(mark, Area)}
+    assert areas == {*COLOURS[:2]}
+    dashed = [mark for mark in panel.marks if isinstance(mark, Rule) and mark.dash == "dashed"]
+    assert [mark.color for mark in dashed] == [COLOURS[0]] * 2
+    assert sorted(mark.at for mark in dashed) == [-29.0, 29.0]
+    assert panel.y.range[1] > 29.0
 
 
 def test_sensor_that_only_one_machine_has_is_left_out_of_the_figure(variants):
     other = variants[1].result.results[0]
     fewer = replace(other, record=other.record.drop_sel(sensor=["Yr", "Yf"]))
     figure = overlaid_envelopes_figure({"a": variants[0].result.results[0], "b": fewer})
-    names = [axes.texts[0].get_text() for axes in figure.axes if axes.get_visible()]
-    assert names == ["Xr", "Zr", "Xf", "Zf"]
+    assert [panel.name for panel in figure.panels] == ["Xr", "Zr", "Xf", "Zf"]
 
 
 def test_there_is_a_colour_for_each_variant():

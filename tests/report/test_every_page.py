@@ -4,16 +4,17 @@ from pathlib import Path
 
 from every_page import KINDS
 
-import wm_drake.report
+import wm_drake
 
-FOLDER = Path(wm_drake.report.__file__).parent
+PACKAGE = Path(wm_drake.__file__).parent
 
 
 def test_each_template_of_a_page_has_a_kind():
     """Find all files that extend page.html: each is a kind, drawn in the browser tests."""
     templates = {
-        path.relative_to(FOLDER).as_posix()
-        for path in FOLDER.rglob("*.html")
+        path.relative_to(PACKAGE / room).as_posix()
+        for room in ("report", "studies")
+        for path in (PACKAGE / room).rglob("*.html")
         if '{% extends "page.html" %}' in path.read_text(encoding="utf-8")
     }
     assert {kind.template for kind in KINDS.values()} == templates

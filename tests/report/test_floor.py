@@ -6,6 +6,7 @@ import pytest
 
 from wm_drake.parameters import SpinProfile, with_value
 from wm_drake.parameters.spin import Region
+from wm_drake.report.figure import Line
 from wm_drake.report.spin.floor import floor_figure, floor_view, floor_warnings, windows
 from wm_drake.report.spin.report import spin_report
 from wm_drake.simulation.cases import Case
@@ -71,13 +72,13 @@ def test_without_cabinet_the_section_says_so(machine, reference):
 
 
 def test_figure_shows_the_smallest_values(result):
-    panels = floor_figure(list(result.results)).axes
+    panels = floor_figure(list(result.results)).panels
     feet = result.results[0].measures.feet
-    for axes, name in zip(
+    for panel, name in zip(
         panels, ("smallest_foot_load", "slide_margin", "turn_margin"), strict=True
     ):
-        drawn = axes.lines[0].get_ydata()
-        assert np.min(drawn) == pytest.approx(float(feet[name]), rel=1e-9)
+        (line,) = (mark for mark in panel.marks if isinstance(mark, Line))
+        assert np.min(line.y) == pytest.approx(float(feet[name]), rel=1e-9)
 
 
 def test_windows_cover_all_samples():

@@ -9,22 +9,25 @@ from pages import without_scripts
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors
-from wm_drake.report.gasket import figures
-from wm_drake.report.gasket.findings import (
+from wm_drake.report.arrangement import arrange
+from wm_drake.simulation.cases import Case
+from wm_drake.studies.doe import make_design
+from wm_drake.studies.gasket import figures
+from wm_drake.studies.gasket.findings import (
     about_residual,
     advice,
     load_findings,
     summary,
     warnings,
 )
-from wm_drake.report.gasket.report import gasket_report
-from wm_drake.report.gasket.tables import digits, factors
-from wm_drake.report.gasket.words import Words
-from wm_drake.simulation.cases import Case
-from wm_drake.studies.doe import make_design
+from wm_drake.studies.gasket.page import gasket_page
+from wm_drake.studies.gasket.page_tables import digits, factors
 from wm_drake.studies.gasket.screening import Meaning, Responses, run_screening
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.tables import as_plain_data, runs_table
+from wm_drake.studies.gasket.task import GasketResult
+from wm_drake.studies.gasket.words import Words
+from wm_drake.studies.study import Facts
 
 NAMES = ("C_L", "C_T", "K_Lx", "K_Ly")
 RESPONSES = [letter + axis for letter in "DFM" for axis in "xyz"]
@@ -158,7 +161,7 @@ def test_full_saturated_design_says_that_nothing_shows_its_fit(trials, words):
     responses = Responses({"middle": frame}, {"y": "mm"}, {})
     screening = run_screening(make_design("full", NAMES[:2]), lambda _: responses)
     assert "nothing shows how well the model fits between them" in warnings(screening, words)[0]
-    page = gasket_report(screening, trials)
+    page = gasket_page(GasketResult(screening, trials), Facts())
     assert not re.search(r"[>( ](nan|NaN)[<) ]", without_scripts(page))
 
 
@@ -173,7 +176,9 @@ def test_contact_is_said_first_and_listed(trials, words):
     first = warnings(screening, words)[0]
     assert "The tub touches the housing in 1 of 81 runs" in first
     assert "trial 5, load middle" in first
-    assert "Runs in which the tub touches the housing" in gasket_report(screening, trials)
+    assert "Runs in which the tub touches the housing" in gasket_page(
+        GasketResult(screening, trials), Facts()
+    )
 
 
 def test_slack_springs_are_counted_by_spring_and_load(words):
@@ -195,9 +200,9 @@ def test_slack_springs_are_counted_by_spring_and_load(words):
 def test_spread_shows_all_points_of_all_loads(screening, words):
     """Check shared limits; once they were those of the first panel and cut points of the others."""
     figure = figures.spread_figure(screening, ["Dx", "Dy", "Dz"], "displacement", words)
-    for axes, load in zip(figure.axes, screening.loads, strict=True):
+    for place, load in zip(arrange(figure).places, screening.loads, strict=True):
         values = screening.responses.values[load][["Dx", "Dy", "Dz"]].to_numpy()
-        low, high = axes.get_ylim()
+        low, high = place.panel.y.range
         assert low <= values.min() < values.max() <= high
 
 
@@ -213,7 +218,7 @@ def test_factor_table_has_every_level_and_its_unit(trials, words):
 
 
 def test_page_is_whole(screening, trials):
-    page = gasket_report(screening, trials, "wm-drake study gasket", 12.0)
+    page = gasket_page(GasketResult(screening, trials), Facts("wm-drake study gasket", 12.0))
     assert "load towel &amp; co" in page
     assert page.count("<figure data-picture>") == 1 + 3 + 2 * 5
     assert "<img" not in page
@@ -238,9 +243,8 @@ def test_page_of_few_factors_and_failed_runs(trials, model):
         frame.loc[2] = np.nan
         return Responses({"middle": frame}, UNITS, {(2, "middle"): "the run diverged at 1.2 s"})
 
-    page = gasket_report(
-        run_screening(make_design("full", NAMES[:3], model=model), evaluate), trials
-    )
+    screening = run_screening(make_design("full", NAMES[:3], model=model), evaluate)
+    page = gasket_page(GasketResult(screening, trials), Facts())
     assert "Trial 3, load middle: the run diverged at 1.2 s" in page
     assert ("all interactions, because the model contains main effects only" in page) == (
         model == "main"
@@ -257,7 +261,8 @@ def test_page_of_one_factor_has_no_interactions(reference):
     factors = levels_of(reference, {"C_L": load_factors(GASKET_FACTORS)["C_L"]})
     case = Case("middle", reference.loads["middle"], reference.profile)
     trials = GasketTrials(reference, factors, [case])
-    page = gasket_report(run_screening(make_design("full", ["C_L"]), evaluate), trials)
+    screening = run_screening(make_design("full", ["C_L"]), evaluate)
+    page = gasket_page(GasketResult(screening, trials), Facts())
     assert "Main effects, load middle" in page
     assert "Strongest interaction" not in page
 

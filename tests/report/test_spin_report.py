@@ -33,7 +33,7 @@ from wm_drake.report.spin.tables import (
     smallest_tensions,
 )
 from wm_drake.report.spin.vibration_pictures import vibration_pictures
-from wm_drake.report.tables import readable
+from wm_drake.report.table import readable
 from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
 
 DIVERGED = "the run diverged at 1.234 s: x = 0.6 m, bound 0.5 m"
@@ -43,7 +43,8 @@ VOID = ("meta", "img", "br", "hr", "link", "input")
 def slack_case(parameters: MachineParameters, load: str, tensions: Sequence[float]) -> CaseResult:
     case = case_result(parameters, load)
     smallest = case.measures.smallest_tension.copy(data=np.array(tensions))
-    return replace(case, measures=replace(case.measures, smallest_tension=smallest))
+    table = case.measures.table.assign(smallest_spring_tension=smallest)
+    return replace(case, measures=replace(case.measures, table=table))
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +67,7 @@ def page(result: SpinResult) -> str:
 @pytest.fixture
 def without_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Skip the slow drawing of the figures, for tests of texts and tables."""
-    monkeypatch.setattr("wm_drake.report.page.describe", lambda figure: {"panels": []})
+    monkeypatch.setattr("wm_drake.report.page.plotly_of", lambda figure: {})
 
 
 class Tags(HTMLParser):
@@ -184,14 +185,14 @@ def test_mount_forces_and_accelerations_of_planted_motion(
 ) -> None:
     (table,) = mount_force_tables(result)
     assert table.header[-1] == "RMS 300 to 400 rpm, N"
-    of_middle = {row.cells[0]: row.cells[1:] for row in table.groups[0].rows}
+    of_middle = {row.cells[0]: row.cells[1:] for row in table.shown[0].rows}
     assert next(iter(of_middle)) == "springs.left"
     assert of_middle["springs.left"][:2] == ("190.0", "190.0")
     # 20, 6 and 10 N in phase: length 23.2 N, RMS 16.4 N, all at 240 rpm
     length = 1000.0 * 0.02 * np.sqrt(1.0 + 0.3**2 + 0.5**2)
     assert float(of_middle["gasket"][1]) == pytest.approx(length, rel=3e-3)  # sampled sines
     assert of_middle["gasket"][2:6] == ("240", "–", "–", number(length / np.sqrt(2.0), 1))
-    rows = accelerations(result).groups[0].rows
+    rows = accelerations(result).shown[0].rows
     largest = dict(zip(machine.sensors, rows[0].cells[1:], strict=True))
     omega = 8.0 * np.pi
     # the tub's angles are small: a = omega^2 d, within a few percent
@@ -216,7 +217,7 @@ def test_spectra_show_the_sensor_with_the_largest_amplitude(machine: MachinePara
     sensor = str(case.measures.amplitude.idxmax("sensor").values)
     assert f"at sensor {sensor}, load middle" in figure.alternative
     assert figure.drawing is not None
-    assert figure.drawing.count('"kind":"cells"') == 4  # maps of displacement and acceleration
+    assert figure.drawing.count('"type":"heatmap"') == 4  # maps of displacement and acceleration
 
 
 def test_no_warning_where_all_is_well(page: str) -> None:
@@ -359,9 +360,8 @@ def test_percent_difference_row_by_hand(machine: MachineParameters) -> None:
     amplitude = case.measures.amplitude.copy(
         data=1e-3 * np.array([34.92, 8.7, 9.45, 23.9, 4.0, 2.3])
     )
-    result = spin_result(
-        machine, [replace(case, measures=replace(case.measures, amplitude=amplitude))]
-    )
+    table = case.measures.table.assign(amplitude=amplitude)
+    result = spin_result(machine, [replace(case, measures=replace(case.measures, table=table))])
     # experiment 29.1, 8.7, 18.9, 23.9, 8.0, 23.0 mm: 34.92 / 29.1 = 1.2, 9.45 / 18.9 = 0.5, 4 / 8 = 0.5, 2.3 / 23 = 0.1
     found = differences(amplitude_table(result), result.results[0])
     np.testing.assert_allclose(
@@ -455,7 +455,7 @@ def test_slack_springs_are_warned_of(machine: MachineParameters) -> None:
         "Springs go slack: left in load middle (with gasket), back (with gasket); "
         "rear in load middle (with gasket). A slack spring"
     )
-    rows = [group.rows[0] for group in smallest_tensions(result).groups]
+    rows = [group.rows[0] for group in smallest_tensions(result).shown]
     assert [row.cells for row in rows][2] == ("−5.0", "1.0", "1.0")
     assert [row.kind for row in rows] == ["alarm", "alarm", ""]
     assert "smallest tension of each spring" in spin_report(result).lower()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from machines_of_each_kind import damper_of
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer, Sine
@@ -17,7 +18,6 @@ from wm_drake.parameters import (
     CoulombDamper,
     EndBushing,
     ForceTable,
-    FreeStrokeDamper,
     HavsinDamper,
     MstvDamper,
     StvDamper,
@@ -35,27 +35,14 @@ from wm_drake.rigs import (
     measures_of,
 )
 from wm_drake.rigs.loops import steady_deformations
-from wm_drake.systems.friction_damper import FrictionDamper
+from wm_drake.systems.element_system import ElementSystem
 
-MSTV = MstvDamper(  # fit of [C]; f_max assumed
-    law="mstv",
-    friction_force=60.0,
-    sponge_stiffness=176e3,
-    sponge_damping=90.0,
-    slider_damping=400.0,
-)
+MSTV = damper_of("mstv", friction_damping=0.0)  # fit of [C]; f_max assumed
 SPONGE = ForceTable(  # assumed
     displacement=(-0.02, -0.01, -0.004, 0.004, 0.01, 0.02),
     force=(-120.0, -40.0, 0.0, 0.0, 40.0, 120.0),
 )
-FREE_STROKE = FreeStrokeDamper(  # [A] Table 1
-    law="free_stroke",
-    friction_force=35.0,
-    friction_damping=60.0,
-    basic_friction_force=10.5,
-    basic_full_friction_velocity=0.09,
-    sponge=SPONGE,
-)
+FREE_STROKE = damper_of("free_stroke", sponge=SPONGE)  # [A] Table 1
 
 
 @functools.cache
@@ -322,7 +309,9 @@ def test_the_dampers_system_under_drakes_integrator_gives_the_loop_of_the_bench(
         Sine(np.eye(7)[5] * motion.amplitude, np.full(7, motion.angular_frequency), np.zeros(7))
     )
     state = builder.AddSystem(Multiplexer([7, 7]))
-    system = builder.AddSystem(FrictionDamper(parameters.packed(), int(parameters.has_sponge)))
+    system = builder.AddSystem(
+        ElementSystem(parameters.kind, parameters.packed(), parameters.state_size)
+    )
     builder.Connect(sine.get_output_port(0), state.get_input_port(0))
     builder.Connect(sine.get_output_port(1), state.get_input_port(1))
     builder.Connect(state.get_output_port(), system.GetInputPort("plant_state"))

@@ -5,16 +5,16 @@ import pytest
 import xarray as xr
 
 from wm_drake.parameters import SpinProfile
-from wm_drake.simulation.measures import (
+from wm_drake.simulation.displacements import (
     envelopes,
     filtered_displacement,
     largest_motion,
-    measure,
     moment_of_largest_amplitude,
     peak_line,
     percent_difference,
     smooth_envelope,
 )
+from wm_drake.simulation.measures import measure
 
 RATE = 200.0  # Hz, as records are sampled
 

@@ -1,24 +1,17 @@
 """Forces on the cabinet: balance of momentum, hand values, batch against record, definitions."""
 
-import warnings
-
 import numpy as np
 import pytest
 from machines_of_each_kind import machines_of_each_kind
 from scipy.integrate import cumulative_simpson
 from scipy.spatial.transform import Rotation
-from telescopic_machine import RUN_UP as SHORT_RUN_UP
-from telescopic_machine import telescopic
 from tube_energy import dense_run
 
-from wm_drake.batch import simulate_many
-from wm_drake.batch.runs import MEASURES
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.measures import measure
 from wm_drake.simulation.mounts import force_measures, mount_names, mount_wrenches
-from wm_drake.simulation.runs import DivergenceWarning, simulate
+from wm_drake.simulation.runs import simulate
 
 LOAD = Load(unbalances=(Unbalance(mass=0.9, radius=0.24, y=-0.1),))
 RUN_UP = SpinProfile(time=(0.0, 2.0), speed=(4.0, 30.0))
@@ -71,9 +64,9 @@ def balances(machine, trajectory, setup):
 
 
 @pytest.mark.parametrize("kind", ["struts", "tubes"])
-def test_forces_on_cabinet_balance_momentum_and_gravity(kind, machine):
+def test_forces_on_cabinet_balance_momentum_and_gravity(kind, shipped):
     """Check Newton and Euler for all moving bodies: dP/dt = gravity - force on the cabinet."""
-    built = machine if kind == "struts" else build_machine(telescopic())
+    built = shipped("reference" if kind == "struts" else "free_stroke")
     setup = built.set_up(LOAD)
     trajectory = dense_run(setup, SpinProfile(time=(0.0, 0.5), speed=(15.0, 25.0)), 5e-4)
     on_cabinet = mount_wrenches(setup, trajectory).sum(axis=1)
@@ -121,45 +114,6 @@ def test_force_of_each_mount_is_that_of_its_element(many_mounts):
 def turned(record, point):
     """Return a vector of T in W at all samples of a record."""
     return Rotation.from_euler("xyz", record.tub_angle.values).apply(point)
-
-
-def variables():
-    """Return the names of the measures of the forces on the cabinet."""
-    return [*MEASURES["mounts"], *MEASURES["cabinet"]]
-
-
-def test_batch_measures_what_the_record_says(many_mounts):
-    cases = [
-        Case("one", LOAD, RUN_UP),
-        Case("two", LOAD, RUN_UP, gasket=False),
-        Case("diverges", VIOLENT, RUN_UP),
-    ]
-    table = simulate_many(many_mounts, cases, measures=("mounts", "cabinet"))
-    assert table.diverged.values[2]
-    assert set(table.data_vars) == {*variables(), "diverged"}
-    for index, case in enumerate(cases):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DivergenceWarning)
-            alone = measure(simulate(many_mounts, case))
-        for name in variables():
-            assert table[name].attrs["units"] in ("N", "N m")
-            np.testing.assert_allclose(
-                table[name].values[index], getattr(alone, name).values, rtol=1e-9, err_msg=name
-            )
-    assert not table.mount_force_peak.sel(run=1, mount="gasket").item()
-    assert table.mount_force_peak.sel(run=0, mount="gasket").item() > 1.0
-
-
-def test_batch_measures_telescopic_dampers():
-    built = build_machine(telescopic())
-    case = Case("one", LOAD, SHORT_RUN_UP)
-    table = simulate_many(built, [case], measures=("mounts", "cabinet"))
-    alone = measure(simulate(built, case))
-    assert "telescopic_dampers.left" in table.mount.values
-    for name in variables():
-        np.testing.assert_allclose(
-            table[name].values[0], getattr(alone, name).values, rtol=1e-9, err_msg=name
-        )
 
 
 def test_definitions_of_the_measures():

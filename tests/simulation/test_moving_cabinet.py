@@ -15,7 +15,8 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance, load_machine, with_value, with_values
 from wm_drake.simulation.cabinet import walk
 from wm_drake.simulation.cases import Case, case_of
-from wm_drake.simulation.measures import measure, walk_of
+from wm_drake.simulation.measures import measure
+from wm_drake.simulation.measures.record import walk_of
 from wm_drake.simulation.records import as_record
 from wm_drake.simulation.runs import DivergenceWarning, simulate
 from wm_drake.studies.modes.study import modes, three_linearisations
@@ -28,8 +29,8 @@ TWO = Load(unbalances=(Unbalance(mass=0.8, radius=0.25, y=-0.1),))
 
 
 @pytest.fixture(scope="module")
-def light():
-    return build_machine(load_machine("light_cabinet"))
+def light(shipped):
+    return shipped("light_cabinet")
 
 
 @pytest.fixture(scope="module")
@@ -79,12 +80,11 @@ def test_the_distance_is_no_artefact_of_step_or_regularisation(light):
     assert 0.3 < second / first < 0.7
 
 
-def test_stiff_feet_give_back_the_fixed_housing(moving):
+def test_stiff_feet_give_back_the_fixed_housing(moving, machine, reference):
     """Check that the deviation falls as 1 / stiffness."""
-    reference = load_machine("reference")
     case = Case("middle", reference.loads["middle"], SHORT)
     how = {"step": 2.5e-3 / 8, "integrator": "runge_kutta"}
-    fixed = simulate(build_machine(reference), case, **how).displacement.values
+    fixed = simulate(machine, case, **how).displacement.values
     errors = []
     for k in (4.0, 8.0):
         feet = {
@@ -228,14 +228,13 @@ def test_a_cabinet_that_cannot_stand_is_refused(changes, message):
         with_moving_cabinet(**changes)
 
 
-def test_other_refusals():
+def test_other_refusals(machine):
     with pytest.raises(ValueError, match="not possible with telescopic_dampers"):
         with_moving_cabinet(load_machine("free_stroke"))
     with pytest.raises(InputError, match="tips over at rest"):
         build_machine(with_moving_cabinet(centre_of_mass=(2.0, 0.0, 0.0))).set_up()
-    fixed = build_machine(load_machine("reference"))
     with pytest.raises(InputError, match=r"cabinet.moves: this cabinet moves"):
-        fixed.set_up(parameters=with_moving_cabinet())
+        machine.set_up(parameters=with_moving_cabinet())
 
 
 def test_modes_and_steady_states_are_refused(light):

@@ -2,7 +2,7 @@
 
 The limits are those that the calibration of this machine reached (analyses/calibrate_reference.py).
 It used all 36 amplitudes and all 18 means, so these tests pin a fit; they do not test a prediction.
-See docs/decisions/0030.
+See docs/theory/fits.md.
 """
 
 import numpy as np

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, find_peaks, sosfiltfilt
 
-from wm_drake.simulation.measures import amplitudes, filtered
+from wm_drake.simulation.displacements import amplitudes, filtered
 
 PERIOD = 0.005
 

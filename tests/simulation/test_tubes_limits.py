@@ -15,8 +15,8 @@ LOAD = Load(unbalances=(Unbalance(mass=0.5, radius=0.24, y=-0.1),))
 
 
 @pytest.fixture(scope="module")
-def built():
-    return build_machine(telescopic())
+def built(shipped):
+    return shipped("free_stroke")
 
 
 def regions(machine, step=None, parameters=None, integrator=None):

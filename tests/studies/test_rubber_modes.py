@@ -5,7 +5,7 @@ import pytest
 from machine_with_bearing import with_bearing
 from machines_of_each_kind import RUBBER, changed
 
-from wm_drake.engines.compiled.packing import CARRIER_STATE_SIZE
+from wm_drake.elements.state_map import CARRIER, STRETCHES
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
 from wm_drake.studies.modes.linearisation import Linearisation, drake_spectrum
@@ -61,8 +61,7 @@ def test_stuck_friction_is_a_spring():
 def test_branches_stay_relaxed_under_a_load(rubber):
     """Check that springs carry the weight of a load: friction holds none of it."""
     loaded = Linearisation(rubber.set_up("middle"), loaded=True)
-    begin = loaded.derivative.layout.branches_begin
-    assert not loaded.equilibrium[begin:].any()
+    assert not loaded.equilibrium[loaded.derivative.layout.states.span(STRETCHES)].any()
     assert np.max(np.abs(loaded.equilibrium - loaded.derivative.rest)) > 1e-4
 
 
@@ -72,25 +71,23 @@ def test_response_is_that_of_the_engine_over_time(rubber):
     balance = HarmonicBalance(setup, Series(11, 128))
     points = [point for point in branch_of(balance, setup, speed) if point.on_grid]
     assert len(points) == len(speed)
-    begin = balance.derivative.layout.branches_begin
     for point in points:
         found = trajectory_of_period(balance, point.coefficients, point.speed, 128)
         wanted = settled_trajectory(setup, point.speed, 128, 120)
         for name in ("state", "stretches"):
             ours, engine = (np.ptp(getattr(each, name)[:, :6], axis=0) for each in (found, wanted))
             np.testing.assert_allclose(ours, engine, rtol=0.01, atol=2e-3 * engine.max())
-    assert begin < len(balance.derivative.rest)
+    assert balance.derivative.layout.states.of_kind(STRETCHES)
 
 
 def test_indices_of_the_bearing_are_right_beside_rubber():
     both = with_bearing(changed(gasket=REFERENCE.gasket.model_dump() | RUBBER))
     balance = HarmonicBalance(build_machine(both).set_up("front"), Series(3, 16))
-    begin = balance.derivative.layout.carrier_begin
-    angles = np.isin(balance.derivative.free, range(begin, begin + 3))
+    carrier = balance.derivative.layout.states.span(CARRIER)
+    angles = np.isin(balance.derivative.free, carrier.start + np.arange(3))
     np.testing.assert_array_equal(balance.scale[angles], ANGLE_ARM)
-    end = begin + CARRIER_STATE_SIZE
-    assert balance.derivative.layout.branches_begin == end
+    assert balance.derivative.layout.states.span(STRETCHES).start == carrier.stop
     turns, shifts = balance.kinematics.turns, balance.kinematics.shifts
     velocities = np.concatenate([turns[1].ravel(), shifts[1]])
-    assert balance.derivative.free[velocities].max() < end
+    assert balance.derivative.free[velocities].max() < carrier.stop
     assert np.all(balance.derivative.is_velocity[velocities])

@@ -57,7 +57,7 @@ def waited(jobs, identifier, wanted):
 
 
 def test_study_runs_and_its_report_is_found(jobs, opened):
-    identifier = jobs.start(*opened, STATE, "gasket", {"--trials": "27"})
+    identifier = jobs.start(*opened, STATE, "gasket", {"trials": "27"})
     shown = waited(jobs, identifier, "finished")
     assert shown["progress"] == (3, 40)
     assert shown["command"].endswith("--machine machine.yaml --out results --trials=27")
@@ -69,7 +69,7 @@ def test_study_runs_and_its_report_is_found(jobs, opened):
 
 
 def test_study_is_cancelled_and_continued(jobs, opened):
-    identifier = jobs.start(*opened, STATE, "tolerance", {"--samples": "16"})
+    identifier = jobs.start(*opened, STATE, "tolerance", {"samples": "16"})
     waited(jobs, identifier, "running")
     jobs.cancel(identifier)
     waited(jobs, identifier, "not finished")
@@ -84,10 +84,15 @@ def test_study_is_cancelled_and_continued(jobs, opened):
     ("study", "options"),
     [
         ("rm", {}),
-        ("gasket", {"--out": "/tmp/x"}),
-        ("gasket", {"--trials": "1; rm -rf /"}),
-        ("gasket", {"--load": "--machine=x"}),
-        ("tolerance", {"--samples": "-1"}),
+        ("calibrate", {}),
+        ("gasket", {"out": "x"}),
+        ("gasket", {"factors": "x.yaml"}),
+        ("gasket", {"trials": "1; rm -rf /"}),
+        ("gasket", {"load": "--machine=x"}),
+        ("gasket", {"design": "../../x.csv"}),
+        ("tolerance", {"samples": "-1"}),
+        ("tolerance", {"samples": "1"}),
+        ("tolerance", {"file": "/etc/passwd"}),
     ],
 )
 def test_hostile_study_is_not_started(jobs, opened, study, options):

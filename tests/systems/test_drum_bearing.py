@@ -8,10 +8,10 @@ from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 from pydrake.math import RollPitchYaw, RotationMatrix
 from scipy.spatial.transform import Rotation
 
-from wm_drake.elements.bearing import FORCE_SIZE, drum_bearing_history
+from wm_drake.elements.bearing import DRUM_BEARING, FORCE_SIZE, drum_bearing_history
 from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bushing_law
 from wm_drake.parameters import Bearing
-from wm_drake.systems.drum_bearing import DrumBearing
+from wm_drake.systems.element_system import ElementSystem
 
 POINT = np.array([0.02, 0.15, -0.01])  # m
 R_TB = RotationMatrix(RollPitchYaw([0.2, 0.0, -0.1])).matrix()
@@ -21,7 +21,7 @@ PACKED = SixComponentBushingParameters(POINT, R_TB, POINT, R_TB, LAW).packed()
 
 @pytest.fixture(scope="module")
 def system():
-    return DrumBearing(PACKED)
+    return ElementSystem(DRUM_BEARING, PACKED)
 
 
 def states(count, seed):

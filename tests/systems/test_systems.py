@@ -6,39 +6,37 @@ from typing import Any
 import numpy as np
 import pytest
 from element_ports import own_outputs
+from machines_of_each_kind import damper_of
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
 from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RollPitchYaw, RotationMatrix
 from scipy.interpolate import PchipInterpolator
 
-from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bushing_law
-from wm_drake.elements.friction_damper import FrictionDamperParameters, packed_damper_law
-from wm_drake.elements.layouts import packed_stiffness
-from wm_drake.elements.spring import SPRING, SpringStrutParameters
-from wm_drake.parameters import SpinProfile
-from wm_drake.parameters.damper_laws import (
-    CoulombDamper,
-    FreeStrokeDamper,
-    HavsinDamper,
-    MstvDamper,
-    StvDamper,
+from wm_drake.elements.bushing import (
+    SIX_COMPONENT_BUSHING,
+    SixComponentBushingParameters,
+    packed_bushing_law,
 )
+from wm_drake.elements.friction_damper import (
+    FRICTION_DAMPER_STRUT,
+    FrictionDamperParameters,
+    packed_damper_law,
+)
+from wm_drake.elements.layouts import packed_stiffness
+from wm_drake.elements.mount import mounts_at
+from wm_drake.elements.spring import SPRING, SPRING_STRUT, SpringStrutParameters
+from wm_drake.elements.state_map import StateMap, sponge_part, tub_part
+from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.elements import Bushing, EndBushing, ForceTable
 from wm_drake.simulation.histories import output_history
-from wm_drake.systems.friction_damper import FrictionDamper
-from wm_drake.systems.six_component_bushing import SixComponentBushing
+from wm_drake.systems.element_system import ElementSystem
 from wm_drake.systems.speed_source import REFLECTED_INERTIA, MotorTorque, SpeedSource
 from wm_drake.systems.spin_profile_source import SpinProfileSource
-from wm_drake.systems.spring_strut import SpringStrut
 from wm_drake.systems.tub_force import TubForce
 
 SPRING_CURVE = ForceTable(
     displacement=(-0.03, -0.01, 0.0, 0.01, 0.04), force=(-200.0, -50.0, 0.0, 60.0, 300.0)
 )  # m, N
-SPONGE = ForceTable(
-    displacement=(-0.02, -0.01, -0.003, 0.003, 0.01, 0.02),
-    force=(-130.0, -40.0, 0.0, 0.0, 40.0, 130.0),
-)
 END_BUSHING = EndBushing(
     stiffness=6.0, damping=0.2, friction_torque=0.4, full_friction_rate=0.8
 )  # N m/rad, N m s/rad, N m
@@ -67,41 +65,8 @@ GASKET = Bushing(
     full_friction_rate_z=0.9,
 )
 DAMPERS = {
-    "coulomb": CoulombDamper(
-        law="coulomb", friction_force=60.0, damping=20.0, end_bushing=END_BUSHING
-    ),
-    "stv": StvDamper(
-        law="stv",
-        friction_force=60.0,
-        transition_velocity=0.2,
-        damping=20.0,
-        end_bushing=END_BUSHING,
-    ),
-    "havsin": HavsinDamper(
-        law="havsin",
-        friction_force=60.0,
-        full_friction_velocity=0.2,
-        damping=20.0,
-        end_bushing=END_BUSHING,
-    ),
-    "mstv": MstvDamper(
-        law="mstv",
-        friction_force=60.0,
-        friction_damping=30.0,
-        sponge_stiffness=176e3,
-        sponge_damping=90.0,
-        slider_damping=400.0,
-        end_bushing=END_BUSHING,
-    ),
-    "free_stroke": FreeStrokeDamper(
-        law="free_stroke",
-        friction_force=35.0,
-        friction_damping=60.0,
-        basic_friction_force=10.5,
-        basic_full_friction_velocity=0.09,
-        sponge=SPONGE,
-        end_bushing=END_BUSHING,
-    ),
+    law: damper_of(law, end_bushing=END_BUSHING)
+    for law in ("coulomb", "stv", "havsin", "mstv", "free_stroke")
 }
 every_damper = pytest.mark.parametrize("damper", DAMPERS.values(), ids=DAMPERS)
 
@@ -173,30 +138,28 @@ class Element:
 
     def system(self, packed=None):
         packed = self.packed if packed is None else packed
-        return (
-            self.kind(packed, len(self.state)) if self.kind is FrictionDamper else self.kind(packed)
-        )
+        return ElementSystem(self.kind, packed, len(self.state))
 
 
 ELEMENTS = {
-    "spring": Element(SpringStrut, spring_parameters().packed()),
-    "spring with a table": Element(SpringStrut, spring_parameters(SPRING_CURVE).packed()),
+    "spring": Element(SPRING_STRUT, spring_parameters().packed()),
+    "spring with a table": Element(SPRING_STRUT, spring_parameters(SPRING_CURVE).packed()),
     "spring that is nearly slack": Element(
-        SpringStrut, SPRING.replaced(spring_parameters().packed(), taut_from=2000.0)
+        SPRING_STRUT, SPRING.replaced(spring_parameters().packed(), taut_from=2000.0)
     ),
-    "bushing": Element(SixComponentBushing, bushing_parameters().packed()),
+    "bushing": Element(SIX_COMPONENT_BUSHING, bushing_parameters().packed()),
 }
 SPONGE_STATES = {"mstv": (2.3e-4,), "free_stroke": (0.012,)}  # m
 for _name, _damper in DAMPERS.items():
     _packed = damper_parameters(_damper).packed()
-    ELEMENTS[_name] = Element(FrictionDamper, _packed, SPONGE_STATES.get(_name, ()))
+    ELEMENTS[_name] = Element(FRICTION_DAMPER_STRUT, _packed, SPONGE_STATES.get(_name, ()))
 every_element = pytest.mark.parametrize("element", ELEMENTS.values(), ids=ELEMENTS)
 
 
 @pytest.mark.parametrize("stiffness", [5200.0, SPRING_CURVE])  # N/m
 def test_a_spring_pulls_its_hooks_together(stiffness):
     placed = spring_parameters(stiffness)
-    spring = SpringStrut(placed.packed())
+    spring = ElementSystem(SPRING_STRUT, placed.packed())
     curve = PchipInterpolator(SPRING_CURVE.displacement, SPRING_CURVE.force)
     for x in random_plant_states(10, seed=21):
         _, arm, p_WA, v_WA = tub_motion(x, placed.p_ToA_T)
@@ -216,7 +179,7 @@ def test_a_spring_pulls_its_hooks_together(stiffness):
 
 
 def test_a_spring_at_rest_has_its_preload():
-    spring = SpringStrut(spring_parameters().packed())
+    spring = ElementSystem(SPRING_STRUT, spring_parameters().packed())
     assert port(spring, context_of(spring, np.zeros(14)), "force") == pytest.approx(
         [240.0], rel=1e-15
     )
@@ -237,7 +200,7 @@ def line_of(damper, x):
 )  # fmt: skip
 def test_a_damper_without_sponge_resists_its_elongation_rate(name, full_force, transition):
     placed = damper_parameters(DAMPERS[name], EndBushing())
-    damper = FrictionDamper(placed.packed(), 0)
+    damper = ElementSystem(FRICTION_DAMPER_STRUT, placed.packed(), 0)
     for x in random_plant_states(10, seed=22):
         arm, e, _, rate, _, _ = line_of(placed, x)
         tension = 20.0 * rate + full_force * transition(rate / 0.2)  # N
@@ -251,7 +214,7 @@ def test_a_damper_without_sponge_resists_its_elongation_rate(name, full_force, t
 
 def test_an_mstv_damper_pulls_with_its_sponge():
     placed = damper_parameters(DAMPERS["mstv"], EndBushing())
-    damper = FrictionDamper(placed.packed(), 1)
+    damper = ElementSystem(FRICTION_DAMPER_STRUT, placed.packed(), 1)
     deformation = 3.5e-4  # m
     for x in random_plant_states(10, seed=23):
         arm, e, _, rate, _, _ = line_of(placed, x)
@@ -271,7 +234,7 @@ def test_an_mstv_damper_pulls_with_its_sponge():
 
 def test_a_free_stroke_damper_pulls_with_its_sponge_and_basic_friction():
     placed = damper_parameters(DAMPERS["free_stroke"], EndBushing())
-    damper = FrictionDamper(placed.packed(), 1)
+    damper = ElementSystem(FRICTION_DAMPER_STRUT, placed.packed(), 1)
     for x in random_plant_states(10, seed=24):
         *_, rate, _, _ = line_of(placed, x)
         basic = 10.5 * np.sin(np.pi / 2 * np.clip(rate / 0.09, -1, 1))  # N
@@ -290,7 +253,7 @@ def test_end_bushings_bend_back_a_strut_and_their_moments_are_balanced(damper):
     placed = damper_parameters(damper)
     state = [0.0] * int(placed.has_sponge)
     bent, free = (
-        FrictionDamper(p.packed(), len(state))
+        ElementSystem(FRICTION_DAMPER_STRUT, p.packed(), len(state))
         for p in (placed, damper_parameters(damper, EndBushing()))
     )
     axis = placed.p_ToA_T - placed.p_WH
@@ -326,7 +289,7 @@ def test_end_bushings_bend_back_a_strut_and_their_moments_are_balanced(damper):
 
 def test_a_bushing_acts_at_its_tub_side_point_along_the_axes_of_its_housing_frame():
     placed = bushing_parameters()
-    bushing = SixComponentBushing(placed.packed())
+    bushing = ElementSystem(SIX_COMPONENT_BUSHING, placed.packed())
     curve = PchipInterpolator(GASKET.stiffness_y.displacement, GASKET.stiffness_y.force)
     R_WG = placed.ground_side_rotation
     for x in random_plant_states(10, seed=26):
@@ -357,7 +320,7 @@ def test_a_bushing_acts_at_its_tub_side_point_along_the_axes_of_its_housing_fram
 
 def test_the_logged_force_of_a_bushing_is_the_reaction_to_what_acts_on_the_tub():
     placed = bushing_parameters()
-    bushing = SixComponentBushing(placed.packed())
+    bushing = ElementSystem(SIX_COMPONENT_BUSHING, placed.packed())
     for x in random_plant_states(5, seed=27):
         _, arm, _, _ = tub_motion(x, placed.tub_side_point)
         context = context_of(bushing, x)
@@ -380,15 +343,17 @@ def test_readings_repeat_the_force_port_row_by_row(element):
     system = element.system()
     states = random_plant_states(11, seed=28)  # more than go side by side, and not a multiple
     sponges = np.outer(np.linspace(0.5, 1.5, len(states)), element.state or [0.0])
-    begins = [
-        np.zeros(int(element.kind is kind), dtype=int)
-        for kind in (SpringStrut, FrictionDamper, SixComponentBushing)
-    ]
-    forces = np.empty((len(states), 6 if element.kind is SixComponentBushing else 1))
-    relaxed = np.empty((len(states), 0))
-    output_history(states, sponges, relaxed, np.empty(0), element.packed, *begins, None, forces)
-    for x, own, force in zip(states, sponges[:, : len(element.state)], forces, strict=True):
-        assert np.array_equal(own_outputs(system, context_of(system, x, own)), force)
+    kinds = {
+        "springs": SPRING_STRUT,
+        "dampers": FRICTION_DAMPER_STRUT,
+        "bushings": SIX_COMPONENT_BUSHING,
+    }
+    begins = {name: [0] for name, kind in kinds.items() if element.kind is kind}
+    mounts = mounts_at(begins, [], [], StateMap.of([tub_part(), sponge_part("")]))
+    forces = np.empty((len(states), 6 if element.kind is SIX_COMPONENT_BUSHING else 1))
+    output_history(np.hstack([states, sponges]), np.empty(0), element.packed, mounts, forces)
+    for x, sponge, force in zip(states, sponges[:, : len(element.state)], forces, strict=True):
+        assert np.array_equal(own_outputs(system, context_of(system, x, sponge)), force)
 
 
 def computed(system, context):
@@ -477,11 +442,14 @@ def test_parameters_of_another_length_are_refused(element):
 @pytest.mark.parametrize("damper", [None, *DAMPERS.values()], ids=["bushing", *DAMPERS])
 def test_a_disengaged_element_exerts_nothing_at_all(damper):
     if damper is None:
-        system, state = SixComponentBushing(bushing_parameters(engaged=0.0).packed()), ()
+        system, state = (
+            ElementSystem(SIX_COMPONENT_BUSHING, bushing_parameters(engaged=0.0).packed()),
+            (),
+        )
     else:
         placed = damper_parameters(damper, engaged=0.0)
         state = [2e-3] if placed.has_sponge else []  # m
-        system = FrictionDamper(placed.packed(), int(placed.has_sponge))
+        system = ElementSystem(FRICTION_DAMPER_STRUT, placed.packed(), int(placed.has_sponge))
     context = context_of(system, random_plant_states(1, seed=32)[0], state)
     assert not np.any(port(system, context, "generalized_force"))
     assert not np.any(own_outputs(system, context))

@@ -9,10 +9,9 @@ May import: `simulation` and the rooms before it.
 
 from wm_drake.batch.many import SimulationInterrupted, simulate_many
 from wm_drake.batch.remembered import run_keys, simulate_remembered, sources_version
-from wm_drake.batch.runs import MEASURES, RunResult
+from wm_drake.batch.runs import RunResult
 
 __all__ = [
-    "MEASURES",
     "RunResult",
     "SimulationInterrupted",
     "run_keys",

@@ -19,13 +19,13 @@ import xarray as xr
 from wm_drake.batch.ledger import Ledger, Result
 from wm_drake.batch.many import as_table, simulate_many
 from wm_drake.batch.remembered import run_keys, sources_version
-from wm_drake.batch.runs import MEASURES
 from wm_drake.errors import WmDrakeError, input_error, shortened
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
-from wm_drake.parameters.machine import DEFAULT_STEP
-from wm_drake.simulation.cases import Case
+from wm_drake.simulation.cases import Case, notice_jumping_friction
+from wm_drake.simulation.measures import MEASURES
+from wm_drake.simulation.runs import checked_step
 
 CASES_PER_WORK_ITEM = 32
 """Number of cases that are sent together.
@@ -99,13 +99,13 @@ def check_workers(client: Any) -> None:
         InputError: there are no workers, or one has other sources or library versions.
     """
     try:
-        found = client.run(sources_version)
+        versions = client.run(sources_version)
     except OSError:
         message = "the scheduler or a worker has gone; start it again, then repeat the command"
         raise input_error(message, where="--cluster") from None
-    if not found:
+    if not versions:
         raise input_error("the cluster has no workers; start at least one", where="--cluster")
-    for worker, version in found.items():
+    for worker, version in versions.items():
         if version != sources_version():
             raise input_error(
                 f"worker {worker} has other sources or versions ({version}) than this computer "
@@ -137,7 +137,7 @@ def simulate_on_cluster(
     client: Any,
     *,
     measures: Iterable[str] = ("extremes",),
-    step: float = DEFAULT_STEP,
+    step: float | None = None,
     progress: Callable[[int], None] = lambda done: None,
 ) -> xr.Dataset:
     """Run the cases whose results are not in a ledger on a cluster, and return the table of all.
@@ -149,9 +149,9 @@ def simulate_on_cluster(
         cases: Cases to run. They are taken one by one as needed.
         ledger: An open ledger.
         client: Client of the cluster, from `cluster_client`.
-        measures: Names of measures, keys of `wm_drake.batch.runs.MEASURES`.
-        step: Step size. [s]
-        progress: Called with the number of results in the ledger.
+        measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`.
+        step: Step size; None for that of the machine. [s]
+        progress: Called with the number of cases that have a result.
 
     Raises:
         WmDrakeError: a work item failed more often than the retry limit allows, or the connection
@@ -159,17 +159,23 @@ def simulate_on_cluster(
     """
     from distributed import as_completed
 
-    wanted = tuple(dict.fromkeys(measures))
+    notice_jumping_friction(machine.parameters)
+    distinct = tuple(dict.fromkeys(measures))
+    step = checked_step(machine.parameters, step)
     names: list[str] = []
     keys: list[str] = []
+    done = 0
 
     def missing() -> Iterator[tuple[str, Case]]:
+        nonlocal done
         given, hashed = itertools.tee(cases)
-        known = run_keys(machine.parameters, hashed, measures=wanted, step=step)
+        known = run_keys(machine.parameters, hashed, measures=distinct, step=step)
         for case, key in zip(given, known, strict=True):
             names.append(case.name)
             keys.append(key)
-            if key not in ledger:
+            if key in ledger:
+                done += 1
+            else:
                 yield key, case
 
     queue = missing()
@@ -182,33 +188,35 @@ def simulate_on_cluster(
             run_work_item,
             machine.parameters,
             work_item,
-            wanted,
+            distinct,
             step,
             pure=False,
             retries=RETRY_LIMIT,
         )
 
     in_flight = WORK_ITEMS_PER_THREAD * max(1, sum(client.nthreads().values()))
-    progress(len(ledger))
     with _cluster_errors():
         running = as_completed(
             [send(work_item) for work_item in itertools.islice(work_items, in_flight)],
             loop=client.loop,
         )
         for future in _as_they_end(running, client):
-            ledger.put_all(future.result())
-            progress(len(ledger))
+            results = future.result()
+            ledger.put_all(results)
+            done += len(results)
+            progress(done)
             for work_item in itertools.islice(work_items, 1):
                 running.add(send(work_item))
+    progress(len(keys))
     rows = {}
     for number, (name, key) in enumerate(zip(names, keys, strict=True)):
         result = ledger.get(key)
         rows[number] = (
             name,
             result.note,
-            [result.values[n] for measure in wanted for n in MEASURES[measure]],
+            [result.values[n] for measure in distinct for n in MEASURES[measure].names],
         )
-    return as_table(machine.parameters, wanted, rows)
+    return as_table(machine.parameters, distinct, rows)
 
 
 def _as_they_end(running: Any, client: Any) -> Iterator[Any]:
@@ -249,15 +257,15 @@ def run_work_item(
     parameters: MachineParameters,
     work_item: tuple[tuple[str, Case], ...],
     measures: tuple[str, ...],
-    step: float,
+    step: float | None,
 ) -> dict[str, Result]:
     """Run the cases of a work item in the process of a worker and return their results by key.
 
     Args:
         parameters: The machine.
         work_item: Pairs of the key of a run and its case.
-        measures: Names of measures, keys of `wm_drake.batch.runs.MEASURES`.
-        step: Step size. [s]
+        measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`.
+        step: Step size; None for that of the machine. [s]
     """
     cases = [case for _, case in work_item]
     results: dict[str, Result] = {}
@@ -293,6 +301,6 @@ class _HashableParameters:
 def _built_machine(hashable: _HashableParameters) -> Machine:
     """Return the built machine, from the cache if it was built before.
 
-    A Drake diagram is never freed, so a worker builds each machine only once.
+    Building takes long beside a run, so a worker builds each machine only once.
     """
     return build_machine(hashable.parameters)

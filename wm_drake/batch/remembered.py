@@ -10,11 +10,12 @@ import xarray as xr
 
 from wm_drake.batch.ledger import Ledger, Result, key_of
 from wm_drake.batch.many import as_table, simulate_many
-from wm_drake.batch.runs import MEASURES, RunResult
+from wm_drake.batch.runs import RunResult
 from wm_drake.model.bodies import sdf_path
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.records import versions
 from wm_drake.simulation.runs import checked_step
 
@@ -57,7 +58,7 @@ def run_keys(
     Args:
         parameters: Machine of the cases that have no parameters of their own.
         cases: Cases.
-        measures: Names of measures, keys of `wm_drake.batch.runs.MEASURES`.
+        measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`.
         step: Step size; None for that of the machine. [s]
 
     Raises:
@@ -96,7 +97,7 @@ def simulate_remembered(
         machine: A built machine.
         cases: Cases to run. They are taken one by one as needed.
         ledger: An open ledger.
-        measures: Names of measures, keys of `wm_drake.batch.runs.MEASURES`.
+        measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`.
         step: Step size; None for that of the machine. [s]
         workers: Number of threads; None for the number of cores.
         progress: Called with the number of cases that have a result.
@@ -106,7 +107,7 @@ def simulate_remembered(
         SimulationInterrupted: Ctrl-C was pressed.
         LedgerError: the ledger cannot be written to, or it is damaged.
     """
-    wanted = tuple(dict.fromkeys(measures))
+    distinct = tuple(dict.fromkeys(measures))
     names: list[str] = []
     keys: list[str] = []
     to_run: list[int] = []  # numbers of the cases that are run, in the order of running
@@ -115,7 +116,7 @@ def simulate_remembered(
     def missing() -> Iterator[Case]:
         nonlocal done
         given, hashed = itertools.tee(cases)
-        known = run_keys(machine.parameters, hashed, measures=wanted, step=step)
+        known = run_keys(machine.parameters, hashed, measures=distinct, step=step)
         for case, key in zip(given, known, strict=True):
             names.append(case.name)
             keys.append(key)
@@ -136,16 +137,16 @@ def simulate_remembered(
         together = dict(ended)  # runs that end together are stored together
         ended.clear()
         ledger.put_all(together)
-        found.update(together)
+        computed.update(together)
         for _ in together:
             done += 1
             progress(done)
 
-    found: dict[str, Result] = {}
+    computed: dict[str, Result] = {}
     table = simulate_many(
         machine,
         missing(),
-        measures=wanted,
+        measures=distinct,
         step=step,
         workers=workers,
         progress=store,
@@ -153,11 +154,11 @@ def simulate_remembered(
     )
     rows = {}
     for number, (name, key) in enumerate(zip(names, keys, strict=True)):
-        result = found[key] if key in found else ledger.get(key)
+        result = computed[key] if key in computed else ledger.get(key)
         rows[number] = (
             name,
             result.note,
-            [result.values[n] for measure in wanted for n in MEASURES[measure]],
+            [result.values[n] for measure in distinct for n in MEASURES[measure].names],
         )
-    pairs = table.pair.values.tolist() if "pair" in table.coords and found else None
-    return as_table(machine.parameters, wanted, rows, pairs)
+    pairs = table.pair.values.tolist() if "pair" in table.coords and computed else None
+    return as_table(machine.parameters, distinct, rows, pairs)

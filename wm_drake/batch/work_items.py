@@ -74,6 +74,24 @@ class BatchKey:
     stepping: Stepping
 
 
+class _Identity:
+    """Key of a cache that compares parameters by identity and keeps them alive.
+
+    To compare them by value would take longer than to pack them.
+    """
+
+    __slots__ = ("parameters",)
+
+    def __init__(self, parameters: MachineParameters) -> None:
+        self.parameters = parameters
+
+    def __hash__(self) -> int:
+        return object.__hash__(self.parameters)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Identity) and other.parameters is self.parameters
+
+
 class Preparation:
     """Packs cases of one machine.
 
@@ -87,7 +105,7 @@ class Preparation:
         self._context: Context | None = None
         self._drawn: list[tuple[object, DrawnBodies]] = []
         self._known_bodies: dict[tuple[Load, ...], FloatArray] = {}
-        self._known_numbers: dict[tuple[int, bool, SpinProfile], PackedParameters] = {}
+        self._known_numbers: dict[tuple[_Identity, bool, SpinProfile], PackedParameters] = {}
 
     def batches(self, cases: Iterable[Case]) -> Iterator[tuple[BatchKey, list[WorkItem]]]:
         """Yield batches of up to `WIDTH` work items that can run side by side.
@@ -138,8 +156,7 @@ class Preparation:
 
     def _numbers(self, case: Case) -> PackedParameters:
         """Return all other packed numbers of a case, which do not depend on its load."""
-        # the cached setup holds the parameters, so that no others can get the same id
-        key = (id(case.parameters or self.machine.parameters), case.gasket, case.profile)
+        key = (_Identity(case.parameters or self.machine.parameters), case.gasket, case.profile)
         if key not in self._known_numbers:
             if len(self._known_numbers) >= KEPT_NUMBERS:
                 del self._known_numbers[next(iter(self._known_numbers))]

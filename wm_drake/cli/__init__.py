@@ -12,16 +12,19 @@ from typing import Annotated
 
 import typer
 
-from wm_drake.cli import calibrate, identify, machine, record, rig, spin, studio, study
+from wm_drake.cli import identify, machine, record, rig, spin, studio, study
+from wm_drake.cli.common import HELP_OPTIONS
 from wm_drake.cli.figures import writes_pages
-from wm_drake.cli.terminal import give_quiet
+from wm_drake.cli.options import command_of
+from wm_drake.cli.quiet import give_quiet
 from wm_drake.errors import Problem, WmDrakeError, reason_of
+from wm_drake.studies.calibration.options import CALIBRATE
 
 app = typer.Typer(
     help="Dynamics of front-loading washing machines.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings=HELP_OPTIONS,
 )
 app.add_typer(identify.app, name="identify")
 app.add_typer(machine.app, name="machine")
@@ -29,13 +32,13 @@ app.add_typer(record.app, name="record")
 app.add_typer(rig.app, name="rig")
 app.add_typer(study.app, name="study")
 app.command()(writes_pages(spin.spin))
-app.command()(writes_pages(calibrate.calibrate))
+app.command("calibrate")(command_of(CALIBRATE))
 app.command()(studio.studio)
 give_quiet(app)
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(requested: bool) -> None:
+    if requested:
         from wm_drake.report.provenance import program
 
         typer.echo(program())

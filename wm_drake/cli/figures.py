@@ -8,15 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from wm_drake.cli.result_folder import FIGURES
-from wm_drake.errors import input_error
-
-
-def _folder(text: str) -> Path:
-    if not str(text).strip():
-        raise input_error("is empty; name a folder", where="--figures")
-    return Path(text)
-
+from wm_drake.cli.common import folder_of
+from wm_drake.studies.result_folder import FIGURES
 
 FiguresOption = Annotated[
     Path | None,
@@ -25,7 +18,7 @@ FiguresOption = Annotated[
         help="Write each picture of the page to this folder as PDF, SVG and PNG, 180 mm wide, with "
         "its data as CSV.",
         metavar="DIR",
-        parser=_folder,
+        parser=folder_of("--figures"),
     ),
 ]
 

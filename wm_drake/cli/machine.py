@@ -8,9 +8,14 @@ from typing import Annotated
 
 import typer
 
-from wm_drake.cli.common import JsonOption, SetOption, check_buildable, load_parameters, located_in
-from wm_drake.cli.terminal import say
+from wm_drake.cli.common import JsonOption, SetOption
 from wm_drake.errors import InputError, input_error, shortened
+from wm_drake.report.terminal import say
+from wm_drake.studies.inputs import (
+    check_buildable,
+    load_parameters,
+    located_in,
+)
 
 app = typer.Typer(help="List, start, check and show machine files.", no_args_is_help=True)
 
@@ -133,12 +138,12 @@ def _template(path: Path, base: str) -> str:
     extends = base
     if base not in shipped_machines():
         extends = os.path.relpath(machine_path(base).resolve(), path.parent.resolve())
-    own = {"name", "about", "model", "measured", "published"}
+    header_keys = {"name", "about", "model", "measured", "published"}
     lines = machine_yaml(parameters.model_copy(update={"sources": {}})).splitlines()
     comments, skipped = [], False
     for line in lines:
         if not line.startswith((" ", "-")):  # a key at the top
-            skipped = line.split(":")[0] in own
+            skipped = line.split(":")[0] in header_keys
         if not skipped:
             comments.append(f"# {line}")
     return "\n".join(

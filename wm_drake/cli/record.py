@@ -6,18 +6,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wm_drake.cli.channels import RecordChannelsOption, channels_of
+from wm_drake.cli.channels import RecordChannelsOption
 from wm_drake.cli.common import (
     JsonOption,
     OutOption,
     OverwriteOption,
-    command_line,
-    existing_file,
     interruptible,
 )
 from wm_drake.cli.figures import writes_pages
-from wm_drake.cli.result_folder import Run, result_folder
-from wm_drake.cli.terminal import say
+from wm_drake.report.provenance import command_line
+from wm_drake.report.terminal import say
+from wm_drake.studies.inputs import (
+    channels_of,
+    existing_file,
+)
+from wm_drake.studies.result_folder import Run, result_folder
 
 if TYPE_CHECKING:
     from wm_drake.studies.steady.orders import Orders

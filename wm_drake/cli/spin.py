@@ -16,33 +16,45 @@ from wm_drake.cli.common import (
     ProfileOption,
     SetOption,
     cases_of,
-    check_buildable,
-    command_line,
     interruptible,
-    load_parameters,
-    with_measured,
 )
-from wm_drake.cli.progress import progress_bars
-from wm_drake.cli.result_folder import Run, result_folder
 from wm_drake.cli.spin_comparison import Choice, compare
-from wm_drake.cli.spin_drive import DriveOption, drive_text, with_drive
 from wm_drake.cli.spin_results import (
     Pages,
     amplitude_lines,
     case_as_json,
-    compared_cases,
     divergences,
+    drive_text,
     end_with,
     gap_text,
+    measure_lines,
     write_cases,
 )
-from wm_drake.cli.terminal import Console, say
 from wm_drake.errors import input_error, nearest_names
+from wm_drake.report.progress import progress_bars
+from wm_drake.report.provenance import command_line
+from wm_drake.report.terminal import Console, say
+from wm_drake.studies.inputs import (
+    check_buildable,
+    load_parameters,
+    with_drive,
+    with_measured,
+)
+from wm_drake.studies.result_folder import Run, result_folder
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.studies.spin.study import SpinResult
 
 DEFAULT_OUT = Path("wm-drake-spin")
+DriveOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Drive in place of that of the machine file: prescribed (follows the profile exactly) "
+        "or motor (the default motor with torque limit and speed controller, or the motor of the "
+        "machine file).",
+        metavar="NAME",
+    ),
+]
 
 
 def spin(
@@ -98,7 +110,7 @@ def spin(
 ) -> None:
     """Simulate the run-up of the drum through the resonances, and report the motion of the tub."""
     from wm_drake.simulation.runs import DEFAULT_ENGINE, ENGINES
-    from wm_drake.studies.spin.study import run_spin
+    from wm_drake.studies.spin.study import compared_cases, run_spin
 
     engine = engine or DEFAULT_ENGINE
     if engine not in ENGINES:
@@ -167,7 +179,9 @@ def _print_tables(result: "SpinResult", out: Path, replay: bool) -> None:
             + ", ".join(f"{name} {tension:.1f} N" for name, tension in shown)
         )
         if result.parameters.drive.kind == "motor":
-            console.print(f"{case.case.name}: {drive_text(case.measures.drive)}")
+            console.print(f"{case.case.name}: {drive_text(case.measures)}")
+        for line in measure_lines(case):
+            console.print(line)
         if (walk := case.measures.walk) is not None:
             console.print(
                 f"{case.case.name}: the cabinet walks {1e3 * walk.distance:.1f} mm and turns by "

@@ -10,29 +10,27 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from wm_drake.cli.common import (
-    cases_of,
-    check_buildable,
-    command_line,
-    interruptible,
-    load_parameters,
-    with_measured,
-)
-from wm_drake.cli.progress import progress_bars
-from wm_drake.cli.result_folder import Run, result_folder
-from wm_drake.cli.spin_drive import with_drive
+from wm_drake.cli.common import cases_of, interruptible
 from wm_drake.cli.spin_results import (
     Pages,
     amplitude_lines,
     case_as_json,
-    compared_cases,
     divergences,
     end_with,
     gap_text,
     write_cases,
 )
-from wm_drake.cli.terminal import Console
 from wm_drake.errors import InputError, Problem, input_error, shortened
+from wm_drake.report.progress import progress_bars
+from wm_drake.report.provenance import command_line
+from wm_drake.report.terminal import Console
+from wm_drake.studies.inputs import (
+    check_buildable,
+    load_parameters,
+    with_drive,
+    with_measured,
+)
+from wm_drake.studies.result_folder import Run, result_folder
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import pandas as pd
@@ -169,7 +167,7 @@ def _name(parameters: "MachineParameters", gasket: bool, choice: Choice) -> str:
 
 def _run(planned: list[_Planned], choice: Choice, engine: str) -> "list[Variant]":
     from wm_drake.studies.spin.comparison import Variant
-    from wm_drake.studies.spin.study import run_spin
+    from wm_drake.studies.spin.study import compared_cases, run_spin
 
     names = [f"{one.name}: {case.name}" for one in planned for case in one.cases]
     changes = choice.sets or ([choice.drive] if choice.drive else None)

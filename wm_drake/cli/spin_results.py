@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from wm_drake.cli.spin_drive import drive_as_json
-from wm_drake.cli.spin_forces import forces_as_json
-
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import pandas as pd
     from rich.table import Table
 
     from wm_drake.model.scene import Gap
-    from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
+    from wm_drake.simulation.cabinet import Walk
+    from wm_drake.simulation.measures import Measures
+    from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 
 @dataclass(frozen=True)
@@ -29,15 +28,6 @@ class Pages:
 
     replay: bool
     detail: bool
-
-
-def compared_cases(measured: list[Path] | None, sets: list[str] | None) -> "Comparison":
-    """Return which cases are compared with measured amplitudes, from the options of a command."""
-    from wm_drake.studies.spin.study import Comparison
-
-    if measured:
-        return Comparison.ALL
-    return Comparison.NONE if sets else Comparison.AS_MEASURED
 
 
 def write_cases(
@@ -70,7 +60,7 @@ def _replay(result: "SpinResult", case: "CaseResult") -> str:
     import numpy as np
 
     from wm_drake.model.replay import Motion, replay_page
-    from wm_drake.simulation.measures import largest_motion
+    from wm_drake.simulation.displacements import largest_motion
 
     # Meshcat would print the address of its server
     logging.getLogger("drake").setLevel(logging.WARNING)
@@ -93,17 +83,10 @@ def _replay(result: "SpinResult", case: "CaseResult") -> str:
 
 def amplitude_lines(title: str, amplitudes: "pd.DataFrame") -> "Table":
     """Return amplitudes as a table for the terminal: words at the left, numbers at the right."""
-    from rich.table import Table
+    from wm_drake.report.table import Column, table_of
 
-    table = Table(title=title)
-    for name, column in amplitudes.items():
-        is_number = column.dtype.kind == "f"
-        table.add_column(str(name), justify="right" if is_number else "left", overflow="fold")
-    for row in amplitudes.itertuples(index=False):
-        table.add_row(
-            *(f"{value:.1f}" if isinstance(value, float) else str(value) for value in row)
-        )
-    return table
+    columns = {str(name): Column(str(name), decimals=1) for name in amplitudes.columns}
+    return table_of(amplitudes, columns=columns).terminal(title)
 
 
 def gap_text(gap: "Gap") -> str:
@@ -135,31 +118,67 @@ def end_with(diverged: list[str]) -> None:
 
 def case_as_json(case: "CaseResult") -> dict[str, Any]:
     """Return the measures of a case as an object for JSON."""
-    from wm_drake.parameters.units import Unit
+    from wm_drake.simulation.measures.as_json import as_json
+    from wm_drake.simulation.mounts import POINT
 
     measures = case.measures
-    millimetre = Unit("m", "mm")
-
-    def numbers(values: Any, unit: Unit, prefix: str = "") -> dict[str, float | None]:
-        labels = [f"{prefix}{label}" for label in values[values.dims[0]].values]
-        # JSON has no NaN
-        shown = [unit.from_si(float(value)) if value == value else None for value in values.values]
-        return dict(zip(labels, shown, strict=True))
-
+    tree = as_json(measures.table)
+    tree["cabinet_wrench"]["about"] = POINT
+    if not measures.has_cabinet:
+        tree["feet"] = None
     return {
         "load": case.case.name,
         "gasket": case.record.attrs["gasket"] == "yes",
-        "amplitudes_mm": numbers(measures.amplitude, millimetre),
-        "detergent_box_mm": numbers(measures.detergent_displacement, millimetre, "D"),
-        "gasket_force_N": numbers(measures.gasket_force, Unit("N", "N"), "F"),
-        "gasket_moment_Nm": numbers(measures.gasket_moment, Unit("N*m", "N*m"), "M"),
-        **forces_as_json(measures),
-        "motor": drive_as_json(measures.drive),
-        "smallest_gap_mm": millimetre.from_si(measures.smallest_gap.distance)
-        if measures.smallest_gap
-        else None,
-        "smallest_spring_tension_N": numbers(measures.smallest_tension, Unit("N", "N")),
-        "critical_rpm": numbers(measures.critical_speed, Unit("rad/s", "rpm")),
+        **tree,
+        "walk": None if measures.walk is None else _walk(measures.walk),
         "diverged": case.record.attrs["diverged"] or None,
         "wall_s": case.wall_s,
     }
+
+
+def _walk(walk: "Walk") -> dict[str, float]:
+    """Return distance and turn of a cabinet that moves, at the end of the run."""
+    from wm_drake.parameters.units import Unit
+
+    return {
+        "distance_mm": Unit("m", "mm").from_si(walk.distance),
+        "turn_deg": Unit("rad", "deg").from_si(walk.turn),
+    }
+
+
+def drive_text(measures: "Measures") -> str:
+    """Return the measures of the drive as text for the terminal."""
+    from wm_drake.simulation.measures.as_json import as_json
+
+    text = as_json(measures.table)["motor"]
+    if text["peak_torque_Nm"] is None:
+        return "the run is too short for measures of the drive"
+    line = f"motor torque on the drum up to {text['peak_torque_Nm']:.1f} N m"
+    if text["mean_torque_Nm"] is not None:
+        line += (
+            f", over a revolution up to {text['mean_torque_Nm']:.2f} N m at "
+            f"{text['mean_torque_rpm']:.0f} rpm"
+        )
+    if text["speed_ripple_percent"] is not None:
+        line += f"; speed ripple {text['speed_ripple_percent']:.1f} %"
+    if text["caught_rpm"] is not None:
+        line += (
+            f"; caught at {text['caught_rpm']:.0f} rpm with {text['caught_mean_torque_Nm']:.2f} "
+            "N m on average"
+        )
+    return line
+
+
+def measure_lines(case: "CaseResult") -> list[str]:
+    """Return a line for the terminal for each variable that is shown from its declaration."""
+    from wm_drake.simulation.measures.as_json import labelled_values
+    from wm_drake.simulation.measures.registry import tabulated
+
+    lines = []
+    for variable in tabulated():
+        numbers = [
+            " ".join([*labels, "-" if value is None else f"{value:.4g}"])
+            for labels, value in labelled_values(case.measures.table, variable)
+        ]
+        lines.append(f"{case.case.name}: {variable.kind} {', '.join(numbers)} {variable.unit_text}")
+    return lines

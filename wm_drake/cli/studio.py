@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from wm_drake.cli.common import MachineOption
-from wm_drake.cli.terminal import say
 from wm_drake.errors import input_error, reason_of
+from wm_drake.report.terminal import say
 
 DEFAULT_FOLDER = Path("wm-drake-studio")
 

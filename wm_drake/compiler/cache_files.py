@@ -12,10 +12,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
-from numba.core.compiler import CompileResult
-
 from wm_drake.compiler.inlined import INLINED, InlinedLibrary
+from wm_drake.compiler.numba_internals import (
+    CompileResult,
+    CompileResultCacheImpl,
+    FunctionCache,
+    IndexDataCacheFile,
+)
 
 _DIGEST = hashlib.sha256().digest_size
 
@@ -28,10 +31,10 @@ class CheckedCacheFile(IndexDataCacheFile):
     """
 
     def _load_index(self) -> dict[Any, str]:
-        found = _read(Path(self._index_path))
-        if found is None:
+        stored_content = _read(Path(self._index_path))
+        if stored_content is None:
             return {}
-        version, stamp, overloads = found
+        version, stamp, overloads = stored_content
         fits = version == self._version and stamp == self._source_stamp
         return overloads if fits else {}
 
@@ -40,10 +43,10 @@ class CheckedCacheFile(IndexDataCacheFile):
         self._write(self._index_path, self._dump(content))
 
     def _load_data(self, name: str) -> Any:
-        found = _read(Path(self._data_path(name)))
-        if found is None:
+        stored_content = _read(Path(self._data_path(name)))
+        if stored_content is None:
             raise FileNotFoundError(name)  # what numba takes as "compile it"
-        return found
+        return stored_content
 
     def _save_data(self, name: str, data: Any) -> None:
         self._write(self._data_path(name), self._dump(data))

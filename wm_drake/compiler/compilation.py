@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import config
-from numba.core.dispatcher import Dispatcher
+from numba import config
+from numba.extending import is_jitted
 
 from wm_drake.compiler.cache_files import LawCache, say_once
 from wm_drake.compiler.lanes import LawCompiler
@@ -102,7 +102,7 @@ def generic(compiled: Any) -> Callable[..., Any]:
     source = compiled.py_func
     names = dict(source.__globals__)
     for name in source.__code__.co_names:  # names of the laws that it calls
-        if isinstance(names.get(name), Dispatcher):
+        if is_jitted(names.get(name)):
             names[name] = generic(names[name])
     return types.FunctionType(
         source.__code__, names, source.__name__, source.__defaults__, source.__closure__

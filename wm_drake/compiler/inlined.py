@@ -9,9 +9,9 @@ import ctypes
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba.core import types
-from numba.core.codegen import JITCodeLibrary
-from numba.core.types.containers import BaseTuple
+from numba import types
+
+from wm_drake.compiler.numba_internals import JITCodeLibrary
 
 INLINED = "inlined"
 """Kind of these libraries in files of compiled code."""
@@ -48,10 +48,10 @@ class InlinedLibrary(JITCodeLibrary):
     @classmethod
     def read(cls, codegen: Any, state: tuple[str, str, bytes]) -> "InlinedLibrary":
         """Return the library of `serialize_using_object_code`."""
-        found = cls(codegen, state[0])
-        found._final_module = llvm.parse_bitcode(state[2])
-        found._finalize_final_module()
-        return found
+        library = cls(codegen, state[0])
+        library._final_module = llvm.parse_bitcode(state[2])
+        library._finalize_final_module()
+        return library
 
     def _finalize_final_module(self) -> None:
         """Make the code ready for linking, without the execution engine."""
@@ -67,4 +67,4 @@ def has_indices(kind: Any) -> bool:
     """
     if isinstance(kind, types.Array):
         return isinstance(kind.dtype, types.Integer)
-    return isinstance(kind, BaseTuple) and any(map(has_indices, kind.types))
+    return isinstance(kind, types.BaseTuple) and any(map(has_indices, kind.types))

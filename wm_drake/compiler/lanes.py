@@ -16,14 +16,18 @@ from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
-from numba.core import cgutils, types
-from numba.core.compiler import Compiler
-from numba.core.typeconv import Conversion
-from numba.core.types.containers import BaseTuple
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba import types
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
 from wm_drake.compiler.inlined import InlinedLibrary, has_indices
+from wm_drake.compiler.numba_internals import (
+    AbstractTemplate,
+    Compiler,
+    Conversion,
+    cgutils,
+    infer_global,
+    signature,
+)
 
 WIDTH = 8
 """Runs side by side: one register of 512 bits, two of 256."""
@@ -97,9 +101,11 @@ class _PointerModel(models.PrimitiveModel):
 @lower_cast(types.Integer, LanesType)
 def _in_each_lane(context: Any, builder: Any, given: Any, lanes: Any, value: Any) -> Any:
     number = context.cast(builder, value, given, types.float64)
-    nothing = ir.Constant(_VECTOR, ir.Undefined)
+    undefined = ir.Constant(_VECTOR, ir.Undefined)
     order = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
-    return builder.shuffle_vector(builder.insert_element(nothing, number, _FIRST), nothing, order)
+    return builder.shuffle_vector(
+        builder.insert_element(undefined, number, _FIRST), undefined, order
+    )
 
 
 def _declare(
@@ -328,6 +334,6 @@ class LawCompiler(Compiler):
 
 def _is_internal(kind: Any) -> bool:
     """Return whether no Python value has this type."""
-    if isinstance(kind, BaseTuple):
+    if isinstance(kind, types.BaseTuple):
         return any(map(_is_internal, kind.types))
     return isinstance(kind, _InternalType)

@@ -19,12 +19,13 @@ from wm_drake.compiler.vectors import (
     subtract,
 )
 from wm_drake.compiler.vectors import transpose as transposed
+from wm_drake.elements.kind import ElementKind, Output
 from wm_drake.elements.layouts import layout_of, packed_fields, packed_once
 from wm_drake.elements.motion import tub_motion, write_generalized_force
 from wm_drake.elements.strut import wrench_at_origin
 from wm_drake.laws.bushing import bushing_force
 from wm_drake.laws.table import stiffness_force
-from wm_drake.parameters.elements import BushingType
+from wm_drake.parameters.elements import Bushing, BushingType
 from wm_drake.parameters.types import FloatArray
 
 AXES = ("x", "y", "z")
@@ -69,6 +70,11 @@ class SixComponentBushingParameters:
     ground_side_rotation: FloatArray
     packed_law: FloatArray
     engaged: float = 1.0
+
+    @property
+    def kind(self) -> ElementKind:
+        """Return the kind of the element; a compliant bearing of the drum has another one."""
+        return SIX_COMPONENT_BUSHING
 
     @property
     def structure(self) -> list[int]:
@@ -214,3 +220,20 @@ def evaluate_six_component_bushing(x, state, p, generalized_force, force, rate):
     write_generalized_force(generalized_force, 0, wrench, 0.0 * wrench[0])
     for i in range(6):
         force[i] = on_housing[i]
+
+
+WRENCH_OUTPUTS = (
+    Output("force", "N", "force on the housing, in G", size=3),
+    Output("moment", "N m", "moment on the housing at the tub-side point, in G", size=3),
+)
+"""Outputs of a bushing; G is the frame on the housing, along whose axes the stiffness acts."""
+
+SIX_COMPONENT_BUSHING = ElementKind(
+    name="six_component_bushing",
+    parameters=Bushing,
+    layout=BUSHING,
+    outputs=WRENCH_OUTPUTS,
+    words="six-component bushing between frames of the tub and of the housing",
+    picture="points",
+    on_plant=evaluate_six_component_bushing,
+)

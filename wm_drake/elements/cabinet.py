@@ -22,6 +22,7 @@ from wm_drake.compiler.vectors import (
     subtract,
     transpose,
 )
+from wm_drake.elements.kind import ElementKind, Output
 from wm_drake.elements.motion import (
     GENERALIZED_FORCE_SIZE,
     PLANT_STATE_SIZE,
@@ -323,13 +324,28 @@ def evaluate_mounts_on_cabinet(x, on_tub, on_feet, generalized_force):
 
 
 @law
-def evaluate_feet(x, state, p, generalized_force, own, rate):
+def evaluate_feet(x, state, p, generalized_force, floor_forces, rate):
     """Write the force of the floor on the cabinet; arguments as in `ElementSystem`.
 
-    x: state of cabinet and drum; state: slips of the feet; own: `FLOOR_FORCE_SIZE` numbers.
+    x: state of cabinet and drum; state: slips of the feet; floor_forces: (`FLOOR_FORCE_SIZE`,).
     """
     motion, q = tub_motion(numbers(x)), numbers(p)
     wrench = feet_on_floor(state, rate, 0, motion, q, 0)
     write_generalized_force(generalized_force, 0, wrench, 0.0 * wrench[0])
     for i in range(FEET_COUNT):
-        own[3 * i], own[3 * i + 1], own[3 * i + 2] = foot_of(state, 0, motion, q, 0, i).force
+        floor_forces[3 * i], floor_forces[3 * i + 1], floor_forces[3 * i + 2] = foot_of(
+            state, 0, motion, q, 0, i
+        ).force
+
+
+FEET = ElementKind(
+    name="feet",
+    parameters=Cabinet,
+    layout=PADS,
+    outputs=(
+        Output("floor_force", "N", "force of the floor on each foot, in W", FLOOR_FORCE_SIZE),
+    ),
+    words="four feet of a cabinet that moves; the plant state is that of cabinet and drum",
+    picture="points",
+    on_plant=evaluate_feet,
+)

@@ -78,10 +78,10 @@ def _choice(
     for position, (number, function) in enumerate(functions.items()):
         layout: PackedLayout = _LAYOUTS[number]
         names[f"law_{number}"], names[f"read_{number}"] = function, layout.read
-        own = DamperLaw.arguments(function)
-        given = [arg if arg in arguments else f"numbers_{number}.{arg}" for arg in own]
+        needed = DamperLaw.arguments(function)
+        given = [arg if arg in arguments else f"numbers_{number}.{arg}" for arg in needed]
         call = f"law_{number}({', '.join(given)})"
-        call = call if "deformation" in own else result.format(call)
+        call = call if "deformation" in needed else result.format(call)
         last = position == len(functions) - 1
         indent = "    " if last else "        "
         lines += [] if last else [f"    if number == {number}:"]

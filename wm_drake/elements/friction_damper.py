@@ -15,11 +15,12 @@ from wm_drake.elements.damper_law import (
     law_structure,
     packed_damper_law,
 )
+from wm_drake.elements.kind import ElementKind, Output
 from wm_drake.elements.layouts import layout_of, packed_fields, packed_once
 from wm_drake.elements.motion import tub_motion, write_generalized_force
 from wm_drake.elements.strut import strut_line, transverse, wrench_at_origin
 from wm_drake.laws.strut import bending_moment, transverse_couple
-from wm_drake.parameters.elements import EndBushing
+from wm_drake.parameters.elements import Damper, EndBushing
 from wm_drake.parameters.types import FloatArray
 
 END_BUSHING = layout_of("EndBushingNumbers", EndBushing, tuple(EndBushing.model_fields))
@@ -47,6 +48,16 @@ class FrictionDamperParameters:
     end_bushing: EndBushing
     packed_law: FloatArray
     engaged: float = 1.0
+
+    @property
+    def kind(self) -> ElementKind:
+        """Return the kind of the element."""
+        return FRICTION_DAMPER_STRUT
+
+    @property
+    def state_size(self) -> int:
+        """Return the number of own states: 1 for a law with a sponge."""
+        return int(self.has_sponge)
 
     @property
     def has_sponge(self) -> bool:
@@ -172,9 +183,21 @@ def evaluate_friction_damper(x, state, p, generalized_force, force, rate):
         rate[0] = deformation_rate
 
 
+FRICTION_DAMPER_STRUT = ElementKind(
+    name="friction_damper",
+    parameters=Damper,
+    layout=FRICTION_DAMPER,
+    outputs=(Output("force", "N", "tension of a damper, > 0"),),
+    acts_at_rest=False,
+    words="damper as a massless strut between a point of the tub and a point of the housing",
+    on_plant=evaluate_friction_damper,
+)
+
+
 __all__ = [
     "END_BUSHING",
     "FRICTION_DAMPER",
+    "FRICTION_DAMPER_STRUT",
     "FrictionDamperParameters",
     "evaluate_friction_damper",
     "friction_damper_force",

@@ -22,7 +22,13 @@ TREE_STATE = PackedLayout(
 
 Roll, pitch, yaw of the body, its position p_WTo, angle or extension of the joint; w_WT, v_WTo, rate
 of the joint. The body is the tub or another one. [rad, m, rad or m; rad/s, m/s, rad/s or m/s]"""
+BODY_STATE = PackedLayout(
+    "BodyState", angles=VECTOR, position=VECTOR, angular_velocity=VECTOR, velocity=VECTOR
+)
+"""Roll, pitch, yaw and position of a floating body, its angular velocity and velocity, in W."""
+BODY_STATE_SIZE = BODY_STATE.fixed_size
 read_pose = POSE.read
+read_body_state, write_body_state = BODY_STATE.read, BODY_STATE.write
 read_tree_state, write_tree_state = TREE_STATE.read, TREE_STATE.write
 
 PLANT_STATE_SIZE = TREE_STATE.fixed_size

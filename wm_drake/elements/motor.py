@@ -3,6 +3,7 @@
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import numbers, where
 from wm_drake.compiler.packed import LAYOUT, SCALAR, PackedLayout
+from wm_drake.elements.kind import ElementKind, Output
 from wm_drake.elements.layouts import packed_torque_limit
 from wm_drake.elements.motion import read_tree_state, write_generalized_force
 from wm_drake.laws.motor import (
@@ -13,7 +14,7 @@ from wm_drake.laws.motor import (
     torque_limit,
 )
 from wm_drake.laws.table import CURVE
-from wm_drake.parameters.drive import MotorDrive, TorqueLimit
+from wm_drake.parameters.drive import BearingFriction, MotorDrive, TorqueLimit
 from wm_drake.parameters.types import FloatArray
 
 CONTROLLER = PackedLayout(
@@ -145,30 +146,30 @@ def sampled_state(state, rate, reference, p, at):
 
 
 @law
-def evaluate_controller(inputs, p, own):
-    """Write demand and rate of the integral part into `own`.
+def evaluate_controller(inputs, p, outputs):
+    """Write demand and rate of the integral part into `outputs`.
 
     Args:
         inputs: Integral part [N m], speed of the drum, wanted speed [rad/s], torque limit [N m].
         p: Numbers of `CONTROLLER`.
-        own: (2,), written. [N m, N m/s]
+        outputs: (2,), written. [N m, N m/s]
     """
     x = numbers(inputs)
-    own[0], own[1] = controller_response(x[0], x[1], x[2], x[3], numbers(p), 0)
+    outputs[0], outputs[1] = controller_response(x[0], x[1], x[2], x[3], numbers(p), 0)
 
 
 @law
-def evaluate_motor(inputs, p, own):
-    """Write torque and torque limit of the motor into `own`.
+def evaluate_motor(inputs, p, outputs):
+    """Write torque and torque limit of the motor into `outputs`.
 
     Args:
         inputs: Demand [N m] and speed of the motor [rad/s].
         p: Numbers of `TORQUE_LIMIT`.
-        own: (2,), written. [N m]
+        outputs: (2,), written. [N m]
     """
     x = numbers(inputs)
     limit = torque_limit(x[1], read_torque_limit(numbers(p), 0))
-    own[0], own[1] = limited(x[0], limit), limit
+    outputs[0], outputs[1] = limited(x[0], limit), limit
 
 
 @law
@@ -180,3 +181,14 @@ def evaluate_drum_friction(x, state, p, generalized_force, force, rate):
     zero = 0.0 * torque
     write_generalized_force(generalized_force, 0, (zero, zero, zero, zero, zero, zero), torque)
     force[0] = torque
+
+
+DRUM_FRICTION = ElementKind(
+    name="drum_friction",
+    parameters=BearingFriction,
+    layout=BEARING_FRICTION,
+    outputs=(Output("torque", "N m", "torque on the drum"),),
+    words="friction of the drum's bearing and seal",
+    picture="points",
+    on_plant=evaluate_drum_friction,
+)

@@ -4,12 +4,15 @@ A mount is everything that connects the oscillating group to the cabinet (the ho
 """
 
 from collections import namedtuple
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from wm_drake.compiler.chosen import call
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes
 from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
+from wm_drake.compiler.matrices import plus
 from wm_drake.compiler.vectors import add, cross, scale
 from wm_drake.elements.bushing import six_component_bushing_wrench
 from wm_drake.elements.friction_damper import (
@@ -17,24 +20,75 @@ from wm_drake.elements.friction_damper import (
     friction_damper_tension,
     friction_damper_wrench,
 )
+from wm_drake.elements.kind import ElementKind, registered_laws
 from wm_drake.elements.motion import motion_at, read_tree_state, tub_motion
-from wm_drake.elements.rubber import bushing_wrench
+from wm_drake.elements.rubber import Branches, bushing_wrench
 from wm_drake.elements.spring import spring_strut_wrench
-from wm_drake.elements.telescopic_damper import inner_tube_motion, read_telescopic_damper
+from wm_drake.elements.state_map import ELEMENT, STRETCHES, StateMap
+from wm_drake.elements.telescopic_damper import (
+    TUBES_STATE_SIZE,
+    inner_tube_motion,
+    read_telescopic_damper,
+)
 
 WRENCH_SIZE = 6
 """Numbers of the wrench of a mount: moment about the origin of W, then force, in W. [N m, N]"""
 
 Mounts = namedtuple(
-    "Mounts", ("springs", "dampers", "bushings", "telescopes", "sponges", "tubes", "branches")
+    "Mounts",
+    (
+        "springs",
+        "dampers",
+        "bushings",
+        "telescopes",
+        "branches",
+        "others",
+        "sponge_states",
+        "tube_states",
+    ),
 )
 """Indices at which the mounts of a machine begin.
 
 springs, dampers, bushings: arrays of indices of the elements in the packed numbers; telescopes: the
-same for the numbers of `TELESCOPIC_DAMPER`, None if there are none; sponges: index of the first
-deformation in the state; tubes: indices of the states of the tubes in the state, None if there are
-none; branches: `Branches` of rubber bushings, None without them.
+same for the numbers of `TELESCOPIC_DAMPER`, None if there are none; branches: `Branches` of rubber
+bushings, None without them; others: `RegisteredLaws` of elements of other packages, or None;
+sponge_states, tube_states: where the sponges of strut dampers and the states of telescopic dampers
+begin in the state.
 """
+
+
+def mounts_at(
+    begins: Mapping[str, Sequence[int]],
+    rubber: Sequence[int],
+    kinds: Sequence[ElementKind],
+    states: StateMap,
+) -> Mounts:
+    """Return the indices of mounts.
+
+    Args:
+        begins: Indices of springs, dampers, bushings, telescopes and others in packed numbers.
+        rubber: Those of the bushings that are of rubber.
+        kinds: Kinds of the others.
+        states: States of the machine.
+    """
+    springs, dampers, bushings, telescopes = (
+        np.array(begins.get(kind, ()), dtype=np.int64)
+        for kind in ("springs", "dampers", "bushings", "telescopes")
+    )
+    branches = None
+    if len(rubber):
+        count = len(states.indices(kinds=[STRETCHES]))
+        branches = Branches(np.array(rubber, dtype=np.int64), states.begins_of(STRETCHES), count)
+    return Mounts(
+        springs,
+        dampers,
+        bushings,
+        telescopes if len(telescopes) else None,
+        branches,
+        registered_laws(kinds, begins.get("others", ()), states.begins_of(ELEMENT).tolist()),
+        states.begins.sponges,
+        states.begins.tubes,
+    )
 
 
 @law
@@ -83,11 +137,10 @@ def write_wrench(wrenches, at, wrench):
 def write_mount_wrenches(x, p, mounts, wrenches):
     """Write the wrench of each mount on the cabinet, one after the other.
 
-    The order is that of `Mounts`: springs, dampers, bushings, telescopic dampers.
+    The order is that of `Mounts`: springs, dampers, bushings, telescopic dampers, others.
 
     Args:
-        x: State: `TREE_STATE` of tub and drum, deformations of the dampers, states of the tubes;
-            stretches of rubber bushings.
+        x: State.
         p: Packed numbers.
         mounts: `Mounts`.
         wrenches: Written: `WRENCH_SIZE` numbers for each mount.
@@ -99,13 +152,15 @@ def write_mount_wrenches(x, p, mounts, wrenches):
     for i in range(len(mounts.dampers)):
         at = mounts.dampers[i]
         arm, line = friction_damper_line(motion, p, at)
-        tension, _ = friction_damper_tension(line[1], x[mounts.sponges + i], p, at)
+        tension, _ = friction_damper_tension(line[1], x[mounts.sponge_states + i], p, at)
         wrench = friction_damper_wrench(motion, arm, line, tension, p, at)
         column = write_wrench(wrenches, column, reaction_on_cabinet(motion.position, wrench))
     for at in mounts.bushings:
         wrench, _ = bushing_wrench(motion, p, at, x, mounts.branches)
         column = write_wrench(wrenches, column, reaction_on_cabinet(motion.position, wrench))
-    _write_telescopic_dampers(x, p, mounts.telescopes, mounts.tubes, wrenches, column)
+    begin = mounts.tube_states
+    column = _write_telescopic_dampers(x, p, mounts.telescopes, begin, wrenches, column)
+    _write_others(x, p, motion, mounts.others, wrenches, column)
 
 
 @law
@@ -117,8 +172,38 @@ def _write_telescopic_dampers(x, p, telescopes, tubes, wrenches, column):
     """
     if telescopes is not None:
         for i in range(len(telescopes)):
-            wrench = telescopic_damper_on_cabinet(x, tubes[i], p, telescopes[i])
+            k = tubes + TUBES_STATE_SIZE * i
+            wrench = telescopic_damper_on_cabinet(x, k, p, telescopes[i])
             column = write_wrench(wrenches, column, wrench)
+    return column
+
+
+@law
+def _write_others(x, p, motion, others, wrenches, column):
+    """Write the wrench of each element of another package; `others` is None without any."""
+    if others is not None:
+        for i in range(len(others.at)):
+            wrench = call(others.wrench, i, x, None, motion, p, others.at[i], others.states[i])
+            column = write_wrench(wrenches, column, reaction_on_cabinet(motion.position, wrench))
+
+
+@law
+def add_others(x, dx, motion, p, others, total):
+    """Return the wrench on the tub with that of all elements of other packages.
+
+    Args:
+        x, dx: State and its time derivative, of which that of the elements is written.
+        motion: `TubMotion` of the tub.
+        p: Packed numbers.
+        others: `RegisteredLaws`; None without such elements.
+        total: Wrench of all other elements: moment about To and force, in W. [N m, N]
+    """
+    if others is None:
+        return total
+    for i in range(len(others.at)):
+        wrench = call(others.wrench, i, x, dx, motion, p, others.at[i], others.states[i])
+        total = plus(total, wrench)
+    return total
 
 
 @long_running
@@ -134,9 +219,9 @@ def mount_wrench_history(states, p, mounts, wrenches):
     align_stack()
     x_numbers, p_numbers = np.empty(states.shape[1] * WIDTH), in_each_lane(p)
     numbers = np.empty(wrenches.shape[1] * WIDTH)
-    x, q, found = lane_array(x_numbers), lane_array(p_numbers), lane_array(numbers)
+    x, q, wrench_lanes = lane_array(x_numbers), lane_array(p_numbers), lane_array(numbers)
     for begin in range(0, len(states), WIDTH):
         rows_to_lanes(states, begin, x_numbers)
-        write_mount_wrenches(x, q, mounts, found)
+        write_mount_wrenches(x, q, mounts, wrench_lanes)
         lanes_to_rows(numbers, begin, wrenches)
     keep(p_numbers)

@@ -6,7 +6,6 @@ axes, friction before the Maxwell element of each.
 """
 
 from collections import namedtuple
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -31,15 +30,17 @@ from wm_drake.compiler.vectors import (
 from wm_drake.compiler.vectors import transpose as transposed
 from wm_drake.elements.bushing import (
     BUSHING,
+    WRENCH_OUTPUTS,
     SixComponentBushingParameters,
     packed_bushing_law,
     read_bushing,
     six_component_bushing_wrench,
 )
+from wm_drake.elements.kind import ElementKind
 from wm_drake.elements.motion import tub_motion, write_generalized_force
 from wm_drake.elements.strut import wrench_at_origin
 from wm_drake.laws.rubber import dahl_rate, maxwell_rate
-from wm_drake.parameters.elements import RubberBushingType
+from wm_drake.parameters.elements import Bushing, RubberBushingType
 from wm_drake.parameters.rubber import DAHL_FIELDS, MAXWELL_FIELDS, RubberBranches
 from wm_drake.parameters.types import FloatArray
 
@@ -121,6 +122,11 @@ class RubberBushingParameters(SixComponentBushingParameters):
     packed_rubber: FloatArray = field(default_factory=lambda: np.zeros(RUBBER.fixed_size))
 
     @property
+    def kind(self) -> ElementKind:
+        """Return the kind of the element."""
+        return SIX_COMPONENT_BUSHING_OF_RUBBER
+
+    @property
     def structure(self) -> list[int]:
         """Numbers of points of its six tables, and which branches are in use."""
         return [*super().structure, *branch_structure(self.packed_rubber)]
@@ -162,27 +168,6 @@ def placed_bushing(
     if branches is None:
         return SixComponentBushingParameters(*place)
     return RubberBushingParameters(*place, packed_rubber=branches)
-
-
-def branches_of(
-    bushings: Mapping[str, SixComponentBushingParameters], begins: Sequence[int], first: int
-) -> Branches | None:
-    """Return the `Branches` of placed bushings; None if none of them has branches.
-
-    Args:
-        bushings: By name.
-        begins: Index of each one's packed numbers.
-        first: Index in the state of the first stretch.
-    """
-    at, states, end = list[int](), list[int](), first
-    for begin, bushing in zip(begins, bushings.values(), strict=True):
-        if isinstance(bushing, RubberBushingParameters):
-            at.append(begin)
-            states.append(end)
-            end += bushing.state_size
-    if not at:
-        return None
-    return Branches(np.array(at, dtype=np.int64), np.array(states, dtype=np.int64), end - first)
 
 
 @law
@@ -354,3 +339,14 @@ def evaluate_rubber_bushing(x, state, p, generalized_force, force, rate):
         force[i] = on_housing[i] + more_on_housing[i]
     at_point = rubber_motion(motion, *whole.bushing)
     write_branch_rates(state, rate, 0, at_point.rate, read_rubber(*whole.rubber))
+
+
+SIX_COMPONENT_BUSHING_OF_RUBBER = ElementKind(
+    name="rubber_bushing",
+    parameters=Bushing,
+    layout=RUBBER_BUSHING,
+    outputs=WRENCH_OUTPUTS,
+    words="six-component bushing of rubber, with a state for the stretch of each branch in use",
+    picture="points",
+    on_plant=evaluate_rubber_bushing,
+)

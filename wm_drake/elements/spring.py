@@ -7,11 +7,13 @@ from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import numbers
 from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import rotate, scale
+from wm_drake.elements.kind import ElementKind, Output
 from wm_drake.elements.layouts import packed_once
 from wm_drake.elements.motion import tub_motion, write_generalized_force
 from wm_drake.elements.strut import strut_line, wrench_at_origin
 from wm_drake.laws.spring import spring_tension
 from wm_drake.laws.table import CURVE, stiffness_force
+from wm_drake.parameters.elements import Spring
 from wm_drake.parameters.types import FloatArray
 
 SPRING = PackedLayout(
@@ -31,7 +33,7 @@ SLACK_TRANSITION = 1e-3
 """Elongation over which a spring changes from slack to taut. [m]
 
 Assumption: a hook settles in its eye over about this distance. A run crosses it within a few steps;
-amplitudes do not depend on it (docs/decisions/0077).
+amplitudes do not depend on it (docs/theory/springs.md).
 """
 
 _LARGEST_SHARE = 0.5
@@ -55,6 +57,16 @@ class SpringStrutParameters:
     packed_stiffness: FloatArray
     pushes: bool = False
     is_given: bool = False
+
+    @property
+    def kind(self) -> ElementKind:
+        """Return the kind of the element."""
+        return SPRING_STRUT
+
+    @property
+    def state_size(self) -> int:
+        """Return the number of own states."""
+        return 0
 
     @property
     def rest_length(self) -> float:
@@ -133,3 +145,13 @@ def evaluate_spring_strut(x, state, p, generalized_force, force, rate):
     wrench, tension = spring_strut_wrench(tub_motion(numbers(x)), numbers(p), 0)
     write_generalized_force(generalized_force, 0, wrench, 0.0 * tension)
     force[0] = tension
+
+
+SPRING_STRUT = ElementKind(
+    name="spring_strut",
+    parameters=Spring,
+    layout=SPRING,
+    outputs=(Output("force", "N", "tension of a spring, > 0"),),
+    words="suspension spring between a point of the tub and a point of the housing",
+    on_plant=evaluate_spring_strut,
+)

@@ -22,25 +22,28 @@ from wm_drake.elements.damper_law import (
     law_of,
     law_structure,
 )
+from wm_drake.elements.kind import ElementKind, Output
 from wm_drake.elements.layouts import packed_once
 from wm_drake.elements.motion import (
     GENERALIZED_FORCE_SIZE,
     PLANT_STATE_SIZE,
+    TREE_STATE,
     TubMotion,
     motion_at,
     read_tree_state,
     tub_motion,
     write_generalized_force,
 )
+from wm_drake.parameters.elements import TelescopicDamper
 from wm_drake.parameters.types import FloatArray
 
-OWN_FORCES = PackedLayout(
+DAMPER_FORCES = PackedLayout(
     "TelescopicDamperForces", tension=SCALAR, on_outer_tube=ARRAY(6), on_housing=ARRAY(6)
 )
-"""Own forces: tension [N]; force and moment of the bushing at the tub on the outer tube; force and
-moment of the other bushing on the housing [N, N m]."""
-FORCE_SIZE = OWN_FORCES.fixed_size
-write_own_forces = OWN_FORCES.write
+"""Forces of a damper: tension [N]; force and moment of the bushing at the tub on the outer tube;
+force and moment of the other bushing on the housing [N, N m]."""
+FORCE_SIZE = DAMPER_FORCES.fixed_size
+write_damper_forces = DAMPER_FORCES.write
 
 TELESCOPIC_DAMPER = PackedLayout(
     "TelescopicDamperNumbers",
@@ -52,7 +55,10 @@ TELESCOPIC_DAMPER = PackedLayout(
 )
 """Direction of the joint in the frame of the outer tube, 1 or 0 for a law that is taken out,
 bushings, law."""
-read_telescopic_damper = TELESCOPIC_DAMPER.read
+TUBES_STATE = PackedLayout("TubesState", tubes=LAYOUT(TREE_STATE), deformation=SCALAR)
+"""State of a telescopic damper: outer tube and joint, then deformation of the sponge. [m]"""
+TUBES_STATE_SIZE, DEFORMATION = TUBES_STATE.fixed_size, TUBES_STATE.offsets["deformation"]
+read_telescopic_damper, read_tubes_state = TELESCOPIC_DAMPER.read, TUBES_STATE.read
 
 
 @dataclass(frozen=True)
@@ -75,6 +81,16 @@ class TelescopicDamperParameters:
     housing_bushing: SixComponentBushingParameters
     packed_law: FloatArray
     engaged: float = 1.0
+
+    @property
+    def kind(self) -> ElementKind:
+        """Return the kind of the element."""
+        return TELESCOPIC_DAMPER_TUBES
+
+    @property
+    def state_size(self) -> int:
+        """Return the number of own states: 1 for a law with a sponge."""
+        return int(self.has_sponge)
 
     @property
     def has_sponge(self) -> bool:
@@ -204,27 +220,45 @@ def evaluate_telescopic_damper(x, state, p, generalized_force, force, rate):
     )
     write_generalized_force(generalized_force, 0, on_tub, 0.0 * tension)
     write_generalized_force(generalized_force, GENERALIZED_FORCE_SIZE, on_tubes, along)
-    write_own_forces(force, 0, tension, first, second)
+    write_damper_forces(force, 0, tension, first, second)
     if len(rate) > 0:
         rate[0] = deformation_rate
 
 
 @law
-def telescopic_damper_history(states, own_states, p, forces):
+def telescopic_damper_history(states, element_states, p, forces):
     """Write the own forces at each row of a sampled motion, as `evaluate_telescopic_damper`."""
     align_stack()
-    x_numbers, own_numbers = np.empty(2 * PLANT_STATE_SIZE * WIDTH), np.empty(WIDTH)
+    x_numbers, sponge_numbers = np.empty(2 * PLANT_STATE_SIZE * WIDTH), np.empty(WIDTH)
     force_numbers, p_numbers = np.empty(FORCE_SIZE * WIDTH), in_each_lane(p)
-    x, own, own_force, q = (
+    x, sponge, force_lanes, q = (
         lane_array(x_numbers),
-        lane_array(own_numbers),
+        lane_array(sponge_numbers),
         lane_array(force_numbers),
         lane_array(p_numbers),
     )
     for begin in range(0, len(states), WIDTH):
         rows_to_lanes(states, begin, x_numbers)
-        rows_to_lanes(own_states, begin, own_numbers)
-        _, _, _, _, tension, first, second = _forces_at(x, own[0], q)
-        write_own_forces(own_force, 0, tension, first, second)
+        rows_to_lanes(element_states, begin, sponge_numbers)
+        _, _, _, _, tension, first, second = _forces_at(x, sponge[0], q)
+        write_damper_forces(force_lanes, 0, tension, first, second)
         lanes_to_rows(force_numbers, begin, forces)
     keep(p_numbers)
+
+
+TELESCOPIC_DAMPER_TUBES = ElementKind(
+    name="telescopic_damper",
+    parameters=TelescopicDamper,
+    layout=TELESCOPIC_DAMPER,
+    outputs=(
+        Output("force", "N", "tension of the law along the joint, > 0"),
+        Output("tub_bushing_force", "N", "force on the outer tube, in its frame", size=3),
+        Output("tub_bushing_moment", "N m", "moment on the outer tube, in its frame", size=3),
+        Output("housing_bushing_force", "N", "force on the housing", size=3),
+        Output("housing_bushing_moment", "N m", "moment on the housing", size=3),
+    ),
+    words="damper of two tubes that are bodies, each on a bushing",
+    on_plant=evaluate_telescopic_damper,
+    trees=2,
+)
+assert TELESCOPIC_DAMPER_TUBES.output_size == FORCE_SIZE

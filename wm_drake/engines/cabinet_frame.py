@@ -25,14 +25,14 @@ def seen_from_cabinet(
     from scipy.spatial.transform import Rotation  # slow to import: cabinets that move
 
     moving, of_body = _motion(cabinet), _motion(body)
-    found = generic(motion_in)(moving, of_body)
+    relative = generic(motion_in)(moving, of_body)
     accelerations = generic(rates_in)(moving, *_vectors(cabinet_rates), of_body, *_vectors(rates))
-    matrices = np.stack(found.rotation, axis=1).reshape(-1, 3, 3)
+    matrices = np.stack(relative.rotation, axis=1).reshape(-1, 3, 3)
     angles = np.full((len(body), 3), np.nan)
     good = np.isfinite(matrices).all(axis=(1, 2))  # a run that diverged has other samples
     if good.any():
         angles[good] = Rotation.from_matrix(matrices[good]).as_euler("xyz")  # space-fixed
-    vectors = found.position, found.angular_velocity, found.velocity
+    vectors = relative.position, relative.angular_velocity, relative.velocity
     motion = np.column_stack([angles, *(np.stack(vector, axis=1) for vector in vectors)])
     return motion, np.column_stack([np.stack(vector, axis=1) for vector in accelerations])
 

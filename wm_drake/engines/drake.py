@@ -16,7 +16,7 @@ from wm_drake.parameters.types import FloatArray
 
 INTEGRATION_SCHEME = "runge_kutta3"
 """Drake's explicit scheme of third order with error control: friction has kinks, across which a
-higher order gains nothing (`docs/performance.md`)."""
+higher order gains nothing (docs/theory/integrator.md)."""
 
 ACCURACY = 1e-5
 """Target accuracy of a step, relative to unit coordinates. Peaks then differ from converged ones by
@@ -139,6 +139,13 @@ class _Samples:
         ]
         stretches = sum(bushing.state_size for bushing, _ in self._branches)
         self._stretches = np.zeros((len(time), stretches))
+        self._others = [
+            (element, element.GetMyContextFromRoot(setup.context))
+            for element in self._machine.others.values()
+            if element.state_size
+        ]
+        others = sum(element.state_size for element, _ in self._others)
+        self._element_states = np.zeros((len(time), others))
         self._plant_context = setup.plant_context
         self._torque = self._machine.outputs["motor_torque"]
         self._torque_context = self._torque.get_system().GetMyContextFromRoot(setup.context)
@@ -172,6 +179,10 @@ class _Samples:
             self._stretches[row] = np.concatenate(
                 [bush.GetOutputPort("state").Eval(context) for bush, context in self._branches]
             )
+        if self._others:
+            self._element_states[row] = np.concatenate(
+                [element.GetOutputPort("state").Eval(context) for element, context in self._others]
+            )
         self._motor_torque[row] = self._torque.Eval(self._torque_context)[0]
         feet = self._machine.feet
         if feet is not None:
@@ -201,6 +212,8 @@ class _Samples:
             if carrier.shape[1]:
                 carrier, _ = seen_from_cabinet(*in_world, carrier, self._rate[:, layout.carrier])
             moving = np.column_stack([cabinet, self._slips])
-        found = self.time, state, self._deformation, self._motor_torque, of_tub, tubes, carrier
-        trajectory = Trajectory(*found, self._stretches, cabinet=moving)
+        columns = self.time, state, self._deformation, self._motor_torque, of_tub, tubes, carrier
+        trajectory = Trajectory(
+            *columns, self._stretches, cabinet=moving, element_states=self._element_states
+        )
         return cut_at_divergence(trajectory, failure)

@@ -1,6 +1,7 @@
 """Result of an engine: the sampled motion, and the reason if the run diverged."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -60,6 +61,7 @@ class Trajectory:
         cabinet: (n, 20) Positions and velocities in W of a cabinet that moves, in the order of
             those of the tub in `state`, then how far each foot has slid, x and y [m]; None for a
             fixed one.
+        element_states: (n, k) States of elements of other packages; None without any.
     """
 
     time: FloatArray
@@ -72,6 +74,16 @@ class Trajectory:
     stretches: FloatArray
     divergence: Divergence | None = None
     cabinet: FloatArray | None = None
+    element_states: FloatArray | None = None
+
+    def part(self, rows: slice) -> "Trajectory":
+        """Return some of the samples."""
+        arrays: dict[str, Any] = {
+            name: values[rows]
+            for name, values in vars(self).items()
+            if isinstance(values, np.ndarray)
+        }
+        return replace(self, **arrays)
 
 
 def cut_at_divergence(trajectory: Trajectory, failure: str = "") -> Trajectory:
@@ -95,23 +107,8 @@ def cut_at_divergence(trajectory: Trajectory, failure: str = "") -> Trajectory:
     assert reason is not None  # this sample is out of bounds
     if failure and np.isnan(trajectory.state[index]).all():  # the engine took no such sample
         reason = "state", failure
-    return _cut(trajectory, index, Divergence(float(trajectory.time[index]), *reason))
-
-
-def _cut(trajectory: Trajectory, length: int, divergence: Divergence) -> Trajectory:
-    """Return the first samples of a trajectory, with a divergence."""
-    return Trajectory(
-        trajectory.time[:length],
-        trajectory.state[:length],
-        trajectory.deformation[:length],
-        trajectory.motor_torque[:length],
-        trajectory.acceleration[:length],
-        trajectory.tubes[:length],
-        trajectory.carrier[:length],
-        trajectory.stretches[:length],
-        divergence,
-        None if trajectory.cabinet is None else trajectory.cabinet[:length],
-    )
+    divergence = Divergence(float(trajectory.time[index]), *reason)
+    return replace(trajectory.part(slice(index)), divergence=divergence)
 
 
 def diverging_coordinate(

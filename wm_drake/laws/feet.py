@@ -219,15 +219,15 @@ def least_turning_resistance(force_x, force_y, holding, x, y):
         if not decrease > least_decrease:
             break
         share = 1.0
-        found = turning_power(v_x + step_x, v_y + step_y, force_x, force_y, holding, x, y)
-        while found > value - 1e-4 * share * decrease and share > 1e-9:
+        power = turning_power(v_x + step_x, v_y + step_y, force_x, force_y, holding, x, y)
+        while power > value - 1e-4 * share * decrease and share > 1e-9:
             share *= 0.5
-            found = turning_power(
+            power = turning_power(
                 v_x + share * step_x, v_y + share * step_y, force_x, force_y, holding, x, y
             )
-        if not found < value:
+        if not power < value:
             break
-        value, v_x, v_y = found, v_x + share * step_x, v_y + share * step_y
+        value, v_x, v_y = power, v_x + share * step_x, v_y + share * step_y
         step_x, step_y, decrease = newton_step(v_x, v_y, force_x, force_y, holding, x, y)
     return value
 
@@ -249,9 +249,9 @@ def turning_about_a_foot(force_x, force_y, holding, x, y):
     value, v_x, v_y, step_x, step_y, decrease = math.inf, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(4):
         a_x, a_y = y[j], -x[j]
-        found = turning_power(a_x, a_y, force_x, force_y, holding, x, y)
-        if found < value:
-            value, v_x, v_y = found, a_x, a_y
+        power = turning_power(a_x, a_y, force_x, force_y, holding, x, y)
+        if power < value:
+            value, v_x, v_y = power, a_x, a_y
             g_x, g_y, spread = -force_x, -force_y, 0.0
             for i in range(4):
                 inverse = 0.0 if i == j else 1.0 / distance(x, y, i, j)

@@ -1,7 +1,6 @@
 """Bodies of a machine: the plant built from its SDF, with overrides and load set in a Context."""
 
 import copy
-import functools
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,7 @@ from pydrake.multibody.tree import (
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names, shortened
 from wm_drake.model.rotor import set_rotor
+from wm_drake.model.sdf_names import frame_problems, sdf_names
 from wm_drake.model.sdf_shapes import check_shapes
 from wm_drake.model.state_layout import CABINET, CARRIER
 from wm_drake.parameters import (
@@ -289,130 +289,9 @@ def _check_degrees_of_freedom(plant: MultibodyPlant, parameters: MachineParamete
         )
 
 
-def tubes_of(plant: MultibodyPlant, joint: str) -> tuple[RigidBody, RigidBody]:
-    """Return outer and inner tube of the joint of a telescopic damper."""
-    telescope = plant.GetJointByName(joint)
-    return telescope.parent_body(), telescope.child_body()
-
-
 def oscillating_bodies(plant: MultibodyPlant) -> list[RigidBody]:
     """Return the tub, the bodies welded to it, and the drum."""
     return [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]
-
-
-def frame_names(plant: MultibodyPlant) -> list[str]:
-    """Return the names of the frames and links of the model, to which elements attach."""
-    frames = map(
-        plant.get_frame, plant.GetFrameIndices(plant.GetBodyByName("tub").model_instance())
-    )
-    return sorted({frame.name() for frame in frames} - {"__model__"})
-
-
-def is_welded_to(plant: MultibodyPlant, body_name: str, frame_name: str) -> bool:
-    """Return whether a frame is on a body, or on one that is welded to it."""
-    body = plant.GetFrameByName(frame_name).body()
-    return any(
-        body.index() == other.index()
-        for other in plant.GetBodiesWeldedTo(plant.GetBodyByName(body_name))
-    )
-
-
-def frame_problems(plant: MultibodyPlant, parameters: MachineParameters) -> list[Problem]:
-    """Return one problem for each wrong name of a frame or body in a machine."""
-    wanted = [
-        (
-            f"{table}.{name}.{end}_frame" if name else f"{table}.{end}_frame",
-            end,
-            getattr(element, f"{end}_frame"),
-        )
-        for table, name, element in _placed_elements(parameters)
-        for end in ("tub", "housing")
-    ]
-    for name, damper in parameters.telescopic_dampers.items():
-        outer, inner = (body.name() for body in tubes_of(plant, damper.joint))
-        ends = (("tub", "tub"), ("outer", outer), ("inner", inner), ("housing", "housing"))
-        key = f"telescopic_dampers.{name}"
-        wanted += [
-            (f"{key}.{end}_frame", body, getattr(damper, f"{end}_frame")) for end, body in ends
-        ]
-    wanted += [
-        (f"sensors.{name}.frame", "tub", sensor.frame)
-        for name, sensor in parameters.sensors.items()
-    ]
-    wanted += [
-        (f"accelerometers.{name}.frame", "tub", sensor.frame)
-        for name, sensor in parameters.accelerometers.items()
-    ]
-    wanted.append(("clearance.detergent_frame", "tub", parameters.clearance.detergent_frame))
-    return list(
-        _name_problems(plant, tuple(wanted), tuple(parameters.bodies), tuple(parameters.frames))
-    )
-
-
-@functools.lru_cache(maxsize=64)  # thousands of machines of a study have the same names
-def _name_problems(
-    plant: MultibodyPlant,
-    wanted: tuple[tuple[str, str, str], ...],
-    bodies: tuple[str, ...],
-    frames: tuple[str, ...],
-) -> tuple[Problem, ...]:
-    """Return one problem for each wrong name.
-
-    Args:
-        plant: The plant.
-        wanted: Frames of elements and sensors: key, body that the frame must be fixed to, name.
-        bodies: Names of overridden bodies.
-        frames: Names of overridden frames.
-    """
-    known = frame_names(plant)
-    problems = []
-    for key, body, frame in wanted:
-        if frame not in known:
-            problems.append(
-                Problem("", key, f"no frame '{frame}' in the SDF{nearest_names(frame, known)}")
-            )
-        elif not is_welded_to(plant, body, frame):
-            problems.append(Problem("", key, f"frame '{frame}' is not fixed to the {body}"))
-    fixed = [body.index() for body in plant.GetBodiesWeldedTo(plant.world_body())]
-    links = [
-        body.name()
-        for body in map(
-            plant.get_body, plant.GetBodyIndices(plant.GetBodyByName("tub").model_instance())
-        )
-        if body.index() not in fixed
-    ]
-    problems += [
-        Problem(
-            "", f"bodies.{name}", f"no moving link '{name}' in the SDF{nearest_names(name, links)}"
-        )
-        for name in bodies
-        if name not in links
-    ]
-    for name in frames:
-        if name not in known or not isinstance(plant.GetFrameByName(name), FixedOffsetFrame):
-            movable = [
-                frame
-                for frame in known
-                if isinstance(plant.GetFrameByName(frame), FixedOffsetFrame)
-            ]
-            problems.append(
-                Problem(
-                    "",
-                    f"frames.{name}",
-                    f"no frame '{name}' in the SDF{nearest_names(name, movable)}; attached_to: "
-                    "LINK makes it a new frame",
-                )
-            )
-    return tuple(problems)
-
-
-def _placed_elements(parameters: MachineParameters) -> Iterable[tuple[str, str, Any]]:
-    """Yield table, name and parameters of each element with a frame on tub and on housing."""
-    for table in ("springs", "dampers", "bushings"):
-        for name, element in getattr(parameters, table).items():
-            yield table, name, element
-    if parameters.gasket:
-        yield "gasket", "", parameters.gasket
 
 
 def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameters) -> None:
@@ -493,10 +372,10 @@ def with_sdf_values(
     changed = parameters
     for table, name, part in dict.fromkeys(tuple([*key.split("."), "", ""][:3]) for key in keys):
         if table == "frames" and name not in changed.frames:
-            known = frame_names(plant)
-            if name not in known or not isinstance(plant.GetFrameByName(name), FixedOffsetFrame):
+            names = sdf_names(plant)
+            if name not in names.movable_frames:
                 raise input_error(
-                    f"no frame '{name}' in the SDF{nearest_names(name, known)}",
+                    f"no frame '{name}' in the SDF{nearest_names(name, names.frames)}",
                     key=f"frames.{name}",
                 )
             position = plant.GetFrameByName(name).GetFixedPoseInBodyFrame().translation()

@@ -1,6 +1,5 @@
 """Add a machine to a diagram, or build a diagram of it alone."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -8,9 +7,8 @@ from pydrake.geometry import Meshcat
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from wm_drake.elements.cabinet import FEET_SIZE
-from wm_drake.elements.motor import packed_controller, packed_friction, packed_limit
-from wm_drake.elements.rubber import RubberBushingParameters
+from wm_drake.elements.cabinet import FEET, FEET_SIZE, SLIP_SIZE
+from wm_drake.elements.motor import DRUM_FRICTION, packed_controller, packed_friction, packed_limit
 from wm_drake.model.bodies import add_bodies
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.machine import Machine, MachineSystems, MotorSystems
@@ -21,16 +19,12 @@ from wm_drake.model.visualization import add_visualizer
 from wm_drake.model.wiring import Link, Wiring
 from wm_drake.parameters import MachineParameters, MotorDrive
 from wm_drake.parameters.drive import motor_of
-from wm_drake.systems.cabinet import Cabinet, Feet
-from wm_drake.systems.drum_bearing import DrumBearing
-from wm_drake.systems.friction_damper import FrictionDamper
-from wm_drake.systems.motor import Belt, DrumFriction, Motor, SpeedController
+from wm_drake.systems.cabinet import Cabinet
+from wm_drake.systems.element_system import ElementSystem
+from wm_drake.systems.motor import Belt, Motor, SpeedController
 from wm_drake.systems.sensors import Sensors
-from wm_drake.systems.six_component_bushing import SixComponentBushing
 from wm_drake.systems.speed_source import MotorTorque, SpeedSource
 from wm_drake.systems.spin_profile_source import SpinProfileSource
-from wm_drake.systems.spring_strut import SpringStrut
-from wm_drake.systems.telescopic_damper import TelescopicDamper
 from wm_drake.systems.tub_force import TubForce
 
 
@@ -66,16 +60,21 @@ def add_washing_machine(
     placed = placed_elements(plant, poses, parameters)
     points = measured_points(tub_points(poses, parameters), np.zeros(6))
     wiring = Wiring(builder, plant, layout, prefix)
-    elements = _element_systems(placed)
-    on_tub, links = _labelled(*elements)
+    by_label, on_tub, links = dict[str, ElementSystem](), list[tuple[str, Any]](), list[Link]()
+    for label, element, kind, tree in placed.by_tree():
+        system = by_label[label] = ElementSystem(kind, element.packed(), element.state_size)
+        if tree:
+            links.append(Link(label, system, tree))
+        else:
+            on_tub.append((label, system))
     drive = motor_of(parameters.drive)
-    friction = DrumFriction(packed_friction(drive)) if drive else None
+    friction = ElementSystem(DRUM_FRICTION, packed_friction(drive)) if drive else None
     tub_force, sensors = TubForce(), Sensors(points)
     others = [("tub_force", tub_force), *([("drum_friction", friction)] if friction else [])]
     tub_state = wiring.tub_state()
     cabinet, feet, seen = None, None, tub_state
     if parameters.cabinet_moves:
-        cabinet, feet = Cabinet(), Feet(np.zeros(FEET_SIZE))
+        cabinet, feet = Cabinet(), ElementSystem(FEET, np.zeros(FEET_SIZE), SLIP_SIZE)
         on_cabinet = Link("cabinet", cabinet, len(layout.trees) - 1)
         wiring.connect_elements(tub_state, others, [*links, on_cabinet])
         seen = wiring.connect_cabinet(cabinet, on_tub, feet)
@@ -101,18 +100,27 @@ def add_washing_machine(
         outputs["tub_in_cabinet"] = seen
         outputs["feet_floor_force"] = feet.GetOutputPort("floor_force")
     for label, system in [*on_tub, *((link.label, link.system) for link in links)]:
-        outputs |= _own_outputs(label, system)
-    systems = *elements, cabinet, feet
+        outputs |= _element_outputs(label, system)
     return MachineSystems(
-        parameters, plant, layout, profile, source, motor, sensors, *systems, inputs, outputs
+        parameters=parameters,
+        plant=plant,
+        state_layout=layout,
+        spin_profile=profile,
+        speed_source=source,
+        motor=motor,
+        sensors=sensors,
+        **_by_kind(placed, by_label),
+        cabinet=cabinet,
+        feet=feet,
+        inputs=inputs,
+        outputs=outputs,
     )
 
 
 def build_machine(parameters: MachineParameters, *, meshcat: Meshcat | None = None) -> Machine:
     """Build the diagram of a machine alone, with its named ports exported.
 
-    Build once and reuse: a Drake diagram with Python systems is never freed. Every number can be
-    changed afterwards in a Context (`Machine.set_up`).
+    Build once and reuse: every number can be changed afterwards in a Context (`Machine.set_up`).
 
     Args:
         parameters: The machine.
@@ -139,60 +147,17 @@ def build_machine(parameters: MachineParameters, *, meshcat: Meshcat | None = No
         builder.ExportOutput(port, name)
     diagram = builder.Build()
     diagram.set_name(parameters.name)
-    values = {key: value for key, value in vars(systems).items() if key != "_poses"}
-    return Machine(**values, diagram=diagram)
+    return Machine(**vars(systems), diagram=diagram)
 
 
-def _element_systems(
-    placed: PlacedElements,
-) -> tuple[
-    dict[str, SpringStrut],
-    dict[str, FrictionDamper],
-    dict[str, SixComponentBushing],
-    dict[str, TelescopicDamper],
-    DrumBearing | None,
-]:
-    """Return a system for each element in its place, by kind and name."""
-    springs = {key: SpringStrut(spring.packed()) for key, spring in placed.springs.items()}
-    dampers = {
-        key: FrictionDamper(damper.packed(), int(damper.has_sponge))
-        for key, damper in placed.dampers.items()
+def _by_kind(placed: PlacedElements, by_label: dict[str, ElementSystem]) -> dict[str, Any]:
+    """Return the element systems by field of `MachineSystems`."""
+    systems = iter(by_label.values())  # in the order of `by_tree`
+    fields = ("springs", "dampers", "bushings", "others", "telescopes")
+    by_field: dict[str, Any] = {
+        field: {name: next(systems) for name in getattr(placed, field)} for field in fields
     }
-    bushings = {
-        key: SixComponentBushing(
-            bush.packed(), isinstance(bush, RubberBushingParameters), bush.state_size
-        )
-        for key, bush in placed.bushings.items()
-    }
-    telescopes = {
-        key: TelescopicDamper(telescope.packed(), int(telescope.has_sponge))
-        for key, telescope in placed.telescopes.items()
-    }
-    bearing = DrumBearing(placed.bearing.packed()) if placed.bearing else None
-    return springs, dampers, bushings, telescopes, bearing
-
-
-def _labelled(
-    springs: Mapping[str, Any],
-    dampers: Mapping[str, Any],
-    bushings: Mapping[str, Any],
-    telescopes: Mapping[str, Any],
-    bearing: DrumBearing | None,
-) -> tuple[list[tuple[str, Any]], list[Link]]:
-    """Return the elements on the tub with their labels, and the links to other trees."""
-    on_tub = [(f"spring_{name}", system) for name, system in springs.items()]
-    on_tub += [(f"damper_{name}", system) for name, system in dampers.items()]
-    on_tub += [
-        ("gasket" if name == "gasket" else f"bushing_{name}", system)
-        for name, system in bushings.items()
-    ]
-    links = [
-        Link(f"damper_{name}", system, tree)
-        for tree, (name, system) in enumerate(telescopes.items(), start=1)
-    ]
-    if bearing:
-        links.append(Link("drum_bearing", bearing, 1 + len(telescopes)))
-    return on_tub, links
+    return by_field | {"bearing": next(systems, None)}
 
 
 def _add_motor(
@@ -200,7 +165,7 @@ def _add_motor(
     drive: MotorDrive,
     profile: SpinProfileSource,
     sensors: Sensors,
-    friction: DrumFriction,
+    friction: ElementSystem,
 ) -> tuple[MotorSystems, OutputPort]:
     """Add controller, motor and belt, and connect them to each other, the profile and the plant.
 
@@ -249,7 +214,7 @@ def _add_speed_source(wiring: Wiring, profile: SpinProfileSource) -> tuple[Speed
     return source, torque.GetOutputPort("torque")
 
 
-def _own_outputs(label: str, system: Any) -> dict[str, OutputPort]:
+def _element_outputs(label: str, system: Any) -> dict[str, OutputPort]:
     """Return the element's own output ports, their names behind its label."""
     ports = [system.get_output_port(i) for i in range(system.num_output_ports())]
     return {

@@ -162,8 +162,8 @@ def _unbalance_radii(setup: Setup, scene: Scene) -> Iterator[Problem]:
         for plane in ("front", "rear"):
             place = getattr(parameters.unbalance_planes, plane)
             radii[f"unbalance_planes.{plane}.radius"] = place.radius
-    found = {radius: key for key, radius in reversed(radii.items()) if radius > largest}
-    for radius, key in found.items():
+    keys = {radius: key for key, radius in reversed(radii.items()) if radius > largest}
+    for radius, key in keys.items():
         yield Problem(
             "",
             key,

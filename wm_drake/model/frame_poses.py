@@ -59,8 +59,8 @@ class FramePoses:
         known = self._placed.get(key)
         if known is None or not all(map(_are_same, known[0], parts)):
             known = self._placed[key] = parts, place()
-        found: Placed = known[1]
-        return found
+        placed: Placed = known[1]
+        return placed
 
 
 def _are_same(a: Any, b: Any) -> bool:

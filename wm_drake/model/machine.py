@@ -18,26 +18,21 @@ from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.bodies import add_load, set_bodies
 from wm_drake.model.cabinet import cabinet_at_rest
 from wm_drake.model.equilibrium import force_as_drawn, preloaded, put_to_rest, rest_pose
-from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.placed_elements import AppliedForce, PlacedElements, placed_elements
 from wm_drake.model.same_elements import check_same_elements
-from wm_drake.model.scene import Scene
+from wm_drake.model.set_up_cache import SetUpCache
 from wm_drake.model.state_layout import StateLayout
 from wm_drake.model.tub_points import TubPoints, measured_points, tub_points
 from wm_drake.model.tub_statics import TubStatics, Weight, weight_of
 from wm_drake.parameters import Drive, Load, MachineParameters, MotorDrive, Sensor, SpinProfile
 from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.cabinet import Cabinet, Feet
-from wm_drake.systems.drum_bearing import DrumBearing
-from wm_drake.systems.friction_damper import FrictionDamper
-from wm_drake.systems.motor import Belt, DrumFriction, Motor, SpeedController
+from wm_drake.systems.cabinet import Cabinet
+from wm_drake.systems.element_system import ElementSystem
+from wm_drake.systems.motor import Belt, Motor, SpeedController
 from wm_drake.systems.sensors import Sensors
-from wm_drake.systems.six_component_bushing import SixComponentBushing
 from wm_drake.systems.speed_source import SpeedSource
 from wm_drake.systems.spin_profile_source import SpinProfileSource
-from wm_drake.systems.spring_strut import SpringStrut
-from wm_drake.systems.telescopic_damper import TelescopicDamper
 
 OUTPUT_PERIOD = 5e-3
 """Time between samples of a record, as in the measurements of [B]. [s]"""
@@ -147,7 +142,7 @@ class MotorSystems:
     controller: SpeedController
     motor: Motor
     belt: Belt
-    friction: DrumFriction
+    friction: ElementSystem
 
     def set_drive(self, context: Context, drive: MotorDrive) -> None:
         """Set the numbers of a drive in a root Context, and its state before a run."""
@@ -175,7 +170,8 @@ class MachineSystems:
         spin_profile, sensors: Systems of the spin profile and of what is measured.
         speed_source: System that prescribes the speed of the drum; None with a motor.
         motor: Systems of a drive with a motor; None if the speed is prescribed.
-        springs, dampers, bushings, telescopes: Element systems by name.
+        springs, dampers, bushings, others, telescopes: Element systems by name; others are those
+            of the section `elements` of a machine file.
         bearing: System of the compliant bearing; None for a rigid one.
         cabinet, feet: Systems of a cabinet that moves; None if it is fixed.
         inputs: By name. "drum_acceleration" (1) [rad/s^2] replaces the acceleration of the spin
@@ -186,7 +182,7 @@ class MachineSystems:
             "detergent_displacement", "drum_speed"; "motor_torque"; and for each element its own
             outputs, such as "spring_left_force", "damper_left_force", "gasket_force" and
             "gasket_moment"; of a cabinet that moves "feet_floor_force".
-        scenes: Scenes of the machine that no thread uses; many short batches share them.
+        cache: Values that set-ups and runs share.
     """
 
     parameters: MachineParameters
@@ -196,20 +192,17 @@ class MachineSystems:
     speed_source: SpeedSource | None
     motor: MotorSystems | None
     sensors: Sensors
-    springs: dict[str, SpringStrut]
-    dampers: dict[str, FrictionDamper]
-    bushings: dict[str, SixComponentBushing]
-    telescopes: dict[str, TelescopicDamper]
-    bearing: DrumBearing | None
+    springs: dict[str, ElementSystem]
+    dampers: dict[str, ElementSystem]
+    bushings: dict[str, ElementSystem]
+    others: dict[str, ElementSystem]
+    telescopes: dict[str, ElementSystem]
+    bearing: ElementSystem | None
     cabinet: Cabinet | None
-    feet: Feet | None
+    feet: ElementSystem | None
     inputs: dict[str, InputPort]
     outputs: dict[str, OutputPort]
-    _poses: list[FramePoses] = field(default_factory=list, repr=False, compare=False, kw_only=True)
-    _weights: list[tuple[Any, Weight]] = field(
-        default_factory=list, repr=False, compare=False, kw_only=True
-    )
-    scenes: list[Scene] = field(default_factory=list, repr=False, compare=False, kw_only=True)
+    cache: SetUpCache = field(default_factory=SetUpCache, repr=False, compare=False, kw_only=True)
 
     def set_up(
         self,
@@ -249,7 +242,7 @@ class MachineSystems:
         parameters = parameters or self.parameters
         check_same_elements(self.parameters, parameters)
         load = self._load(load, parameters)
-        layout, poses = self.state_layout, self._frame_poses(parameters)
+        layout, poses = self.state_layout, self.cache.frame_poses(self.plant, parameters)
         systems = systems or bool(layout.attached.size or self.motor or self.cabinet)
         unloaded = placed_elements(self.plant, poses, parameters)
         weight = self._weight(parameters, context)
@@ -257,9 +250,9 @@ class MachineSystems:
         if systems:
             self.set_up_bodies(None, parameters, context)
         if weight:
-            as_drawn = TubStatics(unloaded, weight).wrench(np.zeros(6))
+            as_drawn = TubStatics(unloaded.at_rest(), weight).wrench(np.zeros(6))
         else:
-            as_drawn = force_as_drawn(self.plant, plant_context, layout, unloaded)
+            as_drawn = force_as_drawn(self.plant, plant_context, layout, unloaded.at_rest())
         balanced = (*unloaded.springs.values(), as_drawn.tobytes())
         springs = poses.placed("springs", balanced, lambda: preloaded(unloaded, as_drawn).springs)
         elements = replace(unloaded, springs=springs)
@@ -268,9 +261,9 @@ class MachineSystems:
         elements = elements if friction else elements.without_friction()
         q = np.zeros(layout.size)
         if weight:
-            q[layout.tub], residual = rest_pose(elements, weight)
+            q[layout.tub], residual = rest_pose(elements.at_rest(), weight)
         else:
-            residual = put_to_rest(self.plant, plant_context, layout, elements)
+            residual = put_to_rest(self.plant, plant_context, layout, elements.at_rest())
             q = self.plant.GetPositions(plant_context)
         parts = parameters.sensors, parameters.clearance, parameters.accelerometers
         points = poses.placed("points", parts, lambda: tub_points(poses, parameters))
@@ -359,28 +352,19 @@ class MachineSystems:
             imbalance = parameters.imperfections.residual_imbalance
             add_load(self.plant, plant_context, Load(unbalances=(imbalance,)))
 
-    def _frame_poses(self, parameters: MachineParameters) -> FramePoses:
-        """Return the frame poses; those of the last set-up if its overrides were the same."""
-        if not self._poses or self._poses[0].frames != parameters.frames:
-            self._poses[:] = [FramePoses(self.plant, parameters)]
-        return self._poses[0]
-
     def _weight(self, parameters: MachineParameters, context: Context) -> Weight | None:
-        """Return the weight on the springs; that of the last set-up if its bodies were the same.
+        """Return the weight on the springs, maybe that of the last set-up; changes the Context.
 
-        None with bodies attached to the tub, whose weight depends on their pose. The Context is
-        changed.
+        None with bodies attached to the tub, whose weight depends on their pose.
         """
         if self.state_layout.attached.size:
             return None
-        bodies = parameters.bodies, parameters.frames
-        for known, weight in self._weights:
-            if known == bodies:
-                return weight
-        self.set_up_bodies(None, parameters, context)
-        weight = weight_of(self.plant, self.plant.GetMyContextFromRoot(context))
-        self._weights[:] = [(bodies, weight)]
-        return weight
+
+        def compute() -> Weight:
+            self.set_up_bodies(None, parameters, context)
+            return weight_of(self.plant, self.plant.GetMyContextFromRoot(context))
+
+        return self.cache.weight(parameters, compute)
 
     def _set_systems(self, context: Context, elements: PlacedElements, points: FloatArray) -> None:
         """Set the parameters of elements and sensors in a root Context, and relax the sponges."""
@@ -389,15 +373,17 @@ class MachineSystems:
             (self.dampers, elements.dampers),
             (self.bushings, elements.bushings),
             (self.telescopes, elements.telescopes),
+            (self.others, elements.others),
         ]
         if self.bearing:
             pairs.append(({"": self.bearing}, {"": elements.bearing}))
         for systems, placed in pairs:
             for name, system in systems.items():
-                own = system.GetMyContextFromRoot(context)
-                system.set_parameters(own, placed[name].packed())
+                part = system.GetMyContextFromRoot(context)
+                system.set_parameters(part, placed[name].packed())
                 if system.state_size:
-                    own.SetContinuousState(np.zeros(system.state_size))
+                    initial = getattr(placed[name], "initial", np.zeros(system.state_size))
+                    part.SetContinuousState(initial)
         self.sensors.set_points(self.sensors.GetMyContextFromRoot(context), points)
 
     def _set_drive(self, context: Context, parameters: MachineParameters) -> None:
@@ -409,9 +395,9 @@ class MachineSystems:
     def _set_feet(self, context: Context, cabinet: CabinetOnFeet | None) -> None:
         """Set the parameters of the feet of a cabinet that moves; no foot has slid."""
         if self.feet is not None and cabinet is not None:
-            own = self.feet.GetMyContextFromRoot(context)
-            self.feet.set_parameters(own, cabinet.packed())
-            own.SetContinuousState(np.zeros(self.feet.state_size))
+            part = self.feet.GetMyContextFromRoot(context)
+            self.feet.set_parameters(part, cabinet.packed())
+            part.SetContinuousState(np.zeros(self.feet.state_size))
 
 
 @dataclass(frozen=True)

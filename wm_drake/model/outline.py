@@ -106,7 +106,7 @@ def measure_motion(poses, reference, reach, motion):
     """
     align_stack()
     x_numbers, numbers = np.empty(6 * WIDTH), np.empty(WIDTH)
-    x, answer, found = lane_array(x_numbers), lane_array(numbers), lane_array(motion)
+    x, answer, displacements = lane_array(x_numbers), lane_array(numbers), lane_array(motion)
     farthest, shift = 0, -1.0
     for begin in range(0, len(poses), WIDTH):
         rows_to_lanes(poses, begin, x_numbers)
@@ -114,8 +114,8 @@ def measure_motion(poses, reference, reach, motion):
         turned = turned * reach
         moved = (x[3] - reference[3], x[4] - reference[4], x[5] - reference[5])
         at = begin // WIDTH * 4
-        found[at], found[at + 1], found[at + 2] = moved
-        found[at + 3] = turned
+        displacements[at], displacements[at + 1], displacements[at + 2] = moved
+        displacements[at + 3] = turned
         answer[0] = sqrt(dot(moved, moved)) + turned
         for lane in range(min(WIDTH, len(poses) - begin)):
             if numbers[lane] > shift:
@@ -144,7 +144,7 @@ def find_near(motion, count, direction, limit, stride, near):
     numbers = np.empty(WIDTH)
     answer, moved = lane_array(numbers), lane_array(motion)
     lanes = WIDTH if stride == 1 else 1
-    found = 0
+    near_count = 0
     for begin in range(0, count, max(stride, WIDTH)):
         at = begin // WIDTH * 4
         along = direction[0] * moved[at] + direction[1] * moved[at + 1]
@@ -152,6 +152,6 @@ def find_near(motion, count, direction, limit, stride, near):
         if lanes_any(answer[0] < limit):
             for lane in range(min(lanes, count - begin)):
                 if numbers[lane] < limit:
-                    near[found] = begin + lane
-                    found += 1
-    return found
+                    near[near_count] = begin + lane
+                    near_count += 1
+    return near_count

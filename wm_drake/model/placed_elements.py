@@ -2,34 +2,40 @@
 
 import functools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 
-from wm_drake.elements.bearing import evaluate_drum_bearing
-from wm_drake.elements.bushing import (
-    SixComponentBushingParameters,
-    evaluate_six_component_bushing,
-    packed_bushing_law,
-)
+from wm_drake.elements.bearing import DRUM_BEARING
+from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bushing_law
 from wm_drake.elements.damper_law import packed_damper_law
-from wm_drake.elements.friction_damper import FrictionDamperParameters, evaluate_friction_damper
+from wm_drake.elements.friction_damper import FrictionDamperParameters
+from wm_drake.elements.kind import (
+    ElementKind,
+    Ends,
+    PlacedElement,
+    element_kind,
+    placed_element,
+)
 from wm_drake.elements.layouts import packed_stiffness
-from wm_drake.elements.rubber import (
-    MOST_STATES,
-    RubberBushingParameters,
-    evaluate_rubber_bushing,
-    placed_bushing,
+from wm_drake.elements.mount import Mounts, mounts_at
+from wm_drake.elements.rubber import MOST_STATES, RubberBushingParameters, placed_bushing
+from wm_drake.elements.spring import SpringStrutParameters
+from wm_drake.elements.state_map import (
+    StateMap,
+    cabinet_part,
+    carrier_part,
+    drive_part,
+    element_part,
+    sponge_part,
+    stretches_part,
+    tub_part,
+    tubes_part,
 )
-from wm_drake.elements.spring import SpringStrutParameters, evaluate_spring_strut
-from wm_drake.elements.telescopic_damper import (
-    FORCE_SIZE,
-    TelescopicDamperParameters,
-    evaluate_telescopic_damper,
-)
+from wm_drake.elements.telescopic_damper import TelescopicDamperParameters
 from wm_drake.errors import input_error
 from wm_drake.laws.table import stiffness_force
 from wm_drake.model.frame_poses import FramePoses
@@ -42,23 +48,26 @@ from wm_drake.parameters.types import FloatArray
 SHORTEST_STRUT = 1e-3
 """A spring or damper that is shorter than this as drawn has no defined direction. [m]"""
 
-LARGEST_OWN_SIZE = FORCE_SIZE
-"""Most own numbers that an element writes beside its generalized force: the telescopic damper's."""
+_RELAXED = np.zeros(MOST_STATES)
+"""States at rest of an element of this package; it has fewer or none."""
 
-
-ON_TUB = ("springs", "dampers", "bushings")
+ON_TUB = ("springs", "dampers", "bushings", "others")
 """Kinds of elements whose forces depend on the motion of the tub only, in packed order."""
 
 
 @dataclass(frozen=True)
 class PlacedElements:
-    """All elements of a machine at their frames, by name; `bearing` is None for a rigid bearing."""
+    """All elements of a machine at their frames, by name.
+
+    `bearing` is None for a rigid bearing; `others` are elements of kinds of other packages.
+    """
 
     springs: dict[str, SpringStrutParameters]
     dampers: dict[str, FrictionDamperParameters]
     bushings: dict[str, SixComponentBushingParameters]
     telescopes: dict[str, TelescopicDamperParameters]
     bearing: SixComponentBushingParameters | None
+    others: dict[str, PlacedElement]
 
     def without_gasket(self) -> "PlacedElements":
         """Return the elements with the gasket disengaged; the same elements if there is none."""
@@ -80,7 +89,15 @@ class PlacedElements:
             dampers={name: damper.without_friction() for name, damper in self.dampers.items()},
             bushings={name: bushing.without_friction() for name, bushing in self.bushings.items()},
             telescopes={name: tubes.sliding() for name, tubes in self.telescopes.items()},
+            others={name: element.without_friction() for name, element in self.others.items()},
         )
+
+    def at_rest(self) -> "PlacedElements":
+        """Return the elements whose force counts in the static equilibrium."""
+        if not self.others:
+            return self
+        others = {name: e for name, e in self.others.items() if e.kind.acts_at_rest}
+        return self if len(others) == len(self.others) else replace(self, others=others)
 
     def packed_on_tub(self, size: int = 0) -> tuple[FloatArray, dict[str, tuple[int, ...]]]:
         """Return the packed elements `ON_TUB`, and by kind the index of each element.
@@ -110,19 +127,77 @@ class PlacedElements:
         elements = (element for kind in ON_TUB for element in getattr(self, kind).values())
         return tuple(number for element in elements for number in structure_of(element))
 
-    def links(self) -> Iterator[tuple[Any, Callable[..., None], int]]:
-        """Yield each element, its law and the tree it acts on beside tub and drum; 0 for none."""
-        for spring in self.springs.values():
-            yield spring, evaluate_spring_strut, 0
-        for damper in self.dampers.values():
-            yield damper, evaluate_friction_damper, 0
-        for bushing in self.bushings.values():
-            rubber = isinstance(bushing, RubberBushingParameters)
-            yield bushing, evaluate_rubber_bushing if rubber else evaluate_six_component_bushing, 0
-        for tree, telescope in enumerate(self.telescopes.values(), start=1):
-            yield telescope, evaluate_telescopic_damper, tree
+    def rubber_begins(self, indices: Mapping[str, Sequence[int]]) -> tuple[int, ...]:
+        """Return the index of each bushing of rubber; `indices` are those of `packed_on_tub`."""
+        pairs = zip(indices["bushings"], self.bushings.values(), strict=True)
+        return tuple(at for at, bush in pairs if isinstance(bush, RubberBushingParameters))
+
+    def initial_of_others(self) -> FloatArray:
+        """Return the states of all elements of other packages at rest, one after the other."""
+        return np.concatenate([[], *(element.initial for element in self.others.values())])
+
+    def states(self, *, drive: bool = False, cabinet: bool = False) -> StateMap:
+        """Return the states of tub, drum and all elements.
+
+        Args:
+            drive, cabinet: Whether there are those of a drive with a motor, and of a cabinet that
+                moves.
+        """
+        rubber = tuple(
+            (name, tuple(bushing.state_kinds))
+            for name, bushing in self.bushings.items()
+            if isinstance(bushing, RubberBushingParameters)
+        )
+        others = tuple((name, len(e.kind.states)) for name, e in self.others.items())
+        parts = tuple(self.dampers), tuple(self.telescopes), rubber, others
+        return _states(*parts, bearing=bool(self.bearing), drive=drive, cabinet=cabinet)
+
+    def mounts(self, begins: Mapping[str, Sequence[int]], states: StateMap) -> Mounts:
+        """Return the indices of the elements on the tub for compiled functions.
+
+        Args:
+            begins: Index of each element in packed numbers, by kind.
+            states: States of the machine.
+        """
+        kinds = tuple(element.kind for element in self.others.values())
+        return mounts_at(begins, self.rubber_begins(begins), kinds, states)
+
+    def by_tree(self) -> Iterator[tuple[str, Any, ElementKind, int]]:
+        """Yield label, element, kind, and the tree it acts on beside tub and drum; 0 for none."""
+        for word, elements in (("spring", self.springs), ("damper", self.dampers)):
+            for name, element in elements.items():
+                yield f"{word}_{name}", element, element.kind, 0
+        for name, bushing in self.bushings.items():
+            yield "gasket" if name == "gasket" else f"bushing_{name}", bushing, bushing.kind, 0
+        for name, other in self.others.items():
+            yield f"element_{name}", other, other.kind, 0
+        for tree, (name, telescope) in enumerate(self.telescopes.items(), start=1):
+            yield f"damper_{name}", telescope, telescope.kind, tree
         if self.bearing:
-            yield self.bearing, evaluate_drum_bearing, 1 + len(self.telescopes)
+            yield "drum_bearing", self.bearing, DRUM_BEARING, 1 + len(self.telescopes)
+
+
+@functools.lru_cache(maxsize=256)  # thousands of machines of a study have the same parts
+def _states(
+    dampers: tuple[str, ...],
+    telescopes: tuple[str, ...],
+    rubber: tuple[tuple[str, tuple[str, ...]], ...],
+    others: tuple[tuple[str, int], ...],
+    **has: bool,
+) -> StateMap:
+    """Return the states of a machine with elements of these names.
+
+    Args:
+        dampers, telescopes: Names of strut dampers and of telescopic dampers.
+        rubber: Name of each bushing of rubber, and the role of each of its states.
+        others: Name of each element of another package, and the number of its states.
+        has: Whether there are states of "bearing", "drive" and "cabinet".
+    """
+    parts = [tub_part(), *map(sponge_part, dampers), *map(tubes_part, telescopes)]
+    parts += [stretches_part(*bushing) for bushing in rubber]
+    parts += [element_part(*element) for element in others]
+    extra = {"bearing": carrier_part(), "drive": drive_part(), "cabinet": cabinet_part()}
+    return StateMap.of([*parts, *(part for name, part in extra.items() if has[name])])
 
 
 class AppliedForce:
@@ -139,22 +214,25 @@ class AppliedForce:
         self._calls = []
         self._states: list[np.ndarray | slice] = []
         parts: dict[int, tuple[int, np.ndarray]] = {}
-        for element, evaluate, tree in elements.links():
+        for _, element, kind, tree in elements.by_tree():
             if tree not in parts:  # elements on the same trees share a part of the state
                 acted_on = [0, tree] if tree else [0]
                 parts[tree] = len(parts), np.concatenate([trees[t] for t in acted_on])
                 self._states.append(_as_slice(np.concatenate([states[t] for t in acted_on])))
             part, of_force = parts[tree]
             force = np.empty(len(of_force))
-            self._calls.append((evaluate, part, _as_slice(of_force), element.packed(), force))
-        self._work = np.zeros(MOST_STATES), np.empty(LARGEST_OWN_SIZE), np.empty(MOST_STATES)
+            state = element.initial if isinstance(element, PlacedElement) else _RELAXED
+            work = state, np.empty(kind.output_size), np.empty(len(state))
+            self._calls.append(
+                (kind.on_plant, part, _as_slice(of_force), element.packed(), force, work)
+            )
 
     def __call__(self, state: FloatArray) -> FloatArray:
         """Return the generalized force (n,) at a state (2 n,) of the plant. [N m, N]"""
-        total, (relaxed, own, rate) = np.zeros(self._size), self._work
+        total = np.zeros(self._size)
         parts = [np.ascontiguousarray(state[indices]) for indices in self._states]
-        for evaluate, part, of_force, packed, force in self._calls:
-            evaluate(parts[part], relaxed, packed, force, own, rate)
+        for evaluate, part, of_force, packed, force, (at_rest, outputs, rate) in self._calls:
+            evaluate(parts[part], at_rest, packed, force, outputs, rate)
             total[of_force] += force  # no index occurs twice
         return total
 
@@ -164,8 +242,8 @@ def structure_of(element: Any) -> list[int]:
     kept = vars(element)
     if "_structure" not in kept:
         kept["_structure"] = element.structure
-    found: list[int] = kept["_structure"]
-    return found
+    structure: list[int] = kept["_structure"]
+    return structure
 
 
 def _as_slice(indices: np.ndarray) -> np.ndarray | slice:
@@ -190,6 +268,7 @@ def placed_elements(
         _bushings(poses, parameters),
         _telescopes(plant, poses, parameters),
         _bearing(plant, parameters),
+        _others(poses, parameters),
     )
 
 
@@ -224,7 +303,7 @@ def _placed_spring(
     poses: FramePoses, spring: Spring, kind: SpringType, key: str
 ) -> SpringStrutParameters:
     """Place a spring; preload 0 if none is given."""
-    found = SpringStrutParameters(
+    strut = SpringStrutParameters(
         *_strut_ends(poses, spring, key),
         0.0,
         packed_stiffness(kind.stiffness),
@@ -232,8 +311,8 @@ def _placed_spring(
     )
     preload = spring.preload
     if kind.free_length is not None:
-        preload = -stiffness_force(kind.free_length - found.rest_length, found.packed_stiffness, 0)
-    return found if preload is None else replace(found, preload=float(preload), is_given=True)
+        preload = -stiffness_force(kind.free_length - strut.rest_length, strut.packed_stiffness, 0)
+    return strut if preload is None else replace(strut, preload=float(preload), is_given=True)
 
 
 def _dampers(
@@ -314,3 +393,16 @@ def _bearing(
     return SixComponentBushingParameters(
         point, rotation, point, rotation, packed_bushing_law(bearing.as_bushing())
     )
+
+
+def _others(poses: FramePoses, parameters: MachineParameters) -> dict[str, PlacedElement]:
+    """Place the elements of kinds of other packages."""
+    placed = {}
+    for name, element in parameters.elements.items():
+        kind, key = element_kind(element.kind), f"elements.{name}"
+        if kind.picture == "strut":
+            _strut_ends(poses, element, key)
+        ends = Ends(*poses("tub", element.tub_frame), *poses("world", element.housing_frame))
+        place = functools.partial(placed_element, kind, element, ends)
+        placed[name] = poses.placed(key, (element,), place)
+    return placed

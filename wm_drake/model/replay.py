@@ -258,6 +258,11 @@ def _parts(
         for name, element in placed.items():
             length = float(np.linalg.norm(element.p_ToA_T - element.p_WH))
             yield of_kind(f"/elements/{kind}/{name}", element.p_ToA_T, element.p_WH, length)
+    for name, other in elements.others.items():
+        if other.kind.picture == "strut":
+            ends = other.ends.tub_point, other.ends.housing_point
+            length = float(np.linalg.norm(ends[0] - ends[1]))
+            yield _Damper(f"/elements/others/{name}", *ends, length)
     if gasket and "gasket" in elements.bushings:
         poses, law = FramePoses(scene.plant, parameters), parameters.gasket
         assert law is not None  # the placed elements have it
@@ -308,8 +313,10 @@ def _tube(
     )
     count = centre.shape[1]
     near = np.arange((count - 1) * sides)
-    beside = near - near % sides + (near + 1) % sides
-    faces = np.hstack([[near, beside, near + sides], [beside, beside + sides, near + sides]])
+    neighbour = near - near % sides + (near + 1) % sides
+    faces = np.hstack(
+        [[near, neighbour, near + sides], [neighbour, neighbour + sides, near + sides]]
+    )
     return vertices.reshape(3, -1), faces.astype(np.int32)
 
 

@@ -14,44 +14,45 @@ from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.elements import ForceTable, TorqueTable
 
 
-def check_same_elements(built: MachineParameters, wanted: MachineParameters) -> None:
+def check_same_elements(built: MachineParameters, requested: MachineParameters) -> None:
     """Raise InputError if a machine has other elements, laws or joints than the built one."""
     for key in ("model", "gravity"):
-        if getattr(wanted, key) != getattr(built, key):
+        if getattr(requested, key) != getattr(built, key):
             raise input_error(
-                f"{getattr(wanted, key)} is not the built machine's {getattr(built, key)}; "
+                f"{getattr(requested, key)} is not the built machine's {getattr(built, key)}; "
                 "rebuild the machine",
                 key=key,
             )
-    if wanted is built:
+    if requested is built:
         return
-    _check_names(built, wanted)
-    _check_frames(built, wanted)
-    if (wanted.imperfections.bearing is None) != (built.imperfections.bearing is None):
+    _check_names(built, requested)
+    _check_frames(built, requested)
+    if (requested.imperfections.bearing is None) != (built.imperfections.bearing is None):
         kinds = ("compliant", "rigid")
-        now, before = kinds if wanted.imperfections.bearing else kinds[::-1]
+        now, before = kinds if requested.imperfections.bearing else kinds[::-1]
         raise input_error(
             f"is {now}; the built machine has a {before} bearing: rebuild the machine to make it "
             f"{now}",
             key="imperfections.bearing",
         )
-    _check_drive(built, wanted)
-    if wanted.cabinet_moves != built.cabinet_moves:
+    _check_drive(built, requested)
+    if requested.cabinet_moves != built.cabinet_moves:
         kinds = ("moves", "does not")
-        now, before = kinds if wanted.cabinet_moves else kinds[::-1]
+        now, before = kinds if requested.cabinet_moves else kinds[::-1]
         raise input_error(
             f"this cabinet {now}, that of the built machine {before}; rebuild the machine",
             key="cabinet.moves",
         )
-    _check_laws(built, wanted)
-    _check_branches(built, wanted)
-    _check_tables(built, wanted)
+    _check_kinds(built, requested)
+    _check_laws(built, requested)
+    _check_branches(built, requested)
+    _check_tables(built, requested)
 
 
-def _check_branches(built: MachineParameters, wanted: MachineParameters) -> None:
+def _check_branches(built: MachineParameters, requested: MachineParameters) -> None:
     """Raise InputError if a bushing uses other branches of rubber."""
     others = built.all_bushings()
-    for name, bushing in wanted.all_bushings().items():
+    for name, bushing in requested.all_bushings().items():
         if bushing is others[name]:
             continue
         if bushing.branches_in_use != others[name].branches_in_use:
@@ -63,9 +64,9 @@ def _check_branches(built: MachineParameters, wanted: MachineParameters) -> None
             )
 
 
-def _check_drive(built: MachineParameters, wanted: MachineParameters) -> None:
+def _check_drive(built: MachineParameters, requested: MachineParameters) -> None:
     """Raise InputError if a drive is of another kind, on another joint or with another sampling."""
-    drives = built.drive, wanted.drive
+    drives = built.drive, requested.drive
     if drives[0] is drives[1]:
         return
     if drives[0].kind != drives[1].kind or drives[0].joint != drives[1].joint:
@@ -85,12 +86,12 @@ def _check_drive(built: MachineParameters, wanted: MachineParameters) -> None:
         )
 
 
-def _check_names(built: MachineParameters, wanted: MachineParameters) -> None:
+def _check_names(built: MachineParameters, requested: MachineParameters) -> None:
     """Raise InputError if an element is in one of the machines only."""
-    for table in ("springs", "dampers", "all_bushings", "telescopic_dampers"):
-        if getattr(built, table) is getattr(wanted, table):
+    for table in ("springs", "dampers", "all_bushings", "telescopic_dampers", "elements"):
+        if getattr(built, table) is getattr(requested, table):
             continue
-        names = [set(t() if callable(t := getattr(p, table)) else t) for p in (built, wanted)]
+        names = [set(t() if callable(t := getattr(p, table)) else t) for p in (built, requested)]
         if names[0] != names[1]:
             other = sorted(names[0] ^ names[1])[0]
             raise input_error(
@@ -100,13 +101,13 @@ def _check_names(built: MachineParameters, wanted: MachineParameters) -> None:
             )
 
 
-def _check_frames(built: MachineParameters, wanted: MachineParameters) -> None:
+def _check_frames(built: MachineParameters, requested: MachineParameters) -> None:
     """Raise InputError if a new frame is on another link, turned, or in one machine only."""
-    if built.frames is wanted.frames:
+    if built.frames is requested.frames:
         return
     added = [
         {name: (f.attached_to, f.angles) for name, f in p.frames.items() if f.attached_to}
-        for p in (built, wanted)
+        for p in (built, requested)
     ]
     for name in {**added[0], **added[1]}:
         if added[0].get(name) != added[1].get(name):
@@ -117,12 +118,23 @@ def _check_frames(built: MachineParameters, wanted: MachineParameters) -> None:
             )
 
 
-def _check_laws(built: MachineParameters, wanted: MachineParameters) -> None:
+def _check_kinds(built: MachineParameters, requested: MachineParameters) -> None:
+    """Raise InputError if an element of another package has another kind."""
+    for name, element in requested.elements.items():
+        if element.kind != built.elements[name].kind:
+            raise input_error(
+                f"kind '{element.kind}' is not the built machine's "
+                f"'{built.elements[name].kind}'; rebuild the machine",
+                key=f"elements.{name}",
+            )
+
+
+def _check_laws(built: MachineParameters, requested: MachineParameters) -> None:
     """Raise InputError if a damper has another law or another joint."""
     for table in ("dampers", "telescopic_dampers"):
-        for name, damper in getattr(wanted, table).items():
+        for name, damper in getattr(requested, table).items():
             built_damper = getattr(built, table)[name]
-            types = built.damper_types[built_damper.type], wanted.damper_types[damper.type]
+            types = built.damper_types[built_damper.type], requested.damper_types[damper.type]
             if damper is built_damper and types[0] is types[1]:
                 continue
             built_law, law = (type_.law for type_ in types)
@@ -138,10 +150,10 @@ def _check_laws(built: MachineParameters, wanted: MachineParameters) -> None:
                 )
 
 
-def _check_tables(built: MachineParameters, wanted: MachineParameters) -> None:
+def _check_tables(built: MachineParameters, requested: MachineParameters) -> None:
     """Raise InputError if an element has a table where the other has none or fewer points."""
     others = dict(_types_of_elements(built))
-    for key, type_ in _types_of_elements(wanted):
+    for key, type_ in _types_of_elements(requested):
         if type_ is others[key]:
             continue
         now, before = _points(type_), _points(others[key])
@@ -164,6 +176,8 @@ def _types_of_elements(machine: MachineParameters) -> Iterator[tuple[str, BaseMo
         yield f"dampers.{name}", machine.damper_types[damper.type]
     for name, bushing in machine.all_bushings().items():
         yield name if name == "gasket" else f"bushings.{name}", bushing
+    for name, element in machine.elements.items():
+        yield f"elements.{name}", element
     for name, telescope in machine.telescopic_dampers.items():
         key = f"telescopic_dampers.{name}"
         yield key, machine.damper_types[telescope.type]

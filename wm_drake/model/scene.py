@@ -135,8 +135,8 @@ class _Motion:
             stride: Only every pose of this stride is looked at, from the first one.
         """
         near = np.empty(self.count, dtype=np.int64)
-        found = find_near(self.motion, self.count, direction, limit - distance, stride, near)
-        return near[:found]
+        count = find_near(self.motion, self.count, direction, limit - distance, stride, near)
+        return near[:count]
 
 
 class Scene:
@@ -352,9 +352,9 @@ class Scene:
         Returns:
             By pair, in the order of `pair_names`; NaN for a pair that does not touch. [m]
         """
-        found = np.full(len(self._pairs), np.nan)
+        distances = np.full(len(self._pairs), np.nan)
         if not len(time):
-            return found
+            return distances
         poses = np.ascontiguousarray(poses)
         reference = _reference(rest_pose)
         near_rest, motion = self._at(reference), _Motion.of(poses, reference, self._reach)
@@ -365,8 +365,8 @@ class Scene:
             near = motion.nearer_than(apart.distance, distance, direction, 1)
             nearest = self._smallest_of_pair(pair, direction, apart, time[near], poses[near])
             if nearest.distance <= 0.0:
-                found[self._pairs.index(pair)] = nearest.distance
-        return found
+                distances[self._pairs.index(pair)] = nearest.distance
+        return distances
 
     def _gap(
         self, pair: tuple[GeometryId, GeometryId], time: float, pose: FloatArray
@@ -383,8 +383,8 @@ class Scene:
     ) -> list[tuple[float, FloatArray, tuple[GeometryId, GeometryId]]]:
         """Return distance, direction and pair of all pairs at a pose, nearest first."""
         if reference not in self._references:
-            found = [(*self._nearest(np.array(reference), pair), pair) for pair in self._pairs]
-            nearest_first = sorted(found, key=lambda entry: entry[0])
+            candidates = [(*self._nearest(np.array(reference), pair), pair) for pair in self._pairs]
+            nearest_first = sorted(candidates, key=lambda entry: entry[0])
             if len(self._references) == _REFERENCES_KEPT:
                 del self._references[next(iter(self._references))]
             self._references[reference] = [
@@ -419,7 +419,7 @@ class Scene:
             if not bound[index] < best.distance:
                 return best
             gap, direction = self._gap(pair, time[index], poses[index])
-            best = min(best, gap, key=lambda found: found.distance)
+            best = min(best, gap, key=lambda candidate: candidate.distance)
             bound[index] = np.inf  # this distance is known
 
     def pose_in_world(self, body: str) -> RigidTransform:

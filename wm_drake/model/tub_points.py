@@ -63,7 +63,7 @@ def measured_points(points: TubPoints, rest: FloatArray) -> FloatArray:
     """
     positions, directions, packed = points.measured
     rotation = np.reshape(rotation_from_rpy(*rest[:3].tolist()), (3, 3))
-    found = packed.copy()
+    moved = packed.copy()
     at_rest = directions * (positions @ rotation.T + rest[3:6])
-    found[:, MEASURED_POINT.offsets["at_rest"]] = at_rest.sum(axis=1)
-    return found
+    moved[:, MEASURED_POINT.offsets["at_rest"]] = at_rest.sum(axis=1)
+    return moved

@@ -13,10 +13,9 @@ from pydrake.systems.framework import Context
 
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.compiler.vectors import rotation_from_rpy
-from wm_drake.elements.motion import PLANT_STATE_SIZE
-from wm_drake.elements.mount import WRENCH_SIZE, Mounts, mount_wrench_history
-from wm_drake.elements.rubber import branches_of
-from wm_drake.model.placed_elements import ON_TUB, PlacedElements
+from wm_drake.elements.mount import WRENCH_SIZE, mount_wrench_history
+from wm_drake.elements.state_map import ELEMENT
+from wm_drake.model.placed_elements import PlacedElements
 from wm_drake.model.state_layout import CABINET
 from wm_drake.parameters.types import FloatArray
 
@@ -89,11 +88,11 @@ class TubStatics:
         """Pack the elements, none of which has bodies of its own."""
         self._weight = weight
         self._packed, begins = elements.packed_on_tub()
-        springs, dampers, bushings = (np.array(begins[kind], dtype=np.int64) for kind in ON_TUB)
-        first = PLANT_STATE_SIZE + len(dampers)
-        branches = branches_of(elements.bushings, begins["bushings"], first)
-        self._mounts = Mounts(springs, dampers, bushings, None, PLANT_STATE_SIZE, None, branches)
-        self._states = np.zeros((WIDTH, first + (branches.count if branches else 0)))
+        states = elements.states()
+        self._mounts = elements.mounts(begins, states)
+        self._states = np.zeros((WIDTH, states.size))
+        if elements.others:
+            self._states[:, states.span(ELEMENT)] = elements.initial_of_others()
         count = sum(map(len, begins.values()))
         self._wrenches = np.empty((WIDTH, count * WRENCH_SIZE), order="F")
 

@@ -14,6 +14,7 @@ from wm_drake.model.cabinet import with_fixed_cabinet
 from wm_drake.model.state_layout import StateLayout, state_layout_of
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
+from wm_drake.systems.callbacks import NO_SLOTS, callback
 
 SHAPES = "/drake/visualizer"
 """Path in Meshcat of the shapes of a machine, seen from the cabinet if it moves."""
@@ -51,13 +52,15 @@ class ShownCabinet(LeafSystem):
     The pose is roll, pitch, yaw and position of the cabinet in W. [rad, m]
     """
 
+    __slots__ = NO_SLOTS
+
     def __init__(self, meshcat: Meshcat) -> None:
         """Show the cabinet in a Meshcat."""
         LeafSystem.__init__(self)
         self._meshcat = meshcat
         self._pose = self.DeclareVectorInputPort("pose", POSE.fixed_size)
-        self.DeclarePeriodicPublishEvent(PICTURE_PERIOD, 0.0, self._show)
-        self.DeclareForcedPublishEvent(self._show)
+        self.DeclarePeriodicPublishEvent(PICTURE_PERIOD, 0.0, callback(self._show))
+        self.DeclareForcedPublishEvent(callback(self._show))
 
     def _show(self, context: Context) -> EventStatus:
         pose = cabinet_pose(self._pose.Eval(context))

@@ -10,7 +10,8 @@ from pydrake.systems.primitives import Adder, Demultiplexer, MatrixGain, Multipl
 
 from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE
 from wm_drake.model.state_layout import StateLayout
-from wm_drake.systems.cabinet import Cabinet, Feet
+from wm_drake.systems.cabinet import Cabinet
+from wm_drake.systems.element_system import ElementSystem
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class Wiring:
         self.builder.Connect(forces, self.plant.get_applied_generalized_force_input_port())
 
     def connect_cabinet(
-        self, cabinet: Cabinet, mounts: list[tuple[str, Any]], feet: Feet
+        self, cabinet: Cabinet, mounts: list[tuple[str, Any]], feet: ElementSystem
     ) -> OutputPort:
         """Add the mounts of tub and drum on a cabinet that moves, and its feet.
 

@@ -2,7 +2,8 @@
 
 Enters: YAML and CSV files, and text with units. Leaves: frozen types in SI units
 (`MachineParameters`, `Component`, `Load`, `SpinProfile`, `Factor`, `MeasuredLoop`) or an
-`InputError` that names file, line and key. `with_value` is the one way to change a number.
+`InputError` that names file, line and key. `with_value` is the one way to change a number, a
+`Variation` declares numbers that change together.
 May import: `laws`, `compiler` and `errors`; no pydrake.
 """
 
@@ -40,7 +41,6 @@ from wm_drake.parameters.factors import (
     factor_of_text,
     levels_of,
     load_factors,
-    nominal_stiffness,
     place_of,
 )
 from wm_drake.parameters.files import (
@@ -66,6 +66,7 @@ from wm_drake.parameters.machine import (
 from wm_drake.parameters.measured import measured_amplitudes
 from wm_drake.parameters.published import PublishedResults, PublishedTerm, published_results
 from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
+from wm_drake.parameters.variation import Change, Variation, apply, variation_of
 
 __all__ = [
     "DAMPER_LAWS",
@@ -75,6 +76,7 @@ __all__ = [
     "BodyOverride",
     "Bushing",
     "BushingType",
+    "Change",
     "Clearance",
     "Component",
     "CoulombDamper",
@@ -105,6 +107,8 @@ __all__ = [
     "TelescopicDamper",
     "TorqueTable",
     "Unbalance",
+    "Variation",
+    "apply",
     "at_levels",
     "at_places",
     "factor_of_text",
@@ -119,7 +123,6 @@ __all__ = [
     "machine_path",
     "machine_yaml",
     "measured_amplitudes",
-    "nominal_stiffness",
     "place_of",
     "published_results",
     "quantities",
@@ -128,6 +131,7 @@ __all__ = [
     "shipped_components",
     "shipped_machines",
     "source_of",
+    "variation_of",
     "with_value",
     "with_values",
 ]

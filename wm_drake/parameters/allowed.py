@@ -2,14 +2,15 @@
 
 import math
 import typing
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import annotated_types
-from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from wm_drake.parameters.keys import is_index
+from wm_drake.parameters.keys import field_at
+from wm_drake.parameters.machine import MachineParameters
 
 
 @dataclass(frozen=True)
@@ -32,50 +33,43 @@ class AllowedRange:
         below = value <= self.high if self.high_is_in else value < self.high
         return above and below
 
+    def limits(self) -> Iterator[tuple[str, float]]:
+        """Yield sign and value of each end, such as (">=", 0.0)."""
+        if math.isfinite(self.low):
+            yield ">=" if self.low_is_in else ">", self.low
+        if math.isfinite(self.high):
+            yield "<=" if self.high_is_in else "<", self.high
 
-def allowed_range(parameters: BaseModel, key: str) -> AllowedRange:
+
+def allowed_range(parameters: MachineParameters, key: str) -> AllowedRange:
     """Return the range that the field of a key path allows; unbounded if it declares none.
 
     Other rules, such as an order of several numbers, are checked when a value is set.
 
     Args:
-        parameters: The machine, or a part of one.
+        parameters: The machine.
         key: Key path of a number in it.
     """
-    node: Any = parameters
-    found = AllowedRange()
-    for part in key.split("."):
-        if isinstance(node, BaseModel):
-            field = type(node).model_fields[part]
-            found = _declared([*field.metadata, *_inner(field.annotation)])
-            node = getattr(node, part)
-        else:
-            node = node[int(part)] if isinstance(node, tuple) and is_index(part) else node[part]
-    return found
+    _, field = field_at(parameters, key)
+    return AllowedRange() if field is None else declared_range(field)
 
 
-def _inner(annotation: Any) -> list[Any]:
-    """Return the metadata in the alternatives of a type, such as ``Annotated[...] | None``."""
-    found = []
-    if hasattr(annotation, "__metadata__"):
-        found += list(annotation.__metadata__)
-        annotation = typing.get_args(annotation)[0]
-    for member in typing.get_args(annotation):
-        found += _inner(member)
-    return found
-
-
-def _declared(metadata: list[Any]) -> AllowedRange:
+def declared_range(field: FieldInfo) -> AllowedRange:
+    """Return the range that a field declares, itself or by the types of its alternatives."""
     low, high, low_is_in, high_is_in = -math.inf, math.inf, False, False
-    for item in metadata:
-        if isinstance(item, FieldInfo):
-            inner = _declared(item.metadata)
-            low, low_is_in = max((low, low_is_in), (inner.low, inner.low_is_in))
-            high, high_is_in = min((high, high_is_in), (inner.high, inner.high_is_in))
-        elif isinstance(item, annotated_types.Gt | annotated_types.Ge):
+    for item in _metadata(field.annotation, field.metadata):
+        if isinstance(item, annotated_types.Gt | annotated_types.Ge):
             low_is_in = isinstance(item, annotated_types.Ge)
             low = float(getattr(item, "ge" if low_is_in else "gt"))
         elif isinstance(item, annotated_types.Lt | annotated_types.Le):
             high_is_in = isinstance(item, annotated_types.Le)
             high = float(getattr(item, "le" if high_is_in else "lt"))
     return AllowedRange(low, high, low_is_in, high_is_in)
+
+
+def _metadata(annotation: Any, metadata: Iterable[Any]) -> Iterator[Any]:
+    for item in metadata:
+        yield from getattr(item, "metadata", [item])
+    for argument in typing.get_args(annotation):
+        inner = getattr(argument, "__metadata__", ())
+        yield from _metadata(typing.get_args(argument)[0] if inner else argument, inner)

@@ -6,14 +6,15 @@ from typing import Any, TypeAlias
 
 from pydantic import TypeAdapter, ValidationError
 
-from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.parameters.damper_laws import DAMPER_LAWS, DamperType
 from wm_drake.parameters.elements import BushingType, Frozen, RubberBushingType
 from wm_drake.parameters.files import read_mapping
 from wm_drake.parameters.problems import problems_of
-from wm_drake.parameters.text_files import is_file
+from wm_drake.parameters.text_files import DATA, ShippedFiles
 
-COMPONENTS_FOLDER = Path(__file__).parents[1] / "data" / "components"
+COMPONENTS_FOLDER = DATA / "components"
+_FILES = ShippedFiles("component", COMPONENTS_FOLDER)
 
 ComponentParameters: TypeAlias = DamperType | BushingType | RubberBushingType
 
@@ -44,7 +45,7 @@ class _DamperFile(Frozen):
 
 def shipped_components() -> dict[str, Path]:
     """Return the component files that the package contains, by name."""
-    return {path.stem: path for path in sorted(COMPONENTS_FOLDER.glob("*.yaml"))}
+    return _FILES.listed()
 
 
 def load_component(name_or_path: str) -> Component:
@@ -58,13 +59,7 @@ def load_component(name_or_path: str) -> Component:
     Raises:
         InputError: the file is missing or wrong, with one problem for each error.
     """
-    shipped = shipped_components()
-    path = shipped.get(name_or_path, Path(name_or_path))
-    if not is_file(path):
-        hint = nearest_names(name_or_path, shipped)
-        raise input_error(
-            f"no such file, and no shipped component of that name{hint}", where=str(path)
-        )
+    path = _FILES.path(name_or_path)
     plain, sources = read_mapping(path)
     return Component(path.stem, _validated(plain, path), sources)
 

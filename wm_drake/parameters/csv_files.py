@@ -11,6 +11,7 @@ import pandas as pd
 from wm_drake.errors import input_error
 from wm_drake.parameters.text_files import read_text
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import comma_hint
 
 _SIGNS = "; columns are separated by commas, and the decimal sign is a point"
 
@@ -54,24 +55,26 @@ def read_csv(
         raise input_error(f"cannot be read as CSV ({reason})", where=str(path), key=key) from None
 
 
-def finite_numbers(table: pd.DataFrame, path: str | Path) -> FloatArray:
+def finite_numbers(table: pd.DataFrame, path: str | Path, key: str = "") -> FloatArray:
     """Return a table as numbers. (row, column)
 
     Args:
         table: Table from `read_csv`.
         path: The file, for messages.
+        key: Key path for messages; empty for the name of the column.
 
     Raises:
         InputError: a value is not a finite number.
     """
     numbers = table.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
-    bad = np.argwhere(~np.isfinite(numbers))
-    if len(bad):
-        row, column = bad[0]
+    wrong = np.argwhere(~np.isfinite(numbers))
+    if len(wrong):
+        row, column = wrong[0]
+        cell = str(table.iloc[row, column])
         raise input_error(
-            f"row {row + 1} of the data: '{table.iloc[row, column]}' is not a finite number",
+            f"row {row + 1} of the data: '{cell}' is not a finite number{comma_hint(cell)}",
             where=str(path),
-            key=str(table.columns[column]),
+            key=key or str(table.columns[column]),
         )
     return numbers
 

@@ -242,10 +242,10 @@ def _registry(*laws: DamperLaw) -> dict[str, DamperLaw]:
     Raises:
         ValueError: Two laws have the same name or number.
     """
-    found = {law.name: law for law in laws}
-    if len(found) < len(laws) or len({law.number for law in laws}) < len(laws):
+    by_name = {law.name: law for law in laws}
+    if len(by_name) < len(laws) or len({law.number for law in laws}) < len(laws):
         raise ValueError("two damper laws have the same name or number")
-    return found
+    return by_name
 
 
 DAMPER_LAWS = _registry(

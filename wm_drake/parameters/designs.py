@@ -9,10 +9,11 @@ from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.files import read_model
 from wm_drake.parameters.machine import MachineParameters, Name
-from wm_drake.parameters.text_files import is_file
-from wm_drake.parameters.tolerances import fraction
+from wm_drake.parameters.text_files import DATA, ShippedFiles
+from wm_drake.parameters.tolerances import OneSided, fraction
 
-DESIGNS_FOLDER = Path(__file__).parents[1] / "data" / "designs"
+DESIGNS_FOLDER = DATA / "designs"
+_FILES = ShippedFiles("design file", DESIGNS_FOLDER)
 
 
 class DesignVariable(Frozen):
@@ -65,24 +66,17 @@ class Objective(Frozen):
         return self
 
 
-class Constraint(Frozen):
+class Constraint(OneSided):
     """A limit that a design must meet.
 
     Attributes:
-        quantity: As that of an objective.
-        at_least, at_most: The limit, with a unit. One of the two.
         over: As that of an objective.
     """
 
-    quantity: str
-    at_least: str | None = None
-    at_most: str | None = None
     over: str = "worst"
 
     @model_validator(mode="after")
-    def _has_one_side(self) -> "Constraint":
-        if (self.at_least is None) == (self.at_most is None):
-            raise ValueError("needs either at_least or at_most")
+    def _over_is_known(self) -> "Constraint":
         check_over(self.over)
         return self
 
@@ -163,7 +157,7 @@ def check_over(text: str) -> None:
 
 def shipped_designs() -> dict[str, Path]:
     """Return the design files that the package contains, by name."""
-    return {path.stem: path for path in sorted(DESIGNS_FOLDER.glob("*.yaml"))}
+    return _FILES.listed()
 
 
 def design_path(name_or_path: str | Path) -> Path:
@@ -172,14 +166,7 @@ def design_path(name_or_path: str | Path) -> Path:
     Raises:
         InputError: there is no such file.
     """
-    shipped = shipped_designs()
-    path = shipped.get(str(name_or_path), Path(name_or_path))
-    if not is_file(path):
-        hint = nearest_names(str(name_or_path), shipped)
-        raise input_error(
-            f"no such file, and no shipped design file of that name{hint}", where=str(path)
-        )
-    return path
+    return _FILES.path(name_or_path)
 
 
 def load_design(name_or_path: str | Path = "gasket") -> DesignTask:

@@ -1,7 +1,7 @@
 """Springs, dampers, bushings of a machine: frozen, SI; fields are the keys of the machine file."""
 
 import itertools
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
@@ -14,10 +14,77 @@ from wm_drake.parameters.types import FloatArray
 class Frozen(BaseModel):
     """A frozen type that allows no unknown fields."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", json_schema_serialization_defaults_required=True
+    )
 
 
-class ForceTable(Frozen):
+LINEAR_PART = 0.2
+"""Part of a table, on each side of zero, whose fitted line has the nominal stiffness as its slope.
+
+[B] section 4: "slopes of linear fit to the first 20 % of the force-displacement and torque-angle
+curves".
+"""
+
+
+class Table(Frozen):
+    """A curve through points: a monotone cubic between them, straight lines beyond them.
+
+    The first field has the rising abscissas, at least two; the second the ordinates, never falling.
+    """
+
+    stiffness_unit: ClassVar[u.Unit]
+
+    @model_validator(mode="after")
+    def _monotone(self) -> Self:
+        (x_name, x), (y_name, y) = self
+        if len(x) != len(y) or len(x) < 2:
+            raise ValueError(
+                f"needs as many values of {x_name} as of {y_name}, at least two; "
+                f"has {len(x)} and {len(y)}"
+            )
+        if any(left >= right for left, right in itertools.pairwise(x)):
+            raise ValueError(f"{x_name} must rise from point to point")
+        if any(left > right for left, right in itertools.pairwise(y)):
+            raise ValueError(f"{y_name} must not fall from point to point")
+        return self
+
+    @property
+    def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Abscissas and ordinates."""
+        (_, x), (_, y) = self
+        return x, y
+
+    def values(self, x: FloatArray) -> FloatArray:
+        """Return the ordinates at abscissas (n,)."""
+        from scipy.interpolate import PchipInterpolator  # 0.5 s to import: machines with tables
+
+        cubic = PchipInterpolator(*self.curve)
+        inside = np.clip(x, self.curve[0][0], self.curve[0][-1])
+        return np.asarray(cubic(inside) + cubic.derivative()(inside) * (x - inside))
+
+    def scaled(self, factor: float) -> Self:
+        """Return the table with its ordinates times a factor."""
+        (_, _), (name, y) = self
+        return self.model_copy(update={name: tuple(factor * number for number in y)})
+
+    @property
+    def nominal_stiffness(self) -> float:
+        """Slope of the least-squares line through the first 20 % of the curve on both sides of 0.
+
+        If the curve is flat there (a free stroke), it is the slope of the line through the whole
+        curve. [N/m or N m/rad]
+        """
+        x = self.curve[0]
+        for part in (LINEAR_PART, 1.0):
+            points = np.linspace(part * min(x[0], 0.0), part * max(x[-1], 0.0), 201)
+            slope = float(np.polyfit(points, self.values(points), 1)[0])
+            if slope > 0.0:
+                return slope
+        return 0.0
+
+
+class ForceTable(Table):
     """Force over displacement: a monotone cubic through the points, straight lines beyond them.
 
     Attributes:
@@ -25,25 +92,12 @@ class ForceTable(Frozen):
         force: Force at each of them, never falling.
     """
 
+    stiffness_unit = u.Unit("N/m", "N/mm")
     displacement: u.Lengths
     force: u.Forces
 
-    @model_validator(mode="after")
-    def _monotone(self) -> "ForceTable":
-        check_curve("displacement", self.displacement, "force", self.force)
-        return self
 
-    @property
-    def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Abscissas and ordinates."""
-        return self.displacement, self.force
-
-    def values(self, displacement: FloatArray) -> FloatArray:
-        """Return the force at displacements (n,). [m -> N]"""
-        return _curve_values(self.curve, displacement)
-
-
-class TorqueTable(Frozen):
+class TorqueTable(Table):
     """Torque over angle: a monotone cubic through the points, straight lines beyond them.
 
     Attributes:
@@ -51,48 +105,9 @@ class TorqueTable(Frozen):
         torque: Torque at each of them, never falling.
     """
 
+    stiffness_unit = u.Unit("N*m/rad", "N*mm/rad")
     angle: u.Angles
     torque: u.Torques
-
-    @model_validator(mode="after")
-    def _monotone(self) -> "TorqueTable":
-        check_curve("angle", self.angle, "torque", self.torque)
-        return self
-
-    @property
-    def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Abscissas and ordinates."""
-        return self.angle, self.torque
-
-    def values(self, angle: FloatArray) -> FloatArray:
-        """Return the torque at angles (n,). [rad -> N m]"""
-        return _curve_values(self.curve, angle)
-
-
-def _curve_values(curve: tuple[tuple[float, ...], tuple[float, ...]], x: FloatArray) -> FloatArray:
-    """Return the ordinates of a monotone cubic with straight ends at abscissas (n,)."""
-    from scipy.interpolate import PchipInterpolator  # half a second to import: machines with tables
-
-    cubic = PchipInterpolator(*curve)
-    inside = np.clip(x, curve[0][0], curve[0][-1])
-    return np.asarray(cubic(inside) + cubic.derivative()(inside) * (x - inside))
-
-
-def check_curve(x_name: str, x: tuple[float, ...], y_name: str, y: tuple[float, ...]) -> None:
-    """Check that a curve is a function of rising abscissa with never falling ordinate.
-
-    Raises:
-        ValueError: It is not.
-    """
-    if len(x) != len(y) or len(x) < 2:
-        raise ValueError(
-            f"needs as many values of {x_name} as of {y_name}, at least two; "
-            f"has {len(x)} and {len(y)}"
-        )
-    if any(left >= right for left, right in itertools.pairwise(x)):
-        raise ValueError(f"{x_name} must rise from point to point")
-    if any(left > right for left, right in itertools.pairwise(y)):
-        raise ValueError(f"{y_name} must not fall from point to point")
 
 
 def _form(value: Any) -> str:

@@ -10,23 +10,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-import annotated_types as limits
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import core_schema
 
+from wm_drake.parameters.allowed import declared_range
 from wm_drake.parameters.damper_laws import DamperNumbers
-from wm_drake.parameters.keys import unit_of
+from wm_drake.parameters.element_kinds import ELEMENT_KINDS, Element
+from wm_drake.parameters.keys import models_in, unit_of
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.units import PureNumber, Unit
 
 EXTENDS = "Name or path of another machine; this file then contains only the differences."
 SOURCE = "Where the numbers come from: a paper, a measurement, or an assumption with its reason."
-_SIGNS = (
-    ("gt", limits.Gt, ">"),
-    ("ge", limits.Ge, ">="),
-    ("lt", limits.Lt, "<"),
-    ("le", limits.Le, "<="),
-)
 
 
 @dataclass(frozen=True)
@@ -75,6 +72,9 @@ def key_groups() -> list[KeyGroup]:
     places: dict[type[BaseModel], list[str]] = {}
     for path, model in _walk(MachineParameters, ""):
         places.setdefault(model, []).append(path)
+    for kind in ELEMENT_KINDS.values():
+        for path, model in _walk(kind.parameters, "elements.NAME"):
+            places.setdefault(model, []).append(path)
     known = list(places)
     return [_group(model, list(dict.fromkeys(paths)), known) for model, paths in places.items()]
 
@@ -82,7 +82,7 @@ def key_groups() -> list[KeyGroup]:
 def _walk(model: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseModel]]]:
     yield path, model
     for name, field in model.model_fields.items():
-        for suffix, inner in _models(field.annotation):
+        for suffix, inner in models_in(field.annotation):
             yield from _walk(inner, f"{path}.{name}{suffix}".lstrip("."))
 
 
@@ -140,31 +140,16 @@ def _form(field: FieldInfo, unit: Unit | None) -> tuple[str, str]:
         form = "number" if isinstance(unit, PureNumber) else f"number in {unit.shown}"
         if is_list:
             form = f"list in {unit.shown}"
-        if any(True for _ in _models(field.annotation)):
+        if any(True for _ in models_in(field.annotation)):
             form += ", or a table"
-        return form, ", ".join(_limits(field, unit))
+        limits = (f"{sign} {unit.text(end)}" for sign, end in declared_range(field).limits())
+        return form, ", ".join(limits).strip()
     choices = _choices(field.annotation)
     if choices:
         return "text", ", ".join(choices)
-    if any(True for _ in _models(field.annotation)):
+    if any(True for _ in models_in(field.annotation)):
         return "group", ""
     return ("list of texts" if "tuple" in str(field.annotation) else "text"), ""
-
-
-def _limits(field: FieldInfo, unit: Unit) -> Iterator[str]:
-    for item in _metadata(field.annotation, field.metadata):
-        for name, kind, sign in _SIGNS:
-            if isinstance(item, kind):
-                yield f"{sign} {unit.text(float(getattr(item, name)))}".strip()
-
-
-def _metadata(annotation: Any, metadata: typing.Iterable[Any]) -> Iterator[Any]:
-    """Yield the limits of a field, also those that the types of an alternative carry."""
-    for item in metadata:
-        yield from getattr(item, "metadata", [item])
-    for argument in typing.get_args(annotation):
-        if hasattr(argument, "__metadata__"):
-            yield from _metadata(typing.get_args(argument)[0], argument.__metadata__)
 
 
 def _choices(annotation: Any) -> list[str]:
@@ -173,121 +158,109 @@ def _choices(annotation: Any) -> list[str]:
     return [choice for argument in typing.get_args(annotation) for choice in _choices(argument)]
 
 
-def _models(annotation: Any, suffix: str = "") -> Iterator[tuple[str, type[BaseModel]]]:
-    """Yield the groups of values in an annotation, each with what its key path adds."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield suffix, annotation
-        return
-    origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
-    if origin is dict:
-        yield from _models(arguments[1], f"{suffix}.NAME")
-    elif origin is tuple:
-        yield from _models(arguments[0], f"{suffix}.N")
-    else:
-        for argument in arguments:
-            if argument is not type(None) and not isinstance(argument, str):
-                yield from _models(argument, suffix)
-
-
 def meanings_of(model: type[BaseModel]) -> dict[str, str]:
     """Return what the docstrings of a type and of its bases say about each field."""
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for base in reversed(model.__mro__):
-        found |= _attributes(base.__doc__ or "")
-    return found
+        texts |= _attributes(base.__doc__ or "")
+    return texts
 
 
 def _attributes(docstring: str) -> dict[str, str]:
     """Return the section "Attributes" of a Google docstring: text by name."""
     _, _, section = docstring.partition("Attributes:\n")
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     names: list[str] = []
     for line in section.splitlines():
         entry = re.match(r"^ {8}(\w[\w, ]*?):( .*)?$", line)
         if entry:
             names = [name.strip() for name in entry[1].split(",")]
-            found |= dict.fromkeys(names, (entry[2] or "").strip())
+            texts |= dict.fromkeys(names, (entry[2] or "").strip())
         elif line.startswith(" " * 12):
-            found |= {name: f"{found[name]} {line.strip()}".strip() for name in names}
+            texts |= {name: f"{texts[name]} {line.strip()}".strip() for name in names}
         elif line.strip():
             break
     # a unit at the end is that of the stored value, not that of the file
-    return {name: re.sub(r" \[[^\]]*\]$", "", text) for name, text in found.items()}
+    return {name: re.sub(r" \[[^\]]*\]$", "", text) for name, text in texts.items()}
+
+
+class DocumentedSchema(GenerateJsonSchema):
+    """JSON schema with the meaning of each group and key from the docstrings of the types."""
+
+    def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
+        """Return the schema of a group."""
+        group = super().model_schema(schema)
+        meanings = meanings_of(schema["cls"])
+        for name, key in group.get("properties", {}).items():
+            if name in meanings:
+                key["description"] = meanings[name]
+        return {**group, "description": _about(schema["cls"])}
+
+
+class _FileSchema(DocumentedSchema):
+    """JSON schema of a file that may extend another one.
+
+    No key is required, any value may be null, which removes it, and each group may have a source.
+    """
+
+    def field_is_required(self, *_: Any, **_named: Any) -> bool:
+        """Return False: a file has only what differs from the machine that it extends."""
+        return False
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+        """Return the schema of a value without its default, which the extended file may have."""
+        return self.generate_inner(schema["schema"])
+
+    def tagged_union_schema(self, schema: core_schema.TaggedUnionSchema) -> JsonSchemaValue:
+        """Return the alternatives of a value; the key that tells them apart may be missing."""
+        return {"anyOf": [self.generate_inner(choice) for choice in schema["choices"].values()]}
+
+    def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
+        """Return the schema of a group; of an element that of all registered kinds."""
+        if schema["cls"] is Element and ELEMENT_KINDS:
+            kinds = [kind.parameters for kind in ELEMENT_KINDS.values()]
+            return {"anyOf": [self.generate_inner(k.__pydantic_core_schema__) for k in kinds]}
+        group = super().model_schema(schema)
+        keys = {name: _or_null(value) for name, value in group.get("properties", {}).items()}
+        return {**group, "properties": {**keys, **_SOURCE}}
+
+    def dict_schema(self, schema: core_schema.DictSchema) -> JsonSchemaValue:
+        """Return the schema of groups by name."""
+        names, entries = self.generate_inner(schema["keys_schema"]), schema["values_schema"]
+        pattern = names.get("pattern", "^").replace("^", "^(?!source$)", 1)
+        return {
+            "type": "object",
+            "properties": dict(_SOURCE),
+            "patternProperties": {pattern: _or_null(self.generate_inner(entries))},
+            "additionalProperties": False,
+        }
+
+
+_SOURCE = {"source": {"type": "string", "description": SOURCE}}
+
+
+def _or_null(schema: dict[str, Any]) -> dict[str, Any]:
+    null, described = {"type": "null"}, {}
+    if "description" in schema:
+        described = {"description": schema["description"]}
+    forms = schema.get("anyOf", [{k: v for k, v in schema.items() if k not in described}])
+    return {**described, "anyOf": [*(form for form in forms if form != null), null]}
 
 
 def file_schema() -> dict[str, Any]:
     """Return the JSON schema of a machine file, for the completion and checks of an editor.
 
-    It is less strict than `wm-drake machine check`: a file that extends another one may leave out
-    any key, and any value may be null, which removes it.
+    It is less strict than `wm-drake machine check`: it does not know the dimensions of units, nor
+    rules between several keys.
     """
-    schema = MachineParameters.model_json_schema()
-    definitions = schema.pop("$defs")
-    properties = {
-        "extends": {"type": "string", "description": EXTENDS},
-        **schema["properties"],
-        "profile": {"description": "Spin profile: points, steps, or the name of one."},
-    }
-    properties.pop("sources")
-    meanings = {model.__name__: meanings_of(model) for model in _all_models(MachineParameters)}
-    for name, definition in definitions.items():
-        definitions[name] = _relaxed(_described(definition, meanings.get(name, {})))
-    top = _described({"properties": properties}, meanings_of(MachineParameters))["properties"]
+    schema = MachineParameters.model_json_schema(schema_generator=_FileSchema)
+    del schema["properties"]["sources"], schema["properties"]["source"]
     return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **schema,
+        "$schema": GenerateJsonSchema.schema_dialect,
         "title": "wm_drake machine file",
-        "type": "object",
-        "additionalProperties": False,
-        "properties": {name: _or_null(_relaxed(value)) for name, value in top.items()},
-        "$defs": definitions,
+        "properties": {
+            "extends": {"type": "string", "description": EXTENDS},
+            **schema["properties"],
+        },
     }
-
-
-def _all_models(model: type[BaseModel]) -> Iterator[type[BaseModel]]:
-    yield model
-    for field in model.model_fields.values():
-        for _, inner in _models(field.annotation):
-            yield from _all_models(inner)
-
-
-def _described(definition: dict[str, Any], meanings: dict[str, str]) -> dict[str, Any]:
-    properties = {
-        name: {**value, "description": meanings.get(name, value.get("description", ""))}
-        for name, value in definition.get("properties", {}).items()
-    }
-    return {**definition, "properties": properties} if properties else definition
-
-
-def _relaxed(node: Any) -> Any:
-    """Return a schema in which no key is required and each group may have a source."""
-    if isinstance(node, list):
-        return [_relaxed(entry) for entry in node]
-    if not isinstance(node, dict):
-        return node
-    node = {key: value for key, value in node.items() if key not in ("required", "default")}
-    properties = node.pop("properties", None)
-    node = {key: _relaxed(value) for key, value in node.items() if key != "discriminator"}
-    if "oneOf" in node:
-        node["anyOf"] = node.pop("oneOf")
-    for kind in ("patternProperties", "additionalProperties"):  # groups by name
-        if isinstance(node.get(kind), dict):
-            node[kind] = _entries_or_null(kind, node[kind])
-    if properties is None:
-        return node
-    own = {name: _or_null(_relaxed(value)) for name, value in properties.items()}
-    return {**node, "properties": {**own, "source": {"type": "string", "description": SOURCE}}}
-
-
-def _entries_or_null(kind: str, entries: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of the entries of a mapping by name; null removes an entry."""
-    if kind == "additionalProperties":
-        return _or_null(entries)
-    return {
-        pattern.replace("^", "^(?!source$)", 1): _or_null(entry)
-        for pattern, entry in entries.items()
-    }
-
-
-def _or_null(schema: dict[str, Any]) -> dict[str, Any]:
-    description = {"description": schema["description"]} if "description" in schema else {}
-    return {**description, "anyOf": [schema, {"type": "null"}]}

@@ -3,6 +3,7 @@
 Every message names the file, the line and the key path.
 """
 
+import io
 import re
 import warnings
 from collections.abc import Iterable, Mapping
@@ -10,8 +11,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
-import pandas as pd
 from pydantic import BaseModel, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
@@ -20,17 +19,24 @@ from ruamel.yaml.error import ReusedAnchorWarning, YAMLError
 from ruamel.yaml.events import AliasEvent, ScalarEvent
 from ruamel.yaml.resolver import VersionedResolver
 
-from wm_drake.errors import InputError, Problem, input_error, nearest_names, reason_of
-from wm_drake.parameters.csv_files import read_csv
+from wm_drake.errors import InputError, Problem, input_error
+from wm_drake.parameters.csv_files import finite_numbers, read_csv
 from wm_drake.parameters.keys import is_index, quantities, source_of
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.spin import Load, SpinProfile
-from wm_drake.parameters.text_files import check_regular, is_file, read_text
-from wm_drake.parameters.units import comma_hint
+from wm_drake.parameters.text_files import (
+    DATA,
+    ShippedFiles,
+    check_regular,
+    is_file,
+    read_text,
+)
 
-MACHINES_FOLDER = Path(__file__).parents[1] / "data" / "machines"
-CYCLES_FOLDER = Path(__file__).parents[1] / "data" / "cycles"
+MACHINES_FOLDER = DATA / "machines"
+CYCLES_FOLDER = DATA / "cycles"
+_MACHINES = ShippedFiles("machine", MACHINES_FOLDER)
+_PROFILES = ShippedFiles("profile", CYCLES_FOLDER, "profile_*", prefix="profile_")
 Model = TypeVar("Model", bound=BaseModel)
 
 LARGEST_YAML = 1 << 20
@@ -48,7 +54,7 @@ OF_MEASURED_MACHINE = ("measured", "published")
 
 def shipped_machines() -> dict[str, Path]:
     """Return the machine files that the package contains, by name."""
-    return {path.stem: path for path in sorted(MACHINES_FOLDER.glob("*.yaml"))}
+    return _MACHINES.listed()
 
 
 def load_machine(name_or_path: str | Path = "reference") -> MachineParameters:
@@ -81,18 +87,7 @@ def machine_path(name_or_path: str | Path) -> Path:
     Raises:
         InputError: there is no such machine and no such file.
     """
-    shipped = shipped_machines()
-    if str(name_or_path) in shipped:
-        return shipped[str(name_or_path)]
-    path = Path(name_or_path)
-    if not is_file(path):
-        try:
-            reason = "is a folder" if path.is_dir() else "no such file"
-        except (OSError, ValueError) as error:
-            reason = reason_of(error)
-        hint = nearest_names(str(name_or_path), shipped)
-        raise input_error(f"{reason}, and no shipped machine of that name{hint}", where=str(path))
-    return path
+    return _MACHINES.path(name_or_path)
 
 
 def load_load(path: Path) -> Load:
@@ -133,15 +128,6 @@ def read_model(model: type[Model], path: Path) -> Model:
     return _validated(model, read_yaml(path), path)
 
 
-def shipped_profiles() -> dict[str, Path]:
-    """Return the spin profiles that the package contains, by name of their files."""
-    return {
-        path.stem: path
-        for path in sorted(CYCLES_FOLDER.iterdir())
-        if path.stem.startswith("profile_")
-    }
-
-
 def load_profile(name_or_path: str | Path) -> SpinProfile:
     """Read a spin profile from YAML, written as in a machine file, or from CSV.
 
@@ -159,37 +145,23 @@ def load_profile(name_or_path: str | Path) -> SpinProfile:
         >>> wm.load_profile("run_up").duration
         70.0
     """
-    shipped = shipped_profiles()
-    path = shipped.get(f"profile_{name_or_path}", Path(name_or_path))
-    if not is_file(path):
-        known = [name.removeprefix("profile_") for name in shipped]
-        raise input_error(
-            f"no such file, and no shipped profile of that name{nearest_names(str(path), known)}",
-            where=str(path),
-        )
+    path = _PROFILES.path(name_or_path)
     if path.suffix.lower() != ".csv":
         tree = read_yaml(path)
         return _validated(SpinProfile, _without_sources(tree)[0], path)
     table = read_csv(path, ["time_s", "speed_rpm"], optional="region")
     if table.empty:
         raise input_error("is empty; a profile needs at least two points", where=str(path))
-    numbers = table[["time_s", "speed_rpm"]].apply(pd.to_numeric, errors="coerce")
-    finite = np.isfinite(numbers.to_numpy(dtype=float)).all(axis=1)
-    if not finite.all():
-        row = int(np.flatnonzero(~finite)[0])
-        cells = ", ".join(f"'{cell}'" for cell in table.iloc[row].tolist())
-        raise input_error(
-            f"row {row + 1} of the data is not two finite numbers: {cells}{comma_hint(cells)}",
-            where=str(path),
-        )
-    text = {"time": ("time_s", "s"), "speed": ("speed_rpm", "rpm")}
+    numbers = finite_numbers(table[["time_s", "speed_rpm"]], path)
     fields: dict[str, Any] = {
-        key: f"({', '.join(map(repr, numbers[name].tolist()))}) {unit}"
-        for key, (name, unit) in text.items()
+        key: f"({', '.join(map(repr, column.tolist()))}) {unit}"
+        for (key, unit), column in zip(
+            {"time": "s", "speed": "rpm"}.items(), numbers.T, strict=True
+        )
     }
     if "region" in table:
         fields["regions"] = _regions(
-            numbers["time_s"].tolist(), table["region"].fillna("").astype(str).tolist()
+            numbers[:, 0].tolist(), table["region"].fillna("").astype(str).tolist()
         )
     return _validated(SpinProfile, fields, path)
 
@@ -230,9 +202,9 @@ def machine_tree(parameters: MachineParameters) -> dict[str, Any]:
 
 def yaml_text(tree: Mapping[str, Any]) -> str:
     """Return a tree of texts as the text of a YAML file."""
-    text = _TextStream()
-    _yaml().dump(tree, text)
-    return text.text
+    stream = io.StringIO()
+    _yaml().dump(tree, stream)
+    return stream.getvalue()
 
 
 def machine_changes(base: MachineParameters, changed: MachineParameters) -> dict[str, Any]:
@@ -249,16 +221,16 @@ def machine_changes(base: MachineParameters, changed: MachineParameters) -> dict
 
 def _changes(base: Mapping[str, Any], changed: Mapping[str, Any]) -> dict[str, Any]:
     """Return what `_merge` must merge into `base` to get `changed`."""
-    found: dict[str, Any] = dict.fromkeys(name for name in base if name not in changed)
+    changes: dict[str, Any] = dict.fromkeys(name for name in base if name not in changed)
     for name, value in changed.items():
         old = base.get(name)
         if isinstance(old, Mapping) and isinstance(value, Mapping) and not _is_whole(value):
             inner = _changes(old, value)
             if inner:
-                found[name] = inner
+                changes[name] = inner
         elif old != value:
-            found[name] = value
-    return found
+            changes[name] = value
+    return changes
 
 
 def extended_files(path: Path) -> list[Path]:
@@ -267,10 +239,10 @@ def extended_files(path: Path) -> list[Path]:
     Raises:
         InputError: one of them cannot be read.
     """
-    found = [path]
-    while len(found) <= LONGEST_CHAIN and "extends" in (tree := read_yaml(found[-1])):
-        found.append(_base_path(tree, found[-1]))
-    return found
+    chain = [path]
+    while len(chain) <= LONGEST_CHAIN and "extends" in (tree := read_yaml(chain[-1])):
+        chain.append(_base_path(tree, chain[-1]))
+    return chain
 
 
 def machine_file_with(path: Path, parameters: MachineParameters, keys: Iterable[str]) -> str:
@@ -298,16 +270,7 @@ def machine_file_with(path: Path, parameters: MachineParameters, keys: Iterable[
             node[name] = CommentedMap()
             node[name].fa.set_flow_style()
         node[name]["value"], node[name]["source"] = unit.text(value), source_of(parameters, key)
-    text = _TextStream()
-    _yaml().dump(tree, text)
-    return text.text
-
-
-class _TextStream:
-    text = ""
-
-    def write(self, part: str | bytes) -> None:
-        self.text += part if isinstance(part, str) else part.decode()
+    return yaml_text(tree)
 
 
 class _TextResolver(VersionedResolver):

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from wm_drake.errors import nearest_names
 from wm_drake.parameters import units as u
@@ -25,6 +25,12 @@ class Measured(Frozen):
     unit: str
     is_list: bool
 
+    @property
+    def pair(self) -> tuple[float, float]:
+        """Both numbers of a pair."""
+        first, second = self.values
+        return first, second
+
 
 def _measured(text: Any) -> Any:
     if isinstance(text, int | float) and not isinstance(text, bool):
@@ -32,11 +38,8 @@ def _measured(text: Any) -> Any:
     if not isinstance(text, str):
         raise ValueError("is not a number or a list of numbers with a unit, such as '12 kg'")
     magnitudes, unit, is_list = u.split(text)
-    return {
-        "values": tuple(u.to_base(number, unit) for number in magnitudes),
-        "unit": unit,
-        "is_list": is_list,
-    }
+    values = tuple(u.to_base(number, unit) for number in magnitudes)
+    return {"values": values, "unit": unit, "is_list": is_list}
 
 
 def _pair(text: Any) -> Any:
@@ -50,31 +53,54 @@ def _one_key(value: Any) -> Any:
     return {value: "1"} if isinstance(value, str) else value
 
 
+def _with_deviation(pair: Measured) -> Measured:
+    if not pair.values[1] > 0.0:
+        raise ValueError("the standard deviation must be above 0")
+    return pair
+
+
+def _in_dimension(unit: str, what: str) -> AfterValidator:
+    def check(pair: Measured) -> Measured:
+        if u.dimension(pair.unit) != u.dimension(unit):
+            raise ValueError(f"the numbers are in {pair.unit or 'pure numbers'}; {what}")
+        return pair
+
+    return AfterValidator(check)
+
+
+_Numbers = Annotated[Measured, BeforeValidator(_measured)]
 _Pair = Annotated[Measured, BeforeValidator(_pair)]
+_Expected = Annotated[_Pair, AfterValidator(_with_deviation)]
+"""A value and its standard deviation."""
+_Ratio = Annotated[_Expected, _in_dimension("", "the ratio is a pure number")]
 
 
-class FreeQuantity(Frozen):
-    """One number that a calibration may change.
+class _Setting(Frozen):
+    """A number on which values of the machine depend.
+
+    Attributes:
+        sets: Factors by key path of the machine's values that depend on this number. Such a value
+            is the sum of factor times number over all numbers that list it. A factor may have a
+            unit, and it may be a list with one number for each point of a table.
+        source: Reason for what is said of the number.
+    """
+
+    sets: Annotated[dict[str, _Numbers], BeforeValidator(_one_key), Field(min_length=1)]
+    source: str
+
+
+class FreeQuantity(_Setting):
+    """One number that a calibration may change: a variation with bounds and a prior.
 
     Attributes:
         bounds: Smallest and largest allowed value.
         prior: Expected value and standard deviation before any measurement of the machine.
-        sets: Factors by key path of the machine's values that depend on this quantity. Such a value
-            is the sum of factor times quantity over all quantities that list it. A factor may have
-            a unit, and it may be a list with one number for each point of a table.
-        source: Reason for the bounds and the prior.
         start: Start value of searches; None for the expected value.
     """
 
     bounds: _Pair
-    prior: _Pair
-    sets: Annotated[
-        dict[str, Annotated[Measured, BeforeValidator(_measured)]],
-        BeforeValidator(_one_key),
-        Field(min_length=1),
-    ]
-    source: str
-    start: Annotated[Measured, BeforeValidator(_measured)] | None = None
+    prior: _Expected
+    start: _Numbers | None = None
 
     @property
     def unit(self) -> str:
@@ -93,8 +119,6 @@ class FreeQuantity(Frozen):
             raise ValueError("the lower bound must be below the upper bound")
         if not lower <= self.prior.values[0] <= upper:
             raise ValueError("the expected value is outside the bounds")
-        if not self.prior.values[1] > 0.0:
-            raise ValueError("the standard deviation must be above 0")
         if self.start is not None:
             if self.start.is_list or u.dimension(self.start.unit) != u.dimension(self.unit):
                 raise ValueError(
@@ -105,22 +129,14 @@ class FreeQuantity(Frozen):
         return self
 
 
-class KnownQuantity(Frozen):
+class KnownQuantity(_Setting):
     """One number that a calibration does not change, in the form of a free quantity.
 
     Attributes:
         value: The value.
-        sets: As in `FreeQuantity`.
-        source: Reason for the value.
     """
 
-    value: Annotated[Measured, BeforeValidator(_measured)]
-    sets: Annotated[
-        dict[str, Annotated[Measured, BeforeValidator(_measured)]],
-        BeforeValidator(_one_key),
-        Field(min_length=1),
-    ]
-    source: str
+    value: _Numbers
 
     @property
     def unit(self) -> str:
@@ -144,22 +160,8 @@ class ExpectedPreload(Frozen):
         source: Reason for the prior.
     """
 
-    prior: _Pair
+    prior: Annotated[_Expected, _in_dimension("N", "a preload needs a unit such as N")]
     source: str
-
-    @model_validator(mode="after")
-    def _force(self) -> "ExpectedPreload":
-        _check_pair(self.prior, "a preload", "N")
-        return self
-
-
-def _check_pair(pair: Measured, what: str, unit: str) -> None:
-    if u.dimension(pair.unit) != u.dimension(unit):
-        raise ValueError(
-            f"the numbers are in {pair.unit or 'pure numbers'}; {what} needs a unit such as {unit}"
-        )
-    if not pair.values[1] > 0.0:
-        raise ValueError("the standard deviation must be above 0")
 
 
 class Relation(Frozen):
@@ -178,21 +180,15 @@ class Relation(Frozen):
     """
 
     quantity: Name
-    to: Annotated[dict[Name, Annotated[Measured, BeforeValidator(_measured)]], Field(min_length=1)]
-    prior: _Pair | None = None
-    at_most: _Pair | None = None
+    to: Annotated[dict[Name, _Numbers], Field(min_length=1)]
+    prior: _Ratio | None = None
+    at_most: _Ratio | None = None
     source: str
 
     @model_validator(mode="after")
     def _one_of_two(self) -> "Relation":
         if (self.prior is None) == (self.at_most is None):
             raise ValueError("needs either 'prior' or 'at_most'")
-        pair = self.prior or self.at_most
-        assert pair is not None
-        if u.dimension(pair.unit) != u.dimension(""):
-            raise ValueError(f"the ratio is in {pair.unit}; it is a pure number")
-        if not pair.values[1] > 0.0:
-            raise ValueError("the standard deviation must be above 0")
         return self
 
 
@@ -206,17 +202,12 @@ class LeastElongation(Frozen):
         source: Reason.
     """
 
-    at_least: _Pair
+    at_least: Annotated[_Expected, _in_dimension("mm", "an elongation needs a unit such as mm")]
     source: str
-
-    @model_validator(mode="after")
-    def _length(self) -> "LeastElongation":
-        _check_pair(self.at_least, "an elongation", "mm")
-        return self
 
 
 class FreeFile(Frozen):
-    """The free quantities of a calibration, by name, and what is known beside them.
+    """The free quantities of a calibration, by name, and what else is known.
 
     A known quantity becomes free, or a free one known, by moving its entry from one section to the
     other.

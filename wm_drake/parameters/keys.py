@@ -3,13 +3,14 @@
 import re
 import typing
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
-from wm_drake.parameters.elements import ForceTable, TorqueTable
+from wm_drake.parameters.elements import Table
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.units import Unit
@@ -42,6 +43,9 @@ def with_value(parameters: Tree, key: str, value: Any) -> Tree:
     return with_values(parameters, {key: value})
 
 
+OF_SDF = ("bodies", "frames")
+"""Groups whose entries replace numbers of the SDF, and need not be in the machine file."""
+
 DEEPEST_KEY = 20
 """Largest number of parts of a key path; no number of a machine needs half of them."""
 
@@ -70,12 +74,10 @@ def with_values(parameters: Tree, values: Mapping[str, Any]) -> Tree:
     for key in values:
         if key.count(".") >= DEEPEST_KEY:
             raise input_error(f"has more than {DEEPEST_KEY} parts; no number has", key=key)
-    return typing.cast(
-        Tree,
-        _replaced(
-            parameters, [_Change(key, key.split("."), value) for key, value in values.items()]
-        ),
-    )
+    edits = _Edit("", 0)
+    for key, value in values.items():
+        edits.add(key, value)
+    return typing.cast(Tree, edits.applied(parameters))
 
 
 def is_index(part: str) -> bool:
@@ -83,167 +85,192 @@ def is_index(part: str) -> bool:
     return part.isascii() and part.isdecimal() and len(part) < 9
 
 
-@dataclass(frozen=True)
-class _Change:
-    """A change of one value in a tree.
+class _Edit:
+    """Changes at one place of a tree: a new value of the whole, then changes inside it.
 
     Attributes:
-        key: Complete key path, for messages.
-        path: Names that lead from the current node to the value.
-        value: The new value.
+        key: Complete key path of the first change here or inside, for messages.
+        depth: Number of parts of the key path that lead here.
+        whole: New value of the whole, in a list; empty if it is not replaced.
+        inside: Edits by the next part of their key paths.
+        is_of_numbers: Whether numbers and tables took the place of numbers and tables.
     """
 
-    key: str
-    path: list[str]
-    value: Any
+    __slots__ = ("depth", "inside", "is_of_numbers", "key", "whole")
 
+    def __init__(self, key: str, depth: int) -> None:
+        self.key, self.depth = key, depth
+        self.whole: list[Any] = []
+        self.inside: dict[str, _Edit] = {}
+        self.is_of_numbers = False
 
-def _replaced(node: Any, changes: list[_Change]) -> Any:
-    last = max((number for number, change in enumerate(changes) if not change.path), default=None)
-    if last is not None:  # the whole node is replaced; later changes apply to the new node
-        return (
-            _replaced(changes[last].value, changes[last + 1 :])
-            if changes[last + 1 :]
-            else changes[last].value
-        )
-    parts: dict[str, list[_Change]] = {}
-    for change in changes:
-        parts.setdefault(change.path[0], []).append(
-            _Change(change.key, change.path[1:], change.value)
-        )
-    if isinstance(node, BaseModel):
-        return _replaced_in_model(node, parts)
-    if isinstance(node, dict):
-        return _replaced_in_mapping(node, parts)
-    for name, inner in parts.items():
+    def add(self, key: str, value: Any) -> None:
+        """Add a change; it replaces all earlier ones at this key path and inside it."""
+        edit = self
+        for depth, part in enumerate(key.split("."), start=1):
+            if part not in edit.inside:
+                edit.inside[part] = _Edit(key, depth)
+            edit = edit.inside[part]
+        edit.whole, edit.inside = [value], {}
+
+    def keys(self) -> Iterator[str]:
+        """Yield the key paths of all changes."""
+        if self.whole:
+            yield self.path
+        for edit in self.inside.values():
+            yield from edit.keys()
+
+    @property
+    def path(self) -> str:
+        """Key path of this place."""
+        return ".".join(self.key.split(".")[: self.depth])
+
+    def applied(self, node: Any) -> Any:
+        """Return what the changes make of a value.
+
+        Raises:
+            InputError: a key is unknown, or a value is not allowed.
+        """
+        if self.whole:
+            self.is_of_numbers = _is_number(self.whole[0]) and _is_number(node)
+            node = self.whole[0]
+            if not self.inside:
+                return node
+        if isinstance(node, BaseModel):
+            node = self._in_model(node)
+        elif isinstance(node, dict):
+            node = self._in_mapping(node)
+        else:
+            node = self._in_list(node)
+        self.is_of_numbers = all(edit.is_of_numbers for edit in self.inside.values())
+        return node
+
+    def _in_list(self, node: Any) -> tuple[Any, ...]:
+        key = next(iter(self.inside.values())).key
         if node is None:
-            whole = inner[0].key.removesuffix("." + ".".join([name, *inner[0].path]))
-            raise input_error(
-                f"the machine has no '{whole}'; to add it, write all of it in a machine file",
-                key=inner[0].key,
+            message = (
+                f"the machine has no '{self.path}'; to add it, write all of it in a machine file"
             )
-        if not (isinstance(node, tuple) and is_index(name) and int(name) < len(node)):
-            allowed = (
-                f"allowed are 0 to {len(node) - 1}"
-                if isinstance(node, tuple)
-                else "the path must end before it"
-            )
-            raise input_error(f"'{name}' does not exist; {allowed}", key=inner[0].key)
-    return tuple(
-        _replaced_entry(entry, parts[str(i)]) if str(i) in parts else entry
-        for i, entry in enumerate(node)
-    )
+            raise input_error(message, key=key)
+        entries = list(node) if isinstance(node, tuple) else []
+        for name, edit in self.inside.items():
+            if not (is_index(name) and int(name) < len(entries)):
+                allowed = f"allowed are 0 to {len(entries) - 1}"
+                if not isinstance(node, tuple):
+                    allowed = "the path must end before it"
+                raise input_error(f"'{name}' does not exist; {allowed}", key=edit.key)
+            entries[int(name)] = edit.applied(entries[int(name)])
+            if entries[int(name)] is None:
+                raise input_error(
+                    "one entry of a list cannot be removed; write the whole list in a machine file",
+                    key=edit.key,
+                )
+        return tuple(entries)
 
+    def _in_mapping(self, node: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a mapping with entries replaced; those whose new value is None are removed."""
+        entries = dict(node)
+        for name, edit in self.inside.items():
+            if name not in node:
+                raise input_error(f"unknown key '{name}'" + nearest_names(name, node), key=edit.key)
+            entries[name] = edit.applied(node[name])
+            if entries[name] is None:
+                del entries[name]
+        return entries
 
-def _replaced_in_mapping(node: dict[str, Any], parts: dict[str, list[_Change]]) -> dict[str, Any]:
-    """Return a mapping with entries replaced; those whose new value is None are removed."""
-    for name, inner in parts.items():
-        if name not in node:
-            raise input_error(f"unknown key '{name}'" + nearest_names(name, node), key=inner[0].key)
-    new = {name: _replaced(node[name], inner) for name, inner in parts.items()}
-    changed = {**node, **new}
-    return {name: changed[name] for name in node if name not in new or new[name] is not None}
+    def _in_model(self, node: BaseModel) -> BaseModel:
+        fields = type(node).model_fields
+        values = {field: getattr(node, field) for field in node.model_fields_set}
+        for name, edit in self.inside.items():
+            if name not in fields:
+                raise input_error(
+                    f"unknown key '{name}'" + nearest_names(name, fields), key=edit.key
+                )
+            child = getattr(node, name)
+            is_of_sdf = name in OF_SDF and not edit.whole
+            values[name] = edit._in_overrides(child) if is_of_sdf else edit.applied(child)
+            if values[name] is None:
+                del values[name]
+        if isinstance(node, MachineParameters) and all(
+            edit.is_of_numbers and not edit.whole for edit in self.inside.values()
+        ):
+            # the part is checked; the rules between parts of a machine are about names and choices
+            return node.model_copy(update={name: values[name] for name in self.inside})
+        try:
+            return type(node).model_validate(values)
+        except ValidationError as error:
+            keys = list(self.keys())
+            raise InputError(
+                _with_key_of_change(problem, keys)
+                for problem in problems_of(error, type(node), self.path)
+            ) from None
 
+    def _in_overrides(self, node: dict[str, Any]) -> dict[str, Any]:
+        """Return overrides of the SDF; one is added when a change names it for the first time."""
+        added = {name: edit for name, edit in self.inside.items() if name not in node}
+        for name, edit in added.items():
+            if edit.whole == [None]:
+                raise input_error(f"unknown key '{name}'{nearest_names(name, node)}", key=edit.key)
+            del self.inside[name]
+        entries = self.applied(node)
+        self.is_of_numbers = self.is_of_numbers and not added
+        self.inside |= added
+        return {**entries, **{name: edit._as_tree() for name, edit in added.items()}}
 
-def _replaced_entry(entry: Any, changes: list[_Change]) -> Any:
-    new = _replaced(entry, changes)
-    if new is None:
-        raise input_error(
-            "one entry of a list cannot be removed; write the whole list in a machine file",
-            key=changes[0].key,
-        )
-    return new
-
-
-def _replaced_in_model(node: BaseModel, parts: dict[str, list[_Change]]) -> BaseModel:
-    fields = type(node).model_fields
-    values = {field: getattr(node, field) for field in node.model_fields_set}
-    for name, changes in parts.items():
-        if name not in fields:
-            raise input_error(
-                f"unknown key '{name}'" + nearest_names(name, fields), key=changes[0].key
-            )
-        values[name] = _changed_field(node, name, changes)
-        if values[name] is None:
-            del values[name]
-    if isinstance(node, MachineParameters) and _only_numbers_inside(node, parts):
-        # the part is checked; the rules between parts of a machine are about names and choices
-        return node.model_copy(update={name: values[name] for name in parts})
-    try:
-        return type(node).model_validate(values)
-    except ValidationError as error:
-        changes = [change for inner in parts.values() for change in inner]
-        here = ".".join(changes[0].key.split(".")[: -1 - len(changes[0].path)])
-        raise InputError(
-            _with_key_of_change(problem, changes)
-            for problem in problems_of(error, type(node), here)
-        ) from None
-
-
-def _only_numbers_inside(node: BaseModel, parts: dict[str, list[_Change]]) -> bool:
-    """Return whether numbers and tables inside the fields of a node take the place of others."""
-    return all(
-        change.path and _is_number(change.value) and _is_number(_inside(node, name, change.path))
-        for name, changes in parts.items()
-        for change in changes
-    )
+    def _as_tree(self) -> Any:
+        """Return the changes as nested mappings."""
+        tree = {name: edit._as_tree() for name, edit in self.inside.items()}
+        return self.whole[0] if self.whole and not tree else {**(self.whole or [{}])[0], **tree}
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, float | int | ForceTable | TorqueTable) and not isinstance(value, bool)
+    return isinstance(value, float | int | Table) and not isinstance(value, bool)
 
 
-def _inside(node: Any, name: str, path: list[str]) -> Any:
-    """Return the value at a path in a field of a node; None if there is none."""
-    for part in (name, *path):
-        if isinstance(node, BaseModel):
-            node = getattr(node, part, None)
-        elif isinstance(node, dict):
-            node = node.get(part)
-        else:
-            known = isinstance(node, tuple) and is_index(part) and int(part) < len(node)
-            node = node[int(part)] if known else None
-    return node
-
-
-def _with_key_of_change(problem: Problem, changes: list[_Change]) -> Problem:
+def _with_key_of_change(problem: Problem, keys: list[str]) -> Problem:
     """Return a problem of a group of values with the key of the change that caused it.
 
     Of several changes in the group it is the one that the message names; if it names none of them,
     the key stays that of the group.
     """
-    inside = [change for change in changes if change.key.startswith(problem.key)]
+    inside = [key for key in keys if key.startswith(problem.key)]
     words = re.findall(r"\w+", problem.message)
-    causes = [change for change in inside if change.key.split(".")[-1] in words]
-    found = causes or (inside if len(inside) == 1 else [])
-    return replace(problem, key=found[0].key) if found else problem
+    causes = [key for key in inside if key.split(".")[-1] in words]
+    causes = causes or (inside if len(inside) == 1 else [])
+    return replace(problem, key=causes[0]) if causes else problem
 
 
-def _changed_field(node: BaseModel, name: str, changes: list[_Change]) -> Any:
-    child = getattr(node, name)
-    if name not in ("bodies", "frames"):
-        return _replaced(child, changes)
-    # an override of the SDF is added when a change names it for the first time
-    new = [change for change in changes if change.path and change.path[0] not in child]
-    known = [change for change in changes if change not in new]
-    for change in new:
-        if change.value is None:
-            name = change.path[0]
-            raise input_error(f"unknown key '{name}'{nearest_names(name, child)}", key=change.key)
-    kept = _replaced(child, known) if known else child
-    return {**(kept or {}), **_nested(new)} if new else kept
+def field_at(parameters: MachineParameters, key: str) -> tuple[Any, FieldInfo | None]:
+    """Return the value at a key path, None if only the SDF has it, and its field.
 
+    The field of an entry of a list is that of the list; a name of a mapping has none.
 
-def _nested(changes: list[_Change]) -> Any:
-    """Return changes as nested mappings."""
-    tree: Any = {}
-    for change in changes:
-        if not change.path:
-            return change.value
-        tree.setdefault(change.path[0], []).append(
-            _Change(change.key, change.path[1:], change.value)
-        )
-    return {name: _nested(inner) for name, inner in tree.items()}
+    Raises:
+        InputError: the machine has no such key.
+    """
+    node: Any = parameters
+    field: FieldInfo | None = None
+    model: type[BaseModel] | None = None  # type of a group that is not in the machine file
+    parts = key.split(".")
+    for place, part in enumerate(parts):
+        model = type(node) if isinstance(node, BaseModel) else model if node is None else None
+        if model is not None and part in model.model_fields:
+            field = model.model_fields[part]
+            model = next((inner for _, inner in models_in(field.annotation)), None)
+            node = None if node is None else getattr(node, part)
+        elif isinstance(node, dict) and part in node:
+            node, field = node[part], None
+        elif isinstance(node, tuple) and is_index(part) and int(part) < len(node):
+            node = node[int(part)]
+        elif place == 1 and parts[0] in OF_SDF:
+            group = type(parameters).model_fields[parts[0]]
+            model, node = next(models_in(group.annotation))[1], None
+        else:
+            known = node if isinstance(node, dict) else model.model_fields if model else []
+            raise input_error(f"unknown key '{part}'{nearest_names(part, known)}", key=key)
+        if node is None and parts[0] not in OF_SDF:
+            raise input_error(f"the machine has no {'.'.join(parts[: place + 1])}", key=key)
+    return node, field
 
 
 def unit_of(annotation: Any, metadata: typing.Iterable[Any] = ()) -> Unit | None:
@@ -257,6 +284,27 @@ def unit_of(annotation: Any, metadata: typing.Iterable[Any] = ()) -> Unit | None
     if typing.get_origin(annotation) in (dict, tuple):
         return None
     return next((unit for unit in map(unit_of, arguments) if unit is not None), None)
+
+
+def models_in(annotation: Any, suffix: str = "") -> Iterator[tuple[str, type[BaseModel]]]:
+    """Yield the groups of values in an annotation, each with what its key path adds.
+
+    Args:
+        annotation: Annotation of a field.
+        suffix: Start of what the key path adds; NAME stands for a name, N for an index.
+    """
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield suffix, annotation
+        return
+    origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin is dict:
+        yield from models_in(arguments[1], f"{suffix}.NAME")
+    elif origin is tuple:
+        yield from models_in(arguments[0], f"{suffix}.N")
+    else:
+        for argument in arguments:
+            if argument is not type(None) and not isinstance(argument, str):
+                yield from models_in(argument, suffix)
 
 
 def quantities(node: Any, path: str = "") -> Iterator[tuple[str, Any, Unit]]:

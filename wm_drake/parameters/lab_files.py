@@ -52,7 +52,7 @@ def read_channels(path: Path) -> list[Channel]:
     check_regular(path, largest=LARGEST)
     read, package = _READERS[path.suffix.lower()]
     try:
-        found = read(path)
+        channels = read(path)
     except ImportError:
         raise input_error(
             f"needs the package {package}: pip install 'wm-drake[lab]'", where=str(path)
@@ -62,9 +62,9 @@ def read_channels(path: Path) -> list[Channel]:
     except Exception as error:  # each library raises errors of its own on a damaged file
         reason = shortened(" ".join(str(error).split()) or type(error).__name__, 120)
         raise input_error(f"cannot be read by {package} ({reason})", where=str(path)) from None
-    if not found:
+    if not channels:
         raise input_error("has no numeric channel", where=str(path))
-    return found
+    return channels
 
 
 def csv_channels(path: Path) -> list[Channel]:
@@ -76,14 +76,14 @@ def csv_channels(path: Path) -> list[Channel]:
         InputError: The file cannot be read.
     """
     table = read_csv(path, read_header(path))
-    found = []
+    channels = []
     for text in table.columns:
         name, _, unit = str(text).partition("[")
         values = pd.to_numeric(table[text], errors="coerce").to_numpy(dtype=float)
         if np.isfinite(values).any():
             unit = unit.strip().removesuffix("]").strip()
-            found.append(Channel(name.strip(), unit, values, None))
-    return found
+            channels.append(Channel(name.strip(), unit, values, None))
+    return channels
 
 
 def chosen(channels: list[Channel], name: str, path: Path) -> Channel:
@@ -112,7 +112,7 @@ def _numbers(values: Any) -> FloatArray | None:
 def _mdf(path: Path) -> list[Channel]:
     from asammdf import MDF
 
-    found = []
+    channels = []
     with MDF(path) as mdf:
         for group, content in enumerate(mdf.groups):
             master = mdf.masters_db.get(group)
@@ -123,14 +123,14 @@ def _mdf(path: Path) -> list[Channel]:
                 values = _numbers(signal.samples)
                 if values is not None:
                     time = np.asarray(signal.timestamps, dtype=float)
-                    found.append(Channel(described.name, signal.unit or "", values, time))
-    return found
+                    channels.append(Channel(described.name, signal.unit or "", values, time))
+    return channels
 
 
 def _tdms(path: Path) -> list[Channel]:
     from nptdms import TdmsFile
 
-    found = []
+    channels = []
     for group in TdmsFile.read(path).groups():
         for channel in group.channels():
             values = _numbers(channel[:])
@@ -142,15 +142,15 @@ def _tdms(path: Path) -> list[Channel]:
             if step > 0.0:
                 time = np.asarray(begin + step * np.arange(len(values)), dtype=float)
             unit = str(channel.properties.get("unit_string", ""))
-            found.append(Channel(channel.name, unit, values, time))
-    return found
+            channels.append(Channel(channel.name, unit, values, time))
+    return channels
 
 
 def _uff(path: Path) -> list[Channel]:
     import pyuff
 
     sets = pyuff.UFF(str(path)).read_sets()
-    found = []
+    channels = []
     for data in sets if isinstance(sets, list) else [sets]:
         if data.get("type") != 58:
             continue
@@ -159,19 +159,19 @@ def _uff(path: Path) -> list[Channel]:
             unit = str(data.get("ordinate_axis_units_lab", "")).strip()
             unit = "" if unit.upper() == "NONE" else unit
             time = np.asarray(data["x"], dtype=float)
-            found.append(Channel(str(data["id1"]).strip(), unit, values, time))
-    return found
+            channels.append(Channel(str(data["id1"]).strip(), unit, values, time))
+    return channels
 
 
 def _mat(path: Path) -> list[Channel]:
     from scipy.io import loadmat
 
-    found = []
+    channels = []
     for name, content in loadmat(path).items():
         values = None if name.startswith("__") else _numbers(content)
         if values is not None:
-            found.append(Channel(name, "", values, None))
-    return found
+            channels.append(Channel(name, "", values, None))
+    return channels
 
 
 _READERS: dict[str, tuple[Callable[[Path], list[Channel]], str]] = {

@@ -15,15 +15,12 @@ from wm_drake.parameters.lab_files import (
     read_channels,
 )
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit, convert
+from wm_drake.parameters.units import Unit, factor_of
 
 TIME_NAMES = ("time", "time_s", "t")
 """Names of a channel of time, for files without a time of their own. [s]"""
 
 ACCELERATION, SPEED = Unit("m/s^2", "m/s^2"), Unit("rad/s", "rpm")
-
-_WORDS = {"g": "g_0", "gn": "g_0", "m/s2": "m/s^2", "m/s²": "m/s^2", "1/min": "rpm"}
-"""Units as instruments write them, and what they mean here."""
 
 
 def available_channels(path: Path, channels: Mapping[str, str]) -> list[Channel]:
@@ -65,10 +62,11 @@ def lab_signals(
             fit, or it has a value that is not a finite number.
     """
     available = available_channels(path, channels or {})
-    found = {name: chosen(available, name, path) for name in units}
-    time = clock_of(available, list(found.values()), path)
+    signals = {name: chosen(available, name, path) for name in units}
+    time = clock_of(available, list(signals.values()), path)
     return time, {
-        name: on_clock(channel, time, units[name], default, path) for name, channel in found.items()
+        name: on_clock(channel, time, units[name], default, path)
+        for name, channel in signals.items()
     }
 
 
@@ -78,9 +76,9 @@ def clock_of(available: list[Channel], used: list[Channel], path: Path) -> Float
     Raises:
         InputError: there is no time, or not one channel of it.
     """
-    own = next((channel.time for channel in used if channel.time is not None), None)
-    if own is not None:
-        return own
+    clock = next((channel.time for channel in used if channel.time is not None), None)
+    if clock is not None:
+        return clock
     named = [channel for channel in available if channel.name.lower() in TIME_NAMES]
     if len(named) != 1:
         raise input_error(
@@ -114,8 +112,7 @@ def on_clock(
 
 
 def _factor(channel: Channel, unit: Unit, default: str, path: Path) -> float:
-    text = channel.unit or default
     try:
-        return convert(1.0, _WORDS.get(text, text), unit)
+        return factor_of(channel.unit or default, unit)
     except ValueError as error:
         raise input_error(str(error), where=str(path), key=channel.name) from None

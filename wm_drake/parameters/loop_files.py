@@ -13,7 +13,7 @@ from wm_drake.parameters.lab_files import Channel, chosen, is_lab_file, read_cha
 from wm_drake.parameters.text_files import read_text
 from wm_drake.parameters.time_stamps import with_distinct_times
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit, comma_hint, convert, plain_number
+from wm_drake.parameters.units import Unit, comma_hint, factor_of, plain_number
 
 FEWEST = 20
 """Smallest number of samples of a loop."""
@@ -31,7 +31,6 @@ _COLUMNS = {
     "force": {"force": _FORCE, "f": _FORCE, "moment": _TORQUE, "torque": _TORQUE, "m": _TORQUE},
 }
 _HEAD = re.compile(r"\s*([A-Za-z]+)\s*(?:[\[(]([^\])]*)[\])]|[_ ](.+))?\s*$")
-_SHORTHAND = {"Nm": "N*m", "Nmm": "N*mm", "-": None, "": None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,14 +133,14 @@ def _checked_loop(
 
 def _renamed(head: list[str], channels: Mapping[str, str], place: str) -> list[str]:
     """Return a header in which the columns that the user names have the words of this module."""
-    found = list(head)
+    columns = list(head)
     plain = [re.split(r"\s*[\[(]", cell)[0].strip() for cell in head]
     for word, name in channels.items():
         if name not in plain:
             raise input_error(f"no column '{name}' among '{', '.join(head)}'", where=place)
         index = plain.index(name)
-        found[index] = word + head[index].strip()[len(name) :]
-    return found
+        columns[index] = word + head[index].strip()[len(name) :]
+    return columns
 
 
 def _lab_loop(
@@ -173,11 +172,11 @@ def _lab_loop(
 def _picked(path: Path, channels: Mapping[str, str]) -> dict[str, Channel]:
     """Return the channels of time, displacement and force by the words of a header."""
     available = read_channels(path)
-    found: dict[str, Channel] = {}
+    signals: dict[str, Channel] = {}
     for column, words in _COLUMNS.items():
         named = {word: name for word, name in channels.items() if word in words}
         if named:
-            found |= {word: chosen(available, name, path) for word, name in named.items()}
+            signals |= {word: chosen(available, name, path) for word, name in named.items()}
             continue
         fitting = [c for c in available if (m := _HEAD.match(c.name)) and m[1].lower() in words]
         if len(fitting) > 1:
@@ -192,8 +191,8 @@ def _picked(path: Path, channels: Mapping[str, str]) -> dict[str, Channel]:
                 f"has no channel of {column}; its channels are {names}; choose one by --channels",
                 where=str(path),
             )
-        found |= {c.name: c for c in fitting}
-    return found
+        signals |= {c.name: c for c in fitting}
+    return signals
 
 
 def _is_time(word: str) -> bool:
@@ -270,35 +269,37 @@ def _columns(
         Indices of the three columns, factors that convert them to SI units, and whether the loop is
         one of angle and moment.
     """
-    found: dict[str, tuple[int, Unit, str | None]] = {}
+    columns: dict[str, tuple[int, Unit, str | None]] = {}
     for index, cell in enumerate(head):
         match = _HEAD.match(cell)
         word = match[1].lower() if match else ""
         for column, names in _COLUMNS.items():
             if word in names:
-                if column in found:
+                if column in columns:
                     raise input_error(f"'{cell}' is a second column of {column}", where=place)
                 assert match is not None
-                found[column] = (index, names[word], (match[2] or match[3] or "").strip() or None)
-    missing = [column for column in _COLUMNS if column not in found]
+                columns[column] = (index, names[word], (match[2] or match[3] or "").strip() or None)
+    missing = [column for column in _COLUMNS if column not in columns]
     if missing:
         raise input_error(
             f"no column {', '.join(missing)} among '{', '.join(head)}'; needs time, displacement "
             "(or angle), force (or moment)",
             where=place,
         )
-    rotates = found["displacement"][1] == _ANGLE
-    if rotates != (found["force"][1] == _TORQUE):
+    rotates = columns["displacement"][1] == _ANGLE
+    if rotates != (columns["force"][1] == _TORQUE):
         raise input_error(
             "mixes a rotation with a translation: angle goes with moment, displacement with force",
             where=place,
         )
     factors = [
-        _factor(head[found[column][0]], column, found[column][1], (found[column][2], given), place)
+        _factor(
+            head[columns[column][0]], column, columns[column][1], (columns[column][2], given), place
+        )
         for given, column in zip(units or (None,) * 3, _COLUMNS, strict=True)
     ]
     return (
-        (found["time"][0], found["displacement"][0], found["force"][0]),
+        (columns["time"][0], columns["displacement"][0], columns["force"][0]),
         (factors[0], factors[1], factors[2]),
         rotates,
     )
@@ -328,7 +329,7 @@ def _factor(
         message = f"has no unit; write '{column} [{unit.shown}]' in the header or use --units"
         raise input_error(message, where=place, key=head)
     try:
-        return convert(1.0, _SHORTHAND.get(text, text), unit)
+        return factor_of(text, unit)
     except ValueError as error:
         raise input_error(str(error), where=place, key=head) from None
 

@@ -10,6 +10,7 @@ from wm_drake.parameters.bearing import Bearing
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.damper_laws import DamperType
 from wm_drake.parameters.drive import AnyDrive, Drive, MotorDrive
+from wm_drake.parameters.element_kinds import AnyElement
 from wm_drake.parameters.elements import (
     Bushing,
     BushingType,
@@ -30,14 +31,14 @@ DEFAULT_STEP = 2.5e-3
 """Default step size; the output period is an integer multiple of it. [s]
 
 With a tenth of this step size, peaks with gasket change by less than 0.05 % in the compiled engine
-and by less than 0.1 % in the Drake engine (tested). See docs/decisions/0007.
+and by less than 0.1 % in the Drake engine (tested).
 """
 
 
 Integrator = Literal["auto", "multistep", "midpoint", "runge_kutta"]
 """Integrator of the compiled engine: one derivative a step (the midpoint rule is for telescopic
 dampers), or the Runge-Kutta scheme with four; "auto" takes the first where it suits the machine.
-See docs/decisions/0087 and docs/decisions/0105."""
+See docs/theory/integrator.md."""
 
 
 class BodyOverride(Frozen):
@@ -170,6 +171,7 @@ class MachineParameters(Frozen):
         spring_types, damper_types, bushing_types: Elements as bought, by name.
         springs, dampers, telescopic_dampers, bushings: Elements in their places, by name.
         gasket: The gasket; null for none.
+        elements: Elements of kinds that other packages register, by name.
         sensors: Displacement sensors, by name.
         accelerometers: Vibration sensors, by name.
         clearance: The point whose distance to the detergent box counts.
@@ -177,7 +179,7 @@ class MachineParameters(Frozen):
         unbalance_planes: Positions of the masses of a spin cycle.
         imperfections: Imperfections of the drum and its bearing.
         loads: The loads, by name.
-        profile: Spin profile, or the name of a shipped one.
+        profile: Spin profile.
         measured: CSV files with measured amplitudes of this very machine.
         published: CSV files with published results of a gasket study of this very machine.
     """
@@ -199,6 +201,7 @@ class MachineParameters(Frozen):
     telescopic_dampers: dict[Name, TelescopicDamper] = {}
     gasket: Bushing | None = None
     bushings: dict[Name, Bushing] = {}
+    elements: dict[Name, AnyElement] = {}
     sensors: dict[Name, Sensor]
     accelerometers: dict[Name, Accelerometer] = {}
     clearance: Clearance

@@ -4,13 +4,11 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from wm_drake.errors import input_error
 from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header
 from wm_drake.parameters.machine import MachineParameters
-from wm_drake.parameters.units import comma_hint
 
 _KEYS = ["load", "gasket", "source"]
 
@@ -97,7 +95,7 @@ def _responses(path: str) -> list[NamedValue]:
         )
     _check_entries(table, "gasket", ("yes", "no"), path)
     _check_entries(table, OF, (MACHINE, DESIGN), path)
-    numbers = finite_numbers(table[columns], path)
+    numbers = finite_numbers(table[columns], path, key="measured")
     return [
         NamedValue(
             str(row["load"]),
@@ -127,12 +125,5 @@ def _check_entries(table: pd.DataFrame, column: str, allowed: tuple[str, str], p
 def _read(path: str, sensors: list[str]) -> pd.DataFrame:
     table = read_csv(path, _KEYS + sensors, key="measured")
     _check_entries(table, "gasket", ("yes", "no"), path)
-    values = table[sensors].apply(pd.to_numeric, errors="coerce")
-    if not np.isfinite(values.to_numpy(dtype=float)).all():
-        cells = table[sensors].to_numpy()[~np.isfinite(values.to_numpy(dtype=float))]
-        raise input_error(
-            f"an amplitude is not a finite number: '{cells[0]}'{comma_hint(str(cells[0]))}",
-            where=path,
-            key="measured",
-        )
-    return table.assign(**{name: values[name] for name in sensors})
+    values = finite_numbers(table[sensors], path, key="measured")
+    return table.assign(**dict(zip(sensors, values.T, strict=True)))

@@ -85,10 +85,10 @@ def unusual_numbers(
         parameters: The machine.
         keys: Key paths of the numbers to check, or of entries of them; all if None.
     """
-    found = []
-    wanted = None if keys is None else {whole for k in keys for whole in (k, k.rpartition(".")[0])}
+    remarks = []
+    chosen = None if keys is None else {whole for k in keys for whole in (k, k.rpartition(".")[0])}
     for key, value, unit in quantities(parameters):
-        if wanted is not None and key not in wanted:
+        if chosen is not None and key not in chosen:
             continue
         usual = usual_range(key)
         values = value if isinstance(value, tuple) else (value,)
@@ -99,7 +99,7 @@ def unusual_numbers(
         outside = [number for number in shown if not usual.low <= number <= usual.high]
         if outside:
             name = unit.shown.replace("*", " ")
-            found.append(
+            remarks.append(
                 Problem(
                     "",
                     key,
@@ -107,7 +107,7 @@ def unusual_numbers(
                     f"{name}",
                 )
             )
-    return _first_of_each_value(found)
+    return _first_of_each_value(remarks)
 
 
 def usual_range(key: str) -> UsualRange | None:

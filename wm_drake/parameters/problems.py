@@ -2,6 +2,8 @@
 
 import types
 import typing
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -9,6 +11,15 @@ from pydantic import BaseModel, ValidationError
 from wm_drake.errors import Problem, nearest_names, shortened
 from wm_drake.parameters.damper_laws import DAMPER_LAWS
 from wm_drake.parameters.drive import DRIVE_TAGS
+
+
+class ProblemsInsideError(ValueError):
+    """Problems of a part of a model that a validator checked by itself; keys begin at the part."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        """Keep the problems."""
+        self.problems = tuple(problems)
+        super().__init__("; ".join(map(str, self.problems)))
 
 
 def problems_of(error: ValidationError, root: type[BaseModel], key: str = "") -> list[Problem]:
@@ -22,13 +33,20 @@ def problems_of(error: ValidationError, root: type[BaseModel], key: str = "") ->
     problems = []
     for detail in error.errors():
         path = [str(part) for part in detail["loc"] if part not in _TAGS]
+        cause = detail.get("ctx", {}).get("error")
+        if isinstance(cause, ProblemsInsideError):
+            start = [key] if key else []
+            for problem in cause.problems:
+                inside = ".".join([*start, *path, problem.key])
+                problems.append(replace(problem, key=inside))
+            continue
         problems.append(
             Problem("", ".".join(([key] if key else []) + path), _message(detail, root))
         )
     return problems
 
 
-_WANTED = {
+_EXPECTED = {
     "model_type": "a group of keys and values",
     "model_attributes_type": "a group of keys and values",
     "dict_type": "a group of keys and values",
@@ -66,8 +84,8 @@ def _message(detail: Any, root: type[BaseModel]) -> str:
         return f"{key} '{given}' is not known; allowed are {known}"
     if kind == "union_tag_not_found":
         return f"needs the key {context['discriminator']}"
-    if kind in _WANTED:
-        return f"needs {_WANTED[kind]}, is {shortened(repr(given), 60)}"
+    if kind in _EXPECTED:
+        return f"needs {_EXPECTED[kind]}, is {shortened(repr(given), 60)}"
     if kind == "literal_error":
         return f"'{shown}' is not allowed; allowed are {context['expected']}"
     return f"{detail['msg'][0].lower()}{detail['msg'][1:]}, is {shortened(repr(given), 60)}"

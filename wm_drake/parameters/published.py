@@ -1,15 +1,15 @@
 """Published results of a gasket study: means, contributions and effects from CSV files."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import pandas as pd
 
-from wm_drake.errors import input_error
+from wm_drake.errors import InputError, input_error
 from wm_drake.parameters.csv_files import read_csv
-from wm_drake.parameters.units import comma_hint
+from wm_drake.parameters.units import comma_hint, plain_number
 
 COLUMNS = ["load", "response", "term", "percent", "effects"]
 
@@ -55,68 +55,77 @@ def published_results(paths: Sequence[str], key: str = "published") -> Published
         InputError: a file is missing or has other columns, a value is not a number, the number of
             effects does not fit the term, or a term is given twice.
     """
-    found: PublishedResults = {}
+    results: PublishedResults = {}
     for path in paths:
-        table = read_csv(path, COLUMNS, key=key)
-        for number, row in enumerate(table.to_dict("records"), start=1):
-            load, response, term = (_word(row, name, number, path, key) for name in COLUMNS[:3])
-            terms = found.setdefault((load, response), {})
+        for number, cells in enumerate(read_csv(path, COLUMNS, key=key).to_dict("records"), 1):
+            row = _Row(cells, number, path, key)
+            load, response, term = map(row.word, COLUMNS[:3])
+            terms = results.setdefault((load, response), {})
             if term in terms:
-                message = f"row {number} of the data: {load}, {response}, {term} is given twice"
-                raise input_error(message, where=path, key=key)
-            terms[term] = _term(term, row, number, path, key)
-    return found
+                raise row.error(f"{load}, {response}, {term} is given twice")
+            terms[term] = _term(term, row)
+    return results
 
 
-def _word(row: dict[Any, Any], column: str, number: int, path: str, key: str) -> str:
-    text = "" if pd.isna(row[column]) else str(row[column]).strip()
-    if not text:
-        message = f"row {number} of the data: the column {column} is empty"
-        raise input_error(message, where=path, key=key)
-    return text
+@dataclass(frozen=True)
+class _Row:
+    """A row of a file.
+
+    Attributes:
+        cells: Values by column.
+        number: Number of the row, from 1 on.
+        path: The file.
+        key: Key path for messages.
+    """
+
+    cells: Mapping[Hashable, Any]
+    number: int
+    path: str
+    key: str
+
+    def error(self, message: str) -> InputError:
+        """Return the error of this row."""
+        text = f"row {self.number} of the data: {message}"
+        return input_error(text, where=self.path, key=self.key)
+
+    def text(self, column: str) -> str:
+        """Return the text of a cell, which may be empty."""
+        return "" if pd.isna(self.cells[column]) else str(self.cells[column]).strip()
+
+    def word(self, column: str) -> str:
+        """Return the text of a cell that must not be empty."""
+        if not self.text(column):
+            raise self.error(f"the column {column} is empty")
+        return self.text(column)
+
+    def numbers(self, column: str) -> tuple[float, ...]:
+        """Return the finite numbers of a cell, separated by spaces."""
+        numbers = []
+        for text in self.text(column).split():
+            try:
+                numbers.append(plain_number(text))
+            except ValueError:
+                numbers.append(math.nan)
+            if not math.isfinite(numbers[-1]):
+                raise self.error(f"{column}: '{text}' is not a finite number{comma_hint(text)}")
+        return tuple(numbers)
 
 
-def _term(term: str, row: dict[Any, Any], number: int, path: str, key: str) -> PublishedTerm:
-    percents = _numbers(row, "percent", number, path, key)
-    effects = _numbers(row, "effects", number, path, key)
-    if _order(term) > MOST_FACTORS:
-        message = f"row {number} of the data: a term has at most {MOST_FACTORS} factors"
-        raise input_error(message, where=path, key=key)
-    allowed = {1} if term == CONSTANT else {0, 2 ** _order(term), 3 ** _order(term)}
+def _term(term: str, row: _Row) -> PublishedTerm:
+    percents, effects = row.numbers("percent"), row.numbers("effects")
+    order = term.count(":") + 1
+    if order > MOST_FACTORS:
+        raise row.error(f"a term has at most {MOST_FACTORS} factors")
+    allowed = {1} if term == CONSTANT else {0, 2**order, 3**order}
     if len(percents) > 1 or len(effects) not in allowed:
         texts = " or ".join(str(n) for n in sorted(allowed) if n)
-        message = (
-            f"row {number} of the data: {term} has {len(percents)} percentages and "
-            f"{len(effects)} effects; allowed are one percentage and {texts} effects"
+        raise row.error(
+            f"{term} has {len(percents)} percentages and {len(effects)} effects; allowed are one "
+            f"percentage and {texts} effects"
         )
-        raise input_error(message, where=path, key=key)
-    if term != CONSTANT and len(effects) == 2 ** _order(term):
+    if term != CONSTANT and len(effects) == 2**order:
         effects = _completed(effects)
     return PublishedTerm(percents[0] if percents else None, effects)
-
-
-def _order(term: str) -> int:
-    return term.count(":") + 1
-
-
-def _numbers(
-    row: dict[Any, Any], column: str, number: int, path: str, key: str
-) -> tuple[float, ...]:
-    texts = "" if pd.isna(row[column]) else str(row[column])
-    found = []
-    for text in texts.split():
-        try:
-            value = float(text) if text.isascii() and "_" not in text else math.nan
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            message = (
-                f"row {number} of the data: {column}: '{text}' is not a finite number"
-                f"{comma_hint(text)}"
-            )
-            raise input_error(message, where=path, key=key)
-        found.append(value)
-    return tuple(found)
 
 
 def _completed(effects: tuple[float, ...]) -> tuple[float, ...]:

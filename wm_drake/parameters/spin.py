@@ -3,7 +3,15 @@
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, StringConstraints, ValidationError, ValidationInfo, model_validator
+from pydantic import (
+    Field,
+    GetJsonSchemaHandler,
+    StringConstraints,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
+from pydantic_core import CoreSchema
 
 from wm_drake.parameters import units as u
 from wm_drake.parameters.elements import Frozen
@@ -43,6 +51,14 @@ class Load(Frozen):
 
 
 class _Step(Frozen):
+    """A step of a spin profile: a ramp to a speed, or a constant speed until a time.
+
+    Attributes:
+        ramp_to: Speed at the end of a ramp.
+        rate: Acceleration of a ramp.
+        hold_until: Time until which the speed is held.
+    """
+
     ramp_to: u.Speed | None = None
     rate: Annotated[u.AngularAcceleration, Field(gt=0.0)] | None = None
     hold_until: u.Duration | None = None
@@ -98,6 +114,18 @@ class SpinProfile(Frozen):
     time: u.Times
     speed: u.Speeds
     regions: tuple[Region, ...] = ()
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Return the JSON schema, in a file with the steps."""
+        schema = handler(core)
+        if handler.mode == "validation":
+            step = handler(_Step.__pydantic_core_schema__)
+            steps = {"type": "array", "items": step, "description": "In place of time and speed."}
+            handler.resolve_ref_schema(schema)["properties"]["steps"] = steps
+        return schema
 
     @model_validator(mode="before")
     @classmethod

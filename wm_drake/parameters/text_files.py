@@ -1,9 +1,13 @@
-"""Text of files that a user names: regular files of limited size, in UTF-8."""
+"""Files that a user names: shipped ones by name, others by path, of limited size and in UTF-8."""
 
 import stat
+from dataclasses import dataclass
 from pathlib import Path
 
-from wm_drake.errors import input_error, reason_of
+from wm_drake.errors import input_error, nearest_names, reason_of
+
+DATA = Path(__file__).parents[1] / "data"
+"""Folder of the files that the package contains."""
 
 LARGEST_TABLE = 64 << 20
 """Largest size of a table of numbers. [byte]"""
@@ -15,6 +19,46 @@ def is_file(path: Path) -> bool:
         return path.exists() and not path.is_dir()
     except (OSError, ValueError):
         return False
+
+
+@dataclass(frozen=True)
+class ShippedFiles:
+    """Files of one kind that the package contains, and others of this kind by path.
+
+    Attributes:
+        kind: What one of them is, for messages.
+        folder: Their folder.
+        pattern: Pattern of their file names.
+        prefix: Start of their file names that is not part of their names.
+    """
+
+    kind: str
+    folder: Path
+    pattern: str = "*.yaml"
+    prefix: str = ""
+
+    def listed(self) -> dict[str, Path]:
+        """Return the shipped files by name."""
+        files = sorted(self.folder.glob(self.pattern))
+        return {path.stem.removeprefix(self.prefix): path for path in files}
+
+    def path(self, name_or_path: str | Path) -> Path:
+        """Return the path of a file, given the name of a shipped one or a path.
+
+        Raises:
+            InputError: there is no such file.
+        """
+        shipped = self.listed()
+        path = shipped.get(str(name_or_path), Path(name_or_path))
+        if not is_file(path):
+            try:
+                reason = "is a folder" if path.is_dir() else "no such file"
+            except (OSError, ValueError) as error:
+                reason = reason_of(error)
+            hint = nearest_names(str(name_or_path), shipped)
+            message = f"{reason}, and no shipped {self.kind} of that name{hint}"
+            raise input_error(message, where=str(path))
+        return path
 
 
 def check_regular(path: Path, *, key: str = "", largest: int = LARGEST_TABLE) -> None:

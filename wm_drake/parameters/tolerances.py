@@ -2,20 +2,21 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.files import read_model
 from wm_drake.parameters.machine import MachineParameters, Name
-from wm_drake.parameters.text_files import is_file
+from wm_drake.parameters.text_files import DATA, ShippedFiles
+from wm_drake.parameters.units import Share
 
-TOLERANCES_FOLDER = Path(__file__).parents[1] / "data" / "tolerances"
+TOLERANCES_FOLDER = DATA / "tolerances"
+_FILES = ShippedFiles("tolerance file", TOLERANCES_FOLDER)
 
 Kind: TypeAlias = Literal["normal", "lognormal", "uniform", "triangular"]
 
@@ -124,8 +125,8 @@ class Laundry(Frozen):
 
     def spreads(self) -> dict[str, Spread]:
         """Return the distributions by name."""
-        found = {name: getattr(self, name) for name in type(self).model_fields}
-        return {name: spread for name, spread in found.items() if spread is not None}
+        spreads = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: spread for name, spread in spreads.items() if spread is not None}
 
 
 class Correlations(Frozen):
@@ -187,25 +188,22 @@ class Tolerances(Frozen):
         return self
 
 
-class Limit(Frozen):
-    """A limit that the runs have to meet, up to an allowed share of them.
+class OneSided(Frozen):
+    """A limit of a quantity on one side.
 
     Attributes:
         quantity: Name of a response, such as gap or amplitude_Xr.
         at_least, at_most: The limit, with a unit. One of the two.
-        allowed_share: Largest allowed share of runs that break the limit. [0 to 1]
     """
 
     quantity: str
     at_least: str | None = None
     at_most: str | None = None
-    allowed_share: str
 
     @model_validator(mode="after")
-    def _has_one_side(self) -> "Limit":
+    def _has_one_side(self) -> Self:
         if (self.at_least is None) == (self.at_most is None):
             raise ValueError("needs either at_least or at_most")
-        fraction(self.allowed_share, "allowed_share")
         return self
 
     @property
@@ -214,13 +212,28 @@ class Limit(Frozen):
         return self.at_least or self.at_most or ""
 
 
+class Limit(OneSided):
+    """A limit that the runs have to meet, up to an allowed share of them.
+
+    Attributes:
+        allowed_share: Largest allowed share of runs that break the limit. [0 to 1]
+    """
+
+    allowed_share: str
+
+    @model_validator(mode="after")
+    def _share_is_known(self) -> "Limit":
+        fraction(self.allowed_share, "allowed_share")
+        return self
+
+
 class _Limits(Frozen):
     limits: tuple[Limit, ...] = Field(min_length=1)
 
 
 def shipped_tolerances() -> dict[str, Path]:
     """Return the tolerance files that the package contains, by name."""
-    return {path.stem: path for path in sorted(TOLERANCES_FOLDER.glob("*.yaml"))}
+    return _FILES.listed()
 
 
 def load_tolerances(name_or_path: str | Path = "laundry") -> Tolerances:
@@ -241,14 +254,7 @@ def tolerances_path(name_or_path: str | Path) -> Path:
     Raises:
         InputError: there is no such file.
     """
-    shipped = shipped_tolerances()
-    path = shipped.get(str(name_or_path), Path(name_or_path))
-    if not is_file(path):
-        hint = nearest_names(str(name_or_path), shipped)
-        raise input_error(
-            f"no such file, and no shipped tolerance file of that name{hint}", where=str(path)
-        )
-    return path
+    return _FILES.path(name_or_path)
 
 
 def check_load(tolerances: Tolerances, machine: MachineParameters, path: Path) -> None:
@@ -272,13 +278,7 @@ def load_limits(path: Path) -> tuple[Limit, ...]:
     Raises:
         InputError: the file is missing or wrong, with one problem for each error.
     """
-    try:
-        return read_model(_Limits, path).limits
-    except InputError as error:
-        raise InputError(
-            Problem(p.where, p.key, p.message) if p.where else replace(p, where=str(path))
-            for p in error.problems
-        ) from None
+    return read_model(_Limits, path).limits
 
 
 def fraction(text: str, name: str) -> float:
@@ -287,11 +287,8 @@ def fraction(text: str, name: str) -> float:
     Raises:
         ValueError: the text is not such a share.
     """
-    body, percent = text.strip(), 1.0
-    if body.endswith("%"):
-        body, percent = body[:-1], 0.01
     try:
-        value = float(body) * percent
+        value = Share().number(text)
     except ValueError:
         value = math.nan
     if not 0.0 <= value <= 1.0:

@@ -74,7 +74,7 @@ def unbalance_planes(parameters: MachineParameters) -> UnbalancePlanes:
     """
     if parameters.unbalance_planes:
         return parameters.unbalance_planes
-    found = []
+    planes = []
     for names in (("front",), ("back", "rear")):
         masses = [parameters.loads[name].unbalances for name in names if name in parameters.loads]
         if not masses or len(masses[0]) != 1:
@@ -83,8 +83,8 @@ def unbalance_planes(parameters: MachineParameters) -> UnbalancePlanes:
                 "positions are then used",
                 key="unbalance_planes",
             )
-        found.append(UnbalancePlace(radius=masses[0][0].radius, y=masses[0][0].y))
-    return UnbalancePlanes(front=found[0], rear=found[1])
+        planes.append(UnbalancePlace(radius=masses[0][0].radius, y=masses[0][0].y))
+    return UnbalancePlanes(front=planes[0], rear=planes[1])
 
 
 def load_unbalance_cases(path: Path = TABLE_9) -> list[UnbalanceCase]:
@@ -117,7 +117,7 @@ def _case(path: Path, row: Mapping[Hashable, Any]) -> UnbalanceCase:
     try:
         return UnbalanceCase.model_validate({"name": str(row["case"]), **fields})
     except ValidationError as error:
-        found = problems_of(error, UnbalanceCase)
+        problems = problems_of(error, UnbalanceCase)
         raise InputError(
-            Problem(str(path), f"case {row['case']}.{p.key}", p.message) for p in found
+            Problem(str(path), f"case {row['case']}.{p.key}", p.message) for p in problems
         ) from None

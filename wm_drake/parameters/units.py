@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import pint
-from pydantic import GetCoreSchemaHandler, ValidationInfo
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema
 from pydantic_core.core_schema import with_info_before_validator_function
 
@@ -97,26 +97,68 @@ class Unit:
             lambda value, info: read(value, info, self), handler(source)
         )
 
-    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: Any) -> dict[str, Any]:
-        """Return the JSON schema of the field in a file: text with a unit, or value and source."""
-        handler(core)
-        is_list = core.get("schema", {}).get("type") == "tuple"
-        example = self.example(is_list=is_list)
-        text = {"type": ["string", "number"] if not self.si else "string", "examples": [example]}
+    def __get_pydantic_json_schema__(
+        self, core: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Return the JSON schema of the field.
+
+        In a file it is text with a unit, or value and source. In a result (mode "serialization") it
+        is an SI number, whose unit is the annotation `unit`.
+        """
+        plain = handler(core)
+        if handler.mode == "serialization":
+            return {**plain, "unit": self.si.replace("*", " ")} if self.si else plain
+        is_list = plain.get("type") == "array"
+        text = {
+            "type": ["string", "number"] if not self.si else "string",
+            "pattern": self._pattern(is_list=is_list),
+            "examples": [self.example(is_list=is_list)],
+        }
         value = {
             "type": "object",
             "properties": {"value": text, "source": {"type": "string"}},
+            "required": ["value"],
             "additionalProperties": False,
         }
         return {"anyOf": [text, value]}
+
+    def _pattern(self, *, is_list: bool) -> str:
+        """Return a regular expression of texts of the field; it knows no dimensions of units."""
+        number = r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?"
+        if not self.si:
+            return rf"^\s*{number}\s*$"
+        unit = r"(\s*(?![eE][+-]?[0-9])[A-Za-z\u00b0\u00b5\u03bc%]|\s+1\s*/)"
+        numbers = rf"\(\s*{number}\s*(,\s*{number}\s*)*\)" if is_list else number
+        return rf"^\s*{numbers}{unit}"
 
     def example(self, *, is_list: bool = False) -> str:
         """Return an example of a value in a file, such as ``1 N/mm``."""
         return f"(1, 2, 3) {self.shown}" if is_list else f"1 {self.shown}".strip()
 
+    @property
+    def label(self) -> str:
+        """Display unit for reading, such as ``N mm/rad``."""
+        return self.shown.replace("*", " ")
+
     def from_si(self, value: float) -> float:
         """Return an SI value in the display unit."""
         return _in_unit(value, self.si, self.shown)
+
+    def number(self, text: str) -> float:
+        """Return a text such as ``'3.2 N/mm'`` as a number in SI units.
+
+        Raises:
+            ValueError: the text is not a finite number with a fitting unit.
+        """
+        match = _SCALAR.fullmatch(text)
+        if match is None or (match[2] or "").startswith(","):
+            hint = comma_hint(text) or f"; write for example '{self.example()}'"
+            raise ValueError(f"'{shortened(text, 60)}' is not a number with a unit{hint}")
+        return convert(float(match[1]), match[2], self)
+
+    def reading(self, value: float, digits: int = 6) -> str:
+        """Return an SI value as text for reading, rounded, in the display unit."""
+        return f"{self.from_si(value):.{digits}g} {self.label}".rstrip()
 
     def text(self, value: Any) -> str:
         """Return an SI value, or a tuple of them, as text such as ``3.2 N/mm``.
@@ -170,6 +212,29 @@ def convert(magnitude: float, unit_text: str | None, unit: Unit) -> float:
     if not math.isfinite(value):
         raise ValueError(f"'{magnitude:g} {unit_text}' is not a finite number")
     return value
+
+
+_INSTRUMENT_UNITS = {
+    "Nm": "N*m",
+    "Nmm": "N*mm",
+    "g": "g_0",
+    "gn": "g_0",
+    "m/s2": "m/s^2",
+    "m/s²": "m/s^2",
+    "1/min": "rpm",
+    "-": None,
+    "": None,
+}
+"""Units as instruments write them, and what they mean."""
+
+
+def factor_of(text: str, unit: Unit) -> float:
+    """Return the factor that converts numbers in a unit, as instruments write it, to SI.
+
+    Raises:
+        ValueError: the unit is missing, unknown or of another dimension.
+    """
+    return convert(1.0, _INSTRUMENT_UNITS.get(text, text), unit)
 
 
 def split(text: str) -> tuple[list[float], str, bool]:
@@ -233,16 +298,7 @@ def to_si(value: Any, info: ValidationInfo, unit: Unit) -> float:
     Raises:
         ValueError: the value is not a finite number with a fitting unit.
     """
-    if isinstance(unit, PureNumber):
-        return _pure_number(value)
-    example = unit.example()
-    if isinstance(value, str):
-        match = _SCALAR.fullmatch(value)
-        if match is None or (match[2] or "").startswith(","):
-            hint = comma_hint(value) or f"; write for example '{example}'"
-            raise ValueError(f"'{shortened(value, 60)}' is not a number with a unit{hint}")
-        return convert(float(match[1]), match[2], unit)
-    return _plain_number(value, info, example)
+    return unit.number(value) if isinstance(value, str) else _plain_number(value, info, unit)
 
 
 def to_si_vector(value: Any, info: ValidationInfo, unit: Unit) -> tuple[float, ...]:
@@ -271,7 +327,7 @@ def to_si_vector(value: Any, info: ValidationInfo, unit: Unit) -> tuple[float, .
             f"{shortened(repr(value), 60)} is not a list of numbers with a unit; "
             f"write for example '{example}'"
         )
-    return tuple(_plain_number(number, info, example) for number in value)
+    return tuple(_plain_number(number, info, unit, is_list=True) for number in value)
 
 
 def comma_hint(text: str) -> str:
@@ -286,21 +342,21 @@ def comma_hint(text: str) -> str:
     return f"; the decimal sign is a point, not a comma: write {match[0].replace(',', '.')}"
 
 
-def _plain_number(value: Any, info: ValidationInfo, example: str) -> float:
+def _plain_number(value: Any, info: ValidationInfo, unit: Unit, *, is_list: bool = False) -> float:
+    example, is_pure = unit.example(is_list=is_list), isinstance(unit, PureNumber)
     if isinstance(value, str) and _BARE.fullmatch(value):
         raise ValueError(f"'{value}' has no unit; write for example '{example}'")
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(
-            f"{shortened(repr(value), 60)} is not a number with a unit; "
-            f"write for example '{example}'"
-        )
+        kind = "a number" if is_pure else "a number with a unit"
+        shown = shortened(repr(value), 60)
+        raise ValueError(f"{shown} is not {kind}; write for example '{example}'")
     try:
         number = float(value)
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
         raise ValueError(f"this is not a finite number; write for example '{example}'")
-    if info.context and info.context.get("units_required"):
+    if not is_pure and info.context and info.context.get("units_required"):
         raise ValueError(f"'{number:g}' has no unit; write for example '{example}'")
     return number
 
@@ -316,23 +372,34 @@ class PureNumber(Unit):
         """Return a number as text that reads back as the same number."""
         return repr(value)
 
+    def number(self, text: str) -> float:
+        """Return a text such as ``'0.4'`` as a number.
 
-def _pure_number(value: Any) -> float:
-    """Return a number, or text of one, as a finite float.
+        Raises:
+            ValueError: the text is not a finite number, or it has a unit.
+        """
+        if not _BARE.fullmatch(text.strip()):
+            hint = comma_hint(text) or "; write for example '1'"
+            raise ValueError(f"'{shortened(text, 60)}' is not a number without unit{hint}")
+        if not math.isfinite(float(text)):
+            raise ValueError(f"'{shortened(text, 60)}' is not a finite number")
+        return float(text)
 
-    Raises:
-        ValueError: it is not one, or it has a unit.
-    """
-    text = value if isinstance(value, str) else ""
-    if text and not _BARE.fullmatch(text.strip()):
-        hint = comma_hint(text) or "; write for example 0.4"
-        raise ValueError(f"'{shortened(text, 60)}' is not a number without unit{hint}")
-    if isinstance(value, bool) or not isinstance(value, str | int | float):
-        raise ValueError(f"{shortened(repr(value), 60)} is not a number; write for example 0.4")
-    number = float(value) if value != "" else math.nan
-    if not math.isfinite(number):
-        raise ValueError("this is not a finite number; write for example 0.4")
-    return number
+
+@dataclass(frozen=True)
+class Share(PureNumber):
+    """A share, such as 0.3 or 30 %."""
+
+    shown: str = "%"
+
+    def number(self, text: str) -> float:
+        """Return a text such as ``'30 %'`` or ``'0.3'`` as a number.
+
+        Raises:
+            ValueError: the text is not a finite number, or it has a unit.
+        """
+        body = text.strip()
+        return 0.01 * super().number(body[:-1]) if body.endswith("%") else super().number(body)
 
 
 Ratio = Annotated[float, PureNumber()]

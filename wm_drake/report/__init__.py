@@ -1,6 +1,6 @@
 """Write reports as HTML pages, tables and figures, one folder per page.
 
-Enters: results of studies and records. Leaves: files. This is the only room that imports a plotting
-library or a template library.
-May import: `studies` and the rooms before it.
+Enters: values, tables, figures. Leaves: pages, files, text on the terminal. Blocks are generic;
+the page of a study is `studies/NAME/page.py`. Folders that still import studies move there.
+May import: `rigs` and the rooms before it.
 """

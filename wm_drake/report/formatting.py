@@ -1,6 +1,8 @@
 """Text form of numbers and names on a page: rounded, in mm and rpm, with a true minus sign."""
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +29,14 @@ def significant(value: float, digits: int = 4) -> str:
     return text.replace("-", "−")
 
 
+def with_interval(value: float, lower: float, upper: float) -> str:
+    """Return a number with the ends of its interval, `2 (1 to 3)`; without ends if they are NaN."""
+    if not math.isfinite(value):
+        return MISSING
+    ends = f" ({significant(lower)} to {significant(upper)})" if math.isfinite(lower) else ""
+    return f"{significant(value)}{ends}"
+
+
 def percent(value: float) -> str:
     """Return a difference in whole percent, with its sign; NaN becomes a dash."""
     if not math.isfinite(value):
@@ -38,3 +48,20 @@ def percent(value: float) -> str:
 def shape_name(name: str) -> str:
     """Return the name of an SDF shape as words: `tub_shell` becomes `tub shell`."""
     return name.replace("_", " ")
+
+
+def plain(value: Any) -> Any:
+    """Return data for JSON: arrays as lists, None for NaN and infinity, which JSON does not have.
+
+    Args:
+        value: Texts, numbers, arrays, and mappings and sequences of them.
+    """
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):  # numbers and arrays of numpy
+        value = value.tolist()
+    elif hasattr(value, "values"):  # labelled arrays
+        value = value.values.tolist()
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -3,7 +3,9 @@
 import functools
 import hashlib
 import importlib.metadata
+import shlex
 import subprocess
+import sys
 from datetime import datetime
 from pathlib import Path
 
@@ -43,6 +45,11 @@ def now() -> str:
 def program() -> str:
     """Return name, version and source revision of this program, as one text."""
     return f"wm_drake {version()}, revision {source_revision()}"
+
+
+def command_line() -> str:
+    """Return the running command as a user would type it."""
+    return shlex.join(["wm-drake", *sys.argv[1:]])
 
 
 def _git(*arguments: str) -> str:

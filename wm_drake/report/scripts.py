@@ -25,19 +25,23 @@ POLICY = (
 class Scripts:
     """Scripts of one page."""
 
-    def __init__(self) -> None:
-        """Begin a page without scripts."""
+    def __init__(self, folder: Path = FOLDER) -> None:
+        """Begin a page without scripts, whose template is in a folder."""
+        self._folder = folder
         self._hashes: list[str] = []
 
     def file(self, name: str) -> Markup:
-        """Return a script of this room as an element, and allow it.
+        """Return a script as an element, and allow it.
 
         Args:
-            name: Name of a file in this folder.
+            name: Name of a file in the folder of the template, or in this folder.
         """
-        return self.own((FOLDER / name).read_text(encoding="utf-8"))
+        nearest = self._folder / name
+        return self.inline(
+            (nearest if nearest.exists() else FOLDER / name).read_text(encoding="utf-8")
+        )
 
-    def own(self, text: str) -> Markup:
+    def inline(self, text: str) -> Markup:
         """Return a text of a template as a script element, and allow it.
 
         Args:
@@ -55,8 +59,8 @@ class Scripts:
 @functools.cache
 def packed_plotly() -> str:
     """Return Plotly's script, gzip-packed, as Base64 text: 1.9 MB in place of 4.8 MB."""
-    found = importlib.util.find_spec("plotly")  # importing Plotly itself is not needed
-    assert found is not None
-    assert found.origin is not None
-    script = Path(found.origin).parent / "package_data" / "plotly.min.js"
+    spec = importlib.util.find_spec("plotly")  # importing Plotly itself is not needed
+    assert spec is not None
+    assert spec.origin is not None
+    script = Path(spec.origin).parent / "package_data" / "plotly.min.js"
     return base64.b64encode(gzip.compress(script.read_bytes(), 6, mtime=0)).decode()

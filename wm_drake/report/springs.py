@@ -20,5 +20,5 @@ def slack_warning(slack: Mapping[str, Sequence[str]], word: str) -> list[str]:
             cases.setdefault(spring, []).append(case)
     if not cases:
         return []
-    found = "; ".join(f"{spring} in {word} {', '.join(of)}" for spring, of in cases.items())
-    return [f"Springs go slack: {found}. {CONSEQUENCE}"]
+    listing = "; ".join(f"{spring} in {word} {', '.join(of)}" for spring, of in cases.items())
+    return [f"Springs go slack: {listing}. {CONSEQUENCE}"]

@@ -120,8 +120,8 @@ def _trial(phase, x, step, packed, amplitude, speed, slopes):  # type: ignore[no
 @long_running
 def _continued(part, slopes):  # type: ignore[no-untyped-def]
     """Return the change of the state after a part of a step, by the step."""
-    found = 0.0
+    value = 0.0
     for k in range(STAGE_COUNT + 1):
         c = CONTINUATION[k]
-        found += slopes[k] * (((c[3] * part + c[2]) * part + c[1]) * part + c[0]) * part
-    return found
+        value += slopes[k] * (((c[3] * part + c[2]) * part + c[1]) * part + c[0]) * part
+    return value

@@ -76,8 +76,8 @@ def harmonic_loads(
     if bench.branches is None:
         return force
     step = np.diff(PHASE) / omega
-    own = _of_branches(bench, step, amplitude * np.sin(PHASE), len(step))
-    return force + np.interp(phase, PHASE, own)
+    of_branches = _of_branches(bench, step, amplitude * np.sin(PHASE), len(step))
+    return force + np.interp(phase, PHASE, of_branches)
 
 
 def recorded_loads(bench: BushingBench, motion: RecordedMotion) -> FloatArray:

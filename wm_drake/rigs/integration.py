@@ -115,7 +115,7 @@ def stiff_period(begin: FloatArray, packed: FloatArray, motion: FloatArray) -> F
         with warnings.catch_warnings():
             warnings.simplefilter("error", ODEintWarning)
             try:
-                found = odeint(
+                solution = odeint(
                     derivative,
                     parts[-1][-1],
                     PHASE[piece],
@@ -126,13 +126,13 @@ def stiff_period(begin: FloatArray, packed: FloatArray, motion: FloatArray) -> F
                     hmax=LONGEST_STEP,
                     **TOLERANCES,
                 )
-            except ODEintWarning as told:
+            except ODEintWarning as warning:
                 raise NotSteadyError(
-                    f"a sponge on the bench cannot be integrated: {told}"
+                    f"a sponge on the bench cannot be integrated: {warning}"
                 ) from None
-        if not np.all(np.isfinite(found)):
+        if not np.all(np.isfinite(solution)):
             raise NotSteadyError("a sponge on the bench runs away")
-        parts.append(found[1:])
+        parts.append(solution[1:])
     return np.concatenate(parts)
 
 

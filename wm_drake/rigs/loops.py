@@ -99,8 +99,12 @@ def force_loops(bench: Bench, motions: Sequence[Harmonic]) -> list[ForceLoop]:
     packed = np.tile(bench.packed, (len(motions), 1))
     deformation = steady_deformations(bench, packed, amplitude, omega)[:, :-1]
     return [
-        _loop(bench, motion, damper_tensions(_driven(bench, motion, phase)[1], own, bench.packed))
-        for motion, own in zip(motions, deformation, strict=True)
+        _loop(
+            bench,
+            motion,
+            damper_tensions(_driven(bench, motion, phase)[1], deformations, bench.packed),
+        )
+        for motion, deformations in zip(motions, deformation, strict=True)
     ]
 
 

@@ -250,13 +250,13 @@ def _period(time: FloatArray, curve: Smoothed) -> float:
 def _frequency(time: FloatArray, values: FloatArray) -> float:
     """Return the frequency of the sine that is nearest to a signal. [Hz]"""
     length, guess = float(time[-1]), _guessed_frequency(time, values)
-    found = minimize_scalar(
+    minimum = minimize_scalar(
         lambda f: float(np.sum(np.square(_projected(time, values, f)[1]))),
         bounds=(max(guess - 0.6 / length, 0.05 / length), guess + 0.6 / length),
         method="bounded",
         options={"xatol": 1e-9 * guess},
     )
-    return float(found.x)
+    return float(minimum.x)
 
 
 def _projected(

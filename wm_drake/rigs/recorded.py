@@ -52,9 +52,9 @@ def recorded_deformation(bench: DamperBench, motion: RecordedMotion) -> FloatArr
         step, rate = motion.step[: motion.repeats], motion.step_rate[: motion.repeats + 1]
 
         def period(state: FloatArray) -> FloatArray:
-            found = np.empty(len(rate))
-            integrate_sponge(step, rate, state[0], bench.packed, found)
-            return found[:, None]
+            deformation = np.empty(len(rate))
+            integrate_sponge(step, rate, state[0], bench.packed, deformation)
+            return deformation[:, None]
 
         try:
             steady = closed_loop(
@@ -63,9 +63,9 @@ def recorded_deformation(bench: DamperBench, motion: RecordedMotion) -> FloatArr
             begin = float(steady[0, 0])
         except NotSteadyError:
             begin = 0.0
-    found = np.empty(len(motion.step_rate))
-    integrate_sponge(motion.step, motion.step_rate, begin, bench.packed, found)
-    return found
+    deformation = np.empty(len(motion.step_rate))
+    integrate_sponge(motion.step, motion.step_rate, begin, bench.packed, deformation)
+    return deformation
 
 
 @long_running

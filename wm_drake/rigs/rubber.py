@@ -73,10 +73,12 @@ def branch_stretches(step, position, branches, begin):  # type: ignore[no-untype
         step, position, branches: As for `branch_forces`.
         begin: Stretches at the beginning (2,).
     """
-    found = np.empty((len(position), 2))
-    found[0] = begin
+    stretch = np.empty((len(position), 2))
+    stretch[0] = begin
     for k in range(len(step)):
         path = position[k + 1] - position[k]
-        found[k + 1, 0] = dahl_after_path(found[k, 0], path, branches[1])
-        found[k + 1, 1] = maxwell_after_path(found[k, 1], path, step[k], branches[2], branches[3])
-    return found
+        stretch[k + 1, 0] = dahl_after_path(stretch[k, 0], path, branches[1])
+        stretch[k + 1, 1] = maxwell_after_path(
+            stretch[k, 1], path, step[k], branches[2], branches[3]
+        )
+    return stretch

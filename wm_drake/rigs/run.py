@@ -72,12 +72,12 @@ def run_rig(
     progress: Callable[[int], None] = lambda done: None,
 ) -> RigRun:
     """Run all motions, those of one frequency side by side, and return their loops."""
-    found: dict[Harmonic, ForceLoop] = {}
+    loop_of: dict[Harmonic, ForceLoop] = {}
     for frequency in dict.fromkeys(motion.frequency for motion in motions):
         together = [motion for motion in motions if motion.frequency == frequency]
-        found |= dict(zip(together, force_loops(bench, together), strict=True))
-        progress(len(found))
-    loops = tuple(found[motion] for motion in motions)
+        loop_of |= dict(zip(together, force_loops(bench, together), strict=True))
+        progress(len(loop_of))
+    loops = tuple(loop_of[motion] for motion in motions)
     return RigRun(title, bench, numbers, loops, tuple(map(measures_of, loops)))
 
 
@@ -123,5 +123,5 @@ def slider_friction_curves(
     friction, numbers = law_of(bench.packed).slider_friction, law_numbers(bench.packed)
     if friction is None:
         return None
-    own = [getattr(numbers, name) for name in DamperLaw.arguments(friction)[2:]]
-    return np.array([[friction(w, u, *own) for w in rates] for u in deformation_rates])
+    constants = [getattr(numbers, name) for name in DamperLaw.arguments(friction)[2:]]
+    return np.array([[friction(w, u, *constants) for w in rates] for u in deformation_rates])

@@ -73,8 +73,8 @@ def smoothed(time: FloatArray, values: FloatArray, cutoff: float | None, path: s
             f"to sample; allowed is {100.0 * LARGEST_NOISE:.0f} %",
             where=path,
         )
-    found = (1.0 / amount) ** 0.25 / (2.0 * np.pi * step) if amount > 0.0 else np.inf
-    return Smoothed(position, found, noise, spline, step)
+    cutoff = (1.0 / amount) ** 0.25 / (2.0 * np.pi * step) if amount > 0.0 else np.inf
+    return Smoothed(position, cutoff, noise, spline, step)
 
 
 def _chosen(clock: FloatArray, values: FloatArray) -> float:

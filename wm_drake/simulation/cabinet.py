@@ -8,7 +8,8 @@ from wm_drake.compiler.compilation import long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.elements.cabinet import FEET_COUNT, FLOOR_FORCE_SIZE, foot_of
-from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE, carrier_motion, read_carrier_state
+from wm_drake.elements.motion import BODY_STATE_SIZE, read_body_state
+from wm_drake.engines.compiled.bearing import carrier_motion
 from wm_drake.engines.compiled.cabinet import SLIPS_BEGIN
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.machine import Setup
@@ -58,7 +59,7 @@ def cabinet_variables(setup: Setup, trajectory: Trajectory) -> Variables:
         return {}
     states = trajectory.cabinet
     forces = floor_forces(states, setup.cabinet.packed())
-    slips = states[:, CARRIER_STATE_SIZE:].reshape(-1, FEET_COUNT, 2)
+    slips = states[:, BODY_STATE_SIZE:].reshape(-1, FEET_COUNT, 2)
     slips = np.concatenate([slips, np.zeros_like(slips[:, :, :1])], axis=2)
     by_axis, by_foot = ("time", "axis"), ("time", "foot", "axis")
     angle = "roll, pitch, yaw of the cabinet in W (3-2-1 Euler angles)"
@@ -104,7 +105,7 @@ def floor_force_history(states, p, forces):
     for begin in range(0, len(states), WIDTH):
         rows_to_lanes(states, begin, x_numbers)
         motion, _ = carrier_motion(x, 0)
-        s, c = sine_cosine(read_carrier_state(x, 0).angles[2])
+        s, c = sine_cosine(read_body_state(x, 0).angles[2])
         for i in range(FEET_COUNT):
             foot = foot_of(x, SLIPS_BEGIN, motion, q, 0, i)
             f_x, f_y, normal = foot.force

@@ -1,8 +1,9 @@
 """The case: one run to make."""
 
+import warnings
 from dataclasses import dataclass
 
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import InputNotice, input_error, nearest_names
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 
 UNUSED_PHASE_ERROR = (
@@ -10,6 +11,12 @@ UNUSED_PHASE_ERROR = (
     "masses of spin-cycle cases. To shift a mass of a load, change its phase."
 )
 """Warning about a machine whose phase error a study of its loads does not use."""
+
+JUMPING_FRICTION = (
+    "Coulomb friction jumps where a damper reverses. Amplitudes of the compiled engine were 5 to "
+    "80 % off in tests (docs/theory/integrator.md); the law mstv does not jump."
+)
+"""Notice about a machine whose dampers have friction that no fixed step resolves."""
 
 
 @dataclass(frozen=True)
@@ -79,3 +86,19 @@ def case_of(parameters: MachineParameters, load: str, *, gasket: bool = True) ->
             key="loads",
         )
     return Case(load, parameters.loads[load], parameters.profile, gasket, parameters)
+
+
+def has_jumping_friction(parameters: MachineParameters) -> bool:
+    """Return whether a damper of a machine has friction that no fixed step resolves."""
+    types = {damper.type for damper in parameters.dampers.values()}
+    types |= {damper.type for damper in parameters.telescopic_dampers.values()}
+    return any(parameters.damper_types[name].law == "coulomb" for name in types)
+
+
+def notice_jumping_friction(parameters: MachineParameters) -> None:
+    """Issue an `InputNotice` if a damper of a machine has friction that no fixed step resolves.
+
+    All cases of a built machine have the same damper laws.
+    """
+    if has_jumping_friction(parameters):
+        warnings.warn(JUMPING_FRICTION, InputNotice, stacklevel=3)

@@ -7,11 +7,9 @@ whatever the motion needs.
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.records import Record
 
 SLOWEST = 2.0 * np.pi
 """Speed from which the ripple is measured: 60 rpm. [rad/s] Below it a turn is mostly start-up."""
@@ -31,22 +29,6 @@ parts of it."""
 
 STALL_DRIFT = 0.005
 """The same for a drum that hardly turns or swings, in parts of the wanted speed."""
-
-
-VARIABLES = {
-    "drive_peak_torque": ("", "N m", "largest torque of the motor on the drum"),
-    "drive_mean_torque": ("", "N m", "largest torque of the motor averaged over a revolution"),
-    "drive_mean_torque_speed": ("", "rad/s", "speed of the drum at the largest mean torque"),
-    "drive_peak_power": ("", "W", "largest power of the motor"),
-    "drive_energy": ("", "J", "work of the motor over the run"),
-    "drive_speed_ripple": ("", "", "largest coefficient of fluctuation of the speed"),
-    "drive_end_speed": ("", "rad/s", "speed of the drum at the end, averaged over a revolution"),
-    "drive_caught_speed": ("", "rad/s", "speed at which the drum is caught; NaN if it is not"),
-    "drive_caught_torque": ("", "N m", "mean torque of the motor where the drum is caught"),
-    "drive_torque_order_one": ("order", "N m", "torque with cosine and sine of the drum angle"),
-    "drive_acceleration_order_one": ("order", "rad/s^2", "acceleration of the drum with them"),
-}
-"""Dimensions, unit and meaning of each measure of the drive in a batch."""
 
 
 @dataclass(frozen=True)
@@ -205,13 +187,13 @@ def capture(
     half = round(0.5 * CAPTURE_TIME / float(time[1] - time[0]))
     if len(time) <= 2 * half:
         return None
-    wanted = np.asarray(profile.speed_at(time))
+    reference = np.asarray(profile.speed_at(time))
 
     def means(signal: FloatArray) -> FloatArray:
         sums = np.append(0.0, np.cumsum(signal))
         return np.asarray((sums[half:] - sums[:-half]) / half)
 
-    fast, at, load = means(wanted), means(speed), means(torque)
+    fast, at, load = means(reference), means(speed), means(torque)
     before, now = at[:-half], at[half:]  # windows that end where the next one begins
     slow = now < (1.0 - CAPTURE_LAG) * fast[half:]
     allowed = np.maximum(CAPTURE_DRIFT * np.abs(now), STALL_DRIFT * np.abs(fast[half:]))
@@ -237,36 +219,23 @@ def measured_drive(
     torque: FloatArray,
     profile: SpinProfile,
 ) -> list[FloatArray]:
-    """Return the numbers of `VARIABLES`, in their order; arguments as for `drive_measures`."""
-    found = drive_measures(time, angle, speed, torque, profile)
-    caught = found.capture
+    """Return the numbers of the measure `drive`, in its order.
+
+    Args:
+        time, angle, speed, torque, profile: As for `drive_measures`.
+    """
+    drive = drive_measures(time, angle, speed, torque, profile)
+    caught = drive.capture
     end = angle >= angle[-1] - 2.0 * np.pi if len(angle) else np.zeros(0, dtype=bool)
     numbers = (
-        found.peak_torque,
-        found.mean_torque,
-        found.mean_torque_speed,
-        found.peak_power,
-        found.energy,
-        found.speed_ripple,
+        drive.peak_torque,
+        drive.mean_torque,
+        drive.mean_torque_speed,
+        drive.peak_power,
+        drive.energy,
+        drive.speed_ripple,
         float(np.mean(speed[end])) if end.any() else np.nan,
         caught.speed if caught else np.nan,
         caught.torque if caught else np.nan,
     )
     return [*map(np.array, numbers), *orders_at_end(time, angle, speed, torque)]
-
-
-def drive_variables(record: Record, profile: SpinProfile) -> dict[str, xr.DataArray]:
-    """Return the measures of the drive of a record as a batch has them, by name.
-
-    Args:
-        record: Record of a run.
-        profile: Speed that is wanted.
-    """
-    angle, speed, torque = (
-        record[name].values for name in ("drum_angle", "drum_speed", "motor_torque")
-    )
-    values = measured_drive(record.time.values, angle, speed, torque, profile)
-    return {
-        name: xr.DataArray(value, dims=dims.split())
-        for (name, (dims, _, _)), value in zip(VARIABLES.items(), values, strict=True)
-    }

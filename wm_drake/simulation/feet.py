@@ -34,25 +34,6 @@ REGION_VARIABLES = tuple(f"region_{name}" for name in MARGINS)
 """Names of what is measured of the feet over a run, and in each region of the profile."""
 
 
-WORDS = {
-    "smallest_foot_load": ("N", "smallest normal load of any foot; 0 if one lifts off"),
-    "slide_margin": (
-        "N",
-        "horizontal force that friction can still take; the cabinet slides below 0",
-    ),
-    "turn_margin": (
-        "N m",
-        "vertical moment that friction can still take beside the horizontal force; the cabinet "
-        "turns below 0",
-    ),
-    "tilt_margin": ("N m", "moment that keeps the cabinet from tipping over; it tips below 0"),
-    "foot_normal_smallest": ("N", "smallest normal load of each foot"),
-    "foot_normal_largest": ("N", "largest normal load of each foot"),
-    "foot_tangential_largest": ("N", "largest horizontal load of each foot"),
-}
-"""Unit and meaning of each measure of the feet, without the prefix `region_`."""
-
-
 def cabinet_of(parameters: MachineParameters) -> Cabinet:
     """Return the cabinet of a machine.
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from wm_drake.compiler.chosen import call
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, where
 from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
@@ -38,60 +39,55 @@ def position_history(samples, points, positions):
 
 
 @long_running
-def output_history(
-    state, deformation, stretches, points, p, springs, dampers, bushings, branches, outputs
-):
+def output_history(states, points, p, mounts, outputs):
     """Evaluate displacements at points and forces of springs, dampers and bushings at each sample.
 
     The forces are those of the elements' ports in Drake, from the same functions.
 
     Args:
-        state: (n, 14) states of the plant.
-        deformation: (n, >= dampers) deformations of the dampers' sponges. [m]
-        stretches: (n, branches) stretches of rubber bushings. [m or rad]
+        states: (n, size) states of the mounts.
         points: Measured points, one after the other (`POINT_SIZE` numbers each).
-        p: Packed numbers of springs, dampers and bushings.
-        springs, dampers, bushings: Arrays of the indices of the elements in them.
-        branches: `Branches` in these numbers and in `stretches`; None without them.
+        p, mounts: Packed numbers of the mounts, and the `Mounts` in them and in the states.
         outputs: (n, k) written: displacement at each point [m], tension of each spring and each
-            damper [N], force and moment of each bushing on the housing [N, N m].
+            damper [N], force and moment of each bushing on the housing [N, N m], outputs of each
+            element of another package.
     """
     align_stack()
-    state_numbers, own_numbers = (
-        np.empty(PLANT_STATE_SIZE * WIDTH),
-        np.empty(deformation.shape[1] * WIDTH),
-    )
-    numbers, p_numbers, point_numbers = (
-        np.empty(outputs.shape[1] * WIDTH),
-        in_each_lane(p),
-        in_each_lane(points),
-    )
-    x, own, answer = lane_array(state_numbers), lane_array(own_numbers), lane_array(numbers)
+    state_numbers, numbers = np.empty(states.shape[1] * WIDTH), np.empty(outputs.shape[1] * WIDTH)
+    p_numbers, point_numbers = in_each_lane(p), in_each_lane(points)
+    x, answer = lane_array(state_numbers), lane_array(numbers)
     q, measured = lane_array(p_numbers), lane_array(point_numbers)
-    stretch_numbers = np.empty(stretches.shape[1] * WIDTH)
-    stretched = lane_array(stretch_numbers)
-    for begin in range(0, len(state), WIDTH):
-        rows_to_lanes(state, begin, state_numbers)
-        rows_to_lanes(deformation, begin, own_numbers)
-        rows_to_lanes(stretches, begin, stretch_numbers)
+    for begin in range(0, len(states), WIDTH):
+        rows_to_lanes(states, begin, state_numbers)
         motion = tub_motion(x)
         column = len(points) // POINT_SIZE
         for k in range(column):
             answer[k] = displacement_at(motion, measured, k * POINT_SIZE)
-        for at in springs:
+        for at in mounts.springs:
             _, answer[column] = spring_strut_wrench(motion, q, at)
             column += 1
-        for i, at in enumerate(dampers):
-            answer[column] = friction_damper_force(motion, own[i], q, at)
+        for i, at in enumerate(mounts.dampers):
+            answer[column] = friction_damper_force(motion, x[mounts.sponge_states + i], q, at)
             column += 1
-        for at in bushings:
-            _, on_housing = bushing_wrench(motion, q, at, stretched, branches)
+        for at in mounts.bushings:
+            _, on_housing = bushing_wrench(motion, q, at, x, mounts.branches)
             for k in range(6):
                 answer[column + k] = on_housing[k]
             column += 6
+        _write_outputs_of_others(x, motion, q, mounts.others, answer, column)
         lanes_to_rows(numbers, begin, outputs)
     keep(p_numbers)
     keep(point_numbers)
+
+
+@law
+def _write_outputs_of_others(x, motion, p, others, answer, column):
+    """Write the outputs of each element of another package; `others` is None without any."""
+    if others is not None:
+        for i in range(len(others.at)):
+            column = call(
+                others.outputs, i, x, motion, p, others.at[i], others.states[i], answer, column
+            )
 
 
 @law

@@ -84,9 +84,9 @@ def measure_mounts_lanes(samples, rows, size, bounds, p, mounts, count, cabinet,
     """
     align_stack()
     x_numbers = np.empty(size * WIDTH)
-    found_numbers = np.empty(count * WRENCH_SIZE * WIDTH)
+    wrench_numbers = np.empty(count * WRENCH_SIZE * WIDTH)
     x, states, numbers = lane_array(x_numbers), lane_array(samples), lane_array(p)
-    found, resultant, total = lane_array(found_numbers), lane_array(cabinet), lane_array(sums)
+    wrenches, resultant, total = lane_array(wrench_numbers), lane_array(cabinet), lane_array(sums)
     zero = 0.0 * numbers[0]
     good, samples_in_bounds = zero + 1.0, zero
     of_cabinet, keeps = count * VECTOR_SIZE, len(cabinet) > 0
@@ -95,18 +95,38 @@ def measure_mounts_lanes(samples, rows, size, bounds, p, mounts, count, cabinet,
             x[k] = states[row * size + k]
         good = good * in_bounds(x, bounds[0], bounds[1])
         samples_in_bounds = samples_in_bounds + good
-        write_mount_wrenches(x, numbers, mounts, found)
+        write_mount_wrenches(x, numbers, mounts, wrenches)
         for i in range(count):
             at = i * WRENCH_SIZE
-            force = (found[at + 3], found[at + 4], found[at + 5])
+            force = (wrenches[at + 3], wrenches[at + 4], wrenches[at + 5])
             add_vector(total, i * VECTOR_SIZE, force, row == 0, good)
         for k in range(WRENCH_SIZE):
             value = zero
             for i in range(count):
-                value = value + found[i * WRENCH_SIZE + k]
+                value = value + wrenches[i * WRENCH_SIZE + k]
             add_signal(total, of_cabinet + k * SIGNAL_SIZE, value, row == 0, good)
             if keeps:
                 resultant[row * WRENCH_SIZE + k] = value
     total[of_cabinet + WRENCH_SIZE * SIGNAL_SIZE] = samples_in_bounds
     keep(x_numbers)
-    keep(found_numbers)
+    keep(wrench_numbers)
+
+
+@long_running
+def sum_mounts_history(forces, wrenches, sums):
+    """Sum up the forces of the mounts of one run, as `measure_mounts_lanes` does.
+
+    Args:
+        forces: (n, 3 mounts) force of each mount on the cabinet. [N]
+        wrenches: (n, 6) resultant wrench on the cabinet: moment and force. [N m, N]
+        sums: Written, as by `measure_mounts_lanes`.
+    """
+    count = forces.shape[1] // 3
+    of_cabinet, good = count * VECTOR_SIZE, 1.0
+    for row in range(len(forces)):
+        for i in range(count):
+            force = (forces[row, 3 * i], forces[row, 3 * i + 1], forces[row, 3 * i + 2])
+            add_vector(sums, i * VECTOR_SIZE, force, row == 0, good)
+        for k in range(WRENCH_SIZE):
+            add_signal(sums, of_cabinet + k * SIGNAL_SIZE, wrenches[row, k], row == 0, good)
+    sums[of_cabinet + WRENCH_SIZE * SIGNAL_SIZE] = len(forces)

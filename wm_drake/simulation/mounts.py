@@ -5,12 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from wm_drake.elements.motion import PLANT_STATE_SIZE
 from wm_drake.elements.mount import WRENCH_SIZE, Mounts, mount_wrench_history
-from wm_drake.elements.rubber import branches_of
-from wm_drake.engines.compiled.mechanics import STATE_SIZE
-from wm_drake.engines.compiled.packing import Layout
-from wm_drake.engines.compiled.tubes import TUBES_AND_DAMPER, TUBES_STATE_SIZE
+from wm_drake.elements.state_map import CARRIER, ELEMENT, STRETCHES
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.machine import Setup
 from wm_drake.parameters import MachineParameters
@@ -42,21 +38,8 @@ def mount_names(parameters: MachineParameters) -> tuple[str, ...]:
         *(f"dampers.{name}" for name in parameters.dampers),
         *bushings,
         *(f"telescopic_dampers.{name}" for name in parameters.telescopic_dampers),
+        *(f"elements.{name}" for name in parameters.elements),
     )
-
-
-def mounts_of(layout: Layout) -> Mounts:
-    """Return the indices of the mounts in packed numbers and states of the compiled engine."""
-    springs, dampers, bushings, telescopes = (
-        np.array(indices, dtype=np.int64)
-        for indices in (layout.springs, layout.dampers, layout.bushings, layout.telescopes)
-    )
-    begin = STATE_SIZE + len(dampers)
-    tubes = begin + TUBES_STATE_SIZE * np.arange(len(telescopes), dtype=np.int64)
-    numbers = telescopes + TUBES_AND_DAMPER.offsets["damper"]
-    parts = (numbers, tubes) if len(telescopes) else (None, None)
-    branches = layout.elements.branches
-    return Mounts(springs, dampers, bushings, parts[0], STATE_SIZE, parts[1], branches)
 
 
 def mount_wrenches(setup: Setup, trajectory: Trajectory) -> FloatArray:
@@ -69,42 +52,38 @@ def mount_wrenches(setup: Setup, trajectory: Trajectory) -> FloatArray:
     Returns:
         (n, mounts, 6) moment about the origin of W and force, in W. [N m, N]
     """
-    p, indices = setup.elements.packed_on_tub()
-    begins, parts = [], [p]
-    for telescope in setup.telescopes.values():
-        begins.append(sum(map(len, parts)))
-        parts.append(telescope.packed())
-    dampers, size = len(indices["dampers"]), PLANT_STATE_SIZE + len(indices["dampers"])
-    n, telescopes = len(trajectory.time), len(begins)
-    tubes = np.arange(telescopes, dtype=np.int64) * PLANT_STATE_SIZE + size
-    springs, on_dampers, bushings = (
-        np.array(indices[kind], dtype=np.int64) for kind in ("springs", "dampers", "bushings")
+    states, p, mounts = mounts_along(setup, trajectory)
+    count = len(mount_names(setup.parameters))
+    # measures read columns
+    wrenches = np.empty((len(trajectory.time), count * WRENCH_SIZE), order="F")
+    mount_wrench_history(states, p, mounts, wrenches)
+    return wrenches.reshape(len(wrenches), count, WRENCH_SIZE)
+
+
+def mounts_along(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, FloatArray, Mounts]:
+    """Return what compiled functions of the mounts need along a motion.
+
+    Args:
+        setup: Machine as it was set up for the run.
+        trajectory: Motion of the machine.
+
+    Returns:
+        States of the mounts (n, size), their packed numbers, and the indices in both.
+    """
+    states = setup.elements.states()
+    packed, indices = setup.elements.packed_on_tub()
+    telescopes = [telescope.packed() for telescope in setup.telescopes.values()]
+    ends = np.cumsum([len(packed), *map(len, telescopes)])
+    begins = {**indices, "telescopes": tuple(ends[:-1])}
+    others = {CARRIER: trajectory.carrier, STRETCHES: trajectory.stretches}
+    if trajectory.element_states is not None:
+        others[ELEMENT] = trajectory.element_states
+    motion = trajectory.state, trajectory.deformation, trajectory.tubes
+    return (
+        states.joined(*motion, others),
+        np.concatenate([packed, *telescopes]),
+        setup.elements.mounts(begins, states),
     )
-    parts_of_tubes = (np.array(begins, dtype=np.int64), tubes) if begins else (None, None)
-    first = size + telescopes * PLANT_STATE_SIZE
-    branches = branches_of(setup.bushings, indices["bushings"], first)
-    mounts = Mounts(
-        springs,
-        on_dampers,
-        bushings,
-        parts_of_tubes[0],
-        PLANT_STATE_SIZE,
-        parts_of_tubes[1],
-        branches,
-    )
-    deformation = trajectory.deformation[:, :dampers]
-    states = np.hstack(
-        [
-            trajectory.state,
-            deformation,
-            trajectory.tubes.reshape(n, telescopes * PLANT_STATE_SIZE),
-            trajectory.stretches,
-        ]
-    )
-    count = sum(map(len, indices.values())) + telescopes
-    wrenches = np.empty((n, count * WRENCH_SIZE), order="F")  # measures read columns
-    mount_wrench_history(states, np.concatenate(parts), mounts, wrenches)
-    return wrenches.reshape(n, count, WRENCH_SIZE)
 
 
 def sums_size(count: int) -> int:
@@ -152,8 +131,8 @@ def _statistics(
     """Return peak, RMS, and RMS without the mean, of signals from their sums."""
     rows = [(s.largest, s.square, s.change_square, *np.atleast_1d(s.change)) for s in signals]
     if not samples:
-        nothing = np.full(len(rows), np.nan)
-        return nothing, nothing, nothing
+        undefined = np.full(len(rows), np.nan)
+        return undefined, undefined, undefined
     largest, square, change_square, *change = np.array(rows).T
     variance = change_square / samples - sum(np.square(c / samples) for c in change)
     return np.sqrt(largest), np.sqrt(square / samples), np.sqrt(np.maximum(variance, 0.0))
@@ -172,8 +151,8 @@ def force_measures(history: FloatArray) -> tuple[FloatArray, FloatArray, FloatAr
     """
     vectors = history if history.ndim == 3 else history[:, :, None]
     if not len(vectors):
-        nothing = np.full(vectors.shape[1], np.nan)
-        return nothing, nothing, nothing
+        undefined = np.full(vectors.shape[1], np.nan)
+        return undefined, undefined, undefined
     square = np.square(vectors).sum(axis=2)
     deviation = np.square(vectors - vectors.mean(axis=0)).sum(axis=2)
     return (

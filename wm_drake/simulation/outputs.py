@@ -4,14 +4,14 @@ import numpy as np
 
 from wm_drake.elements.bearing import FORCE_SIZE as BEARING_FORCE_SIZE
 from wm_drake.elements.bearing import drum_bearing_history
-from wm_drake.elements.rubber import branches_of
+from wm_drake.elements.kind import ElementKind
 from wm_drake.elements.telescopic_damper import FORCE_SIZE, telescopic_damper_history
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cabinet import cabinet_variables
 from wm_drake.simulation.histories import output_history, position_history
-from wm_drake.simulation.mounts import POINT, mount_wrenches
+from wm_drake.simulation.mounts import POINT, mount_wrenches, mounts_along
 from wm_drake.simulation.variables import Variables
 
 AXES = ("x", "y", "z")
@@ -19,7 +19,7 @@ AXES = ("x", "y", "z")
 
 def variables_of(setup: Setup, trajectory: Trajectory) -> Variables:
     """Return all variables that a record holds of a trajectory."""
-    displacements, *forces = tub_outputs(setup, trajectory)
+    displacements, *forces, outputs = tub_outputs(setup, trajectory)
     if setup.telescopes:
         forces = _with_telescopes(setup, trajectory, *forces)
     return (
@@ -29,6 +29,7 @@ def variables_of(setup: Setup, trajectory: Trajectory) -> Variables:
         | _whirl(setup, trajectory)
         | _motion(setup, trajectory, displacements)
         | _forces(trajectory, *forces)
+        | _outputs_of_others(setup, outputs)
         | _on_cabinet(mount_wrenches(setup, trajectory))
     )
 
@@ -228,6 +229,39 @@ def _forces(
     }
 
 
+def others_by_kind(setup: Setup) -> dict[ElementKind, list[str]]:
+    """Return the names of the elements of other packages, by kind."""
+    names: dict[ElementKind, list[str]] = {}
+    for name, element in setup.elements.others.items():
+        names.setdefault(element.kind, []).append(name)
+    return names
+
+
+def _outputs_of_others(setup: Setup, outputs: FloatArray) -> Variables:
+    """Return the outputs of elements of other packages, a variable for each output of a kind.
+
+    Args:
+        setup: Machine as it was set up for the run.
+        outputs: Of all elements, one after the other. (n, k)
+    """
+    columns: dict[str, int] = {}
+    end = 0
+    for name, element in setup.elements.others.items():
+        columns[name], end = end, end + element.kind.output_size
+    variables: Variables = {}
+    for kind, names in others_by_kind(setup).items():
+        begins = np.array([columns[name] for name in names])
+        for output in kind.outputs:
+            part = kind.output_parts[output.name]
+            values = outputs[:, begins[:, None] + np.arange(part.start, part.stop)]
+            dims: tuple[str, ...] = ("time", kind.name, "axis")
+            if output.size == 1:
+                dims, values = dims[:2], values[:, :, 0]
+            words = output.words or output.name
+            variables[f"{kind.name}_{output.name}"] = (dims, values, output.unit, words)
+    return variables
+
+
 def _on_cabinet(wrenches: FloatArray) -> Variables:
     """Return the variables of the forces of the mounts on the cabinet.
 
@@ -258,17 +292,19 @@ def tub_outputs(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, ...]:
     Returns:
         Displacements at the `measured_points` (n, points) [m]; tensions of the springs (n, springs)
         and of the strut dampers (n, dampers) [N]; force and moment of the bushings on the housing
-        (n, bushings, 6) [N, N m].
+        (n, bushings, 6) [N, N m]; outputs of elements of other packages (n, k).
     """
-    points, (p, indices) = setup.measured_points, setup.elements.packed_on_tub()
-    begins = [np.array(of_kind, dtype=np.int64) for of_kind in indices.values()]
-    sizes = [len(points), len(begins[0]), len(begins[1]), 6 * len(begins[2])]
+    points, bushing_count = setup.measured_points, len(setup.bushings)
+    sizes = [len(points), len(setup.springs), len(setup.dampers), 6 * bushing_count]
+    sizes.append(sum(element.kind.output_size for element in setup.elements.others.values()))
     columns = np.empty((len(trajectory.time), sum(sizes)), order="F")
-    branches = branches_of(setup.bushings, indices["bushings"], 0)
-    motion = trajectory.state, trajectory.deformation, trajectory.stretches
-    output_history(*motion, points.ravel(), p, *begins, branches, columns)
-    displacements, springs, dampers, bushings = np.split(columns, np.cumsum(sizes)[:-1], axis=1)
-    return displacements, springs, dampers, bushings.reshape(len(columns), len(begins[2]), 6)
+    states, p, mounts = mounts_along(setup, trajectory)
+    output_history(states, points.ravel(), p, mounts, columns)
+    displacements, springs, dampers, bushings, others = np.split(
+        columns, np.cumsum(sizes)[:-1], axis=1
+    )
+    bushings = bushings.reshape(len(columns), bushing_count, 6)
+    return displacements, springs, dampers, bushings, others
 
 
 def _with_telescopes(

@@ -1,23 +1,24 @@
 """The record: a labelled dataset of one run, with units; how it is made, written and read."""
 
 import functools
-import gc
 import importlib.metadata
 import json
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
+import h5py
 import numpy as np
 import xarray as xr
 
 from wm_drake.engines.trajectory import COORDINATES, Trajectory, divergence_text
 from wm_drake.errors import input_error
 from wm_drake.model.machine import Setup
+from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.mounts import mount_names
-from wm_drake.simulation.outputs import AXES, branch_names, variables_of
+from wm_drake.simulation.outputs import AXES, branch_names, others_by_kind, variables_of
 
 Record: TypeAlias = xr.Dataset
 """Outputs of one run over time, in SI units.
@@ -58,6 +59,7 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
         "mount": mount_names(setup.parameters),
         **({"tube": setup.telescopes} if setup.telescopes else {}),
         **({"branch": branches} if (branches := branch_names(setup)) else {}),
+        **{kind.name: names for kind, names in others_by_kind(setup).items()},
         **({"foot": setup.cabinet.cabinet.corners} if setup.cabinet else {}),
     }
     label_coordinates = _label_coordinates(**{name: tuple(of) for name, of in labels.items()})
@@ -80,6 +82,25 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
 def _label_coordinates(**labels: tuple[str, ...]) -> xr.Coordinates:
     """Return the coordinates of all dimensions except time."""
     return xr.Coordinates({name: list(of) for name, of in labels.items()})
+
+
+def sample_period(record: Record) -> float:
+    """Return the time between the samples of a record; 1 if it has fewer than two samples. [s]"""
+    time = record.time.values
+    return float(time[1] - time[0]) if len(time) > 1 else 1.0
+
+
+def profile_of(record: Record) -> SpinProfile:
+    """Return the spin profile of the run of a record."""
+    return SpinProfile.model_validate_json(record.attrs["profile"])
+
+
+def cabinet_in(record: Record) -> tuple[Cabinet, float] | None:
+    """Return cabinet and gravity [m/s^2] of the machine of a record; None without a cabinet."""
+    parameters = json.loads(record.attrs.get("parameters", "{}"))
+    if not parameters.get("cabinet"):
+        return None
+    return Cabinet.model_validate(parameters["cabinet"]), float(parameters["gravity"])
 
 
 MOST_REASON = 150
@@ -144,9 +165,9 @@ def read_measured(path: Path, variables: Mapping[str, tuple[str, ...]]) -> xr.Da
         raise input_error(f"cannot be read as a netCDF record ({record})", where=str(path))
     for name, dims in variables.items():
         if name not in record.variables or record[name].dims != dims:
-            found = "is missing" if name not in record.variables else "has other dimensions"
+            fault = "is missing" if name not in record.variables else "has other dimensions"
             need = ", ".join(dims)
-            raise input_error(f"{found}; it needs the dimensions {need}", where=str(path), key=name)
+            raise input_error(f"{fault}; it needs the dimensions {need}", where=str(path), key=name)
         if record[name].dtype.kind not in "iuf" or not np.all(np.isfinite(record[name].values)):
             raise input_error("has values that are not finite numbers", where=str(path), key=name)
     if "sensor" in record.dims and "sensor" not in record.coords:
@@ -156,21 +177,14 @@ def read_measured(path: Path, variables: Mapping[str, tuple[str, ...]]) -> xr.Da
 
 
 def _readable(path: Path) -> xr.Dataset | str:
-    """Return a record, or why it cannot be read.
-
-    The reader leaves a half-open file behind, whose removal prints a Python error. It is removed
-    here, and nothing is printed.
-    """
-    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    """Return a record, or why it cannot be read."""
     try:
-        try:
-            return xr.load_dataset(path, engine="h5netcdf")
-        except Exception as error:  # damaged files end in errors of any kind
-            reason = " ".join(str(error).split())[:MOST_REASON]
-        gc.collect()
-    finally:
-        sys.unraisablehook = hook
-    return reason or "it is damaged"
+        # h5netcdf leaves a half-open file behind if the attributes of the file are damaged
+        with h5py.File(path, "r") as file:
+            dict(file.attrs)
+        return xr.load_dataset(path, engine="h5netcdf")
+    except Exception as error:  # damaged files end in errors of any kind
+        return " ".join(str(error).split())[:MOST_REASON] or "it is damaged"
 
 
 @functools.cache  # reading them takes more than 10 % of the time of a run

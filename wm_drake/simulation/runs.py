@@ -14,7 +14,7 @@ from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.machine import OUTPUT_PERIOD, Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.machine import Integrator
-from wm_drake.simulation.cases import Case, case_of
+from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
 from wm_drake.simulation.records import Record, as_record
 
 Engine: TypeAlias = Callable[..., Trajectory]
@@ -76,6 +76,7 @@ def simulate(
     numbers: dict[str, Any] = {"parameters": case.parameters, "gasket": case.gasket}
     setup = machine.set_up(**numbers)
     if engine == DEFAULT_ENGINE:  # the other one controls its error
+        notice_jumping_friction(machine.parameters)
         stepping = choose_stepping(setup, *pack(setup), case.profile, step, chosen)
         step, run = (
             stepping.step,

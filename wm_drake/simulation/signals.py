@@ -35,7 +35,7 @@ def filter_both_ways(signals, shape, sections, settled, padding, work, answer):
     """
     align_stack()
     rows, groups, stride = shape
-    given, kept, found = lane_array(signals), lane_array(work), lane_array(answer)
+    given, kept, filtered = lane_array(signals), lane_array(work), lane_array(answer)
     c, rest = number_array(sections), number_array(settled)
     padded = rows + 2 * padding
     for group in range(groups):
@@ -47,7 +47,7 @@ def filter_both_ways(signals, shape, sections, settled, padding, work, answer):
         for at in range(padded - 1, padding - 1, -1):
             value, state = pass_sections(kept[at], state, c)
             if at < padding + rows:
-                found[(at - padding) * groups + group] = value
+                filtered[(at - padding) * groups + group] = value
 
 
 @law

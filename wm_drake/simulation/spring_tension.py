@@ -33,12 +33,12 @@ def tensions_at(
         Tensions [N] and elongations [m]; NaN where the length is not finite. An elongation is
         negative for a slack spring, and NaN for a spring without a free length.
     """
-    found = np.full((2, len(lengths)), np.nan)
+    answer = np.full((2, len(lengths)), np.nan)
     for column, (spring, length) in enumerate(zip(springs, lengths, strict=True)):
         if np.isfinite(length):
             free = spring.free_length
-            found[:, column] = spring.tension(length), np.nan if free is None else length - free
-    return found[0], found[1]
+            answer[:, column] = spring.tension(length), np.nan if free is None else length - free
+    return answer[0], answer[1]
 
 
 def slack_springs(smallest: xr.DataArray) -> list[str]:

@@ -79,28 +79,7 @@ def region_displacements(
     return rms_direct, rms_integrated
 
 
-def record_region_displacements(
-    record: Record, points: FloatArray, profile: SpinProfile
-) -> tuple[FloatArray, FloatArray]:
-    """Return the RMS displacements of points in regions for the run of a record.
-
-    Args:
-        record: Record of a run.
-        points: (k, 3) positions in T. [m]
-        profile: Spin profile with regions.
-
-    Returns:
-        Two arrays (regions, k, 3) as returned by `region_displacements`. [m]
-    """
-    states, acceleration = _motion_of(record)
-    time = record.time.values
-    period = float(time[1] - time[0]) if len(time) > 1 else 1.0
-    return region_displacements(
-        states, acceleration, points, np.asarray(record.attrs["rest_pose"]), period, profile
-    )
-
-
-def _motion_of(record: Record) -> tuple[FloatArray, FloatArray]:
+def tub_motion_of(record: Record) -> tuple[FloatArray, FloatArray]:
     """Return states (n, 13) and accelerations (n, 6) of the tub in the form of this module."""
     angle = record.drum_angle.values[:, None]
     motion = [
@@ -130,7 +109,7 @@ def sensor_accelerations(record: Record, sensors: Mapping[str, Sensor]) -> xr.Da
     """
     names = [str(name) for name in record.sensor.values]
     axes = ["xyz".index(sensors[name].axis) for name in names]
-    at_points = point_accelerations(*_motion_of(record), record.sensor_point.values)
+    at_points = point_accelerations(*tub_motion_of(record), record.sensor_point.values)
     along = np.stack([at_points[:, k, axis] for k, axis in enumerate(axes)], axis=1)
     return record.displacement.copy(data=along).assign_attrs(
         units="m/s^2", long_name="acceleration at the sensors, along their axes"

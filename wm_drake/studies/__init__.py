@@ -1,8 +1,7 @@
-"""Studies: one folder for each question about a machine, and tools that several studies share.
+"""Answer one question about a machine per folder; share designs of experiments and fits.
 
 Enters: machine parameters, and what a study varies or measures. Leaves: results such as modes, an
-ANOVA table, a fit or a calibration. Questions: `spin`, `description`, `gasket`, `gasket_damping`,
-`spin_cycle`, `spin_identification`, `identification`, `calibration`. Shared: `doe`, `fitting`; they
-take a function of parameters and need no engine.
-May import: `rigs`, `batch` and the rooms before them.
+ANOVA table, a fit or a calibration. `study.py` declares a study, `run.py` runs any of them. Shared:
+`doe`, `fitting`; they take a function of parameters and need no engine.
+May import: `report` and the rooms before it.
 """

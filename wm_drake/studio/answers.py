@@ -4,6 +4,7 @@ One run has eight lanes: the first has the chosen numbers and its history, the o
 number turned by a hundredth of its slider. They cost little, and give the sensitivity arrows.
 """
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -24,19 +25,23 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.spin.figures import ORBIT_REVOLUTIONS, axis_path_mm, orbit_window
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.measures import (
+from wm_drake.simulation.displacements import (
     amplitudes,
     filtered_displacement,
     largest_motion,
     moment_of_largest_amplitude,
 )
-from wm_drake.simulation.mounts import mount_names
+from wm_drake.simulation.measures import MEASURES, Variable
+from wm_drake.simulation.measures.labels import LABELS
 from wm_drake.simulation.records import Record
 from wm_drake.studio.machines import OpenMachine, is_same
 from wm_drake.studio.state import State
 
-MEASURES = ("extremes", "amplitudes", "gap", "mounts")
-"""What is measured of each lane."""
+FIRST = ("amplitudes", "gap", "extremes", "mounts")
+"""Measures that the page shows first, in this order."""
+
+EACH = ("sensor",)
+"""Dimensions of which a comparison of variants shows each number; of others it has the largest."""
 
 LANES = WIDTH - 1
 """How many numbers one run turns."""
@@ -52,9 +57,17 @@ MS_PER_S = 1e3
 MICRO = 1e6
 
 
+def shown_measures() -> tuple[str, ...]:
+    """Return the names of the measures of which the page shows a variable."""
+    shown = [
+        one.name for one in MEASURES.values() if any(v.studio is not None for v in one.variables)
+    ]
+    return (*FIRST, *(name for name in shown if name not in FIRST))
+
+
 def runner_of(machine: OpenMachine) -> Runner:
     """Return the runner of the pages of a machine: the first run of a batch has a history."""
-    return Runner(machine.parameters, MEASURES, histories={0}, are_alike=True)
+    return Runner(machine.parameters, shown_measures(), histories={0}, are_alike=True)
 
 
 def answer(
@@ -117,14 +130,14 @@ def arrows(
 
 def influential_keys(machine: OpenMachine, state: State) -> list[str]:
     """Return the numbers that can change a run of a state: not the cabinet, no other load."""
-    own = f"loads.{state.load}." if not state.masses else "no load of the machine"
+    prefix = f"loads.{state.load}." if not state.masses else "no load of the machine"
     with machine.lock:
-        numbers = machine.numbers
+        sliders = machine.sliders
     return [
         key
-        for key in numbers
+        for key in sliders
         if not key.startswith(("cabinet.", "step", "profile.", "imperfections.phase_error"))
-        and (not key.startswith("loads.") or key.startswith(own))
+        and (not key.startswith("loads.") or key.startswith(prefix))
         and (state.gasket or not key.startswith("gasket."))
     ]
 
@@ -135,12 +148,12 @@ def _turned(machine: OpenMachine, case: Case, keys: Iterable[str]) -> list[tuple
     A step beyond the allowed range is taken to the other side. A number that can be turned to
     neither side is left out.
     """
-    found = []
+    turned = []
     assert case.parameters is not None  # a page's case has parameters of its own
     preparation = machine.preparation(case.parameters)
     for key in keys:
-        number = machine.numbers.get(key)
-        for step in (number.step, -number.step) if number is not None else ():
+        slider = machine.sliders.get(key)
+        for step in (slider.step, -slider.step) if slider is not None else ():
             try:
                 parameters = machine.moved_by(case.parameters, key, step)
             except InputError:
@@ -152,9 +165,9 @@ def _turned(machine: OpenMachine, case: Case, keys: Iterable[str]) -> list[tuple
             else:
                 other = replace(case, parameters=parameters, profile=parameters.profile)
             if _can_be_set_up(preparation, other):
-                found.append((key, step, other))
+                turned.append((key, step, other))
                 break
-    return found
+    return turned
 
 
 def _can_be_set_up(preparation: Preparation, case: Case) -> bool:
@@ -176,19 +189,39 @@ def _batch(machine: OpenMachine, cases: list[Case]) -> tuple[BatchKey, list[Work
 
 
 def _measures(machine: OpenMachine, run: RunResult) -> dict[str, Any]:
-    """Return the numbers of a run: mm, rpm, N, N m."""
-    values = run.values
+    """Return the rows of the table of measures, in units for reading, and the smallest gap."""
     gap = run.gap
     return {
-        "amplitude": _plain(values["amplitude"] * MM_PER_M),
-        "critical_speed": _plain(values["critical_speed"] * RPM_PER_RAD_S),
-        "detergent": _plain(values["detergent_displacement"] * MM_PER_M),
-        "gasket_force": _plain(values["gasket_force"]),
-        "gasket_moment": _plain(values["gasket_moment"]),
-        "mount_peak": _plain(values["mount_force_peak"]),
+        "rows": [
+            row
+            for name in shown_measures()
+            for variable in MEASURES[name].variables
+            if variable.studio is not None
+            for row in _rows(machine, run, variable)
+        ],
         "gap": None if gap is None else _gap(gap, run.case.profile),
-        "mounts": list(mount_names(machine.parameters)),
     }
+
+
+def _rows(machine: OpenMachine, run: RunResult, variable: Variable) -> list[dict[str, Any]]:
+    """Return a row for each number of a variable of a run."""
+    along = [LABELS[dim](machine.parameters, run.case.profile) for dim in variable.dims]
+    values = _plain(run.values[variable.name] * variable.unit.from_si(1.0))
+    rows = []
+    for labels, value in zip(itertools.product(*along), values, strict=True):
+        title, unit = variable.short_title_of(labels), variable.unit_text
+        rows.append(
+            {
+                "title": f"{title}, {unit}",
+                "kind": variable.kind,
+                "group": "" if variable.dims in ((), EACH) else f"largest {variable.kind}, {unit}",
+                "value": value,
+                "decimals": variable.studio,
+                "sensor": labels[0] if variable.name == "amplitude" else None,
+                "alarm": variable.name == "smallest_gap" and value is not None and value <= 0.0,
+            }
+        )
+    return rows
 
 
 def _gap(gap: Gap, profile: SpinProfile) -> dict[str, Any]:
@@ -217,15 +250,12 @@ def _arrow(
 ) -> dict[str, Any]:
     """Return what a number does when it is moved up by a hundredth of its slider."""
     up = math.copysign(1.0, step)
-    unit = machine.numbers[key].unit
-    before, after = _measures(machine, main), _measures(machine, run)
-    changes = {
-        name: [_difference(a, b, up) for a, b in zip(after[name], before[name], strict=True)]
-        for name in ("amplitude", "detergent", "gasket_force", "gasket_moment", "mount_peak")
-    }
-    wider, gap = (of["gap"]["distance"] if of["gap"] else None for of in (after, before))
-    changes["gap"] = [_difference(wider, gap, up)]
-    return {"key": key, "step": unit.from_si(abs(step)), **changes}
+    unit = machine.sliders[key].unit
+    before, after = (_measures(machine, one)["rows"] for one in (main, run))
+    changes = [
+        _difference(now["value"], was["value"], up) for now, was in zip(after, before, strict=True)
+    ]
+    return {"key": key, "step": unit.from_si(abs(step)), "changes": changes}
 
 
 def _difference(after: float | None, before: float | None, up: float) -> float | None:
@@ -272,28 +302,28 @@ def _envelopes(record: Record, displacement: FloatArray) -> list[dict[str, Any]]
     They are `measures.envelopes`, which are lines from peak to peak, without the samples between.
     """
     time = np.rint(record.time.values * MS_PER_S).astype(int)
-    found: list[dict[str, Any]] = []
+    corners: list[dict[str, Any]] = []
     for column in displacement.T:
         sides: dict[str, Any] = {}
         if np.isnan(column[0]):  # too short to be filtered
-            found.append({"upper": [[], []], "lower": [[], []]})
+            corners.append({"upper": [[], []], "lower": [[], []]})
             continue
         for name, sign in (("upper", 1.0), ("lower", -1.0)):
             at = find_peaks(sign * column)[0]
             at = at if len(at) else np.arange(len(column))
             sides[name] = [time[at].tolist(), _whole(column[at])]
-        found.append(sides)
-    return found
+        corners.append(sides)
+    return corners
 
 
 def _orbits(record: Record, largest: int) -> list[dict[str, Any]]:
     depths = record.sensor_point.values[:, 1]
     window = orbit_window(record, largest, ORBIT_REVOLUTIONS)
-    found = []
+    orbits = []
     for y in (float(depths.min()), float(depths.max())):
         path = axis_path_mm(record, y)[window] / MM_PER_M
-        found.append({"y": y * MM_PER_M, "x": _whole(path[:, 0]), "z": _whole(path[:, 2])})
-    return found
+        orbits.append({"y": y * MM_PER_M, "x": _whole(path[:, 0]), "z": _whole(path[:, 2])})
+    return orbits
 
 
 def _forces(record: Record) -> dict[str, Any]:

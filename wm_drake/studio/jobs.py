@@ -17,21 +17,11 @@ from typing import Any
 
 from wm_drake.errors import input_error, reason_of
 from wm_drake.report.provenance import now
+from wm_drake.studies.study import STUDIES
+from wm_drake.studio.forms import arguments
 from wm_drake.studio.machines import Machines, OpenMachine
 from wm_drake.studio.saving import chosen, write_machine
 from wm_drake.studio.state import State
-
-OPTIONS = {
-    "gasket": {
-        "--trials": "[0-9]{1,6}",
-        "--design": "d-optimal|orthogonal",
-        "--model": "main|main\\+2fi",
-        "--load": "[\\w-]+",
-    },
-    "tolerance": {"--samples": "[0-9]{1,6}", "--sensitivity": "[0-9]{1,6}", "--subset": "[0-9]+"},
-    "spin-cycle": {"--case": "[\\w-]+"},
-}
-"""Studies that a page may start, with the options that it may give and their form."""
 
 MOST_RUNNING = 4
 """Largest number of studies that run at a time."""
@@ -39,7 +29,7 @@ MOST_RUNNING = 4
 LONGEST_OUTPUT = 20_000
 """Number of characters at the end of the output that a page gets."""
 
-_IDENTIFIER = re.compile(r"[a-z-]{1,20}-[0-9]{1,6}")
+_IDENTIFIER = re.compile(r"[a-z0-9_-]{1,60}-[0-9]{1,6}")
 _PROGRESS = re.compile(r"([0-9]+) of ([0-9]+)")
 
 
@@ -69,7 +59,7 @@ class Jobs:
             InputError: there is no such study or option, a number is wrong, too many studies run,
                 or the folder cannot be written.
         """
-        arguments = _arguments(study, options)
+        words = arguments(study, options)
         if sum(self._runs(identifier) for identifier in self._running) >= MOST_RUNNING:
             raise input_error(f"{MOST_RUNNING} studies run already; wait or cancel one", key=study)
         parameters = chosen(machine, state)
@@ -78,7 +68,7 @@ class Jobs:
             identifier = self._new_folder(study)
             folder = self.folder / identifier
             write_machine(folder / "machine.yaml", base, parameters, machine)
-            command = ["study", study, "--machine", "machine.yaml", "--out", "results", *arguments]
+            command = ["study", study, "--machine", "machine.yaml", "--out", "results", *words]
             about = {"study": study, "command": command, "started": now(), "machine": state.machine}
             (folder / "job.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
             self._launch(identifier, command)
@@ -97,7 +87,7 @@ class Jobs:
         about = self._about(identifier)
         if self._runs(identifier):
             raise input_error("runs already", key=identifier)
-        again = [] if about["study"] == "spin-cycle" else ["--resume"]
+        again = ["--resume"] if STUDIES[about["study"]].has_runs else []
         self._launch(identifier, [*about["command"], *again])
 
     def cancel(self, identifier: str) -> None:
@@ -113,8 +103,8 @@ class Jobs:
 
     def listed(self) -> list[dict[str, Any]]:
         """Return all studies of the folder, the latest first."""
-        found = [p.parent.name for p in self.folder.glob("*/job.json")]
-        known = [name for name in found if _IDENTIFIER.fullmatch(name)]
+        names = [p.parent.name for p in self.folder.glob("*/job.json")]
+        known = [name for name in names if _IDENTIFIER.fullmatch(name)]
         shown = [self.shown(identifier) for identifier in known]
         return sorted(shown, key=lambda job: (job["started"], job["number"]), reverse=True)
 
@@ -201,31 +191,11 @@ class Jobs:
             if _IDENTIFIER.fullmatch(identifier):
                 text = (self.folder / identifier / "job.json").read_text(encoding="utf-8")
                 about = json.loads(text)
-                if about["study"] in OPTIONS and {"command", "started", "machine"} <= set(about):
+                if about["study"] in STUDIES and {"command", "started", "machine"} <= set(about):
                     return dict(about)
         except (OSError, ValueError, KeyError, TypeError):
             pass
         raise input_error(f"no study '{identifier}'", key="study")
-
-
-def _arguments(study: str, options: dict[str, str]) -> list[str]:
-    """Return options of a study as arguments, after checking their form.
-
-    Raises:
-        InputError: there is no such study or option, or a value has another form.
-    """
-    if study not in OPTIONS:
-        raise input_error(f"no study '{study}'; allowed are {', '.join(OPTIONS)}", key="study")
-    found = []
-    for name, text in options.items():
-        form = OPTIONS[study].get(name)
-        if form is None:
-            allowed = ", ".join(OPTIONS[study])
-            raise input_error(f"no option of 'study {study}' here; allowed are {allowed}", key=name)
-        if not re.fullmatch(form, text):
-            raise input_error(f"'{text}' is not allowed", key=name)
-        found.append(f"{name}={text}")
-    return found
 
 
 def _end_of(path: Path) -> str:

@@ -2,22 +2,20 @@
 
 import threading
 from collections.abc import Mapping
-from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame
 
 from wm_drake.batch.work_items import Preparation
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
-from wm_drake.model.bodies import frame_names, with_sdf_values
+from wm_drake.model.bodies import with_sdf_values
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.model.same_elements import check_same_elements
 from wm_drake.model.scene import Outline, Scene
+from wm_drake.model.sdf_names import sdf_names
 from wm_drake.parameters import (
     MachineParameters,
     load_machine,
@@ -25,10 +23,12 @@ from wm_drake.parameters import (
     shipped_machines,
     with_values,
 )
+from wm_drake.parameters.variation import value_at
 from wm_drake.simulation.cases import Case, case_of
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.runs import checked_integrator, checked_step
-from wm_drake.studio.numbers import Number, numbers_of
+from wm_drake.studio.numbers import Slider, sliders_of
+from wm_drake.studio.shared_values import SharedValues
 from wm_drake.studio.state import DESCRIBED, State
 
 GIVEN = "given"
@@ -41,7 +41,7 @@ MOST_STEPS = 300_000
 """Largest number of steps of a run of a page."""
 
 MOST_BUILT = 4
-"""Largest number of machines that are built for one file; a built machine is never freed."""
+"""Largest number of machines that are built for one file."""
 
 MOST_OPEN = 16
 """Largest number of machines that are kept open."""
@@ -60,8 +60,7 @@ class Machines:
 
     given: str
     folder: Path
-    _open: dict[tuple[Path, int], "Future[OpenMachine]"] = field(default_factory=dict)
-    _lock: threading.Lock = field(default_factory=threading.Lock)
+    _open: "SharedValues[OpenMachine]" = field(default_factory=lambda: SharedValues(MOST_OPEN))
 
     def listed(self) -> dict[str, str]:
         """Return the kind of each machine that can be opened, by identifier: given first."""
@@ -105,33 +104,12 @@ class Machines:
             key = path.resolve(), path.stat().st_mtime_ns
         except OSError:
             raise input_error("this file is gone", where=identifier, key="machine") from None
-        with self._lock:  # not held while a machine is built: other pages go on
-            is_new = key not in self._open
-            future = self._open.setdefault(key, Future())
-        if is_new:
-            self._open_into(future, key, name)
-        return future.result()
-
-    def _open_into(
-        self, future: "Future[OpenMachine]", key: tuple[Path, int], name: str | Path
-    ) -> None:
-        """Open a machine and give it, or the error, to all that wait for it."""
-        try:
-            future.set_result(self._opened(load_machine(name)))
-        except BaseException as error:
-            with self._lock:
-                self._open.pop(key, None)  # the next page tries again
-            future.set_exception(error)
-        with self._lock:
-            while len(self._open) > MOST_OPEN:
-                del self._open[next(iter(self._open))]
+        return self._open.get(key, lambda: self._opened(load_machine(name)))
 
     def _opened(self, parameters: MachineParameters) -> "OpenMachine":
         """Return a machine, built anew only if no open one has the same elements."""
         checked_step(parameters, None)
-        with self._lock:
-            ready = [f for f in self._open.values() if f.done() and f.exception() is None]
-        for other in (future.result() for future in ready):
+        for other in self._open.ready():
             try:
                 check_same_elements(other.machine.parameters, parameters)
             except InputError:
@@ -158,18 +136,19 @@ class OpenMachine:
     lock: threading.Lock = field(default_factory=threading.Lock)
     _preparations: dict[tuple[int, float, str], Preparation] = field(default_factory=dict)
     _others: list[Machine] = field(default_factory=list)
-    _numbers: dict[str, Number] = field(default_factory=dict)
+    _sliders: dict[str, Slider] = field(default_factory=dict)
     _measured: list[pd.DataFrame] = field(default_factory=list)
 
     @property
-    def numbers(self) -> Mapping[str, Number]:
-        """Return all numbers that can be moved, by key path; those of the SDF among them."""
-        if not self._numbers:
+    def sliders(self) -> Mapping[str, Slider]:
+        """Return a slider for each number that can be moved, by key path; also for the SDF's."""
+        if not self._sliders:
             plant, parts = self.machine.plant, ("mass", "centre_of_mass")
-            keys = [f"bodies.{body}.{part}" for body in _moving_links(plant) for part in parts]
-            keys += [f"frames.{name}" for name in _movable_frames(plant)]
-            self._numbers.update(numbers_of(with_sdf_values(plant, self.parameters, keys)))
-        return self._numbers
+            names = sdf_names(plant)
+            keys = [f"bodies.{link}.{part}" for link in names.links for part in parts]
+            keys += [f"frames.{name}" for name in names.movable_frames]
+            self._sliders.update(sliders_of(with_sdf_values(plant, self.parameters, keys)))
+        return self._sliders
 
     def preparation(self, parameters: MachineParameters) -> Preparation:
         """Return the preparation of runs with the step and the integrator of some parameters."""
@@ -199,7 +178,7 @@ class OpenMachine:
         """Return the machine with other numbers.
 
         Args:
-            values: Texts with units by key path, those of `numbers` or of whole vectors.
+            values: Texts with units by key path, those of `sliders` or of whole vectors.
 
         Raises:
             InputError: one problem for each number that is wrong, in the words of `machine check`.
@@ -225,19 +204,18 @@ class OpenMachine:
             InputError: the new value is not allowed.
         """
         with_sdf = with_sdf_values(self.machine.plant, parameters, [key])
-        value = _value_at(with_sdf, key)
-        return with_values(with_sdf, {key: value + step})
+        return with_values(with_sdf, {key: value_at(with_sdf, key) + step})
 
     def _with(self, parameters: MachineParameters, values: Mapping[str, str]) -> MachineParameters:
         for key in values:
-            if not any(key in (known, known.rpartition(".")[0]) for known in self.numbers):
+            if not any(key in (known, known.rpartition(".")[0]) for known in self.sliders):
                 raise input_error(
-                    f"'{key}' is not a number of the machine{nearest_names(key, self.numbers)}",
+                    f"'{key}' is not a number of the machine{nearest_names(key, self.sliders)}",
                     key=key,
                 )
         given: dict[str, str | float] = {
-            key: number.in_si(text)
-            if (number := self.numbers.get(key)) is not None and number.is_entry
+            key: slider.number.resolved(text)
+            if (slider := self.sliders.get(key)) is not None and slider.is_entry
             else text
             for key, text in values.items()
         }
@@ -263,9 +241,9 @@ class OpenMachine:
         """Return the moved numbers of a case in their display units, by key path."""
         assert case.parameters is not None  # a page's case has parameters of its own
         return {
-            key: self.numbers[key].unit.from_si(_value_at(case.parameters, key))
+            key: self.sliders[key].unit.from_si(value_at(case.parameters, key))
             for key in state.values
-            if key in self.numbers
+            if key in self.sliders
         }
 
     def measured(self, state: State) -> list[dict[str, object]]:
@@ -286,7 +264,7 @@ class OpenMachine:
         """Return all that a page needs to know of the machine before the first run."""
         parameters = self.parameters
         with self.lock:
-            numbers = [number.for_page() for number in self.numbers.values()]
+            numbers = [slider.for_page() for slider in self.sliders.values()]
             shapes = {
                 body: [_shape(name, of) for name, of in outlines.items()]
                 for body, outlines in (
@@ -318,34 +296,6 @@ def _shape(name: str, outline: Outline) -> dict[str, object]:
 
 def _by_sensor(row: Mapping[Any, Any], parameters: MachineParameters) -> dict[str, float]:
     return {name: float(row[name]) for name in parameters.sensors}
-
-
-def _moving_links(plant: MultibodyPlant) -> list[str]:
-    """Return the links whose mass can be changed: those that are not fixed to the world."""
-    fixed = {body.index() for body in plant.GetBodiesWeldedTo(plant.world_body())}
-    model = plant.GetBodyByName("tub").model_instance()
-    bodies = [plant.get_body(index) for index in plant.GetBodyIndices(model)]
-    return [body.name() for body in bodies if body.index() not in fixed]
-
-
-def _movable_frames(plant: MultibodyPlant) -> list[str]:
-    """Return the frames of the SDF whose position can be changed."""
-    return [
-        name
-        for name in frame_names(plant)
-        if isinstance(plant.GetFrameByName(name), FixedOffsetFrame)
-    ]
-
-
-def _value_at(parameters: MachineParameters, key: str) -> float:
-    """Return the number at a key path, an entry of a vector or table too. SI."""
-    node: Any = parameters
-    for part in key.split("."):
-        if isinstance(node, tuple):
-            node = node[int(part)]
-        else:
-            node = node[part] if isinstance(node, dict) else getattr(node, part)
-    return float(node)
 
 
 def is_same(built: Machine, parameters: MachineParameters) -> bool:

@@ -3,17 +3,14 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BaseModel, TypeAdapter, ValidationError
-
-from wm_drake.errors import InputError, Problem
 from wm_drake.parameters import MachineParameters, quantities, source_of
 from wm_drake.parameters.allowed import AllowedRange, allowed_range
 from wm_drake.parameters.keys import is_index
 from wm_drake.parameters.plausibility import UsualRange, usual_range
-from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.units import Unit
+from wm_drake.parameters.variation import Number
 
 NOT_MOVED = ("gravity",)
 """Numbers that a built machine cannot change."""
@@ -29,22 +26,18 @@ VECTORS = ("position", "centre_of_mass", "angles")
 
 
 @dataclass(frozen=True)
-class Number:
-    """One number of a machine.
+class Slider:
+    """A number of a machine with a range, in which a page moves it.
 
     Attributes:
-        key: Key path; of a vector or a table, that of one of its entries.
-        value: Value in SI units.
-        unit: Its unit.
+        number: The number; of a vector or a table, one of its entries.
         low, high: Ends of the slider, in the display unit.
         allowed, usual: Ranges; None if there is no usual one.
         source: Where the value comes from.
         is_entry: Whether it is an entry of a vector or a table.
     """
 
-    key: str
-    value: float
-    unit: Unit
+    number: Number
     low: float
     high: float
     allowed: AllowedRange
@@ -53,21 +46,19 @@ class Number:
     is_entry: bool
 
     @property
+    def key(self) -> str:
+        """Key path of the number."""
+        return self.number.key
+
+    @property
+    def unit(self) -> Unit:
+        """Unit of the number."""
+        return self.number.unit
+
+    @property
     def step(self) -> float:
         """One hundredth of the slider, in SI units."""
         return (self.high - self.low) / 100.0 / self.unit.from_si(1.0)
-
-    def in_si(self, text: str) -> float:
-        """Return a text with a unit as an SI value.
-
-        Raises:
-            InputError: the text is not a number with a fitting unit.
-        """
-        try:
-            return float(TypeAdapter(Annotated[float, self.unit]).validate_python(text))
-        except ValidationError as error:
-            found = problems_of(error, BaseModel)
-            raise InputError(Problem("", self.key, p.message) for p in found) from None
 
     def for_page(self) -> dict[str, Any]:
         """Return the number as the page shows it; `short` is unique enough for a narrow column."""
@@ -84,8 +75,8 @@ class Number:
             "group": " · ".join(parents).replace("_", " ") or "machine",
             "label": label,
             "short": f"{last} {label}".strip(),
-            "unit": _plain(self.unit),
-            "value": self.unit.from_si(self.value),
+            "unit": self.unit.label,
+            "value": self.unit.from_si(float(self.number.nominal or 0.0)),
             "low": self.low,
             "high": self.high,
             "allowed": self._allowed_in_words(),
@@ -94,27 +85,23 @@ class Number:
         }
 
     def _allowed_in_words(self) -> str:
-        allowed, words = self.allowed, []
-        if math.isfinite(allowed.low):
-            end = self.unit.from_si(allowed.low)
-            words.append(f"{'≥' if allowed.low_is_in else '>'} {end:g}")
-        if math.isfinite(allowed.high):
-            end = self.unit.from_si(allowed.high)
-            words.append(f"{'≤' if allowed.high_is_in else '<'} {end:g}")
-        return " and ".join(words)
+        limits = self.allowed.limits()
+        signs = {">=": "≥", "<=": "≤"}
+        ends = (f"{signs.get(sign, sign)} {self.unit.from_si(end):g}" for sign, end in limits)
+        return " and ".join(ends)
 
 
-def numbers_of(parameters: MachineParameters) -> dict[str, Number]:
-    """Return the numbers of a machine that can be moved, by key path.
+def sliders_of(parameters: MachineParameters) -> dict[str, Slider]:
+    """Return a slider for each number of a machine that can be moved, by key path.
 
     Args:
         parameters: The machine, with the values of the SDF that are to be moved too.
     """
-    found = sorted(_numbers(parameters), key=lambda number: number.key.startswith(LAST))
-    return {number.key: number for number in found}
+    listed = sorted(_sliders(parameters), key=lambda slider: slider.key.startswith(LAST))
+    return {slider.key: slider for slider in listed}
 
 
-def _numbers(parameters: MachineParameters) -> Iterator[Number]:
+def _sliders(parameters: MachineParameters) -> Iterator[Slider]:
     for key, value, unit in quantities(parameters):
         if key in NOT_MOVED:
             continue
@@ -122,11 +109,11 @@ def _numbers(parameters: MachineParameters) -> Iterator[Number]:
         source, is_tuple = source_of(parameters, key), isinstance(value, tuple)
         entries = [(f"{key}.{i}", v) for i, v in enumerate(value)] if is_tuple else [(key, value)]
         for path, entry in entries:
-            low, high = _slider(unit.from_si(entry), unit, allowed, usual)
-            yield Number(path, entry, unit, low, high, allowed, usual, source, is_tuple)
+            low, high = _ends(unit.from_si(entry), unit, allowed, usual)
+            yield Slider(Number(path, entry, unit), low, high, allowed, usual, source, is_tuple)
 
 
-def _slider(
+def _ends(
     shown: float, unit: Unit, allowed: AllowedRange, usual: UsualRange | None
 ) -> tuple[float, float]:
     """Return the ends of a slider, in the display unit.
@@ -140,7 +127,3 @@ def _slider(
         high = 0.1 * usual.high if usual is not None else 1.0
         return (0.0 if allowed.low == 0.0 else -high), high
     return min(0.5 * shown, 2.0 * shown), max(0.5 * shown, 2.0 * shown)
-
-
-def _plain(unit: Unit) -> str:
-    return unit.shown.replace("*", " ")

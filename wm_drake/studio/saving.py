@@ -68,8 +68,8 @@ def chosen(machine: OpenMachine, state: State) -> MachineParameters:
     parameters = machine.moved(state.values)
     sources = dict(parameters.sources)
     for key in state.values:
-        number = machine.numbers.get(key)
-        whole = key.rpartition(".")[0] if number is not None and number.is_entry else key
+        slider = machine.sliders.get(key)
+        whole = key.rpartition(".")[0] if slider is not None and slider.is_entry else key
         sources[whole] = f"set in wm-drake studio, {now()}"
     changes: dict[str, Any] = {"sources": sources}
     if state.masses:
@@ -113,11 +113,11 @@ def write_machine(
         raise input_error(f"cannot be written to: {reason_of(error)}", where=str(path)) from None
 
 
-def _check_same(read: MachineParameters, wanted: MachineParameters) -> None:
+def _check_same(read: MachineParameters, expected: MachineParameters) -> None:
     """Raise InputError if a file that was just written does not give the machine."""
     trees = [
         parameters.model_dump(exclude={"name", "about", "measured", "published", "sources"})
-        for parameters in (read, wanted)
+        for parameters in (read, expected)
     ]
     differ = [key for key in trees[0] if trees[0][key] != trees[1].get(key)]
     if differ:

@@ -24,8 +24,9 @@ from wm_drake.batch.runs import Runner
 from wm_drake.errors import InputError, input_error
 from wm_drake.report.provenance import program
 from wm_drake.studio.answers import LANES, answer, arrows, influential_keys, runner_of
+from wm_drake.studio.forms import forms
 from wm_drake.studio.guard import Guard
-from wm_drake.studio.jobs import OPTIONS, Jobs
+from wm_drake.studio.jobs import Jobs
 from wm_drake.studio.machines import Machines, OpenMachine
 from wm_drake.studio.saving import ExistsAlreadyError, save_machine
 from wm_drake.studio.state import State, Text
@@ -98,9 +99,9 @@ class Studio:
         """Return the answer to a page."""
         begin = time.perf_counter(), time.thread_time()
         machine, runner = self.opened(state.machine)
-        found = answer(machine, runner, state, keys) | {"measured": machine.measured(state)}
+        answered = answer(machine, runner, state, keys) | {"measured": machine.measured(state)}
         passed = time.perf_counter() - begin[0], time.thread_time() - begin[1]
-        return found | {"server_s": {"wall": passed[0], "cpu": passed[1]}}
+        return answered | {"server_s": {"wall": passed[0], "cpu": passed[1]}}
 
     async def ranking(self, state: State) -> list[dict[str, Any]]:
         """Return the arrows of all numbers that influence a run; pages share the work."""
@@ -117,11 +118,11 @@ class Studio:
         take = partial(self.turns.take, f"ranking {key}", background=True)
         machine, runner = await take(lambda: self.opened(state.machine))
         keys = await take(partial(influential_keys, machine, state))
-        found: list[dict[str, Any]] = []
+        effects: list[dict[str, Any]] = []
         for begin in range(0, len(keys), LANES):
             part = keys[begin : begin + LANES]
-            found += await take(partial(arrows, machine, runner, state, part))
-        return found
+            effects += await take(partial(arrows, machine, runner, state, part))
+        return effects
 
     def end(self) -> None:
         """End all studies and threads."""
@@ -177,7 +178,7 @@ class _Routes:
                 "machines": [{"id": name, "kind": kind} for name, kind in listed.items()],
                 "first": machines.first,
                 "folder": str(machines.folder),
-                "studies": {study: list(options) for study, options in OPTIONS.items()},
+                "studies": forms(),
                 "program": program(),
             }
         )
@@ -193,27 +194,27 @@ class _Routes:
 
     async def run(self, request: Request) -> Response:
         """Run what a page has chosen; a request that is overtaken is dropped."""
-        asked = RunRequest.model_validate_json(await request.body())
+        body = RunRequest.model_validate_json(await request.body())
         try:
-            run = partial(self.studio.run, asked.state, asked.keys)
-            return _json(await self.studio.turns.take(f"page {asked.page}", run))
+            run = partial(self.studio.run, body.state, body.keys)
+            return _json(await self.studio.turns.take(f"page {body.page}", run))
         except OvertakenError:
             return _json({"overtaken": True})
 
     async def ranking(self, request: Request) -> Response:
         """Return the arrows of all numbers that influence a run."""
-        asked = RunRequest.model_validate_json(await request.body())
-        return _json({"arrows": await self.studio.ranking(asked.state)})
+        body = RunRequest.model_validate_json(await request.body())
+        return _json({"arrows": await self.studio.ranking(body.state)})
 
     async def save(self, request: Request) -> Response:
         """Save a machine file."""
-        asked = SaveRequest.model_validate_json(await request.body())
+        body = SaveRequest.model_validate_json(await request.body())
 
         def save() -> str:
-            machine, _ = self.studio.opened(asked.state.machine)
+            machine, _ = self.studio.opened(body.state.machine)
             with machine.lock:
                 return save_machine(
-                    self.studio.machines, machine, asked.state, asked.name, asked.overwrite
+                    self.studio.machines, machine, body.state, body.name, body.overwrite
                 ).name
 
         return _json({"saved": await _in_thread(save)})
@@ -224,13 +225,13 @@ class _Routes:
 
     async def start(self, request: Request) -> Response:
         """Start a study."""
-        asked = StudyRequest.model_validate_json(await request.body())
+        body = StudyRequest.model_validate_json(await request.body())
 
         def start() -> str:
-            machine, _ = self.studio.opened(asked.state.machine)
+            machine, _ = self.studio.opened(body.state.machine)
             with machine.lock:
                 return self.studio.jobs.start(
-                    self.studio.machines, machine, asked.state, asked.study, asked.options
+                    self.studio.machines, machine, body.state, body.study, body.options
                 )
 
         return _json({"id": await _in_thread(start)})

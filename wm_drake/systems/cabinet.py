@@ -1,19 +1,16 @@
-"""A cabinet that moves: the frame that all mounts stand on, and its feet on the floor."""
+"""A cabinet that moves: the frame that all mounts stand on."""
 
 from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
 
 from wm_drake.elements.cabinet import (
-    FLOOR_FORCE_SIZE,
-    SLIP_SIZE,
-    evaluate_feet,
     evaluate_mounts_on_cabinet,
     evaluate_tub_in_cabinet,
 )
 from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE
-from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.element_system import ElementSystem, define_system, empty, evaluator
+from wm_drake.systems.callbacks import NO_SLOTS, callback
+from wm_drake.systems.scalars import define_system, empty, evaluator
 
 
 @define_system("Cabinet_", __name__)
@@ -34,6 +31,8 @@ def Cabinet_(T: type) -> Any:
         on cabinet and drum, in W.
         """
 
+        __slots__ = NO_SLOTS
+
         def _construct(self, converter: Any = None) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             self._seen = evaluator(evaluate_tub_in_cabinet, T)
@@ -45,12 +44,12 @@ def Cabinet_(T: type) -> Any:
             )
             state = self._state.ticket()
             self.DeclareVectorOutputPort(
-                "tub_in_cabinet", PLANT_STATE_SIZE, self._calc_seen, {state}
+                "tub_in_cabinet", PLANT_STATE_SIZE, callback(self._calc_seen), {state}
             )
             self.DeclareVectorOutputPort(
                 "generalized_force",
                 2 * GENERALIZED_FORCE_SIZE,
-                self._calc_force,
+                callback(self._calc_force),
                 {state, self._on_tub.ticket(), self._on_feet.ticket()},
             )
 
@@ -73,37 +72,3 @@ def Cabinet_(T: type) -> Any:
 
 
 Cabinet = Cabinet_[None]
-
-
-@define_system("Feet_", __name__)
-def Feet_(T: type) -> Any:
-    """Return the class Feet for a scalar type."""
-
-    class Feet(ElementSystem, LeafSystem_[T]):
-        """Four feet of a cabinet on the floor; laws `pad_normal_force` and `pad_friction`.
-
-            plant_state (14) ──▶ [ Feet           ] ──▶ generalized_force (7) [N m, N]
-                                 [ (state: slips) ] ──▶ floor_force (12) on each foot, in W [N]
-                                                    ──▶ state (8) how far each has slid, x, y [m]
-
-        The plant state is that of cabinet and drum, and the generalized force acts on them.
-        """
-
-        def _construct(self, parameters: FloatArray, converter: Any = None) -> None:
-            LeafSystem_[T].__init__(self, converter=converter)
-            self.declare_element(
-                T,
-                evaluate_feet,
-                parameters,
-                {"floor_force": slice(0, FLOOR_FORCE_SIZE)},
-                state_size=SLIP_SIZE,
-            )
-
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other.packed, converter=converter)
-
-    Impl = Feet
-    return Feet
-
-
-Feet = Feet_[None]

@@ -1,4 +1,4 @@
-"""Speed controller, motor and belt of a drive, and the friction of the drum's bearing.
+"""Speed controller, motor and belt of a drive.
 
 spin profile ──▶ [ SpeedController ] ──demand──▶ [ Motor ] ──torque──▶ [ Belt ] ──▶ drum
                       ▲        ▲                  │     ▲                │   ▲
@@ -9,34 +9,18 @@ spin profile ──▶ [ SpeedController ] ──demand──▶ [ Motor ] ─�
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import BasicVector_, LeafSystem_, NumericParameterIndex
+from pydrake.systems.framework import LeafSystem_
 
-from wm_drake.elements.motor import evaluate_controller, evaluate_drum_friction, evaluate_motor
+from wm_drake.elements.motor import evaluate_controller, evaluate_motor
 from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.element_system import ElementSystem, define_system, empty, evaluator
+from wm_drake.systems.callbacks import NO_SLOTS, callback
+from wm_drake.systems.scalars import Packed, define_system, empty, evaluator
 
 
-class _Packed:
-    """Mixin of systems whose packed numbers are one numeric parameter of the Context."""
-
-    def declare_numbers(self, scalar: type, packed: FloatArray) -> Any:
-        """Declare the parameter and return its ticket."""
-        system: Any = self
-        self.packed = packed  # a scalar-converted copy is constructed from these
-        self._numbers = system.DeclareNumericParameter(BasicVector_[scalar](packed))
-        return system.numeric_parameter_ticket(NumericParameterIndex(self._numbers))
-
-    def set_parameters(self, context: Any, packed: FloatArray) -> None:
-        """Set the packed numbers in the system's own Context."""
-        context.get_mutable_numeric_parameter(self._numbers).SetFromVector(packed)
-
-    def packed_numbers(self, context: Any) -> Any:
-        """Return the packed numbers in the system's own Context."""
-        return context.get_numeric_parameter(self._numbers).CopyToVector()
-
-
-class _Controller(_Packed):
+class _Controller(Packed):
     """Methods of the `SpeedController`, for both scalar types."""
+
+    __slots__ = NO_SLOTS
 
     def declare_controller(self, scalar: type, packed: FloatArray, sample_time: float) -> None:
         """Declare ports, state and events; `self` is a LeafSystem of the scalar type."""
@@ -44,19 +28,19 @@ class _Controller(_Packed):
         self.sample_time, self._scalar = sample_time, scalar
         self._evaluate = evaluator(evaluate_controller, scalar)
         ticket = self.declare_numbers(scalar, packed)
-        self._profile, self._wanted, self._speed, self._limit = (
+        self._profile, self._reference, self._speed, self._limit = (
             system.DeclareVectorInputPort(name, 1)
             for name in ("profile_speed", "speed_reference", "drum_speed", "torque_limit")
         )
         if sample_time:
             system.DeclareDiscreteState(2)
-            system.DeclarePeriodicDiscreteUpdateEvent(sample_time, 0.0, self._sample)
+            system.DeclarePeriodicDiscreteUpdateEvent(sample_time, 0.0, callback(self._sample))
             needs = {system.xd_ticket()}
         else:
             system.DeclareContinuousState(1)
-            inputs = self._profile, self._wanted, self._speed
+            inputs = self._profile, self._reference, self._speed
             needs = {ticket, system.xc_ticket(), *(port.ticket() for port in inputs)}
-        system.DeclareVectorOutputPort("demand", 1, self._calc_demand, needs)
+        system.DeclareVectorOutputPort("demand", 1, callback(self._calc_demand), needs)
 
     def reset(self, context: Any) -> None:
         """Set the controller's own Context to its state before a run: no torque."""
@@ -80,12 +64,12 @@ class _Controller(_Packed):
 
         The demand does not depend on the limit. To read it there would be an algebraic loop.
         """
-        wanted = self._wanted if self._wanted.HasValue(context) else self._profile
-        inputs, own = empty(4, self._scalar), empty(2, self._scalar)
-        inputs[:3] = integral, self._speed.Eval(context)[0], wanted.Eval(context)[0]
+        reference = self._reference if self._reference.HasValue(context) else self._profile
+        inputs, outputs = empty(4, self._scalar), empty(2, self._scalar)
+        inputs[:3] = integral, self._speed.Eval(context)[0], reference.Eval(context)[0]
         inputs[3] = self._limit.Eval(context)[0] if with_limit else 0.0 * integral
-        self._evaluate(inputs, self.packed_numbers(context), own)
-        return own
+        self._evaluate(inputs, self.packed_numbers(context), outputs)
+        return outputs
 
     def _calc_demand(self, context: Any, output: Any) -> None:
         if self.sample_time:
@@ -117,6 +101,8 @@ def SpeedController_(T: type) -> Any:
         part; a sampled one has it and the demand, which it holds, as discrete states.
         """
 
+        __slots__ = NO_SLOTS
+
         def _construct(self, packed: FloatArray, sample_time: float, converter: Any = None) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             self.declare_controller(T, packed, sample_time)
@@ -135,12 +121,14 @@ SpeedController = SpeedController_[None]
 def Motor_(T: type) -> Any:
     """Return the class Motor for a scalar type."""
 
-    class Motor(_Packed, LeafSystem_[T]):
+    class Motor(Packed, LeafSystem_[T]):
         """Motor with a torque limit over its speed; laws `torque_limit` and `limited`.
 
         demand (1) [N m]        ──▶ [ Motor ] ──▶ torque (1) at its shaft [N m]
         motor_speed (1) [rad/s] ──▶ [       ] ──▶ torque_limit (1) [N m]
         """
+
+        __slots__ = NO_SLOTS
 
         def _construct(self, packed: FloatArray, converter: Any = None) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
@@ -150,18 +138,18 @@ def Motor_(T: type) -> Any:
             self._speed = self.DeclareVectorInputPort("motor_speed", 1)
             needs = {ticket, self._speed.ticket()}
             self.DeclareVectorOutputPort(
-                "torque", 1, self._calc_torque, {self._demand.ticket(), *needs}
+                "torque", 1, callback(self._calc_torque), {self._demand.ticket(), *needs}
             )
-            self.DeclareVectorOutputPort("torque_limit", 1, self._calc_limit, needs)
+            self.DeclareVectorOutputPort("torque_limit", 1, callback(self._calc_limit), needs)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._construct(self, other.packed, converter=converter)
 
         def _response(self, context: Any, demand: Any) -> Any:
-            inputs, own = empty(2, T), empty(2, T)
+            inputs, outputs = empty(2, T), empty(2, T)
             inputs[:] = demand, self._speed.Eval(context)[0]
-            self._evaluate(inputs, self.packed_numbers(context), own)
-            return own
+            self._evaluate(inputs, self.packed_numbers(context), outputs)
+            return outputs
 
         def _calc_torque(self, context: Any, output: Any) -> None:
             output.SetFromVector(self._response(context, self._demand.Eval(context)[0])[:1])
@@ -180,7 +168,7 @@ Motor = Motor_[None]
 def Belt_(T: type) -> Any:
     """Return the class Belt for a scalar type."""
 
-    class Belt(_Packed, LeafSystem_[T]):
+    class Belt(Packed, LeafSystem_[T]):
         """Rigid belt without slip: the motor turns `belt_ratio` times as fast as the drum.
 
             drum_speed (1) [rad/s]  ──▶ [ Belt ] ──▶ motor_speed (1) [rad/s]
@@ -190,52 +178,30 @@ def Belt_(T: type) -> Any:
         is part of it (`wm_drake.model.rotor`).
         """
 
+        __slots__ = NO_SLOTS
+
         def _construct(self, packed: FloatArray, converter: Any = None) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             ticket = self.declare_numbers(T, packed)
             self._speed = self.DeclareVectorInputPort("drum_speed", 1)
             self._torque = self.DeclareVectorInputPort("motor_torque", 1)
-            for name, port in (("motor_speed", self._speed), ("drum_torque", self._torque)):
-                self.DeclareVectorOutputPort(
-                    name, 1, self._multiplied(port), {ticket, port.ticket()}
-                )
+            for name, port, calc in (
+                ("motor_speed", self._speed, self._calc_speed),
+                ("drum_torque", self._torque, self._calc_torque),
+            ):
+                self.DeclareVectorOutputPort(name, 1, callback(calc), {ticket, port.ticket()})
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._construct(self, other.packed, converter=converter)
 
-        def _multiplied(self, port: Any) -> Any:
-            def calc(context: Any, output: Any) -> None:
-                output.SetFromVector(self.packed_numbers(context) * port.Eval(context))
+        def _calc_speed(self, context: Any, output: Any) -> None:
+            output.SetFromVector(self.packed_numbers(context) * self._speed.Eval(context))
 
-            return calc
+        def _calc_torque(self, context: Any, output: Any) -> None:
+            output.SetFromVector(self.packed_numbers(context) * self._torque.Eval(context))
 
     Impl = Belt
     return Belt
 
 
 Belt = Belt_[None]
-
-
-@define_system("DrumFriction_", __name__)
-def DrumFriction_(T: type) -> Any:
-    """Return the class DrumFriction for a scalar type."""
-
-    class DrumFriction(ElementSystem, LeafSystem_[T]):
-        """Friction of the drum's bearing and seal; law `drum_friction`.
-
-        plant_state (14) ──▶ [ DrumFriction ] ──▶ generalized_force (7) [N m, N]
-                                              ──▶ torque (1) on the drum [N m]
-        """
-
-        def _construct(self, parameters: FloatArray, converter: Any = None) -> None:
-            LeafSystem_[T].__init__(self, converter=converter)
-            self.declare_element(T, evaluate_drum_friction, parameters, {"torque": slice(0, 1)})
-
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other.packed, converter=converter)
-
-    Impl = DrumFriction
-    return DrumFriction
-
-
-DrumFriction = DrumFriction_[None]

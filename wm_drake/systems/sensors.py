@@ -7,7 +7,8 @@ from pydrake.systems.framework import BasicVector_, LeafSystem_, NumericParamete
 from wm_drake.elements.motion import PLANT_STATE_SIZE
 from wm_drake.elements.sensor import POINT_SIZE, evaluate_sensors
 from wm_drake.parameters.types import FloatArray
-from wm_drake.systems.element_system import define_system, empty, evaluator
+from wm_drake.systems.callbacks import NO_SLOTS, callback
+from wm_drake.systems.scalars import define_system, empty, evaluator
 
 DETERGENT_SIZE = 3
 """The last three measured points are the point nearest the detergent box, along x, y, z."""
@@ -27,6 +28,8 @@ def Sensors_(T: type) -> Any:
         Displacements are from the rest pose of the empty machine.
         """
 
+        __slots__ = NO_SLOTS
+
         def _construct(self, points: FloatArray, converter: Any = None) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             self.points = points  # a scalar-converted copy is constructed from these
@@ -38,12 +41,14 @@ def Sensors_(T: type) -> Any:
                 self.numeric_parameter_ticket(NumericParameterIndex(self._index)),
             }
             sensors = len(points) - DETERGENT_SIZE
-            self.DeclareVectorOutputPort("displacement", sensors, self._calc_sensors, needs)
             self.DeclareVectorOutputPort(
-                "detergent_displacement", DETERGENT_SIZE, self._calc_detergent, needs
+                "displacement", sensors, callback(self._calc_sensors), needs
             )
             self.DeclareVectorOutputPort(
-                "drum_speed", 1, self._calc_drum_speed, {self._plant_state.ticket()}
+                "detergent_displacement", DETERGENT_SIZE, callback(self._calc_detergent), needs
+            )
+            self.DeclareVectorOutputPort(
+                "drum_speed", 1, callback(self._calc_drum_speed), {self._plant_state.ticket()}
             )
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:

@@ -4,7 +4,8 @@ from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
 
-from wm_drake.systems.element_system import define_system
+from wm_drake.systems.callbacks import NO_SLOTS, callback
+from wm_drake.systems.scalars import define_system
 
 REFLECTED_INERTIA = 1e8
 """Inertia of the drive at the drum joint. [kg m^2] Not physical: it enters only the diagonal of the
@@ -26,19 +27,23 @@ def SpeedSource_(T: type) -> Any:
         that of `profile_acceleration`. [rad/s^2]
         """
 
+        __slots__ = NO_SLOTS
+
         def _construct(self, converter: Any = None) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             self._profile = self.DeclareVectorInputPort("profile_acceleration", 1)
-            self._wanted = self.DeclareVectorInputPort("drum_acceleration", 1)
-            needs = {self._profile.ticket(), self._wanted.ticket()}
-            self.DeclareVectorOutputPort("actuation", 1, self._calc_actuation, needs)
+            self._acceleration = self.DeclareVectorInputPort("drum_acceleration", 1)
+            needs = {self._profile.ticket(), self._acceleration.ticket()}
+            self.DeclareVectorOutputPort("actuation", 1, callback(self._calc_actuation), needs)
 
         def _construct_copy(self, _: Any, converter: Any = None) -> None:
             Impl._construct(self, converter=converter)
 
         def _calc_actuation(self, context: Any, output: Any) -> None:
-            wanted = self._wanted if self._wanted.HasValue(context) else self._profile
-            output.SetFromVector(REFLECTED_INERTIA * wanted.Eval(context))
+            acceleration = (
+                self._acceleration if self._acceleration.HasValue(context) else self._profile
+            )
+            output.SetFromVector(REFLECTED_INERTIA * acceleration.Eval(context))
 
     Impl = SpeedSource
     return SpeedSource
@@ -60,13 +65,15 @@ def MotorTorque_(T: type) -> Any:
         torque = actuation - J vdot, with the reflected inertia J of the drive.
         """
 
+        __slots__ = NO_SLOTS
+
         def _construct(self, size: int, drum: int, converter: Any = None) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             self._size, self._drum = size, drum
             self._actuation = self.DeclareVectorInputPort("actuation", 1)
             self._rates = self.DeclareVectorInputPort("generalized_acceleration", size)
             needs = {self._actuation.ticket(), self._rates.ticket()}
-            self.DeclareVectorOutputPort("torque", 1, self._calc_torque, needs)
+            self.DeclareVectorOutputPort("torque", 1, callback(self._calc_torque), needs)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._construct(self, other._size, other._drum, converter=converter)

@@ -8,7 +8,8 @@ from pydrake.systems.framework import AbstractParameterIndex, LeafSystem_
 
 from wm_drake.elements.spin_profile import drum_acceleration, drum_motion
 from wm_drake.parameters import SpinProfile
-from wm_drake.systems.element_system import define_system
+from wm_drake.systems.callbacks import NO_SLOTS, callback
+from wm_drake.systems.scalars import define_system
 
 
 @define_system("SpinProfileSource_", __name__)
@@ -28,6 +29,8 @@ def SpinProfileSource_(T: type) -> Any:
         the speed is constant.
         """
 
+        __slots__ = NO_SLOTS
+
         def _construct(self, profile: SpinProfile, converter: Any = None) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             self.profile = profile  # a scalar-converted copy is constructed from it
@@ -36,8 +39,10 @@ def SpinProfileSource_(T: type) -> Any:
                 self.time_ticket(),
                 self.abstract_parameter_ticket(AbstractParameterIndex(self._index)),
             }
-            self.DeclareVectorOutputPort("acceleration", 1, self._calc_acceleration, needs)
-            self.DeclareVectorOutputPort("speed", 1, self._calc_speed, needs)
+            self.DeclareVectorOutputPort(
+                "acceleration", 1, callback(self._calc_acceleration), needs
+            )
+            self.DeclareVectorOutputPort("speed", 1, callback(self._calc_speed), needs)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._construct(self, other.profile, converter=converter)

@@ -5,7 +5,8 @@ from typing import Any
 from pydrake.systems.framework import LeafSystem_
 
 from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE
-from wm_drake.systems.element_system import define_system
+from wm_drake.systems.callbacks import NO_SLOTS, callback
+from wm_drake.systems.scalars import define_system
 
 
 @define_system("TubForce_", __name__)
@@ -20,11 +21,16 @@ def TubForce_(T: type) -> Any:
         `tub_force` is moment about To and force on the tub, in W. [N m, N]
         """
 
+        __slots__ = NO_SLOTS
+
         def _construct(self, converter: Any = None) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             self._force = self.DeclareVectorInputPort("tub_force", GENERALIZED_FORCE_SIZE - 1)
             self.DeclareVectorOutputPort(
-                "generalized_force", GENERALIZED_FORCE_SIZE, self._calc, {self._force.ticket()}
+                "generalized_force",
+                GENERALIZED_FORCE_SIZE,
+                callback(self._calc),
+                {self._force.ticket()},
             )
 
         def _construct_copy(self, _: Any, converter: Any = None) -> None:

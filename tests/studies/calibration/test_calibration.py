@@ -14,7 +14,7 @@ from wm_drake.parameters import SpinProfile, load_machine
 from wm_drake.parameters.files import yaml_text
 from wm_drake.parameters.free import Measured, load_free
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
-from wm_drake.studies.calibration.computed import Evaluation
+from wm_drake.studies.calibration.computed import Evaluation, Runner
 from wm_drake.studies.calibration.fewer import fewer_table, fit_with_fewer
 from wm_drake.studies.calibration.outcome import (
     amplitude_rows,
@@ -26,6 +26,7 @@ from wm_drake.studies.calibration.parameter_map import parameter_map_of
 from wm_drake.studies.calibration.prediction import check_held_out, predict, prediction_table
 from wm_drake.studies.calibration.solutions import Solution, distinct
 from wm_drake.studies.calibration.targets import Targets, targets_of
+from wm_drake.studies.fitting.posterior import Posterior
 
 FREE = """
 quantities:
@@ -289,11 +290,13 @@ def test_expected_preload_is_prior_not_data(short, tmp_path):
     free = free_file(tmp_path, PRELOAD + FREE)
     targets = Targets((("middle", True),), ("Xr",) * 6, np.full((1, 6), 0.01), np.ones((1, 6)))
     with open_ledger(tmp_path / "ledger.sqlite", {"study": "test"}) as ledger:
-        (found,) = calibrate(short, free, targets, Plan(starts=1, iterations=1), ledger).ended
-    assert found.slopes.shape == (6, 3)
+        (found,) = calibrate(
+            Runner(short, ledger), free, targets, Plan(starts=1, iterations=1)
+        ).ended
+    assert found.posterior.slopes.shape == (6, 3)
     parameter_map = parameter_map_of(short, free)
     rows = known_residuals(short, parameter_map, found.point[None])[0]
-    assert found.all_slopes.shape == (6 + 3, 3)
+    assert found.posterior.all_slopes.shape == (6 + 3, 3)
     assert found.prior_cost == pytest.approx(0.5 * (np.sum(rows**2) + np.sum(found.coordinates**2)))
 
 
@@ -359,7 +362,7 @@ def test_search_keeps_a_limit_that_the_cost_alone_does_not(short, tmp_path):
     for number, limits in enumerate(({}, {"Xr": 0.03})):
         with open_ledger(tmp_path / f"{number}.sqlite", {"study": "test"}) as ledger:
             (found,) = calibrate(
-                short, free, targets.limited(limits), Plan(starts=1, iterations=20), ledger
+                Runner(short, ledger), free, targets.limited(limits), Plan(starts=1, iterations=20)
             ).ended
         errors.append(abs(found.errors(targets)[0, place]))
     assert errors[0] > 0.05
@@ -388,8 +391,8 @@ def recovered(short, tmp_path_factory):
         Plan(starts=2, seed=4, iterations=12, deviation=0.002, resolution=0.0),
     )
     with open_ledger(folder / "ledger.sqlite", identity_of(short, free, targets, plan)) as ledger:
-        calibration = calibrate(short, free, targets, plan, ledger)
-        predictions = predict(short, free, calibration, [["middle"]], ledger)
+        calibration = calibrate(Runner(short, ledger), free, targets, plan)
+        predictions = predict(Runner(short, ledger), free, calibration, [["middle"]])
         ledger.mark_finished()
     return truth, free, targets, plan, calibration, predictions, folder
 
@@ -398,12 +401,12 @@ def test_known_machine_is_recovered_within_its_standard_deviations(recovered):
     truth, _, targets, _, calibration, _, _ = recovered
     best = calibration.solutions[0]
     parameter_map = calibration.parameter_map
-    posterior = best.spread() * parameter_map.deviation
+    posterior = best.posterior.spread() * parameter_map.deviation
     assert np.all(np.abs(best.point - truth) < 3.0 * posterior + 0.02 * parameter_map.deviation)
     assert np.nanmax(np.abs(best.errors(targets))) < 0.01
     # friction and lean change the amplitudes; the mass of the motor hardly does
-    assert np.all(best.spread()[:2] < 0.2)
-    assert np.sum(best.directions() > 1.0) >= 2
+    assert np.all(best.posterior.spread()[:2] < 0.2)
+    assert np.sum(best.posterior.directions() > 1.0) >= 2
 
 
 def test_start_values_of_the_free_file_are_not_used_for_predictions(short, recovered, tmp_path):
@@ -418,7 +421,7 @@ def test_start_values_of_the_free_file_are_not_used_for_predictions(short, recov
     assert np.array_equal(parameter_map_of(short, started).start, truth)
     identity = identity_of(short, started, targets, plan)
     with open_ledger(tmp_path / "ledger.sqlite", identity) as ledger:
-        (again,) = predict(short, started, calibration, [["middle"]], ledger)
+        (again,) = predict(Runner(short, ledger), started, calibration, [["middle"]])
     assert np.array_equal(again.predicted, predictions[0].predicted)
 
 
@@ -439,7 +442,7 @@ def test_fewer_quantities_cost_more_and_the_least_determined_goes_first(recovere
     _, free, targets, plan, calibration, _, _ = recovered
     identity = identity_of(short, free, targets, plan)
     with open_ledger(tmp_path / "ledger.sqlite", identity) as ledger:
-        fits = fit_with_fewer(short, calibration, [2, 1], ledger)
+        fits = fit_with_fewer(Runner(short, ledger), calibration, [2, 1])
     assert [fit.count for fit in fits] == [3, 2, 1]
     assert fits[0].cost == pytest.approx(calibration.solutions[0].cost, rel=1e-9)
     assert fits[1].fixed == ("motor",)  # its mass hardly changes an amplitude
@@ -458,7 +461,7 @@ def test_finished_calibration_is_read_back_without_a_run(recovered, short, monke
 
     monkeypatch.setattr("wm_drake.studies.calibration.computed.simulate_many", no_run)
     with open_ledger(folder / "ledger.sqlite", identity_of(short, free, targets, plan)) as ledger:
-        again = calibrate(short, free, targets, plan, ledger)
+        again = calibrate(Runner(short, ledger), free, targets, plan)
     assert quantity_table(again).equals(quantity_table(calibration))
 
 
@@ -472,10 +475,10 @@ def test_interrupted_calibration_continues_where_it_stopped(short, tmp_path, rec
 
     path = tmp_path / "ledger.sqlite"
     with pytest.raises(KeyboardInterrupt), open_ledger(path, identity) as ledger:
-        calibrate(short, free, targets, plan, ledger, report=stop)
+        calibrate(Runner(short, ledger, report=stop), free, targets, plan)
     with open_ledger(path, identity, resume=True) as ledger:
         assert len(ledger) > 5
-        resumed = calibrate(short, free, targets, plan, ledger, workers=1)
+        resumed = calibrate(Runner(short, ledger, workers=1), free, targets, plan)
     assert quantity_table(resumed).equals(
         quantity_table(calibration)
     )  # also: any number of workers
@@ -515,25 +518,9 @@ def test_unknown_load_or_all_loads_cannot_be_held_out():
 
 
 def solution(coordinates, amplitude, slopes, cost=1.0):
-    return Solution(
-        0,
-        np.array(coordinates),
-        np.array(coordinates),
-        np.array([amplitude]),
-        np.empty(0),
-        cost,
-        0.0,
-        np.array(slopes),
-        len(slopes),
-        1,
-    )
-
-
-def test_spread_is_that_of_the_normal_distribution():
-    # the data of the first quantity have the deviation of its prior; the second has no data
-    one = solution([0.0, 0.0], [1.0], [[1.0, 0.0]])
-    assert one.spread() == pytest.approx([np.sqrt(0.5), 1.0])
-    assert one.directions() == pytest.approx([1.0])
+    posterior = Posterior(np.array(coordinates), np.array(slopes), len(slopes))
+    amplitudes = np.array([amplitude])
+    return Solution(0, np.array(coordinates), amplitudes, np.empty(0), cost, 0.0, posterior, 1)
 
 
 def test_distinct_solutions_are_good_and_far_apart():

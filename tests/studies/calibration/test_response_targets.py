@@ -189,7 +189,7 @@ def test_relations_are_residuals_of_ratios(tmp_path):
         ("{radial: 0.01 m^2/rad}", "{radial: 0.01 m/rad}", "has not the dimension of torsion"),
         ("prior: (4, 2)", "prior: (4, 0)", "standard deviation must be above 0"),
         ("    prior: (4, 2)\n", "", "needs either 'prior' or 'at_most'"),
-        ("prior: (4, 2)", "prior: (4, 2) N", "the ratio is in N; it is a pure number"),
+        ("prior: (4, 2)", "prior: (4, 2) N", "the numbers are in N; the ratio is a pure number"),
     ],
 )
 def test_a_wrong_relation_is_refused(tmp_path, old, new, message):

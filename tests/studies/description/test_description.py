@@ -2,6 +2,7 @@
 
 import json
 
+import jsonschema
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -21,19 +22,31 @@ SLACK = np.array([0.0, 0.04, 0.0, 0.0, 0.0, 0.025])
 
 
 @pytest.fixture(scope="module", params=shipped_machines())
-def described(request):
+def described(request, shipped):
     """Return a shipped machine, set up, and its description as it comes from a JSON file."""
-    machine = build_machine(load_machine(request.param))
+    machine = shipped(request.param)
     return machine, json.loads(json.dumps(describe(machine)))
 
 
 def test_description_follows_its_schema(described):
     _, plain = described
     Description.model_validate(plain)
-    assert description_schema()["required"] == list(plain)
-    for change in ({"more": 1}, {"springs": {"left": {}}}, {"gravity_W": [0.0, 0.0]}):
+    schema = description_schema()
+    assert schema["required"] == list(plain)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    validator = jsonschema.Draft202012Validator(schema)
+    validator.validate(plain)
+    for change in (
+        {"more": 1},
+        {"springs": {"left": {}}},
+        {"gravity_W": [0.0, 0.0]},
+        {"sag_at_rest": "1 mm"},
+        {"loads": {"front": {"unbalances": [{"mass": "1 kg"}]}}},
+    ):
         with pytest.raises(ValidationError):
-            Description.model_validate(plain | change)
+            Description.model_validate(plain | change, strict=True)
+        assert not validator.is_valid(plain | change)
+    assert schema["$defs"]["Unbalance"]["properties"]["mass"]["unit"] == "kg"
 
 
 def test_schema_is_printed(wm_drake):
@@ -104,8 +117,7 @@ def rebuilt_force(plain, pose):
     return np.concatenate([moment, force])
 
 
-def test_elastic_force_is_rebuilt_from_the_description():
-    machine = build_machine(load_machine("reference"))
+def test_elastic_force_is_rebuilt_from_the_description(machine):
     plain = json.loads(json.dumps(describe(machine)))
     setup = machine.set_up()
     for pose in (POSE, -2.0 * POSE, SLACK):
@@ -117,7 +129,7 @@ def test_elastic_force_is_rebuilt_from_the_description():
         np.testing.assert_allclose(rebuilt_force(plain, pose), expected, rtol=1e-9, atol=1e-9)
 
 
-def test_imperfections_and_points_are_described(reference):
+def test_imperfections_and_points_are_described(machine, reference):
     changed = with_values(
         reference,
         {
@@ -126,7 +138,7 @@ def test_imperfections_and_points_are_described(reference):
             "imperfections.phase_error": "5 deg",
         },
     )
-    plain, found = describe(build_machine(reference)), describe(build_machine(changed))
+    plain, found = describe(machine), describe(build_machine(changed))
     assert found["imperfections"]["residual_imbalance"]["mass"] == pytest.approx(0.02)
     assert found["imperfections"]["phase_error"] == pytest.approx(np.deg2rad(5.0))
     assert found["imperfections"] != plain["imperfections"]
@@ -152,16 +164,16 @@ def test_neutral_direction_is_that_of_the_drawing_not_of_rest():
     )
 
 
-def test_a_motor_is_described(described):
-    machine, plain = described
-    drive = machine.parameters.drive
+def test_a_motor_is_described(described, machine):
+    driven, plain = described
+    drive = driven.parameters.drive
     if drive.kind == "prescribed":
         assert plain["motor"] is None
         return
     assert plain["motor"]["belt_ratio"] == drive.belt_ratio
     assert plain["motor"]["torque_limit"] == {"torque": 2.2, "power": 550.0}
     # n J of the rotor is at the drum instead of the tub, see wm_drake.model.rotor
-    reference = describe(build_machine(load_machine("reference")))["bodies"]
+    reference = describe(machine)["bodies"]
     for body, sign in (("drum", 1.0), ("tub", -1.0)):
         inertias = (b[body]["inertia_about_centre_T"]["yy"] for b in (plain["bodies"], reference))
         change = np.subtract(*inertias)

@@ -41,7 +41,7 @@ def test_they_are_the_errors_of_fits_without_each_test(model):
     for index in everyone:
         fit = identify(part([k for k in everyone if k != index]))
         alone = part([index])
-        expected = np.sqrt(np.mean(alone.residuals(alone.to_unit(fit.values)[None]) ** 2))
+        expected = np.sqrt(np.mean(alone.residuals(alone.coordinates_of(fit.values)[None]) ** 2))
         assert found[index] == pytest.approx(expected, rel=1e-3 if model is line else 2e-2)
 
 

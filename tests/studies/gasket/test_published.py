@@ -1,6 +1,6 @@
 """Published results and level 0 beside a screening, on responses with known effects."""
 
-import json
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -16,17 +16,18 @@ from wm_drake.parameters import (
     levels_of,
     load_factors,
 )
-from wm_drake.report.gasket import tables as texts
-from wm_drake.report.gasket.findings import level_zero_text, summary
-from wm_drake.report.gasket.words import Words
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.measures.responses import chosen_responses
 from wm_drake.studies.doe import make_design
-from wm_drake.studies.gasket.beside import Beside
+from wm_drake.studies.gasket import page_tables as texts
+from wm_drake.studies.gasket.compared import Compared
+from wm_drake.studies.gasket.findings import level_zero_text, summary
 from wm_drake.studies.gasket.level_zero import run_level_zero
-from wm_drake.studies.gasket.published import NOTHING, published_beside
-from wm_drake.studies.gasket.responses import chosen_responses
+from wm_drake.studies.gasket.published import NOT_PUBLISHED, published_for
 from wm_drake.studies.gasket.screening import Responses, run_screening
-from wm_drake.studies.gasket.tables import as_plain_data, to_json, write_tables
+from wm_drake.studies.gasket.tables import as_plain_data
+from wm_drake.studies.gasket.task import GasketResult
+from wm_drake.studies.gasket.words import Words
 
 NAMES = ("C_L", "K_Lx", "K_Ly")
 
@@ -59,7 +60,7 @@ def published():
         ("back", "Dx"): {"constant": PublishedTerm(None, (1.0,))},
     }
     labels = [(load, name) for load in ("middle", "counter") for name in ("Dx", "Dy")]
-    return published_beside(results, labels, "table.csv")
+    return published_for(results, labels, "table.csv")
 
 
 def test_differences_from_the_published_results(screening, published):
@@ -83,7 +84,7 @@ def test_term_with_its_factors_in_another_order_is_found(screening, published):
 
 def test_summary_says_what_is_far(screening, published):
     words = Words((), {})
-    text = " ".join(summary(screening, words, Beside(published)))
+    text = " ".join(summary(screening, words, Compared(published)))
     assert (
         "Means beside the published ones: 1 of 2 differ by more than 30 %: Dy, load middle (+67 %)."
     ) in text
@@ -116,11 +117,11 @@ def test_tables_and_files_have_published_numbers_beside_ours(screening, publishe
     assert ("published effect", "", "", "1.00", "0.500", "−1.50") in cells
     assert len(texts.variance(screening, words).header) == len(found.header) - 2
 
-    write_tables(screening, tmp_path, (), Beside(published))
+    GasketResult(screening, SimpleNamespace(factors=()), Compared(published)).write(tmp_path)
     table = pd.read_csv(tmp_path / "published.csv").set_index(["response", "term"])
     assert table.loc[("Dx", "constant"), "published_effect"] == 16.0
     assert table.loc[("Dx", "C_L"), "published_percent"].tolist() == [60.0] * 3
-    data = json.loads(to_json(as_plain_data(screening, Beside(published))))
+    data = as_plain_data(screening, Compared(published))
     response = data["responses"]["middle"]["Dx"]
     assert (data["published"], response["published_mean"]) == ("table.csv", 16.0)
     assert response["mean_difference_percent"] == pytest.approx(25.0)
@@ -186,5 +187,5 @@ def test_level_zero_is_not_run_without_tables(reference, factor):
 
 
 def test_nothing_is_nothing():
-    assert not NOTHING
-    assert not published_beside({("a", "b"): {}}, [("a", "c")], "table.csv")
+    assert not NOT_PUBLISHED
+    assert not published_for({("a", "b"): {}}, [("a", "c")], "table.csv")

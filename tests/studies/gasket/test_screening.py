@@ -1,5 +1,8 @@
 """Screening and the gasket study on functions with a known answer."""
 
+import json
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -20,12 +23,13 @@ from wm_drake.parameters import (
 from wm_drake.parameters.spin import Region
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
+from wm_drake.simulation.measures.responses import chosen_responses, measures_of
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.doe import Design, level_matrix, make_design, read_design
-from wm_drake.studies.gasket.responses import chosen_responses, measures_of
 from wm_drake.studies.gasket.screening import Responses, leading_terms, mean_at, run_screening
 from wm_drake.studies.gasket.study import GasketTrials, as_responses
-from wm_drake.studies.gasket.tables import as_plain_data, to_json, write_tables
+from wm_drake.studies.gasket.tables import as_plain_data
+from wm_drake.studies.gasket.task import GasketResult
 
 NAMES = ("a", "b", "c")
 UNITS = {"y": "mm", "z": "N"}
@@ -70,7 +74,7 @@ def test_mean_at_levels_is_the_mean_over_the_others(screening):
 def test_tables_are_the_same_bytes_each_time(screening, tmp_path):
     for name in ("first", "second"):
         (tmp_path / name).mkdir()
-        write_tables(screening, tmp_path / name)
+        GasketResult(screening, SimpleNamespace(factors=())).write(tmp_path / name)
     files = {path.name: path.read_bytes() for path in (tmp_path / "first").iterdir()}
     assert files == {path.name: path.read_bytes() for path in (tmp_path / "second").iterdir()}
     assert set(files) == {
@@ -90,7 +94,7 @@ def test_tables_are_the_same_bytes_each_time(screening, tmp_path):
 
 def test_plain_data_have_the_documented_form(screening):
     data = as_plain_data(screening)
-    to_json(data)
+    json.dumps(data, allow_nan=False)
     assert {"design", "trials", "d_efficiency", "responses"} <= set(data)
     response = data["responses"]["two"]["y"]
     assert {"mean", "main_percent", "interaction_percent", "residual_percent", "terms"} <= set(
@@ -159,7 +163,7 @@ def test_cases_of_trials_have_their_levels(reference):
     )  # its own masses stay
 
 
-def test_any_measure_can_be_a_response(reference):
+def test_any_measure_can_be_a_response(machine, reference):
     profile = SpinProfile(
         time=(0.0, 2.0), speed=(5.0, 12.0), regions=(Region(name="R1", begin=0.5, end=1.5),)
     )
@@ -168,7 +172,7 @@ def test_any_measure_can_be_a_response(reference):
     names += ("turn_margin", "drive_mean_torque", "drive_speed_ripple", "drive_end_speed")
     chosen = chosen_responses(reference, profile, names)
     case = Case("middle", reference.loads["middle"], profile)
-    table = simulate_many(build_machine(reference), [case], measures=measures_of(reference, chosen))
+    table = simulate_many(machine, [case], measures=measures_of(reference, chosen))
     found = as_responses(table, ["middle"], chosen).values["middle"].loc[0]
     assert found["gap"] == pytest.approx(1e3 * table.smallest_gap.item())
     assert found["amplitude_Xr"] == pytest.approx(1e3 * table.amplitude.sel(sensor="Xr").item())
@@ -223,9 +227,8 @@ def test_physical_values_are_in_design_and_runs(reference, tmp_path):
     factors = levels_of(reference, dict(factor_of_text(text, known) for text in texts))
     design = Design("own", ("C_L", "K_Lx"), level_matrix(2), "main")
     y = pd.DataFrame({"y": np.arange(9.0)})
-    write_tables(
-        run_screening(design, lambda _: Responses({"one": y}, {"y": "mm"}, {})), tmp_path, factors
-    )
+    screening = run_screening(design, lambda _: Responses({"one": y}, {"y": "mm"}, {}))
+    GasketResult(screening, SimpleNamespace(factors=factors)).write(tmp_path)
     for name in ("design.csv", "runs.csv"):
         table = pd.read_csv(tmp_path / name)
         assert list(table["K_Lx [N/mm]"]) == pytest.approx([2.0, 3.0, 4.0] * 3)

@@ -12,19 +12,22 @@ from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile
-from wm_drake.report.gasket_damping.report import summary
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.gasket_damping.grid_search import Round, Search, grid_search
+from wm_drake.studies.fitting.grid import Round, grid_search
+from wm_drake.studies.fitting.search import Optimum
+from wm_drake.studies.gasket_damping.page import summary
 from wm_drake.studies.gasket_damping.study import (
     LOWER,
     MESH,
     NOISE,
     UPPER,
     Damping,
-    EnvelopeDistance,
+    EnvelopeModel,
     as_measured,
+    damping_problem,
     identify_damping,
+    run_up_of,
     with_damping,
 )
 
@@ -42,15 +45,21 @@ def fast(reference):
 
 
 @pytest.fixture(scope="module")
-def distance(fast):
-    cases = EnvelopeDistance(fast, {}).profile
+def records(fast):
+    cases = run_up_of(fast)
     planted = with_damping(fast, TRUTH)
     machine = build_machine(planted)
-    records = {
+    return {
         load: simulate(machine, Case(load, planted.loads[load], cases)).displacement
         for load in ("middle", "counter")
     }
-    return EnvelopeDistance(fast, records)
+
+
+@pytest.fixture(scope="module")
+def distance(fast, records):
+    """Return the distance at points (k, 2). [N s/m, N m s/rad -> mm]"""
+    problem = damping_problem(EnvelopeModel(build_machine(fast), records))
+    return lambda points: problem.costs(problem.evaluate(np.array(points)), np.array(points))
 
 
 def test_distance_is_zero_at_the_true_damping_and_grows_away_from_it(distance):
@@ -103,12 +112,14 @@ def with_noise(records, seed):
 @pytest.mark.parametrize("pair", PLANTED)
 def test_grid_recovers_planted_damping_for_five_seeds_of_noise(reference, pair):
     truth = si(pair)
-    profile = EnvelopeDistance(reference, {}).profile
+    profile = run_up_of(reference)
     records = records_with(reference, truth, profile, ("middle", "counter"))
     for seed in range(5):
-        objective = EnvelopeDistance(reference, with_noise(records, seed))
-        found = grid_search(objective, LOWER, UPPER, MESH)
-        assert found.best == pytest.approx(truth, rel=0.02), seed
+        problem = damping_problem(
+            EnvelopeModel(build_machine(reference), with_noise(records, seed))
+        )
+        end, _ = grid_search(problem, MESH)
+        assert problem.points_at(end.point) == pytest.approx(truth, rel=0.02), seed
 
 
 def test_grid_recovers_planted_damping_in_a_short_run(fast, monkeypatch):
@@ -116,43 +127,37 @@ def test_grid_recovers_planted_damping_in_a_short_run(fast, monkeypatch):
     monkeypatch.setattr("wm_drake.studies.gasket_damping.study.WINDOW", (9.0, 21.0))
     monkeypatch.setattr("wm_drake.studies.gasket_damping.study.AFTER", 2.0)
     truth = si(PLANTED[0])
-    profile = EnvelopeDistance(fast, {}).profile
+    profile = run_up_of(fast)
     assert profile.duration == 23.0
     records = records_with(fast, truth, profile, ("counter",))
-    objective = EnvelopeDistance(fast, with_noise(records, 1))
-    found = grid_search(objective, LOWER, UPPER, 0.002)
-    assert found.best == pytest.approx(truth, rel=0.02)
+    problem = damping_problem(EnvelopeModel(build_machine(fast), with_noise(records, 1)))
+    end, _ = grid_search(problem, 0.002)
+    assert problem.points_at(end.point) == pytest.approx(truth, rel=0.02)
 
 
 @pytest.mark.slow
-def test_both_searches_find_the_true_damping(fast, distance):
-    found = identify_damping(fast, with_noise(distance.measured, 1), TRUTH)
-    assert found.searches_agree
-    assert found.better.value == min(found.grid.value, found.scipy.value)
-    assert found.better.best == pytest.approx(TRUTH, rel=0.02)
-    assert found.grid.best == pytest.approx(TRUTH, rel=0.02)
+def test_both_searches_find_the_true_damping(fast, records):
+    result = identify_damping(build_machine(fast), with_noise(records, 1), TRUTH)
+    assert result.searches_agree
+    assert result.better.cost == min(result.grid.cost, result.scipy.cost)
+    assert result.better.point == pytest.approx(TRUTH, rel=0.02)
+    assert result.grid.point == pytest.approx(TRUTH, rel=0.02)
 
 
-def test_better_search_is_reported_and_disagreement_is_said():
-    near = Search(si((0.019, 60.0)), 0.02, 60)
-    far = Search(
-        si((0.025, 50.0)),
-        95.7,
-        33,
-        (Round(np.zeros((0, 2)), np.zeros(0), si((0.025, 50.0)), 95.7, 0.125),),
-    )
-    found = Damping(far, near, si((0.019, 60.0)), {}, {"middle": None})
-    assert found.better is near
-    assert not found.searches_agree
-    text = summary(found)
+def test_better_search_is_reported_and_disagreement_is_said(reference):
+    near, far = Optimum(si((0.019, 60.0)), 0.02, 60), Optimum(si((0.025, 50.0)), 95.7, 33)
+    rounds = (Round(np.zeros((0, 2)), np.zeros(0), far.point, 95.7, 0.125),)
+    result = Damping(reference, far, near, {"middle": None}, rounds, near.point)
+    assert result.better is near
+    assert not result.searches_agree
+    text = summary(result)
     assert "at C_L = 0.0190 N s/mm and C_T = 60.0 N mm s/deg, with an envelope" in text
     assert "The two searches disagree; the better one is reported." in text
     assert text.index("0.0190") < text.index("0.0250")
     assert "differs from them by 0.0 % and 0.0 %" in text
-    other = Damping(near, far, None, {}, {"middle": None})
-    assert other.better is near
-    close = Search(near.best + 0.009 * (UPPER - LOWER), 0.5, 10)
-    assert Damping(near, close, None, {}, {"middle": None}).searches_agree
+    assert Damping(reference, near, far, {"middle": None}).better is near
+    close = Optimum(near.point + 0.009 * (UPPER - LOWER), 0.5, 10)
+    assert Damping(reference, near, close, {"middle": None}).searches_agree
 
 
 def test_measured_records_are_interpolated_to_samples_every_5_ms():
@@ -190,7 +195,7 @@ def test_short_profile_is_refused(reference):
         update={"profile": SpinProfile(time=(0.0, 30.0), speed=(0.0, 30.0))}
     )
     with pytest.raises(InputError, match="ends at 30 s"):
-        EnvelopeDistance(short, {})
+        run_up_of(short)
 
 
 ENGINES = 1e-3

@@ -1,7 +1,6 @@
 """Effect of the gasket: percent differences and steady amplitudes on records of known answer."""
 
 import json
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +10,9 @@ import xarray as xr
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import SpinProfile
-from wm_drake.report.gasket_effect.report import amplitudes, summary
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import Measures
+from wm_drake.studies.gasket_effect.page import amplitudes, summary
 from wm_drake.studies.gasket_effect.study import (
     GasketEffect,
     effect_table,
@@ -63,8 +62,8 @@ def result(parameters, gasket, transient, steady, comparison):
     record = sines(steady, duration=70.0)
     record.attrs |= {"gasket": "yes" if gasket else "no", "diverged": ""}
     sizes = xr.DataArray(np.full(6, transient), {"sensor": SENSORS}, ["sensor"])
-    rest = {field.name: None for field in fields(Measures)}
-    measures = Measures(**rest | {"amplitude": sizes, "critical_speed": sizes})
+    table = xr.Dataset({"amplitude": sizes, "critical_speed": sizes})
+    measures = Measures(table, None, None, None, has_cabinet=False)
     results = (CaseResult(case, record, measures, 0.0),)
     return SpinResult(parameters, "compiled", 0.0025, results, comparison)
 

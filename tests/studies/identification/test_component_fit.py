@@ -16,8 +16,11 @@ from wm_drake.parameters import (
 )
 from wm_drake.rigs import Harmonic, bushing_bench, damper_bench
 from wm_drake.rigs.measured import RecordedMotion, measured_motion
+from wm_drake.studies.components import Target
 from wm_drake.studies.fitting import METHODS, identify, least_squares
-from wm_drake.studies.identification import bushing_model, damper_model, fit_problem, fragment
+from wm_drake.studies.identification.fragment import Destination, fragment
+from wm_drake.studies.identification.models import Given, TestedAxis, bushing_model, damper_model
+from wm_drake.studies.identification.problem import fit_problem
 
 MSTV = load_component("mstv_damper").parameters
 FREE_STROKE = (
@@ -130,7 +133,7 @@ def radial(noise=0.0, seed=0):
         noise=noise,
         seed=seed,
     )
-    return bushing_model("voigt", loops, GASKET, "x"), loops
+    return bushing_model("voigt", loops, TestedAxis(GASKET, "x")), loops
 
 
 def axial(noise=0.0, seed=0):
@@ -140,7 +143,7 @@ def axial(noise=0.0, seed=0):
         noise=noise,
         seed=seed,
     )
-    return bushing_model("table", loops, AXIAL, "y", knots=2), loops
+    return bushing_model("table", loops, TestedAxis(AXIAL, "y"), Given(knots=2)), loops
 
 
 def tilt(noise=0.0, seed=0):
@@ -148,7 +151,7 @@ def tilt(noise=0.0, seed=0):
     motions = [Harmonic(f, a) for f, a in ((1.0, 0.1), (3.0, 0.2), (7.0, 0.2))]
     rubber = BUSHING.model_copy(update={"rotational_damping_x": 0.01})
     loops = measured(bushing_bench(rubber, "about_x"), motions, noise=noise, seed=seed)
-    return bushing_model("voigt_havsin", loops, rubber, "about_x"), loops
+    return bushing_model("voigt_havsin", loops, TestedAxis(rubber, "about_x")), loops
 
 
 COMPONENTS = {
@@ -234,7 +237,7 @@ def test_what_no_loop_shows_is_named_and_not_invented():
         slider_damping=400.0,
     )
     loops = measured(damper_bench(stuck), motions_mm((1.0, 0.1), (10.0, 0.2)))
-    model = damper_model("stv_sponge", loops, fixed={"transition_velocity": 0.0})
+    model = damper_model("stv_sponge", loops, Given(fixed={"transition_velocity": 0.0}))
     fit = least_squares(fit_problem(model, loops), starts=2, screened=32)
     assert (
         relative_errors(fit, {"sponge_stiffness": 176e3, "sponge_damping": 90.0})[
@@ -258,7 +261,9 @@ def test_friction_of_a_bushing_turned_too_slowly_is_not_told_from_its_damping():
     motions = motions_mm(*((f, a) for f in (1.0, 3.0, 5.0, 7.0) for a in (2.0, 4.0)))
     loops = measured(bushing_bench(BUSHING, "about_x", arm=0.1), motions, noise=0.02)
     fit = least_squares(
-        fit_problem(bushing_model("voigt_havsin", loops, BUSHING, "about_x", arm=0.1), loops)
+        fit_problem(
+            bushing_model("voigt_havsin", loops, TestedAxis(BUSHING, "about_x", arm=0.1)), loops
+        )
     )
     assert fit["rotational_stiffness_x"].value == pytest.approx(0.75, rel=0.02)
     assert not fit["rotational_damping_x"].determined
@@ -267,9 +272,10 @@ def test_friction_of_a_bushing_turned_too_slowly_is_not_told_from_its_damping():
 def test_a_component_file_keeps_the_tables_of_its_other_axes(tmp_path):
     motions = motions_mm((1.0, 1.0), (5.0, 2.0))
     loops = measured(bushing_bench(AXIAL, "x"), motions)
-    model = bushing_model("voigt", loops, AXIAL, "x")
+    model = bushing_model("voigt", loops, TestedAxis(AXIAL, "x"))
     fit = least_squares(fit_problem(model, loops), starts=1)
-    text = fragment(fit, model, Component("axial", AXIAL, {}), "", "", {}, tmp_path)
+    target = Target(Component("axial", AXIAL, {}), "", "")
+    text = fragment(fit, model, Destination(target, tmp_path))
     (tmp_path / "axial.yaml").write_text(text)
     found = load_component(str(tmp_path / "axial.yaml")).parameters
     assert found.stiffness_y.displacement == pytest.approx(AXIAL.stiffness_y.displacement)
@@ -280,7 +286,7 @@ def test_a_component_file_keeps_the_tables_of_its_other_axes(tmp_path):
 def test_a_number_that_is_kept_by_default_is_searched_between_the_users_bounds():
     _, loops = mstv()
     bounds = {"friction_damping": (1.0, 200.0), "regularisation_velocity": (1e-7, 1e-5)}
-    model = damper_model("mstv", loops, bounds=bounds)
+    model = damper_model("mstv", loops, Given(bounds))
     found = {unknown.name: unknown for unknown in model.unknowns}
     assert set(found) == {*MSTV_TRUTH, *bounds}
     for name, (lower, upper) in bounds.items():
@@ -303,21 +309,27 @@ def test_twelve_noisy_loops_are_fitted():
     [
         (lambda m: damper_model("glue", m), "--law: no law 'glue' of a damper"),
         (
-            lambda m: damper_model("mstv", m, bounds={"stiffness": (1.0, 2.0)}),
+            lambda m: damper_model("mstv", m, Given({"stiffness": (1.0, 2.0)})),
             "--bounds: unknown number 'stiffness'",
         ),
-        (lambda m: damper_model("mstv", m, fixed={"glue": 1.0}), "--fix: unknown number 'glue'"),
+        (
+            lambda m: damper_model("mstv", m, Given(fixed={"glue": 1.0})),
+            "--fix: unknown number 'glue'",
+        ),
         (
             lambda m: damper_model(
-                "mstv", m, bounds={"slider_damping": (1.0, 2.0)}, fixed={"slider_damping": 1.0}
+                "mstv", m, Given({"slider_damping": (1.0, 2.0)}, {"slider_damping": 1.0})
             ),
             "--fix: 'slider_damping' has bounds and is fixed",
         ),
         (
-            lambda m: bushing_model("voigt_havsin", m, GASKET, "x"),
+            lambda m: bushing_model("voigt_havsin", m, TestedAxis(GASKET, "x")),
             "--law: voigt_havsin is a law about an axis",
         ),
-        (lambda m: bushing_model("putty", m, GASKET, "x"), "--law: no law 'putty' of a bushing"),
+        (
+            lambda m: bushing_model("putty", m, TestedAxis(GASKET, "x")),
+            "--law: no law 'putty' of a bushing",
+        ),
     ],
 )
 def test_bad_questions_are_told(make, message):

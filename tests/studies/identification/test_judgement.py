@@ -9,8 +9,9 @@ from wm_drake.parameters import CoulombDamper, MeasuredLoop, load_component, loa
 from wm_drake.rigs import Harmonic, bushing_bench, damper_bench, force_loops
 from wm_drake.rigs.measured import measured_motion
 from wm_drake.studies.fitting import least_squares
-from wm_drake.studies.identification import bushing_model, damper_model, fit_problem, judge
-from wm_drake.studies.identification.judgement import noise_of
+from wm_drake.studies.identification.judgement import judge, noise_of
+from wm_drake.studies.identification.models import Given, TestedAxis, bushing_model, damper_model
+from wm_drake.studies.identification.problem import fit_problem
 
 MSTV = load_component("mstv_damper").parameters
 GASKET = load_machine("free_stroke").gasket
@@ -100,7 +101,7 @@ def test_lack_of_fit_below_the_noise_is_not_claimed():
     found = []
     for noise in (0.1, 0.0):
         loops = recorded(damper_bench(rubber), noise=noise)
-        model = damper_model("coulomb", loops, fixed={"friction_force": 0.0})
+        model = damper_model("coulomb", loops, Given(fixed={"friction_force": 0.0}))
         found.append(judged(model, loops).missed)
     assert found[0] == 0.0
     assert 5e-4 < found[1] < 0.05
@@ -115,7 +116,7 @@ def test_a_reversed_sign_is_told(bench, noise):
         model = (
             damper_model("coulomb", loops)
             if bench == "damper"
-            else bushing_model("voigt", loops, GASKET, "x")
+            else bushing_model("voigt", loops, TestedAxis(GASKET, "x"))
         )
         judgement = judged(model, loops)
         if sign > 0.0:
@@ -130,7 +131,7 @@ def test_a_reversed_sign_is_told(bench, noise):
 
 def test_a_delay_of_the_force_is_told_from_a_reversed_sign():
     loops = recorded(bushing_bench(GASKET, "x"), delay=0.5)
-    (hint,) = judged(bushing_model("voigt", loops, GASKET, "x"), loops).hints
+    (hint,) = judged(bushing_model("voigt", loops, TestedAxis(GASKET, "x")), loops).hints
     assert hint.startswith("The component gives energy in all 2 loops")
 
 

@@ -9,7 +9,8 @@ from wm_drake.parameters import MeasuredLoop, load_component
 from wm_drake.rigs import damper_bench
 from wm_drake.rigs.measured import inertia_share, measured_motion, without_inertia
 from wm_drake.studies.fitting import identify
-from wm_drake.studies.identification import damper_model, fit_problem
+from wm_drake.studies.identification.models import Given, damper_model
+from wm_drake.studies.identification.problem import fit_problem
 
 MSTV = load_component("mstv_damper").parameters
 MOTIONS = motions_mm((3.0, 3.0), (6.67, 1.5), (10.0, 1.5))
@@ -51,10 +52,10 @@ def test_a_sponge_with_mass_is_followed_in_a_fit():
     """Move 10 g at 10 Hz, which changes the loop little, and 1 kg, which is seen."""
     loops = measured(damper_bench(MSTV, 1.0), MOTIONS[2:])
     kept = {name: value for name, value in TRUTH.items() if name != "friction_force"}
-    with_mass = damper_model("mstv", loops, fixed=kept, sponge_mass=1.0)
+    with_mass = damper_model("mstv", loops, Given(fixed=kept), sponge_mass=1.0)
     result = identify(fit_problem(with_mass, loops))
     assert result["friction_force"].value == pytest.approx(TRUTH["friction_force"], rel=2e-3)
-    plain = identify(fit_problem(damper_model("mstv", loops, fixed=kept), loops))
+    plain = identify(fit_problem(damper_model("mstv", loops, Given(fixed=kept)), loops))
     assert plain.rmse > 5.0 * result.rmse
 
 

@@ -9,7 +9,8 @@ from wm_drake.parameters import load_machine
 from wm_drake.parameters.elements import BushingType
 from wm_drake.rigs import Harmonic, bushing_bench, force_loop, measures_of
 from wm_drake.studies.fitting import identify
-from wm_drake.studies.identification import bushing_model, fit_problem
+from wm_drake.studies.identification.models import TestedAxis, bushing_model
+from wm_drake.studies.identification.problem import fit_problem
 
 GASKET = load_machine("reference").gasket
 NUMBERS = {
@@ -28,7 +29,7 @@ def loops():
 
 
 def found(law, loops):
-    model = bushing_model(law, loops, GASKET, "y")
+    model = bushing_model(law, loops, TestedAxis(GASKET, "y"))
     return identify(fit_problem(model, loops))
 
 
@@ -96,4 +97,4 @@ def test_a_loop_of_the_bench_is_that_of_the_closed_form():
 def test_a_bushing_of_tubes_has_no_rubber(loops):
     plain = BushingType(**{name: getattr(GASKET, name) for name in BushingType.model_fields})
     with pytest.raises(InputError, match="branches of rubber"):
-        bushing_model("rubber", loops, plain, "y")
+        bushing_model("rubber", loops, TestedAxis(plain, "y"))

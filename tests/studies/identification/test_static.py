@@ -9,7 +9,7 @@ import pytest
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import MeasuredLoop, load_machine
-from wm_drake.studies.identification import static_curve
+from wm_drake.studies.identification.static import static_curve
 
 FRICTION, SOON = 3.0, 2e-4  # N, m
 

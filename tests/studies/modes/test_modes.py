@@ -6,7 +6,7 @@ from simple_machines import DAMPING, MASS, STIFFNESS, isotropic_machine
 
 import wm_drake as wm
 from wm_drake.model.build import build_machine
-from wm_drake.parameters import load_machine, with_values
+from wm_drake.parameters import with_values
 from wm_drake.parameters.machine import BodyOverride, InertiaMatrix
 from wm_drake.studies.modes.amplitude import amplitude_modes
 from wm_drake.studies.modes.campbell import campbell, critical_speeds, mac
@@ -44,8 +44,8 @@ def test_frequency_and_damping_of_one_mass_are_those_of_the_closed_form(isotropi
 
 @pytest.mark.parametrize("options", [{}, {"friction": False}, {"dampers": False}])
 @pytest.mark.parametrize("name", ["reference", "free_stroke"])
-def test_compiled_linearisation_is_drakes(name, options):
-    machine = build_machine(load_machine(name))
+def test_compiled_linearisation_is_drakes(name, options, shipped):
+    machine = shipped(name)
     ours = linearised(machine, **options).spectrum().first(6)
     drakes = drake_spectrum(machine.set_up(**options)).first(6)
     # the tables of gaskets bend at their points: differences see it to 1e-7

@@ -13,18 +13,17 @@ from wm_drake.errors import InputError
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.designs import DesignTask, load_design, shipped_designs
 from wm_drake.parameters.tolerances import Tolerances
-from wm_drake.report.pareto.report import pareto_report
 from wm_drake.simulation.cases import Case, case_of
 from wm_drake.studies.pareto.envelopes import front_envelopes
+from wm_drake.studies.pareto.page import DesignResult
 from wm_drake.studies.pareto.problem import machine_designs
 from wm_drake.studies.pareto.robust import _is_kept, promises, summary_of
 from wm_drake.studies.pareto.study import run_designs
 from wm_drake.studies.pareto.tables import (
-    as_plain_data,
     front_table,
     promises_table,
-    write_tables,
 )
+from wm_drake.studies.study import Facts
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.variables import uncertain_machine
 
@@ -115,16 +114,17 @@ def test_front_under_a_constraint_is_found(machine, tmp_path):
     assert (dx.min(), dx.max()) == pytest.approx((2.0 / 1.5, 2.5), rel=0.01)
     assert front.constraints[:, 0] == pytest.approx(dx)
     assert front.nominal_objectives == pytest.approx([2.0, 10.0])
-    data = as_plain_data(front)
+    data = DesignResult(front, [], None, "").as_json()
     assert data["evaluations"] == 640
     assert set(data["front"][0]) == {"objectives", "constraints", "variables"}
     assert len(front_table(front)) == len(data["front"])
-    write_tables(front, (), tmp_path)
+    DesignResult(front, [], None, "").write(tmp_path)
     for name, number in front.chosen.items():
         loaded = load_machine(tmp_path / f"machine_{name.replace(' ', '_')}.yaml")
         wanted = front.machine(number).spring_types["suspension"].stiffness
         assert loaded.spring_types["suspension"].stiffness == pytest.approx(wanted, rel=1e-12)
-    page = pareto_report(front, front_envelopes(front, histories_of(machine)), (), "about")
+    shown = front_envelopes(front, histories_of(machine))
+    page = DesignResult(front, [], shown, "about").page(Facts())
     assert "compromise" in page
     assert "loads middle, counter" in page
     (shown,) = (one for one in data_of(page) if "envelopes" in one)
@@ -164,7 +164,7 @@ def test_envelopes_are_the_largest_over_the_loads(machine):
     middle = slice(30, 90)
     assert shown.nominal[:, middle] == pytest.approx(2e-3, rel=0.01)
     assert shown.designs.shape == (len(front.objectives), len(machine.sensors), len(shown.time))
-    for (x,), lines in zip(front.found.designs, shown.designs, strict=True):
+    for (x,), lines in zip(front.search.designs, shown.designs, strict=True):
         k = front.designs.dimensions[0].number(float(x))
         assert lines[:, middle] == pytest.approx(2e-3 / k, rel=0.01)
 
@@ -208,10 +208,10 @@ def test_robust_front_keeps_its_promise_on_fresh_samples(machine):
         )
 
     front = run_designs(designs(0), run_of(machine), evaluations=96, population=32, seed=0)
-    fresh, _ = designs(7).evaluate(front.found.designs, run_of(machine))
+    fresh, _ = designs(7).evaluate(front.search.designs, run_of(machine))
     # Fx = 10 k N with k within 5 %: its 95 % quantile is 1 + 1.645 * 0.05 times the nominal one
     k = front.designs.dimensions[0]
-    nominal = np.array([10.0 * k.number(float(x)) for (x,) in front.found.designs])
+    nominal = np.array([10.0 * k.number(float(x)) for (x,) in front.search.designs])
     assert front.objectives[:, 0] == pytest.approx((1.0 + 1.645 * 0.05) * nominal, rel=2e-3)
     assert fresh == pytest.approx(front.objectives, rel=5e-3)
     kept = promises(front, run_of(machine), 0)
@@ -227,8 +227,8 @@ def test_robust_front_keeps_its_promise_on_fresh_samples(machine):
     assert best.fresh.upper - best.fresh.lower < best.promised.upper - best.promised.lower
     table = promises_table(kept)
     assert list(table["kept"]) == [True] * 6
-    assert as_plain_data(front, kept)["robust"][0]["fresh_value"] > 0.0
-    page = pareto_report(front, None, kept, "about")
+    assert DesignResult(front, kept, None, "").as_json()["robust"][0]["fresh_value"] > 0.0
+    page = DesignResult(front, kept, None, "about").page(Facts())
     assert "On fresh samples 6 of 6 values" in page
 
 

@@ -16,20 +16,20 @@ SHORT = SpinProfile(time=(0.0, 2.0), speed=(0.0, 15.0))
 def test_results_do_not_depend_on_the_number_of_workers(engine):
     parameters = load_machine("reference")
     cases = [Case(name, parameters.loads[name], SHORT) for name in ("middle", "back", "front")]
-    told = []
-    alone = run_spin(parameters, cases, engine, workers=1)
+    reports = []
+    single = run_spin(parameters, cases, engine, workers=1)
     shared = run_spin(
         parameters,
         cases,
         engine,
         workers=2,
-        progress=lambda index, fraction: told.append((index, fraction)),
+        progress=lambda index, fraction: reports.append((index, fraction)),
     )
-    for one, other in zip(alone.results, shared.results, strict=True):
+    for one, other in zip(single.results, shared.results, strict=True):
         assert one.case == other.case
         assert one.record.identical(other.record)
         assert one.measures.smallest_gap == other.measures.smallest_gap
-    assert {index for index, fraction in told if fraction == 1.0} == {0, 1, 2}
+    assert {index for index, fraction in reports if fraction == 1.0} == {0, 1, 2}
 
 
 def test_single_case_runs_in_this_process_and_is_measured():

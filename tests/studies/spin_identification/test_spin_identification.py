@@ -12,8 +12,8 @@ from wm_drake.errors import InputError
 from wm_drake.parameters import SpinProfile, load_machine, with_value
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
-from wm_drake.report.spin_identify.report import summary, warnings_of
 from wm_drake.studies.spin_cycle.study import labels_of
+from wm_drake.studies.spin_identification.page import summary, warnings_of
 from wm_drake.studies.spin_identification.study import (
     SpinModel,
     at_point,
@@ -155,7 +155,7 @@ def test_numbers_that_are_one_unknown_change_together(reference):
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        (("gasket.stifness_x",), "no number 'gasket.stifness_x' in machine 'reference'"),
+        (("gasket.stifness_x",), "unknown key 'stifness_x' .did you mean 'stiffness_x'"),
         (("gasket.stiffness_x", "gasket.damping_x"), "have different units"),
         (
             ("damper_types.friction.friction_damping",),
@@ -246,7 +246,7 @@ def test_a_key_is_one_line_of_the_terminal(identify):
     )
     lines = [line.strip() for line in identify(*unknowns).out.splitlines()]
     assert {"gasket.stiffness_x", "= gasket.stiffness_z", "gasket.damping_x"} <= set(lines)
-    assert "identified.yaml, parameters.csv" in lines[-1]
+    assert "report.html, identified.yaml, measured.csv" in lines[-1]
 
 
 @pytest.mark.parametrize(
@@ -255,12 +255,16 @@ def test_a_key_is_one_line_of_the_terminal(identify):
         ((), "machine 'reference' does not have the numbers of [A] Table 8; give keys"),
         (
             ("--unknown", "gasket.stiffness"),
-            "--unknown: gasket.stiffness: no number 'gasket.stiffness'",
+            "--unknown: gasket.stiffness: unknown key 'stiffness'",
         ),
         (("--unknown", "gasket.stiffness_x=(2, 8) N"), "unit 'N' does not fit"),
         (
             ("--unknown", "gasket.stiffness_x=2..8"),
-            "'2..8' is not a range; write for example '(1, 2) N/mm'",
+            "'2' has no unit; write for example '1 N/mm'",
+        ),
+        (
+            ("--unknown", "gasket.stiffness_x=2 N/mm"),
+            "'2 N/mm' is not a range; write for example '(1, 2) N/mm'",
         ),
         (
             ("--unknown", "gasket.stiffness_x=(8, 2) N/mm"),

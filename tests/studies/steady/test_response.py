@@ -473,7 +473,7 @@ def test_response_follows_dampers_that_spin():
     sizes = []
     for revolutions in (71, 271, 371):
         engine = settled_trajectory(setup, speed, 128, revolutions)
-        begin = coefficients_of(balance, setup, engine)
+        begin = coefficients_of(balance, engine)
         with threadpool_limits(1, "blas"):
             motion = first_motion(balance, speed, iter([begin]))
         own = trajectory_of_period(balance, motion, speed, 128)

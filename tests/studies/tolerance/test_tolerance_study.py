@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy import stats
-from simple_machines import with_gasket_tables
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import load_machine
@@ -15,17 +14,18 @@ from wm_drake.parameters.tolerances import (
     load_tolerances,
     shipped_tolerances,
 )
-from wm_drake.report.tolerance.report import tolerance_report
-from wm_drake.report.tolerance.words import in_a_million, summary
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.gasket.responses import MM, Response
-from wm_drake.studies.gasket.screening import Meaning
+from wm_drake.simulation.measures import MEASURES
+from wm_drake.simulation.measures.responses import Response
+from wm_drake.studies.study import Facts
+from wm_drake.studies.tolerance.page import ToleranceReport
 from wm_drake.studies.tolerance.study import Settings, limits_of, run_tolerances
-from wm_drake.studies.tolerance.tables import as_plain_data, samples_table
+from wm_drake.studies.tolerance.tables import samples_frame
 from wm_drake.studies.tolerance.variables import uncertain_machine
+from wm_drake.studies.tolerance.words import in_a_million, summary
 
 SPRING = "spring_types.suspension.stiffness"
-GAP = Response("gap", "gap", "gap", "smallest_gap", (), MM, Meaning("smallest gap"))
+GAP = Response("gap", MEASURES["gap"].variables[0])
 
 
 @pytest.fixture(scope="module")
@@ -78,25 +78,6 @@ def test_samples_with_the_same_parts_share_a_machine(machine):
     assert k[1] == pytest.approx(1.025 * k[0])
 
 
-def test_table_is_scaled(machine):
-    machine = with_gasket_tables(machine)
-    key = "gasket.stiffness_x"
-    found = uncertain(machine, {"load": "middle", "quantities": {"g": normal(key)}})
-    (case,) = found.cases(np.array([[-2.0]]))
-    before, after = machine.gasket.stiffness_x, case.parameters.gasket.stiffness_x
-    assert after.force == pytest.approx(0.9 * np.array(before.force))
-    assert after.displacement == before.displacement
-
-
-def test_load_by_key_path(machine):
-    key = "loads.middle.unbalances.0.mass"
-    found = uncertain(
-        machine, {"load": "middle", "quantities": {"m": normal(key, "0.5 kg", "20 g")}}
-    )
-    (case,) = found.cases(np.array([[1.0]]))
-    assert case.load.unbalances[0].mass == pytest.approx(0.52)
-
-
 def test_split_laundry_is_two_lumps(machine):
     found = uncertain(machine, load_tolerances("laundry").model_dump())
     cases = found.cases(np.random.default_rng(0).standard_normal((20, len(found.variables))))
@@ -122,8 +103,6 @@ def test_shipped_files_fit_the_reference_machine(machine):
 @pytest.mark.parametrize(
     ("tree", "message"),
     [
-        ({"quantities": {"k": normal("spring_types.suspension.stifness")}}, "stiffness"),
-        ({"quantities": {"k": normal(SPRING, "9 kg", "1 kg")}}, "kg"),
         ({"quantities": {"k": normal(SPRING, "100 %", "1 N/mm")}}, "not in percent"),
         ({"quantities": {"k": normal(SPRING, low="120 %", high="110 %")}}, "below"),
         ({"quantities": {"k": normal(SPRING), "l": normal(SPRING)}}, "already"),
@@ -139,12 +118,6 @@ def test_shipped_files_fit_the_reference_machine(machine):
 def test_wrong_files_are_refused(machine, tree, message):
     with pytest.raises(InputError, match=message):
         uncertain(machine, {"load": "middle"} | tree)
-
-
-def test_table_by_value_is_refused(machine):
-    tree = {"load": "middle", "quantities": {"g": normal("gasket.stiffness_x", "4 N/mm", "1 N/mm")}}
-    with pytest.raises(InputError, match="is a table; give its distribution in percent"):
-        uncertain(with_gasket_tables(machine), tree)
 
 
 def test_negative_mass_is_refused_before_the_study(machine):
@@ -247,7 +220,7 @@ def test_words_claim_no_more_than_the_samples_support(study):
 
 def test_doubling_keeps_the_old_samples(study):
     few, many = study(Settings(64, 0, 0)), study(Settings(128, 0, 0))
-    assert samples_table(few).equals(samples_table(many)[:64])
+    assert samples_frame(few).equals(samples_frame(many)[:64])
 
 
 def test_correlated_quantities_have_no_sobol_indices(study):
@@ -284,7 +257,8 @@ def test_limits_that_cannot_be_judged_are_refused(tmp_path):
 def test_json_and_page_have_what_they_must(study):
     wanted = Limit(quantity="gap", at_least="0 mm", allowed_share="1 %")
     result = study(Settings(256, 64, 1000), limits=[wanted])
-    data = as_plain_data(result)
+    report = ToleranceReport(result, "about")
+    data = report.as_json()
     assert {"p5", "p50", "p95"} <= set(data["measures"]["smallest_gap_mm"])
     assert {"estimate", "lower", "upper", "method"} <= set(data["contact_probability"])
     assert {"first", "total", "total_lower", "total_upper"} <= set(
@@ -292,7 +266,7 @@ def test_json_and_page_have_what_they_must(study):
     )
     assert data["limits"][0]["verdict"] in ("pass", "fail", "undecided")
     assert data["measures"]["smallest_gap_mm"]["p50"] == pytest.approx(30.0, abs=1.0)
-    page = tolerance_report(result, "about")
+    page = report.page(Facts())
     assert "in a million runs touch" in page
     assert "motor" in page
 

@@ -6,15 +6,18 @@ import pytest
 import xarray as xr
 
 from wm_drake.parameters import PublishedTerm
-from wm_drake.report.validation.page import (
-    UNEXPLAINED,
-    Made,
-    validation_page,
-    verification_page,
-)
 from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket.screening import Responses, run_screening
 from wm_drake.studies.spin_cycle.study import SpinCycleResult
+from wm_drake.studies.validation.page import (
+    BEGIN,
+    END,
+    UNEXPLAINED,
+    compared,
+    origin,
+    renewed,
+    verified,
+)
 from wm_drake.studies.validation.rows import (
     FITTED,
     MET,
@@ -145,50 +148,51 @@ def test_held_out_loads_are_judged_by_their_mean_and_their_intervals():
     assert (covered.ours, covered.verdict) == ("100 %", MET)
 
 
-def test_page_ends_with_tables_without_verdicts(amplitude_table):
+def test_part_ends_with_tables_without_verdicts(amplitude_table):
     table = pd.DataFrame({"free quantities": ["40"], "cost": ["137"]})
-    made = Made("x", reasons={"Fewer": "Why."})
-    page = validation_page(amplitude_rows(amplitude_table), made, FITTED, {"Fewer": table})
-    assert page.endswith(
-        "\n## Fewer\n\nWhy.\n\n| free quantities | cost |\n| --- | --- |\n| 40 | 137 |\n"
+    text = compared(amplitude_rows(amplitude_table), FITTED, {"Fewer": "Why."}, {"Fewer": table})
+    assert text.endswith(
+        "\n### Fewer\n\nWhy.\n\n| free quantities | cost |\n| --- | --- |\n| 40 | 137 |\n"
     )
 
 
-def test_page_counts_and_explains(amplitude_table):
+def test_part_counts_and_explains(amplitude_table):
     rows = amplitude_rows(amplitude_table)
-    table = counts(rows)
-    assert table.iloc[0].tolist() == [1, 2, 0]
+    assert counts(rows).iloc[0].tolist() == [1, 2, 0]
     section = rows[0].section
     reasons = {section: "About all.", f"{section} | {rows[1].quantity}": "the spring is soft"}
     reasons[f"{section} | command"] = "wm-drake spin; wm-drake spin --no-gasket"
-    made = Made("python write.py", ["A note."], reasons)
-    page = validation_page(rows, made, FITTED)
-    assert "Of 3 fitted results, 2 are missed." in page
-    assert f"## {section}\n\nAbout all.\n" in page
-    assert "Command: `wm-drake spin`; `wm-drake spin --no-gasket`." in page
-    assert "| **missed** | above 20 %; Adams model of [B]: −10.0 %; the spring is soft |" in page
-    assert f"; {UNEXPLAINED} |" in page  # the mean, which has no explanation
-    assert "python write.py" in page
-    assert "Written 20" in page
-    assert "wm_drake" in page
-    other = validation_page(rows, made, PREDICTED)
-    assert other.startswith("# Prediction\n")
-    assert other.endswith("Nothing was compared.\n")
+    text = compared(rows, FITTED, reasons)
+    assert "Of 3 fitted results, 2 are missed." in text
+    assert f"### {section}\n\nAbout all.\n" in text
+    assert "Command: `wm-drake spin`; `wm-drake spin --no-gasket`." in text
+    assert "| **missed** | above 20 %; Adams model of [B]: −10.0 %; the spring is soft |" in text
+    assert f"; {UNEXPLAINED} |" in text  # the mean, which has no explanation
+    assert compared(rows, PREDICTED, reasons).endswith("Nothing was compared.\n")
 
 
-def test_the_page_of_verification_has_a_row_per_comparison():
+def test_page_is_renewed_between_its_marks_and_says_how():
+    text = origin("python write.py", ["A note."])
+    page = renewed(f"before\n{BEGIN}old\n{END}\nafter\n", text)
+    assert page == f"before\n{BEGIN}{text}{END}\nafter\n"
+    assert "python write.py" in text
+    assert "Written 20" in text
+    assert "- A note." in text
+
+
+def test_verification_has_a_row_per_comparison():
     rows = [
         {"what": "a law", "against": "hand values", "agreement": "1e-9", "tests": ["a.py", "b.py"]},
         {"what": "a run", "against": "MuJoCo", "agreement": "1 %", "command": "python c.py"},
     ]
-    page = verification_page({"Laws": rows}, "python write.py", {})
-    assert "| a law | hand values | 1e-9 | `a.py`<br>`b.py` |" in page
-    assert "| a run | MuJoCo | 1 % | `python c.py` |" in page
+    text = verified({"Laws": rows}, {})
+    assert "| a law | hand values | 1e-9 | `a.py`<br>`b.py` |" in text
+    assert "| a run | MuJoCo | 1 % | `python c.py` |" in text
     for outcomes, words in (
         ({"a.py": (2, 0), "b.py": (3, 0)}, "5 passed"),
         ({"a.py": (2, 0), "b.py": (3, 1)}, "**1 of 5 failed**"),
         ({"a.py": (2, 0)}, "not run: marked `hours`, or skipped"),
     ):
-        ran = verification_page({"Laws": rows}, "python write.py", outcomes)
+        ran = verified({"Laws": rows}, outcomes)
         assert f"| `a.py`<br>`b.py` | {words} |" in ran
         assert "| `python c.py` |  |" in ran

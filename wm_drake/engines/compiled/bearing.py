@@ -7,7 +7,7 @@ and its inertia I about To:
 
     M a_O + w' x S + w x (w x S) = F,    S x a_O + I w' + w x (I w) = tau
 
-The packed numbers are those of `TUB_AND_BEARING`; the state of the carrier is a `CARRIER_STATE`.
+The packed numbers are those of `TUB_AND_BEARING`; the state of the carrier is a `BODY_STATE`.
 """
 
 from wm_drake.compiler.compilation import law
@@ -24,7 +24,7 @@ from wm_drake.compiler.vectors import (
     subtract,
 )
 from wm_drake.elements.bushing import BUSHING
-from wm_drake.elements.motion import TubMotion, rpy_rates
+from wm_drake.elements.motion import TubMotion, read_body_state, rpy_rates
 
 TUB = PackedLayout(
     "TubNumbers",
@@ -37,14 +37,8 @@ TUB = PackedLayout(
 of mass [1/(kg m^2)]."""
 TUB_AND_BEARING = PackedLayout("TubAndBearingNumbers", tub=LAYOUT(TUB), bearing=LAYOUT(BUSHING))
 """Packed numbers of a compliant bearing: the tub, then the bushing."""
-CARRIER_STATE = PackedLayout(
-    "CarrierState", angles=VECTOR, position=VECTOR, angular_velocity=VECTOR, velocity=VECTOR
-)
-"""Roll, pitch, yaw and position of the carrier, its angular velocity and velocity, in W."""
-CARRIER_STATE_SIZE = CARRIER_STATE.fixed_size
 
 read_tub, read_tub_and_bearing = TUB.read, TUB_AND_BEARING.read
-read_carrier_state, write_carrier_state = CARRIER_STATE.read, CARRIER_STATE.write
 
 
 @law
@@ -76,16 +70,8 @@ def tub_accelerations(motion, wrench, gravity, p, at):
 @law
 def carrier_motion(x, k):
     """Return the motion of the carrier, whose state begins at index k, and its angle rates."""
-    state = read_carrier_state(x, k)
+    state = read_body_state(x, k)
     angles, w = state.angles, state.angular_velocity
     roll, pitch, yaw = sine_cosine(angles[0]), sine_cosine(angles[1]), sine_cosine(angles[2])
     rotation = rotation_from_sines(roll, pitch, yaw)
     return TubMotion(rotation, state.position, w, state.velocity), rpy_rates(w, pitch, yaw)
-
-
-@law
-def carrier_size(bearing):
-    """Return the size of the state of the carrier; 0 for a rigid bearing (None)."""
-    if bearing is None:
-        return 0
-    return CARRIER_STATE_SIZE

@@ -4,7 +4,7 @@ The laws of all mounts are evaluated with the motion of the tub seen from the ca
 C; the wrench on the tub is turned back to W, and the opposite one acts on the cabinet. For a fixed
 cabinet, whose index is None, all of this is compiled away.
 
-State: a `CARRIER_STATE` of C, then the slips of the feet. Packed numbers: those of `TUB` for the
+State: a `BODY_STATE` of C, then the slips of the feet. Packed numbers: those of `TUB` for the
 cabinet without its mounts, then those of the feet.
 """
 
@@ -20,46 +20,25 @@ from wm_drake.elements.cabinet import (
     rpy_of,
     wrenches_of_mounts,
 )
-from wm_drake.elements.motion import motion_at, read_tree_state, write_tree_state
-from wm_drake.engines.compiled.bearing import (
-    CARRIER_STATE,
-    CARRIER_STATE_SIZE,
-    TUB,
-    carrier_motion,
-    read_carrier_state,
-    tub_accelerations,
-    write_carrier_state,
+from wm_drake.elements.motion import (
+    BODY_STATE_SIZE,
+    motion_at,
+    read_body_state,
+    read_tree_state,
+    write_body_state,
+    write_tree_state,
 )
+from wm_drake.engines.compiled.bearing import TUB, carrier_motion, tub_accelerations
 from wm_drake.engines.trajectory import LARGEST_TILT
 
 FEET_BEGIN = TUB.fixed_size
 """Index of the feet in the packed numbers of a cabinet."""
 CABINET_SIZE = FEET_BEGIN + FEET_SIZE
 """Packed numbers of a cabinet."""
-SLIPS_BEGIN = CARRIER_STATE_SIZE
+SLIPS_BEGIN = BODY_STATE_SIZE
 """Index of the slips in the state of a cabinet."""
-CABINET_STATE_SIZE = CARRIER_STATE_SIZE + SLIP_SIZE
+CABINET_STATE_SIZE = SLIPS_BEGIN + SLIP_SIZE
 """State of a cabinet."""
-WRENCH_SIZE = 6
-"""Numbers of a wrench."""
-VELOCITIES = range(CARRIER_STATE.offsets["angular_velocity"], CARRIER_STATE_SIZE)
-"""Indices of the velocities in the state of a cabinet."""
-
-
-@law
-def cabinet_size(cabinet):
-    """Return the size of the state of the cabinet; 0 for a fixed one (None)."""
-    if cabinet is None:
-        return 0
-    return CABINET_STATE_SIZE
-
-
-@law
-def cabinet_input_count(cabinet):
-    """Return the number of inputs of the cabinet: the wrench of its mounts; 0 for None."""
-    if cabinet is None:
-        return 0
-    return WRENCH_SIZE
 
 
 @law
@@ -96,7 +75,7 @@ def with_cabinet(x, dx, inputs, first_input, motion, total, gravity, p, cabinet,
         return total
     moving, angle_rates = carrier_motion(x, first)
     on_tub, on_cabinet = wrenches_of_mounts(moving, motion, total)
-    for k in range(WRENCH_SIZE):
+    for k in range(6):
         inputs[first_input + k] = on_cabinet[k]
     write_cabinet_rates(x, dx, moving, angle_rates, on_cabinet, gravity, p, cabinet, first)
     return on_tub
@@ -114,7 +93,7 @@ def write_cabinet_rates(x, dx, moving, angle_rates, on_cabinet, gravity, p, cabi
     """
     feet = feet_on_floor(x, dx, first + SLIPS_BEGIN, moving, p, cabinet + FEET_BEGIN)
     w_rate, v_rate = tub_accelerations(moving, plus(on_cabinet, feet), gravity, p, cabinet)
-    write_carrier_state(dx, first, angle_rates, moving.velocity, w_rate, v_rate)
+    write_body_state(dx, first, angle_rates, moving.velocity, w_rate, v_rate)
 
 
 @law
@@ -148,7 +127,9 @@ def cabinet_after_step(x, rate, stage, total, middle, end, h, gravity, p, cabine
 
 
 @law
-def write_jacobian_alone(x, rate, inputs, first_input, difference, gravity, p, cabinet, first, own):
+def write_cabinet_jacobian(
+    x, rate, inputs, first_input, difference, gravity, p, cabinet, first, jacobian
+):
     """Write the Jacobian of the cabinet under a constant wrench of its mounts, by rows.
 
     Args:
@@ -157,7 +138,7 @@ def write_jacobian_alone(x, rate, inputs, first_input, difference, gravity, p, c
         inputs, first_input: As for `with_cabinet`, the wrench.
         difference: Half of the central difference.
         gravity, p, cabinet, first: As for `with_cabinet`; nothing is done for a fixed one.
-        own: (`CABINET_STATE_SIZE`, `CABINET_STATE_SIZE`), written. [1/s]
+        jacobian: (`CABINET_STATE_SIZE`, `CABINET_STATE_SIZE`), written. [1/s]
     """
     if cabinet is None:
         return
@@ -165,14 +146,14 @@ def write_jacobian_alone(x, rate, inputs, first_input, difference, gravity, p, c
     for column in range(CABINET_STATE_SIZE):
         at_rest = x[first + column]
         for row in range(CABINET_STATE_SIZE):
-            own[row * CABINET_STATE_SIZE + column] = 0.0 * at_rest
+            jacobian[row * CABINET_STATE_SIZE + column] = 0.0 * at_rest
         for side in (-1.0, 1.0):
             x[first + column] = at_rest + side * difference
             moving, angle_rates = carrier_motion(x, first)
             write_cabinet_rates(x, rate, moving, angle_rates, wrench, gravity, p, cabinet, first)
             for row in range(CABINET_STATE_SIZE):
                 k = row * CABINET_STATE_SIZE + column
-                own[k] = own[k] + side * rate[first + row] / (2.0 * difference)
+                jacobian[k] = jacobian[k] + side * rate[first + row] / (2.0 * difference)
         x[first + column] = at_rest
 
 
@@ -189,12 +170,17 @@ def write_seen_sample(history, at, x, dx, cabinet, first, rates):
     if cabinet is not None:
         moving, _ = carrier_motion(x, first)
         body, rate = motion_at(x, 0), read_tree_state(dx, 0)
-        own = read_carrier_state(dx, first)
+        moved = read_body_state(dx, first)
         seen = motion_in(moving, body)
-        turned, moved = rates_in(
-            moving, own.angular_velocity, own.velocity, body, rate.angular_velocity, rate.velocity
+        turned, shifted = rates_in(
+            moving,
+            moved.angular_velocity,
+            moved.velocity,
+            body,
+            rate.angular_velocity,
+            rate.velocity,
         )
-        angles = read_carrier_state(x, first).angles
+        angles = read_body_state(x, first).angles
         stands = (abs(angles[0]) < LARGEST_TILT) & (abs(angles[1]) < LARGEST_TILT)
         drum, (roll, pitch, yaw) = read_tree_state(x, 0), rpy_of(seen.rotation)
         write_tree_state(
@@ -209,6 +195,6 @@ def write_seen_sample(history, at, x, dx, cabinet, first, rates):
         )
         for k in range(3):
             history[rates[0] + k] = turned[k]
-            history[rates[0] + 3 + k] = moved[k]
-            history[rates[1] + k] = own.angular_velocity[k]
-            history[rates[1] + 3 + k] = own.velocity[k]
+            history[rates[0] + 3 + k] = shifted[k]
+            history[rates[1] + k] = moved.angular_velocity[k]
+            history[rates[1] + 3 + k] = moved.velocity[k]

@@ -12,7 +12,7 @@ from wm_drake.parameters.types import FloatArray
 class StateDerivative:
     """The time derivative of the state of a machine as it is set up.
 
-    A state has the layout of `wm_drake.engines.compiled.mechanics`; see `initial_state`.
+    The order of a state is that of `layout.states`; see `initial_state`.
 
     Attributes:
         layout: Indices of the parts of the machine in packed numbers and states.
@@ -58,6 +58,6 @@ class StateDerivative:
         """
         state, rate = aligned(states.size), aligned(states.size)
         state[:] = states.T.ravel()
-        inputs = aligned(self.layout.inputs_size * WIDTH)
+        inputs = aligned(self.layout.states.begins.inputs * WIDTH)
         derivative_lanes(state, rate, inputs, reference, acceleration, self._p, self._elements)
         return rate.reshape(-1, WIDTH).T.copy()

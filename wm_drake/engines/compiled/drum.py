@@ -26,7 +26,6 @@ from wm_drake.compiler.matrices import times
 from wm_drake.compiler.vectors import add, cross, dot, rotate, scale, subtract
 from wm_drake.elements.motion import read_tree_state
 from wm_drake.elements.motor import (
-    MOTOR_STATE_SIZE,
     motor_response,
     read_bearing_friction,
     read_motor,
@@ -35,14 +34,6 @@ from wm_drake.elements.motor import (
     write_motor_state,
 )
 from wm_drake.laws.motor import drum_friction
-
-
-@law
-def motor_size(motor):
-    """Return the size of the state of the drive; 0 if the speed is prescribed (None)."""
-    if motor is None:
-        return 0
-    return MOTOR_STATE_SIZE
 
 
 @law
@@ -120,14 +111,14 @@ def motor_torque_history(states, reference, p, motor, first, torque):
         torque: (n, 1), written. [N m]
     """
     align_stack()
-    x_numbers, wanted_numbers = np.empty(states.shape[1] * WIDTH), np.empty(WIDTH)
+    x_numbers, reference_numbers = np.empty(states.shape[1] * WIDTH), np.empty(WIDTH)
     numbers, p_numbers = np.empty(WIDTH), in_each_lane(p)
-    x, wanted = lane_array(x_numbers), lane_array(wanted_numbers)
+    x, target_speed = lane_array(x_numbers), lane_array(reference_numbers)
     answer, q = lane_array(numbers), lane_array(p_numbers)
     for begin in range(0, len(torque), WIDTH):
         rows_to_lanes(states, begin, x_numbers)
-        rows_to_lanes(reference, begin, wanted_numbers)
+        rows_to_lanes(reference, begin, reference_numbers)
         state, rate = read_motor_state(x, first), read_tree_state(x, 0).joint_rate
-        answer[0], _ = motor_response(state, rate, wanted[0], q, motor)
+        answer[0], _ = motor_response(state, rate, target_speed[0], q, motor)
         lanes_to_rows(numbers, begin, torque)
     keep(p_numbers)

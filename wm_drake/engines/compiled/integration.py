@@ -13,12 +13,9 @@ from wm_drake.engines.compiled.drum import sample_controller
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     follow_profile,
-    inputs_size,
     mass_properties,
-    motor_begin,
     state_derivative,
-    state_size,
-    wanted_speed,
+    target_speed,
     write_sample,
 )
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES, multistep_step, remember
@@ -53,8 +50,8 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
         elements: `Elements`, which all machines have in common.
         x: States; they are advanced.
         work: `Work`, the same from the first step to the last.
-        history: Samples, one after the other: the state, then `rates_size` accelerations. A sample
-            is written at the start of each step that has a sample number.
+        history: Samples, one after the other: the state, then `Begins.rates` accelerations. One is
+            written at the start of each step that has a sample number.
     """
     align_stack()
     numbers, state, samples = lane_array(p), lane_array(x), lane_array(history)
@@ -62,18 +59,16 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
     stage, total = lane_array(work.stage), lane_array(work.total)
     past = Past(lane_array(work.past_rates), lane_array(work.past_inputs))
     length, acceleration, drum, row, controls, one_derivative = steps
-    zero = 0.0 * state[0]
+    zero, begins = 0.0 * state[0], elements.begins
     for i in range(begin, end):
-        sample_controller(
-            state, drum[2 * i, 0], controls[i], numbers, elements.motor, motor_begin(elements)
-        )
+        sample_controller(state, drum[2 * i, 0], controls[i], numbers, elements.motor, begins.motor)
         masses = mass_properties(numbers, zero + drum[2 * i, 1], zero + drum[2 * i, 2])
         speed, speed_rate = zero + drum[2 * i, 0], zero + acceleration[i]
         state_derivative(state, rate, inputs, masses, speed, speed_rate, numbers, elements)
         if row[i] >= 0:
             write_sample(samples, row[i], state, rate, elements)
-        remember(past.rates, i, PAST_RATES, rate, state_size(elements))
-        remember(past.inputs, i, PAST_INPUTS, inputs, inputs_size(elements))
+        remember(past.rates, i, PAST_RATES, rate, begins.size)
+        remember(past.inputs, i, PAST_INPUTS, inputs, begins.inputs)
         if one_derivative[i]:
             multistep_step(state, rate, past, stage, total, i, length[i], numbers, elements)
         else:
@@ -98,7 +93,8 @@ def runge_kutta_step(
         h: Length of the step. [s]
         acceleration, numbers, elements: See `state_derivative`.
     """
-    size, branches, first = state_size(elements), elements.branches, len(elements.dampers)
+    branches, begins = elements.mounts.branches, elements.begins
+    size, first = begins.size, begins.stretch_inputs
     zero = 0.0 * acceleration
     masses = mass_properties(numbers, zero + drum[2 * i + 1, 1], zero + drum[2 * i + 1, 2])
     write_paths(rate, inputs, first, numbers, branches)
@@ -145,7 +141,7 @@ def derivative_lanes(x, dx, inputs, reference, acceleration, p, elements):
         lane_array(dx),
         lane_array(inputs),
         masses,
-        wanted_speed(state, zero + reference, elements.motor),
+        target_speed(state, zero + reference, elements.motor),
         zero + acceleration,
         numbers,
         elements,

@@ -13,16 +13,14 @@ import numpy as np
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import decay_factor, sine_cosine, where
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
-from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, write_jacobian_alone
+from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, write_cabinet_jacobian
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
-    cabinet_begin,
-    cabinet_input,
     mass_properties,
     read_bodies,
     state_derivative,
-    wanted_speed,
+    target_speed,
 )
 from wm_drake.engines.compiled.multistep import (
     PAST_INPUTS,
@@ -34,7 +32,7 @@ from wm_drake.engines.compiled.multistep import (
 from wm_drake.engines.compiled.packing import Layout, aligned, fill_lanes
 from wm_drake.parameters.types import FloatArray
 
-SMOOTH, SPONGE, PATH, CABINET = 0, 1, 2, 3
+SMOOTH, INTERNAL, PATH, CABINET = 0, 1, 2, 3
 """How the multistep integrator treats a state: with the explicit formula; as an internal state, by
 a step of the Runge-Kutta scheme of it alone; in closed form along its path; with all states of the
 cabinet, by a step of the Runge-Kutta scheme of them."""
@@ -65,12 +63,16 @@ def jacobians(
     p = fill_lanes(aligned(len(packed) * WIDTH), [packed])
     x = fill_lanes(aligned(states.size), list(states))
     n = len(free)
-    found, work = aligned(n * n * WIDTH), aligned((states.shape[1] + layout.inputs_size) * WIDTH)
+    entries = aligned(n * n * WIDTH)
+    work = aligned((states.shape[1] + layout.states.begins.inputs) * WIDTH)
     m = CABINET_STATE_SIZE if layout.cabinet >= 0 else 0
-    own = aligned(m * m * WIDTH)
-    jacobian_lanes(x, work, np.asarray(free), difference, p, layout.elements, found, own)
+    cabinet_jacobian = aligned(m * m * WIDTH)
+    jacobian_lanes(
+        x, work, np.asarray(free), difference, p, layout.elements, entries, cabinet_jacobian
+    )
     of_all, of_cabinet = (
-        part.reshape(size, size, WIDTH).transpose(2, 0, 1) for part, size in ((found, n), (own, m))
+        part.reshape(size, size, WIDTH).transpose(2, 0, 1)
+        for part, size in ((entries, n), (cabinet_jacobian, m))
     )
     return of_all, of_cabinet
 
@@ -84,7 +86,7 @@ def is_followed(
 
     Args:
         jacobians: (WIDTH, n, n) [1/s]
-        internal: (n,) `SMOOTH`, `SPONGE`, `PATH` or `CABINET`: how each state is treated.
+        internal: (n,) `SMOOTH`, `INTERNAL`, `PATH` or `CABINET`: how each state is treated.
         step: Step size. [s]
         cabinet: (WIDTH, m, m) Jacobians of the m states `CABINET` under a constant wrench of the
             mounts; None without any. [1/s]
@@ -99,19 +101,21 @@ def is_followed(
     jacobian[:] = jacobians.transpose(1, 2, 0).ravel()
     largest = aligned(4 * WIDTH)
     m = int(np.count_nonzero(internal == CABINET))
-    own = work = None
+    cabinet_jacobian = work = None
     if m and cabinet is not None:
-        own, work = aligned(m * m * WIDTH), aligned(3 * m * WIDTH)
-        own[:] = cabinet.transpose(1, 2, 0).ravel()
+        cabinet_jacobian, work = aligned(m * m * WIDTH), aligned(3 * m * WIDTH)
+        cabinet_jacobian[:] = cabinet.transpose(1, 2, 0).ravel()
     block = int(np.argmax(internal == CABINET)), m
-    growth_lanes(jacobian, internal, step, STEPS, numbers, own, block, work, largest)
+    growth_lanes(jacobian, internal, step, STEPS, numbers, cabinet_jacobian, block, work, largest)
     quarters = largest.reshape(4, WIDTH)
     if not np.all(np.isfinite(numbers)):  # also where no number was seen on the way to it
         return False
     grown = quarters[3] > LARGEST_GROWTH * quarters[1]
     if m and np.any(grown):
-        own_growth = np.exp(0.5 * STEPS * step * _fastest_growth(jacobians[grown]))
-        return bool(np.all(quarters[3, grown] <= LARGEST_GROWTH * own_growth * quarters[1, grown]))
+        motion_growth = np.exp(0.5 * STEPS * step * _fastest_growth(jacobians[grown]))
+        return bool(
+            np.all(quarters[3, grown] <= LARGEST_GROWTH * motion_growth * quarters[1, grown])
+        )
     return not np.any(grown)
 
 
@@ -131,7 +135,7 @@ def _fastest_growth(jacobians: FloatArray) -> FloatArray:
 
 
 @long_running
-def jacobian_lanes(x, work, free, difference, p, elements, jacobian, own):
+def jacobian_lanes(x, work, free, difference, p, elements, jacobian, cabinet_jacobian):
     """Write the Jacobians of `lanes.WIDTH` states, by rows.
 
     Args:
@@ -142,46 +146,47 @@ def jacobian_lanes(x, work, free, difference, p, elements, jacobian, own):
         p: Packed numbers.
         elements: `Elements`.
         jacobian: Square matrices, written.
-        own: The same of a cabinet that moves under a constant wrench of its mounts.
+        cabinet_jacobian: The same of a cabinet that moves under a constant wrench of its mounts.
     """
     align_stack()
-    state, numbers, found = lane_array(x), lane_array(p), lane_array(jacobian)
-    alone = lane_array(own)
+    state, numbers, entries = lane_array(x), lane_array(p), lane_array(jacobian)
+    cabinet_entries = lane_array(cabinet_jacobian)
     size = len(x) // WIDTH
     rate, inputs = lane_array(work[: size * WIDTH]), lane_array(work[size * WIDTH :])
     sine, cosine = sine_cosine(state[DRUM_ANGLE])
     masses = mass_properties(numbers, cosine, sine)
     n, reference, zero = len(free), state[DRUM_RATE], 0.0 * state[DRUM_RATE]
+    begins = elements.begins
     for column in range(n):
         at_rest = state[free[column]]
         for row in range(n):
-            found[row * n + column] = 0.0 * at_rest
+            entries[row * n + column] = 0.0 * at_rest
         for side in (-1.0, 1.0):
             state[free[column]] = at_rest + side * difference
-            wanted = wanted_speed(state, reference, elements.motor)
-            state_derivative(state, rate, inputs, masses, wanted, zero, numbers, elements)
+            target = target_speed(state, reference, elements.motor)
+            state_derivative(state, rate, inputs, masses, target, zero, numbers, elements)
             for row in range(n):
                 change = side * rate[free[row]] / (2.0 * difference)
-                found[row * n + column] = found[row * n + column] + change
+                entries[row * n + column] = entries[row * n + column] + change
         state[free[column]] = at_rest
-    write_jacobian_alone(
-        state, rate, inputs, cabinet_input(elements), difference, read_bodies(numbers, 0).gravity,
-        numbers, elements.cabinet, cabinet_begin(elements), alone
+    write_cabinet_jacobian(
+        state, rate, inputs, begins.wrench_input, difference, read_bodies(numbers, 0).gravity,
+        numbers, elements.cabinet, begins.cabinet, cabinet_entries
     )  # fmt: skip
 
 
 @long_running
-def growth_lanes(jacobian, internal, h, steps, numbers, own, block, work, largest):
+def growth_lanes(jacobian, internal, h, steps, numbers, cabinet_jacobian, block, work, largest):
     """Take the steps of the multistep integrator with linear machines.
 
     Args:
         jacobian: Square matrices, by rows.
-        internal: How each state is treated: `SMOOTH`, `SPONGE`, `PATH` or `CABINET`.
+        internal: How each state is treated: `SMOOTH`, `INTERNAL`, `PATH` or `CABINET`.
         h: Step size. [s]
         steps: Number of steps.
         numbers: Anything to start from: state, its rate, past rates, past inputs.
-        own, block: Matrices of the states `CABINET` alone, by rows, None without such states; the
-            first of them and their number.
+        cabinet_jacobian, block: Matrices of the states `CABINET` alone, by rows, None without such
+            states; the first of them and their number.
         work: Array to work in, for three numbers of each of these states; None without them.
         largest: Largest number of the state in each quarter of the steps, written.
     """
@@ -191,7 +196,7 @@ def growth_lanes(jacobian, internal, h, steps, numbers, own, block, work, larges
     x, rate = lane_array(numbers[: n * WIDTH]), lane_array(numbers[n * WIDTH : 2 * n * WIDTH])
     begin, end = 2 * n * WIDTH, (2 + PAST_RATES) * n * WIDTH
     past_rates, past_inputs = lane_array(numbers[begin:end]), lane_array(numbers[end:])
-    b, stage, (first, m) = as_lanes(own), as_lanes(work), block
+    b, stage, (first, m) = as_lanes(cabinet_jacobian), as_lanes(work), block
     for quarter in range(4):
         top[quarter] = 0.0 * x[0]
     for i in range(steps):
@@ -202,7 +207,7 @@ def growth_lanes(jacobian, internal, h, steps, numbers, own, block, work, larges
             past_inputs[i % PAST_INPUTS * n + row] = rate[row] - share
         block_after_step(x, rate, past_inputs, i, n, h, b, first, m, stage)
         for row in range(n):
-            if internal[row] == SPONGE:
+            if internal[row] == INTERNAL:
                 middle, ahead = extrapolated(past_inputs, i, row, n)
                 x[row] = decay_after_step(x[row], rate[row], a[row * n + row], middle, ahead, h)
             elif internal[row] == PATH:

@@ -16,10 +16,7 @@ harmonic of the angle and no other.
 
 The packed numbers of the bodies are those of `BODIES`, from index 0.
 
-State: tub and drum (`TREE_STATE`); the deformation of each strut damper; the `TUBES_STATE` of each
-telescopic damper; the `CARRIER_STATE` of the drum's carrier in a compliant bearing; the
-`MOTOR_STATE` of a drive with a motor; the state of a cabinet that moves
-(`wm_drake.engines.compiled.cabinet`); the stretches of the branches of rubber bushings.
+The order of the states is that of `wm_drake.elements.state_map`.
 """
 
 from collections import namedtuple
@@ -38,43 +35,30 @@ from wm_drake.elements.friction_damper import (
 from wm_drake.elements.motion import (
     TREE_STATE,
     motion_from_sines,
+    read_body_state,
     read_tree_state,
     rpy_rates,
+    write_body_state,
     write_tree_state,
 )
 from wm_drake.elements.motor import read_motor
+from wm_drake.elements.mount import add_others
 from wm_drake.elements.rubber import bushing_wrench
 from wm_drake.elements.spring import spring_strut_wrench
+from wm_drake.elements.state_map import RATES_SIZE
 from wm_drake.engines.compiled.bearing import (
     carrier_motion,
-    carrier_size,
-    read_carrier_state,
     read_tub_and_bearing,
     tub_accelerations,
-    write_carrier_state,
 )
 from wm_drake.engines.compiled.cabinet import (
-    cabinet_input_count,
-    cabinet_size,
     seen_from_cabinet,
     with_cabinet,
     write_seen_sample,
 )
-from wm_drake.engines.compiled.drum import (
-    motor_size,
-    motor_torque_and_rates,
-    with_free_drum,
-)
-from wm_drake.engines.compiled.rubber import (
-    branch_count,
-    branch_input_count,
-    write_branches,
-)
-from wm_drake.engines.compiled.tubes import (
-    TUBES_STATE_SIZE,
-    add_telescopic_dampers,
-    telescopic_damper_count,
-)
+from wm_drake.engines.compiled.drum import motor_torque_and_rates, with_free_drum
+from wm_drake.engines.compiled.rubber import write_branches
+from wm_drake.engines.compiled.tubes import add_telescopic_dampers
 
 FIRST_HARMONIC = PackedLayout("FirstHarmonic", mean=SCALAR, cosine=SCALAR, sine=SCALAR)
 """Parts of a function of the drum angle."""
@@ -115,33 +99,18 @@ DRUM_ANGLE, DRUM_RATE = TREE_STATE.offsets["joint_position"], TREE_STATE.offsets
 """Indices of the drum's angle and rate in the state."""
 RATES = PackedLayout("Rates", angular_acceleration=VECTOR, acceleration=VECTOR)
 """Accelerations of a body in a sample: angular, and of its origin, in W. [rad/s^2, m/s^2]"""
-RATES_SIZE = RATES.fixed_size
+assert RATES.fixed_size == RATES_SIZE
 
 read_first_harmonic, read_second_harmonic = FIRST_HARMONIC.read, SECOND_HARMONIC.read
 read_bodies, read_rates, write_rates_of = BODIES.read, RATES.read, RATES.write
 
-Elements = namedtuple(
-    "Elements",
-    (
-        "springs",
-        "dampers",
-        "bushings",
-        "telescopes",
-        "bearing",
-        "tubes",
-        "motor",
-        "cabinet",
-        "branches",
-    ),
-)
-"""Indices at which the parts of a machine begin.
+Elements = namedtuple("Elements", ("mounts", "begins", "tubes", "bearing", "motor", "cabinet"))
+"""Indices at which the parts of a machine begin in the packed numbers.
 
-springs, dampers, bushings: arrays of indices of the elements in the packed numbers; telescopes: the
-same for telescopic dampers, None if there are none; bearing: index of the drum's bearing in the
-packed numbers, None if the bearing is rigid; tubes: index of the telescopic dampers in the state;
-motor: index of the motor in the packed numbers, None if the speed of the drum is prescribed;
-cabinet: index of the cabinet in the packed numbers, None if it is fixed; branches: `Branches` of
-rubber bushings, None if there are none.
+mounts: `Mounts`; begins: `Begins`, indices in the state; tubes: array of indices of the bodies of
+telescopic dampers (`TUBES`), None if there are none; bearing: index of the drum's bearing, None if
+it is rigid; motor: index of the motor, None if the speed of the drum is prescribed; cabinet: index
+of the cabinet, None if it is fixed.
 """
 
 MassProperties = namedtuple(
@@ -272,40 +241,38 @@ def state_derivative(x, dx, inputs, masses, rate, acceleration, p, elements):
         elements: `Elements`.
     """
     motor, reference = elements.motor, rate
+    mounts, begins = elements.mounts, elements.begins
     masses, rate = drum_now(x, masses, rate, p, motor)
     angles = read_tree_state(x, 0).angles
     roll, pitch, yaw = sine_cosine(angles[0]), sine_cosine(angles[1]), sine_cosine(angles[2])
     in_world = motion_from_sines(x, 0, roll, pitch, yaw)
-    cabinet, first = elements.cabinet, cabinet_begin(elements)
+    cabinet, first = elements.cabinet, begins.cabinet
     motion = seen_from_cabinet(x, in_world, cabinet, first)
     zero = 0.0 * angles[0]
     total = (zero, zero, zero, zero, zero, zero)
-    for at in elements.springs:
+    for at in mounts.springs:
         wrench, _ = spring_strut_wrench(motion, p, at)
         total = plus(total, wrench)
-    for at in elements.bushings:
-        wrench, _ = bushing_wrench(motion, p, at, x, elements.branches)
+    for at in mounts.bushings:
+        wrench, _ = bushing_wrench(motion, p, at, x, mounts.branches)
         total = plus(total, wrench)
-    write_branches(x, dx, inputs, len(elements.dampers), motion, p, elements.branches)
-    for i in range(len(elements.dampers)):
-        at, k = elements.dampers[i], STATE_SIZE + i
+    write_branches(x, dx, inputs, begins.stretch_inputs, motion, p, mounts.branches)
+    for i in range(len(mounts.dampers)):
+        at, k = mounts.dampers[i], begins.sponges + i
         arm, line = friction_damper_line(motion, p, at)
         inputs[i] = line[1]
         tension, dx[k] = friction_damper_tension(line[1], x[k], p, at)
         total = plus(total, friction_damper_wrench(motion, arm, line, tension, p, at))
     gravity = read_bodies(p, 0).gravity
-    total = add_telescopic_dampers(
-        x, dx, motion, gravity, p, elements.telescopes, elements.tubes, total
-    )
-    wrench_input = cabinet_input(elements)
+    total = add_telescopic_dampers(x, dx, motion, gravity, p, elements.tubes, mounts, total)
+    total = add_others(x, dx, motion, p, mounts.others, total)
+    wrench_input = begins.wrench_input
     total = with_cabinet(x, dx, inputs, wrench_input, in_world, total, gravity, p, cabinet, first)
     bodies = in_world, masses, rate, acceleration, total, p
-    w_rate, v_rate = tub_and_carrier_accelerations(
-        x, dx, *bodies, elements.bearing, carrier_begin(elements)
-    )
+    w_rate, v_rate = tub_and_carrier_accelerations(x, dx, *bodies, elements.bearing, begins.carrier)
     w_rate, v_rate, acceleration = turned_by_motor(
         x, dx, in_world, masses, (w_rate, v_rate, acceleration), reference, p, motor,
-        motor_begin(elements)
+        begins.motor
     )  # fmt: skip
     write_tree_state(
         dx,
@@ -344,7 +311,7 @@ def tub_and_carrier_accelerations(
     carrier, angle_rates = carrier_motion(x, first)
     on_tub, on_carrier, _ = drum_bearing_forces(motion, carrier, *numbers.bearing)
     w_rate, v_rate = accelerations(carrier, masses, rate, acceleration, on_carrier, p)
-    write_carrier_state(dx, first, angle_rates, carrier.velocity, w_rate, v_rate)
+    write_body_state(dx, first, angle_rates, carrier.velocity, w_rate, v_rate)
     return tub_accelerations(motion, plus(total, on_tub), gravity, *numbers.tub)
 
 
@@ -395,48 +362,11 @@ def follow_profile(x, angle, rate, motor):
 
 
 @law
-def wanted_speed(x, reference, motor):
+def target_speed(x, reference, motor):
     """Return the speed that the controller wants; without a motor it is the drum's own."""
     if motor is None:
         return x[DRUM_RATE]
     return reference
-
-
-@law
-def state_size(elements):
-    """Return the size of the state of a machine with these elements."""
-    return branches_begin(elements) + branch_count(elements.branches)
-
-
-@law
-def branches_begin(elements):
-    """Return the index in the state where the stretches of rubber bushings begin."""
-    return cabinet_begin(elements) + cabinet_size(elements.cabinet)
-
-
-@law
-def motor_begin(elements):
-    """Return the index in the state where the drive begins, if it has a motor."""
-    return carrier_begin(elements) + carrier_size(elements.bearing)
-
-
-@law
-def inputs_size(elements):
-    """Return the number of inputs of internal states: see `state_derivative`."""
-    return cabinet_input(elements) + cabinet_input_count(elements.cabinet)
-
-
-@law
-def cabinet_input(elements):
-    """Return the index in the inputs of the wrench on the cabinet, if it moves."""
-    return len(elements.dampers) + branch_input_count(elements.branches)
-
-
-@law
-def rates_size(elements):
-    """Return the number of accelerations in a sample."""
-    carrier = 0 if elements.bearing is None else RATES_SIZE
-    return RATES_SIZE + carrier + (0 if elements.cabinet is None else RATES_SIZE)
 
 
 @law
@@ -445,13 +375,14 @@ def write_sample(history, number, x, dx, elements):
 
     The tub is that seen from the cabinet, so that displacements and forces follow from it alone.
     """
-    size = state_size(elements)
-    at = number * (size + rates_size(elements))
+    begins = elements.begins
+    size = begins.size
+    at = number * (size + begins.rates)
     for k in range(size):
         history[at + k] = x[k]
     write_rates(history, at + size, dx, elements)
-    rates = at + size, at + size + rates_size(elements) - RATES_SIZE
-    write_seen_sample(history, at, x, dx, elements.cabinet, cabinet_begin(elements), rates)
+    rates = at + size, at + size + begins.rates - RATES_SIZE
+    write_seen_sample(history, at, x, dx, elements.cabinet, begins.cabinet, rates)
 
 
 @law
@@ -460,17 +391,5 @@ def write_rates(history, at, dx, elements):
     tub = read_tree_state(dx, 0)
     write_rates_of(history, at, tub.angular_velocity, tub.velocity)
     if elements.bearing is not None:
-        carrier = read_carrier_state(dx, carrier_begin(elements))
+        carrier = read_body_state(dx, elements.begins.carrier)
         write_rates_of(history, at + RATES_SIZE, carrier.angular_velocity, carrier.velocity)
-
-
-@law
-def carrier_begin(elements):
-    """Return the index in the state where the drum's carrier begins, if there is one."""
-    return elements.tubes + TUBES_STATE_SIZE * telescopic_damper_count(elements.telescopes)
-
-
-@law
-def cabinet_begin(elements):
-    """Return the index in the state where the cabinet begins, if it moves."""
-    return motor_begin(elements) + motor_size(elements.motor)

@@ -26,26 +26,22 @@ from collections import namedtuple
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
-from wm_drake.elements.motion import TREE_STATE, rpy_rates
-from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE
+from wm_drake.elements.motion import BODY_STATE, TREE_STATE, rpy_rates
+from wm_drake.elements.telescopic_damper import DEFORMATION, TUBES_STATE_SIZE
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
-    STATE_SIZE,
-    carrier_begin,
     mass_properties,
     state_derivative,
-    state_size,
     write_sample,
 )
 from wm_drake.engines.compiled.packing import aligned
-from wm_drake.engines.compiled.tubes import DEFORMATION, TUBES_STATE_SIZE, telescopic_damper_count
 
 BODY, TUBES = 6, 7
 """Degrees of freedom of a floating body, and of the tubes of a damper."""
 VELOCITIES = TREE_STATE.offsets["angular_velocity"]
 """Where the velocities of a `TREE_STATE` begin; its positions are before them, in this order."""
-CARRIER_VELOCITIES = CARRIER_STATE_SIZE // 2
+CARRIER_VELOCITIES = BODY_STATE.offsets["angular_velocity"]
 
 MidpointWork = namedtuple("MidpointWork", ("rate", "inputs", "middle", "past", "change"))
 """Arrays to work in. `past` must stay from call to call: at the index of each velocity its A, at
@@ -67,7 +63,7 @@ def integrate_midpoint_lanes(steps, begin, end, p, elements, relaxation, x, work
             of a `Schedule`; no arrays of lanes.
         begin, end: Numbers of steps.
         p: Packed numbers.
-        elements: `Elements`, which all machines have in common; telescopes is not None.
+        elements: `Elements`, which all machines have in common; tubes is not None.
         relaxation: R of each telescopic damper, by rows.
         x: States; they are advanced.
         work: `MidpointWork`, the same from the first step to the last.
@@ -88,7 +84,7 @@ def integrate_midpoint_lanes(steps, begin, end, p, elements, relaxation, x, work
             if row[i] >= 0:
                 write_sample(samples, row[i], state, rate, elements)
             if i == 0:
-                for k in range(state_size(elements)):
+                for k in range(elements.begins.size):
                     past[k] = rate[k]
         h = length[i]
         predict_middle(state, middle, past, h, elements)
@@ -114,15 +110,18 @@ def predict_middle(state, middle, past, h, elements):
     """
     predict_body(state, middle, past, 0, VELOCITIES, BODY, h)
     middle[DRUM_ANGLE], middle[DRUM_RATE] = state[DRUM_ANGLE], state[DRUM_RATE]
-    for k in range(STATE_SIZE, STATE_SIZE + len(elements.dampers)):
+    begins = elements.begins
+    for k in range(begins.sponges, begins.tubes):
         middle[k] = state[k] + 0.5 * h * past[k]
-    for i in range(telescopic_damper_count(elements.telescopes)):
-        at = elements.tubes + TUBES_STATE_SIZE * i
+    for k in range(begins.elements, begins.size):
+        middle[k] = state[k] + 0.5 * h * past[k]
+    for i in range(len(elements.tubes)):
+        at = begins.tubes + TUBES_STATE_SIZE * i
         predict_body(state, middle, past, at, VELOCITIES, TUBES, h)
         sponge = at + DEFORMATION
         middle[sponge] = state[sponge] + 0.5 * h * past[sponge]
     if elements.bearing is not None:
-        at = carrier_begin(elements)
+        at = begins.carrier
         predict_body(state, middle, past, at, CARRIER_VELOCITIES, BODY, h)
 
 
@@ -176,18 +175,22 @@ def advance(state, middle, rate, past, change, h, relaxation, elements):
     """
     keep(past, rate, VELOCITIES, BODY)
     advance_body(state, middle, past, 0, VELOCITIES, BODY, h)
-    for k in range(STATE_SIZE, STATE_SIZE + len(elements.dampers)):
+    begins = elements.begins
+    for k in range(begins.sponges, begins.tubes):
         past[k] = rate[k]
         state[k] = state[k] + h * rate[k]
-    for i in range(telescopic_damper_count(elements.telescopes)):
-        at = elements.tubes + TUBES_STATE_SIZE * i
+    for k in range(begins.elements, begins.size):
+        past[k] = rate[k]
+        state[k] = state[k] + h * rate[k]
+    for i in range(len(elements.tubes)):
+        at = begins.tubes + TUBES_STATE_SIZE * i
         relax(past, rate, change, at + VELOCITIES, relaxation, TUBES * TUBES * i)
         advance_body(state, middle, past, at, VELOCITIES, TUBES, h)
         sponge = at + DEFORMATION
         past[sponge] = rate[sponge]
         state[sponge] = state[sponge] + h * rate[sponge]
     if elements.bearing is not None:
-        at = carrier_begin(elements)
+        at = begins.carrier
         keep(past, rate, at + CARRIER_VELOCITIES, BODY)
         advance_body(state, middle, past, at, CARRIER_VELOCITIES, BODY, h)
 

@@ -6,11 +6,21 @@ states with slow and fast motion. It must not grow faster than the linearised ma
 
 import numpy as np
 
-from wm_drake.engines.compiled.mechanics import STATE_SIZE
-from wm_drake.engines.compiled.midpoint import BODY, CARRIER_VELOCITIES, TUBES, VELOCITIES
+from wm_drake.elements.state_map import (
+    ELEMENT_STATE,
+    JOINT,
+    JOINT_VELOCITY,
+    PLACES,
+    SPONGE,
+    TUB,
+    TUBES,
+    VELOCITIES,
+)
+from wm_drake.engines.compiled.midpoint import BODY
+from wm_drake.engines.compiled.midpoint import TUBES as TUBES_FREEDOM
+from wm_drake.engines.compiled.midpoint import VELOCITIES as FIRST_VELOCITY
 from wm_drake.engines.compiled.packing import Layout
 from wm_drake.engines.compiled.step_check import free_states
-from wm_drake.engines.compiled.tubes import DEFORMATION, TUBES_STATE_SIZE
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 
@@ -31,11 +41,11 @@ def relaxation_matrices(
         jacobians: (lanes, n, n) of its free states, the first one at rest. [1/s]
         step: Step size. [s]
     """
-    place = _places(setup)
+    place = _places(setup, layout)
     return np.array(
         [
             np.linalg.inv(_newton_matrix(jacobians[0], place, begin, step))
-            for begin in _tubes(layout)
+            for begin in layout.states.begins_of(TUBES)
         ]
     )
 
@@ -44,13 +54,13 @@ def _newton_matrix(
     jacobian: FloatArray, place: dict[int, int], begin: int, step: float
 ) -> FloatArray:
     """Return the inverse of R of the damper whose state begins at an index. (7, 7)"""
-    q = [place[begin + k] for k in range(TUBES)]
-    v = [place[begin + VELOCITIES + k] for k in range(TUBES)]
+    q = [place[begin + k] for k in range(TUBES_FREEDOM)]
+    v = [place[begin + FIRST_VELOCITY + k] for k in range(TUBES_FREEDOM)]
     by_position = jacobian[np.ix_(v, q)] @ jacobian[np.ix_(q, v)]
-    found: FloatArray = (
-        np.eye(TUBES) - 0.5 * step * jacobian[np.ix_(v, v)] - 0.25 * step**2 * by_position
+    newton: FloatArray = (
+        np.eye(TUBES_FREEDOM) - 0.5 * step * jacobian[np.ix_(v, v)] - 0.25 * step**2 * by_position
     )
-    return found
+    return newton
 
 
 def midpoint_follows(setup: Setup, layout: Layout, jacobians: FloatArray, step: float) -> bool:
@@ -79,15 +89,15 @@ def step_matrices(setup: Setup, layout: Layout, jacobians: FloatArray, step: flo
         (lanes, m, m) for the free states, then what is kept from step to step: the acceleration
         of each velocity and the rate of each sponge.
     """
-    place = _places(setup)
-    q, v, sponges = (np.array([place[k] for k in part]) for part in _parts(setup, layout))
+    place = _places(setup, layout)
+    q, v, sponges = (np.array([place[k] for k in part]) for part in _parts(layout))
     n, moving, internal = jacobians.shape[1], len(v), len(sponges)
     relaxation = np.eye(moving)
     for number, matrix in enumerate(relaxation_matrices(setup, layout, jacobians, step)):
-        at = BODY + TUBES * number
-        relaxation[at : at + TUBES, at : at + TUBES] = matrix
+        at = BODY + TUBES_FREEDOM * number
+        relaxation[at : at + TUBES_FREEDOM, at : at + TUBES_FREEDOM] = matrix
     state, kept, rates = np.split(np.eye(n + moving + internal), [n, n + moving])
-    found = []
+    transitions = []
     for jacobian in jacobians:
         kinematics = jacobian[np.ix_(q, v)]
         middle, after = state.copy(), state.copy()
@@ -99,8 +109,8 @@ def step_matrices(setup: Setup, layout: Layout, jacobians: FloatArray, step: flo
         after[q] += step * kinematics @ (state[v] + 0.5 * step * acceleration)
         after[v] += step * acceleration
         after[sponges] += step * rate[sponges]
-        found.append(np.vstack([after, acceleration, rate[sponges]]))
-    return np.array(found)
+        transitions.append(np.vstack([after, acceleration, rate[sponges]]))
+    return np.array(transitions)
 
 
 def _growth(matrices: FloatArray) -> FloatArray:
@@ -112,27 +122,20 @@ def _growth(matrices: FloatArray) -> FloatArray:
     return np.asarray(sizes[0] / sizes[1])
 
 
-def _places(setup: Setup) -> dict[int, int]:
+def _places(setup: Setup, layout: Layout) -> dict[int, int]:
     """Return the place of each free state among them, by its index in the state."""
-    free, _ = free_states(setup)
+    free, _ = free_states(setup, layout.states)
     return {index: place for place, index in enumerate(free)}
 
 
-def _tubes(layout: Layout) -> list[int]:
-    """Return the index in the state where each telescopic damper begins."""
-    begin = STATE_SIZE + len(layout.dampers)
-    return [begin + TUBES_STATE_SIZE * number for number in range(len(layout.telescopes))]
+def _parts(layout: Layout) -> tuple[list[int], list[int], list[int]]:
+    """Return the indices of positions, of their velocities, and of other states of elements.
 
-
-def _parts(setup: Setup, layout: Layout) -> tuple[list[int], list[int], list[int]]:
-    """Return the indices in the state of positions, of their velocities, and of sponges."""
-    bodies = [(0, VELOCITIES, BODY)]
-    bodies += [(begin, VELOCITIES, TUBES) for begin in _tubes(layout)]
-    sponges = list(range(STATE_SIZE, STATE_SIZE + len(layout.dampers)))
-    sponges += [begin + DEFORMATION for begin in _tubes(layout)]
-    if setup.bearing:
-        end = STATE_SIZE + len(layout.dampers) + TUBES_STATE_SIZE * len(layout.telescopes)
-        bodies.append((end, CARRIER_VELOCITIES, BODY))
-    positions = [begin + k for begin, _, count in bodies for k in range(count)]
-    velocities = [begin + first + k for begin, first, count in bodies for k in range(count)]
-    return positions, velocities, sponges
+    The order is that of the bodies: tub, tubes, carrier. The joint of the tub is the drum's.
+    """
+    positions, velocities = list[int](), list[int]()
+    for part in layout.states.parts:
+        skipped = (JOINT, JOINT_VELOCITY) if part.kind == TUB else ()
+        positions += part.indices(*(role for role in PLACES if role not in skipped))
+        velocities += part.indices(*(role for role in VELOCITIES if role not in skipped))
+    return positions, velocities, layout.states.indices(SPONGE, ELEMENT_STATE).tolist()

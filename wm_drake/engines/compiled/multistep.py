@@ -13,9 +13,9 @@ A step from t to t + h knows f_j = f(t - j h) and u_j = u(t - j h) of steps of t
     z(t + h): one step of the classical Runge-Kutta scheme for z' = g(u(t + s h), z)
 
 The first line is the Adams-Bashforth formula of fourth order plus 0.2 times the fourth and -0.15
-times the fifth backward difference of f: any such sum has order four. These two numbers are an own
-choice (docs/decisions/0087): the error constant is 0.15 in place of 0.35, and the formula is stable
-for h lambda from -0.38 to 0 and to 0.34 i, in place of -0.30 and 0.43 i.
+times the fifth backward difference of f: any such sum has order four. These two numbers were
+scanned for error and stability: the error constant is 0.15 in place of 0.35, and the formula is
+stable for h lambda from -0.38 to 0 and to 0.34 i, in place of -0.30 and 0.43 i.
 
 The friction of a rubber bushing follows its path in closed form instead
 (`wm_drake.laws.rubber.dahl_after_step`).
@@ -30,11 +30,7 @@ from wm_drake.elements.rubber import AXIS_COUNT, read_rubber, read_rubber_bushin
 from wm_drake.engines.compiled.cabinet import cabinet_after_step
 from wm_drake.engines.compiled.mechanics import (
     STATE_SIZE,
-    cabinet_begin,
-    cabinet_input,
-    inputs_size,
     read_bodies,
-    state_size,
 )
 from wm_drake.engines.compiled.rubber import branch_after_step
 
@@ -56,19 +52,22 @@ def multistep_step(state, rate, past, stage, total, i, h, p, elements):
         h: Length of the step. [s]
         p, elements: See `state_derivative`.
     """
-    size, struts, inputs = state_size(elements), len(elements.dampers), inputs_size(elements)
+    mounts, begins = elements.mounts, elements.begins
+    size, inputs = begins.size, begins.inputs
     for k in range(STATE_SIZE):
         state[k] = explicit_multistep(state[k], past.rates, i, k, size, h)
-    for k in range(STATE_SIZE + struts, cabinet_begin(elements)):
+    for k in range(begins.tubes, begins.cabinet):
         state[k] = explicit_multistep(state[k], past.rates, i, k, size, h)
-    for d in range(struts):
-        k, at = STATE_SIZE + d, elements.dampers[d]
+    for k in range(begins.elements, size):
+        state[k] = explicit_multistep(state[k], past.rates, i, k, size, h)
+    for d in range(len(mounts.dampers)):
+        k, at = begins.sponges + d, mounts.dampers[d]
         middle, end = extrapolated(past.inputs, i, d, inputs)
         state[k] = sponge_after_step(state[k], rate[k], middle, end, h, p, at)
-    branches_after_step(state, past.inputs, i, h, p, elements.branches, struts, inputs)
+    branches_after_step(state, past.inputs, i, h, p, mounts.branches, begins.stretch_inputs, inputs)
     step_cabinet(
-        state, rate, stage, total, past.inputs, i, cabinet_input(elements), inputs, h, p,
-        elements.cabinet, cabinet_begin(elements)
+        state, rate, stage, total, past.inputs, i, begins.wrench_input, inputs, h, p,
+        elements.cabinet, begins.cabinet
     )  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 """`Setup` -> flat numbers and indices for the compiled engine, all read from the built machine."""
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,27 +11,22 @@ from pydrake.systems.framework import Context
 
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.compiler.matrices import about_centre, inverse
+from wm_drake.elements.kind import ElementKind
 from wm_drake.elements.motion import POSE
-from wm_drake.elements.motor import MOTOR_STATE_SIZE, motor_structure, packed_motor
-from wm_drake.elements.rubber import AXIS_COUNT, Branches, RubberBushingParameters
-from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE, TUB, TUB_AND_BEARING
-from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, WRENCH_SIZE
+from wm_drake.elements.motor import motor_structure, packed_motor
+from wm_drake.elements.mount import Mounts, mounts_at
+from wm_drake.elements.state_map import CARRIER as CARRIER_STATES
+from wm_drake.elements.state_map import ELEMENT, PLACES, TUBES, StateMap
+from wm_drake.engines.compiled.bearing import TUB, TUB_AND_BEARING
 from wm_drake.engines.compiled.mechanics import (
     BODIES,
     BODIES_SIZE,
     DRUM_RATE,
     FIRST_HARMONIC,
-    RATES_SIZE,
     SECOND_HARMONIC,
-    STATE_SIZE,
     Elements,
 )
-from wm_drake.engines.compiled.tubes import (
-    DEFORMATION,
-    TUBES,
-    TUBES_AND_DAMPER,
-    TUBES_STATE_SIZE,
-)
+from wm_drake.engines.compiled.tubes import TUBES as TUBES_NUMBERS
 from wm_drake.errors import InputError, input_error
 from wm_drake.model.bodies import DRUM, with_load
 from wm_drake.model.machine import Setup
@@ -45,120 +41,51 @@ class Layout:
 
     Attributes:
         springs, dampers, bushings, telescopes: Index of each element.
-        gasket: Index of the gasket, -1 without one.
+        rubber: Index of each bushing of rubber.
+        tubes: Index of the bodies of each telescopic damper.
         bearing: Index of the drum's compliant bearing, -1 for a rigid one.
         motor: Index of the motor, -1 if the speed of the drum is prescribed.
-        control_period: Time between two samples of a sampled controller, else 0. [s]
         cabinet: Index of the cabinet, -1 for a fixed one.
+        gasket: Index of the gasket, -1 without one.
+        control_period: Time between two samples of a sampled controller, else 0. [s]
         structure: Number of each damper's law and number of points of every table, in order.
-        rubber: Index of each bushing of rubber, and number of its stretches.
+        states: Order of the states.
+        others, kinds: Index and kind of each element of another package.
     """
 
     springs: tuple[int, ...]
     dampers: tuple[int, ...]
     bushings: tuple[int, ...]
     telescopes: tuple[int, ...]
-    gasket: int
+    rubber: tuple[int, ...]
+    tubes: tuple[int, ...]
     bearing: int
     motor: int
-    control_period: float
     cabinet: int
+    gasket: int
+    control_period: float
     structure: tuple[int, ...]
-    rubber: tuple[tuple[int, int], ...] = ()
+    states: StateMap
+    others: tuple[int, ...] = ()
+    kinds: tuple[ElementKind, ...] = ()
+
+    @property
+    def mounts(self) -> Mounts:
+        """Return the indices of the mounts in the form that compiled functions use."""
+        return mounts_at(vars(self), self.rubber, self.kinds, self.states)
 
     @property
     def elements(self) -> Elements:
-        """The indices in the form that compiled functions use.
+        """Return the indices in the form that compiled functions use.
 
         Without telescopic dampers, a compliant bearing or a motor their index is None, and the
         functions are compiled without them.
         """
-        springs, dampers, bushings, telescopes = (
-            np.array(indices, dtype=np.int64)
-            for indices in (self.springs, self.dampers, self.bushings, self.telescopes)
+        tubes = np.array(self.tubes, dtype=np.int64) if self.tubes else None
+        bearing, motor, cabinet = (
+            at if at >= 0 else None for at in (self.bearing, self.motor, self.cabinet)
         )
-        bearing = self.bearing if self.bearing >= 0 else None
-        tubes = STATE_SIZE + len(dampers)
-        return Elements(
-            springs,
-            dampers,
-            bushings,
-            telescopes if self.telescopes else None,
-            bearing,
-            tubes,
-            self.motor if self.motor >= 0 else None,
-            self.cabinet if self.cabinet >= 0 else None,
-            self.branches(self.branches_begin),
-        )
-
-    @property
-    def branches_begin(self) -> int:
-        """Index in the state where the stretches of rubber bushings begin."""
-        begin = STATE_SIZE + len(self.dampers) + TUBES_STATE_SIZE * len(self.telescopes)
-        begin += CARRIER_STATE_SIZE if self.bearing >= 0 else 0
-        return begin + self.motor_size + self.cabinet_size
-
-    def branches(self, first: int) -> Branches | None:
-        """Return the bushings of rubber, of which the first stretch has an index in the state."""
-        if not self.rubber:
-            return None
-        at, counts = np.array(self.rubber, dtype=np.int64).T
-        return Branches(at.copy(), first + np.cumsum(counts) - counts, int(counts.sum()))
-
-    @property
-    def inputs_size(self) -> int:
-        """Number of inputs of internal states."""
-        wrench = WRENCH_SIZE if self.cabinet >= 0 else 0
-        return len(self.dampers) + AXIS_COUNT * len(self.rubber) + wrench
-
-    @property
-    def rates_size(self) -> int:
-        """Number of accelerations in a sample, behind the state."""
-        return RATES_SIZE * (1 + (self.bearing >= 0) + (self.cabinet >= 0))
-
-    def parts(self, states: FloatArray) -> tuple[FloatArray, ...]:
-        """Split states (n, size) into their parts.
-
-        Returns:
-            State of tub and drum (n, 14); deformations of all dampers, those of telescopic ones
-            last (n, d); states of the tubes (n, k, 14); state of the drum's carrier (n, 12), or
-            (n, 0) without one; stretches of rubber bushings (n, s). The rest is the `cabinet_part`.
-        """
-        tubes_begin = STATE_SIZE + len(self.dampers)
-        tubes_end = tubes_begin + TUBES_STATE_SIZE * len(self.telescopes)
-        tubes = states[:, tubes_begin:tubes_end].reshape(
-            len(states), len(self.telescopes), TUBES_STATE_SIZE
-        )
-        own, deformation_of_tubes = tubes[:, :, :STATE_SIZE], tubes[:, :, DEFORMATION]
-        deformation = np.hstack([states[:, STATE_SIZE:tubes_begin], deformation_of_tubes])
-        carrier = states[:, tubes_end : self.motor_begin]
-        stretches = states[:, self.branches_begin :]
-        return states[:, :STATE_SIZE], deformation, own, carrier, stretches
-
-    @property
-    def motor_begin(self) -> int:
-        """Index in the state where the drive begins, if it has a motor."""
-        return self.branches_begin - self.cabinet_size - self.motor_size
-
-    @property
-    def carrier_begin(self) -> int:
-        """Index in the state where the drum's carrier begins, if the bearing is compliant."""
-        return self.motor_begin - CARRIER_STATE_SIZE
-
-    @property
-    def motor_size(self) -> int:
-        """Size of the state of the drive, before that of the cabinet; 0 for a prescribed speed."""
-        return MOTOR_STATE_SIZE if self.motor >= 0 else 0
-
-    def cabinet_part(self, states: FloatArray) -> FloatArray | None:
-        """Return the states (n, `CABINET_STATE_SIZE`) of a cabinet that moves; None if fixed."""
-        end = self.branches_begin
-        return states[:, end - self.cabinet_size : end] if self.cabinet >= 0 else None
-
-    @property
-    def cabinet_size(self) -> int:
-        """Size of the state of the cabinet; 0 for a fixed one."""
-        return CABINET_STATE_SIZE if self.cabinet >= 0 else 0
+        return Elements(self.mounts, self.states.begins, tubes, bearing, motor, cabinet)
 
 
 def pack(setup: Setup) -> tuple[FloatArray, Layout]:
@@ -177,49 +104,49 @@ def pack(setup: Setup) -> tuple[FloatArray, Layout]:
 def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
     """Return the packed numbers behind the bodies, which no load changes, and the layout of all."""
     on_tub, indices = setup.elements.packed_on_tub(BODIES_SIZE)
-    parts, size = [on_tub], BODIES_SIZE + len(on_tub)
-    structure = list(setup.elements.structure_on_tub)
-    begins = []
+    parts, structure = [on_tub], list(setup.elements.structure_on_tub)
+    size = BODIES_SIZE + len(on_tub)
+
+    def add(packed: FloatArray, points: Sequence[int] = ()) -> int:
+        """Append packed numbers with their structure; return their index."""
+        nonlocal size
+        begin, size = size, size + len(packed)
+        parts.append(packed)
+        structure.extend(points)
+        return begin
+
+    tubes, telescopes = list[int](), list[int]()
     for name, telescope in setup.telescopes.items():
-        begins.append(size)
-        parts.append(
-            TUBES_AND_DAMPER.pack(tubes=pack_tubes(setup, name), damper=telescope.packed())
-        )
-        size += len(parts[-1])
-        structure += telescope.structure
-    indices["telescopes"] = tuple(begins)
-    names = list(setup.bushings)
-    gasket = indices["bushings"][names.index("gasket")] if "gasket" in names else -1
-    bearing = size if setup.bearing else -1
+        tubes.append(add(pack_tubes(setup, name)))
+        telescopes.append(add(telescope.packed(), telescope.structure))
+    bearing, motor, cabinet, control_period = -1, -1, -1, 0.0
     if setup.bearing:
-        tub = pack_rigid(setup, "tub")
-        parts.append(TUB_AND_BEARING.pack(tub=tub, bearing=setup.bearing.packed()))
-        structure += setup.bearing.structure
-    motor, control_period = -1, 0.0
+        tub, bushing = pack_rigid(setup, "tub"), setup.bearing.packed()
+        bearing = add(TUB_AND_BEARING.pack(tub=tub, bearing=bushing), setup.bearing.structure)
     if drive := setup.motor:
-        motor = BODIES_SIZE + sum(map(len, parts))
-        parts.append(packed_motor(drive))
-        structure += motor_structure(drive)
+        motor = add(packed_motor(drive), motor_structure(drive))
         control_period = drive.controller.sample_time or 0.0
-    cabinet = -1
     if setup.cabinet:
-        cabinet = BODIES_SIZE + sum(map(len, parts))
-        parts += [pack_rigid(setup, CABINET), setup.cabinet.packed()]
-    rubber = tuple(
-        (at, bushing.state_size)
-        for at, bushing in zip(indices["bushings"], setup.bushings.values(), strict=True)
-        if isinstance(bushing, RubberBushingParameters)
-    )
+        cabinet = add(np.concatenate([pack_rigid(setup, CABINET), setup.cabinet.packed()]))
     return np.concatenate(parts), Layout(
         **indices,
-        gasket=gasket,
+        telescopes=tuple(telescopes),
+        rubber=setup.elements.rubber_begins(indices),
+        tubes=tuple(tubes),
         bearing=bearing,
         motor=motor,
-        control_period=control_period,
         cabinet=cabinet,
+        gasket=dict(zip(setup.bushings, indices["bushings"], strict=True)).get("gasket", -1),
+        control_period=control_period,
         structure=tuple(structure),
-        rubber=rubber,
+        states=state_map(setup),
+        kinds=tuple(element.kind for element in setup.elements.others.values()),
     )
+
+
+def state_map(setup: Setup) -> StateMap:
+    """Return the order of the states of a machine as it is set up."""
+    return setup.elements.states(drive=bool(setup.motor), cabinet=bool(setup.cabinet))
 
 
 def aligned(size: int) -> FloatArray:
@@ -252,20 +179,19 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     The machine is at rest at the rest pose, the drum at its first speed; sponges and branches of
     rubber are relaxed, a motor is without torque.
     """
-    x = np.zeros(STATE_SIZE + len(setup.dampers))
+    states = state_map(setup)
+    x: FloatArray = np.zeros(states.size)
     x[: POSE.fixed_size] = setup.rest_pose
     x[DRUM_RATE] = profile.speed[0]
-    tubes = np.zeros((len(setup.telescopes), TUBES_STATE_SIZE))
-    tubes[:, : setup.tube_rest.shape[1]] = setup.tube_rest
-    size = sum(bushing.state_size for bushing in setup.bushings.values())
-    size += MOTOR_STATE_SIZE if setup.motor else 0
-    size += CABINET_STATE_SIZE if setup.cabinet else 0
-    carrier = setup.carrier_rest, np.zeros_like(setup.carrier_rest)
-    return np.concatenate([x, tubes.ravel(), *carrier, np.zeros(size)])
+    x[states.indices(*PLACES, kinds=[TUBES])] = setup.tube_rest.ravel()
+    x[states.indices(*PLACES, kinds=[CARRIER_STATES])] = setup.carrier_rest
+    if setup.elements.others:
+        x[states.span(ELEMENT)] = setup.elements.initial_of_others()
+    return x
 
 
 def pack_tubes(setup: Setup, name: str) -> FloatArray:
-    """Return the packed bodies of a telescopic damper (`TUBES`).
+    """Return the packed bodies of a telescopic damper (`engines.compiled.tubes.TUBES`).
 
     Raises:
         InputError: the joint has something that the compiled engine does not represent.
@@ -293,7 +219,7 @@ def pack_tubes(setup: Setup, name: str) -> FloatArray:
     second_order = m * (np.eye(3) - np.outer(a, a))
     both = _matrix(outer_inertia) + _matrix(inner_inertia)
     mass = outer_inertia.get_mass() + m
-    return TUBES.pack(
+    return TUBES_NUMBERS.pack(
         inverse_mass=1.0 / mass,
         inner_mass=m,
         axis=a,
@@ -355,7 +281,7 @@ class DrawnBodies:
             [part.index() for part in plant.GetBodiesWeldedTo(body) if part.index() != drum.index()]
             for body in (tub, joint.child_body())
         )
-        of_tub, self._beside_drum = (
+        of_tub, self._welded_to_drum = (
             plant.CalcSpatialInertia(context, tub.body_frame(), group).Shift(origin)
             if group
             else SpatialInertia.Zero()
@@ -384,9 +310,9 @@ class DrawnBodies:
         for load in loads:
             drum = with_load(drum, load)
         in_tub = drum.ReExpress(self._R_TD).Shift(self._p_DoO_T)
-        mass = in_tub.get_mass() + self._beside_drum.get_mass()
-        moment = _moment(in_tub) + _moment(self._beside_drum)
-        six = _six(_matrix(in_tub)) + _six(_matrix(self._beside_drum))
+        mass = in_tub.get_mass() + self._welded_to_drum.get_mass()
+        moment = _moment(in_tub) + _moment(self._welded_to_drum)
+        six = _six(_matrix(in_tub)) + _six(_matrix(self._welded_to_drum))
         numbers = self._numbers.copy()
         numbers[BODIES.offsets["inverse_mass"]] = 1.0 / (self._tub_mass + mass)
         begin, end = BODIES.offsets["drum_moment_x"], BODIES.offsets["joint_damping"]

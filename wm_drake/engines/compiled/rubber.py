@@ -41,22 +41,6 @@ def write_branches(x, dx, inputs, first_input, motion, p, branches):
 
 
 @law
-def branch_input_count(branches):
-    """Return the number of inputs of the branches; 0 for None."""
-    if branches is None:
-        return 0
-    return AXIS_COUNT * len(branches.at)
-
-
-@law
-def branch_count(branches):
-    """Return the number of stretches; 0 for None."""
-    if branches is None:
-        return 0
-    return branches.count
-
-
-@law
 def write_paths(rate, inputs, first_input, p, branches):
     """Write the rate of the path of each friction in place of the rate of its stretch.
 

@@ -53,7 +53,7 @@ def run_compiled(
     p, layout = pack(setup)
     begin = initial_state(setup, profile)
     schedule = schedule_of(profile, step, period, layout.control_period)
-    rows, size = len(schedule.time), len(begin) + layout.rates_size
+    rows, size = len(schedule.time), len(begin) + layout.states.begins.rates
     samples = aligned(rows * size * WIDTH)
     numbers, x = (aligned(len(values) * WIDTH) for values in (p, begin))
     fill_lanes(numbers, [p])
@@ -118,7 +118,7 @@ def _advance(
 
     Arguments as for `integrate_runs`.
     """
-    sizes, elements = (len(x) // WIDTH, layout.inputs_size), layout.elements
+    sizes, elements = (len(x) // WIDTH, layout.states.begins.inputs), layout.elements
     if relaxation is None:
         work, steps = work_arrays(*sizes), (*schedule.steps, one_derivative)
         return lambda begin, end: integrate_lanes(steps, begin, end, p, elements, x, work, samples)

@@ -6,14 +6,14 @@ from wm_drake.compiler.compilation import long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes, sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.elements.cabinet import motion_with, rates_with
-from wm_drake.elements.motion import POSE, tub_motion
+from wm_drake.elements.motion import BODY_STATE_SIZE, POSE, tub_motion
+from wm_drake.elements.state_map import CARRIER, ELEMENT, RATES_SIZE, STRETCHES, TUB
 from wm_drake.engines.cabinet_frame import seen_from_cabinet
-from wm_drake.engines.compiled.bearing import CARRIER_STATE_SIZE, carrier_motion
+from wm_drake.engines.compiled.bearing import carrier_motion
 from wm_drake.engines.compiled.drum import motor_torque_history
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
-    RATES_SIZE,
     STATE_SIZE,
     mass_properties,
     motor_torque,
@@ -31,18 +31,20 @@ def trajectory_of(
     """Return the motion up to the last good sample, with the motor's torque.
 
     Args:
-        samples: (rows, size + `Layout.rates_size`) as `wm_drake.engines.compiled.integration`
+        samples: (rows, size + `Begins.rates`) as `wm_drake.engines.compiled.integration`
             writes them; NaN behind the end of a run.
         schedule: The steps.
         p, layout: From `pack`.
     """
-    states, rates = np.split(samples, [-layout.rates_size], axis=1)
-    motion, deformation, tubes, carrier, stretches = layout.parts(states)
-    cabinet, of_tub = layout.cabinet_part(states), rates[:, :RATES_SIZE]
+    states, rates = np.split(samples, [layout.states.size], axis=1)
+    motion, carrier, stretches = (
+        layout.states.take(states, kind) for kind in (TUB, CARRIER, STRETCHES)
+    )
+    cabinet, of_tub = layout.states.cabinet(states), rates[:, :RATES_SIZE]
     of_carrier = rates[:, RATES_SIZE : 2 * RATES_SIZE] if carrier.shape[1] else of_tub
     moving, turning = None, _motion_of_drum_and_carrier(motion, carrier)
     if cabinet is not None:
-        in_world = cabinet[:, :CARRIER_STATE_SIZE], rates[:, -RATES_SIZE:]
+        in_world = cabinet[:, :BODY_STATE_SIZE], rates[:, -RATES_SIZE:]
         if carrier.shape[1]:  # samples have the carrier in W, and the tub seen from the cabinet
             carrier, _ = seen_from_cabinet(*in_world, carrier, of_carrier)
         else:
@@ -53,8 +55,19 @@ def trajectory_of(
     else:
         drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
         torque_history(turning, of_carrier, drum_acceleration, p, moving, torque)
-    found = schedule.time, motion, deformation, torque[:, 0], of_tub, tubes, carrier, stretches
-    return cut_at_divergence(Trajectory(*found, cabinet=cabinet))
+    trajectory = Trajectory(
+        schedule.time,
+        motion,
+        layout.states.deformation(states),
+        torque[:, 0],
+        of_tub,
+        layout.states.tubes(states),
+        carrier,
+        stretches,
+        cabinet=cabinet,
+        element_states=layout.states.take(states, ELEMENT) if layout.kinds else None,
+    )
+    return cut_at_divergence(trajectory)
 
 
 def torque_of_motor(
@@ -68,13 +81,12 @@ def torque_of_motor(
     """
     torque = np.empty((len(states), 1))
     reference = schedule.drum[:-1:2][schedule.row >= 0, :1]
-    first = layout.motor_begin
     motor_torque_history(
         np.ascontiguousarray(states),
         np.ascontiguousarray(reference),
         p,
         layout.motor,
-        first,
+        layout.states.begins.motor,
         torque,
     )
     return torque
@@ -115,7 +127,7 @@ def torque_history(motions, rates, acceleration, p, cabinet, torque):
     drum_numbers, numbers, p_numbers = np.empty(WIDTH), np.empty(WIDTH), in_each_lane(p)
     x, dx, drum = lane_array(x_numbers), lane_array(rates_numbers), lane_array(drum_numbers)
     answer, q = lane_array(numbers), lane_array(p_numbers)
-    cabinet_numbers = np.empty((CARRIER_STATE_SIZE + RATES_SIZE) * WIDTH)
+    cabinet_numbers = np.empty((BODY_STATE_SIZE + RATES_SIZE) * WIDTH)
     c = lane_array(cabinet_numbers)
     for begin in range(0, len(torque), WIDTH):
         rows_to_lanes(motions, begin, x_numbers)
@@ -126,9 +138,14 @@ def torque_history(motions, rates, acceleration, p, cabinet, torque):
         w_rate, v_rate = rate.angular_acceleration, rate.acceleration
         if cabinet is not None:
             rows_to_lanes(cabinet, begin, cabinet_numbers)
-            (moving, _), own = carrier_motion(c, 0), read_rates(c, CARRIER_STATE_SIZE)
+            (moving, _), moving_rates = carrier_motion(c, 0), read_rates(c, BODY_STATE_SIZE)
             w_rate, v_rate = rates_with(
-                moving, own.angular_acceleration, own.acceleration, motion, w_rate, v_rate
+                moving,
+                moving_rates.angular_acceleration,
+                moving_rates.acceleration,
+                motion,
+                w_rate,
+                v_rate,
             )
             motion = motion_with(moving, motion)
         answer[0] = motor_torque(motion, w_rate, v_rate, masses, x[DRUM_RATE], drum[0], q)

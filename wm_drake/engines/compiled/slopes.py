@@ -7,10 +7,10 @@ states are evaluated side by side.
 
 import numpy as np
 
+from wm_drake.compiler.chosen import call
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, sine_cosine
 from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
-from wm_drake.elements.cabinet import SLIP_SIZE
 from wm_drake.elements.friction_damper import (
     friction_damper_line,
     friction_damper_tension,
@@ -19,23 +19,19 @@ from wm_drake.elements.friction_damper import (
 from wm_drake.elements.motion import motion_at, read_tree_state, tub_motion
 from wm_drake.elements.rubber import bushing_wrench
 from wm_drake.elements.spring import spring_strut_wrench
-from wm_drake.elements.telescopic_damper import telescopic_damper_forces
-from wm_drake.engines.compiled.cabinet import VELOCITIES
+from wm_drake.elements.state_map import SLIP, VELOCITIES
+from wm_drake.elements.telescopic_damper import (
+    TUBES_STATE_SIZE,
+    read_tubes_state,
+    telescopic_damper_forces,
+)
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
-    STATE_SIZE,
-    inputs_size,
     mass_properties,
     state_derivative,
 )
 from wm_drake.engines.compiled.packing import initial_state, pack
-from wm_drake.engines.compiled.tubes import (
-    TUBES_STATE_SIZE,
-    read_tubes_and_damper,
-    read_tubes_state,
-    telescopic_damper_count,
-)
 from wm_drake.model.machine import Setup, with_prescribed_speed
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
@@ -52,7 +48,7 @@ damper that sticks."""
 class SlopedDerivative:
     """The time derivative of the state of a machine as it is set up, and its slopes.
 
-    A state has the layout of `wm_drake.engines.compiled.mechanics`. Free are all its numbers but
+    The order of a state is that of `layout.states`. Free are all its numbers but
     angle and rate of the drum, which are prescribed, also in a machine with a motor, and the slips
     of the feet of a cabinet that moves: the feet stick.
 
@@ -73,20 +69,9 @@ class SlopedDerivative:
         setup = with_prescribed_speed(setup)
         self.packed, self.layout = pack(setup)
         self.rest = initial_state(setup, SpinProfile(time=(0.0, 1.0), speed=(0.0, 0.0)))
-        size = len(self.rest)
-        end = self.layout.branches_begin
-        slips = np.arange(end - SLIP_SIZE if setup.cabinet else end, end)
-        self.free = np.setdiff1d(np.arange(size), (DRUM_ANGLE, DRUM_RATE, *slips))
-        velocities = np.zeros(size, dtype=bool)
-        velocities[STATE_SIZE // 2 : STATE_SIZE] = True
-        begin = STATE_SIZE + len(setup.dampers)
-        for _ in setup.telescopes:
-            velocities[begin + 7 : begin + TUBES_STATE_SIZE - 1] = True
-            begin += TUBES_STATE_SIZE
-        cabinet = end - self.layout.cabinet_size
-        velocities[begin + (cabinet - begin) // 2 : cabinet] = True
-        if setup.cabinet:
-            velocities[cabinet + np.array(VELOCITIES)] = True
+        every, slips = np.arange(len(self.rest)), self.layout.states.indices(SLIP)
+        self.free = np.setdiff1d(every, (DRUM_ANGLE, DRUM_RATE, *slips))
+        velocities = np.isin(every, self.layout.states.indices(*VELOCITIES))
         self.is_velocity = velocities[self.free]
         self._steps = np.where(velocities, VELOCITY_STEP, POSITION_STEP)
         self._steps[DRUM_RATE] = POSITION_STEP
@@ -131,16 +116,17 @@ class SlopedDerivative:
         Returns:
             (elements, 6, free) moment about To and force, in W, by each free number. [N m, N]
         """
-        indices = self.layout.elements
-        count = len(indices.springs) + len(indices.dampers) + len(indices.bushings)
-        count += telescopic_damper_count.py_func(indices.telescopes)
+        mounts = self.layout.mounts
+        count = len(mounts.springs) + len(mounts.dampers) + len(mounts.bushings)
+        count += 0 if mounts.telescopes is None else len(mounts.telescopes)
+        count += len(self.layout.kinds)
         steps = self._steps[self.free]
         columns, both = np.tile(self.free, 2), np.concatenate([steps, -steps])
         idle = -len(columns) % WIDTH
         columns, both = np.pad(columns, (0, idle)), np.pad(both, (0, idle))
         wrenches = np.empty((len(columns), count, 6))
         states = np.tile(state, (len(columns), 1))
-        tub_wrenches_at(states, columns, both, self.packed, indices, wrenches)
+        tub_wrenches_at(states, columns, both, self.packed, mounts, wrenches)
         half = len(self.free)
         slopes = (wrenches[:half] - wrenches[half : 2 * half]) / (2.0 * steps[:, None, None])
         return np.ascontiguousarray(slopes.transpose(1, 2, 0))
@@ -172,7 +158,7 @@ def derivatives_at(states, columns, steps, p, elements, rates, moved):
     x_numbers, dx_numbers = np.empty(size * WIDTH), np.empty(size * WIDTH)
     p_numbers = in_each_lane(p)
     x, dx, numbers = lane_array(x_numbers), lane_array(dx_numbers), lane_array(p_numbers)
-    inputs_numbers = np.empty(max(inputs_size(elements), 1) * WIDTH)
+    inputs_numbers = np.empty(max(elements.begins.inputs, 1) * WIDTH)
     inputs = lane_array(inputs_numbers)
     total = count * (moves + 1)
     for begin in range(0, total, WIDTH):
@@ -200,16 +186,16 @@ def derivatives_at(states, columns, steps, p, elements, rates, moved):
 
 
 @long_running
-def tub_wrenches_at(states, columns, steps, p, elements, wrenches):
+def tub_wrenches_at(states, columns, steps, p, mounts, wrenches):
     """Evaluate the wrench of each element on the tub, at states that are moved in one number each.
 
-    The elements are springs, strut dampers, bushings and telescopic dampers, in this order.
+    The elements are springs, strut dampers, bushings, telescopic dampers and others, in this order.
 
     Args:
         states: (n, size), n a multiple of `WIDTH`.
         columns, steps: Index and size of the move of each state. (n,)
         p: Packed numbers.
-        elements: `Elements`.
+        mounts: `Mounts`.
         wrenches: Moment about To and force on the tub, in W, written. (n, elements, 6) [N m, N]
     """
     align_stack()
@@ -227,29 +213,25 @@ def tub_wrenches_at(states, columns, steps, p, elements, wrenches):
             x_numbers[columns[begin + lane] * WIDTH + lane] += steps[begin + lane]
         motion = tub_motion(x)
         at_row = 0
-        for at in elements.springs:
+        for at in mounts.springs:
             wrench, _ = spring_strut_wrench(motion, numbers, at)
             write_six(answer, at_row, wrench)
             at_row += 6
-        for i in range(len(elements.dampers)):
-            at = elements.dampers[i]
+        for i in range(len(mounts.dampers)):
+            at = mounts.dampers[i]
             arm, line = friction_damper_line(motion, numbers, at)
-            tension, _ = friction_damper_tension(line[1], x[STATE_SIZE + i], numbers, at)
+            tension, _ = friction_damper_tension(line[1], x[mounts.sponge_states + i], numbers, at)
             write_six(
                 answer, at_row, friction_damper_wrench(motion, arm, line, tension, numbers, at)
             )
             at_row += 6
-        for at in elements.bushings:
-            wrench, _ = bushing_wrench(motion, numbers, at, x, elements.branches)
+        for at in mounts.bushings:
+            wrench, _ = bushing_wrench(motion, numbers, at, x, mounts.branches)
             write_six(answer, at_row, wrench)
             at_row += 6
-        for i in range(telescopic_damper_count(elements.telescopes)):
-            write_six(
-                answer,
-                at_row,
-                telescope_on_tub(x, motion, numbers, elements.telescopes, elements.tubes, i),
-            )
-            at_row += 6
+        _write_telescopes(x, motion, numbers, mounts, mounts.telescopes, answer, at_row)
+        at_row = 6 * (wrenches.shape[1] - other_count(mounts.others))
+        _write_others(x, motion, numbers, mounts.others, answer, at_row)
         for k in range(6 * wrenches.shape[1]):
             for lane in range(WIDTH):
                 wrenches[begin + lane, k // 6, k % 6] = out[k * WIDTH + lane]
@@ -257,31 +239,48 @@ def tub_wrenches_at(states, columns, steps, p, elements, wrenches):
 
 
 @law
-def telescope_on_tub(x, motion, p, telescopes, first, i):
-    """Return the wrench of a telescopic damper on the tub (six numbers, W). [N m, N]
+def _write_telescopes(x, motion, p, mounts, telescopes, answer, at_row):
+    """Write the wrench of each telescopic damper on the tub (six numbers, W). [N m, N]
 
     Args:
         x: State.
         motion: `TubMotion` of the tub.
-        p: Packed numbers.
-        telescopes, first: Fields `telescopes` and `tubes` of `Elements`.
-        i: Number of the damper.
+        p, mounts: Packed numbers, and the `Mounts` in them.
+        telescopes: A field of these, None without such dampers: it is an argument of its own so
+            that None compiles to nothing.
+        answer, at_row: Array that is written, and index of the first number.
     """
-    if telescopes is None:
-        zero = 0.0 * x[0]
-        return (zero, zero, zero, zero, zero, zero)
-    numbers = read_tubes_and_damper(p, telescopes[i])
-    own = read_tubes_state(x, first + TUBES_STATE_SIZE * i)
-    state = read_tree_state(*own.tubes)
-    on_tub, _, _, _, _, _, _ = telescopic_damper_forces(
-        motion,
-        motion_at(*own.tubes),
-        state.joint_position,
-        state.joint_rate,
-        own.deformation,
-        *numbers.damper,
-    )
-    return on_tub
+    if telescopes is not None:
+        for i in range(len(telescopes)):
+            damper_state = read_tubes_state(x, mounts.tube_states + TUBES_STATE_SIZE * i)
+            state = read_tree_state(*damper_state.tubes)
+            on_tub, _, _, _, _, _, _ = telescopic_damper_forces(
+                motion,
+                motion_at(*damper_state.tubes),
+                state.joint_position,
+                state.joint_rate,
+                damper_state.deformation,
+                p,
+                telescopes[i],
+            )
+            write_six(answer, at_row + 6 * i, on_tub)
+
+
+@law
+def other_count(others):
+    """Return the number of elements of other packages; `others` is None without any."""
+    if others is None:
+        return 0
+    return len(others.at)
+
+
+@law
+def _write_others(x, motion, p, others, answer, at_row):
+    """Write the wrench of each element of another package on the tub (six numbers, W)."""
+    if others is not None:
+        for i in range(len(others.at)):
+            wrench = call(others.wrench, i, x, None, motion, p, others.at[i], others.states[i])
+            write_six(answer, at_row + 6 * i, wrench)
 
 
 @law

@@ -9,19 +9,26 @@ and fast motion show it, whatever the law.
 
 import functools
 import itertools
+import threading
 from dataclasses import dataclass
 
 import numpy as np
 
 from wm_drake.compiler.lanes import WIDTH
-from wm_drake.elements.motor import MOTOR_STATE_SIZE
-from wm_drake.elements.rubber import FRICTION, RubberBushingParameters
-from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, VELOCITIES
+from wm_drake.elements.rubber import FRICTION, MAXWELL
+from wm_drake.elements.state_map import CABINET as CABINET_STATES
+from wm_drake.elements.state_map import (
+    CONTROL,
+    DRIVE_WORDS,
+    SPONGE,
+    STRUT_SPONGE,
+    VELOCITIES,
+    StateMap,
+)
 from wm_drake.engines.compiled.linear import CABINET as MOVING_CABINET
-from wm_drake.engines.compiled.linear import PATH, SMOOTH, SPONGE, jacobians
-from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
+from wm_drake.engines.compiled.linear import INTERNAL, PATH, SMOOTH, jacobians
+from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE
 from wm_drake.engines.compiled.packing import Layout, initial_state, pack
-from wm_drake.engines.compiled.tubes import TUBES_STATE_SIZE
 from wm_drake.errors import input_error
 from wm_drake.model.machine import OUTPUT_PERIOD, Setup
 from wm_drake.parameters import SpinProfile
@@ -40,10 +47,6 @@ SPEEDS = (1e-6, 1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0)
 """Speeds of the states that are looked at, one a lane. [m/s, rad/s]
 
 The slowest has every friction on its steepest part; in the fast ones the sponges slip."""
-
-TUB, BEARING, CABINET = "the tub", "the drum in its bearing", "the cabinet on its feet"
-DRUM = "the drum with its motor"
-"""Names of parts that move."""
 
 DEFORMATION = 1e-4
 """Deformation of the sponges in these states. [m]"""
@@ -64,7 +67,7 @@ class Linearised:
 
     Attributes:
         jacobians: Of the free states. (WIDTH, n, n) [1/s]
-        kinds: How the multistep integrator treats each: `SMOOTH`, `SPONGE`, `PATH` or `CABINET` of
+        kinds: How the multistep integrator treats each: one of the constants of
             `wm_drake.engines.compiled.linear`. (n,)
         cabinet: Of a cabinet that moves, under a constant wrench of its mounts. (WIDTH, m, m) [1/s]
     """
@@ -98,22 +101,22 @@ class FastestMotion:
 def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
     """Return the motion of each part of a machine that needs the shortest step, by part.
 
-    The parts are `TUB`, `BEARING`, `DRUM`, `CABINET`, the sponge and the tubes of each damper, and
-    the Maxwell branches of each bushing, as far as they have a fastest motion of their own. The
-    drum's own angle is prescribed without a motor. The friction of a bushing of rubber is left out:
+    The parts are named as in the `StateMap`, as far as they have a fastest motion of their own. The
+    drum's angle is prescribed without a motor. The friction of a bushing of rubber is left out:
     every step follows its path in closed form. Its stiffness counts in the motion of the tub.
 
     Raises:
         InputError: the machine has something that the compiled engine does not represent.
     """
-    free, parts = free_states(setup)
-    followed = {parts[k] for k, kind in enumerate(_treatment(setup, free)) if kind == PATH}
-    matrices = linearised(setup, *pack(setup), DIFFERENCE).jacobians
+    packed, layout = pack(setup)
+    (free, parts), kinds = free_states(setup, layout.states), _state_kinds(setup, layout)
+    followed = {parts[k] for k, kind in enumerate(kinds.treatment) if kind == PATH}
+    matrices = linearised(setup, packed, layout, DIFFERENCE).jacobians
     if not np.all(np.isfinite(matrices)):
         return {"the machine": FastestMotion(np.inf, False, "the machine")}
-    moving = np.isin(free, _velocities(setup))
+    moving = np.isin(free, layout.states.indices(*VELOCITIES))
     values, vectors = np.linalg.eig(matrices)
-    found: dict[str, FastestMotion] = {}
+    slowest_step: dict[str, FastestMotion] = {}
     for rates, modes in zip(values, vectors, strict=True):
         for rate, mode in zip(rates, modes.T, strict=True):
             size = float(abs(rate))
@@ -123,9 +126,9 @@ def fastest_motions(setup: Setup) -> dict[str, FastestMotion]:
             if part in followed:
                 continue
             motion = FastestMotion(size, bool(abs(rate.imag) > abs(rate.real)), part)
-            if part not in found or motion.longest_step < found[part].longest_step:
-                found[part] = motion
-    return found
+            if part not in slowest_step or motion.longest_step < slowest_step[part].longest_step:
+                slowest_step[part] = motion
+    return slowest_step
 
 
 def fastest_motion(setup: Setup) -> FastestMotion:
@@ -142,8 +145,8 @@ def linearised(setup: Setup, packed: FloatArray, layout: Layout, difference: flo
         difference: Half a step of the central differences. [m, rad, m/s, rad/s]
     """
     kinds = _state_kinds(setup, layout)
-    found, cabinet = jacobians(packed, layout, _states(setup, kinds), kinds.free, difference)
-    return Linearised(found, kinds.treatment, cabinet)
+    of_states, cabinet = jacobians(packed, layout, _states(setup, kinds), kinds.free, difference)
+    return Linearised(of_states, kinds.treatment, cabinet)
 
 
 @dataclass(frozen=True)
@@ -166,43 +169,36 @@ class StateKinds:
 _KNOWN_KINDS: dict[Layout, StateKinds] = {}
 """Kinds by layout, of the last `_MOST_KNOWN` layouts."""
 _MOST_KNOWN = 64
+_KNOWN_KINDS_LOCK = threading.Lock()
 
 
 def _state_kinds(setup: Setup, layout: Layout) -> StateKinds:
     """Return the kinds of the state; the machines of a design share theirs with their layout."""
     kinds = _KNOWN_KINDS.get(layout)
     if kinds is None:
-        free, _ = free_states(setup)
-        velocities = sorted(set(free) & set(_velocities(setup)))
+        states = layout.states
+        free, _ = free_states(setup, states)
         kinds = StateKinds(
-            np.array(free), _treatment(setup, free), np.array(velocities), np.array(_sponges(setup))
+            np.array(free),
+            _treatment(states, free),
+            np.intersect1d(free, states.indices(*VELOCITIES)),
+            states.indices(SPONGE),
         )
-        if len(_KNOWN_KINDS) >= _MOST_KNOWN:
-            _KNOWN_KINDS.clear()
-        _KNOWN_KINDS[layout] = kinds
+        with _KNOWN_KINDS_LOCK:  # machines are prepared in several threads
+            if len(_KNOWN_KINDS) >= _MOST_KNOWN:
+                _KNOWN_KINDS.clear()
+            _KNOWN_KINDS[layout] = kinds
     return kinds
 
 
-def _treatment(setup: Setup, free: list[int]) -> np.ndarray:
+def _treatment(states: StateMap, free: list[int]) -> np.ndarray:
     """Return how the multistep integrator treats the free states. (n,)"""
-    kinds = np.full(free[-1] + 1, SMOOTH)
-    kinds[STATE_SIZE : STATE_SIZE + len(setup.dampers)] = SPONGE
-    if setup.cabinet:
-        end = free[-1] + 1 - len(_branches(setup))
-        kinds[end - CABINET_STATE_SIZE : end] = MOVING_CABINET
-    for index, (_, kind) in zip(reversed(free), reversed(_branches(setup)), strict=False):
-        kinds[index] = PATH if kind == FRICTION else SPONGE
+    kinds = np.full(states.size, SMOOTH)
+    kinds[states.span(STRUT_SPONGE)] = INTERNAL
+    kinds[states.span(CABINET_STATES)] = MOVING_CABINET
+    kinds[states.indices(FRICTION)] = PATH
+    kinds[states.indices(MAXWELL)] = INTERNAL
     return kinds[free]
-
-
-def _branches(setup: Setup) -> list[tuple[str, str]]:
-    """Return the bushing and the kind of each stretch of rubber, the last states of a machine."""
-    return [
-        (name, kind)
-        for name, bushing in setup.bushings.items()
-        if isinstance(bushing, RubberBushingParameters)
-        for kind in bushing.state_kinds
-    ]
 
 
 def check_step(setup: Setup, step: float) -> None:
@@ -281,27 +277,16 @@ def _allowed(longest: float) -> str:
     return text
 
 
-def free_states(setup: Setup) -> tuple[list[int], list[str]]:
+def free_states(setup: Setup, states: StateMap) -> tuple[list[int], list[str]]:
     """Return the indices of the states that are not prescribed, and what each belongs to."""
-    parts = [TUB] * STATE_SIZE
-    parts += [f"the sponge of damper '{name}'" for name in setup.dampers]
-    for name in setup.telescopes:
-        parts += [f"the tubes of damper '{name}'"] * (TUBES_STATE_SIZE - 1)
-        parts.append(f"the sponge of damper '{name}'")
-    size = len(initial_state(setup, _STANDSTILL))
-    branches = [f"the {kind} of bushing '{name}'" for name, kind in _branches(setup)]
-    driven = MOTOR_STATE_SIZE if setup.motor else 0
-    cabinet = CABINET_STATE_SIZE if setup.cabinet else 0
-    parts += [BEARING] * (size - driven - cabinet - len(branches) - len(parts))
-    parts += [*[DRUM] * driven, *[CABINET] * cabinet, *branches]
-    fixed = [DRUM_ANGLE, DRUM_RATE]
+    words, fixed = states.words(), [DRUM_ANGLE, DRUM_RATE]
     if setup.motor:
-        parts[DRUM_ANGLE] = parts[DRUM_RATE] = DRUM
+        words[DRUM_ANGLE] = words[DRUM_RATE] = DRIVE_WORDS
         # a sampled controller changes its state at its samples only; a continuous one holds nothing
-        demand = size - len(branches) - cabinet - 1
-        fixed = [demand - 1, demand] if setup.motor.controller.sample_time else [demand]
-    free = [index for index in range(size) if index not in fixed]
-    return free, [parts[index] for index in free]
+        integral, demand = states.indices(CONTROL)
+        fixed = [integral, demand] if setup.motor.controller.sample_time else [demand]
+    free = [index for index in range(states.size) if index not in fixed]
+    return free, [words[index] for index in free]
 
 
 def _states(setup: Setup, kinds: StateKinds) -> FloatArray:
@@ -318,28 +303,3 @@ def _states(setup: Setup, kinds: StateKinds) -> FloatArray:
 def _directions(size: int) -> FloatArray:
     """Return the same numbers at random between -1 and 1 for all machines of a size. (size,)"""
     return np.random.default_rng(0).uniform(-1.0, 1.0, size)
-
-
-def _velocities(setup: Setup) -> list[int]:
-    """Return the indices of all velocities in the state."""
-    size = len(initial_state(setup, _STANDSTILL))
-    found = list(range(STATE_SIZE // 2, STATE_SIZE))
-    begin = STATE_SIZE + len(setup.dampers)
-    for _ in setup.telescopes:
-        found += range(begin + 7, begin + TUBES_STATE_SIZE - 1)
-        begin += TUBES_STATE_SIZE
-    end = size - len(_branches(setup))
-    cabinet = end - CABINET_STATE_SIZE if setup.cabinet else end
-    carrier = cabinet - (MOTOR_STATE_SIZE if setup.motor else 0)
-    found += range(begin + (carrier - begin) // 2, carrier)
-    if setup.cabinet:
-        found += [cabinet + index for index in VELOCITIES]
-    return found
-
-
-def _sponges(setup: Setup) -> list[int]:
-    """Return the indices of all deformations of sponges in the state."""
-    struts = len(setup.dampers)
-    found = list(range(STATE_SIZE, STATE_SIZE + struts))
-    first = STATE_SIZE + struts + TUBES_STATE_SIZE - 1
-    return found + [first + TUBES_STATE_SIZE * number for number in range(len(setup.telescopes))]

@@ -36,7 +36,7 @@ that jumps at zero is steep. One derivative a step does not resolve it. [m, rad,
 
 LONGEST_STEP = 2.5e-3
 """Longest step with one derivative that "auto" takes. [s] Peaks hold to 0.1 % with it; the edges of
-friction laws, and not stability, make longer ones inaccurate (docs/performance.md)."""
+friction laws, and not stability, make longer ones inaccurate (docs/theory/integrator.md)."""
 
 LARGEST_TURN_OF_MIDPOINT = 0.04
 """Largest turn of the drum in a step of the midpoint rule. [rad] At a constant speed its relative
@@ -44,7 +44,7 @@ error is turn^2 / 24: 0.007 %."""
 
 LONGEST_STEP_OF_MIDPOINT = 2.5e-4
 """Longest step of the midpoint rule that "auto" takes. [s] Peaks hold to 0.1 % with it; the sponges
-of MSTV dampers make twice as long ones inaccurate (docs/performance.md)."""
+of MSTV dampers make twice as long ones inaccurate (docs/theory/integrator.md)."""
 
 PIECES = (1, 2)
 """Into how many steps with one derivative a step may be divided: four take as long as one step of
@@ -109,9 +109,9 @@ def choose_stepping(
         linear = linearised(setup, packed, layout, ACROSS_JUMPS)
         fastest = max(abs(speed) for speed in profile.speed)
         if only_tubes and integrator != "multistep":
-            found = _midpoint(setup, layout, linear.jacobians, fastest, step, integrator)
-            if found:
-                return found
+            midpoint = _midpoint(setup, layout, linear.jacobians, fastest, step, integrator)
+            if midpoint:
+                return midpoint
         if integrator != "midpoint":
             for length in _lengths(step, integrator, LONGEST_STEP):
                 turn = fastest * length

@@ -13,22 +13,26 @@ M: mass of both tubes, m: of the inner one; S, S_i: first moments of both and of
 inertia of both. The first equation gives a_O and the third s''. Three equations with a symmetric
 matrix remain for w'.
 
-The packed numbers of a damper are those of `TUBES_AND_DAMPER`; its state is a `TUBES_STATE`.
+The packed numbers of the bodies are those of `TUBES`; the state of a damper is a `TUBES_STATE`.
 """
 
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import sine_cosine
 from wm_drake.compiler.matrices import about_centre, inverse, less_square, plus, times
-from wm_drake.compiler.packed import LAYOUT, SCALAR, SYMMETRIC, VECTOR, PackedLayout
+from wm_drake.compiler.packed import SCALAR, SYMMETRIC, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import add, cross, dot, rotate, rotate_back, scale, subtract
 from wm_drake.elements.motion import (
-    TREE_STATE,
     motion_from_sines,
     read_tree_state,
     rpy_rates,
     write_tree_state,
 )
-from wm_drake.elements.telescopic_damper import TELESCOPIC_DAMPER, telescopic_damper_forces
+from wm_drake.elements.telescopic_damper import (
+    DEFORMATION,
+    TUBES_STATE_SIZE,
+    read_tubes_state,
+    telescopic_damper_forces,
+)
 
 TUBES = PackedLayout(
     "TubesNumbers",
@@ -43,16 +47,8 @@ TUBES = PackedLayout(
 )
 """Bodies of a damper: 1/M [1/kg], m [kg], a, S_0 and S_i0 [kg m], I_0 [kg m^2], I_1 [kg m], I_2
 [kg]."""
-TUBES_AND_DAMPER = PackedLayout(
-    "TubesAndDamperNumbers", tubes=LAYOUT(TUBES), damper=LAYOUT(TELESCOPIC_DAMPER)
-)
-"""Packed numbers of a telescopic damper: its bodies, then its forces."""
-TUBES_STATE = PackedLayout("TubesState", tubes=LAYOUT(TREE_STATE), deformation=SCALAR)
-"""State of a telescopic damper: outer tube and joint, then deformation of the sponge. [m]"""
-TUBES_STATE_SIZE, DEFORMATION = TUBES_STATE.fixed_size, TUBES_STATE.offsets["deformation"]
 
-read_tubes, read_tubes_and_damper = TUBES.read, TUBES_AND_DAMPER.read
-read_tubes_state = TUBES_STATE.read
+read_tubes = TUBES.read
 
 
 @law
@@ -107,7 +103,7 @@ def tube_accelerations(motion, s, s_rate, wrench, along, gravity, p, at):
 
 
 @law
-def add_telescopic_dampers(x, dx, motion, gravity, p, telescopes, first, total):
+def add_telescopic_dampers(x, dx, motion, gravity, p, tubes, mounts, total):
     """Return the wrench on the tub with that of all telescopic dampers.
 
     The time derivatives of the tubes' states are written into `dx`.
@@ -117,25 +113,24 @@ def add_telescopic_dampers(x, dx, motion, gravity, p, telescopes, first, total):
         motion: `TubMotion` of the tub.
         gravity: Acceleration in W. [m/s^2]
         p: Packed numbers.
-        telescopes: Index of each damper in them; None if there are none.
-        first: Index in the state where the first damper begins.
+        tubes: Index in them of the bodies of each damper; None without telescopic dampers.
+        mounts: `Mounts`.
         total: Wrench of other elements on the tub: moment about To and force, in W. [N m, N]
     """
-    if telescopes is None:
+    if tubes is None:
         return total
-    for i in range(len(telescopes)):
-        numbers = read_tubes_and_damper(p, telescopes[i])
-        k = first + TUBES_STATE_SIZE * i
-        own = read_tubes_state(x, k)
-        state = read_tree_state(*own.tubes)
+    for i in range(len(tubes)):
+        k = mounts.tube_states + TUBES_STATE_SIZE * i
+        damper_state = read_tubes_state(x, k)
+        state = read_tree_state(*damper_state.tubes)
         angles, s, s_rate = state.angles, state.joint_position, state.joint_rate
         roll, pitch, yaw = sine_cosine(angles[0]), sine_cosine(angles[1]), sine_cosine(angles[2])
         outer = motion_from_sines(x, k, roll, pitch, yaw)
         on_tub, on_tubes, along, deformation_rate, _, _, _ = telescopic_damper_forces(
-            motion, outer, s, s_rate, own.deformation, *numbers.damper
+            motion, outer, s, s_rate, damper_state.deformation, p, mounts.telescopes[i]
         )
         w_rate, v_rate, s_acceleration = tube_accelerations(
-            outer, s, s_rate, on_tubes, along, gravity, *numbers.tubes
+            outer, s, s_rate, on_tubes, along, gravity, p, tubes[i]
         )
         write_tree_state(
             dx,
@@ -150,11 +145,3 @@ def add_telescopic_dampers(x, dx, motion, gravity, p, telescopes, first, total):
         dx[k + DEFORMATION] = deformation_rate
         total = plus(total, on_tub)
     return total
-
-
-@law
-def telescopic_damper_count(telescopes):
-    """Return the number of telescopic dampers; `telescopes` is None if there are none."""
-    if telescopes is None:
-        return 0
-    return len(telescopes)

@@ -1,14 +1,27 @@
 """Report of the orders of a record: waterfall and order map of each signal."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figures import GRID, MARK, WIDTH, style_axes
+from wm_drake.report.figure import (
+    MARK,
+    MEASURED,
+    Axis,
+    Cells,
+    Figure,
+    Line,
+    Mark,
+    Panel,
+    Scale,
+    band,
+    in_grid,
+)
 from wm_drake.report.formatting import RPM_PER_RAD_S, number
 from wm_drake.report.page import picture, render
-from wm_drake.report.tables import Group, Row, Table
+from wm_drake.report.table import Group, Row, Table
 from wm_drake.simulation.orders import REVOLUTIONS
 from wm_drake.simulation.records import versions
 from wm_drake.studies.steady.orders import Orders
@@ -18,6 +31,10 @@ SHOWN_ORDERS = (0.5, 1.0, 2.0, 3.0)
 
 WATERFALL_LINES = 40
 """Largest number of spectra of a waterfall."""
+
+
+MAP_COLUMNS = 400
+"""Largest number of columns of an order map."""
 
 
 def orders_report(result: Orders, command: str = "") -> str:
@@ -94,31 +111,32 @@ def _table(result: Orders) -> Table:
 
 
 def signal_figure(result: Orders, index: int) -> Figure:
-    """Draw waterfall and order map of a signal."""
-    figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    _draw_waterfall(left, result, index)
-    orders = result.orders.values[:, :, index]
+    """Return waterfall and order map of a signal."""
+    return Figure(
+        panels=in_grid([_waterfall(result, index), _order_map(result, index)], 2), height=350.0
+    )
+
+
+def _order_map(result: Orders, index: int) -> Panel:
+    """Return the amplitude of each order over the drum speed, at even speeds."""
     rpm = RPM_PER_RAD_S * np.abs(result.orders.speed.values)
     at = np.argsort(rpm, kind="stable")
-    mesh = right.pcolormesh(
-        rpm[at],
-        result.orders.order.values,
-        orders[at].T,
-        cmap="Blues",
-        shading="nearest",
-        rasterized=True,
-        vmin=0.0,
+    even = np.linspace(rpm[at[0]], rpm[at[-1]], min(len(rpm), MAP_COLUMNS))
+    nearest = at[np.clip(np.searchsorted(rpm[at], even), 0, len(at) - 1)]
+    values = result.orders.values[nearest, :, index].T
+    scale = Scale(low=0.0, high=float(np.nanmax(values)) or 1.0, shades="Blues")
+    scale = replace(scale, label=f"amplitude, {result.signals.unit}")
+    cells = Cells(values, even, result.orders.order.values, scale=scale)
+    return Panel(
+        name="orders",
+        marks=(cells,),
+        x=Axis(label="drum speed, rpm", has_grid=False),
+        y=Axis(label="order", has_grid=False),
     )
-    figure.colorbar(mesh, ax=right, label=f"amplitude, {result.signals.unit}", pad=0.02)
-    right.set_xlabel("drum speed, rpm", fontsize=9.5)
-    right.set_ylabel("order", fontsize=9.5)
-    style_axes(right)
-    return figure
 
 
-def _draw_waterfall(axes, result: Orders, index: int) -> None:  # type: ignore[no-untyped-def]
-    """Draw spectra above each other, at the height of their drum speed."""
+def _waterfall(result: Orders, index: int) -> Panel:
+    """Return spectra above each other, at the height of their drum speed."""
     signals = result.signals
     speed = np.gradient(signals.angle, signals.time)
     maps = result.frequencies
@@ -131,18 +149,16 @@ def _draw_waterfall(axes, result: Orders, index: int) -> None:  # type: ignore[n
     rows = np.unique([int(np.argmin(np.abs(rpm - level))) for level in levels])
     height = 5.0 * max(float(np.ptp(rpm)), 1.0) / max(len(rows), 1)
     scale = height / max(float(np.nanmax(values[rows])), 1e-300)
+    marks: list[Mark] = []
     for row in sorted(rows, key=lambda row: -rpm[row]):
-        line = rpm[row] + scale * values[row]
-        axes.fill_between(frequency, rpm[row], line, color="white", zorder=-rpm[row])
-        axes.plot(frequency, line, color=MARK, linewidth=0.7, zorder=-rpm[row])
+        line, level = rpm[row] + scale * values[row], np.full(len(frequency), rpm[row])
+        marks.append(band(frequency, level, line, color="#ffffff", opacity=1.0))
+        marks.append(Line(frequency, line, color=MARK, width=1.0))
     ends = np.array([rpm.min(), rpm.max()])
-    for order in (1.0, 2.0):
-        axes.plot(order * ends / 60.0, ends, "--", color="#b34700", linewidth=0.9, zorder=1)
-    axes.set_xlim(0.0, top)
-    axes.set_xlabel("frequency, Hz", fontsize=9.5)
-    axes.set_ylabel("drum speed, rpm", fontsize=9.5)
-    axes.grid(axis="x", color=GRID)
-    style_axes(axes)
+    marks += [Line(k * ends / 60.0, ends, color=MEASURED, dash="dashed") for k in (1.0, 2.0)]
+    x = Axis(label="frequency, Hz", range=(0.0, top))
+    y = Axis(label="drum speed, rpm", has_grid=False)
+    return Panel(name="waterfall", marks=tuple(marks), x=x, y=y)
 
 
 def orders_table(result: Orders) -> pd.DataFrame:

@@ -1,33 +1,27 @@
 """Comparison of spin results: overlaid envelopes, tables of differences, and a page of both."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from wm_drake.parameters import quantities
-from wm_drake.report.figures import MEASURED, OURS, QUIET
+from wm_drake.report.figure import MEASURED, OURS, Figure, Mark
 from wm_drake.report.formatting import MISSING, MM_PER_M, number, percent, shape_name
 from wm_drake.report.page import Picture, picture, render, versions_of
 from wm_drake.report.spin import tables
 from wm_drake.report.spin.cases import speed_rpm
+from wm_drake.report.spin.figures import experiment_rules
 from wm_drake.report.spin.panels import (
-    COLUMNS,
-    band_handle,
-    draw_band,
-    largest_handle,
-    legend_below,
-    mark_largest,
-    name_panel,
-    set_symmetric_limits,
-    time_panels,
+    largest_marks,
+    symmetric_limits,
+    time_band,
+    time_figure,
+    time_panel,
 )
 from wm_drake.report.spin.report import warnings_of
-from wm_drake.report.tables import Group, Row, Table, line, readable
-from wm_drake.simulation.measures import envelopes
+from wm_drake.report.table import Group, Row, Table, line, readable
+from wm_drake.simulation.displacements import envelopes
 from wm_drake.studies.spin.comparison import Variant, common_sensors, difference_table, remarks
 from wm_drake.studies.spin.study import CaseResult
 
@@ -37,18 +31,15 @@ COLOURS = (OURS, MEASURED, "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 MOST_MARKED = 3
 """Largest number of variants whose largest values are written into each panel."""
 
-DASHED: dict[str, Any] = {"linewidth": 1.3, "linestyle": (0, (5, 2.5))}
-"""Line style of measured amplitudes."""
-
 DECIMALS = {"mm": 1, "rpm": 0, "N": 1, "N*m": 2}
-"""Decimals of a value in a table, by unit."""
+"""Decimals of a value in a table, by unit; others have two."""
 
 
 def overlaid_envelopes_figure(
     cases: Mapping[str, CaseResult],
     measured_mm: Mapping[str, Mapping[str, float]] | None = None,
 ) -> Figure:
-    """Draw the envelopes of several runs over each other, one panel per sensor.
+    """Return the envelopes of several runs over each other, one panel per sensor.
 
     Sensors that not all runs have are left out. The drum speed along the top is that of the longest
     run.
@@ -67,31 +58,24 @@ def overlaid_envelopes_figure(
         if all(name in band.sensor for band in bands.values())
     ]
     measured = measured_mm or {}
-    rows = -(-len(sensors) // COLUMNS)
-    figure, panels = time_panels(longest, len(sensors), ["displacement, mm"] * rows)
     lines = len(cases) if len(cases) <= MOST_MARKED else 0
     sizes = [float(abs(band.sel(sensor=sensors)).to_array().max()) for band in bands.values()]
     sizes += [of_variant[sensor] for of_variant in measured.values() for sensor in sensors]
-    set_symmetric_limits(panels, max(sizes), max(1, lines))
-    for axes, sensor in zip(panels, sensors, strict=True):
-        name_panel(axes, sensor)
+    limits = symmetric_limits(max(sizes), max(1, lines))
+    panels = []
+    for sensor in sensors:
+        marks: list[Mark] = []
         for index, (name, band) in enumerate(bands.items()):
             color, record = COLOURS[index], cases[name].record
             lower, upper = (b.sel(sensor=sensor).values for b in (band.lower, band.upper))
-            draw_band(axes, record.time.values, lower, upper, color)
+            marks.append(time_band((record.time.values, lower, upper), limits[1], name, color))
             if lines:
                 farther = np.where(np.abs(lower) > np.abs(upper), lower, upper)
-                mark_largest(axes, record, "", farther, "mm", color=color, line=index)
+                marks += largest_marks(record, farther, "mm", color, index)
             if name in measured:
-                for side in (-1.0, 1.0):
-                    axes.axhline(side * measured[name][sensor], color=color, **DASHED)
-    handles = [band_handle(name, color) for name, color in zip(cases, COLOURS, strict=False)]
-    if lines:
-        handles.append(largest_handle(QUIET))
-    if measured:
-        handles.append(Line2D([], [], color=QUIET, label="experiment, ± amplitude", **DASHED))
-    legend_below(figure, handles)
-    return figure
+                marks += experiment_rules(measured[name][sensor], color)
+        panels.append(time_panel(longest, sensor, marks, "displacement, mm", limits))
+    return time_figure(panels)
 
 
 def differences(table: pd.DataFrame, load: str) -> Table:
@@ -111,7 +95,7 @@ def differences(table: pd.DataFrame, load: str) -> Table:
     for measure, of_measure in rows.groupby("measure", sort=False):
         lines = []
         for (label, unit), of_label in of_measure.groupby(["name", "unit"], sort=False):
-            decimals = DECIMALS[str(unit)]
+            decimals = DECIMALS.get(str(unit), 2)
             cells = [str(label), str(unit).replace("*", " ")]
             cells.append(number(of_label["reference_value"].iloc[0], decimals))
             for _, row in of_label.iterrows():
@@ -149,9 +133,11 @@ def amplitudes(variants: Sequence[Variant], table: pd.DataFrame) -> Table:
             rows.append(Row((variant.name, *values), "ours"))
         of_load = table[(table["load"] == case.case.name) & (table["measure"] == "amplitude")]
         for variant in variants[1:]:
-            own = of_load[of_load["variant"] == variant.name].set_index("name")["percent"]
+            of_variant = of_load[of_load["variant"] == variant.name].set_index("name")["percent"]
             heading = f"{variant.name} vs. {variants[0].name}"
-            rows.append(Row((heading, *(percent(own[name]) for name in sensors)), "difference"))
+            rows.append(
+                Row((heading, *(percent(of_variant[name]) for name in sensors)), "difference")
+            )
         groups.append(Group(case.case.name, tuple(rows)))
     caption = (
         "Amplitude of the displacement at each sensor: the largest absolute value of its envelopes "
@@ -222,13 +208,13 @@ def envelopes_picture(variants: Sequence[Variant], index: int) -> Picture | None
 
 def _measured_mm(variants: Sequence[Variant], index: int) -> dict[str, dict[str, float]]:
     """Return the measured amplitudes of a case by variant and sensor; equal ones only once. [mm]"""
-    found: dict[str, dict[str, float]] = {}
+    different: dict[str, dict[str, float]] = {}
     for variant in variants:
         table = tables.amplitude_table(variant.result)
         measured = tables.experiment_mm(table, variant.result.results[index])
-        if measured is not None and measured not in found.values():
-            found[variant.name] = measured
-    return found
+        if measured is not None and measured not in different.values():
+            different[variant.name] = measured
+    return different
 
 
 def comparison_report(
@@ -313,17 +299,17 @@ def _of_variant(variant: Variant) -> str:
 
 def _gap_facts(variants: Sequence[Variant], index: int) -> str:
     """Return the smallest gaps of the case with an index, as one sentence; empty without gaps."""
-    found = []
+    texts = []
     for variant in variants:
         case = variant.result.results[index]
         gap = case.measures.smallest_gap
         if gap is not None:
-            found.append(
+            texts.append(
                 f"{variant.name} {number(MM_PER_M * gap.distance)} mm between "
                 f"{shape_name(gap.moving)} and {shape_name(gap.fixed)}, at "
                 f"{number(speed_rpm(case, gap.time), 0)} rpm"
             )
-    return f"Smallest gap to the housing: {'; '.join(found)}." if found else ""
+    return f"Smallest gap to the housing: {'; '.join(texts)}." if texts else ""
 
 
 def facts_of_comparison(variants: Sequence[Variant], command: str) -> list[tuple[str, str]]:

@@ -3,19 +3,31 @@
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from wm_drake.elements.motor import evaluate_motor, packed_limit
 from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH, style_axes
+from wm_drake.report.figure import (
+    MARK,
+    MEASURED,
+    QUIET,
+    Axis,
+    Figure,
+    Line,
+    Mark,
+    Panel,
+    Span,
+    Text,
+    band,
+    in_grid,
+)
 from wm_drake.report.formatting import MISSING, RPM_PER_RAD_S, number
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.spin.cases import case_title
 from wm_drake.report.spin.panels import revolution_starts
-from wm_drake.report.tables import Group, Row, Table
+from wm_drake.report.table import Group, Row, Table
 from wm_drake.simulation.drive import CAPTURE_LAG, CAPTURE_TIME, over_revolutions
-from wm_drake.simulation.measures import profile_of
+from wm_drake.simulation.records import profile_of
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 
@@ -125,47 +137,45 @@ def _picture(result: SpinResult, case: CaseResult) -> Picture:
 
 
 def drive_figure(result: SpinResult, case: CaseResult) -> Figure:
-    """Draw speed and torque of a drive with a motor over time."""
+    """Return speed and torque of a drive with a motor over time."""
     record, time = case.record, case.record.time.values
     torque, speed = record.motor_torque.values, record.drum_speed.values
-    figure = Figure(figsize=(WIDTH, 5.0))
-    above, below = figure.subplots(2, 1, sharex=True)
     starts = revolution_starts(record)
-    above.plot(time, RPM_PER_RAD_S * speed, color=OURS, linewidth=1.0, label="speed of the drum")
-    wanted = RPM_PER_RAD_S * np.asarray(profile_of(record).speed_at(time))
-    above.plot(time, wanted, color=MARK, linewidth=1.0, linestyle=(0, (5, 2.5)), label="wanted")
+    target = RPM_PER_RAD_S * np.asarray(profile_of(record).speed_at(time))
+    above: list[Mark] = [
+        Line(time, RPM_PER_RAD_S * speed, width=1.4, key="speed of the drum"),
+        Line(time, target, color=MARK, width=1.4, dash="dashed", key="wanted"),
+    ]
     if caught := case.measures.drive.capture:
-        above.axvspan(caught.begin, caught.end, color=MEASURED, alpha=0.12, linewidth=0.0)
-        place = 0.5 * (caught.begin + caught.end), RPM_PER_RAD_S * caught.speed
-        text = f"caught at {number(place[1], 0)} rpm"
-        above.annotate(text, place, (0, -6), textcoords="offset points", ha="center", va="top",
-                       color=MEASURED, fontsize=9.5)  # fmt: skip
+        above.insert(0, Span(caught.begin, caught.end, color=MEASURED, opacity=0.12))
+        x, y = 0.5 * (caught.begin + caught.end), RPM_PER_RAD_S * caught.speed
+        text = f"caught at {number(y, 0)} rpm"
+        above.append(Text(x, y, text, color=MEASURED, up="top", shift=(0.0, -8.0)))
     low, high = (side.reduceat(torque, starts) for side in (np.minimum, np.maximum))
-    below.fill_between(time[starts], low, high, color=OURS, alpha=0.25, linewidth=0.0)
     mean = over_revolutions(time, record.drum_angle.values, torque)
-    below.plot(time, mean, color=OURS, linewidth=1.2, label="torque, average over a revolution")
+    key = "torque, average over a revolution"
+    below: list[Mark] = [
+        band(time[starts], low, high, opacity=0.25),
+        Line(time, mean, key=key),
+    ]
     limit = _limit(result, speed[starts])
     if np.abs(limit).min() < 4.0 * np.abs(torque).max():  # else it would hide the torque
-        below.plot(time[starts], limit, color=QUIET, linewidth=1.0,
-                   linestyle=(0, (5, 2.5)), label="limit")  # fmt: skip
-    above.set_ylabel("speed, rpm", fontsize=9.5)
-    below.set_ylabel("torque at the drum, N\u00a0m", fontsize=9.5)
-    below.set_xlabel("time, s", fontsize=9.5)
-    below.set_xlim(0.0, float(time[-1]))
-    for axes in (above, below):
-        axes.grid(color=GRID)
-        style_axes(axes)
-        axes.legend(frameon=False, fontsize=9.5, loc="lower right", ncols=2)
-    figure.subplots_adjust(left=0.075, right=0.985, top=0.98, bottom=0.1, hspace=0.1)
-    return figure
+        below.append(Line(time[starts], limit, color=QUIET, dash="dashed", key="limit"))
+    x_axis = Axis(label="time, s", range=(0.0, float(time[-1])))
+    labels = {"speed, rpm": above, "torque at the drum, N\u00a0m": below}
+    panels = [
+        Panel(name=label.split(",")[0], marks=tuple(marks), x=x_axis, y=Axis(label=label))
+        for label, marks in labels.items()
+    ]
+    return Figure(panels=in_grid(panels, 1, share="x"), height=200.0)
 
 
 def _limit(result: SpinResult, speed: FloatArray) -> FloatArray:
     """Return the torque limit at the drum at speeds of the drum (n,). [N m]"""
     drive = motor_of(result.parameters.drive)
     assert drive is not None
-    packed, own, limit = packed_limit(drive), np.empty(2), np.empty(len(speed))
+    packed, of_motor, limit = packed_limit(drive), np.empty(2), np.empty(len(speed))
     for index, rate in enumerate(drive.belt_ratio * speed):
-        evaluate_motor(np.array([0.0, rate]), packed, own)
-        limit[index] = drive.belt_ratio * own[1]
+        evaluate_motor(np.array([0.0, rate]), packed, of_motor)
+        limit[index] = drive.belt_ratio * of_motor[1]
     return limit

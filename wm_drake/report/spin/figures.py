@@ -1,39 +1,44 @@
 """Figures of a spin run: envelopes, gasket forces, orbits and gaps."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figures import GRID, MARK, MEASURED, OURS, QUIET, WIDTH, style_axes
+from wm_drake.report.figure import (
+    MARK,
+    MEASURED,
+    OURS,
+    QUIET,
+    Axis,
+    Figure,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Rule,
+    Text,
+    in_grid,
+    named,
+)
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, shape_name
 from wm_drake.report.spin.cases import case_title, speed_rpm
 from wm_drake.report.spin.panels import (
-    COLUMNS,
-    band_handle,
-    draw_band,
-    largest_handle,
-    legend_below,
-    mark_largest,
+    IN_REVOLUTIONS,
+    largest_marks,
     revolution_band,
-    set_symmetric_limits,
-    time_panels,
+    symmetric_limits,
+    time_band,
+    time_figure,
+    time_panel,
 )
-from wm_drake.simulation.measures import axis_motion, envelopes, moment_of_largest_amplitude
+from wm_drake.simulation.displacements import axis_motion, envelopes, moment_of_largest_amplitude
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record
 from wm_drake.studies.spin.study import CaseResult
 
 BoolArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
-
-DASHED: dict[str, Any] = {"color": MEASURED, "linewidth": 1.3, "linestyle": (0, (5, 2.5))}
-"""Line style of measured amplitudes."""
 
 ORBIT_REVOLUTIONS = 6.0
 """Number of drum revolutions that an orbit shows, with the largest amplitude in the middle."""
@@ -43,7 +48,7 @@ LONGEST_ORBIT = 8.0
 
 
 def envelopes_figure(record: Record, measured_mm: Mapping[str, float] | None = None) -> Figure:
-    """Draw the envelopes of the filtered displacement over time, one panel per sensor.
+    """Return the envelopes of the filtered displacement over time, one panel per sensor.
 
     The drum speed is given along the top.
 
@@ -52,62 +57,54 @@ def envelopes_figure(record: Record, measured_mm: Mapping[str, float] | None = N
         measured_mm: Measured amplitude A by sensor, drawn as dashed lines at +-A. [mm]
     """
     band = envelopes(record) * MM_PER_M
-    sensors = [str(name) for name in record.sensor.values]
-    rows = -(-len(sensors) // COLUMNS)
-    figure, panels = time_panels(record, len(sensors), ["displacement, mm"] * rows)
     largest = np.abs([band.lower.values, band.upper.values]).max()
-    set_symmetric_limits(panels, max([largest, *(measured_mm or {}).values()]))
-    for axes, name in zip(panels, sensors, strict=True):
+    limits = symmetric_limits(max([largest, *(measured_mm or {}).values()]))
+    panels = []
+    for name in map(str, record.sensor.values):
         lower, upper = band.lower.sel(sensor=name).values, band.upper.sel(sensor=name).values
-        draw_band(axes, record.time.values, lower, upper)
-        mark_largest(
-            axes, record, name, np.where(np.abs(lower) > np.abs(upper), lower, upper), "mm"
-        )
+        sides = record.time.values, lower, upper
+        marks: list[Mark] = [time_band(sides, limits[1], "wm_drake, lower to upper envelope")]
         if measured_mm is not None:
-            for side in (-1.0, 1.0):
-                axes.axhline(side * measured_mm[name], **DASHED)
-    handles = [band_handle("wm_drake, lower to upper envelope"), largest_handle()]
-    legend_below(
-        figure,
-        [*handles, Line2D([], [], label="experiment, ± amplitude", **DASHED)]
-        if measured_mm
-        else handles,
-    )
-    return figure
+            marks += experiment_rules(measured_mm[name])
+        farther = np.where(np.abs(lower) > np.abs(upper), lower, upper)
+        marks += largest_marks(record, farther, "mm")
+        panels.append(time_panel(record, name, marks, "displacement, mm", limits))
+    return time_figure(panels)
+
+
+def experiment_rules(amplitude_mm: float, color: str = MEASURED) -> list[Mark]:
+    """Return lines at both sides of zero at a measured amplitude. [mm]"""
+    key = "experiment, ± amplitude"
+    at = (-amplitude_mm, amplitude_mm)
+    return [Rule(side, color=color, width=1.6, dash="dashed", key=key) for side in at]
 
 
 def gasket_figure(record: Record) -> Figure:
-    """Draw force (upper row) and moment (lower row) of the gasket on the housing over time.
+    """Return force (upper row) and moment (lower row) of the gasket on the housing over time.
 
     A band shows the smallest to the largest value in each drum revolution.
 
     Args:
         record: A record of a run with gasket.
     """
-    figure, panels = time_panels(record, 2 * COLUMNS, ["force, N", "moment, N m"])
-    rows = {
-        "F": (record.bushing_force, "N", panels[:COLUMNS]),
-        "M": (record.bushing_moment, "N m", panels[COLUMNS:]),
-    }
-    for letter, (variable, unit, row) in rows.items():
+    panels = []
+    for letter, variable, label in (
+        ("F", record.bushing_force, "force, N"),
+        ("M", record.bushing_moment, "moment, N m"),
+    ):
         gasket = variable.sel(bushing="gasket")
-        set_symmetric_limits(row, float(np.abs(gasket).max()))
-        for axes, axis in zip(row, map(str, record.axis.values), strict=True):
+        limits = symmetric_limits(float(np.abs(gasket).max()))
+        for axis in map(str, record.axis.values):
             values = gasket.sel(axis=axis).values
-            draw_band(axes, *revolution_band(record, values))
-            mark_largest(axes, record, f"{letter}{axis}", values, unit)
-    legend_below(
-        figure,
-        [
-            band_handle("wm_drake, smallest to largest value in each drum revolution"),
-            largest_handle(),
-        ],
-    )
-    return figure
+            sides = revolution_band(record, values)
+            shown = time_band(sides, limits[1], IN_REVOLUTIONS)
+            marks = [shown, *largest_marks(record, values, label.split(", ")[1])]
+            panels.append(time_panel(record, f"{letter}{axis}", marks, label, limits))
+    return time_figure(panels)
 
 
 def orbits_figure(record: Record, y_front: float, y_rear: float) -> Figure:
-    """Draw the paths of two points of the drum axis in the x-z plane, seen from the front.
+    """Return the paths of two points of the drum axis in the x-z plane, seen from the front.
 
     The paths cover the drum revolutions around the largest amplitude of all sensors.
 
@@ -118,76 +115,54 @@ def orbits_figure(record: Record, y_front: float, y_rear: float) -> Figure:
     """
     paths = [axis_path_mm(record, y) for y in (y_front, y_rear)]
     largest = moment_of_largest_amplitude(record)
-    window = orbit_window(record, largest, ORBIT_REVOLUTIONS)
-    x_limit, z_limit = orbit_limits([path[window] for path in paths])
-    height = 4.6 * z_limit / x_limit + 1.3
-    figure = Figure(figsize=(WIDTH, height))
-    figure.subplots_adjust(
-        left=0.07, right=0.985, top=1.0 - 0.35 / height, bottom=0.95 / height, wspace=0.14
-    )
-    for axes, path, title in zip(
-        figure.subplots(1, 2), paths, _depths(y_front, y_rear), strict=True
-    ):
-        _orbit(axes, path, window, orbit_window(record, largest, 1.0), largest)
-        axes.set(aspect="equal", xlim=(-x_limit, x_limit), ylim=(-z_limit, z_limit))
-        axes.set_xlabel("x, to the right, mm", fontsize=9.5)
-        axes.set_ylabel("z, up, mm", fontsize=9.5)
-        axes.set_title(title, fontsize=10.5, loc="left", fontweight="bold")
+    windows = [orbit_window(record, largest, turns) for turns in (ORBIT_REVOLUTIONS, 1.0)]
+    x_limit, z_limit = orbit_limits([path[windows[0]] for path in paths])
+    x = Axis(label="x, to the right, mm", range=(-x_limit, x_limit))
+    z = Axis(label="z, up, mm", range=(-z_limit, z_limit))
     speed = record.drum_speed.values[largest] * RPM_PER_RAD_S
     moment = f"largest amplitude: {record.time.values[largest]:.2f} s, {number(speed, 0)} rpm"
-    legend_below(figure, _orbit_handles(record.time.values[window], moment))
-    return figure
+    time = record.time.values[windows[0]]
+    keys = (f"{time[0]:.1f} s to {time[-1]:.1f} s", "revolution around it", moment)
+    panels = [
+        Panel(title=title, marks=_orbit(path, windows, largest, keys), x=x, y=z, is_square=True)
+        for path, title in zip(paths, _depths(y_front, y_rear), strict=True)
+    ]
+    keys_shown = (*keys[::-1], "rest position")
+    return Figure(panels=in_grid(panels, 2), height=455.0 * z_limit / x_limit, keys=keys_shown)
 
 
 def gaps_figure(results: Sequence[CaseResult]) -> Figure:
-    """Draw the smallest gap between tub and housing, one line per case.
+    """Return the smallest gap between tub and housing, one line per case.
 
     The text at each line gives the two parts and the drum speed at which the gap occurs.
 
     Args:
         results: Cases, each with a smallest gap.
     """
-    figure = Figure(figsize=(WIDTH, 0.75 + 0.5 * len(results)), layout="constrained")
-    axes = figure.subplots()
     gaps = [gap for gap in (result.measures.smallest_gap for result in results) if gap is not None]
     distances = [MM_PER_M * gap.distance for gap in gaps]
     low, high = min(0.0, *distances), max(0.0, *distances)
     span = (high - low) or 1.0
+    marks: list[Mark] = []
     for place, (result, gap, distance) in enumerate(zip(results, gaps, distances, strict=True)):
-        colour = MEASURED if distance <= 0.0 else OURS
-        axes.plot(
-            [0.0, distance], [place, place], color=colour, linewidth=2.5, solid_capstyle="butt"
-        )
-        axes.plot(distance, place, "o", color=colour, markersize=8)
+        color = MEASURED if distance <= 0.0 else OURS
+        marks.append(Line([0.0, distance], [place, place], color=color, width=4.0))
+        marks.append(Points([distance], [place], color=color, size=10.0))
         speed = number(speed_rpm(result, gap.time), 0)
         parts = f"{shape_name(gap.moving)} to {shape_name(gap.fixed)}"
         text = f"{number(distance)} mm at {speed} rpm\n{parts}"
-        axes.text(
-            max(distance, 0.0) + 0.025 * span,
-            place,
-            text,
-            va="center",
-            fontsize=9.5,
-            parse_math=False,
-        )
-    axes.axvline(0.0, color=MARK, linewidth=1.0)
-    axes.set_yticks(
-        range(len(results)), [case_title(result) for result in results], parse_math=False
+        marks.append(Text(max(distance, 0.0), place, text, across="left", shift=(14.0, 0.0)))
+    marks.append(Rule(0.0, "y", color=MARK))
+    x = Axis(
+        label="smallest gap, mm (0: the parts touch)", range=(low - 0.02 * span, high + 1.1 * span)
     )
-    axes.set_xticks(
-        [
-            tick
-            for tick in MaxNLocator(6).tick_values(low, high)
-            if low - 0.1 * span <= tick <= high + 0.1 * span
-        ]
+    y = Axis(
+        ticks=named(map(case_title, results)),
+        range=(len(results) - 0.4, -0.6),
+        has_grid=False,
+        has_line=False,
     )
-    axes.set(xlim=(low - 0.02 * span, high + 1.1 * span), ylim=(len(results) - 0.4, -0.6))
-    axes.set_xlabel("smallest gap, mm (0: the parts touch)", fontsize=9.5, loc="left")
-    axes.grid(axis="x", color=GRID)
-    style_axes(axes)
-    axes.spines["left"].set_visible(False)
-    axes.tick_params(axis="y", length=0)
-    return figure
+    return Figure(panels=(Panel(marks=tuple(marks), x=x, y=y),), height=50.0 * len(results))
 
 
 def axis_path_mm(record: Record, y: float) -> FloatArray:
@@ -228,28 +203,16 @@ def _depths(y_front: float, y_rear: float) -> list[str]:
     ]
 
 
-def _orbit(axes: Axes, path: FloatArray, window: BoolArray, turn: BoolArray, largest: int) -> None:
-    axes.plot(path[window, 0], path[window, 2], color=OURS, alpha=0.4, linewidth=0.9)
-    axes.plot(path[turn, 0], path[turn, 2], color=OURS, linewidth=2.0)
-    axes.plot(0.0, 0.0, "+", color=QUIET, markersize=10)
-    axes.plot(path[largest, 0], path[largest, 2], "o", color=MARK, markersize=5)
-    axes.grid(color=GRID)
-    style_axes(axes)
-
-
-def _orbit_handles(window: FloatArray, moment: str) -> list[Artist]:
-    return [
-        Line2D([], [], color=MARK, marker="o", markersize=5, linestyle="none", label=moment),
-        Line2D([], [], color=OURS, linewidth=2.0, label="revolution around it"),
-        Line2D(
-            [],
-            [],
-            color=OURS,
-            alpha=0.4,
-            linewidth=0.9,
-            label=f"{window[0]:.1f} s to {window[-1]:.1f} s",
-        ),
-        Line2D(
-            [], [], color=QUIET, marker="+", markersize=10, linestyle="none", label="rest position"
-        ),
-    ]
+def _orbit(
+    path: FloatArray, windows: Sequence[BoolArray], largest: int, keys: tuple[str, str, str]
+) -> tuple[Mark, ...]:
+    """Return the path in a long and a short window, the rest position and the largest amplitude."""
+    x, _, z = path.T
+    long, short = windows
+    at = slice(largest, largest + 1)
+    return (
+        Line(x[long], z[long], opacity=0.4, width=1.2, key=keys[0]),
+        Line(x[short], z[short], width=2.6, key=keys[1]),
+        Points([0.0], [0.0], symbol="cross-thin", color=QUIET, size=12.0, key="rest position"),
+        Points(x[at], z[at], color=MARK, key=keys[2]),
+    )

@@ -3,17 +3,16 @@
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figures import GRID, MARK, WIDTH, style_axes
+from wm_drake.report.figure import COLOURS, MARK, Axis, Figure, Line, Mark, Panel, Rule, in_grid
 from wm_drake.report.formatting import number
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.spin.cases import case_title
 from wm_drake.report.spin.walk import WALKING, walk_view, walk_warning
-from wm_drake.report.tables import Group, Row, Table
+from wm_drake.report.table import Group, Row, Table
 from wm_drake.simulation.feet import MARGINS
-from wm_drake.simulation.measures import foot_loads_of
+from wm_drake.simulation.measures.record import foot_loads_of
 from wm_drake.simulation.mounts import POINT
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
@@ -73,21 +72,21 @@ def floor_view(result: SpinResult) -> FloorView:
 
 def floor_warnings(result: SpinResult) -> list[str]:
     """Return a warning for each case in which the cabinet would move, or walks."""
-    found = []
+    warnings = []
     for case in result.results:
         feet = case.measures.feet
         if feet is None or case.record.attrs["diverged"]:
             continue
         if case.measures.walk is not None:
-            found += walk_warning(case)
+            warnings += walk_warning(case)
             continue
         verbs = [verb for name, verb in zip(MARGINS, VERBS, strict=True) if feet[name] <= 0.0]
         if verbs:
             text = " and ".join([", ".join(verbs[:-1]), verbs[-1]] if verbs[1:] else verbs)
-            found.append(
+            warnings.append(
                 f"Load {case_title(case)}: the cabinet {text}. The model keeps it in its place."
             )
-    return found
+    return warnings
 
 
 def resultant_table(result: SpinResult) -> Table:
@@ -181,31 +180,23 @@ def _pictures(cases: list[CaseResult]) -> tuple[Picture, ...]:
 
 
 def floor_figure(cases: list[CaseResult]) -> Figure:
-    """Draw smallest load of a foot, margin of sliding and margin of turning over time.
+    """Return smallest load of a foot, margin of sliding and margin of turning over time.
 
     Args:
         cases: Cases with feet and at least two samples.
     """
-    figure = Figure(figsize=(WIDTH, 6.6))
-    panels = list(figure.subplots(3, 1, sharex=True))
-    for case in cases:
+    marks: list[list[Mark]] = [[Rule(0.0, color=MARK)] for _ in HEADS[:3]]
+    for index, case in enumerate(cases):
         time, smallest = windows(case.record.time.values, foot_loads_of(case.record).margins)
-        for axes, column in zip(panels, smallest.T, strict=False):
-            axes.plot(time, column, linewidth=1.2, label=case_title(case))
-    for axes, head in zip(panels, HEADS, strict=False):
-        axes.set_ylabel(head, fontsize=9.5)
-        axes.axhline(0.0, color=MARK, linewidth=0.8)
-        axes.grid(color=GRID)
-        style_axes(axes)
-    panels[-1].set_xlabel("time, s", fontsize=9.5)
-    panels[-1].set_xlim(0.0, max(float(case.record.time[-1]) for case in cases))
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="lower center", ncols=4, frameon=False, fontsize=9.5)
-    rows = -(-len(cases) // 4)
-    figure.subplots_adjust(
-        left=0.075, right=0.985, top=0.98, bottom=0.09 + 0.035 * rows, hspace=0.12
-    )
-    return figure
+        color = COLOURS[index % len(COLOURS)]
+        for of_panel, column in zip(marks, smallest.T, strict=False):
+            of_panel.append(Line(time, column, color=color, key=case_title(case)))
+    x = Axis(label="time, s", range=(0.0, max(float(case.record.time[-1]) for case in cases)))
+    panels = [
+        Panel(name=head.split(",")[0], marks=tuple(of_panel), x=x, y=Axis(label=head))
+        for head, of_panel in zip(HEADS, marks, strict=False)
+    ]
+    return Figure(panels=in_grid(panels, 1, share="x"), height=180.0)
 
 
 def windows(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:

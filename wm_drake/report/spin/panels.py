@@ -1,19 +1,30 @@
-"""Panels over time that the figures of a spin page share: axes, bands, marks and legends."""
+"""Panels over time that the figures of a spin page share: axes, bands and marks."""
 
-from collections.abc import Collection, Sequence
-from typing import Any, TypeAlias
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.colors import to_rgba
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figures import GRID, MARK, OURS, QUIET, WIDTH, style_axes
+from wm_drake.report.figure import (
+    MARK,
+    OURS,
+    QUIET,
+    TITLE,
+    Area,
+    Axis,
+    Figure,
+    Mark,
+    Panel,
+    Points,
+    Rule,
+    Text,
+    band,
+    in_grid,
+    named,
+    round_numbers,
+)
 from wm_drake.report.formatting import RPM_PER_RAD_S, number
 from wm_drake.simulation.records import Record
 
@@ -22,8 +33,14 @@ IndexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 COLUMNS = 3
 """Number of panels in a row, one for each of the axes x, y and z."""
 
-LONGEST_LEGEND = 140
-"""Largest number of characters of a legend in one line."""
+LARGEST = "largest absolute value"
+"""Entry of the legend of the dots at largest values."""
+
+IN_REVOLUTIONS = "wm_drake, smallest to largest value in each drum revolution"
+"""Entry of the legend of bands of `revolution_band`."""
+
+LONGEST_LINE = 28
+"""Number of characters from which on a name and a text at the top of a panel take two lines."""
 
 FEWEST_REVOLUTIONS = 20
 """Smallest number of revolutions in a record for which extremes per revolution are drawn."""
@@ -62,83 +79,79 @@ def simplified_indices(x: FloatArray, y: FloatArray, tolerance: float) -> IndexA
     return np.array(sorted(kept))
 
 
-def time_panels(
-    record: Record, count: int, labels: Sequence[str], hidden: Collection[int] = ()
-) -> tuple[Figure, list[Axes]]:
-    """Make panels over time, with a common scale and label per row and the drum speed at the top.
+def time_figure(panels: Sequence[Panel | None]) -> Figure:
+    """Return a figure of panels over time, three in a row."""
+    return Figure(panels=in_grid(panels, COLUMNS, share="x and rows"), height=180.0)
+
+
+def time_panel(
+    record: Record, name: str, marks: Sequence[Mark], label: str, limits: tuple[float, float]
+) -> Panel:
+    """Return a panel over time, with the drum speed along the top.
 
     Args:
         record: Record that gives the time range and the drum speed.
-        count: Number of panels.
-        labels: Label of the vertical axis of each row.
-        hidden: Indices of panels that stay empty.
+        name: Name, which is written at the top left.
+        marks: What the panel shows.
+        label: Quantity and unit.
+        limits: Ends of the vertical axis.
     """
-    rows, end = len(labels), float(record.time[-1])
-    height = 2.05 * rows + 1.4
-    figure = Figure(figsize=(WIDTH, height))
-    figure.subplots_adjust(
-        left=0.065,
-        right=0.985,
-        top=1.0 - 0.55 / height,
-        bottom=0.9 / height,
-        wspace=0.1,
-        hspace=0.12,
+    end = float(record.time[-1])
+    marks = _lowered(name, marks)
+    at = {"in_data": (False, False), "across": "left", "up": "top", "is_bold": True}
+    title = Text(0.02, 0.975, name, size=TITLE, **at)  # type: ignore[arg-type]
+    return Panel(
+        name=name,
+        marks=(Rule(0.0, color=QUIET, width=0.8), *marks, title),
+        x=Axis(label="time, s", range=(0.0, end)),
+        y=Axis(label=label, range=limits),
+        top=speed_axis(record),
     )
-    panels: list[Axes] = list(
-        figure.subplots(rows, COLUMNS, sharex=True, sharey="row", squeeze=False).flat
-    )
-    ticks = time_ticks(end)
-    panels[0].set(xlim=(0.0, end), xticks=ticks)
-    shown = [index < count and index not in hidden for index in range(len(panels))]
-    for index, axes in enumerate(panels):
-        axes.set_visible(shown[index])
-        axes.grid(color=GRID)
-        axes.axhline(0.0, color=QUIET, linewidth=0.6)
-        style_axes(axes)
-        if shown[index] and not any(shown[index % COLUMNS : index : COLUMNS]):
-            speed_axis(axes, record, ticks)
-        if shown[index] and not any(shown[index + COLUMNS :: COLUMNS]):
-            axes.tick_params(labelbottom=True)
-            axes.set_xlabel("time, s", fontsize=9.5)
-        if index % COLUMNS == 0:
-            axes.set_ylabel(labels[index // COLUMNS], fontsize=9.5)
-    return figure, panels[:count]
 
 
-def time_ticks(end: float) -> FloatArray:
-    """Return round times from 0 to the end of a record. [s]"""
-    return np.array([tick for tick in MaxNLocator(7).tick_values(0.0, end) if 0.0 <= tick <= end])
+def _lowered(name: str, marks: Sequence[Mark]) -> list[Mark]:
+    """Return marks with the texts at the top right lower if the name reaches to them."""
+    longest = max((len(mark.text) for mark in marks if isinstance(mark, Text)), default=0)
+    if not longest or len(name) + longest < LONGEST_LINE:
+        return list(marks)
+    down = -15.0
+    return [
+        replace(mark, shift=(mark.shift[0], mark.shift[1] + down))
+        if isinstance(mark, Text)
+        else mark
+        for mark in marks
+    ]
 
 
-def speed_axis(axes: Axes, record: Record, ticks: FloatArray) -> None:
-    """Label the time ticks along the top with the drum speed, for any spin profile."""
-    speeds = np.interp(ticks, record.time.values, record.drum_speed.values) * RPM_PER_RAD_S
-    top = axes.secondary_xaxis("top")
-    top.set_xticks(ticks, [number(speed, 0) for speed in speeds])
-    top.tick_params(labelsize=9, colors=QUIET)
-    top.set_xlabel("drum speed, rpm", fontsize=9.5, color=QUIET)
-    top.spines["top"].set_color(QUIET)
+def speed_axis(record: Record) -> Axis:
+    """Return an axis that gives the drum speed at round times, for any spin profile."""
+    times = round_numbers(0.0, float(record.time[-1]), 7)
+    speeds = np.interp(times, record.time.values, record.drum_speed.values) * RPM_PER_RAD_S
+    ticks = named((number(speed, 0) for speed in speeds), times)
+    return Axis(label="drum speed, rpm", ticks=ticks)
 
 
-def set_symmetric_limits(panels: Sequence[Axes], largest: float, lines: int = 1) -> None:
-    """Set ordinates that are symmetric about zero, with room for lines of text at the top."""
+def symmetric_limits(largest: float, lines: int = 1) -> tuple[float, float]:
+    """Return limits that are symmetric about zero, with room for lines of text at the top."""
     limit = (1.3 + 0.15 * lines) * largest or 1.0
-    for axes in panels:
-        axes.set_ylim(-limit, limit)
+    return -limit, limit
 
 
-def draw_band(
-    axes: Axes, time: FloatArray, lower: FloatArray, upper: FloatArray, color: str = OURS
-) -> None:
-    """Draw two lines over time and shade the area between them."""
-    tolerance = 1e-3 * axes.get_ylim()[1]
-    kept = [simplified_indices(time, line, tolerance) for line in (lower, upper)]
+def time_band(
+    sides: tuple[FloatArray, FloatArray, FloatArray], limit: float, key: str, color: str = OURS
+) -> Area:
+    """Return the area between two lines over time, with as few points as are needed.
+
+    Args:
+        sides: Times (n,), lower and upper values (n,).
+        limit: Upper end of the vertical axis, which says how fine the lines are seen.
+        key: Entry of the legend.
+        color: Colour.
+    """
+    time, *lines = sides
+    kept = [simplified_indices(time, line, 1e-3 * limit) for line in lines]
     both = np.union1d(*kept)
-    axes.fill_between(
-        time[both], lower[both], upper[both], facecolor=color, alpha=0.22, linewidth=0.0
-    )
-    for line, own in zip((lower, upper), kept, strict=True):
-        axes.plot(time[own], line[own], color=color, linewidth=1.0)
+    return band(time[both], lines[0][both], lines[1][both], color=color, edge=color, key=key)
 
 
 def revolution_band(
@@ -161,81 +174,24 @@ def revolution_band(
     return np.concatenate([time[:1], middle, time[-1:]]), lower, upper
 
 
-def name_panel(axes: Axes, name: str) -> None:
-    """Write the name of a panel at its top left."""
-    place: dict[str, Any] = {"transform": axes.transAxes, "va": "top"}
-    axes.text(0.02, 0.965, name, fontweight="bold", fontsize=10.5, parse_math=False, **place)
-
-
-def mark_largest(
-    axes: Axes,
-    record: Record,
-    name: str,
-    values: FloatArray,
-    unit: str,
-    *,
-    color: str = MARK,
-    line: int = 0,
-) -> None:
-    """Mark the largest absolute value with a dot, and write it with its drum speed at the top.
+def largest_marks(
+    record: Record, values: FloatArray, unit: str, color: str = MARK, line: int = 0
+) -> list[Mark]:
+    """Return a dot at the largest absolute value, and that value with its drum speed at the top.
 
     Args:
-        axes: The panel.
         record: Record that gives time and drum speed.
-        name: Name of the panel; empty if it is written already.
         values: (n,) the signal.
         unit: Unit of the signal.
-        color: Colour of the dot and, except for the first colour of marks, of the text.
+        color: Colour of the dot and of the text.
         line: Number of the line of text, counted from the top of the panel.
     """
     index = int(np.argmax(np.abs(values)))
-    axes.plot(record.time.values[index], values[index], "o", color=color, markersize=4.5, zorder=4)
     speed = record.drum_speed.values[index] * RPM_PER_RAD_S
     text = f"{number(abs(values[index]))} {unit} at {number(speed, 0)} rpm"
-    if name:
-        name_panel(axes, name)
-    axes.annotate(
-        text,
-        (0.985, 0.96),
-        (0.0, -11.0 * line),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        ha="right",
-        va="top",
-        fontsize=9,
-        color=color,
-    )
-
-
-def band_handle(label: str, color: str = OURS) -> Artist:
-    """Return the sample of a band for a legend; matplotlib hides labels that begin with `_`."""
-    label = f" {label}" if label.startswith("_") else label
-    return Patch(facecolor=to_rgba(color, 0.22), edgecolor=color, label=label)
-
-
-def largest_handle(color: str = MARK) -> Artist:
-    """Return the sample of the dot at the largest absolute value for a legend."""
-    return Line2D(
-        [],
-        [],
-        color=color,
-        marker="o",
-        markersize=4.5,
-        linestyle="none",
-        label="largest absolute value",
-    )
-
-
-def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
-    """Put a legend in one line below the panels, in two lines if it is long."""
-    words = sum(len(str(handle.get_label())) + 6 for handle in handles)
-    legend = figure.legend(
-        handles=handles,
-        loc="lower center",
-        ncols=len(handles) if words < LONGEST_LEGEND else -(-len(handles) // 2),
-        frameon=False,
-        fontsize=9.5,
-        borderaxespad=0.2,
-    )
-    for text in legend.get_texts():
-        text.set_parse_math(False)
+    at = {"in_data": (False, False), "across": "right", "up": "top"}
+    dot = Points(record.time.values[index : index + 1], values[index : index + 1], color=color)
+    return [
+        replace(dot, key=LARGEST, size=6.5),
+        Text(0.985, 0.965, text, color=color, shift=(0.0, -15.0 * line), **at),  # type: ignore[arg-type]
+    ]

@@ -16,7 +16,6 @@ from wm_drake.report.formatting import (
     percent,
     shape_name,
 )
-from wm_drake.report.modes.report import natural_modes_table
 from wm_drake.report.page import Picture, picture, render, versions_of
 from wm_drake.report.spin import tables
 from wm_drake.report.spin.cases import case_title, has_gasket, speed_rpm
@@ -26,9 +25,10 @@ from wm_drake.report.spin.floor import floor_view, floor_warnings
 from wm_drake.report.spin.tables import amplitude_table
 from wm_drake.report.spin.vibration_pictures import vibration_pictures
 from wm_drake.report.springs import slack_warning
-from wm_drake.report.tables import Table, parameter_table
+from wm_drake.report.table import Table, parameter_table
 from wm_drake.simulation.cases import UNUSED_PHASE_ERROR
 from wm_drake.simulation.spring_tension import slack_springs
+from wm_drake.studies.modes.page import natural_modes_table
 from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
 
 __all__ = ["amplitude_table", "spin_report"]
@@ -96,6 +96,7 @@ def spin_report(
         smallest_gaps=tables.smallest_gaps(result),
         gaps_picture=_gaps_picture(result),
         smallest_tensions=tables.smallest_tensions(result),
+        more_measures=tables.more_measures(result),
         cases=[
             replace(
                 _case_view(result, index, table, any(case is one for one in detailed)),
@@ -160,10 +161,10 @@ def _peak(case: CaseResult) -> tuple[float, str, float]:
 
 
 def _smallest_gap_sentence(cases: list[CaseResult]) -> str:
-    found = [(case.measures.smallest_gap, case) for case in cases if case.measures.smallest_gap]
-    if not found:
+    gaps = [(case.measures.smallest_gap, case) for case in cases if case.measures.smallest_gap]
+    if not gaps:
         return ""
-    gap, case = min(found, key=lambda pair: pair[0].distance)
+    gap, case = min(gaps, key=lambda pair: pair[0].distance)
     return (
         f"The smallest gap to the housing occurs with load {case_title(case)}: "
         f"{_gap_text(case, gap)}."
@@ -223,24 +224,28 @@ def _why_not_compared(result: SpinResult) -> str:
 
 def warnings_of(result: SpinResult) -> list[str]:
     """Return warnings about unusual numbers, divergence, overlaps, and springs that go slack."""
-    found = [f"{problem.key}: {problem.message}." for problem in unusual_numbers(result.parameters)]
+    warnings = [
+        f"{problem.key}: {problem.message}." for problem in unusual_numbers(result.parameters)
+    ]
     if result.parameters.imperfections.phase_error:
-        found.append(UNUSED_PHASE_ERROR)
+        warnings.append(UNUSED_PHASE_ERROR)
     for case in result.results:
         gap, title = case.measures.smallest_gap, case_title(case)
         if case.record.attrs["diverged"]:
-            found.append(
+            warnings.append(
                 f"Load {title}: {case.record.attrs['diverged']}. The results below cover the time "
                 "before that."
             )
         if gap is not None and gap.distance <= 0.0:
             parts = f"{shape_name(gap.moving)} and {shape_name(gap.fixed)}"
-            found.append(
+            warnings.append(
                 f"Load {title}: {parts} overlap by {number(-MM_PER_M * gap.distance)} mm. The "
                 "model has no contact forces. In the real machine these parts would collide, and "
                 "the motion after that is not valid."
             )
-    return found + slack_springs_warning(result) + floor_warnings(result) + capture_warnings(result)
+    return (
+        warnings + slack_springs_warning(result) + floor_warnings(result) + capture_warnings(result)
+    )
 
 
 def slack_springs_warning(result: SpinResult) -> list[str]:

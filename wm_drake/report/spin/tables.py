@@ -1,7 +1,7 @@
 """Results of a spin run as tables: numbers for files, text for a page."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -10,7 +10,6 @@ import xarray as xr
 from wm_drake.parameters import Load, measured_amplitudes, quantities
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.formatting import (
-    MISSING,
     MM_PER_M,
     RPM_PER_RAD_S,
     number,
@@ -18,8 +17,21 @@ from wm_drake.report.formatting import (
     shape_name,
 )
 from wm_drake.report.spin.cases import case_title, has_gasket, sensors_of, speed_rpm
-from wm_drake.report.tables import MOST_SHOWN, Group, Row, Table, line, readable
-from wm_drake.simulation.measures import percent_difference
+from wm_drake.report.table import (
+    MOST_SHOWN,
+    Column,
+    Columns,
+    Group,
+    Row,
+    Table,
+    Value,
+    line,
+    readable,
+)
+from wm_drake.simulation.displacements import percent_difference
+from wm_drake.simulation.measures import MEASURES, Variable
+from wm_drake.simulation.measures.as_json import labelled_values
+from wm_drake.simulation.measures.registry import tabulated
 from wm_drake.simulation.mount_forces import MountForce, mount_forces, rms_table, speed_ranges
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.simulation.vibration import sensor_accelerations
@@ -142,19 +154,32 @@ def _difference_rows(changes: list[Difference], source: str) -> list[Row]:
 
 def critical_speeds(result: SpinResult) -> Table:
     """Return the drum speed at which the displacement of each sensor is largest."""
-    groups = [
-        line(
-            case_title(case),
-            [number(RPM_PER_RAD_S * float(speed), 0) for speed in case.measures.critical_speed],
-        )
-        for case in result.results
-    ]
-    header = ("load", *(f"{name}, rpm" for name in result.parameters.sensors))
-    return Table(
-        "Critical speeds: the drum speed at which the displacement of each sensor is largest.",
-        header,
-        tuple(groups),
-    )
+    (variable,) = (v for v in MEASURES["amplitudes"].variables if v.name == "critical_speed")
+    caption = "Critical speeds: the drum speed at which the displacement of each sensor is largest."
+    return replace(variable_table(result, variable, 0), caption=caption)
+
+
+def more_measures(result: SpinResult) -> list[Table]:
+    """Return a table for each measure that has none of its own, from its declaration."""
+    return [variable_table(result, variable) for variable in tabulated()]
+
+
+def variable_table(result: SpinResult, variable: Variable, decimals: int | None = None) -> Table:
+    """Return one variable of a measure for each case.
+
+    Args:
+        result: The result.
+        variable: The variable.
+        decimals: Number of decimals; None for significant digits.
+    """
+    groups, columns = [], list[Column]()
+    for case in result.results:
+        numbers = labelled_values(case.measures.table, variable)
+        names = [" ".join(labels) or variable.kind for labels, _ in numbers]
+        columns = [Column(name, variable.unit_text, decimals) for name in names]
+        groups.append(line(case_title(case), [value for _, value in numbers]))
+    caption = f"{variable.about[0].upper()}{variable.about[1:]}."
+    return Table(caption, ("load", *columns), tuple(groups))
 
 
 def largest_values(result: SpinResult) -> Table:
@@ -164,11 +189,11 @@ def largest_values(result: SpinResult) -> Table:
         "detergent box. F, M: largest force and moment of the gasket on the housing. All are the "
         "largest absolute values over the whole run, for each axis."
     )
-    header = (
+    header: Columns = (
         "load",
         *(
-            f"{name}{axis}, {unit}"
-            for name, unit in (("D", "mm"), ("F", "N"), ("M", "N m"))
+            Column(f"{name}{axis}", unit, decimals)
+            for name, unit, decimals in (("D", "mm", 1), ("F", "N", 1), ("M", "N m", 2))
             for axis in "xyz"
         ),
     )
@@ -179,17 +204,12 @@ def largest_values(result: SpinResult) -> Table:
     )
 
 
-def _largest_cells(case: CaseResult) -> list[str]:
+def _largest_cells(case: CaseResult) -> list[float]:
     measures = case.measures
-    shown = [number(MM_PER_M * float(value)) for value in measures.detergent_displacement]
-    gasket = [*measures.gasket_force, *measures.gasket_moment]
-    decimals = [1] * 3 + [2] * 3
+    gasket = np.concatenate([measures.gasket_force.values, measures.gasket_moment.values])
     if not has_gasket(case):
-        return [*shown, *[MISSING] * len(gasket)]
-    return [
-        *shown,
-        *(number(float(value), places) for value, places in zip(gasket, decimals, strict=True)),
-    ]
+        gasket = np.full(len(gasket), np.nan)
+    return [*(MM_PER_M * measures.detergent_displacement.values), *gasket]
 
 
 def accelerations(result: SpinResult) -> Table:
@@ -200,13 +220,17 @@ def accelerations(result: SpinResult) -> Table:
             continue
         values = sensor_accelerations(case.record, sensors_of(result, case)).values
         shown = {"largest": np.abs(values).max(axis=0), "RMS": np.sqrt(np.mean(values**2, axis=0))}
-        rows = (Row((name, *(number(s, 2) for s in sizes))) for name, sizes in shown.items())
+        rows = (Row((name, *sizes)) for name, sizes in shown.items())
         groups.append(Group(case_title(case), tuple(rows)))
     caption = (
         "Acceleration of the tub at each sensor, along its axis: the largest absolute value and "
         "the RMS over the whole run. Gravity is not included, and nothing is filtered."
     )
-    header = ("load", "value", *(f"{name}, m/s²" for name in result.parameters.sensors))
+    header: Columns = (
+        "load",
+        "value",
+        *(Column(name, "m/s²", 2) for name in result.parameters.sensors),
+    )
     return Table(caption, header, tuple(groups), text_columns=2)
 
 
@@ -224,17 +248,22 @@ def mount_force_tables(result: SpinResult) -> list[Table]:
         if rows:
             names = tuple(part.name for part in ranges)
             by_ranges.setdefault(names, []).append(Group(case_title(case), rows))
-    start = ("load", "mount", "at rest, N", "largest, N", "at, rpm")
+    start: Columns = ("load", "mount", Column("at rest", "N", 1), Column("largest", "N", 1))
+    speed = Column("at", "rpm", 0)
     return [
-        Table(caption, (*start, *(f"RMS {name}, N" for name in names)), tuple(groups), 2)
+        Table(
+            caption,
+            (*start, speed, *(Column(f"RMS {name}", "N", 1) for name in names)),
+            tuple(groups),
+            text_columns=2,
+        )
         for names, groups in by_ranges.items()
     ]
 
 
 def _mount_row(case: CaseResult, force: MountForce, rms: FloatArray) -> Row:
     speed = speed_rpm(case, float(case.record.time[force.peak_index]))
-    cells = [number(force.at_rest), number(force.peak), number(speed, 0), *map(number, rms)]
-    return Row((force.name.replace("_", " "), *cells))
+    return Row((force.name.replace("_", " "), force.at_rest, force.peak, speed, *map(float, rms)))
 
 
 def smallest_gaps(result: SpinResult) -> Table:
@@ -244,16 +273,14 @@ def smallest_gaps(result: SpinResult) -> Table:
         "A negative gap means that the parts overlap. x (to the right), y (to the rear), z (up): "
         "position of the nearest point of the moving part, from drum mid-depth at rest."
     )
-    header = (
+    header: Columns = (
         "load",
         "moving part",
         "part of the housing",
-        "gap, mm",
-        "drum speed, rpm",
-        "time, s",
-        "x, mm",
-        "y, mm",
-        "z, mm",
+        Column("gap", "mm", 1),
+        Column("drum speed", "rpm", 0),
+        Column("time", "s", 2),
+        *(Column(axis, "mm", 0) for axis in "xyz"),
     )
     return Table(caption, header, tuple(_gap(case) for case in result.results), text_columns=3)
 
@@ -261,16 +288,14 @@ def smallest_gaps(result: SpinResult) -> Table:
 def _gap(case: CaseResult) -> Group:
     gap = case.measures.smallest_gap
     if gap is None:
-        return line(case_title(case), ["not computed", *[MISSING] * 7])
-    place = [number(MM_PER_M * value, 0) for value in gap.point]
-    speed = number(speed_rpm(case, gap.time), 0)
-    cells = [
+        return line(case_title(case), ["not computed", *[None] * 7])
+    cells: list[Value] = [
         shape_name(gap.moving),
         shape_name(gap.fixed),
-        number(MM_PER_M * gap.distance),
-        speed,
-        number(gap.time, 2),
-        *place,
+        MM_PER_M * gap.distance,
+        speed_rpm(case, gap.time),
+        gap.time,
+        *(MM_PER_M * float(value) for value in gap.point),
     ]
     return line(case_title(case), cells, "alarm" if gap.distance <= 0.0 else "")
 
@@ -284,10 +309,11 @@ def smallest_tensions(result: SpinResult) -> Table:
     groups = []
     for case in result.results:
         smallest = case.measures.smallest_tension
-        cells = [number(float(value)) for value in smallest.values]
-        groups.append(line(case_title(case), cells, "alarm" if slack_springs(smallest) else ""))
+        groups.append(
+            line(case_title(case), smallest.values, "alarm" if slack_springs(smallest) else "")
+        )
     names = result.results[0].measures.smallest_tension.spring.values
-    return Table(caption, ("load", *(f"{name}, N" for name in names)), tuple(groups))
+    return Table(caption, ("load", *(Column(str(name), "N", 1) for name in names)), tuple(groups))
 
 
 def loads(result: SpinResult) -> Table:
@@ -296,23 +322,23 @@ def loads(result: SpinResult) -> Table:
         "Loads: point masses in the drum. A mass with phase 0 is at the top when the drum angle is "
         "0. y is measured from drum mid-depth to the rear."
     )
+    header: Columns = (
+        "load",
+        Column("mass", "kg", 3),
+        Column("radius", "mm", 1),
+        Column("y", "mm", 1),
+        Column("phase", "deg", 1),
+    )
     groups = (Group(case_title(case), _masses(case.case.load)) for case in result.results)
-    return Table(caption, ("load", "mass, kg", "radius, mm", "y, mm", "phase, deg"), tuple(groups))
+    return Table(caption, header, tuple(groups))
 
 
 def _masses(load: Load) -> tuple[Row, ...]:
     rows = [
-        Row(
-            (
-                number(u.mass, 3),
-                number(MM_PER_M * u.radius),
-                number(MM_PER_M * u.y),
-                number(float(np.rad2deg(u.phase))),
-            )
-        )
+        Row((u.mass, MM_PER_M * u.radius, MM_PER_M * u.y, float(np.rad2deg(u.phase))))
         for u in load.unbalances
     ]
-    return tuple(rows) or (Row(("0 (empty drum)", *[MISSING] * 3)),)
+    return tuple(rows) or (Row(("0 (empty drum)", None, None, None)),)
 
 
 def profiles(result: SpinResult) -> Table:
@@ -328,15 +354,13 @@ def profiles(result: SpinResult) -> Table:
     )
     return Table(
         "Spin profile. The drum speed is linear between these points.",
-        ("load", "time, s", "drum speed, rpm"),
+        ("load", Column("time", "s", 3), Column("drum speed", "rpm", 1)),
         tuple(groups),
     )
 
 
 def _points(times: Sequence[float], speeds: Sequence[float]) -> tuple[Row, ...]:
-    rows = [
-        Row((number(t, 3), number(RPM_PER_RAD_S * w))) for t, w in zip(times, speeds, strict=True)
-    ]
+    rows = [Row((t, RPM_PER_RAD_S * w)) for t, w in zip(times, speeds, strict=True)]
     if len(rows) > MOST_SHOWN:
         half = MOST_SHOWN // 2
         rows[half:-half] = [Row((f"{len(rows) - 2 * half} more", "…"))]

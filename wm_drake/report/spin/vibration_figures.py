@@ -1,28 +1,23 @@
 """Figures of the vibration of a spin run: spectra, order map, accelerations and mount forces."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figures import GRID, OURS, WIDTH, style_axes
+from wm_drake.report.figure import Axis, Cells, Figure, Line, Mark, Panel, Scale, Text, in_grid
 from wm_drake.report.spin.panels import (
     COLUMNS,
-    band_handle,
-    draw_band,
-    largest_handle,
-    legend_below,
-    mark_largest,
+    IN_REVOLUTIONS,
+    largest_marks,
     revolution_band,
-    set_symmetric_limits,
     speed_axis,
-    time_panels,
-    time_ticks,
+    symmetric_limits,
+    time_band,
+    time_figure,
+    time_panel,
 )
 from wm_drake.simulation.mount_forces import MountForce
 from wm_drake.simulation.orders import PERIOD, frequency_map, order_map
@@ -38,8 +33,12 @@ LOWEST_LIMIT_HZ = 8.0
 """Smallest upper end of the frequencies that are shown. [Hz]"""
 
 
+ON_MAP = "#fefefe"
+"""Colour of lines and texts on a map, in light and in dark."""
+
+
 def spectra_figure(record: Record, signals: Sequence[tuple[str, str, FloatArray]]) -> Figure | None:
-    """Draw spectrum, frequency map and order map of signals, one row per signal.
+    """Return spectrum, frequency map and order map of signals, one row per signal.
 
     The spectrum is the largest amplitude at each frequency over all windows of the map.
 
@@ -55,48 +54,29 @@ def spectra_figure(record: Record, signals: Sequence[tuple[str, str, FloatArray]
     by_frequency, by_order = frequency_map(columns, time), order_map(columns, angle, time)
     if not by_frequency.sizes["time"] or not by_order.sizes["time"]:
         return None
-    height = 2.45 * len(signals) + 0.75
-    figure = Figure(figsize=(WIDTH, height))
-    grid = figure.add_gridspec(
-        len(signals),
-        4,
-        width_ratios=(1.0, 1.3, 1.3, 0.04),
-        left=0.065,
-        right=0.94,
-        top=1.0 - 0.62 / height,
-        bottom=0.5 / height,
-        wspace=0.3,
-        hspace=0.2,
-    )
+    highest = _highest_hz(record)
+    panels = []
     for row, (name, unit, _) in enumerate(signals):
         frequencies, orders = by_frequency.isel(signal=row), by_order.isel(signal=row)
-        spectrum, lines, map_of_orders, scale = (
-            figure.add_subplot(grid[row, column]) for column in range(4)
-        )
-        largest = float(np.nanmax([frequencies.max(), orders.max()]))
-        limits = LogNorm(largest * 10.0**-DECADES, largest) if largest else LogNorm(0.1, 1.0)
-        highest = _highest_hz(record)
-        _spectrum(spectrum, frequencies, highest, limits, f"{name}, {unit}")
-        _map(lines, record, frequencies, "frequency", limits)
-        lines.set_ylim(0.0, highest)
-        _order_lines(lines, record)
-        image = _map(map_of_orders, record, orders, "order", limits)
-        bar = figure.colorbar(image, cax=scale)
-        bar.set_label(f"amplitude, {unit}", fontsize=9)
-        bar.ax.tick_params(labelsize=8.5)
-        lines.set_ylabel("frequency, Hz", fontsize=9.5)
-        map_of_orders.set_ylabel("order", fontsize=9.5)
-        for axes in (lines, map_of_orders):
-            if row == 0:
-                speed_axis(axes, record, time_ticks(float(time[-1])))
-        if row == len(signals) - 1:
-            spectrum.set_xlabel("frequency, Hz", fontsize=9.5)
-            for axes in (lines, map_of_orders):
-                axes.set_xlabel("time, s", fontsize=9.5)
-        else:
-            for axes in (spectrum, lines, map_of_orders):
-                axes.tick_params(labelbottom=False)
-    return figure
+        largest = float(np.nanmax([frequencies.max(), orders.max()])) or 1.0
+        low, label = largest * 10.0**-DECADES, f"amplitude, {unit}"
+        scale = Scale(low=low, high=largest, kind="log", label=label)
+        panels += [
+            _spectrum(frequencies, highest, scale, f"{name}, {unit}"),
+            _map(record, frequencies, "frequency", replace(scale, label=""), highest),
+            _map(record, orders, "order", scale),
+        ]
+    placed = in_grid(panels, 3)
+    placed = tuple(_in_rows(panel, len(signals)) for panel in placed)
+    return Figure(panels=placed, height=190.0, widths=(1.0, 1.3, 1.3))
+
+
+def _in_rows(panel: Panel, rows: int) -> Panel:
+    """Return a panel with the texts of the x axis in the last row, of the top axis in the first."""
+    x = replace(panel.x, scale="time" if panel.column else "frequency")
+    if panel.row < rows - 1:
+        x = replace(x, has_numbers=False, label="")
+    return replace(panel, x=x, top=None if panel.row else panel.top)
 
 
 def _highest_hz(record: Record) -> float:
@@ -105,105 +85,93 @@ def _highest_hz(record: Record) -> float:
     return max(LOWEST_LIMIT_HZ, (ORDERS_SHOWN[-1] + 0.5) * fastest)
 
 
-def _spectrum(
-    axes: Axes, frequencies: xr.DataArray, highest: float, limits: LogNorm, label: str
-) -> None:
+def _spectrum(frequencies: xr.DataArray, highest: float, scale: Scale, label: str) -> Panel:
     largest = frequencies.max("time")
-    axes.semilogy(largest.frequency, largest, color=OURS, linewidth=1.2)
-    axes.set(xlim=(0.0, highest), ylim=(limits.vmin, 1.5 * (limits.vmax or 1.0)))
-    axes.set_ylabel(label, fontsize=9.5)
-    axes.grid(color=GRID)
-    style_axes(axes)
+    line = Line(largest.frequency.values, largest.values)
+    x = Axis(label="frequency, Hz", range=(0.0, highest))
+    y = Axis(label=label, range=(scale.low, 1.5 * scale.high), is_log=True)
+    return Panel(name=label, marks=(line,), x=x, y=y)
 
 
 def _map(
-    axes: Axes, record: Record, values: xr.DataArray, dimension: str, limits: LogNorm
-) -> AxesImage:
-    """Draw amplitudes over time and frequency or order as an image, one column per window."""
-    end, step = float(record.time[-1]), float(values[dimension][1] - values[dimension][0])
-    first = float(values.time[0])
-    times = np.arange(first, float(values.time[-1]) + 0.5 * PERIOD, PERIOD)
+    record: Record, values: xr.DataArray, dimension: str, scale: Scale, highest: float = 0.0
+) -> Panel:
+    """Return amplitudes over time and frequency or order as cells, one column per window.
+
+    Args:
+        record: Record of the signal.
+        values: Amplitudes (time, dimension).
+        dimension: frequency or order.
+        scale: Colours of the amplitudes.
+        highest: Upper end of the frequencies; 0 for the largest order. [Hz]
+    """
+    times = np.arange(float(values.time[0]), float(values.time[-1]) + 0.5 * PERIOD, PERIOD)
     # a time without a window stays empty
     even = values.reindex(time=times, method="nearest", tolerance=0.5 * PERIOD)
-    extent = (
-        first - 0.5 * PERIOD,
-        float(times[-1]) + 0.5 * PERIOD,
-        float(values[dimension][0]) - 0.5 * step,
-        float(values[dimension][-1]) + 0.5 * step,
+    up = values[dimension].values
+    shown = up <= (highest or up[-1]) + (up[1] - up[0])
+    cells = even.transpose(dimension, "time").values[shown]
+    marks: list[Mark] = [Cells(cells, times, up[shown], scale=scale)]
+    top = highest or float(up[-1] + 0.5 * (up[1] - up[0]))
+    if highest:
+        marks += _order_lines(record, top)
+    return Panel(
+        marks=tuple(marks),
+        x=Axis(label="time, s", range=(0.0, float(record.time[-1])), has_grid=False),
+        y=Axis(label=f"{dimension}{', Hz' * bool(highest)}", range=(0.0, top), has_grid=False),
+        top=speed_axis(record),
     )
-    image = axes.imshow(
-        np.maximum(even.transpose(dimension, "time").values, limits.vmin or 0.0),
-        extent=extent,
-        origin="lower",
-        aspect="auto",
-        norm=limits,
-        cmap="viridis",
-        interpolation="none",
-    )
-    axes.set(xlim=(0.0, end), xticks=time_ticks(end), ylim=(0.0, extent[3]))
-    style_axes(axes)
-    return image
 
 
-def _order_lines(axes: Axes, record: Record) -> None:
-    """Draw and name the frequencies of the first orders."""
+def _order_lines(record: Record, top: float) -> list[Mark]:
+    """Return the frequencies of the first orders, with their names. `top`: highest one. [Hz]"""
     hertz = np.abs(record.drum_speed.values) / (2.0 * np.pi)
-    time, top = record.time.values, axes.get_ylim()[1]
+    time = record.time.values
     every = slice(None, None, max(1, len(time) // 500))
+    marks: list[Mark] = []
     for order in ORDERS_SHOWN:
-        axes.plot(time[every], order * hertz[every], color="white", linewidth=0.8, linestyle=":")
+        line = order * hertz[every]
+        marks.append(Line(time[every], line, color=ON_MAP, width=1.2, dash="dotted"))
         last = min(order * float(hertz[-1]), 0.94 * top)
-        axes.annotate(
-            f"{order}×",
-            (float(time[-1]), last),
-            (-9.0, 4.0),
-            textcoords="offset points",
-            ha="right",
-            fontsize=8.5,
-            color="white",
-        )
+        at = Text(float(time[-1]), last, f"{order}×", color=ON_MAP, across="right", up="bottom")
+        marks.append(replace(at, shift=(-12.0, 2.0)))
+    return marks
 
 
 def accelerations_figure(record: Record, values: xr.DataArray) -> Figure:
-    """Draw the accelerations (time, sensor) at the sensors over time, one panel per sensor.
+    """Return the accelerations (time, sensor) at the sensors over time, one panel per sensor.
 
     A band shows the smallest to the largest value in each drum revolution.
     """
-    sensors = [str(name) for name in values.sensor.values]
-    rows = -(-len(sensors) // COLUMNS)
-    figure, panels = time_panels(record, len(sensors), ["acceleration, m/s²"] * rows)
-    set_symmetric_limits(panels, float(abs(values).max()))
-    for axes, name in zip(panels, sensors, strict=True):
+    limits = symmetric_limits(float(abs(values).max()))
+    panels = []
+    for name in map(str, values.sensor.values):
         signal = values.sel(sensor=name).values
-        draw_band(axes, *revolution_band(record, signal))
-        mark_largest(axes, record, name, signal, "m/s²")
-    _legend_of_bands(figure)
-    return figure
+        shown = time_band(revolution_band(record, signal), limits[1], IN_REVOLUTIONS)
+        marks = [shown, *largest_marks(record, signal, "m/s²")]
+        panels.append(time_panel(record, name, marks, "acceleration, m/s²", limits))
+    return time_figure(panels)
 
 
 def mounts_figure(record: Record, forces: Sequence[MountForce]) -> Figure:
-    """Draw the forces of the mounts over time, a row of panels for each kind of mount.
+    """Return the forces of the mounts over time, a row of panels for each kind of mount.
 
     A band shows the smallest to the largest size of the force in each drum revolution.
     """
-    rows = _rows(forces)
-    places = [COLUMNS * row + column for row, of in enumerate(rows) for column in range(len(of))]
-    count = places[-1] + 1
-    figure, panels = time_panels(
-        record, count, ["force, N"] * len(rows), set(range(count)) - set(places)
-    )
-    for row, of_row in enumerate(rows):
+    panels: list[Panel | None] = []
+    for of_row in _rows(forces):
         signals = [np.asarray(np.linalg.norm(force.force, axis=1)) for force in of_row]
-        own = panels[COLUMNS * row : COLUMNS * row + len(of_row)]
         low = min(0.0, *(float(signal.min()) for signal in signals))
         high = max(0.0, *(float(signal.max()) for signal in signals))
         span = (high - low) or 1.0
-        for axes, force, signal in zip(own, of_row, signals, strict=True):
-            axes.set_ylim(low - 0.08 * span, high + 0.28 * span)
-            draw_band(axes, *revolution_band(record, signal))
-            mark_largest(axes, record, force.name.replace("_", " "), signal, "N")
-    _legend_of_bands(figure)
-    return figure
+        limits = low - 0.08 * span, high + 0.28 * span
+        for force, signal in zip(of_row, signals, strict=True):
+            shown = time_band(revolution_band(record, signal), limits[1], IN_REVOLUTIONS)
+            marks = [shown, *largest_marks(record, signal, "N")]
+            name = force.name.replace("_", " ")
+            panels.append(time_panel(record, name, marks, "force, N", limits))
+        panels += [None] * (COLUMNS - len(of_row))
+    return time_figure(panels)
 
 
 def _rows(forces: Sequence[MountForce]) -> list[list[MountForce]]:
@@ -216,13 +184,3 @@ def _rows(forces: Sequence[MountForce]) -> list[list[MountForce]]:
         for of_kind in kinds.values()
         for begin in range(0, len(of_kind), COLUMNS)
     ]
-
-
-def _legend_of_bands(figure: Figure) -> None:
-    legend_below(
-        figure,
-        [
-            band_handle("wm_drake, smallest to largest value in each drum revolution"),
-            largest_handle(),
-        ],
-    )

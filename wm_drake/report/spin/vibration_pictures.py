@@ -85,4 +85,4 @@ def _spectra_picture(case: CaseResult, accelerations: xr.DataArray) -> Picture |
         f"Spectrum, frequency map and order map of displacement and acceleration at sensor "
         f"{sensor}, load {case_title(case)}."
     )
-    return picture(figure, alternative, caption, has_images=True)
+    return picture(figure, alternative, caption)

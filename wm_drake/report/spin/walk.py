@@ -1,20 +1,18 @@
 """Part of a spin page about a cabinet that moves: where it stands after the run, and its path."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.report.figures import GRID, OURS, QUIET, WIDTH, style_axes
+from wm_drake.report.figure import COLOURS, OURS, QUIET, Axis, Figure, Line, Mark, Panel, Points
 from wm_drake.report.formatting import number
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.spin.cases import case_title
-from wm_drake.report.tables import Group, Row, Table
+from wm_drake.report.table import Group, Row, Table
 from wm_drake.simulation.cabinet import walk
-from wm_drake.simulation.measures import cabinet_in
+from wm_drake.simulation.records import cabinet_in
 from wm_drake.studies.spin.study import CaseResult
 
 WALKING = (
@@ -57,12 +55,12 @@ def walk_view(cases: list[CaseResult]) -> WalkView:
 
 def walk_warning(case: CaseResult) -> list[str]:
     """Return a warning if the cabinet of a case walks or turns."""
-    found = case.measures.walk
-    if found is None or (found.distance < LEAST_WALK and abs(found.turn) < LEAST_TURN):
+    walked = case.measures.walk
+    if walked is None or (walked.distance < LEAST_WALK and abs(walked.turn) < LEAST_TURN):
         return []
     return [
-        f"Load {case_title(case)}: the cabinet walks {number(MM.from_si(found.distance))} mm and "
-        f"turns by {number(DEGREE.from_si(found.turn))} degrees."
+        f"Load {case_title(case)}: the cabinet walks {number(MM.from_si(walked.distance))} mm and "
+        f"turns by {number(DEGREE.from_si(walked.turn))} degrees."
     ]
 
 
@@ -70,13 +68,13 @@ def walk_table(cases: list[CaseResult]) -> Table:
     """Return where the cabinet stands after the run of each case."""
     groups = []
     for case in cases:
-        found = case.measures.walk
-        if found is None:
+        walked = case.measures.walk
+        if walked is None:
             continue
-        moved = [*found.shift, found.distance]
+        moved = [*walked.shift, walked.distance]
         cells = [number(MM.from_si(float(value)), 2) for value in moved]
         kind = "alarm" if walk_warning(case) else ""
-        turn = number(DEGREE.from_si(found.turn), 2)
+        turn = number(DEGREE.from_si(walked.turn), 2)
         groups.append(Group(case_title(case), (Row((*cells, turn), kind),)))
     caption = (
         "Where the cabinet stands after the run: shift of the middle of its feet on the floor, and "
@@ -105,60 +103,53 @@ def _pictures(cases: list[CaseResult]) -> tuple[Picture, ...]:
 
 
 def walk_figure(cases: list[CaseResult], farthest: CaseResult) -> Figure:
-    """Draw the path of the feet of one case, and distance and turn over time of all.
+    """Return the path of the feet of one case, and distance and turn over time of all.
 
     Args:
         cases: Cases whose cabinet moves, with at least two samples.
         farthest: The case whose feet are drawn.
     """
-    figure = Figure(figsize=(WIDTH, 4.8))
-    panels = figure.subplot_mosaic([["floor", "distance"], ["floor", "turn"]])
-    _draw_floor(panels["floor"], farthest)
-    for case in cases:
-        time, path = _sampled(case)
-        for name, column, unit in (("distance", 0, MM), ("turn", 1, DEGREE)):
-            values = unit.from_si(1.0) * path[:, column]
-            panels[name].plot(time, values, linewidth=1.2, label=case_title(case))
     last = max(float(case.record.time[-1]) for case in cases)
-    for name, text in (("distance", "distance, mm"), ("turn", "turn, degrees")):
-        panels[name].set_ylabel(text, fontsize=9.5)
-        panels[name].set_xlim(0.0, last)
-        panels[name].grid(color=GRID)
-        style_axes(panels[name])
-    panels["turn"].set_xlabel("time, s", fontsize=9.5)
-    handles, labels = panels["turn"].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="lower center", ncols=4, frameon=False, fontsize=9.5)
-    rows = -(-len(cases) // 4)
-    figure.subplots_adjust(
-        left=0.075, right=0.985, top=0.97, bottom=0.12 + 0.05 * rows, hspace=0.22, wspace=0.25
-    )
-    return figure
+    panels = [_floor(farthest)]
+    texts = ("distance, mm", "turn, degrees")
+    for row, (text, unit) in enumerate(zip(texts, (MM, DEGREE), strict=True)):
+        marks = []
+        for index, case in enumerate(cases):
+            time, path = _sampled(case)
+            color = COLOURS[index % len(COLOURS)]
+            values = unit.from_si(1.0) * path[:, row]
+            marks.append(Line(time, values, color=color, key=case_title(case)))
+        x = Axis(label="time, s" if row else "", range=(0.0, last), scale="time")
+        x = replace(x, has_numbers=bool(row))
+        y = Axis(label=text)
+        name = text.split(",")[0]
+        panels.append(Panel(name=name, marks=tuple(marks), x=x, y=y, row=row, column=1))
+    return Figure(panels=tuple(panels), height=185.0)
 
 
-def _draw_floor(axes: Axes, case: CaseResult) -> None:
-    """Draw the feet before and after a run, with their paths, from above."""
-    found = cabinet_in(case.record)
-    assert found is not None
-    feet = np.array([[found[0].feet[name].x, found[0].feet[name].y] for name in found[0].corners])
+def _floor(case: CaseResult) -> Panel:
+    """Return the feet before and after a run, with their paths, from above."""
+    in_record = cabinet_in(case.record)
+    assert in_record is not None
+    cabinet = in_record[0]
+    feet = np.array([[cabinet.feet[name].x, cabinet.feet[name].y] for name in cabinet.corners])
     paths = MM.from_si(1.0) * (feet + _thinned(case.record.foot_slip.values[:, :, :2]))
-    for foot in range(len(feet)):
-        axes.plot(*paths[:, foot].T, color=OURS, linewidth=1.0)
-    for at, color, fill in ((0, QUIET, "none"), (-1, OURS, OURS)):
+    marks: list[Mark] = [Line(*paths[:, foot].T) for foot in range(len(feet))]
+    for at, color in ((0, QUIET), (-1, OURS)):
         corners = np.vstack([paths[at], paths[at][:1]])
-        axes.plot(*corners.T, color=color, linewidth=1.2, linestyle="--" if at == 0 else "-")
-        axes.plot(*paths[at].T, color=color, marker="o", linestyle="none", markerfacecolor=fill)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel("x, mm", fontsize=9.5)
-    axes.set_ylabel("y, mm", fontsize=9.5)
-    axes.grid(color=GRID)
-    style_axes(axes)
+        marks.append(Line(*corners.T, color=color, dash="" if at else "dashed"))
+        marks.append(Points(*paths[at].T, color=color, is_open=at == 0, size=8.0))
+    x, y = Axis(label="x, mm"), Axis(label="y, mm")
+    return Panel(name="floor", marks=tuple(marks), x=x, y=y, rows=2, is_square=True)
 
 
 def _sampled(case: CaseResult) -> tuple[FloatArray, FloatArray]:
     """Return times and, at each, distance [m] and turn [rad] of the cabinet of a case."""
-    found = cabinet_in(case.record)
-    assert found is not None
-    walks = [walk(found[0], slips) for slips in _thinned(case.record.foot_slip.values[:, :, :2])]
+    in_record = cabinet_in(case.record)
+    assert in_record is not None
+    walks = [
+        walk(in_record[0], slips) for slips in _thinned(case.record.foot_slip.values[:, :, :2])
+    ]
     values = np.array([(one.distance, one.turn) for one in walks])
     return _thinned(case.record.time.values), values
 

@@ -1,21 +1,23 @@
 """calibrate(machine, free, targets): search from several starts, with each evaluation stored."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from wm_drake.batch.ledger import Ledger, key_of
+from wm_drake.batch.ledger import key_of
 from wm_drake.batch.remembered import model_version, sources_version
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibration.computed import Evaluation, StoredValues
+from wm_drake.studies.calibration.computed import Runner, StoredValues
 from wm_drake.studies.calibration.parameter_map import ParameterMap, parameter_map_of
-from wm_drake.studies.calibration.search import METHODS, Residuals, SearchProblem
 from wm_drake.studies.calibration.solutions import Solution, distinct
 from wm_drake.studies.calibration.targets import Targets
+from wm_drake.studies.fitting.kinks import METHODS, smooth_jacobian, start_number
+from wm_drake.studies.fitting.posterior import Posterior
+from wm_drake.studies.fitting.problem import PriorProblem, Residuals, Unknown
+from wm_drake.studies.fitting.search import Search
 
 RELATIVE_DEVIATION = 0.05
 """Relative standard deviation of a measured amplitude from the computed one.
@@ -52,6 +54,8 @@ class Plan:
         deviation: Relative standard deviation of an amplitude.
         resolution: Resolution of the measured amplitudes. Rounding adds the standard deviation
             resolution / sqrt(12). [m]
+        draws: Number of machines that are drawn from the posterior for the interval of a
+            prediction.
     """
 
     method: str = "least-squares"
@@ -60,6 +64,7 @@ class Plan:
     iterations: int = 0
     deviation: float = RELATIVE_DEVIATION
     resolution: float = RESOLUTION
+    draws: int = 200
 
     def check(self) -> None:
         """Check the settings.
@@ -125,16 +130,7 @@ def identity_of(machine: Machine, free: FreeFile, targets: Targets, plan: Plan) 
     }
 
 
-def calibrate(
-    machine: Machine,
-    free: FreeFile,
-    targets: Targets,
-    plan: Plan,
-    ledger: Ledger,
-    *,
-    workers: int | None = None,
-    report: Callable[[int, int, float], None] = lambda start, evaluations, best: None,
-) -> Calibration:
+def calibrate(runner: Runner, free: FreeFile, targets: Targets, plan: Plan) -> Calibration:
     """Search for machines with the measured amplitudes.
 
     Each evaluation is stored in the ledger before it is used. A search that is started again takes
@@ -142,93 +138,103 @@ def calibrate(
     depend on the number of workers.
 
     Args:
-        machine: A built machine. Numbers that the free file does not name keep its values.
+        runner: The machine, and the ledger of this calibration. Numbers that the free file does not
+            name keep their values.
         free: Quantities that may change, with bounds and priors.
         targets: Measured amplitudes.
         plan: Settings of the search.
-        ledger: The open ledger of this calibration.
-        workers: Number of threads; None for the number of cores.
-        report: Called with the number of the start, the number of points it has evaluated and its
-            lowest cost so far.
 
     Raises:
         InputError: the free file does not fit the machine, or a setting of the plan is not allowed.
     """
     plan.check()
-    parameter_map = parameter_map_of(machine, free)
-    values = StoredValues(Evaluation(machine, parameter_map, targets, workers), ledger)
-    ended = [
-        _search(number, parameter_map, targets, plan, values, report)
-        for number in range(plan.starts)
-    ]
+    parameter_map = parameter_map_of(runner.machine, free)
+    values = runner.values(parameter_map, targets)
+    problem = calibration_problem(parameter_map, targets, plan, values)
+    ended = []
+    for number in range(plan.starts):
+        search = Search(problem, runner.report_of(number))
+        start = start_number(search, number, plan.seed)
+        iterations = plan.iterations or ITERATIONS[plan.method]
+        end = METHODS[plan.method](search, start, iterations, plan.seed + number)
+        ended.append(_solution(number, search, end.point, targets, values))
     return Calibration(parameter_map, targets, plan, tuple(distinct(ended, targets)), tuple(ended))
 
 
-def residuals_of(
+def calibration_problem(
     parameter_map: ParameterMap, targets: Targets, plan: Plan, values: StoredValues
-) -> Residuals:
-    """Return the residuals as a function of points in units of the prior.
+) -> PriorProblem:
+    """Return the problem of the free quantities.
 
     The first `targets.count` residuals are those of the data. Those of values that have a limit
     follow, then those of what is known beside the priors of the quantities.
     """
     spread = plan.spread(targets.amplitude)
-
-    def residuals(coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
-        points = parameter_map.expected + coordinates * parameter_map.deviation
-        found = values(points)
-        known = parameter_map.prior_residuals(points, found.preload, found.elongation)
-        beyond = BEYOND_LIMIT * targets.excesses(found.amplitude, found.responses, spread)
-        exact, smooth = (
-            np.hstack([targets.residuals(amplitude, found.responses, spread), beyond, known])
-            for amplitude in (found.amplitude, found.power_mean)
+    unknowns = tuple(
+        Unknown(
+            name,
+            lower,
+            upper,
+            start=min(max(start, lower), upper),
+            prior=(float(parameter_map.expected[k]), float(parameter_map.deviation[k])),
         )
-        return exact, smooth
-
-    return residuals
-
-
-def _search(
-    number: int,
-    parameter_map: ParameterMap,
-    targets: Targets,
-    plan: Plan,
-    values: StoredValues,
-    report: Callable[[int, int, float], None],
-) -> Solution:
-    residuals = residuals_of(parameter_map, targets, plan, values)
-    lower, upper = (
-        (bound - parameter_map.expected) / parameter_map.deviation
-        for bound in (parameter_map.lower, parameter_map.upper)
+        for k, (name, lower, upper, start) in enumerate(
+            zip(
+                parameter_map.names,
+                parameter_map.lower.tolist(),
+                parameter_map.upper.tolist(),
+                parameter_map.start.tolist(),
+                strict=True,
+            )
+        )
     )
-    first = (parameter_map.start - parameter_map.expected) / parameter_map.deviation
-    problem = SearchProblem(
-        residuals, lower, upper, first, lambda evaluations, best: report(number, evaluations, best)
-    )
-    iterations = plan.iterations or ITERATIONS[plan.method]
-    found = METHODS[plan.method](
-        problem, problem.start(number, plan.seed), iterations, plan.seed + number
-    )
-    point = parameter_map.expected + found.point * parameter_map.deviation
+
+    def residuals(points: FloatArray) -> Residuals:
+        computed = values(points)
+        known = parameter_map.prior_residuals(points, computed.preload, computed.elongation)
+        beyond = BEYOND_LIMIT * targets.excesses(computed.amplitude, computed.responses, spread)
+        exact, smooth = (
+            np.hstack([targets.residuals(amplitude, computed.responses, spread), beyond, known])
+            for amplitude in (computed.amplitude, computed.power_mean)
+        )
+        return Residuals(exact, smooth)
+
+    return PriorProblem(unknowns, residuals)
+
+
+def costs_at(problem: PriorProblem, point: FloatArray, targets: Targets) -> tuple[float, float]:
+    """Return half the sums of squares of the data and of the priors at a point, in coordinates."""
+    squares = problem.residuals(point[None])[0] ** 2
     # the residuals after those of the data belong to the prior
-    squares = residuals(found.point[None])[0][0] ** 2
-    data, prior = (
+    return (
         0.5 * float(np.sum(squares[: targets.count])),
-        0.5 * float(np.sum(squares[targets.count :]) + np.sum(found.point**2)),
+        0.5 * float(np.sum(squares[targets.count :]) + np.sum(point**2)),
     )
+
+
+def _solution(
+    number: int,
+    search: Search[PriorProblem],
+    coordinates: FloatArray,
+    targets: Targets,
+    values: StoredValues,
+) -> Solution:
+    """Return the end of a search as a solution."""
+    problem = search.problem
+    point = problem.points_at(coordinates)
+    data, prior = costs_at(problem, coordinates, targets)
     computed = values(point[None])
     # a limit is a wish: it does not make a quantity more certain
     limited = int(np.isfinite(targets.limit_of_each()).sum())
     limits = slice(targets.count, targets.count + limited)
+    slopes = np.delete(smooth_jacobian(search, coordinates), limits, axis=0)
     return Solution(
-        number,
-        point,
-        found.point,
-        computed.amplitude[0],
-        computed.responses[0],
-        data,
-        prior,
-        np.delete(problem.jacobian(found.point), limits, axis=0),
-        targets.count,
-        problem.evaluations,
+        start=number,
+        point=point,
+        amplitude=computed.amplitude[0],
+        responses=computed.responses[0],
+        data_cost=data,
+        prior_cost=prior,
+        posterior=Posterior(coordinates, slopes, targets.count),
+        evaluations=search.evaluations,
     )

@@ -1,6 +1,6 @@
 """Computed values at points: amplitudes, other responses, and what is known of the springs."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,7 +25,7 @@ class Computed:
     Attributes:
         amplitude: (point, case, sensor) amplitudes. [m]
         power_mean: (point, case, sensor) smooth substitutes of the amplitudes
-            (`wm_drake.simulation.measures.power_means`). [m]
+            (`wm_drake.simulation.displacements.power_means`). [m]
         responses: (point, response) other responses. [unit for reading]
         preload: (point, spring) preloads. [N]
         elongation: (point, spring) smallest elongation from the free length, over all cases. [m]
@@ -65,7 +65,7 @@ class Evaluation:
             index: ([spring.preload for spring in setup.springs.values()], setup.parameters)
             for index, setup in self._set_up(points)
         }
-        places, result = list(preloads), self._nothing(len(points))
+        places, result = list(preloads), self._empty(len(points))
         if not places:
             return result
         machines = [parameters for _, parameters in preloads.values()]
@@ -93,7 +93,7 @@ class Evaluation:
         result.preload[places] = [preload for preload, _ in preloads.values()]
         return result
 
-    def _nothing(self, points: int) -> Computed:
+    def _empty(self, points: int) -> Computed:
         amplitude = (points, *self.targets.amplitude.shape)
         springs = (points, len(self.machine.springs))
         others = (points, len(self.targets.responses)), springs, springs
@@ -135,11 +135,38 @@ class StoredValues:
         keys = [key_of(point=point) for point in points]
         new = [index for index, key in enumerate(keys) if key not in self.ledger]
         if new:
-            found = self.evaluation(points[new])
+            computed = self.evaluation(points[new])
             results = {
-                keys[i]: Result({kind: getattr(found, kind)[row] for kind in _KINDS})
+                keys[i]: Result({kind: getattr(computed, kind)[row] for kind in _KINDS})
                 for row, i in enumerate(new)
             }
             self.ledger.put_all(results)
         stored = [self.ledger.get(key).values for key in keys]
         return Computed(*(np.array([values[kind] for values in stored]) for kind in _KINDS))
+
+
+@dataclass(frozen=True)
+class Runner:
+    """Machine, ledger and threads with which points are evaluated.
+
+    Attributes:
+        machine: A built machine.
+        ledger: The open ledger of this calibration.
+        workers: Number of threads; None for the number of cores.
+        report: Called with the number of the search, the number of points it has evaluated and its
+            lowest cost so far.
+    """
+
+    machine: Machine
+    ledger: Ledger
+    workers: int | None = None
+    report: Callable[[int, int, float], None] = lambda search, evaluations, best: None
+
+    def values(self, parameter_map: ParameterMap, targets: Targets) -> StoredValues:
+        """Return the function that computes and stores the values at points."""
+        evaluation = Evaluation(self.machine, parameter_map, targets, self.workers)
+        return StoredValues(evaluation, self.ledger)
+
+    def report_of(self, search: int) -> Callable[[int, float], None]:
+        """Return the report of a search with a number."""
+        return lambda evaluations, best: self.report(search, evaluations, best)

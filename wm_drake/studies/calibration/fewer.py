@@ -1,19 +1,24 @@
 """Simpler machines: what the fit loses when quantities keep their expected values."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
-from wm_drake.batch.ledger import Ledger
 from wm_drake.errors import input_error
-from wm_drake.model.machine import Machine
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibration.calibration import ITERATIONS, Calibration, residuals_of
-from wm_drake.studies.calibration.computed import Evaluation, StoredValues
+from wm_drake.studies.calibration.calibration import (
+    ITERATIONS,
+    Calibration,
+    calibration_problem,
+    costs_at,
+)
+from wm_drake.studies.calibration.computed import Runner
 from wm_drake.studies.calibration.outcome import mean_and_largest
-from wm_drake.studies.calibration.search import Residuals, SearchProblem, least_squares_search
+from wm_drake.studies.fitting.kinks import least_squares_search, smooth_jacobian
+from wm_drake.studies.fitting.posterior import least_needed_out
+from wm_drake.studies.fitting.search import Search
 
 
 @dataclass(frozen=True)
@@ -59,13 +64,7 @@ def check_counts(counts: Sequence[int], quantities: int) -> None:
 
 
 def fit_with_fewer(
-    machine: Machine,
-    calibration: Calibration,
-    counts: Sequence[int],
-    ledger: Ledger,
-    *,
-    workers: int | None = None,
-    report: Callable[[int, int, float], None] = lambda step, evaluations, best: None,
+    runner: Runner, calibration: Calibration, counts: Sequence[int]
 ) -> list[Simpler]:
     """Fit the machine again with fewer and fewer free quantities.
 
@@ -74,13 +73,9 @@ def fit_with_fewer(
     least squares from where the linearised fit puts them.
 
     Args:
-        machine: The built machine of the calibration.
+        runner: The machine of the calibration, and its ledger.
         calibration: Its result; the first fit is its best solution.
         counts: Falling numbers of free quantities.
-        ledger: The open ledger of the calibration, which keeps the evaluations.
-        workers: Number of threads; None for the number of cores.
-        report: Called with the number of the fit, the number of points it has evaluated and its
-            lowest cost so far.
 
     Returns:
         The calibration itself and a fit for each count.
@@ -88,24 +83,40 @@ def fit_with_fewer(
     Raises:
         InputError: the counts do not fall from the number of free quantities.
     """
-    mapped, targets, plan = calibration.parameter_map, calibration.targets, calibration.plan
-    check_counts(counts, len(mapped.names))
-    values = StoredValues(Evaluation(machine, mapped, targets, workers), ledger)
-    residuals = residuals_of(mapped, targets, plan, values)
+    parameter_map, targets, plan = calibration.parameter_map, calibration.targets, calibration.plan
+    names = parameter_map.names
+    check_counts(counts, len(names))
+    values = runner.values(parameter_map, targets)
+    problem = calibration_problem(parameter_map, targets, plan, values)
     iterations = plan.iterations or ITERATIONS["least-squares"]
     best = calibration.solutions[0]
-    point, slopes, free = best.coordinates, best.all_slopes, np.arange(len(mapped.names))
-    fits = [_fit(calibration, residuals, values, point, free, ())]
+
+    def simpler(point: FloatArray, free: np.ndarray, fixed: Sequence[str]) -> Simpler:
+        computed = values(problem.points_at(point)[None])
+        end = replace(best, amplitude=computed.amplitude[0], responses=computed.responses[0])
+        return Simpler(
+            len(free),
+            tuple(fixed),
+            *costs_at(problem, point, targets),
+            mean_and_largest(end.errors(targets)),
+            mean_and_largest(end.response_errors(targets))
+            if targets.responses
+            else (np.nan, np.nan),
+        )
+
+    point, slopes, free = best.coordinates, best.posterior.all_slopes, np.arange(len(names))
+    fits = [simpler(point, free, ())]
     for step, count in enumerate(counts):
         kept, start = least_needed_out(slopes, point[free], count)
-        gone = [mapped.names[i] for i in np.delete(free, kept)]
+        fixed = [names[i] for i in np.delete(free, kept)]
         free = free[kept]
-        problem = _problem(calibration, residuals, free, start, step, report)
-        found = least_squares_search(problem, problem.start(0, plan.seed), iterations)
-        point = np.zeros(len(mapped.names))
-        point[free] = found.point
-        slopes = problem.jacobian(found.point)
-        fits.append(_fit(calibration, residuals, values, point, free, gone))
+        part = problem.restricted(free, np.zeros(len(names)))
+        search = Search(part, runner.report_of(step))
+        end = least_squares_search(search, search.clipped(start), iterations)
+        point = np.zeros(len(names))
+        point[free] = end.point
+        slopes = smooth_jacobian(search, end.point)
+        fits.append(simpler(point, free, fixed))
     return fits
 
 
@@ -125,84 +136,4 @@ def fewer_table(fits: Sequence[Simpler]) -> pd.DataFrame:
             }
             for fit in fits
         ]
-    )
-
-
-def least_needed_out(
-    slopes: FloatArray, point: FloatArray, count: int
-) -> tuple[np.ndarray, FloatArray]:
-    """Choose the quantities that stay free, in the linearised fit.
-
-    At its minimum the cost is a quadratic function with the curvature H = J^T J + 1. If coordinate
-    i goes to 0 and the others follow, it rises by x_i^2 / (2 (H^-1)_ii). The one with the least
-    rise goes first.
-
-    Args:
-        slopes: (m, n) derivatives J of the residuals with respect to the coordinates.
-        point: (n) coordinates x of the minimum.
-        count: Number of coordinates that stay free.
-
-    Returns:
-        Indices of those, rising (count), and their values at the minimum without the others
-        (count).
-    """
-    kept, x = np.arange(len(point)), np.array(point)
-    curvature = slopes.T @ slopes + np.eye(len(point))
-    while len(kept) > count:
-        covariance = np.linalg.inv(curvature)
-        out = int(np.argmin(x**2 / np.diag(covariance)))
-        x = x - covariance[:, out] / covariance[out, out] * x[out]
-        kept, x = np.delete(kept, out), np.delete(x, out)
-        curvature = np.delete(np.delete(curvature, out, axis=0), out, axis=1)
-    return kept, x
-
-
-def _problem(
-    calibration: Calibration,
-    residuals: Residuals,
-    free: np.ndarray,
-    start: FloatArray,
-    step: int,
-    report: Callable[[int, int, float], None],
-) -> SearchProblem:
-    """Return the search over some coordinates; the others are 0, their expected values."""
-    mapped = calibration.parameter_map
-    lower, upper = (
-        ((bound - mapped.expected) / mapped.deviation)[free]
-        for bound in (mapped.lower, mapped.upper)
-    )
-
-    def of_free(coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
-        full = np.zeros((len(coordinates), len(mapped.names)))
-        full[:, free] = coordinates
-        return residuals(full)
-
-    return SearchProblem(
-        of_free, lower, upper, start, lambda evaluations, best: report(step, evaluations, best)
-    )
-
-
-def _fit(
-    calibration: Calibration,
-    residuals: Residuals,
-    values: StoredValues,
-    point: FloatArray,
-    free: np.ndarray,
-    fixed: Sequence[str],
-) -> Simpler:
-    mapped, targets = calibration.parameter_map, calibration.targets
-    squares = residuals(point[None])[0][0] ** 2
-    computed = values((mapped.expected + point * mapped.deviation)[None])
-    amplitude = np.where(
-        targets.weight > 0.0, computed.amplitude[0] / targets.amplitude - 1.0, np.nan
-    )
-    wanted = np.array([target.value for target in targets.responses])
-    others = np.where(targets.response_weight > 0.0, computed.responses[0] / wanted - 1.0, np.nan)
-    return Simpler(
-        len(free),
-        tuple(fixed),
-        0.5 * float(np.sum(squares[: targets.count])),
-        0.5 * float(np.sum(squares[targets.count :]) + np.sum(point**2)),
-        mean_and_largest(amplitude),
-        mean_and_largest(others) if len(wanted) else (np.nan, np.nan),
     )

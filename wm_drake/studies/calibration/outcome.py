@@ -10,8 +10,9 @@ from wm_drake.parameters.measured import DESIGN, MACHINE
 from wm_drake.parameters.units import from_base, to_base
 from wm_drake.studies.calibration.calibration import Calibration
 from wm_drake.studies.calibration.parameter_map import ParameterMap
-from wm_drake.studies.calibration.solutions import AT_BOUND, DETERMINED, UNDETERMINED, Solution
+from wm_drake.studies.calibration.solutions import Solution
 from wm_drake.studies.calibration.targets import EXPERIMENT, MILLIMETRE, Targets
+from wm_drake.studies.fitting.posterior import AT_BOUND, DETERMINED, UNDETERMINED
 
 
 def solved_machine(
@@ -27,11 +28,11 @@ def solved_machine(
         solution: The solution.
         number: Number of the solution, for the name of the machine; 0 keeps the name.
     """
-    spread = solution.spread()
+    spread = solution.posterior.spread()
     fits: dict[str, list[str]] = {}
     reasons: dict[str, list[str]] = {}
     for value in parameter_map.values:
-        key = ".".join(value.path)
+        key = value.key
         entering = np.flatnonzero(np.any(value.factors != 0.0, axis=1))
         texts = (fit_text(parameter_map, solution, spread, int(index)) for index in entering)
         for listed, new in ((fits, texts), (reasons, value.reasons)):
@@ -151,7 +152,7 @@ def quantity_table(calibration: Calibration) -> pd.DataFrame:
         "expected": parameter_map.expected,
         "deviation": parameter_map.deviation,
     }
-    spreads = [solution.spread() for solution in calibration.solutions]
+    spreads = [solution.posterior.spread() for solution in calibration.solutions]
     for index, (name, unit) in enumerate(
         zip(parameter_map.names, parameter_map.units, strict=True)
     ):

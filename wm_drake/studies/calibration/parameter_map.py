@@ -5,15 +5,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from wm_drake.errors import InputError, Problem, nearest_names
 from wm_drake.model.bodies import with_sdf_values
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import MachineParameters
+from wm_drake.parameters import MachineParameters, with_values
 from wm_drake.parameters.free import FreeFile, FreeQuantity, KnownQuantity, Measured
 from wm_drake.parameters.keys import quantities
-from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit, dimension, from_base
 
@@ -25,7 +23,7 @@ class Value:
     """A value of the machine that depends on free quantities.
 
     Attributes:
-        path: Names and indices that lead to the value in the tree of parameters.
+        key: Key path of the value; of the whole vector if it is one component of it.
         component: Index of the component of a vector; None for the whole value.
         factors: (quantities, 1 or points) factors of each free quantity: one for a number, several
             for the column of a table.
@@ -34,12 +32,21 @@ class Value:
         is_list: Whether the value is the column of a table.
     """
 
-    path: tuple[str, ...]
+    key: str
     component: int | None
     factors: FloatArray
     constant: FloatArray
     reasons: tuple[str, ...]
     is_list: bool
+
+    def changes(self, point: FloatArray) -> dict[str, Any]:
+        """Return the value at a point (quantities), by key path. [SI]"""
+        sums = self.constant + np.asarray(point) @ self.factors
+        if np.count_nonzero(self.factors) > sums.size:
+            # 15 digits, so that the sum is short in a file
+            sums = np.array([float(f"{number:.15g}") for number in sums])
+        key = self.key if self.component is None else f"{self.key}.{self.component}"
+        return {key: tuple(map(float, sums)) if self.is_list else float(sums[0])}
 
 
 @dataclass(frozen=True)
@@ -103,12 +110,11 @@ class ParameterMap:
     preload: tuple[float, float] | None
     elongation: tuple[float, float] | None
     relations: tuple[KnownRatio, ...]
-    _tree: dict[str, Any]
 
     def prior_residuals(
         self, points: FloatArray, preload: FloatArray, elongation: FloatArray
     ) -> FloatArray:
-        """Return the residuals of what is known beside the priors of the quantities.
+        """Return the residuals of what is known besides the priors of the quantities.
 
         Args:
             points: (point, quantity) in SI units.
@@ -137,17 +143,10 @@ class ParameterMap:
         Raises:
             InputError: a value of the machine is not allowed.
         """
-        tree = dict(self._tree)
+        changes: dict[str, Any] = {}
         for value in self.values:
-            set_to = value.constant + np.asarray(point) @ value.factors
-            if np.count_nonzero(value.factors) > set_to.size:
-                # 15 digits, so that the sum is short in a file
-                set_to = np.array([float(f"{number:.15g}") for number in set_to])
-            _set(tree, value, tuple(map(float, set_to)) if value.is_list else float(set_to[0]))
-        try:
-            return MachineParameters.model_validate(tree)
-        except ValidationError as error:
-            raise InputError(problems_of(error, MachineParameters)) from None
+            changes |= value.changes(point)
+        return with_values(self.base, changes)
 
 
 def parameter_map_of(machine: Machine, free: FreeFile) -> ParameterMap:
@@ -177,15 +176,6 @@ def parameter_map_of(machine: Machine, free: FreeFile) -> ParameterMap:
     names, units = tuple(free.quantities), tuple(q.unit for q in entries)
     lower, upper, expected, deviation = pairs.T
     start = np.array([(q.start or q.prior).values[0] for q in entries])
-    tree = base.model_dump(exclude_unset=True)
-    preload = elongation = None
-    if free.spring_elongation is not None:
-        elongation = (
-            free.spring_elongation.at_least.values[0],
-            free.spring_elongation.at_least.values[1],
-        )
-    if free.spring_preload is not None:
-        preload = (free.spring_preload.prior.values[0], free.spring_preload.prior.values[1])
     return ParameterMap(
         base,
         names,
@@ -196,10 +186,9 @@ def parameter_map_of(machine: Machine, free: FreeFile) -> ParameterMap:
         deviation,
         start,
         tuple(values),
-        preload,
-        elongation,
+        None if free.spring_preload is None else free.spring_preload.prior.pair,
+        None if free.spring_elongation is None else free.spring_elongation.at_least.pair,
         tuple(_known_ratios(free)),
-        tree,
     )
 
 
@@ -213,8 +202,7 @@ def _known_ratios(free: FreeFile) -> Iterator[KnownRatio]:
             name,
             names.index(relation.quantity),
             factors,
-            pair.values[0],
-            pair.values[1],
+            *pair.pair,
             relation.at_most is not None,
         )
 
@@ -243,7 +231,7 @@ def _value(key: str, known: Mapping[str, tuple[Any, Unit]], free: FreeFile) -> V
         (entry.value.values[0] * factors(entry) for entry in entering.values()), np.zeros(size)
     )
     return Value(
-        tuple(shape_key.split(".")),
+        shape_key,
         component,
         np.array([factors(quantity) for quantity in free.quantities.values()]),
         constant,
@@ -262,27 +250,9 @@ def _factor(
     factor: Measured, quantity_unit: str, unit: Unit, size: int, is_list: bool
 ) -> FloatArray:
     if factor.is_list != is_list or len(factor.values) != size:
-        wanted = f"a list of {size} factors" if is_list else "one factor"
-        raise ValueError(f"needs {wanted}, not {len(factor.values)}")
+        needed = f"a list of {size} factors" if is_list else "one factor"
+        raise ValueError(f"needs {needed}, not {len(factor.values)}")
     if dimension(quantity_unit) * dimension(factor.unit) != dimension(unit.si):
         written = " times ".join(filter(None, [quantity_unit, factor.unit])) or "a pure number"
         raise ValueError(f"needs a unit such as {unit.shown}, but {written} is not of this kind")
     return np.array(factor.values)
-
-
-def _set(tree: dict[str, Any], value: Value, number: Any) -> None:
-    """Set a value in a tree; containers on the path are copied, so the base does not change."""
-    node: Any = tree
-    *parents, last = value.path
-    for part in parents:
-        at: Any = int(part) if isinstance(node, list) else part
-        child = node[at]
-        node[at] = dict(child) if isinstance(child, dict) else list(child)
-        node = node[at]
-    place: Any = int(last) if isinstance(node, list) else last
-    if value.component is None:
-        node[place] = number
-    else:
-        vector = list(node[place])
-        vector[value.component] = number
-        node[place] = tuple(vector)

@@ -5,19 +5,17 @@ machines that are drawn from the posterior of the calibration, and from the scat
 amplitudes that this calibration has seen.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
-from wm_drake.batch.ledger import Ledger
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.model.machine import Machine
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate
-from wm_drake.studies.calibration.computed import Evaluation, StoredValues
+from wm_drake.studies.calibration.computed import Runner, StoredValues
 from wm_drake.studies.calibration.outcome import mean_and_largest
 from wm_drake.studies.calibration.targets import Targets
 
@@ -53,24 +51,16 @@ class Prediction:
         return float(np.mean((lower <= 0.0) & (upper >= 0.0)))
 
 
-DRAWS = 200
-"""Usual number of machines that are drawn from the posterior."""
-
 LEVEL = 0.95
 """Probability of an interval."""
 
 
 def predict(
-    machine: Machine,
+    runner: Runner,
     free: FreeFile,
     calibration: Calibration,
     held_out: Sequence[Sequence[str]],
-    ledger: Ledger,
-    *,
     plan: Plan | None = None,
-    draws: int = DRAWS,
-    workers: int | None = None,
-    report: Callable[[int, int, float], None] = lambda start, evaluations, best: None,
 ) -> list[Prediction]:
     """Repeat a calibration once for each group of held-out loads.
 
@@ -78,16 +68,11 @@ def predict(
     used, because they may come from a calibration with all loads.
 
     Args:
-        machine: A built machine.
+        runner: The machine, and the ledger of this calibration.
         free: Quantities that may change, with bounds and priors.
         calibration: Calibration with all loads.
         held_out: Groups of names of loads.
-        ledger: The open ledger of this calibration.
         plan: Settings of these searches; None for those of the calibration.
-        draws: Number of machines that are drawn from the posterior for the intervals.
-        workers: Number of threads; None for the number of cores.
-        report: Called with the number of the start, the number of points it has evaluated and its
-            lowest cost so far.
 
     Returns:
         One prediction for each group.
@@ -96,16 +81,13 @@ def predict(
         InputError: a load was not measured, or a group contains all loads.
     """
     check_held_out(calibration.targets, held_out)
-    targets, plan, found = calibration.targets, plan or calibration.plan, []
+    targets, plan, predictions = calibration.targets, plan or calibration.plan, []
     for loads in map(tuple, held_out):
         seen = targets.without(*loads)
-        others = calibrate(
-            machine, free.without_starts(), seen, plan, ledger, workers=workers, report=report
-        )
+        others = calibrate(runner, free.without_starts(), seen, plan)
         cases, best = targets.of(*loads), others.solutions[0]
-        evaluation = Evaluation(machine, others.parameter_map, targets, workers)
-        limits, scatter = _interval(others, StoredValues(evaluation, ledger), draws)
-        found.append(
+        limits, scatter = _interval(others, runner.values(others.parameter_map, targets))
+        predictions.append(
             Prediction(
                 loads,
                 calibration.solutions[0].amplitude[cases] / targets.amplitude[cases] - 1.0,
@@ -115,7 +97,7 @@ def predict(
                 scatter,
             )
         )
-    return found
+    return predictions
 
 
 def prediction_table(predictions: Sequence[Prediction]) -> pd.DataFrame:
@@ -134,23 +116,23 @@ def prediction_table(predictions: Sequence[Prediction]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _interval(
-    calibration: Calibration, values: StoredValues, draws: int
-) -> tuple[FloatArray, float]:
+def _interval(calibration: Calibration, values: StoredValues) -> tuple[FloatArray, float]:
     """Return the limits (2, case, sensor) of predicted amplitudes [m], and the scatter.
 
     Machines are drawn in equal numbers from the normal distributions around all distinct good
     solutions, because the data cannot tell these apart.
     """
     targets, plan, parameter_map = calibration.targets, calibration.plan, calibration.parameter_map
-    generator = np.random.default_rng([plan.seed, draws])
+    generator = np.random.default_rng([plan.seed, plan.draws])
     logarithms = np.log1p(calibration.solutions[0].errors(targets))
     scatter = max(plan.deviation, float(np.sqrt(np.nanmean(logarithms**2))))
-    each = -(-draws // len(calibration.solutions))
+    each = -(-plan.draws // len(calibration.solutions))
     drawn = np.concatenate(
         [
             generator.multivariate_normal(
-                solution.coordinates, solution.covariance(scatter / plan.deviation), each
+                solution.coordinates,
+                solution.posterior.covariance(scatter / plan.deviation),
+                each,
             )
             for solution in calibration.solutions
         ]

@@ -15,9 +15,9 @@ from wm_drake.parameters.measured import DESIGN, NamedValue
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import dimension, from_base, to_base
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.measures.responses import Response, known_responses
 from wm_drake.studies.doe.coding import Levels
 from wm_drake.studies.doe.orthogonal import orthogonal_levels
-from wm_drake.studies.gasket.responses import Response, known_responses
 
 TRIALS = 27
 """Trials of the orthogonal array that stands for the design of a mean.
@@ -64,7 +64,7 @@ class ResponseTarget:
             f"{self.load}:{self.response.name}",
             self.response.name,
             self.response.group,
-            self.response.meaning.kind,
+            self.response.kind,
             self.load,
         )
 
@@ -84,21 +84,23 @@ def response_targets_of(
     """
     known = {r.name: r for r in known_responses(parameters, parameters.profile)}
     problems: list[Problem] = []
-    found: dict[tuple[object, ...], ResponseTarget] = {}
+    targets: dict[tuple[object, ...], ResponseTarget] = {}
     for value in values:
         message = _problem(parameters, known, value)
         key = (value.load, value.gasket, value.of, value.name)
-        if not message and key in found:
+        if not message and key in targets:
             message = f"'{value.name}' of load '{value.load}' occurs twice"
         if message:
             problems.append(Problem(value.where, "measured", message))
             continue
         response = known[value.name]
         number = from_base(to_base(value.value, value.unit), response.unit.shown)
-        found[key] = ResponseTarget(value.load, value.gasket, value.of == DESIGN, response, number)
+        targets[key] = ResponseTarget(
+            value.load, value.gasket, value.of == DESIGN, response, number
+        )
     if problems:
         raise InputError(problems)
-    return tuple(found.values())
+    return tuple(targets.values())
 
 
 def _problem(
@@ -216,18 +218,18 @@ class ComputedResponses:
     ) -> None:
         """Write the responses that are evaluated in one way."""
         places = [i for i, t in enumerate(self.targets) if t.of_design == way.is_design]
-        wanted = [self.targets[i] for i in places]
-        loads = list(dict.fromkeys((t.load, t.gasket) for t in wanted))
+        evaluated = [self.targets[i] for i in places]
+        loads = list(dict.fromkeys((t.load, t.gasket) for t in evaluated))
         cases = (
             Case(load, trial.loads[load], trial.profile, gasket, parameters=trial)
             for parameters in machines
             for trial in way.trials(parameters)
             for load, gasket in loads
         )
-        measures = dict.fromkeys(target.response.measure for target in wanted)
+        measures = dict.fromkeys(target.response.measure for target in evaluated)
         table = simulate_many(way.machine, cases, measures=measures, workers=self.workers)
         ended = table.diverged.values == ""
-        for place, target in zip(places, wanted, strict=True):
+        for place, target in zip(places, evaluated, strict=True):
             values = np.where(ended, target.response.values(table), np.nan)
             runs = values.reshape(len(machines), -1, len(loads))
             result[:, place] = runs[..., loads.index((target.load, target.gasket))].mean(axis=1)

@@ -95,9 +95,9 @@ class Targets:
 
     def _logarithms(self, amplitude: FloatArray, responses: FloatArray) -> FloatArray:
         """Return the logarithms of the ratios of computed to wanted values that are used."""
-        wanted = np.array([target.value for target in self.responses])
+        values = np.array([target.value for target in self.responses])
         ratios = (amplitude / self.amplitude)[..., self.weight > 0.0]
-        others = (responses / wanted)[..., self._used]
+        others = (responses / values)[..., self._used]
         return np.asarray(np.log(np.concatenate([ratios, others], axis=-1)))
 
     def _deviations(self, spread: FloatArray) -> FloatArray:
@@ -118,8 +118,8 @@ class Targets:
         names = [*amplitudes, *(target.names for target in self.responses)]
         limit = np.array(
             [
-                next((self.limits[name] for name in own if name in self.limits), np.inf)
-                for own in names
+                next((self.limits[name] for name in fitting if name in self.limits), np.inf)
+                for fitting in names
             ]
         )
         return limit[np.concatenate([self.weight.ravel() > 0.0, self._used])]

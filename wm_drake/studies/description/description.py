@@ -7,10 +7,12 @@ import numpy as np
 from wm_drake.compiler.compilation import generic
 from wm_drake.compiler.vectors import rotation_from_rpy
 from wm_drake.elements.spin_profile import drum_motion
-from wm_drake.engines.compiled.step_check import BEARING, fastest_motions
-from wm_drake.model.bodies import oscillating_bodies, tubes_of
+from wm_drake.elements.state_map import BEARING_WORDS
+from wm_drake.engines.compiled.step_check import fastest_motions
+from wm_drake.model.bodies import oscillating_bodies
 from wm_drake.model.equilibrium import tensions_at
 from wm_drake.model.machine import OUTPUT_PERIOD, Machine, Setup
+from wm_drake.model.sdf_names import tubes_of
 from wm_drake.model.state_layout import CARRIER
 from wm_drake.parameters import (
     DAMPER_LAWS,
@@ -21,7 +23,7 @@ from wm_drake.parameters import (
 )
 from wm_drake.parameters.rubber import RubberBranches
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.measures import BAND_HZ, FILTER_ORDER, PADDING
+from wm_drake.simulation.displacements import BAND_HZ, FILTER_ORDER, PADDING
 from wm_drake.simulation.vibration import HIGH_PASS_HZ
 from wm_drake.simulation.vibration import ORDER as RMS_ORDER
 from wm_drake.studies.description.modal import natural_modes
@@ -75,7 +77,7 @@ def describe(machine: Machine) -> dict[str, Any]:
     setup = machine.set_up()
     modes = natural_modes(machine)
     parameters, bodies = setup.parameters, _bodies(setup)
-    return {
+    described = {
         "machine": parameters.name,
         "units": "SI: m, kg, s, rad, N; x right, y to the rear, z up",
         "format": VERSION,
@@ -113,6 +115,21 @@ def describe(machine: Machine) -> dict[str, Any]:
         "natural_frequencies_hz": modes.frequency_hz.tolist(),
         "mode_damping_ratios": modes.damping_ratio.tolist(),
     }
+    if setup.elements.others:
+        described["elements"] = {name: _element(setup, name) for name in setup.elements.others}
+    return described
+
+
+def _element(setup: Setup, name: str) -> dict[str, Any]:
+    """Return an element of another package: its kind, its parameters and its points."""
+    placed, element = setup.elements.others[name], setup.parameters.elements[name]
+    return element.model_dump(exclude={"tub_frame", "housing_frame"}) | {
+        "law": placed.kind.words,
+        "tub_point_T": placed.ends.tub_point.tolist(),
+        "tub_rotation_T": placed.ends.tub_rotation.tolist(),
+        "housing_point_W": placed.ends.housing_point.tolist(),
+        "housing_rotation_W": placed.ends.housing_rotation.tolist(),
+    }
 
 
 def _cabinet(parameters: MachineParameters) -> dict[str, Any] | None:
@@ -134,23 +151,23 @@ def _cabinet(parameters: MachineParameters) -> dict[str, Any] | None:
 
 def _laws(parameters: MachineParameters) -> dict[str, str]:
     """Return the equation numbers of the laws that a machine uses, by name of the law."""
-    found = {
+    laws = {
         kind.law: f"{DAMPER_LAWS[kind.law].equations}; wm_drake.laws.damper."
         f"{DAMPER_LAWS[kind.law].response.__name__}"
         for kind in parameters.damper_types.values()
     }
-    found["spring"] = "Hooke's law; wm_drake.laws.spring.spring_tension"
+    laws["spring"] = "Hooke's law; wm_drake.laws.spring.spring_tension"
     if parameters.all_bushings() or parameters.telescopic_dampers:
-        found["bushing"] = "[A] (7), (8), [B] Fig. 4; wm_drake.laws.bushing.bushing_force"
+        laws["bushing"] = "[A] (7), (8), [B] Fig. 4; wm_drake.laws.bushing.bushing_force"
     if any(bushing.branches_in_use for bushing in parameters.all_bushings().values()):
-        found["rubber"] = (
+        laws["rubber"] = (
             "friction F_max z / x_c with z' = v - |v| z / x_c (Dahl 1968; F_max dahl_force, x_c "
             "dahl_displacement), Maxwell spring k z with z' = v - k z / c, cross-stiffness K: "
             "F_i = -K_ij q_j over position and rotation vector; wm_drake.laws.rubber"
         )
     if parameters.dampers:
-        found["end_bushing"] = "[A] (7), [B] section 3; wm_drake.laws.strut.bending_moment"
-    return found
+        laws["end_bushing"] = "[A] (7), [B] section 3; wm_drake.laws.strut.bending_moment"
+    return laws
 
 
 _RUNGE_KUTTA = "classical Runge-Kutta method of fourth order, fixed step"
@@ -261,7 +278,7 @@ def _drum_bearing(setup: Setup) -> dict[str, Any] | None:
         return None
     kind = bearing.as_bushing().model_dump(include=set(_BEARING_NUMBERS))
     sag = setup.carrier_rest[3:] - setup.rest_pose[3:]
-    rate = {"fastest_motion_hz": fastest_motions(setup)[BEARING].rate / (2.0 * np.pi)}
+    rate = {"fastest_motion_hz": fastest_motions(setup)[BEARING_WORDS].rate / (2.0 * np.pi)}
     return {
         "point_T": placed.ground_side_point.tolist(),
         "rotation_T": placed.ground_side_rotation.tolist(),

@@ -50,6 +50,6 @@ def natural_modes(
         6
     """
     setup = machine.set_up(parameters=parameters, gasket=gasket, dampers=False)
-    found = Linearisation(setup).spectrum().first(MODES)
-    shapes = [shape_of(vector).real for vector in found.right.T]
-    return Modes(found.frequency_hz, found.damping_ratio, np.array(shapes))
+    spectrum = Linearisation(setup).spectrum().first(MODES)
+    shapes = [shape_of(vector).real for vector in spectrum.right.T]
+    return Modes(spectrum.frequency_hz, spectrum.damping_ratio, np.array(shapes))

@@ -147,10 +147,10 @@ class SumCoding:
             interactions: Whether the model has two-factor interactions.
         """
         self.levels = {str(name): sorted(set(levels[name])) for name in levels.columns}
-        self.codes = {name: _sum_code(len(found)) for name, found in self.levels.items()}
+        self.codes = {name: _sum_code(len(values)) for name, values in self.levels.items()}
         indices = {
-            name: levels[name].map({v: i for i, v in enumerate(found)})
-            for name, found in self.levels.items()
+            name: levels[name].map({v: i for i, v in enumerate(values)})
+            for name, values in self.levels.items()
         }
         names, self.terms, blocks = list(self.levels), [], [np.ones((len(levels), 1))]
         for size in (1, 2) if interactions else (1,):
@@ -168,7 +168,7 @@ class SumCoding:
         self.matrix = np.hstack(blocks)
         self.residual_df = len(levels) - self.matrix.shape[1]
         self._is_repeated = bool(levels.duplicated().any())
-        self._grid_size = math.prod(len(found) for found in self.levels.values())
+        self._grid_size = math.prod(len(values) for values in self.levels.values())
 
     @functools.cached_property
     def _inverse(self) -> FloatArray:
@@ -271,8 +271,10 @@ def _analysed(coding: SumCoding, response: FloatArray) -> AnovaTable:
     scale = 100.0 / variance if variance > 1e-20 * float(np.mean(response**2)) else np.nan
     terms = []
     for term, columns in coding.columns.items():
-        df, own = columns.stop - columns.start, fit.params[columns]
-        sum_sq = float(own @ np.linalg.solve(coding.covariance[columns, columns], own))
+        df, coefficients = columns.stop - columns.start, fit.params[columns]
+        sum_sq = float(
+            coefficients @ np.linalg.solve(coding.covariance[columns, columns], coefficients)
+        )
         with np.errstate(divide="ignore", invalid="ignore"):
             f = float(np.divide(sum_sq / df, noise))
         p = float(fdtrc(df, fit.df_resid, f)) if fit.df_resid > 0 else np.nan

@@ -106,24 +106,25 @@ def make_design(
         return Design(
             kind, factors, orthogonal_levels(count, 729 if trials is None else trials), model
         )
-    wanted = min(1000, everything) if trials is None else trials
+    if trials is None:
+        trials = min(1000, everything)
     least = columns(count, model)
-    if wanted < least:
+    if trials < least:
         raise input_error(
-            f"{wanted} trials cannot determine the {least} coefficients of {model} with {count} "
+            f"{trials} trials cannot determine the {least} coefficients of {model} with {count} "
             f"factors; allowed are {least} to {everything}",
             key="trials",
         )
-    if wanted > everything:
+    if trials > everything:
         raise input_error(
             f"{count} factors have only {everything} different trials, and a repeated run has the "
             f"same result; allowed are {least} to {everything}",
             key="trials",
         )
-    _check_size(wanted)
-    if wanted == everything:
+    _check_size(trials)
+    if trials == everything:
         return Design(kind, factors, level_matrix(count), model, seed)
-    return Design(kind, factors, d_optimal_levels(count, wanted, model, seed), model, seed)
+    return Design(kind, factors, d_optimal_levels(count, trials, model, seed), model, seed)
 
 
 LARGEST_DESIGN = 3**11
@@ -166,8 +167,8 @@ def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -
             not determine the model.
     """
     named = list(read_header(path))
-    wanted = [name for name in named if name != TRIAL and not _VALUES.fullmatch(name)]
-    if sorted(wanted) != sorted(factors):
+    factor_columns = [name for name in named if name != TRIAL and not _VALUES.fullmatch(name)]
+    if sorted(factor_columns) != sorted(factors):
         raise input_error(
             f"needs the columns {','.join(factors)} (and may have {TRIAL}), has {','.join(named)}",
             where=str(path),

@@ -15,8 +15,11 @@ does: m r = |T_1 - J w'_1| / g. An appliance knows T from its current and w' fro
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from wm_drake.engines.compiled.step_check import drum_inertia
@@ -33,6 +36,13 @@ from wm_drake.parameters import (
 from wm_drake.parameters.drive import TorqueLimit, motor_of
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
+from wm_drake.studies.drive.options import DriveOptions
+from wm_drake.studies.inputs import selected_cases
+from wm_drake.studies.run import Executor
+from wm_drake.studies.study import Facts, Result, Task
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 MEASURES = ("drive",)
 """Measures of `simulate_many` that the study needs."""
@@ -119,7 +129,7 @@ class Estimation:
 
 
 @dataclass(frozen=True)
-class DriveResult:
+class DriveResult(Result):
     """Result of the study.
 
     Attributes:
@@ -137,6 +147,31 @@ class DriveResult:
     map: TorqueMap
     estimation: Estimation | None
     runs: int
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return thresholds, map and, with random loads, the estimation."""
+        from wm_drake.studies.drive.tables import estimation_table, map_table, thresholds_table
+
+        shown = {"thresholds": thresholds_table(self), "map": map_table(self)}
+        return shown if self.estimation is None else shown | {"estimation": estimation_table(self)}
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the result for JSON."""
+        from wm_drake.studies.drive.tables import as_plain_data
+
+        return as_plain_data(self)
+
+    def terminal(self) -> "list[Table | str]":
+        """Return the smallest torque limits and a summary."""
+        from wm_drake.studies.drive.page import summary, terminal_table
+
+        return [terminal_table(self), summary(self)]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        from wm_drake.studies.drive.page import drive_page
+
+        return drive_page(self, facts)
 
 
 def motor_with_limit(parameters: MachineParameters) -> tuple[MotorDrive, TorqueLimit]:
@@ -320,52 +355,48 @@ def random_loads(count: int, seed: int, places: Load) -> list[Load]:
     ]
 
 
-def run_drive(
-    machine: Machine,
-    cases: Sequence[Case],
-    run: Callable[[Iterable[Case], str], xr.Dataset],
-    grid: tuple[int, int],
-    random: tuple[int, float, int],
-) -> DriveResult:
-    """Run the study.
+class DriveTask(Task):
+    """The study with checked options."""
 
-    Args:
-        machine: Built machine with a motor.
-        cases: A case for each load, all with the same profile.
-        run: Runs cases and returns the table of their measures.
-        grid: Numbers of torque limits and of unbalances of the map.
-        random: Number of random loads, speed of the estimation [rpm], seed.
+    def __init__(self, options: DriveOptions, machine: Machine) -> None:
+        """Check the drive, the loads and the profile.
 
-    Raises:
-        InputError: the drive has no motor with a constant torque limit, or the profile ends at
-            standstill.
-    """
-    parameters, profile, count = machine.parameters, cases[0].profile, 0
-    motor_with_limit(parameters)
-    if not profile.speed[-1] > 0.0:
-        raise input_error(
-            "the last speed of the profile is 0; allowed is a profile that ends at the speed that "
-            "the drum must reach",
-            key="profile",
-        )
+        Raises:
+            InputError: the drive has no motor with a constant torque limit, a load or the profile
+                is wrong, or the profile ends at standstill.
+        """
+        self.options, self.machine = options, machine
+        motor_with_limit(machine.parameters)
+        self.cases = selected_cases(machine.parameters, options.load, True, options.profile)
+        if not self.cases[0].profile.speed[-1] > 0.0:
+            raise input_error(
+                "the last speed of the profile is 0; allowed is a profile that ends at the speed "
+                "that the drum must reach",
+                key="profile",
+            )
 
-    def counted(listed: Iterable[Case], what: str) -> xr.Dataset:
-        nonlocal count
-        chosen = list(listed)
-        count += len(chosen)
-        return run(chosen, what)
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the runs beside the machine."""
+        return {"profile": self.cases[0].profile, "seed": str(self.options.seed)}
 
-    thresholds = find_thresholds(parameters, cases, counted)
-    worst = max(range(len(cases)), key=lambda i: np.nan_to_num(thresholds[i].passes_from, nan=9e9))
-    largest = motor_with_limit(parameters)[1].torque
-    top = thresholds[worst].passes_from if thresholds[worst].passes_from < largest else largest
-    torques = (top * np.linspace(0.25, 2.0, grid[0])).tolist()
-    factors = np.linspace(0.25, 1.5, grid[1]).tolist()
-    found = torque_map(parameters, cases[worst], torques, factors, counted)
-    estimation, (number, speed_rpm, seed) = None, random
-    if number:
-        setup = machine.set_up()
-        loads = random_loads(number, seed, cases[0].load)
-        speed = speed_rpm * np.pi / 30.0
-        estimation = estimate_unbalance(parameters, speed, loads, counted, drum_inertia(setup))
-    return DriveResult(parameters, profile, thresholds, found, estimation, count)
+    def run(self, executor: Executor) -> "DriveResult":
+        """Find thresholds, draw the map for the load that needs most, and estimate unbalance."""
+        options, parameters = self.options, self.machine.parameters
+        run = partial(executor.simulate, self.machine, MEASURES)
+        thresholds = find_thresholds(parameters, self.cases, run)
+        needs = [np.nan_to_num(threshold.passes_from, nan=9e9) for threshold in thresholds]
+        worst = max(range(len(needs)), key=needs.__getitem__)
+        largest = motor_with_limit(parameters)[1].torque
+        top = min(needs[worst], largest)
+        torques = (top * np.linspace(0.25, 2.0, options.torques)).tolist()
+        factors = np.linspace(0.25, 1.5, options.unbalances).tolist()
+        grid = torque_map(parameters, self.cases[worst], torques, factors, run)
+        estimation = None
+        if options.loads:
+            inertia = drum_inertia(self.machine.set_up())
+            loads = random_loads(options.loads, options.seed, self.cases[0].load)
+            speed = options.speed * np.pi / 30.0
+            estimation = estimate_unbalance(parameters, speed, loads, run, inertia)
+        profile = self.cases[0].profile
+        return DriveResult(parameters, profile, thresholds, grid, estimation, executor.runs)

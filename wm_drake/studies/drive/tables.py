@@ -32,34 +32,34 @@ def thresholds_table(result: DriveResult) -> pd.DataFrame:
 
 def map_table(result: DriveResult) -> pd.DataFrame:
     """Return the map over torque limit and unbalance, a row for each run."""
-    found = result.map
+    torque_map = result.map
     rows = [
         {
-            "load": found.load,
+            "load": torque_map.load,
             "mass_factor": factor,
-            "unbalance_gm": 1e3 * found.unbalance[u],
+            "unbalance_gm": 1e3 * torque_map.unbalance[u],
             "torque_limit_Nm": torque,
-            "end_rpm": rpm(float(found.end_speed[u, t])),
-            "caught_rpm": rpm(float(found.caught_speed[u, t])),
+            "end_rpm": rpm(float(torque_map.end_speed[u, t])),
+            "caught_rpm": rpm(float(torque_map.caught_speed[u, t])),
         }
-        for u, factor in enumerate(found.factors)
-        for t, torque in enumerate(found.torques)
+        for u, factor in enumerate(torque_map.factors)
+        for t, torque in enumerate(torque_map.torques)
     ]
     return pd.DataFrame(rows)
 
 
 def estimation_table(result: DriveResult) -> pd.DataFrame:
     """Return planted and estimated unbalance of each random load. [g m]"""
-    found = result.estimation
-    if found is None:
+    estimation = result.estimation
+    if estimation is None:
         return pd.DataFrame()
     return pd.DataFrame(
         {
-            "planted_gm": 1e3 * found.planted,
-            "estimated_gm": 1e3 * found.estimated,
-            "error_gm": 1e3 * found.errors,
-            "from_torque_alone_gm": 1e3 * found.from_torque,
-            "from_speed_alone_gm": 1e3 * found.from_speed,
+            "planted_gm": 1e3 * estimation.planted,
+            "estimated_gm": 1e3 * estimation.estimated,
+            "error_gm": 1e3 * estimation.errors,
+            "from_torque_alone_gm": 1e3 * estimation.from_torque,
+            "from_speed_alone_gm": 1e3 * estimation.from_speed,
         }
     )
 

@@ -1,4 +1,13 @@
-"""Identify unknown numbers of any model from measurements, by three methods."""
+"""Fit unknown numbers of any model: the room of all optimisers.
+
+Enters: a `Problem`: unknowns with bounds and priors, and a function from points to residuals. A
+`FitProblem` compares with measurements, a `PriorProblem` weighs data against priors, a
+`NormProblem` adds norms of groups. Leaves: a `Fit` or an `Optimum`. Searches: `methods` (least
+squares, evolution), `surfaces`, `kinks` (coarse differences, hops, CMA-ES) and `grid` (grids,
+simplex). Assessment: `assessment`, `profile`, `posterior`, `jackknife`, `cross_validation`. `page`
+has what the pages of fits share.
+May import: `parameters`, `report` and `errors`; no machine and no engine.
+"""
 
 from wm_drake.studies.fitting.assessment import assess, evaluated
 from wm_drake.studies.fitting.cross_validation import left_out_errors

@@ -1,14 +1,15 @@
 """Assessment of a fit: bounds that were hit, covariance, confidence intervals."""
 
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 from scipy.stats import t as student
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.fitting.fit import Direction, Estimate, Fit, TestError
+from wm_drake.studies.fitting.fit import Direction, Estimate, Fit, SearchLog, TestError
 from wm_drake.studies.fitting.problem import FitProblem, rmse
-from wm_drake.studies.fitting.profile import profiled_end
+from wm_drake.studies.fitting.profile import Profile
 
 IndexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 
@@ -33,17 +34,8 @@ TAKES_PART = 0.3
 """Component of a unit direction from which on an unknown is named with it."""
 
 
-def assess(
-    problem: FitProblem,
-    point: FloatArray,
-    *,
-    method: str,
-    seed: int,
-    evaluations: int,
-    history: tuple[float, ...],
-    notes: tuple[str, ...] = (),
-) -> Fit:
-    """Return the fit at a point in unit coordinates (p,) where a search ended.
+def assess(problem: FitProblem, point: FloatArray, log: SearchLog) -> Fit:
+    """Return the fit at the point (p,) where a search ended, in coordinates.
 
     The covariance is the sandwich of generalised least squares: each test has its own variance,
     larger by the correlation of its samples where they follow each other. So a densely sampled test
@@ -53,10 +45,7 @@ def assess(
     Args:
         problem: The problem.
         point: Where the search ended.
-        method, seed: Of the search.
-        evaluations: Points that the search evaluated.
-        history: Least RMSE after each round.
-        notes: Remarks of the search.
+        log: Course of the search; the evaluations of the assessment are added to it.
     """
     residuals = problem.residuals(point[None])[0]
     jacobian, evaluated = central_differences(problem, point, residuals)
@@ -70,8 +59,7 @@ def assess(
     computed, baselines = _computed(problem, point)
     return Fit(
         problem=problem,
-        method=method,
-        seed=seed,
+        log=replace(log, evaluations=log.evaluations + evaluated + 2),
         estimates=_estimates(problem, point, bound, spread),
         rmse=float(rmse(residuals)),
         tests=_test_errors(problem, residuals),
@@ -80,9 +68,6 @@ def assess(
         covariance=covariance,
         condition=spread.condition,
         undetermined=spread.undetermined([problem.unknowns[k].name for k in free]),
-        evaluations=evaluations + evaluated + 2,
-        history=history,
-        notes=notes,
     )
 
 
@@ -91,10 +76,10 @@ def evaluated(problem: FitProblem) -> Fit:
     nowhere = np.zeros(0)
     residuals = problem.residuals(nowhere[None])[0]
     computed, baselines = _computed(problem, nowhere)
+    note = "all numbers are given: nothing was searched"
     return Fit(
         problem=problem,
-        method="evaluation",
-        seed=0,
+        log=SearchLog("evaluation", evaluations=2, notes=(note,)),
         estimates=(),
         rmse=float(rmse(residuals)),
         tests=_test_errors(problem, residuals),
@@ -103,9 +88,6 @@ def evaluated(problem: FitProblem) -> Fit:
         covariance=np.zeros((0, 0)),
         condition=1.0,
         undetermined=(),
-        evaluations=2,
-        history=(),
-        notes=("all numbers are given: nothing was searched",),
     )
 
 
@@ -138,15 +120,15 @@ def central_differences(
     sides = np.clip(np.concatenate([point + steps, point - steps]), 0.0, 1.0)
     above, below = np.split(problem.residuals(sides), 2)
     width = np.diag(sides[: len(point)] - sides[len(point) :])
-    found = (above - below) / width[:, None]
+    slopes = (above - below) / width[:, None]
     flat = _flat_sides(point, residuals, above, below)
     corners = np.flatnonzero(flat)
     if len(corners):
         far = point + WIDEST * np.diag(flat)[corners]
         far = np.clip(far, 0.0, 1.0)
         length = np.sum(far - point, axis=1)
-        found[corners] = (problem.residuals(far) - residuals) / length[:, None]
-    return np.asarray(found.T), len(sides) + len(corners)
+        slopes[corners] = (problem.residuals(far) - residuals) / length[:, None]
+    return np.asarray(slopes.T), len(sides) + len(corners)
 
 
 def _flat_sides(
@@ -193,17 +175,17 @@ class _Spread:
 
     def undetermined(self, names: list[str]) -> tuple[Direction, ...]:
         """Return the directions along which the data do not determine the unknowns."""
-        found = []
+        undetermined = []
         for row, deviation in zip(self.directions, self.deviations, strict=True):
             if deviation > WIDEST:
                 taking = np.flatnonzero(np.abs(row) > TAKES_PART)
                 parts = row[taking] / row[taking][np.argmax(np.abs(row[taking]))]
-                found.append(
+                undetermined.append(
                     Direction(
                         tuple(names[k] for k in taking), tuple(map(float, parts)), float(deviation)
                     )
                 )
-        return tuple(found)
+        return tuple(undetermined)
 
 
 def _spread(problem: FitProblem, residuals: FloatArray, jacobian: FloatArray) -> _Spread:
@@ -223,8 +205,8 @@ def _estimates(
         student.ppf(0.5 + 0.5 * CONFIDENCE, max(_degrees_of_freedom(problem, len(free)), 1))
     )
     with np.errstate(over="ignore", invalid="ignore"):
-        lower, upper = (problem.from_unit(point + sign * quantile * wide) for sign in (-1.0, 1.0))
-    values, found = problem.from_unit(point), []
+        lower, upper = (problem.points_at(point + sign * quantile * wide) for sign in (-1.0, 1.0))
+    values, estimates = problem.points_at(point), []
     for k, unknown in enumerate(problem.unknowns):
         determined = bool(resolved[k] <= WIDEST)
         claims = determined and bound[k] == 0
@@ -234,27 +216,19 @@ def _estimates(
             reach = quantile * wide[k]
             ends = point[k] - reach, point[k] + reach
             rise = reach**2 / spread.inverse[place, place]
+            profile = Profile(problem, point, k, free)
             interval = (
-                _end(problem, point, k, free, -1, rise) if ends[0] < 0.0 else float(lower[k]),
-                _end(problem, point, k, free, 1, rise) if ends[1] > 1.0 else float(upper[k]),
+                profile.end(-1, rise) if ends[0] < 0.0 else float(lower[k]),
+                profile.end(1, rise) if ends[1] > 1.0 else float(upper[k]),
             )
         at_bound = {-1: "lower", 0: "", 1: "upper"}[int(bound[k])]
-        found.append(Estimate(unknown.name, float(values[k]), *interval, determined, at_bound))
-    return tuple(found)
-
-
-def _end(
-    problem: FitProblem, point: FloatArray, held: int, free: IndexArray, side: int, rise: float
-) -> float:
-    """Return the end of an interval by its profile, within the bounds. [SI]"""
-    whole = point.copy()
-    whole[held] = profiled_end(problem, point, held, free, side, rise)
-    return float(problem.from_unit(whole)[held])
+        estimates.append(Estimate(unknown.name, float(values[k]), *interval, determined, at_bound))
+    return tuple(estimates)
 
 
 def _slopes(problem: FitProblem, point: FloatArray) -> FloatArray:
     """Return the derivative of the SI value of each unknown by its unit coordinate."""
-    values = problem.from_unit(point)
+    values = problem.points_at(point)
     return np.array(
         [
             value * np.log(u.upper / u.lower) if u.logarithmic else u.upper - u.lower
@@ -280,12 +254,12 @@ def _variances(problem: FitProblem, residuals: FloatArray, jacobian: FloatArray)
     )
     parts = []
     for where, m in zip(problem.slices, problem.measurements, strict=True):
-        own = residuals[where]
+        series = residuals[where]
         variance = pooled
         if m.correlated:
-            freedom = max(len(own) - m.basis.shape[1] - float(np.sum(leverage[where])), 1e-12)
-            variance = float(np.sum(np.square(own))) / freedom * correlation_time(own)
-        parts.append(np.full(len(own), variance))
+            freedom = max(len(series) - m.basis.shape[1] - float(np.sum(leverage[where])), 1e-12)
+            variance = float(np.sum(np.square(series))) / freedom * correlation_time(series)
+        parts.append(np.full(len(series), variance))
     return np.concatenate(parts)
 
 
@@ -314,16 +288,16 @@ def _resolution(problem: FitProblem) -> FloatArray:
 
 
 def _test_errors(problem: FitProblem, residuals: FloatArray) -> tuple[TestError, ...]:
-    found = []
+    errors = []
     for where, m in zip(problem.slices, problem.measurements, strict=True):
         error = float(rmse(residuals[where])) * m.scale
-        found.append(TestError(m.name, error, error / m.largest if m.largest else float("nan")))
-    return tuple(found)
+        errors.append(TestError(m.name, error, error / m.largest if m.largest else float("nan")))
+    return tuple(errors)
 
 
 def _computed(problem: FitProblem, point: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]]:
     """Return computed values with the best baselines added (n,), and the baselines' amounts."""
-    computed = problem.evaluate(problem.from_unit(point)[None])[0].copy()
+    computed = problem.evaluate(problem.points_at(point)[None])[0].copy()
     amounts = []
     for where, m in zip(problem.slices, problem.measurements, strict=True):
         if m.baseline is None:

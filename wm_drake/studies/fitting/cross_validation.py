@@ -6,9 +6,9 @@ import numpy as np
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.fitting.assessment import central_differences
+from wm_drake.studies.fitting.descent import descended
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.problem import FitProblem, rmse
-from wm_drake.studies.fitting.search import Count, descend
 
 SEEN = 1e-10
 """Smallest eigenvalue, by the largest, of the information in the other tests about a direction that
@@ -34,25 +34,25 @@ def left_out_errors(fit: Fit, part: Callable[[Sequence[int]], FitProblem]) -> Fl
     count = len(problem.measurements)
     if not problem.unknowns:
         return np.array([test.rmse for test in fit.tests])
-    point = np.clip(problem.to_unit(fit.values), 0.0, 1.0)
+    point = np.clip(problem.coordinates_of(fit.values), 0.0, 1.0)
     residuals = problem.residuals(point[None])[0]
     jacobian, _ = central_differences(problem, point, residuals)
     free = [k for k, estimate in enumerate(fit.estimates) if not estimate.at_bound]
     jacobian = jacobian[:, free]
     information, slope = jacobian.T @ jacobian, jacobian.T @ residuals
-    found = np.empty(count)
+    errors = np.empty(count)
     for index, where in enumerate(problem.slices):
-        own = jacobian[where]
-        inverse = np.linalg.pinv(information - own.T @ own, rcond=SEEN, hermitian=True)
+        rows = jacobian[where]
+        inverse = np.linalg.pinv(information - rows.T @ rows, rcond=SEEN, hermitian=True)
         moved = point.copy()
-        moved[free] -= inverse @ (slope - own.T @ residuals[where])
+        moved[free] -= inverse @ (slope - rows.T @ residuals[where])
         if np.max(np.abs(moved - point)) > FAR:
             rest = part([k for k in range(count) if k != index])
-            moved, _ = descend(Count(rest), point, lambda fraction: None, MOST_STEPS)
-        alone = part([index])
-        error = rmse(alone.residuals(np.clip(moved, 0.0, 1.0)[None])[0])
-        found[index] = float(error) * alone.measurements[0].scale
-    return found
+            moved = descended(rest.residuals, point, most=MOST_STEPS).point
+        left_out = part([index])
+        error = rmse(left_out.residuals(np.clip(moved, 0.0, 1.0)[None])[0])
+        errors[index] = float(error) * left_out.measurements[0].scale
+    return errors
 
 
 MOST_STEPS = 20

@@ -8,18 +8,22 @@ from scipy import optimize
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.fitting.problem import rmse
+from wm_drake.studies.fitting.search import Optimum
 
 STEP = 1e-5
 """Step of one-sided differences during a search, in ranges."""
 
-Residuals: TypeAlias = Callable[[FloatArray], FloatArray]
-"""Points in unit coordinates (k, p) -> residuals (k, n)."""
+ResidualFunction: TypeAlias = Callable[[FloatArray], FloatArray]
+"""Points in coordinates (k, p) -> residuals (k, n)."""
 
 
 def descended(
-    evaluate: Residuals, begin: FloatArray, step_done: Callable[[float], None], most: int = 60
-) -> tuple[FloatArray, float]:
-    """Return where a search ends, in unit coordinates (p,), and its RMSE.
+    evaluate: ResidualFunction,
+    begin: FloatArray,
+    step_done: Callable[[float], None] = lambda fraction: None,
+    most: int = 60,
+) -> Optimum:
+    """Return where a search ends, with its RMSE as cost.
 
     Args:
         evaluate: Residuals of the problem.
@@ -41,13 +45,12 @@ def descended(
         step_done(min(1.0, steps / 25))
         here = last[1] if np.array_equal(z, last[0]) else evaluate(z[None])[0]
         sign = np.where(z > 0.5, -1.0, 1.0)
-        found = evaluate(z + np.diag(STEP * sign))
-        return np.asarray(((found - here) / (STEP * sign)[:, None]).T)
+        moved = evaluate(z + np.diag(STEP * sign))
+        return np.asarray(((moved - here) / (STEP * sign)[:, None]).T)
 
-    inside = np.clip(begin, 1e-4, 1.0 - 1e-4)
     end = optimize.least_squares(
         residuals,
-        inside,
+        np.clip(begin, 1e-4, 1.0 - 1e-4),
         jacobian,
         bounds=(0.0, 1.0),
         x_scale=1.0,
@@ -56,4 +59,4 @@ def descended(
         gtol=1e-14,
         max_nfev=most,
     )
-    return end.x, float(rmse(end.fun))
+    return Optimum(end.x, float(rmse(end.fun)))

@@ -62,13 +62,31 @@ class Direction:
     deviation: float
 
 
+@dataclass(frozen=True)
+class SearchLog:
+    """Course of a search.
+
+    Attributes:
+        method, seed: Of the search.
+        evaluations: Points at which the model was evaluated.
+        history: Least cost after each round.
+        notes: Remarks on the search, for the reader.
+    """
+
+    method: str
+    seed: int = 0
+    evaluations: int = 0
+    history: tuple[float, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Result of an identification; the same for every method.
 
     Attributes:
         problem: The problem.
-        method, seed: Of the search.
+        log: Course of the search.
         estimates: One for each unknown.
         rmse: Over all values of all tests, scaled as in the problem.
         tests: Error of each test.
@@ -78,14 +96,10 @@ class Fit:
         condition: Condition of the scaled Jacobian: 1 if the data see all directions alike, large
             if they hardly see one.
         undetermined: Directions that the data do not determine.
-        evaluations: Points at which the model was evaluated.
-        history: Least RMSE after each round of the search.
-        notes: Remarks on the search, for the reader.
     """
 
     problem: FitProblem
-    method: str
-    seed: int
+    log: SearchLog
     estimates: tuple[Estimate, ...]
     rmse: float
     tests: tuple[TestError, ...]
@@ -94,9 +108,6 @@ class Fit:
     covariance: FloatArray
     condition: float
     undetermined: tuple[Direction, ...]
-    evaluations: int
-    history: tuple[float, ...]
-    notes: tuple[str, ...]
 
     def without_intervals(self, reason: str) -> "Fit":
         """Return the fit without intervals and covariance, with the reason as a note."""
@@ -105,7 +116,7 @@ class Fit:
             self,
             estimates=bare,
             covariance=np.full_like(self.covariance, np.nan),
-            notes=(*self.notes, reason),
+            log=replace(self.log, notes=(*self.log.notes, reason)),
         )
 
     @property
@@ -123,8 +134,8 @@ class Fit:
         Numbers that are not finite become null, and so does the value of an undetermined unknown.
         """
         return {
-            "method": self.method,
-            "seed": self.seed,
+            "method": self.log.method,
+            "seed": self.log.seed,
             "rmse": self.rmse,
             "unknowns": {
                 e.name: {
@@ -144,6 +155,6 @@ class Fit:
             "undetermined": [
                 {"unknowns": list(d.names), "parts": list(d.parts)} for d in self.undetermined
             ],
-            "evaluations": self.evaluations,
-            "notes": list(self.notes),
+            "evaluations": self.log.evaluations,
+            "notes": list(self.log.notes),
         }

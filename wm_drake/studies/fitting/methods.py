@@ -11,14 +11,14 @@ from scipy import optimize
 
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.fitting.assessment import evaluated
+from wm_drake.studies.fitting.assessment import assess, evaluated
+from wm_drake.studies.fitting.descent import descended
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.problem import FitProblem, Progress
 from wm_drake.studies.fitting.search import (
-    Count,
-    End,
+    Optimum,
+    Search,
     agreeing,
-    descend,
     scattered,
     silent,
     underway,
@@ -51,24 +51,25 @@ def least_squares(
         screened: Points that are evaluated (a power of two), of which the best become starts.
         progress: Called after every step.
     """
-    count = Count(problem)
+    search = Search(problem)
     points = scattered(len(problem.unknowns), screened, seed)
-    order = np.argsort(count.errors(points), kind="stable")
+    order = np.argsort(search.costs(points), kind="stable")
     begins = [problem.start, *points[order[: starts - 1]]]
-    count.round_done()
-    ends: list[End] = []
+    search.round_done()
+    ends: list[Optimum] = []
     for index, begin in enumerate(begins):
         if agreeing(problem, ends) >= AGREEING:
             break
 
         def step_done(fraction: float, index: int = index) -> None:
-            progress((index + fraction) / len(begins), count.least)
+            progress((index + fraction) / len(begins), search.least)
 
-        ends.append(descend(count, begin, step_done))
-        count.round_done()
+        ends.append(descended(search.residuals, begin, step_done))
+        search.round_done()
     note = f"{agreeing(problem, ends)} of {len(ends)} starts came to the same least RMSE"
-    progress(1.0, count.least)
-    return count.fit(min(ends, key=lambda end: end[1])[0], "least-squares", seed, (note,))
+    progress(1.0, search.least)
+    best = min(ends, key=lambda end: end.cost)
+    return assess(problem, best.point, search.log("least-squares", seed, note))
 
 
 def evolution(
@@ -91,18 +92,18 @@ def evolution(
         generations: Generations at most.
         progress: Called after every generation.
     """
-    count = Count(problem)
-    polish = _Polish(problem, count)
+    search = Search(problem)
+    polish = _Polish(problem, search)
 
     def generation_done(intermediate_result: optimize.OptimizeResult) -> bool:
-        count.round_done()
-        progress(underway(intermediate_result.nit, 2 * POLISHED_EVERY), count.least)
+        search.round_done()
+        progress(underway(intermediate_result.nit, 2 * POLISHED_EVERY), search.least)
         return intermediate_result.nit % POLISHED_EVERY == 0 and polish.agrees_from(
             intermediate_result.x
         )
 
-    found = optimize.differential_evolution(
-        lambda points: count.errors(points.T),
+    end = optimize.differential_evolution(
+        lambda points: search.costs(points.T),
         [(0.0, 1.0)] * len(problem.unknowns),
         popsize=population,
         maxiter=generations,
@@ -114,23 +115,23 @@ def evolution(
         callback=generation_done,
         rng=np.random.default_rng(seed),
     )
-    polish.agrees_from(found.x)
-    count.round_done()
-    progress(1.0, count.least)
+    polish.agrees_from(end.x)
+    search.round_done()
+    progress(1.0, search.least)
     note = (
-        f"least squares from the best of {len(polish.ends)} of {found.nit} generations: "
+        f"least squares from the best of {len(polish.ends)} of {end.nit} generations: "
         f"{polish.agreeing} came to the same least RMSE"
     )
-    return count.fit(polish.best, "evolution", seed, (note,))
+    return assess(problem, polish.best, search.log("evolution", seed, note))
 
 
 class _Polish:
     """Least squares from the best points of an evolution, until two searches agree."""
 
-    def __init__(self, problem: FitProblem, count: Count) -> None:
-        self._problem, self._count = problem, count
+    def __init__(self, problem: FitProblem, search: Search[FitProblem]) -> None:
+        self._problem, self._search = problem, search
         self._last: FloatArray | None = None
-        self.ends: list[End] = []
+        self.ends: list[Optimum] = []
 
     def agrees_from(self, point: FloatArray) -> bool:
         """Search from one more point, and return whether enough searches agree.
@@ -141,7 +142,7 @@ class _Polish:
             self._last is not None and np.array_equal(point, self._last)
         ):
             self._last = point.copy()
-            self.ends.append(descend(self._count, point, lambda fraction: None))
+            self.ends.append(descended(self._search.residuals, point))
         return self.agreeing >= AGREEING
 
     @property
@@ -152,22 +153,22 @@ class _Polish:
     @property
     def best(self) -> FloatArray:
         """Point of the least end."""
-        return min(self.ends, key=lambda end: end[1])[0]
+        return min(self.ends, key=lambda end: end.cost).point
 
 
-def refined(problem: FitProblem, values: FloatArray, note: str, method: str, seed: int) -> Fit:
-    """Search by least squares from one point, the end of a search with a part of the measurements.
+def refined(problem: FitProblem, fit: Fit, note: str) -> Fit:
+    """Search by least squares from the end of a search with a part of the measurements.
 
     Args:
-        problem: The problem.
-        values: The point (p,). [SI]
+        problem: The problem with all measurements.
+        fit: Fit to the part.
         note: Remark on the search that led there.
-        method, seed: Of this search.
     """
-    count = Count(problem)
-    end, _ = descend(count, np.clip(problem.to_unit(values), 0.0, 1.0), lambda fraction: None)
-    count.round_done()
-    return count.fit(end, method, seed, (note,))
+    search = Search(problem)
+    begin = np.clip(problem.coordinates_of(fit.values), 0.0, 1.0)
+    end = descended(search.residuals, begin)
+    search.round_done()
+    return assess(problem, end.point, search.log(fit.log.method, fit.log.seed, note))
 
 
 METHODS: dict[str, Callable[..., Fit]] = {

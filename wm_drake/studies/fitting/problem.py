@@ -1,14 +1,15 @@
-"""Problem of an identification: unknown numbers, measurements, and a model that computes them.
+"""Problem of a fit: unknown numbers, and residuals that a search makes small.
 
-It depends on no engine: the model is any function of the unknowns. It is evaluated at many points
-at once, so that it can run them side by side; `point_by_point` makes it from a function of one
-point.
+No problem depends on an engine: its model is any function of the unknowns. It is evaluated at many
+points at once, so that it can run them side by side; `point_by_point` makes it from a function of
+one point. Searches, intervals and profiles use the interface `Problem` only.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -22,7 +23,7 @@ Evaluate: TypeAlias = Callable[[FloatArray], FloatArray]
 A row of NaN means that the model fails at the point."""
 
 Progress: TypeAlias = Callable[[float, float], None]
-"""Function that is called with the fraction done and the least RMSE so far."""
+"""Function that is called with the fraction done and the least cost so far."""
 
 FAILED = 1e3
 """Residual of a point where the model fails, in largest measured values: worse than any other."""
@@ -41,6 +42,7 @@ class Unknown:
         unit: Unit in SI and as people read it; a pure number by default.
         start: A first guess; the middle of the bounds if None. [SI]
         logarithmic: Searched by its logarithm: for numbers of unknown order of magnitude.
+        prior: Expected value and its standard deviation; None if nothing is known. [SI]
     """
 
     name: str
@@ -49,6 +51,7 @@ class Unknown:
     unit: Unit = PURE_NUMBER
     start: float | None = None
     logarithmic: bool = False
+    prior: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         """Check bounds and start.
@@ -75,6 +78,181 @@ class Unknown:
             if np.isfinite(value)
             else str(value)
         )
+
+
+class Residuals(NamedTuple):
+    """Residuals (k, n) at points, and a smooth substitute of them (k, n) for their derivatives.
+
+    Both have the same derivatives except at kinks of the residuals. They are one array where the
+    residuals have no kinks.
+    """
+
+    exact: FloatArray
+    smooth: FloatArray
+
+
+class Problem(ABC):
+    """Problem of finding the unknowns with the least cost.
+
+    A search moves in coordinates. The coordinate of an unknown (or of its logarithm) goes from 0 at
+    the lower to 1 at the upper bound. That of an unknown with a prior is its distance from the
+    expected value in standard deviations.
+
+    Attributes:
+        unknowns: The unknowns.
+    """
+
+    unknowns: tuple[Unknown, ...]
+
+    @abstractmethod
+    def evaluated(self, coordinates: FloatArray) -> Residuals:
+        """Return the residuals at points (k, p)."""
+
+    @abstractmethod
+    def costs(self, residuals: FloatArray, coordinates: FloatArray) -> FloatArray:
+        """Return what a search makes small (k,), of residuals (k, n) at points (k, p)."""
+
+    def residuals(self, coordinates: FloatArray) -> FloatArray:
+        """Return the residuals (k, n) at points (k, p)."""
+        return self.evaluated(coordinates).exact
+
+    @cached_property
+    def lower(self) -> FloatArray:
+        """Lower bounds (p,)."""
+        return self.coordinates_of(np.array([u.lower for u in self.unknowns]))
+
+    @cached_property
+    def upper(self) -> FloatArray:
+        """Upper bounds (p,)."""
+        return self.coordinates_of(np.array([u.upper for u in self.unknowns]))
+
+    @property
+    def start(self) -> FloatArray:
+        """First guess (p,)."""
+        known = [u.start is not None for u in self.unknowns]
+        guess = self.coordinates_of(
+            np.array([u.lower if u.start is None else u.start for u in self.unknowns])
+        )
+        return np.where(known, guess, 0.5 * (self.lower + self.upper))
+
+    def coordinates_of(self, points: FloatArray) -> FloatArray:
+        """Return the coordinates of points (..., p) in SI."""
+        origin, size = self._frame
+        return np.asarray((self._straight(points) - origin) / size)
+
+    def points_at(self, coordinates: FloatArray) -> FloatArray:
+        """Return the points in SI at coordinates (..., p), the inverse of `coordinates_of`."""
+        origin, size = self._frame
+        straight = origin + np.asarray(coordinates) * size
+        return np.where(
+            self._logarithmic, np.exp(np.where(self._logarithmic, straight, 0.0)), straight
+        )
+
+    def restricted(self, free: Sequence[int] | np.ndarray, held: FloatArray) -> "Problem":
+        """Return the problem of some unknowns with all others held.
+
+        Args:
+            free: Indices of the unknowns that are searched.
+            held: Coordinates (p,), of which those of the other unknowns are used.
+        """
+        return _Restricted(self, np.asarray(free, dtype=int), held)
+
+    @cached_property
+    def _logarithmic(self) -> np.ndarray:
+        return np.array([u.logarithmic for u in self.unknowns], dtype=bool)
+
+    @cached_property
+    def _frame(self) -> tuple[FloatArray, FloatArray]:
+        """Origin and unit of the coordinates."""
+        lower, upper = (
+            self._straight(np.array([getattr(u, side) for u in self.unknowns]))
+            for side in ("lower", "upper")
+        )
+        pairs = [
+            u.prior or (low, high - low)
+            for u, low, high in zip(self.unknowns, lower, upper, strict=True)
+        ]
+        origin, size = np.array(pairs).reshape(-1, 2).T
+        return origin, size
+
+    def _straight(self, points: FloatArray) -> FloatArray:
+        safe = np.where(self._logarithmic, points, 1.0)
+        return np.where(self._logarithmic, np.log(safe), points)
+
+
+@dataclass(frozen=True, eq=False)
+class _Restricted(Problem):
+    """Problem of some unknowns of another one; see `Problem.restricted`."""
+
+    whole: Problem
+    free: np.ndarray
+    held: FloatArray
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:  # type: ignore[override]
+        """Unknowns that are searched."""
+        return tuple(self.whole.unknowns[k] for k in self.free)
+
+    def evaluated(self, coordinates: FloatArray) -> Residuals:
+        """Return the residuals at points (k, p)."""
+        full = np.tile(self.held, (len(coordinates), 1))
+        full[:, self.free] = coordinates
+        return self.whole.evaluated(full)
+
+    def costs(self, residuals: FloatArray, coordinates: FloatArray) -> FloatArray:
+        """Return the costs of the whole problem, with the priors of the free unknowns only."""
+        return self.whole.costs(residuals, coordinates)
+
+
+@dataclass(frozen=True, eq=False)
+class PriorProblem(Problem):
+    """Problem of residuals in standard deviations, and of unknowns that all have a prior.
+
+    The cost is half the sum of the squares of residuals and coordinates: the negative logarithm of
+    the posterior density but for a constant. It is infinite if a residual is NaN.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    evaluate: Callable[[FloatArray], Residuals]
+    """Points (k, p), in SI -> residuals."""
+
+    def evaluated(self, coordinates: FloatArray) -> Residuals:
+        """Return the residuals of the data at points (k, p)."""
+        return self.evaluate(self.points_at(coordinates))
+
+    def costs(self, residuals: FloatArray, coordinates: FloatArray) -> FloatArray:
+        """Return half the sums of squares (k,)."""
+        costs = 0.5 * (np.sum(residuals**2, axis=1) + np.sum(coordinates**2, axis=1))
+        return np.where(np.isfinite(costs), costs, np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class NormProblem(Problem):
+    """Problem of the sum of the 2-norms of the residuals of some groups, as [B] Eq. (2), (3).
+
+    Attributes:
+        unknowns: The unknowns.
+        evaluate: Points (k, p), in SI -> residuals (k, n); NaN where the model fails.
+        curves: Group and columns of each measured curve; curves of a group follow each other.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    evaluate: Evaluate
+    curves: tuple[tuple[str, slice], ...]
+
+    def evaluated(self, coordinates: FloatArray) -> Residuals:
+        """Return the residuals at points (k, p)."""
+        residuals = self.evaluate(self.points_at(coordinates))
+        return Residuals(residuals, residuals)
+
+    def costs(self, residuals: FloatArray, coordinates: FloatArray) -> FloatArray:  # noqa: ARG002
+        """Return the sum of the norms (k,); infinite where the model fails."""
+        costs = np.zeros(len(residuals))
+        for group in dict.fromkeys(name for name, _ in self.curves):
+            parts = [where for name, where in self.curves if name == group]
+            columns = residuals[:, parts[0].start : parts[-1].stop]
+            costs += [float(np.linalg.norm(row)) for row in columns]
+        return np.where(np.isnan(costs), np.inf, costs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,13 +297,12 @@ class Measurement:
 
 
 @dataclass(frozen=True, eq=False)
-class FitProblem:
+class FitProblem(Problem):
     """Problem of finding the unknowns with which the model is nearest to the measurements.
 
     Without unknowns the model is only evaluated.
 
-    The distance is the root mean square error over all values of all tests, [A] Eq. (1) = [C] Eq.
-    (5).
+    The cost is the root mean square error over all values of all tests, [A] Eq. (1) = [C] Eq. (5).
     """
 
     unknowns: tuple[Unknown, ...]
@@ -154,52 +331,20 @@ class FitProblem:
             for end, m in zip(ends, self.measurements, strict=True)
         )
 
-    @property
-    def start(self) -> FloatArray:
-        """First guess in unit coordinates (p,)."""
-        known = [u.start is not None for u in self.unknowns]
-        guess = self.to_unit(
-            np.array([u.lower if u.start is None else u.start for u in self.unknowns])
-        )
-        return np.where(known, guess, 0.5)
-
-    def to_unit(self, points: FloatArray) -> FloatArray:
-        """Return coordinates from 0 at the lower to 1 at the upper bound, of SI values (..., p)."""
-        lower, upper = self._ends
-        return np.asarray((self._straight(points) - lower) / (upper - lower))
-
-    def from_unit(self, coordinates: FloatArray) -> FloatArray:
-        """Return the SI values of unit coordinates, the inverse of `to_unit`."""
-        lower, upper = self._ends
-        straight = lower + np.asarray(coordinates) * (upper - lower)
-        return np.where(
-            self._logarithmic, np.exp(np.where(self._logarithmic, straight, 0.0)), straight
-        )
-
-    def residuals(self, coordinates: FloatArray) -> FloatArray:
-        """Return scaled residuals (k, n) at points in unit coordinates (k, p), always finite."""
-        computed = self.evaluate(self.from_unit(coordinates))
+    def evaluated(self, coordinates: FloatArray) -> Residuals:
+        """Return scaled residuals (k, n) at points (k, p), always finite."""
+        computed = self.evaluate(self.points_at(coordinates))
         parts = []
         for where, m in zip(self.slices, self.measurements, strict=True):
             plain = m.residuals(computed[:, where])
             failed = FAILED * (m.largest or 1.0)
             parts.append(np.where(np.isfinite(plain), plain, failed) / m.scale)
-        return np.concatenate(parts, axis=1)
+        residuals = np.concatenate(parts, axis=1)
+        return Residuals(residuals, residuals)
 
-    @cached_property
-    def _logarithmic(self) -> np.ndarray:
-        return np.array([u.logarithmic for u in self.unknowns], dtype=bool)
-
-    @cached_property
-    def _ends(self) -> tuple[FloatArray, FloatArray]:
-        lower, upper = (
-            np.array([getattr(u, side) for u in self.unknowns]) for side in ("lower", "upper")
-        )
-        return self._straight(lower), self._straight(upper)
-
-    def _straight(self, points: FloatArray) -> FloatArray:
-        safe = np.where(self._logarithmic, points, 1.0)
-        return np.where(self._logarithmic, np.log(safe), points)
+    def costs(self, residuals: FloatArray, coordinates: FloatArray) -> FloatArray:  # noqa: ARG002
+        """Return the root mean square errors (k,)."""
+        return rmse(residuals)
 
 
 def point_by_point(model: Callable[[FloatArray], Sequence[FloatArray]]) -> Evaluate:

@@ -8,6 +8,7 @@ that variance and the one of independent samples.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
@@ -23,47 +24,65 @@ NEAR = 2e-3
 """Accuracy of an end, in ranges."""
 
 
-def profiled_end(
-    problem: FitProblem,
-    point: FloatArray,
-    held: int,
-    free: Sequence[int] | np.ndarray,
-    side: int,
-    rise: float,
-) -> float:
-    """Return the end of an interval within the bounds, in unit coordinates.
+@dataclass(frozen=True)
+class Profile:
+    """Least sum of squares over one unknown.
 
-    Args:
+    Attributes:
         problem: The problem.
-        point: Where the search ended (p,), in unit coordinates.
-        held: Index of the unknown.
+        point: Where the search ended (p,), in coordinates.
+        unknown: Index of the unknown.
         free: Indices of the unknowns that are not at a bound.
-        side: -1 for the lower and 1 for the upper end.
-        rise: Rise of the sum of squared residuals at the end.
-
-    Returns:
-        Where the profile has risen so far; the bound, if it does not.
     """
-    others = np.array([k for k in free if k != held], dtype=int)
-    begin = point[others]
-    count = sum(len(m.values) for m in problem.measurements)
-    least = float(np.sum(np.square(problem.residuals(point[None])[0])))
 
-    def excess(place: float) -> float:
-        """Return the rise of the profile less the wanted one, in roots: nearly linear."""
+    problem: FitProblem
+    point: FloatArray
+    unknown: int
+    free: Sequence[int] | np.ndarray
 
-        def residuals(points: FloatArray) -> FloatArray:
-            whole = np.tile(point, (len(points), 1))
-            whole[:, others], whole[:, held] = points, place
-            return problem.residuals(whole)
+    def end(self, side: int, rise: float) -> float:
+        """Return the end of an interval within the bounds. [SI]
 
+        Args:
+            side: -1 for the lower and 1 for the upper end.
+            rise: Rise of the sum of squared residuals at the end.
+
+        Returns:
+            Where the profile has risen so far; the bound, if it does not.
+        """
+        count = sum(len(m.values) for m in self.problem.measurements)
+        least = float(np.sum(np.square(self.problem.residuals(self.point[None])[0])))
+
+        def excess(place: float) -> float:
+            """Return the rise of the profile less `rise`, in roots: nearly linear."""
+            error = self._least_rmse(place)
+            return float(np.sqrt(max(error**2 * count - least, 0.0)) - np.sqrt(rise))
+
+        whole, bound = self.point.copy(), 0.0 if side < 0 else 1.0
+        whole[self.unknown] = (
+            bound
+            if excess(bound) <= 0.0
+            else float(
+                brentq(
+                    excess,
+                    bound,
+                    self.point[self.unknown],
+                    xtol=NEAR,
+                    rtol=NEAR,
+                    maxiter=12,
+                    disp=False,
+                )
+            )
+        )
+        return float(self.problem.points_at(whole)[self.unknown])
+
+    def _least_rmse(self, place: float) -> float:
+        """Return the least root mean square error with the unknown held at a coordinate."""
+        others = np.array([k for k in self.free if k != self.unknown], dtype=int)
+        held = self.point.copy()
+        held[self.unknown] = place
+        problem = self.problem.restricted(others, held)
         if len(others):
-            _, error = descended(residuals, begin, lambda fraction: None, MOST_STEPS)
-        else:
-            error = float(np.sqrt(np.mean(np.square(residuals(np.zeros((1, 0)))[0]))))
-        return float(np.sqrt(max(error**2 * count - least, 0.0)) - np.sqrt(rise))
-
-    bound = 0.0 if side < 0 else 1.0
-    if excess(bound) <= 0.0:
-        return bound
-    return float(brentq(excess, bound, point[held], xtol=NEAR, rtol=NEAR, maxiter=12, disp=False))
+            begin = self.point[others]
+            return descended(problem.residuals, begin, most=MOST_STEPS).cost
+        return float(np.sqrt(np.mean(np.square(problem.residuals(np.zeros((1, 0)))[0]))))

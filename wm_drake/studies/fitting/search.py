@@ -1,23 +1,36 @@
-"""Shared by all methods of search: count of evaluations, scattered points, descent."""
+"""Shared by all methods of search: count of evaluations, scattered points, end of a search."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Generic, TypeVar
 
 import numpy as np
 from scipy.stats import qmc
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.fitting.assessment import assess
-from wm_drake.studies.fitting.descent import descended
-from wm_drake.studies.fitting.fit import Fit
-from wm_drake.studies.fitting.problem import FitProblem, rmse
+from wm_drake.studies.fitting.fit import SearchLog
+from wm_drake.studies.fitting.problem import FitProblem, Problem, Residuals, rmse
 
 SAME_END = 1e-3
-"""Searches whose RMSE differ by less than this part have the same end."""
+"""Searches whose costs differ by less than this part have the same end."""
 
-End: TypeAlias = tuple[FloatArray, float]
-"""Point where a search ended, in unit coordinates (p,), and its RMSE."""
+
+AnyProblem = TypeVar("AnyProblem", bound=Problem)
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Where a search ended.
+
+    Attributes:
+        point: Coordinates (p,).
+        cost: Cost there.
+        evaluations: Points that this search evaluated.
+    """
+
+    point: FloatArray
+    cost: float
+    evaluations: int = 0
 
 
 def silent(fraction: float, least: float) -> None:
@@ -30,45 +43,58 @@ def underway(done: int, usual: int) -> float:
 
 
 @dataclass
-class Count:
-    """A problem with a count of its evaluations and the best point so far."""
+class Search(Generic[AnyProblem]):
+    """A problem with a count of its evaluations and the best point so far.
 
-    problem: FitProblem
-    evaluations: int = 0
-    best: FloatArray | None = None
-    least: float = np.inf
-    history: list[float] = field(default_factory=list)
+    Attributes:
+        problem: The problem.
+        report: Called after each evaluation with the points evaluated and the least cost so far.
+        evaluations: Points evaluated so far.
+        best: Coordinates of the best point so far; None before the first finite cost.
+        least: Its cost.
+        history: Least cost after each round.
+    """
+
+    problem: AnyProblem
+    report: Callable[[int, float], None] = lambda evaluations, least: None
+    evaluations: int = field(default=0, init=False)
+    best: FloatArray | None = field(default=None, init=False)
+    least: float = field(default=np.inf, init=False)
+    history: list[float] = field(default_factory=list, init=False)
+
+    def evaluated(self, points: FloatArray) -> Residuals:
+        """Return the residuals at points (k, p)."""
+        return self._counted(points)[0]
 
     def residuals(self, points: FloatArray) -> FloatArray:
-        """Return scaled residuals (k, n) at points in unit coordinates (k, p)."""
-        found = self.problem.residuals(points)
-        self.evaluations += len(points)
-        errors = rmse(found)
-        index = int(np.argmin(errors))
-        if errors[index] < self.least:
-            self.least, self.best = float(errors[index]), points[index].copy()
-        return found
+        """Return the residuals (k, n) at points (k, p)."""
+        return self.evaluated(points).exact
 
-    def errors(self, points: FloatArray) -> FloatArray:
-        """Return the RMSE at each point (k,)."""
-        return rmse(self.residuals(points))
+    def costs(self, points: FloatArray) -> FloatArray:
+        """Return the cost at each point (k,)."""
+        return self._counted(points)[1]
+
+    def clipped(self, points: FloatArray) -> FloatArray:
+        """Return points moved into the bounds."""
+        return np.clip(points, self.problem.lower, self.problem.upper)
 
     def round_done(self) -> None:
-        """Append the least RMSE so far to the history."""
+        """Append the least cost so far to the history."""
         self.history.append(self.least)
 
-    def fit(self, point: FloatArray, method: str, seed: int, notes: tuple[str, ...] = ()) -> Fit:
-        """Return the fit at the point where the search ended."""
-        rounds = (*self.history, self.least)
-        return assess(
-            self.problem,
-            point,
-            method=method,
-            seed=seed,
-            evaluations=self.evaluations,
-            history=rounds,
-            notes=notes,
-        )
+    def log(self, method: str, seed: int, *notes: str) -> SearchLog:
+        """Return the log of the search at its end."""
+        return SearchLog(method, seed, self.evaluations, (*self.history, self.least), notes)
+
+    def _counted(self, points: FloatArray) -> tuple[Residuals, FloatArray]:
+        residuals = self.problem.evaluated(points)
+        costs = self.problem.costs(residuals.exact, points)
+        self.evaluations += len(points)
+        index = int(np.argmin(costs))
+        if costs[index] < self.least:
+            self.least, self.best = float(costs[index]), points[index].copy()
+        self.report(self.evaluations, self.least)
+        return residuals, costs
 
 
 def scattered(p: int, number: int, seed: int) -> FloatArray:
@@ -76,17 +102,10 @@ def scattered(p: int, number: int, seed: int) -> FloatArray:
     return np.asarray(qmc.Sobol(p, rng=np.random.default_rng(seed)).random(number))
 
 
-def agreeing(problem: FitProblem, ends: list[End]) -> int:
+def agreeing(problem: FitProblem, ends: list[Optimum]) -> int:
     """Return how many searches came to the least RMSE of all."""
     if not ends:
         return 0
-    errors = np.array([error for _, error in ends])
+    errors = np.array([end.cost for end in ends])
     floor = 1e-9 * float(rmse(np.concatenate([m.values / m.scale for m in problem.measurements])))
     return int(np.sum(errors <= (1.0 + SAME_END) * errors.min() + floor))
-
-
-def descend(
-    count: Count, begin: FloatArray, step_done: Callable[[float], None], most: int = 60
-) -> End:
-    """Search once by least squares from a point, and return its end."""
-    return descended(count.residuals, begin, step_done, most)

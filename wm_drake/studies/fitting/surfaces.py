@@ -13,9 +13,10 @@ import numpy as np
 from scipy import optimize
 
 from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.fitting.assessment import assess
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.problem import FitProblem, Progress
-from wm_drake.studies.fitting.search import Count, scattered, silent, underway
+from wm_drake.studies.fitting.search import Search, scattered, silent, underway
 
 WIDEST = 0.5
 """Longest half axis of a region, in ranges; all half axes of the first region."""
@@ -60,18 +61,18 @@ def response_surface(
         rounds: Rounds at most.
         progress: Called after every round.
     """
-    count = Count(problem)
+    search = Search(problem)
     design = surface_design(len(problem.unknowns))
-    region = _first_region(count, seed, screened)
+    region = _first_region(search, seed, screened)
     done, ended = 0, False
     while done < rounds and not ended:
         done += 1
-        region, ended = _round(count, region, design)
-        count.round_done()
-        progress(underway(done, USUAL_ROUNDS), count.least)
-    progress(1.0, count.least)
-    notes = (f"{done} rounds, last region {2.0 * region.longest:.2g} of the ranges",)
-    fit = count.fit(region.centre, "response-surface", seed, notes)
+        region, ended = _round(search, region, design)
+        search.round_done()
+        progress(underway(done, USUAL_ROUNDS), search.least)
+    progress(1.0, search.least)
+    note = f"{done} rounds, last region {2.0 * region.longest:.2g} of the ranges"
+    fit = assess(problem, region.centre, search.log("response-surface", seed, note))
     if ended:
         return fit
     return fit.without_intervals(
@@ -140,31 +141,31 @@ class Region:
         )
 
 
-def _first_region(count: Count, seed: int, screened: int) -> Region:
+def _first_region(search: Search[FitProblem], seed: int, screened: int) -> Region:
     """Return the whole ranges, about the best of the problem's start and scattered points."""
-    p = len(count.problem.unknowns)
-    begins = np.concatenate([count.problem.start[None], scattered(p, screened, seed)])
-    values = np.square(count.errors(begins))
-    count.round_done()
+    p = len(search.problem.unknowns)
+    begins = np.concatenate([search.problem.start[None], scattered(p, screened, seed)])
+    values = np.square(search.costs(begins))
+    search.round_done()
     best = int(np.argmin(values))
     return Region(begins[best], float(values[best]), WIDEST * np.eye(p))
 
 
-def _round(count: Count, region: Region, design: FloatArray) -> tuple[Region, bool]:
+def _round(search: Search[FitProblem], region: Region, design: FloatArray) -> tuple[Region, bool]:
     """Return the region after a round, and whether the search ends."""
     points = region.designed(design)
-    places, values = region.places(points), np.square(count.errors(points))
+    places, values = region.places(points), np.square(search.costs(points))
     surface = QuadraticSurface(places, values, region.value)
     least = surface.least_place(region)
     target = region.points(least)
-    value = float(count.errors(target[None])[0]) ** 2
+    value = float(search.costs(target[None])[0]) ** 2
     foretold = region.value - value > 0.5 * -surface.rise(least) > 0.0
     best = int(np.argmin(values))
     if values[best] < value:
         target, value, least = points[best], float(values[best]), places[best]
     better = value < region.value
     factor = _resize(float(np.max(np.abs(least))), better, foretold)
-    samples = sum(len(m.values) for m in count.problem.measurements)
+    samples = sum(len(m.values) for m in search.problem.measurements)
     flat = float(np.max(values)) - region.value <= FLAT * region.value / samples
     after = (region.moved(target, value) if better else region).reshaped(surface.hessian, factor)
     return after, flat or after.longest <= SMALLEST
@@ -210,10 +211,10 @@ class QuadraticSurface:
         # low values matter most
         near = 1.0 / np.sqrt(1e-300 + np.abs(values) + 1e-3 * np.max(np.abs(values)))
         rows = np.concatenate([places, products], axis=1) * near[:, None]
-        found = np.linalg.lstsq(rows, (values - at_centre) * near, rcond=None)[0]
-        self.gradient = found[:p]
+        coefficients = np.linalg.lstsq(rows, (values - at_centre) * near, rcond=None)[0]
+        self.gradient = coefficients[:p]
         self.hessian = np.zeros((p, p))
-        for coefficient, (i, j) in zip(found[p:], self._pairs, strict=True):
+        for coefficient, (i, j) in zip(coefficients[p:], self._pairs, strict=True):
             self.hessian[i, j] += coefficient
             self.hessian[j, i] += coefficient
 

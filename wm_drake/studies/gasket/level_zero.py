@@ -15,7 +15,7 @@ import xarray as xr
 
 from wm_drake.parameters import TABLES, FactorLevels, MachineParameters, at_levels
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.gasket.responses import Response
+from wm_drake.simulation.measures.responses import Response
 from wm_drake.studies.gasket.screening import Label, Responses
 from wm_drake.studies.gasket.study import as_responses
 
@@ -103,17 +103,17 @@ def run_level_zero(
     variants = {MACHINE: machine}
     for name in TABLES:
         variants[name] = at_levels(machine, levels[name], [0] * len(levels[name]))
-    found = []
+    runs = []
     for name, parameters in variants.items():
         cases = []
         for case in loads:
             # a factor may be a mass of one of the machine's own loads
-            is_own = machine.loads.get(case.name) == case.load
-            load = parameters.loads[case.name] if is_own else case.load
+            is_of_machine = machine.loads.get(case.name) == case.load
+            load = parameters.loads[case.name] if is_of_machine else case.load
             cases.append(Case(f"{case.name}, {name}", load, case.profile, case.gasket))
         # a table and a number are different structures, so each variant is built
-        found.append(run(parameters, cases))
-    table = xr.concat(found, "run")
+        runs.append(run(parameters, cases))
+    table = xr.concat(runs, "run")
     return LevelZero(tables, as_responses(table, [case.name for case in loads], chosen))
 
 

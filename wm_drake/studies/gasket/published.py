@@ -57,19 +57,21 @@ class Published:
 
     def percent(self, label: Label, term: Term) -> float | None:
         """Return the published contribution of a term. [%]"""
-        found, _ = self._found(label, term.factors)
-        return None if found is None else found.percent
+        published, _ = self._published_term(label, term.factors)
+        return None if published is None else published.percent
 
     def effects(self, label: Label, term: Term) -> dict[Combination, float]:
         """Return the published effects of a term by level; empty without. [unit of the response]"""
-        found, is_turned = self._found(label, term.factors)
-        if found is None or not found.effects:
+        published, is_turned = self._published_term(label, term.factors)
+        if published is None or not published.effects:
             return {}
         levels = product(LEVELS, repeat=len(term.factors))
         turned = (combination[::-1] if is_turned else combination for combination in levels)
-        return dict(zip(turned, found.effects, strict=True))
+        return dict(zip(turned, published.effects, strict=True))
 
-    def _found(self, label: Label, factors: tuple[str, ...]) -> tuple[PublishedTerm | None, bool]:
+    def _published_term(
+        self, label: Label, factors: tuple[str, ...]
+    ) -> tuple[PublishedTerm | None, bool]:
         """Return a published term, and whether its factors are in the reverse order."""
         terms = self.terms.get(label, {})
         straight, turned = ":".join(factors), ":".join(factors[::-1])
@@ -77,25 +79,25 @@ class Published:
 
     def far_means(self, screening: Screening) -> dict[Label, float]:
         """Return the means that differ from the published ones by more than `FAR`. [%]"""
-        found = {label: self.mean_difference(screening, label) for label in screening.tables}
-        return {label: d for label, d in found.items() if d is not None and abs(d) > FAR}
+        differences = {label: self.mean_difference(screening, label) for label in screening.tables}
+        return {label: d for label, d in differences.items() if d is not None and abs(d) > FAR}
 
     def far_contributions(self, screening: Screening) -> dict[tuple[Label, str], float]:
         """Return the contributions that differ by more than `FAR`, by label and term. [points]"""
-        found = {}
+        differences = {}
         for label, table in screening.tables.items():
             for term in table.terms:
                 published = self.percent(label, term)
                 if published is not None and abs(term.percent - published) > FAR:
-                    found[label, term.name] = term.percent - published
-        return found
+                    differences[label, term.name] = term.percent - published
+        return differences
 
 
-NOTHING = Published()
+NOT_PUBLISHED = Published()
 """No published results."""
 
 
-def published_beside(
+def published_for(
     results: PublishedResults, labels: Iterable[Label], source: str = ""
 ) -> Published:
     """Return those published results that belong to some loads and responses.
@@ -105,6 +107,6 @@ def published_beside(
         labels: Loads and responses that are compared.
         source: Where the results are from, for reading.
     """
-    wanted = set(labels)
-    kept = {label: terms for label, terms in results.items() if label in wanted}
+    compared = set(labels)
+    kept = {label: terms for label, terms in results.items() if label in compared}
     return Published(kept, source if kept else "")

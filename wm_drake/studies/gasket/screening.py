@@ -119,8 +119,8 @@ class Screening:
         """Return the responses that the model predicts poorly, with their predicted R2."""
         if self.is_complete:
             return {}
-        found = {label: table.predicted_r2 for label, table in self.tables.items()}
-        return {label: r2 for label, r2 in found.items() if r2 < LEAST_PREDICTED_R2}
+        predicted = {label: table.predicted_r2 for label, table in self.tables.items()}
+        return {label: r2 for label, r2 in predicted.items() if r2 < LEAST_PREDICTED_R2}
 
 
 def run_screening(design: Design, evaluate: Evaluate) -> Screening:
@@ -165,16 +165,16 @@ def analyse(design: Design, responses: Responses) -> Screening:
                 f"effects of {design.model}",
                 where=f"load {load}",
             )
-        found = anova(levels[good], values[good], interactions=design.model != "main")
-        tables |= {(load, name): table for name, table in found.items()}
+        by_response = anova(levels[good], values[good], interactions=design.model != "main")
+        tables |= {(load, name): table for name, table in by_response.items()}
     return Screening(design, responses, tables)
 
 
 def leading_terms(table: AnovaTable) -> list[Term]:
     """Return the terms above the thresholds of [B] Table 5, largest first."""
     least = {1: LEADING_MAIN_PERCENT, 2: LEADING_INTERACTION_PERCENT}
-    found = [term for term in table.terms if term.percent > least[len(term.factors)]]
-    return sorted(found, key=lambda term: -term.percent)
+    leading = [term for term in table.terms if term.percent > least[len(term.factors)]]
+    return sorted(leading, key=lambda term: -term.percent)
 
 
 def main_effects(table: AnovaTable) -> list[Term]:

@@ -13,10 +13,11 @@ import pandas as pd
 import xarray as xr
 
 from wm_drake.parameters import FactorLevels, MachineParameters, at_levels
+from wm_drake.parameters.units import Unit
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.measures.responses import Response, chosen_responses, measures_of
 from wm_drake.studies.doe import Design
-from wm_drake.studies.gasket.responses import MM, Response, chosen_responses, measures_of
-from wm_drake.studies.gasket.screening import Responses
+from wm_drake.studies.gasket.screening import Meaning, Responses
 
 LOADS = ("middle", "counter")
 """Loads of [B] section 4."""
@@ -33,14 +34,14 @@ class GasketTrials:
         parameters: The machine; only the factors change.
         factors: Levels of the factors for this machine.
         loads: One case for each load to run, without parameters.
-        wanted: Names of the responses, as for `chosen_responses`; empty for the default.
+        response_names: Names of the responses, as for `chosen_responses`; empty for the default.
         chosen: The responses.
     """
 
     parameters: MachineParameters
     factors: tuple[FactorLevels, ...]
     loads: Sequence[Case]
-    wanted: Sequence[str] = ()
+    response_names: Sequence[str] = ()
     chosen: tuple[Response, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -49,8 +50,8 @@ class GasketTrials:
         Raises:
             InputError: a response is unknown, or the machine does not have it.
         """
-        found = chosen_responses(self.parameters, self.loads[0].profile, self.wanted)
-        object.__setattr__(self, "chosen", found)
+        responses = chosen_responses(self.parameters, self.loads[0].profile, self.response_names)
+        object.__setattr__(self, "chosen", responses)
 
     @property
     def measures(self) -> tuple[str, ...]:
@@ -67,8 +68,8 @@ class GasketTrials:
         """Yield a case of each load for a changed machine."""
         for case in self.loads:
             # a factor may be a mass of one of the machine's own loads
-            is_own = self.parameters.loads.get(case.name) == case.load
-            load = changed.loads[case.name] if is_own else case.load
+            is_of_machine = self.parameters.loads.get(case.name) == case.load
+            load = changed.loads[case.name] if is_of_machine else case.load
             yield Case(f"{case.name}, {name}", load, case.profile, parameters=changed)
 
     def responses(self, design: Design, run: Run) -> Responses:
@@ -98,14 +99,16 @@ def as_responses(table: xr.Dataset, loads: Sequence[str], chosen: Sequence[Respo
     touching = {}
     if "smallest_gap" in table:
         gaps = zip(places, map(float, table.smallest_gap.values), strict=True)
-        touching = {p: MM.from_si(gap) for p, gap in gaps if gap <= 0.0 and p not in failed}
+        touching = {
+            p: Unit("m", "mm").from_si(gap) for p, gap in gaps if gap <= 0.0 and p not in failed
+        }
     springs = zip(places, _slack(table), strict=True)
     slack = {place: names for place, names in springs if names and place not in failed}
     return Responses(
         values,
         {response.name: response.unit_text for response in chosen},
         failed,
-        {response.name: response.meaning for response in chosen},
+        {r.name: Meaning(r.title, r.variable.about, r.kind, r.better) for r in chosen},
         touching,
         slack,
     )

@@ -133,7 +133,9 @@ def _inverse(screening: Screening, interactions: bool, good: bytes) -> FloatArra
 
 def _coefficients(table: AnovaTable) -> FloatArray:
     """Return the coefficients: of sum-coded columns they are the effects at -1 and 0."""
-    found = [table.constant]
+    coefficients = [table.constant]
     for term in table.terms:
-        found += [term.effects[at] for at in itertools.product((-1, 0), repeat=len(term.factors))]
-    return np.array(found)
+        coefficients += [
+            term.effects[at] for at in itertools.product((-1, 0), repeat=len(term.factors))
+        ]
+    return np.array(coefficients)

@@ -1,9 +1,7 @@
 """Results of a screening as tables and plain data, for files and other programs."""
 
-import json
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,48 +9,39 @@ import pandas as pd
 
 from wm_drake.parameters import FactorLevels
 from wm_drake.parameters.published import CONSTANT
-from wm_drake.studies.doe import Design, write_design
+from wm_drake.studies.doe import Design
 from wm_drake.studies.doe.anova import Term
-from wm_drake.studies.gasket.beside import ALONE, Beside
+from wm_drake.studies.gasket.compared import NOT_COMPARED, Compared
 from wm_drake.studies.gasket.published import Published
 from wm_drake.studies.gasket.screening import Label, Screening, leading_terms
 
-DIGITS = "%.9g"
-"""Format of numbers in CSV files; it has more digits than the results are accurate to."""
 
-
-def write_tables(
+def all_tables(
     screening: Screening,
-    folder: Path,
     factors: Sequence[FactorLevels] = (),
-    beside: Beside = ALONE,
-) -> None:
-    """Write all tables as CSV files. One screening always results in the same bytes.
+    compared: Compared = NOT_COMPARED,
+) -> dict[str, pd.DataFrame]:
+    """Return all tables but the design by name of the file, without suffix.
 
     Args:
         screening: Result of the study.
-        folder: Where the files are written.
-        factors: Levels of the factors, for their physical values in design.csv and runs.csv.
-        beside: What the results are compared with; published.csv, level_zero.csv and
-            check.csv show it.
+        factors: Levels of the factors, for their physical values.
+        compared: What the results are compared with.
     """
-    values = physical_values(screening.design, factors)
-    write_design(screening.design, folder / "design.csv", values)
     tables = {
-        "runs.csv": runs_table(screening, values),
-        "variance.csv": variance_table(screening),
-        "contributions.csv": contributions_table(screening),
-        "effects.csv": effects_table(screening),
-        "leading_terms.csv": leading_table(screening),
+        "runs": runs_table(screening, physical_values(screening.design, factors)),
+        "variance": variance_table(screening),
+        "contributions": contributions_table(screening),
+        "effects": effects_table(screening),
+        "leading_terms": leading_table(screening),
     }
-    if beside.published:
-        tables["published.csv"] = published_table(screening, beside.published)
-    if beside.level_zero is not None:
-        tables["level_zero.csv"] = beside.level_zero.frame()
-    if beside.check is not None:
-        tables["check.csv"] = beside.check.frame()
-    for name, table in tables.items():
-        table.to_csv(folder / name, index=False, float_format=DIGITS)
+    if compared.published:
+        tables["published"] = published_table(screening, compared.published)
+    if compared.level_zero is not None:
+        tables["level_zero"] = compared.level_zero.frame()
+    if compared.check is not None:
+        tables["check"] = compared.check.frame()
+    return tables
 
 
 def physical_values(design: Design, factors: Sequence[FactorLevels]) -> pd.DataFrame:
@@ -217,14 +206,14 @@ def effects_of(term: Term) -> dict[str, float]:
     return {":".join(map(str, levels)): effect for levels, effect in term.effects.items()}
 
 
-def as_plain_data(screening: Screening, beside: Beside = ALONE) -> dict[str, Any]:
+def as_plain_data(screening: Screening, compared: Compared = NOT_COMPARED) -> dict[str, Any]:
     """Return a screening as data for JSON.
 
     It has the design with its efficiency, the runs in which the tub touches the housing or a spring
     goes slack, and for each load and response the contributions, the effects at each level, and how
-    well the model predicts. Published numbers and level 0 are beside ours if there are any.
+    well the model predicts. Published numbers and level 0 are compared ours if there are any.
     """
-    published, zero = beside.published, beside.level_zero
+    published, zero = compared.published, compared.level_zero
     responses: dict[str, dict[str, Any]] = {load: {} for load in screening.loads}
     for (load, name), table in screening.tables.items():
         responses[load][name] = {
@@ -248,16 +237,16 @@ def as_plain_data(screening: Screening, beside: Beside = ALONE) -> dict[str, Any
             **_published_mean(screening, published, (load, name)),
         }
     design = screening.design
-    compared: dict[str, Any] = {}
+    extra: dict[str, Any] = {}
     if published:
-        compared["published"] = published.source
-    if beside.check is not None:
-        compared["check"] = [
+        extra["published"] = published.source
+    if compared.check is not None:
+        extra["check"] = [
             {k: finite(v) if isinstance(v, float) else v for k, v in row.items()}
-            for row in beside.check.frame().to_dict("records")
+            for row in compared.check.frame().to_dict("records")
         ]
     if zero is not None:
-        compared["level_zero"] = {
+        extra["level_zero"] = {
             "tables": zero.tables,
             "responses": [
                 {k: finite(v) if isinstance(v, float) else v for k, v in row.items()}
@@ -280,7 +269,7 @@ def as_plain_data(screening: Screening, beside: Beside = ALONE) -> dict[str, Any
             for (trial, load), springs in screening.responses.slack.items()
         ],
         "responses": responses,
-        **compared,
+        **extra,
     }
 
 
@@ -295,20 +284,15 @@ def _published_mean(screening: Screening, published: Published, label: Label) ->
 
 def _published_term(published: Published, label: Label, term: Term) -> dict[str, Any]:
     """Return the published contribution and effects of a term, if there are any."""
-    found: dict[str, Any] = {}
+    entries: dict[str, Any] = {}
     percent, effects = published.percent(label, term), published.effects(label, term)
     if percent is not None:
-        found["published_percent"] = percent
+        entries["published_percent"] = percent
     if effects:
-        found["published_effects"] = {":".join(map(str, k)): v for k, v in effects.items()}
-    return found
+        entries["published_effects"] = {":".join(map(str, k)): v for k, v in effects.items()}
+    return entries
 
 
 def finite(value: float) -> float | None:
     """Return a number, or None if it is not finite, because JSON has no NaN."""
     return value if math.isfinite(value) else None
-
-
-def to_json(data: Any) -> str:
-    """Return data as one line of strict JSON."""
-    return json.dumps(data, allow_nan=False)

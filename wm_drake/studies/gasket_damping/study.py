@@ -1,10 +1,12 @@
 """Identification of the gasket damping C_L and C_T from measured envelopes, [B] section 3.1.2."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TypeAlias
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from wm_drake.batch import RunResult, simulate_many
@@ -18,19 +20,26 @@ from wm_drake.parameters import (
     load_factors,
     with_values,
 )
+from wm_drake.parameters.csv_files import finite_numbers, read_csv
 from wm_drake.parameters.time_stamps import with_distinct_times
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
+from wm_drake.report.terminal import say
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.measures import smooth_envelope
-from wm_drake.simulation.records import Record
+from wm_drake.simulation.displacements import smooth_envelope
+from wm_drake.simulation.records import Record, read_measured
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.gasket_damping.grid_search import Search, bounded_search, grid_search
-from wm_drake.studies.gasket_damping.uncertainty import (
-    Interval,
-    curves_of,
-    difference_points,
-    jackknife_interval,
-)
+from wm_drake.studies.fitting.grid import Round, grid_search, simplex_search
+from wm_drake.studies.fitting.jackknife import Interval, jackknife_interval
+from wm_drake.studies.fitting.problem import NormProblem, Unknown
+from wm_drake.studies.fitting.search import Optimum
+from wm_drake.studies.gasket_damping.options import GasketDampingOptions
+from wm_drake.studies.inputs import existing_file
+from wm_drake.studies.run import Executor
+from wm_drake.studies.study import Facts, Result, Task
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 UNKNOWNS = ("C_L", "C_T")
 
@@ -60,45 +69,191 @@ NOISE = 1e-4
 
 MM_PER_M = 1e3
 
+UNITS = (Unit("N*s/m", "N*s/mm"), Unit("N*m*s/rad", "N*mm*s/deg"))
+"""SI units and printed units of C_L and C_T."""
+
 Measured: TypeAlias = Mapping[str, xr.DataArray]
 """Displacements (time, sensor), sampled every 5 ms, by load. [m]"""
 
 
 @dataclass(frozen=True)
-class Damping:
+class Damping(Result):
     """Result of an identification of C_L and C_T.
 
     Attributes:
-        grid: Optimum of the grid search. [N s/m, N m s/rad]
-        scipy: Optimum of the bounded search of scipy. [N s/m, N m s/rad]
+        parameters: Machine before the search.
+        grid: Optimum of the grid search, its point in SI. [N s/m, N m s/rad]
+        scipy: Optimum of the bounded search of scipy, its point in SI. [N s/m, N m s/rad]
+        measured: The measured displacements.
+        rounds: The grids of the grid search.
         truth: True values of a virtual experiment; None for a measurement. [N s/m, N m s/rad]
         at_best: Computed record at the better optimum, by load.
-        measured: The measured displacements.
         interval: Confidence interval of the better of the two optima; None if there are too few
             curves. [N s/m, N m s/rad]
     """
 
-    grid: Search
-    scipy: Search
-    truth: FloatArray | None
-    at_best: dict[str, Record]
+    parameters: MachineParameters
+    grid: Optimum
+    scipy: Optimum
     measured: Measured
+    rounds: tuple[Round, ...] = ()
+    truth: FloatArray | None = None
+    at_best: Mapping[str, Record] = field(default_factory=dict)
     interval: Interval | None = None
+    float_format: ClassVar[str] = "%.9g"
 
     @property
-    def better(self) -> Search:
+    def better(self) -> Optimum:
         """The search that found the smaller distance; the grid search if both found the same."""
-        return min((self.grid, self.scipy), key=lambda search: search.value)
+        return min((self.grid, self.scipy), key=lambda search: search.cost)
 
     @property
     def searches_agree(self) -> bool:
         """Whether the optima of both searches differ by at most `AGREEMENT`."""
-        difference = np.abs(self.grid.best - self.scipy.best) / (UPPER - LOWER)
+        difference = np.abs(self.grid.point - self.scipy.point) / (UPPER - LOWER)
         return bool(np.all(difference <= AGREEMENT))
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return every point of the grid search with its distance."""
+        from wm_drake.studies.gasket_damping.page import points_table
+
+        return {"objective": points_table(self)}
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the result for JSON, in the units of [B]."""
+
+        def plain(search: Optimum) -> dict[str, Any]:
+            return {
+                **_named(search.point),
+                "objective_mm": search.cost,
+                "evaluations": search.evaluations,
+            }
+
+        interval = self.interval
+        ends = [] if interval is None else [_named(interval.low), _named(interval.high)]
+        return {
+            "units": {"C_L": "N s/mm", "C_T": "N mm s/deg"},
+            "virtual_experiment": self.truth is not None,
+            "planted": None if self.truth is None else _named(self.truth),
+            "best": plain(self.better)
+            | {"search": "grid" if self.better is self.grid else "scipy"},
+            "searches_agree": self.searches_agree,
+            "grid": plain(self.grid)
+            | {"rounds": len(self.rounds), "mesh_percent": 100.0 * self.rounds[-1].spacing},
+            "scipy": plain(self.scipy),
+            "interval_95": {name: [end[name] for end in ends] for name in UNKNOWNS}
+            if ends
+            else None,
+        }
+
+    def terminal(self) -> "list[Table | str]":
+        """Return the summary."""
+        from wm_drake.studies.gasket_damping.page import summary
+
+        return [summary(self)]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        from wm_drake.studies.gasket_damping.page import gasket_damping_page
+
+        return gasket_damping_page(self, facts)
+
+
+def in_units_of_paper(damping: FloatArray) -> tuple[float, float]:
+    """Return C_L and C_T in the units of [B]. [N s/mm, N mm s/deg]"""
+    linear, torsional = (
+        unit.from_si(float(value)) for unit, value in zip(UNITS, damping, strict=True)
+    )
+    return linear, torsional
+
+
+def _named(damping: FloatArray) -> dict[str, float]:
+    return dict(zip(UNKNOWNS, in_units_of_paper(damping), strict=True))
+
+
+class GasketDampingTask(Task):
+    """The study with checked options."""
+
+    def __init__(self, options: GasketDampingOptions, machine: Machine) -> None:
+        """Check the machine, and read the records or the true values of the virtual experiment.
+
+        Raises:
+            InputError: the machine has no gasket, its profile ends before the window, it does not
+                have the loads of the virtual experiment, or a record or true value is wrong.
+        """
+        self.options, self.machine = options, machine
+        run_up_of(machine.parameters)
+        self.records, self.truth = read_records(machine.parameters, options.record), None
+        if not options.record:
+            self.truth = planted_damping(
+                machine.parameters, options.planted_linear, options.planted_torsional
+            )
+
+    def run(self, executor: Executor) -> Damping:  # noqa: ARG002
+        """Identify the damping, from the records or from a virtual experiment."""
+        records = self.records
+        if self.truth is not None:
+            say(
+                "No measured records were given. The Drake engine runs a virtual experiment with "
+                "other damping values and noise.",
+                err=True,
+            )
+            records = virtual_experiment(self.machine.parameters, self.truth, self.options.seed)
+        return identify_damping(self.machine, records, self.truth, self.options.mesh / 100.0)
+
+
+def read_records(parameters: MachineParameters, entries: Sequence[str]) -> dict[str, xr.DataArray]:
+    """Return the measured displacements of LOAD=FILE entries, by load. [m]
+
+    Raises:
+        InputError: an entry names no load of the machine, or a file is wrong.
+    """
+    measured, sensors = {}, list(parameters.sensors)
+    for entry in entries:
+        load, equals, name = (part.strip() for part in entry.partition("="))
+        if not equals or load not in parameters.loads:
+            raise input_error(
+                f"'{entry}' does not have the form LOAD=FILE with a load of the machine "
+                f"({', '.join(parameters.loads)})",
+                where="--record",
+            )
+        path = existing_file(Path(name), "--record")
+        if path.suffix.lower() == ".csv":
+            numbers = finite_numbers(read_csv(path, ["time_s", *sensors]), path)
+            record = xr.DataArray(
+                numbers[:, 1:] / MM_PER_M,
+                {"time": numbers[:, 0], "sensor": sensors},
+                ["time", "sensor"],
+            )
+        else:
+            needs = {"time": ("time",), "displacement": ("time", "sensor")}
+            record = read_measured(path, needs).displacement
+        measured[load] = as_measured(record, sensors, name)
+    return measured
+
+
+def planted_damping(parameters: MachineParameters, linear: str, torsional: str) -> FloatArray:
+    """Return C_L and C_T of a virtual experiment, of texts with units. [N s/m, N m s/rad]
+
+    Raises:
+        InputError: a unit does not fit, or the machine does not have the loads of the experiment.
+    """
+    changed = with_values(
+        parameters, {"gasket.damping_x": linear, "gasket.rotational_damping_x": torsional}
+    )
+    assert changed.gasket is not None  # checked before
+    for name in LOADS:
+        if name not in parameters.loads:
+            raise input_error(
+                f"machine '{parameters.name}' has no load '{name}', which the virtual experiment "
+                "needs",
+                key="loads",
+            )
+    return np.array([changed.gasket.damping_x, changed.gasket.rotational_damping_x])
 
 
 def identify_damping(
-    parameters: MachineParameters,
+    machine: Machine,
     measured: Measured,
     truth: FloatArray | None = None,
     mesh: float = MESH,
@@ -106,7 +261,7 @@ def identify_damping(
     """Identify C_L and C_T from measured displacements.
 
     Args:
-        parameters: The machine.
+        machine: The built machine.
         measured: Displacements of its sensors, by load.
         truth: True values if `measured` is from `virtual_experiment`. [N s/m, N m s/rad]
         mesh: Spacing at which the grid search ends, as a part of the region.
@@ -114,13 +269,28 @@ def identify_damping(
     Raises:
         InputError: the machine has no gasket, or its profile ends before the window.
     """
-    objective = EnvelopeDistance(parameters, measured)
-    grid = grid_search(objective, LOWER, UPPER, mesh)
-    scipy = bounded_search(objective, LOWER, UPPER, STOP)
-    found = Damping(grid, scipy, truth, {}, measured)
-    best = found.better.best
-    at_best = {case.name: simulate(objective.machine, case) for case in objective.cases(best)}
-    return replace(found, at_best=at_best, interval=objective.interval(best))
+    model = EnvelopeModel(machine, measured)
+    problem = damping_problem(model)
+    grid, rounds = grid_search(problem, mesh)
+    scipy = simplex_search(problem, STOP)
+    grid, scipy = (replace(end, point=problem.points_at(end.point)) for end in (grid, scipy))
+    result = Damping(machine.parameters, grid, scipy, measured, rounds, truth)
+    best = result.better.point
+    at_best = {case.name: simulate(machine, case) for case in model.cases(best)}
+    return replace(result, at_best=at_best, interval=jackknife_interval(problem, best))
+
+
+def damping_problem(model: "EnvelopeModel") -> NormProblem:
+    """Return the problem of C_L and C_T: the distance [B] Eq. (2), (3) of the envelopes. [mm]
+
+    It is the sum over the loads of the 2-norm of envelope differences. The norm includes the upper
+    and lower envelopes of all sensors at all samples in the window.
+    """
+    unknowns = tuple(
+        Unknown(name, float(lower), float(upper), unit)
+        for name, lower, upper, unit in zip(UNKNOWNS, LOWER, UPPER, UNITS, strict=True)
+    )
+    return NormProblem(unknowns, model, tuple(model.curves))
 
 
 def virtual_experiment(
@@ -140,7 +310,7 @@ def virtual_experiment(
     machine = build_machine(true_parameters)
     records = {}
     for load in LOADS:
-        case = Case(load, true_parameters.loads[load], _run_up(true_parameters.profile))
+        case = Case(load, true_parameters.loads[load], run_up_of(true_parameters))
         displacement = simulate(machine, case, "drake").displacement
         records[load] = displacement + rng.normal(scale=NOISE, size=displacement.shape)
     return records
@@ -155,88 +325,63 @@ def with_damping(parameters: MachineParameters, damping: FloatArray) -> MachineP
     )
 
 
-class EnvelopeDistance:
-    """Objective [B] Eq. (2), (3): sum over the loads of the 2-norm of envelope differences. [mm]
+class EnvelopeModel:
+    """Differences of computed and measured envelopes as a function of C_L and C_T.
 
-    The norm includes the upper and lower envelopes of all sensors at all samples in the window.
-    They are those of the analytic signal (`smooth_envelope`).
+    The envelopes are those of the analytic signal (`smooth_envelope`).
+
+    Attributes:
+        machine: The built machine.
+        profile: Its profile, cut after the window.
+        curves: Load and columns of each curve: upper and lower envelope of a sensor with a load.
     """
 
-    def __init__(self, parameters: MachineParameters, measured: Measured) -> None:
-        """Build the machine and compute the measured envelopes.
+    def __init__(self, machine: Machine, measured: Measured) -> None:
+        """Compute the measured envelopes.
 
         Args:
-            parameters: The machine.
+            machine: The built machine.
             measured: Displacements of its sensors, by load.
 
         Raises:
             InputError: the machine has no gasket, or its profile ends before the window.
         """
-        if parameters.gasket is None:
-            raise input_error(
-                f"machine '{parameters.name}' has no gasket; this study needs one", key="gasket"
-            )
-        self.parameters, self.measured = parameters, measured
-        self.machine: Machine = build_machine(parameters)
-        self.profile = _run_up(parameters.profile)
+        self.machine = machine
+        self.profile = run_up_of(machine.parameters)
         self._targets = {load: _envelopes(displacement) for load, displacement in measured.items()}
+        self.curves, end = list[tuple[str, slice]](), 0
+        for load, (sides, samples, sensors) in ((k, v.shape) for k, v in self._targets.items()):
+            for _ in range(sensors):
+                self.curves.append((load, slice(end, end + sides * samples)))
+                end += sides * samples
 
     def cases(self, damping: FloatArray) -> list[Case]:
         """Return one case for each load, with a damping C_L, C_T. [N s/m, N m s/rad]"""
-        changed = with_damping(self.parameters, damping)
+        changed = with_damping(self.machine.parameters, damping)
         return [
             Case(load, changed.loads[load], self.profile, parameters=changed)
-            for load in self.measured
+            for load in self._targets
         ]
 
-    def __call__(self, points: Sequence[FloatArray]) -> list[float]:
-        """Return the values at several points (C_L, C_T); infinite where a run diverges. [mm]"""
-        values = np.zeros(len(points))
-
-        def add(point: int, load: str, record: Record | None) -> None:
-            values[point] += np.inf if record is None else self._distance(load, record)
-
-        self._run(points, add)
-        return [float(value) for value in values]
-
-    def interval(self, best: FloatArray) -> Interval | None:
-        """Return the confidence interval of an optimum (C_L, C_T). [N s/m, N m s/rad]
-
-        It is None if there are too few curves, or if a run diverges.
-        """
-        points = difference_points(best, LOWER, UPPER)
-        found: list[dict[str, FloatArray]] = [{} for _ in points]
-
-        def add(point: int, load: str, record: Record | None) -> None:
-            if record is not None:
-                found[point][load] = self._curves(load, record)
-
-        self._run(points, add)
-        if any(len(differences) < len(self.measured) for differences in found):
-            return None
-        loads = list(self.measured)  # threads end in any order
-        ordered = [{load: differences[load] for load in loads} for differences in found]
-        return jackknife_interval(best, LOWER, UPPER, curves_of(ordered, points, UPPER - LOWER))
-
-    def _run(
-        self, points: Sequence[FloatArray], add: Callable[[int, str, Record | None], None]
-    ) -> None:
-        """Run all loads at several points and pass each record, or None if the run diverged."""
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """Return the differences (k, n) at points (k, 2); NaN where a run diverges. [mm]"""
+        differences = np.full((len(points), self.curves[-1][1].stop), np.nan)
         cases = [case for damping in points for case in self.cases(damping)]
 
-        def pass_on(run: RunResult) -> None:
-            record = None if run.diverged else run.record
-            add(run.number // len(self.measured), run.case.name, record)
+        def keep(run: RunResult) -> None:
+            if not run.diverged and run.record is not None:
+                point, load = run.number // len(self._targets), run.case.name
+                parts = [where for name, where in self.curves if name == load]
+                columns = slice(parts[0].start, parts[-1].stop)
+                differences[point, columns] = self._differences(load, run.record)
 
-        simulate_many(self.machine, cases, measures=("extremes",), histories=True, finished=pass_on)
+        simulate_many(self.machine, cases, measures=("extremes",), histories=True, finished=keep)
+        return differences
 
-    def _curves(self, load: str, record: Record) -> FloatArray:
-        """Return the differences (sensor, n) of both envelopes in the window. [mm]"""
+    def _differences(self, load: str, record: Record) -> FloatArray:
+        """Return the differences of all curves of a load in a row. [mm]"""
         differences = _envelopes(record.displacement) - self._targets[load]
-        return MM_PER_M * np.moveaxis(differences, 2, 0).reshape(differences.shape[2], -1)
-
-    def _distance(self, load: str, record: Record) -> float:
-        return float(np.linalg.norm(self._curves(load, record)))
+        return MM_PER_M * np.moveaxis(differences, 2, 0).ravel()
 
 
 def _envelopes(displacement: xr.DataArray) -> FloatArray:
@@ -246,13 +391,17 @@ def _envelopes(displacement: xr.DataArray) -> FloatArray:
     return np.stack([upper, -upper])
 
 
-def _run_up(profile: SpinProfile) -> SpinProfile:
+def run_up_of(parameters: MachineParameters) -> SpinProfile:
     """Return the profile, cut after the window and the time that the filter needs.
 
     Raises:
-        InputError: the profile ends before the window does.
+        InputError: the machine has no gasket, or its profile ends before the window.
     """
-    end = WINDOW[1] + AFTER
+    if parameters.gasket is None:
+        raise input_error(
+            f"machine '{parameters.name}' has no gasket; this study needs one", key="gasket"
+        )
+    profile, end = parameters.profile, WINDOW[1] + AFTER
     if profile.duration < WINDOW[1]:
         raise input_error(
             f"ends at {profile.duration:g} s; it must last at least {WINDOW[1]:g} s, because "

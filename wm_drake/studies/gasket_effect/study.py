@@ -2,20 +2,36 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
 from wm_drake.errors import input_error
+from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters, SpinProfile, measured_amplitudes
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.measures import percent_difference, smooth_envelope
-from wm_drake.simulation.records import Record
+from wm_drake.simulation.displacements import percent_difference, smooth_envelope
+from wm_drake.simulation.records import Record, save_record
 from wm_drake.simulation.runs import DEFAULT_ENGINE
+from wm_drake.studies.gasket_effect.options import GasketEffectOptions
+from wm_drake.studies.inputs import selected_cases, with_measured
+from wm_drake.studies.run import Executor
 from wm_drake.studies.spin.comparison import Variant
-from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult, run_spin
+from wm_drake.studies.spin.study import (
+    CaseResult,
+    Comparison,
+    SpinResult,
+    compared_cases,
+    run_spin,
+)
+from wm_drake.studies.study import Facts, Result, Task
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 WITHOUT, WITH = "without gasket", "with gasket"
 """Names of the two variants; differences are in percent of the first."""
@@ -87,20 +103,24 @@ def run_gasket_effect(
     Raises:
         InputError: the machine has no gasket.
     """
-    if parameters.gasket is None:
-        raise input_error(
-            f"machine '{parameters.name}' has no gasket; this study needs one", key="gasket"
-        )
-    found = []
+    _check_gasket(parameters)
+    both = []
     for index, gasket in enumerate((False, True)):
         first = index * len(cases)
-        own = [replace(case, gasket=gasket) for case in cases]
+        chosen = [replace(case, gasket=gasket) for case in cases]
 
         def report(number: int, fraction: float, first: int = first) -> None:
             progress(first + number, fraction)
 
-        found.append(run_spin(parameters, own, engine, progress=report, comparison=comparison))
-    return GasketEffect(*found)
+        both.append(run_spin(parameters, chosen, engine, progress=report, comparison=comparison))
+    return GasketEffect(*both)
+
+
+def _check_gasket(parameters: MachineParameters) -> None:
+    if parameters.gasket is None:
+        raise input_error(
+            f"machine '{parameters.name}' has no gasket; this study needs one", key="gasket"
+        )
 
 
 def steady_window(profile: SpinProfile) -> tuple[float, float] | None:
@@ -143,9 +163,9 @@ def effect_table(effect: GasketEffect) -> pd.DataFrame:
             "gasket",
         )
         window = steady_window(without.case.profile)
-        nothing = xr.full_like(without.measures.amplitude, np.nan)
+        missing = xr.full_like(without.measures.amplitude, np.nan)
         columns["steady_"] = xr.concat(
-            [steady_amplitudes(c.record, window) if window else nothing for c in both], "gasket"
+            [steady_amplitudes(c.record, window) if window else missing for c in both], "gasket"
         )
         for sensor in map(str, without.record.sensor.values):
             row: dict[str, object] = {"load": without.case.name, "sensor": sensor}
@@ -170,3 +190,84 @@ def _experiment(result: SpinResult, case: CaseResult) -> xr.DataArray:
         if len(rows):
             values = rows.iloc[0][sensors].to_numpy(dtype=float) / MM.from_si(1.0)
     return xr.DataArray(values, {"sensor": sensors}, ["sensor"])
+
+
+@dataclass(frozen=True)
+class GasketEffectResult(Result):
+    """Result of the study: both runs, and the table of amplitudes."""
+
+    effect: GasketEffect
+    table: pd.DataFrame
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return the amplitudes."""
+        return {"effect": self.table}
+
+    def write(self, folder: Path) -> None:
+        """Write the amplitudes, and the record of each run."""
+        super().write(folder)
+        for variant in self.effect.variants:
+            for result in variant.result.results:
+                name = f"record_{variant.name.replace(' ', '_')}_{result.case.name}.nc"
+                save_record(result.record, folder / name)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the amplitudes for JSON, which has no NaN."""
+        without = self.effect.without
+        return {
+            "machine": without.parameters.name,
+            "steady_window_s": steady_window(without.results[0].case.profile),
+            "amplitudes": [
+                {str(key): None if value != value else value for key, value in row.items()}
+                for row in self.table.to_dict("records")
+            ],
+        }
+
+    def terminal(self) -> "list[Table | str]":
+        """Return the amplitudes and a summary."""
+        from wm_drake.studies.gasket_effect.page import summary, terminal_table
+
+        return [terminal_table(self.effect, self.table), summary(self.table)]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        from wm_drake.studies.gasket_effect.page import gasket_effect_page
+
+        return gasket_effect_page(self, facts)
+
+    def failures(self) -> list[str]:
+        """Return a line for each run that diverged."""
+        return [
+            f"{case.case.name}, {variant.name}: {case.record.attrs['diverged']}"
+            for variant in self.effect.variants
+            for case in variant.result.results
+            if case.record.attrs["diverged"]
+        ]
+
+
+class GasketEffectTask(Task):
+    """The study with checked options."""
+
+    def __init__(self, options: GasketEffectOptions, machine: Machine) -> None:
+        """Check gasket, measured amplitudes and loads.
+
+        Raises:
+            InputError: the machine has no gasket, or a file or a load is wrong.
+        """
+        self.options = options
+        self.parameters = with_measured(machine.parameters, options.measured, "--measured")
+        measured_amplitudes(self.parameters)
+        _check_gasket(self.parameters)
+        default = [name for name in LOADS if name in self.parameters.loads]
+        loads = options.load or default
+        self.cases = selected_cases(self.parameters, loads, True, options.profile)
+
+    def run(self, executor: Executor) -> GasketEffectResult:
+        """Run all loads without and with the gasket."""
+        comparison = compared_cases(self.options.measured, self.options.sets)
+        names = [f"{c.name}, {text}" for text in (WITHOUT, WITH) for c in self.cases]
+        with executor.fractions(names) as progress:
+            effect = run_gasket_effect(
+                self.parameters, self.cases, progress=progress, comparison=comparison
+            )
+        return GasketEffectResult(effect, effect_table(effect))

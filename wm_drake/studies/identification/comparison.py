@@ -149,18 +149,18 @@ class Comparison:
                 f"test{'s' if len(self.motions) > 1 else ''}, above the best: "
                 + ", ".join(f"{r.law} {r.criterion - best.criterion:.3g}" for r in self.order)
             )
-        found = [f"The data support the law {self.supported.law} ({how})."]
+        sentences = [f"The data support the law {self.supported.law} ({how})."]
         if alike:
-            found.append(
+            sentences.append(
                 f"They do not tell it apart from {', '.join(alike)}; it has the fewest unknown "
                 "numbers of these."
             )
         if self.supported.judgement.verdict != "good":
-            found.append(
+            sentences.append(
                 f"{self.supported.law}: {self.supported.judgement.sentences[0][0].lower()}"
                 f"{self.supported.judgement.sentences[0][1:]}"
             )
-        return found
+        return sentences
 
     def _blind(self) -> list[str]:
         if not self.validation:
@@ -173,16 +173,16 @@ class Comparison:
             if r.prediction and r.predicted
         ]
         count = len(self.validation)
-        found = [
+        sentences = [
             f"Blind prediction of {count} test{'s' if count > 1 else ''} that no fit has seen, "
             f"RMSE: {'; '.join(texts)}."
         ]
         if len(ranked) > 1 and ranked[0].law not in [r.law for r in self.as_good]:
-            found.append(
+            sentences.append(
                 f"There {ranked[0].law} is best, not {self.supported.law}: the tests of the fit do "
                 "not hold what those of the prediction show."
             )
-        return found
+        return sentences
 
     def _remarks(self) -> list[str]:
         return [
@@ -229,10 +229,17 @@ def _finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
+@dataclass(frozen=True)
+class SplitTests:
+    """Tests to fit, and tests to predict, which no fit sees."""
+
+    fitted: tuple[MeasuredMotion, ...]
+    predicted: tuple[MeasuredMotion, ...] = ()
+
+
 def compare_laws(
     models: Mapping[str, ComponentModel],
-    motions: Sequence[MeasuredMotion],
-    validation: Sequence[MeasuredMotion] = (),
+    tests: SplitTests,
     method: str = "least-squares",
     *,
     seed: int = 0,
@@ -242,15 +249,14 @@ def compare_laws(
 
     Args:
         models: Model of each law.
-        motions: Tests to fit.
-        validation: Tests to predict; no fit sees them.
+        tests: Tests to fit and to predict.
         method, seed: Of the search.
         progress: Called with a law and the fraction done of its search.
     """
     fits = {
         law: fit_law(
             model,
-            motions,
+            tests.fitted,
             method,
             seed=seed,
             progress=lambda fraction, least, law=law: progress(law, fraction),  # type: ignore[misc]
@@ -259,14 +265,8 @@ def compare_laws(
     }
     best = min(fits.values(), key=lambda fit: fit.rmse)
     independent = _independent_samples(best)
-    return Comparison(
-        tuple(
-            _result(law, models[law], fit, motions, validation, independent)
-            for law, fit in fits.items()
-        ),
-        tuple(motions),
-        tuple(validation),
-    )
+    results = tuple(_result(models[law], fit, tests, independent) for law, fit in fits.items())
+    return Comparison(results, tests.fitted, tests.predicted)
 
 
 def fit_law(
@@ -296,37 +296,31 @@ def fit_law(
         progress=lambda fraction, least: progress(0.8 * fraction, least),
     )
     note = (
-        f"{first.notes[0]}; searched with {len(part)} of {len(motions)} tests, then refined by "
+        f"{first.log.notes[0]}; searched with {len(part)} of {len(motions)} tests, then refined by "
         "least squares with all"
     )
-    fit = refined(problem, first.values, note, method, seed)
+    fit = refined(problem, first, note)
     progress(1.0, fit.rmse)
     return fit
 
 
-def _result(
-    law: str,
-    model: ComponentModel,
-    fit: Fit,
-    motions: Sequence[MeasuredMotion],
-    validation: Sequence[MeasuredMotion],
-    independent: float,
-) -> LawResult:
+def _result(model: ComponentModel, fit: Fit, tests: SplitTests, independent: float) -> LawResult:
+    motions = tests.fitted
     left_out: FloatArray = np.full(len(motions), np.nan)
     if len(motions) >= FEWEST_LEFT_OUT:
         left_out = left_out_errors(
             fit, lambda chosen: fit_problem(model, [motions[k] for k in chosen])
         )
-    prediction = _prediction(model, fit, validation) if validation else None
+    prediction = _prediction(model, fit, tests.predicted) if tests.predicted else None
     return LawResult(
-        law,
+        model.law,
         model,
         fit,
         judge(fit, motions),
         left_out,
         information_criterion(fit, independent),
         prediction,
-        judge(prediction, validation) if prediction else None,
+        judge(prediction, tests.predicted) if prediction else None,
     )
 
 

@@ -19,7 +19,7 @@ from wm_drake.parameters.damper_laws import DamperNumbers
 from wm_drake.rigs import Harmonic, damper_bench, force_loops
 from wm_drake.rigs.measured import HarmonicMotion, measured_motion
 from wm_drake.studies.fitting import least_squares
-from wm_drake.studies.identification.models import damper_model
+from wm_drake.studies.identification.models import Given, damper_model
 from wm_drake.studies.identification.problem import fit_problem
 
 BOUNDS = {"sponge_stiffness": (50e3, 300e3), "sponge_damping": (0.0, 10e3)}
@@ -37,15 +37,15 @@ def printed_table() -> pd.DataFrame:
 
 def mstv_motions(damper: DamperNumbers, motions: Sequence[Harmonic]) -> list[HarmonicMotion]:
     """Return loops of a damper as if they had been measured."""
-    found = []
+    measured_loops = []
     for loop in force_loops(damper_bench(damper), motions):
         name = f"{loop.motion.frequency:g} Hz, {loop.motion.amplitude / MM:g} mm"
         measured = measured_motion(
             MeasuredLoop(name, name, loop.time, loop.displacement, loop.force, False)
         )
         assert isinstance(measured, HarmonicMotion)
-        found.append(measured)
-    return found
+        measured_loops.append(measured)
+    return measured_loops
 
 
 def coulomb_fits(
@@ -71,7 +71,7 @@ def coulomb_fits(
     }
     printed, rows = printed_table(), []
     for measured in motions:
-        model = damper_model("stv_sponge", [measured], BOUNDS, known)
+        model = damper_model("stv_sponge", [measured], Given(BOUNDS, known))
         fit = least_squares(fit_problem(model, [measured]), starts=3, screened=16)
         f, a = measured.motion.frequency, measured.motion.amplitude / MM
         near = (np.abs(printed.frequency_hz / f - 1.0) < SAME) & (

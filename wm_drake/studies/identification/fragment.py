@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from wm_drake.parameters import (
     shipped_machines,
 )
 from wm_drake.parameters.units import Unit
+from wm_drake.studies.components import Target
 from wm_drake.studies.fitting import Fit
 from wm_drake.studies.identification.models import ComponentModel, unit_of_field
 from wm_drake.studies.identification.scales import FORCE, TORQUE
@@ -28,78 +30,79 @@ FIXED = "fixed by the user in an identification"
 _LENGTH, _ANGLE = Unit("m", "mm"), Unit("rad", "deg")
 
 
+@dataclass(frozen=True)
+class Destination:
+    """Where identified numbers go.
+
+    Attributes:
+        target: The component as it was, for the keys of another law that have to go, and its place
+            in the machine that the fragment starts from. Without a machine the file is a component
+            file that stands alone.
+        out: Folder the file goes to, from which a machine file is named.
+        changes: Other numbers of the machine that the user changed: text by key path. A number
+            inside a list cannot be in a fragment; a comment names it.
+    """
+
+    target: Target
+    out: Path
+    changes: Mapping[str, str] = field(default_factory=dict)
+
+
 def fragment(
     fit: Fit,
     model: ComponentModel,
-    target: Component,
-    machine: str,
-    key: str,
-    copies: Mapping[str, str],
-    out: Path,
+    destination: Destination,
+    copies: Mapping[str, str] | None = None,
     remarks: Sequence[str] = (),
-    changes: Mapping[str, str] | None = None,
 ) -> str:
     """Return the text of a YAML file with identified numbers; comments name the undetermined ones.
 
     Args:
         fit: Fit of the model.
         model: Model of the component.
-        target: The component as it was, for the keys of another law that have to go.
-        machine: Machine that the fragment starts from, as it was named; "" for a component file
-            that stands alone.
-        key: Key path of the component in the machine.
+        destination: Where the numbers go.
         copies: Fields that get the value of another, such as z of an axisymmetric bushing from x.
-        out: Folder the file goes to, from which a machine file is named.
         remarks: Sentences on the fit for the head of the file.
-        changes: Other numbers of the machine that the user changed: text by key path. A number
-            inside a list cannot be in a fragment; a comment names it.
 
     Raises:
         InputError: The data do not determine a number that a new law needs.
     """
-    entries, comments = _entries(fit, model, target)
-    for field, source in copies.items():
+    entries, comments = _entries(fit, model, destination.target.component)
+    for name, source in (copies or {}).items():
         if source in entries:
-            entries[field] = dict(entries[source])
+            entries[name] = dict(entries[source])
     tests = ", ".join(test.name for test in fit.tests)
     unit = "N m" if any(unknown.unit == TORQUE for unknown in fit.problem.unknowns) else "N"
     head = [
-        f"Identified by least RMSE, method {fit.method}, seed {fit.seed}, from {tests}.",
+        f"Identified by least RMSE, method {fit.log.method}, seed {fit.log.seed}, from {tests}.",
         f"RMSE {fit.rmse:.4g} {unit} over all tests.",
         *remarks,
         *comments,
     ]
-    return written_fragment(entries, head, target, machine, key, out, changes)
+    return written_fragment(entries, head, destination)
 
 
-def written_fragment(
-    entries: dict[str, Any],
-    head: Sequence[str],
-    target: Component,
-    machine: str,
-    key: str,
-    out: Path,
-    changes: Mapping[str, str] | None = None,
-) -> str:
+def written_fragment(entries: dict[str, Any], head: Sequence[str], destination: Destination) -> str:
     """Return the text of a YAML file with entries of one component.
 
     Args:
         entries: Values with sources by field.
         head: Lines of the comment at the beginning.
-        target, machine, key, out, changes: As for `fragment`.
+        destination: Where the numbers go.
     """
-    written, left_out = _of_fragment(changes or {})
+    target = destination.target
+    written, left_out = _of_fragment(destination.changes)
     lines = [f"# {line}" for line in head]
-    if left_out and machine:
+    if left_out and target.machine:
         lines.append(f"# Not in this file: --set {', '.join(left_out)}.")
-    if not machine:
-        body: Any = _whole(entries, target)
+    if not target.machine:
+        body: Any = _whole(entries, target.component)
     else:
-        body = {"extends": _named_from(machine, out)}
+        body = {"extends": _named_from(target.machine, destination.out)}
         for path, text in written.items():
             *parents, name = path.split(".")
             _node(body, parents)[name] = YAML(typ="safe").load(text)
-        _node(body, key.split(".")).update(_leaving(entries, target))
+        _node(body, target.key.split(".")).update(_leaving(entries, target.component))
     dumped: list[str] = []
     yaml = YAML()
     yaml.width = 4096

@@ -125,7 +125,7 @@ class Judgement:
                 f"no lack of fit shows above the noise, {noise} of the measured {self.quantity} "
                 "(root mean square)"
             )
-        found = [
+        sentences = [
             {
                 "good": f"Good fit: {known}.",
                 "fair": f"Fair fit: {known}. The 95 % intervals hold only if the law is right; it "
@@ -135,28 +135,28 @@ class Judgement:
             }[self.verdict]
         ]
         if self.verdict != "poor":
-            found += self._poor_loops()
-        return (*found, *self.hints)
+            sentences += self._poor_loops()
+        return (*sentences, *self.hints)
 
     @property
     def hints(self) -> tuple[str, ...]:
         """Hints on errors of the measurement: a reversed sign, a delay."""
         backwards = [loop.name for loop in self.loops if loop.is_reversed]
         gives = [loop.name for loop in self.loops if loop.gives_energy and not loop.is_reversed]
-        found, count = [], len(self.loops)
+        hints, count = [], len(self.loops)
         if backwards:
-            found.append(
+            hints.append(
                 f"The {self.quantity} seems to have the wrong sign in {_named(backwards, count)}: "
                 "it pushes along with the motion, and no damper or rubber does. Reverse the sign "
                 "of one of the two columns."
             )
         if gives:
-            found.append(
+            hints.append(
                 f"The component gives energy in {_named(gives, count)}, and no damper or rubber "
                 f"does: the {self.quantity} lags the motion. Check the delay between the two "
                 "signals."
             )
-        return tuple(found)
+        return tuple(hints)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the judgement for JSON, in SI."""
@@ -214,12 +214,12 @@ def _named(names: Sequence[str], total: int) -> str:
 
 def judge(fit: Fit, motions: Sequence[MeasuredMotion]) -> Judgement:
     """Return the judgement of a fit to measured loops, in the order of its tests."""
-    found = []
+    loops = []
     for where, measured, amounts in zip(fit.problem.slices, motions, fit.baselines, strict=True):
         force = measured.loop.force - measured.baseline @ amounts
         in_phase, out_of_phase = _parts(measured, force)
         is_sine = isinstance(measured, HarmonicMotion)
-        found.append(
+        loops.append(
             LoopJudgement(
                 name=measured.loop.name,
                 force=float(rmse(force)),
@@ -234,7 +234,7 @@ def judge(fit: Fit, motions: Sequence[MeasuredMotion]) -> Judgement:
                 out_of_phase=out_of_phase,
             )
         )
-    return Judgement(tuple(found), "moment" if motions[0].loop.rotates else "force")
+    return Judgement(tuple(loops), "moment" if motions[0].loop.rotates else "force")
 
 
 def noise_of(phase: FloatArray, values: FloatArray) -> float:

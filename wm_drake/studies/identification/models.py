@@ -71,12 +71,25 @@ class ComponentModel:
     fixed: Mapping[str, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Given:
+    """What the user gives for a law.
+
+    Attributes:
+        bounds: Bounds of unknowns, by field, in place of the default ones. [SI]
+        fixed: Values that are known, by field. [SI]
+        knots: Points of each curve of the law on each side of zero.
+    """
+
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    knots: int = KNOTS
+
+
 def damper_model(
     law: str,
     motions: Sequence[MeasuredMotion],
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    fixed: Mapping[str, float] | None = None,
-    knots: int = KNOTS,
+    given: Given | None = None,
     kept: Mapping[str, float] | None = None,
     sponge_mass: float = 0.0,
 ) -> ComponentModel:
@@ -88,9 +101,7 @@ def damper_model(
     Args:
         law: As in a machine file.
         motions: Measured loops, for default bounds and for the stroke that a table must cover.
-        bounds: Bounds of unknowns, by field, in place of the default ones. [SI]
-        fixed: Values that are known, by field. [SI]
-        knots: Points of each curve of the law on each side of zero.
+        given: What the user gives.
         kept: Numbers of the component that stay as they are, unless they are fixed. [SI]
         sponge_mass: Mass of the sponge on the bench; all motions must be sines then. [kg]
 
@@ -101,24 +112,25 @@ def damper_model(
         raise input_error(
             f"no law '{law}' of a damper{nearest_names(law, DAMPER_LAWS)}", where="--law"
         )
+    given = given or Given()
     registered, scale = DAMPER_LAWS[law], scale_of(motions)
     if sponge_mass > 0.0:
         _check_sponge_mass(registered, motions)
-    tables = tuple(OddTable(curve, scale, knots) for curve in registered.curves)
+    tables = tuple(OddTable(curve, scale, given.knots) for curve in registered.curves)
     numbers_of_law = [name for name in registered.fields if name not in registered.curves]
-    check_names([*numbers_of_law, *_rises(tables)], bounds, fixed)
-    bounded = {name: own for name, own in (bounds or {}).items() if name in numbers_of_law}
+    check_names([*numbers_of_law, *_rises(tables)], given.bounds, given.fixed)
+    bounded = {name: ends for name, ends in given.bounds.items() if name in numbers_of_law}
     searched = {**registered.unknowns, **bounded}
-    known = {**(kept or {}), **(fixed or {})}
-    numbers = unknowns_of(searched, _units(registered), scale, bounds, known)
-    unknowns = (*numbers, *_free_rises(tables, bounds, fixed))
+    known = {**(kept or {}), **given.fixed}
+    numbers = unknowns_of(searched, _units(registered), scale, given.bounds, known)
+    unknowns = (*numbers, *_free_rises(tables, given))
     fields = _Fields({"law": law, **known}, unknowns, tables)
     return ComponentModel(
         law,
         unknowns,
         fields,
         lambda point: damper_bench(_damper(fields(point)), sponge_mass),
-        fixed or {},
+        given.fixed,
     )
 
 
@@ -159,25 +171,35 @@ def _damper(fields: dict[str, Any]) -> DamperNumbers:
         ) from None
 
 
+@dataclass(frozen=True)
+class TestedAxis:
+    """Axis of a bushing on the bench.
+
+    Attributes:
+        base: The bushing whose other axes stay as they are.
+        axis: One of `wm_drake.rigs.AXES`.
+        arm: Radius of the jig, where displacements and forces of its end were measured. [m]
+    """
+
+    __test__ = False  # not one of pytest's
+
+    base: BushingType
+    axis: str
+    arm: float = 0.0
+
+
 def bushing_model(
     law: str,
     motions: Sequence[MeasuredMotion],
-    base: BushingType,
-    axis: str,
-    *,
-    arm: float = 0.0,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    fixed: Mapping[str, float] | None = None,
-    knots: int = KNOTS,
+    tested: TestedAxis,
+    given: Given | None = None,
 ) -> ComponentModel:
     """Return one axis of a bushing with unknown numbers.
 
     Args:
         law: One of `BUSHING_LAWS`.
-        motions, bounds, fixed, knots: As for `damper_model`.
-        base: The bushing whose other axes stay as they are.
-        axis: One of `wm_drake.rigs.AXES`.
-        arm: Radius of the jig, where displacements and forces of its end were measured. [m]
+        motions, given: As for `damper_model`.
+        tested: The axis.
 
     Raises:
         InputError: There is no such law (or not along an axis), or no such field.
@@ -186,14 +208,15 @@ def bushing_model(
         raise input_error(
             f"no law '{law}' of a bushing{nearest_names(law, BUSHING_LAWS)}", where="--law"
         )
+    base, axis, given = tested.base, tested.axis, given or Given()
     about = axis.startswith("about")
     if law == "voigt_havsin" and not about:
         raise input_error(
             "voigt_havsin is a law about an axis; along one, take voigt or table", where="--law"
         )
-    scale, kinds = scale_of(motions, arm), _bushing_kinds(axis)
+    scale, kinds = scale_of(motions, tested.arm), _bushing_kinds(axis)
     stiffness = next(iter(kinds))
-    tables = (TwoSidedTable(stiffness, scale, knots, about),) if law == "table" else ()
+    tables = (TwoSidedTable(stiffness, scale, given.knots, about),) if law == "table" else ()
     if set(BUSHING_LAWS[law]) & _OF_RUBBER and not isinstance(base, RubberBushingType):
         raise input_error(
             f"law '{law}' has branches of rubber, which a bushing of a damper's tubes cannot have; "
@@ -202,14 +225,14 @@ def bushing_model(
         )
     names = list(kinds)
     searched = {names[k]: kinds[names[k]] for k in BUSHING_LAWS[law]}
-    check_names([*searched, *_rises(tables)], bounds, fixed)
+    check_names([*searched, *_rises(tables)], given.bounds, given.fixed)
     kinds_of_units = ABOUT if about else ALONG
     units = {name: kinds_of_units[kind] for name, kind in searched.items()}
-    numbers = unknowns_of(searched, units, scale, bounds, fixed)
-    unknowns = (*numbers, *_free_rises(tables, bounds, fixed))
-    known = {name: value for name, value in (fixed or {}).items() if name in searched}
+    numbers = unknowns_of(searched, units, scale, given.bounds, given.fixed)
+    unknowns = (*numbers, *_free_rises(tables, given))
+    known = {name: value for name, value in given.fixed.items() if name in searched}
     _check_fixed(base, {unknown.name: unknown.upper for unknown in numbers} | known)
-    fields = _Fields(fixed or {}, unknowns, tables)
+    fields = _Fields(given.fixed, unknowns, tables)
 
     def bench(point: FloatArray) -> Bench:
         kind = TorqueTable if about else ForceTable
@@ -217,9 +240,9 @@ def bushing_model(
             name: kind(**value) if isinstance(value, dict) else value
             for name, value in fields(point).items()
         }
-        return bushing_bench(base.model_copy(update=values), axis, arm)
+        return bushing_bench(base.model_copy(update=values), axis, tested.arm)
 
-    return ComponentModel(law, unknowns, fields, bench, fixed or {})
+    return ComponentModel(law, unknowns, fields, bench, given.fixed)
 
 
 def _check_fixed(base: BushingType, fixed: Mapping[str, float]) -> None:
@@ -266,22 +289,18 @@ class _Fields:
 
     def __call__(self, point: FloatArray) -> dict[str, Any]:
         named = {u.name: float(value) for u, value in zip(self.unknowns, point, strict=True)}
-        found = {**self.known, **named}
+        fields = {**self.known, **named}
         curves = {
-            table.name: table.curve(np.array([found.pop(rise.name) for rise in table.unknowns]))
+            table.name: table.curve(np.array([fields.pop(rise.name) for rise in table.unknowns]))
             for table in self.tables
         }
-        return {**found, **curves}
+        return {**fields, **curves}
 
 
-def _free_rises(
-    tables: tuple[OddTable | TwoSidedTable, ...],
-    bounds: Mapping[str, tuple[float, float]] | None,
-    fixed: Mapping[str, float] | None,
-) -> tuple[Unknown, ...]:
+def _free_rises(tables: tuple[OddTable | TwoSidedTable, ...], given: Given) -> tuple[Unknown, ...]:
     """Return the rises of tables that are not fixed, with the user's bounds where there are any."""
-    rises = with_bounds(_unknown_rises(tables), bounds)
-    return tuple(rise for rise in rises if rise.name not in (fixed or {}))
+    rises = with_bounds(_unknown_rises(tables), given.bounds)
+    return tuple(rise for rise in rises if rise.name not in given.fixed)
 
 
 def _unknown_rises(tables: tuple[OddTable | TwoSidedTable, ...]) -> tuple[Unknown, ...]:
@@ -309,18 +328,18 @@ def fields_of_law(law: str, axis: str = "") -> tuple[str, ...]:
     if not axis:
         return DAMPER_LAWS[law].fields
     kinds = list(_bushing_kinds(axis))
-    own = (kinds[k] for k in BUSHING_LAWS[law])
-    return (*own, *(kinds[:1] if law == "table" else ()))
+    numbers = (kinds[k] for k in BUSHING_LAWS[law])
+    return (*numbers, *(kinds[:1] if law == "table" else ()))
 
 
 def units_of_fields() -> dict[str, Unit]:
     """Return the unit of every number of a component that can be unknown or fixed."""
-    found = {name: unit for law in DAMPER_LAWS.values() for name, unit in _units(law).items()}
+    units = {name: unit for law in DAMPER_LAWS.values() for name, unit in _units(law).items()}
     for letter in "xyz":
         along, about = _bushing_kinds(letter), _bushing_kinds(f"about_{letter}")
-        found |= {name: ALONG[kind] for name, kind in along.items() if "friction" not in name}
-        found |= {name: ABOUT[kind] for name, kind in about.items()}
-    return found
+        units |= {name: ALONG[kind] for name, kind in along.items() if "friction" not in name}
+        units |= {name: ABOUT[kind] for name, kind in about.items()}
+    return units
 
 
 def unit_of_field(name: str) -> Unit | None:

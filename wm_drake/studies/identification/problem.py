@@ -45,7 +45,7 @@ def computed_forces(
     """Return the forces at the samples of all tests, at each point (k, n); NaN if not steady."""
     benches = [model.bench(point) for point in points]
     ends = np.cumsum([len(m.position) for m in motions])
-    found = np.empty((len(points), ends[-1]))
+    forces = np.empty((len(points), ends[-1]))
     sines = sines_of(motions)
     if sines:
         steady = _steady_forces(benches, sines)
@@ -53,11 +53,11 @@ def computed_forces(
     for motion, end in zip(motions, ends, strict=True):
         where = slice(end - len(motion.position), end)
         if isinstance(motion, HarmonicMotion):
-            found[:, where] = steady[:, begin : begin + len(motion.position)]
+            forces[:, where] = steady[:, begin : begin + len(motion.position)]
             begin += len(motion.position)
         elif isinstance(motion, RecordedMotion):
-            found[:, where] = [recorded_forces(bench, motion) for bench in benches]
-    return found
+            forces[:, where] = [recorded_forces(bench, motion) for bench in benches]
+    return forces
 
 
 def _steady_forces(benches: Sequence[Bench], motions: Sequence[HarmonicMotion]) -> FloatArray:
@@ -117,7 +117,7 @@ def _damper_forces(benches: Sequence[Bench], motions: Sequence[HarmonicMotion]) 
     for index, bench in enumerate(dampers):
         forces = []
         for number, m in enumerate(motions):
-            own = np.interp(m.phase, PHASE, deformation[index * len(motions) + number])
-            forces.append(damper_tensions(m.rate, own, bench.packed))
+            sponge = np.interp(m.phase, PHASE, deformation[index * len(motions) + number])
+            forces.append(damper_tensions(m.rate, sponge, bench.packed))
         rows.append(np.concatenate(forces))
     return np.array(rows)

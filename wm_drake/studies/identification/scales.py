@@ -96,8 +96,8 @@ def unknowns_of(
     searches: Mapping[str, Search],
     units: Mapping[str, Unit],
     scale: Scale,
-    bounds: Mapping[str, tuple[float, float]] | None,
-    fixed: Mapping[str, float] | None,
+    bounds: Mapping[str, tuple[float, float]],
+    fixed: Mapping[str, float],
 ) -> tuple[Unknown, ...]:
     """Return the unknowns of some fields.
 
@@ -108,27 +108,26 @@ def unknowns_of(
         bounds: Bounds that the user gives in place of the default ones. [SI]
         fixed: Fields that are no unknowns. [SI]
     """
-    found = []
+    unknowns = []
     for name, search in searches.items():
-        if name in (fixed or {}):
+        if name in fixed:
             continue
-        lower, upper, logarithmic = scale.bounds((bounds or {}).get(name, search))
-        found.append(Unknown(name, lower, upper, units[name], logarithmic=logarithmic))
-    return tuple(found)
+        lower, upper, logarithmic = scale.bounds(bounds.get(name, search))
+        unknowns.append(Unknown(name, lower, upper, units[name], logarithmic=logarithmic))
+    return tuple(unknowns)
 
 
 def with_bounds(
-    unknowns: tuple[Unknown, ...], bounds: Mapping[str, tuple[float, float]] | None
+    unknowns: tuple[Unknown, ...], bounds: Mapping[str, tuple[float, float]]
 ) -> tuple[Unknown, ...]:
     """Return the unknowns with the user's bounds where there are some."""
-    given = bounds or {}
-    return tuple(Unknown(u.name, *given.get(u.name, (u.lower, u.upper)), u.unit) for u in unknowns)
+    return tuple(Unknown(u.name, *bounds.get(u.name, (u.lower, u.upper)), u.unit) for u in unknowns)
 
 
 def check_names(
     known: list[str],
-    bounds: Mapping[str, tuple[float, float]] | None,
-    fixed: Mapping[str, float] | None,
+    bounds: Mapping[str, tuple[float, float]],
+    fixed: Mapping[str, float],
 ) -> None:
     """Check names of fields.
 
@@ -136,11 +135,11 @@ def check_names(
         InputError: No field has the name, or it has bounds and is fixed.
     """
     for option, given in (("--bounds", bounds), ("--fix", fixed)):
-        for name in given or {}:
+        for name in given:
             if name not in known:
                 raise input_error(
                     f"unknown number '{name}'{nearest_names(name, known)}", where=option
                 )
     for name in fixed or {}:
-        if name in (bounds or {}):
+        if name in bounds:
             raise input_error(f"'{name}' has bounds and is fixed", where="--fix")

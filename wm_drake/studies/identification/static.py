@@ -196,7 +196,7 @@ def _signal(loop: MeasuredLoop) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _turning_points(position: FloatArray, threshold: float) -> list[int]:
     """Return the indices of the ends of a motion and of its reversals by more than a threshold."""
-    found, extreme, rises = [0], 0, 0
+    turns, extreme, rises = [0], 0, 0
     for index in range(1, len(position)):
         moved = position[index] - position[extreme]
         if rises == 0:
@@ -205,9 +205,9 @@ def _turning_points(position: FloatArray, threshold: float) -> list[int]:
         elif moved * rises > 0.0:
             extreme = index
         elif -moved * rises > threshold:
-            found.append(extreme)
+            turns.append(extreme)
             rises, extreme = -rises, index
-    return [*found, extreme] if extreme != found[-1] else found
+    return [*turns, extreme] if extreme != turns[-1] else turns
 
 
 def _branch(places: FloatArray, position: FloatArray, force: FloatArray) -> FloatArray:
@@ -220,7 +220,7 @@ def _branch(places: FloatArray, position: FloatArray, force: FloatArray) -> Floa
     order = np.argsort(position, kind="stable")
     x, y = position[order], force[order]
     step = float(np.min(np.diff(places))) if len(places) > 1 else abs(way)
-    found = np.full(len(places), np.nan)
+    forces = np.full(len(places), np.nan)
     for index, place in enumerate(places):
         part = (place - begin) / way
         if not DEVELOPED <= part <= 1.0 + 1e-6:
@@ -228,10 +228,10 @@ def _branch(places: FloatArray, position: FloatArray, force: FloatArray) -> Floa
         near = slice(*np.searchsorted(x, [place - step, place + step]))
         if len(x[near]) >= 4 and np.ptp(x[near]) > 0.5 * step:
             slope, level = np.polyfit(x[near] - place, y[near], 1)
-            found[index] = level if np.isfinite(slope) else np.nan
+            forces[index] = level if np.isfinite(slope) else np.nan
         else:
-            found[index] = float(np.interp(place, x, y))
-    return found
+            forces[index] = float(np.interp(place, x, y))
+    return forces
 
 
 def _mean(branches: list[FloatArray]) -> FloatArray:
@@ -244,8 +244,8 @@ def _mean(branches: list[FloatArray]) -> FloatArray:
 
 def _never_falling(places: FloatArray, force: FloatArray) -> FloatArray:
     """Return a curve that does not fall on its way out from zero."""
-    found = force.copy()
+    curve = force.copy()
     zero = int(np.argmin(np.abs(places)))
-    found[zero:] = np.maximum.accumulate(force[zero:])
-    found[: zero + 1] = np.minimum.accumulate(force[: zero + 1][::-1])[::-1]
-    return found
+    curve[zero:] = np.maximum.accumulate(force[zero:])
+    curve[: zero + 1] = np.minimum.accumulate(force[: zero + 1][::-1])[::-1]
+    return curve

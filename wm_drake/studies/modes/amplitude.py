@@ -188,10 +188,10 @@ def _follow(
     size = float(np.sqrt(np.sum(free.weights * motion**2)))
     motion[1:3] *= amplitude / size
     here = free.solve(motion, float(abs(value)), float(-value.real), amplitude)
-    found: list[tuple[float, FloatArray, float, float]] = []
+    points: list[tuple[float, FloatArray, float, float]] = []
     factor, before = FIRST_FACTOR, None
     while here is not None:
-        found.append((amplitude, *here))
+        points.append((amplitude, *here))
         target = next((a for a in amplitudes if a > amplitude * (1.0 + 1e-9)), None)
         if target is None:
             break
@@ -205,12 +205,12 @@ def _follow(
             break
         before, here, amplitude = (amplitude, here), moved, ahead
         factor = min(factor * 1.3, 2.0)
-    shapes = [_shape(coefficients, amplitude) for amplitude, coefficients, _, _ in found]
+    shapes = [_shape(coefficients, amplitude) for amplitude, coefficients, _, _ in points]
     return AmplitudeMode(
         name,
-        np.array([entry[0] for entry in found]),
-        np.array([entry[2] for entry in found]) / (2.0 * np.pi),
-        np.array([entry[3] / entry[2] for entry in found]),
+        np.array([entry[0] for entry in points]),
+        np.array([entry[2] for entry in points]) / (2.0 * np.pi),
+        np.array([entry[3] / entry[2] for entry in points]),
         np.array(shapes).reshape(-1, 6),
     )
 

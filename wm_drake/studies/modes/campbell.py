@@ -105,16 +105,16 @@ def _joined(
     """Return the same modes at the next speed, and the least MAC on the way of each."""
     there = spectrum_at(after)
     table = mac(here, there)
-    modes, found = linear_sum_assignment(-table)
-    sizes = table[modes, found]
-    if len(found) == len(here.values) and (sizes.min() >= CLEAR_MAC or not halvings):
-        chosen = Spectrum(there.values[found], there.right[:, found], there.left[found])
+    modes, partners = linear_sum_assignment(-table)
+    sizes = table[modes, partners]
+    if len(partners) == len(here.values) and (sizes.min() >= CLEAR_MAC or not halvings):
+        chosen = Spectrum(there.values[partners], there.right[:, partners], there.left[partners])
         return chosen, sizes
     if not halvings:  # a mode has become overdamped: it ends here
         lost = np.setdiff1d(np.arange(len(here.values)), modes)
         values, right, left = here.values.copy(), here.right.copy(), here.left.copy()
-        values[modes] = there.values[found]
-        right[:, modes], left[modes] = there.right[:, found], there.left[found]
+        values[modes] = there.values[partners]
+        right[:, modes], left[modes] = there.right[:, partners], there.left[partners]
         values[lost] = np.nan
         every = np.zeros(len(values))
         every[modes] = sizes
@@ -134,7 +134,7 @@ def critical_speeds(
     """
     from scipy.interpolate import CubicSpline
 
-    found = []
+    crossings = []
     for order in orders:
         for mode, values in enumerate(diagram.value.T):
             excess = np.abs(values) - order * diagram.speed
@@ -144,9 +144,9 @@ def critical_speeds(
             speeds = diagram.speed[good]
             curve = CubicSpline(speeds, excess[good])
             ratio = CubicSpline(speeds, diagram.damping_ratio[good, mode])
-            found += [
+            crossings += [
                 CriticalSpeed(order, mode, float(speed), float(ratio(speed)))
                 for speed in curve.roots(extrapolate=False)
                 if speed > 0.0
             ]
-    return sorted(found, key=lambda critical: critical.speed)
+    return sorted(crossings, key=lambda critical: critical.speed)

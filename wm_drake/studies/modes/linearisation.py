@@ -15,6 +15,7 @@ import numpy as np
 from pydrake.systems.framework import InputPortSelection, OutputPortSelection
 from pydrake.systems.primitives import Linearize
 
+from wm_drake.elements.rubber import FRICTION, MAXWELL
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE
 from wm_drake.engines.compiled.slopes import SlopedDerivative
 from wm_drake.model.machine import Machine, Setup
@@ -70,8 +71,8 @@ def spectrum_of(matrix: FloatArray) -> Spectrum:
     """Return the oscillating eigenvalues of a matrix."""
     values, vectors = np.linalg.eig(matrix)
     left = np.linalg.pinv(vectors) if _is_defective(vectors) else np.linalg.inv(vectors)
-    found = np.flatnonzero(values.imag > max(SLOWEST, 1e-6 * np.abs(values).max()))
-    order = found[np.argsort(np.abs(values[found]))]
+    oscillating = np.flatnonzero(values.imag > max(SLOWEST, 1e-6 * np.abs(values).max()))
+    order = oscillating[np.argsort(np.abs(values[oscillating]))]
     return Spectrum(values[order], vectors[:, order], left[order])
 
 
@@ -104,8 +105,9 @@ class Linearisation:
             setup.dampers,
             setup.bushings,
             setup.telescopes,
+            setup.elements.others,
         )
-        words = ("spring", "damper", "bushing", "damper")
+        words = ("spring", "damper", "bushing", "damper", "element")
         self.names = [
             name if name == "gasket" else f"{word} {name}"
             for word, kind in zip(words, kinds, strict=True)
@@ -145,7 +147,7 @@ class Linearisation:
         """
         self._equilibrium = self.derivative.rest
         free, still = self.derivative.free, ~self.derivative.is_velocity
-        still &= free < self.derivative.layout.branches_begin
+        still &= ~np.isin(free, self.derivative.layout.states.indices(FRICTION, MAXWELL))
         for _ in range(20):
             states = self._revolution(0.0)
             rates = self.derivative(states).mean(axis=0)[free]

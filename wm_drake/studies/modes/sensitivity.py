@@ -10,15 +10,15 @@ preloads and rest pose follow.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from wm_drake.errors import InputError
-from wm_drake.parameters import MachineParameters, with_value
+from wm_drake.parameters import Change, MachineParameters, with_value
 from wm_drake.parameters.keys import quantities
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
+from wm_drake.parameters.variation import Number
 from wm_drake.studies.modes.linearisation import Spectrum
 
 RELATIVE_STEP = 1e-3
@@ -71,9 +71,9 @@ def sensitivities(
         loads: Whether the matrix depends on a load.
         progress: Called after each number.
     """
-    found = []
-    for key, value, unit in numbers_of(parameters, loads):
-        slope, per_unit = _slope(parameters, key, value, unit, matrix_of)
+    sensitive = []
+    for number in numbers_of(parameters, loads):
+        slope = _slope(parameters, number, matrix_of)
         progress()
         if slope is None:
             continue
@@ -81,47 +81,44 @@ def sensitivities(
         size = np.abs(spectrum.values)
         relative = np.real(np.conj(spectrum.values) * change) / size**2
         damping = -change.real / size + spectrum.values.real * relative / size
-        number = np.nan if isinstance(value, tuple) else float(value)
-        found.append(Sensitivity(key, number, unit, relative, damping, per_unit))
-    return found
+        value = np.nan if isinstance(number.original, tuple) else float(number.nominal or 0.0)
+        sensitive.append(
+            Sensitivity(number.key, value, number.unit, relative, damping, per_unit=value == 0.0)
+        )
+    return sensitive
 
 
-def numbers_of(parameters: MachineParameters, loads: bool) -> Iterator[tuple[str, Any, Unit]]:
-    """Yield key, value and unit of every number that a linearisation may depend on."""
+def numbers_of(parameters: MachineParameters, loads: bool) -> Iterator[Number]:
+    """Yield every number, or column of a table, that a linearisation may depend on."""
     for key, value, unit in quantities(parameters):
         group = key.split(".")[0]
         if group in SKIPPED or (group == "loads" and not loads):
             continue
         if isinstance(value, tuple) and not any(value):
             continue
-        yield key, value, unit
+        yield Number(key, value, unit)
 
 
 def _slope(
     parameters: MachineParameters,
-    key: str,
-    value: Any,
-    unit: Unit,
+    number: Number,
     matrix_of: Callable[[MachineParameters], FloatArray],
-) -> tuple[FloatArray | None, bool]:
-    """Return dA per relative change of a number, and False; dA per display unit and True for 0."""
+) -> FloatArray | None:
+    """Return dA per relative change of a number; of a zero, dA per display unit.
 
-    def at(factor: float, shift: float) -> FloatArray:
-        moved = (
-            tuple(factor * number for number in value)
-            if isinstance(value, tuple)
-            else factor * value + shift
-        )
-        return matrix_of(with_value(parameters, key, moved))
+    Returns:
+        None if the number cannot be changed, or is of a branch of rubber that is not in use.
+    """
+
+    def at(change: Change, value: float) -> FloatArray:
+        return matrix_of(with_value(parameters, number.key, number.changed(change, value)))
 
     try:
-        if value == 0.0:
-            step = STEP_OF_ZERO / unit.from_si(1.0)
-            moved, plain = at(1.0, step), at(1.0, 0.0)
-            if moved.shape != plain.shape:  # a branch of rubber that is not in use
-                return None, False
-            return (moved - plain) / STEP_OF_ZERO, True
-        both = at(1.0 + RELATIVE_STEP, 0.0) - at(1.0 - RELATIVE_STEP, 0.0)
-        return both / (2.0 * RELATIVE_STEP), False
+        if number.original == 0.0:
+            step = STEP_OF_ZERO / number.unit.from_si(1.0)
+            moved, plain = at(Change.DISTANCE, step), at(Change.DISTANCE, 0.0)
+            return (moved - plain) / STEP_OF_ZERO if moved.shape == plain.shape else None
+        ends = [at(Change.PERCENT, 1.0 + sign * RELATIVE_STEP) for sign in (1.0, -1.0)]
+        return (ends[0] - ends[1]) / (2.0 * RELATIVE_STEP)
     except InputError:
-        return None, False
+        return None

@@ -115,8 +115,8 @@ def names_of(shares: FloatArray) -> list[str]:
     """
     modes, coordinates = linear_sum_assignment(-shares)
     words = [NAMES[coordinate] for coordinate in COORDINATES]
-    found = {int(mode): words[c] for mode, c in zip(modes, coordinates, strict=True)}
-    return [found.get(mode, "other") for mode in range(len(shares))]
+    names = {int(mode): words[c] for mode, c in zip(modes, coordinates, strict=True)}
+    return [names.get(mode, "other") for mode in range(len(shares))]
 
 
 def energies(

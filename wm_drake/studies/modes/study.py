@@ -172,21 +172,21 @@ def three_linearisations(
     numbers = parameters or machine.parameters
     check_fixed_cabinet(numbers)
     with threadpool_limits(1, "blas"):  # the matrices are small: several threads would be slower
-        found = {}
+        natural = {}
         for name, friction in ((SLIDING, False), (STUCK, True)):
             setup = machine.set_up(load, parameters=numbers, gasket=gasket, friction=friction)
             linear = Linearisation(setup, loaded=True)
             spectrum = linear.spectrum().first(MODES)
-            found[name] = modes_of(spectrum, linear.wrench_slopes())
+            natural[name] = modes_of(spectrum, linear.wrench_slopes())
         # the last setup is the one with friction
-        names = [mode.name for mode in found[STUCK]]
+        names = [mode.name for mode in natural[STUCK]]
         if numbers.telescopic_dampers:
             values = [AmplitudeValue(name, None, None) for name in names]
         else:
-            over = amplitude_modes(setup, spectrum, found[STUCK], np.array([amplitude]))
+            over = amplitude_modes(setup, spectrum, natural[STUCK], np.array([amplitude]))
             values = _values_at(over, amplitude)
     return NaturalModes(
-        numbers, load if isinstance(load, str) else "given", found, amplitude, values
+        numbers, load if isinstance(load, str) else "given", natural, amplitude, values
     )
 
 
@@ -208,11 +208,11 @@ def _modes(
         SLIDING: _linearisation(machine, load, gasket, friction=False),
     }
     spectra = {name: one.spectrum().first(MODES) for name, one in linear.items()}
-    found = {name: modes_of(spectra[name], one.wrench_slopes()) for name, one in linear.items()}
+    natural = {name: modes_of(spectra[name], one.wrench_slopes()) for name, one in linear.items()}
     progress(0.1)
     setup = machine.set_up(load, gasket=gasket)
     amplitudes = np.union1d(AMPLITUDES, amplitude)
-    over = amplitude_modes(setup, spectra[STUCK], found[STUCK], amplitudes)
+    over = amplitude_modes(setup, spectra[STUCK], natural[STUCK], amplitudes)
     progress(0.3)
     last = SPEEDS_RPM[1] * max(parameters.profile.speed)
     speeds = np.linspace(SPEEDS_RPM[0] * np.pi / 30.0, last, int(SPEEDS_RPM[2]))
@@ -232,7 +232,7 @@ def _modes(
         load if isinstance(load, str) else "" if load is None else "given",
         gasket,
         linear[STUCK].names,
-        found,
+        natural,
         amplitude,
         _values_at(over, amplitude),
         over,

@@ -10,7 +10,7 @@ import numpy as np
 from wm_drake.model.machine import OUTPUT_PERIOD
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.measures import envelopes
+from wm_drake.simulation.displacements import envelopes
 from wm_drake.simulation.records import Record
 from wm_drake.studies.pareto.study import ParetoFront
 
@@ -48,20 +48,20 @@ def front_envelopes(front: ParetoFront, histories: Histories) -> Envelopes:
         histories: Function that runs cases.
     """
     designs = front.designs
-    points = [*front.found.designs, designs.nominal()]
+    points = [*front.search.designs, designs.nominal()]
     runs = [designs.shown_runs(designs.machine_at(p), f"{i}") for i, p in enumerate(points, 1)]
     owners = [number for number, cases in enumerate(runs) for _ in cases]
     sensors = tuple(designs.parameters.sensors)
-    found = np.full((len(points), len(sensors), INTERVALS), np.nan)
+    largest = np.full((len(points), len(sensors), INTERVALS), np.nan)
     duration = max(case.profile.duration for cases in runs for case in cases)
 
     def add(number: int, record: Record) -> None:
-        own = owners[number]
-        found[own] = np.fmax(found[own], envelope_of(record, duration))
+        owner = owners[number]
+        largest[owner] = np.fmax(largest[owner], envelope_of(record, duration))
 
     histories([case for cases in runs for case in cases], add)
     time = (np.arange(INTERVALS) + 0.5) * duration / INTERVALS
-    return Envelopes(time, sensors, found[:-1], found[-1], designs.shown)
+    return Envelopes(time, sensors, largest[:-1], largest[-1], designs.shown)
 
 
 def envelope_of(record: Record, duration: float) -> FloatArray:
@@ -71,8 +71,8 @@ def envelope_of(record: Record, duration: float) -> FloatArray:
         record: Record of a run.
         duration: Duration that is divided into `INTERVALS`. [s]
     """
-    found = envelopes(record)
-    size = np.maximum(np.abs(found.upper.values), np.abs(found.lower.values))
+    sensors = envelopes(record)
+    size = np.maximum(np.abs(sensors.upper.values), np.abs(sensors.lower.values))
     answer = np.full((size.shape[1], INTERVALS), np.nan)
     per_interval = duration / OUTPUT_PERIOD / INTERVALS
     ends = np.round(np.arange(INTERVALS + 1) * per_interval).astype(int)

@@ -8,64 +8,86 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.errors import InputError, Problem, input_error
-from wm_drake.parameters import ForceTable, MachineParameters, TorqueTable, quantities, with_values
-from wm_drake.parameters.designs import Constraint, DesignTask, DesignVariable, Objective
-from wm_drake.parameters.factors import nominal_at, scaled_table, value_at
-from wm_drake.parameters.tolerances import Spread, fraction
+from wm_drake.parameters import MachineParameters, Variation, quantities, variation_of, with_values
+from wm_drake.parameters.designs import Constraint, DesignTask, Objective
+from wm_drake.parameters.tolerances import fraction
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
+from wm_drake.parameters.variation import value_at
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.gasket.responses import Response, chosen_responses
-from wm_drake.studies.tolerance.study import in_unit_of
-from wm_drake.studies.tolerance.variables import DISTANCE, PERCENT, UncertainMachine, marginal_of
+from wm_drake.simulation.measures.responses import Response, chosen_responses
+from wm_drake.studies.tolerance.variables import UncertainMachine
 
 Run: TypeAlias = Callable[[Iterable[Case]], xr.Dataset]
 """Function that runs cases and returns their table."""
 
 
 @dataclass(frozen=True)
-class Dimension:
-    """A variable, or a choice among options.
+class Range:
+    """A design variable: a variation with a range.
 
     Attributes:
-        name: Name in the design file.
-        keys: Key paths that a variable sets.
-        form: PERCENT, VALUE or DISTANCE of a variable.
-        low, high: Bounds of a variable. [1 for PERCENT, else SI]
-        unit: Unit of a variable; None if it has none.
-        options: Values by key path, by name of the option; empty for a variable.
+        variation: What it changes.
+        low, high: Bounds. [1 for percent, else SI]
     """
 
-    name: str
-    keys: tuple[str, ...]
-    form: str
+    variation: Variation
     low: float
     high: float
-    unit: Unit | None
-    options: dict[str, dict[str, str]]
 
-    def option(self, place: float) -> str:
-        """Return the option at a place from 0 to 1."""
-        names = list(self.options)
-        return names[min(int(place * len(names)), len(names) - 1)]
+    @property
+    def name(self) -> str:
+        """Name in the design file."""
+        return self.variation.name
 
-    def number(self, place: float) -> float:
-        """Return the number of a variable at a place from 0 to 1. [1 for PERCENT, else SI]"""
-        return self.low + place * (self.high - self.low)
+    @property
+    def nominal(self) -> float:
+        """Place from 0 to 1 nearest to the machine itself."""
+        place = (self.variation.nominal - self.low) / (self.high - self.low)
+        return float(np.clip(place, 0.0, 1.0))
 
-    def place(self, number: float) -> float:
-        """Return the place of a number, moved to the nearest bound if it is outside."""
-        return float(np.clip((number - self.low) / (self.high - self.low), 0.0, 1.0))
+    def changes(self, place: float) -> dict[str, Any]:
+        """Return new values of the machine by key path, at a place from 0 to 1."""
+        return self.variation.changes(self.number(place))
 
     def shown(self, place: float) -> tuple[float | str, str]:
         """Return value and unit for reading."""
-        if self.options:
-            return self.option(place), ""
-        if self.form == PERCENT:
-            return 100.0 * self.number(place), "%"
-        unit = self.unit
-        number = self.number(place)
-        return (number, "") if unit is None else (unit.from_si(number), unit.shown)
+        unit = self.variation.unit
+        return unit.from_si(self.number(place)), unit.shown
+
+    def number(self, place: float) -> float:
+        """Return the value of the variation at a place from 0 to 1. [1 for percent, else SI]"""
+        return self.low + place * (self.high - self.low)
+
+
+@dataclass(frozen=True)
+class Options:
+    """A choice among options.
+
+    Attributes:
+        name: Name in the design file.
+        options: Values by key path, by name of the option.
+    """
+
+    name: str
+    options: dict[str, dict[str, str]]
+
+    @property
+    def nominal(self) -> float:
+        """Place of the first option."""
+        return 0.5 / len(self.options)
+
+    def changes(self, place: float) -> dict[str, Any]:
+        """Return new values of the machine by key path, at a place from 0 to 1."""
+        return self.options[self._option(place)]
+
+    def shown(self, place: float) -> tuple[float | str, str]:
+        """Return the name of an option, without a unit."""
+        return self._option(place), ""
+
+    def _option(self, place: float) -> str:
+        names = list(self.options)
+        return names[min(int(place * len(names)), len(names) - 1)]
 
 
 @dataclass(frozen=True)
@@ -125,7 +147,7 @@ class MachineDesigns:
     """
 
     parameters: MachineParameters
-    dimensions: tuple[Dimension, ...]
+    dimensions: tuple[Range | Options, ...]
     objectives: tuple[Goal, ...]
     constraints: tuple[Goal, ...]
     cases: tuple[Case, ...]
@@ -144,8 +166,8 @@ class MachineDesigns:
     @property
     def responses(self) -> tuple[Response, ...]:
         """Responses that the goals need."""
-        found = [g.response for g in self.goals if g.response]
-        return tuple(dict.fromkeys(found))
+        responses = [g.response for g in self.goals if g.response]
+        return tuple(dict.fromkeys(responses))
 
     @property
     def scenarios(self) -> int:
@@ -160,46 +182,26 @@ class MachineDesigns:
         """
         changes: dict[str, Any] = {}
         for dimension, place in zip(self.dimensions, map(float, design), strict=True):
-            if dimension.options:
-                changes |= dimension.options[dimension.option(place)]
-                continue
-            for key in dimension.keys:
-                nominal, number = value_at(self.parameters, key), dimension.number(place)
-                if dimension.form == PERCENT and isinstance(nominal, ForceTable | TorqueTable):
-                    changes[key] = scaled_table(nominal, number)
-                elif dimension.form == PERCENT:
-                    changes[key] = nominal * number
-                else:
-                    changes[key] = nominal + number if dimension.form == DISTANCE else number
+            changes |= dimension.changes(place)
         return with_values(self.parameters, changes)
 
     def nominal(self) -> FloatArray:
         """Return the design nearest to the machine itself; choices have their first option."""
-        places = []
-        for dimension in self.dimensions:
-            if dimension.options:
-                places.append(0.5 / len(dimension.options))
-            elif dimension.form == PERCENT:
-                places.append(dimension.place(1.0))
-            elif dimension.form == DISTANCE:
-                places.append(dimension.place(0.0))
-            else:
-                places.append(dimension.place(float(value_at(self.parameters, dimension.keys[0]))))
-        return np.array(places)
+        return np.array([dimension.nominal for dimension in self.dimensions])
 
     def runs_of(self, parameters: MachineParameters, name: str) -> list[Case]:
         """Return the cases of a design."""
         if self.scattered is not None and self.scores is not None:
             cases = self.scattered(parameters).cases(self.scores)
             return [replace(case, name=f"{name}, {case.name}") for case in cases]
-        found = []
+        runs = []
         for case in self.cases:
             # a variable may be a mass of one of the machine's own loads
-            is_own = self.parameters.loads.get(case.name) == case.load
-            load = parameters.loads[case.name] if is_own else case.load
-            own = replace(case, name=f"{name}, {case.name}", load=load, parameters=parameters)
-            found.append(own)
-        return found
+            is_of_machine = self.parameters.loads.get(case.name) == case.load
+            load = parameters.loads[case.name] if is_of_machine else case.load
+            changed = replace(case, name=f"{name}, {case.name}", load=load, parameters=parameters)
+            runs.append(changed)
+        return runs
 
     @property
     def shown(self) -> str:
@@ -249,15 +251,15 @@ class MachineDesigns:
             ]
         )
         failed = table.diverged.values != ""
-        found: list[FloatArray] = []
+        by_goal: list[FloatArray] = []
         for goal in self.goals:
             if goal.response is None:
-                own = [goal.unit.from_si(value_at(m, goal.given.quantity)) for m in machines]
-                values: FloatArray = np.repeat(np.array(own), self.scenarios)
+                numbers = [goal.unit.from_si(value_at(m, goal.given.quantity)) for m in machines]
+                values: FloatArray = np.repeat(np.array(numbers), self.scenarios)
             else:
                 values = goal.response.values(table)
-            found.append(np.where(failed, np.nan, values).reshape(len(designs), -1))
-        return found
+            by_goal.append(np.where(failed, np.nan, values).reshape(len(designs), -1))
+        return by_goal
 
     def costs(self, designs: FloatArray, run: Run) -> tuple[FloatArray, FloatArray]:
         """Return what the search makes small, and constraints that are met at 0 and below."""
@@ -290,10 +292,10 @@ def machine_designs(
     dimensions, problems = _dimensions(parameters, task)
     goals: dict[str, list[Goal]] = {"objectives": [], "constraints": []}
     known = {key: (value, unit) for key, value, unit in quantities(parameters)}
-    for kind, found in goals.items():
+    for kind, listed in goals.items():
         for place, given in enumerate(getattr(task, kind)):
             try:
-                found.append(_goal(parameters, cases[0], given, known))
+                listed.append(_goal(parameters, cases[0], given, known))
             except InputError as error:
                 problems += [Problem("", f"{kind}.{place}", p.message) for p in error.problems]
     if problems:
@@ -311,16 +313,20 @@ def machine_designs(
 
 def _dimensions(
     parameters: MachineParameters, task: DesignTask
-) -> tuple[list[Dimension], list[Problem]]:
+) -> tuple[list[Range | Options], list[Problem]]:
     """Return the variables and choices of a file, and what is wrong with them."""
-    dimensions, problems = list[Dimension](), list[Problem]()
-    for name, variable in task.variables.items():
+    dimensions, problems = list[Range | Options](), list[Problem]()
+    for name, given in task.variables.items():
+        texts = {"low": given.low, "high": given.high}
         try:
-            dimensions.append(_variable(parameters, name, variable))
+            variation, ends = variation_of(parameters, name, given.keys, texts, given.about)
+            if not ends["low"] < ends["high"]:
+                raise input_error("low must be below high", key=given.keys[-1])
+            dimensions.append(Range(variation, **ends))
         except InputError as error:
             problems += [Problem(f"variable {name}", p.key, p.message) for p in error.problems]
     for name, choice in task.choices.items():
-        dimensions.append(Dimension(name, (), "", 0.0, 1.0, None, choice.options))
+        dimensions.append(Options(name, choice.options))
         for option, values in choice.options.items():
             try:
                 with_values(parameters, values)
@@ -330,28 +336,13 @@ def _dimensions(
     return dimensions, problems
 
 
-def _variable(parameters: MachineParameters, name: str, variable: DesignVariable) -> Dimension:
-    known = {key: (value, unit) for key, value, unit in quantities(parameters)}
-    spread = Spread(distribution="uniform", low=variable.low, high=variable.high)
-    units = []
-    for key in variable.keys:
-        number, unit = nominal_at(parameters, known, key)
-        form, marginal = marginal_of(spread, unit, number, key)
-        is_table = isinstance(value_at(parameters, key), ForceTable | TorqueTable)
-        if is_table and form != PERCENT:
-            raise input_error("is a table; give its bounds in percent", key=key)
-        units.append(unit)
-    low, high = (float(v) for v in marginal.frozen.support())
-    return Dimension(name, variable.keys, form, low, high, units[0], {})
-
-
 def _goal(
     parameters: MachineParameters,
     case: Case,
     given: Objective | Constraint,
     known: dict[str, tuple[Any, Unit]],
 ) -> Goal:
-    limit_text = None if isinstance(given, Objective) else given.at_least or given.at_most
+    limit_text = None if isinstance(given, Objective) else given.text
     response, unit = None, Unit("", "")
     if given.quantity in known:
         value, unit = known[given.quantity]
@@ -364,5 +355,8 @@ def _goal(
             raise input_error(f"'{given.quantity}' is several responses; name one of {names}")
         (response,) = chosen
         unit = response.unit
-    limit = in_unit_of(limit_text, unit) if limit_text is not None else float("nan")
+    try:
+        limit = float("nan") if limit_text is None else unit.from_si(unit.number(limit_text))
+    except ValueError as error:
+        raise input_error(str(error)) from None
     return Goal(given, response, unit, limit)

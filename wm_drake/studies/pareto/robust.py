@@ -52,19 +52,19 @@ def promises(front: ParetoFront, run: Run, seed: int) -> list[Promise]:
     if scores is None or not front.chosen:
         return []
     numbers = sorted(set(front.chosen.values()))
-    points = front.found.designs[numbers]
+    points = front.search.designs[numbers]
     count, size = scores.shape
     fresh, _ = base_samples(size, FRESH * count, seed + OTHER_SEED)
     before = designs.scenario_values(points, run)
     after = designs.with_scores(fresh).scenario_values(points, run)
-    found = []
+    promises = []
     for name, number in front.chosen.items():
         row = numbers.index(number)
         for goal, old, new in zip(designs.goals, before, after, strict=True):
             if goal.response is not None:
                 promised, kept = summary_of(goal, old[row]), summary_of(goal, new[row])
-                found.append(Promise(name, goal, promised, kept, _is_kept(goal, promised, kept)))
-    return found
+                promises.append(Promise(name, goal, promised, kept, _is_kept(goal, promised, kept)))
+    return promises
 
 
 def _is_kept(goal: Goal, promised: Percentile, fresh: Percentile) -> bool | None:
@@ -93,5 +93,5 @@ def summary_of(goal: Goal, values: FloatArray) -> Percentile:
         width = quantile * float(np.std(values, ddof=1)) / np.sqrt(len(values))
         return Percentile(value, value - width, value + width)
     share = fraction(how, "over")
-    found = percentile_of(values, 100.0 * (share if goal.is_small_better else 1.0 - share))
-    return Percentile(value, found.lower, found.upper)
+    estimate = percentile_of(values, 100.0 * (share if goal.is_small_better else 1.0 - share))
+    return Percentile(value, estimate.lower, estimate.upper)

@@ -20,7 +20,7 @@ UNUSABLE = 1e12
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """What a search found.
 
     Attributes:
@@ -88,8 +88,7 @@ def search_front(
     evaluations: int = 2000,
     population: int = 64,
     seed: int = 0,
-    generation: Callable[[int], None] = lambda done: None,
-) -> Found:
+) -> SearchResult:
     """Return the Pareto front of a problem.
 
     With up to two objectives the search is NSGA-II, with more NSGA-III. The first population is the
@@ -103,7 +102,6 @@ def search_front(
         evaluations: Number of designs to evaluate, at least one population.
         population: Designs of a generation.
         seed: Of all random numbers.
-        generation: Called with the number of evaluated designs after each generation.
 
     Raises:
         InputError: there are fewer evaluations than designs of a generation.
@@ -121,7 +119,6 @@ def search_front(
         if not first:
             first.append(f)
         done += len(x)
-        generation(done)
         return f, g
 
     def note(algorithm: Any) -> None:
@@ -134,13 +131,13 @@ def search_front(
     result = minimized(usable_only, points, objectives, constraints, until, population, seed, note)
     if result.F is None:
         empty = np.empty((0, size)), np.empty((0, objectives)), np.empty((0, constraints))
-        return Found(*empty, done, first[0], tuple(history))
+        return SearchResult(*empty, done, first[0], tuple(history))
     x, f = np.atleast_2d(result.X), np.reshape(result.F, (-1, objectives))
     g = np.reshape(result.G, (len(f), -1)) if constraints else np.empty((len(f), 0))
     usable = np.all(f < UNUSABLE, axis=1)
     x, f, g = x[usable], f[usable], g[usable]
     order = np.lexsort(f.T[::-1])
-    return Found(x[order], f[order], g[order], done, first[0], tuple(history))
+    return SearchResult(x[order], f[order], g[order], done, first[0], tuple(history))
 
 
 def first_population(start: FloatArray, population: int, seed: int) -> FloatArray:

@@ -1,6 +1,5 @@
 """The design study: search, front in units for reading, chosen designs, check of robust designs."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +7,7 @@ import numpy as np
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.pareto.problem import Goal, MachineDesigns, Run
-from wm_drake.studies.pareto.search import Found, search_front
+from wm_drake.studies.pareto.search import SearchResult, search_front
 from wm_drake.studies.pareto.surrogate import search_with_surfaces
 
 SEARCHES = {"genetic": search_front, "surfaces": search_with_surfaces}
@@ -24,7 +23,7 @@ class ParetoFront:
 
     Attributes:
         designs: The designs that were searched.
-        found: Result of the search.
+        search: Result of the search.
         objectives, constraints: Values of the front, in units for reading. (n, m) and (n, k)
         nominal_objectives, nominal_constraints: Those of the machine itself, moved into the
             bounds. (m,) and (k,)
@@ -32,7 +31,7 @@ class ParetoFront:
     """
 
     designs: MachineDesigns
-    found: Found
+    search: SearchResult
     objectives: FloatArray
     constraints: FloatArray
     nominal_objectives: FloatArray
@@ -41,7 +40,7 @@ class ParetoFront:
 
     def machine(self, number: int) -> MachineParameters:
         """Return the machine of a design of the front."""
-        return self.designs.machine_at(self.found.designs[number])
+        return self.designs.machine_at(self.search.designs[number])
 
 
 def run_designs(
@@ -52,17 +51,16 @@ def run_designs(
     population: int,
     seed: int,
     search: str = "genetic",
-    generation: Callable[[int], None] = lambda done: None,
 ) -> ParetoFront:
     """Search the Pareto front of the designs of a machine.
 
     Args:
         designs: The designs.
         run: Function that runs cases.
-        evaluations, population, seed, generation: As of `search_front`.
+        evaluations, population, seed: As of `search_front`.
         search: Name in `SEARCHES`.
     """
-    found = SEARCHES[search](
+    result = SEARCHES[search](
         lambda x: designs.costs(x, run),
         designs.nominal(),
         len(designs.objectives),
@@ -70,17 +68,16 @@ def run_designs(
         evaluations=evaluations,
         population=population,
         seed=seed,
-        generation=generation,
     )
-    own = designs.evaluate(designs.nominal()[None], run)
+    nominal = designs.evaluate(designs.nominal()[None], run)
     return ParetoFront(
         designs,
-        found,
-        _values(designs.objectives, found.objectives),
-        _values(designs.constraints, found.constraints),
-        own[0][0],
-        own[1][0],
-        chosen_designs(designs.objectives, found.objectives),
+        result,
+        _values(designs.objectives, result.objectives),
+        _values(designs.constraints, result.constraints),
+        nominal[0][0],
+        nominal[1][0],
+        chosen_designs(designs.objectives, result.objectives),
     )
 
 
@@ -92,14 +89,14 @@ def chosen_designs(goals: tuple[Goal, ...], costs: FloatArray) -> dict[str, int]
     """
     if not len(costs):
         return {}
-    found = {
+    chosen = {
         f"best {g.given.quantity}": int(np.argmin(c)) for g, c in zip(goals, costs.T, strict=True)
     }
     if len(goals) > 1:
         low, high = costs.min(axis=0), costs.max(axis=0)
         scaled = (costs - low) / np.where(high > low, high - low, 1.0)
-        found[COMPROMISE] = int(np.argmin(np.linalg.norm(scaled, axis=1)))
-    return found
+        chosen[COMPROMISE] = int(np.argmin(np.linalg.norm(scaled, axis=1)))
+    return chosen
 
 
 def _values(goals: tuple[Goal, ...], costs: FloatArray) -> FloatArray:

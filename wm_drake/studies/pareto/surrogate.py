@@ -5,7 +5,6 @@ objectives and constraints of the designs that were evaluated. NSGA finds the fr
 surfaces, and the designs of it that lie farthest from known objectives are evaluated next.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from scipy.interpolate import RBFInterpolator
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.pareto.search import (
     Evaluate,
-    Found,
+    SearchResult,
     check_search,
     first_population,
     hypervolume,
@@ -43,8 +42,7 @@ def search_with_surfaces(
     evaluations: int = 400,
     population: int = 64,
     seed: int = 0,
-    generation: Callable[[int], None] = lambda done: None,
-) -> Found:
+) -> SearchResult:
     """Return the Pareto front of a problem; arguments and result are those of `search_front`.
 
     Raises:
@@ -54,17 +52,17 @@ def search_with_surfaces(
     check_search(evaluations, population)
     known = _Known(objectives, constraints)
     known.add(first_population(start, population, seed), evaluate)
-    generation(len(known.x))
     history = [(len(known.x), known.volume())]
     while len(known.x) < evaluations:
         batch = min(BATCH, evaluations - len(known.x))
         known.add(_next_designs(known, population, batch, seed + len(known.x)), evaluate)
-        generation(len(known.x))
         history.append((len(known.x), known.volume()))
     best = np.flatnonzero(known.is_best())
     best = best[np.lexsort(known.f[best].T[::-1])]
     first = known.f[:population]
-    return Found(known.x[best], known.f[best], known.g[best], len(known.x), first, tuple(history))
+    return SearchResult(
+        known.x[best], known.f[best], known.g[best], len(known.x), first, tuple(history)
+    )
 
 
 class _Known:
@@ -135,7 +133,7 @@ def _next_designs(known: _Known, population: int, count: int, seed: int) -> Floa
         return values[:, :objectives], values[:, objectives:]
 
     begin = np.vstack([known.x[rows[:population]], random.random((population, size))])[:population]
-    found = minimized(
+    result = minimized(
         predicted,
         begin,
         objectives,
@@ -144,7 +142,7 @@ def _next_designs(known: _Known, population: int, count: int, seed: int) -> Floa
         population,
         seed,
     )
-    candidates: Any = np.atleast_2d(found.X) if found.X is not None else others
+    candidates: Any = np.atleast_2d(result.X) if result.X is not None else others
     best = known.f[known.is_best()]
     values = predicted(np.asarray(candidates, dtype=float))[0]
     return _spread(candidates, values, known.x, best, count, random)

@@ -1,13 +1,10 @@
 """Tables of a design study, for CSV files and JSON, and its machine files."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from wm_drake.parameters import machine_yaml
-from wm_drake.studies.gasket.tables import finite
 from wm_drake.studies.pareto.robust import Promise
 from wm_drake.studies.pareto.study import ParetoFront
 
@@ -15,7 +12,7 @@ from wm_drake.studies.pareto.study import ParetoFront
 def front_table(front: ParetoFront) -> pd.DataFrame:
     """Return objectives, constraints and variables of each design of the front."""
     rows = []
-    for number, design in enumerate(front.found.designs):
+    for number, design in enumerate(front.search.designs):
         row: dict[str, Any] = {"design": number + 1}
         row |= _goals(front, number)
         for dimension, place in zip(front.designs.dimensions, design, strict=True):
@@ -34,7 +31,7 @@ def _goals(front: ParetoFront, number: int) -> dict[str, float]:
 
 def history_table(front: ParetoFront) -> pd.DataFrame:
     """Return the hypervolume after each generation."""
-    return pd.DataFrame(front.found.history, columns=["evaluations", "hypervolume"])
+    return pd.DataFrame(front.search.history, columns=["evaluations", "hypervolume"])
 
 
 def machine_file_name(name: str) -> str:
@@ -57,49 +54,23 @@ def promises_table(kept: Sequence[Promise]) -> pd.DataFrame:
     )
 
 
-def write_tables(front: ParetoFront, kept: Sequence[Promise], folder: Path) -> None:
-    """Write the CSV files of a study and the machine files of its chosen designs."""
-    if kept:
-        promises_table(kept).to_csv(folder / "robust.csv", index=False)
-    front_table(front).to_csv(folder / "front.csv", index=False)
-    history_table(front).to_csv(folder / "history.csv", index=False)
-    for name, number in front.chosen.items():
-        machine = front.machine(number)
-        about = f"Design '{name}' of a design study of machine {machine.name}"
-        copy = machine.model_copy(update={"about": about, "measured": ()})
-        (folder / machine_file_name(name)).write_text(machine_yaml(copy), encoding="utf-8")
-
-
-def as_plain_data(front: ParetoFront, kept: Sequence[Promise] = ()) -> dict[str, Any]:
-    """Return a result as data for JSON."""
-    designs = front.designs
-    entries = []
-    for number, design in enumerate(front.found.designs):
-        shown = [d.shown(float(x)) for d, x in zip(designs.dimensions, design, strict=True)]
-        variables = {
-            d.name: {"value": value, "unit": unit} if unit else value
-            for d, (value, unit) in zip(designs.dimensions, shown, strict=True)
-        }
+def designs_as_json(front: ParetoFront) -> list[dict[str, Any]]:
+    """Return objectives, constraints and variables of each design of the front."""
+    designs, entries = front.designs, []
+    for number, design in enumerate(front.search.designs):
+        shown = [
+            (d.name, *d.shown(float(x))) for d, x in zip(designs.dimensions, design, strict=True)
+        ]
         values = zip(designs.objectives, front.objectives[number], strict=True)
         limits = zip(designs.constraints, front.constraints[number], strict=True)
         entries.append(
             {
-                "objectives": {g.key: finite(float(v)) for g, v in values},
-                "constraints": {g.key: finite(float(v)) for g, v in limits},
-                "variables": variables,
+                "objectives": {goal.key: value for goal, value in values},
+                "constraints": {goal.key: value for goal, value in limits},
+                "variables": {
+                    name: {"value": value, "unit": unit} if unit else value
+                    for name, value, unit in shown
+                },
             }
         )
-    return {
-        "robust": [
-            {k: finite(v) if isinstance(v, float) else v for k, v in row.items()}
-            for row in promises_table(kept).to_dict("records")
-        ],
-        "evaluations": front.found.evaluations,
-        "front": entries,
-        "hypervolume": front.found.hypervolume,
-        "chosen": {name: number + 1 for name, number in front.chosen.items()},
-        "nominal": {
-            g.key: finite(float(v))
-            for g, v in zip(designs.objectives, front.nominal_objectives, strict=True)
-        },
-    }
+    return entries

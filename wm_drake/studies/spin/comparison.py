@@ -8,24 +8,25 @@ import pandas as pd
 
 from wm_drake.errors import input_error
 from wm_drake.parameters import MachineParameters
-from wm_drake.parameters.units import Unit
-from wm_drake.simulation.mount_forces import mount_forces
+from wm_drake.simulation.measures import MEASURES, Variable
+from wm_drake.simulation.measures.as_json import labelled_values
+from wm_drake.simulation.measures.registry import tabulated
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 MOST_VARIANTS = 6
 """Largest number of variants that a figure can tell apart."""
 
 
-GROUPS = (
-    "amplitude",
-    "critical speed",
-    "detergent box displacement",
-    "smallest gap",
-    "gasket force",
-    "gasket moment",
-    "largest mount force",
-)
-"""Groups of measures in the order of a table of differences."""
+GROUPS = {
+    "amplitude": "amplitude",
+    "critical_speed": "critical speed",
+    "detergent_displacement": "detergent box displacement",
+    "smallest_gap": "smallest gap",
+    "gasket_force": "gasket force",
+    "gasket_moment": "gasket moment",
+    "mount_force_peak": "largest mount force",
+}
+"""Names of the variables in a table of differences, in its order; others have their kind."""
 
 DIFFERENCE_COLUMNS = [
     "load",
@@ -72,32 +73,27 @@ class MeasureOfCase:
     value: float
 
 
+def compared_variables() -> dict[str, Variable]:
+    """Return the variables of a table of differences by their name there, in its order."""
+    known = {v.name: v for measure in MEASURES.values() for v in measure.variables}
+    return {title: known[name] for name, title in GROUPS.items()} | {
+        variable.kind: variable for variable in tabulated()
+    }
+
+
 def measures_of(case: CaseResult) -> list[MeasureOfCase]:
-    """Return every measure of a case."""
-    measures, has_gasket = case.measures, case.record.attrs["gasket"] == "yes"
-    by_label = (
-        ("amplitude", measures.amplitude, Unit("m", "mm"), True),
-        ("critical speed", measures.critical_speed, Unit("rad/s", "rpm"), True),
-        ("detergent box displacement", measures.detergent_displacement, Unit("m", "mm"), True),
-        ("gasket force", measures.gasket_force, Unit("N", "N"), has_gasket),
-        ("gasket moment", measures.gasket_moment, Unit("N*m", "N*m"), has_gasket),
-    )
-    found = [
-        MeasureOfCase(
-            group, str(label), unit.shown, unit.from_si(float(value)) if there else np.nan
-        )
-        for group, values, unit, there in by_label
-        for label, value in zip(values[values.dims[0]].values, map(float, values), strict=True)
-    ]
-    gap = measures.smallest_gap
-    millimetre = Unit("m", "mm")
-    distance = millimetre.from_si(gap.distance) if gap else np.nan
-    found.append(MeasureOfCase("smallest gap", "", "mm", distance))
-    found += [
-        MeasureOfCase("largest mount force", force.name, "N", force.peak)
-        for force in mount_forces(case.record)
-    ]
-    return found
+    """Return every measure of a case; NaN for the forces of a gasket that is not there."""
+    has_gasket = case.record.attrs["gasket"] == "yes"
+    measured = []
+    for title, variable in compared_variables().items():
+        for labels, value in labelled_values(case.measures.table, variable):
+            if not has_gasket and labels == ("gasket",):
+                continue
+            number = np.nan if value is None else value
+            if variable.name.startswith("gasket_") and not has_gasket:
+                number = np.nan
+            measured.append(MeasureOfCase(title, " ".join(labels), variable.unit.shown, number))
+    return measured
 
 
 def difference_table(variants: Sequence[Variant]) -> pd.DataFrame:
@@ -113,14 +109,14 @@ def difference_table(variants: Sequence[Variant]) -> pd.DataFrame:
         example a gasket force without gasket. A measure that only some variants have, such as the
         force of a mount, has a row for each variant.
     """
-    rows = []
+    rows, order = [], list(compared_variables())
     for index, case in enumerate(variants[0].result.results):
         of_variants = [
             {(m.group, m.name, m.unit): m.value for m in measures_of(v.result.results[index])}
             for v in variants
         ]
         keys = list(dict.fromkeys(key for values in of_variants for key in values))
-        keys.sort(key=lambda key: GROUPS.index(key[0]))  # a stable sort
+        keys.sort(key=lambda key: order.index(key[0]))  # a stable sort
         for key in keys:
             reference = of_variants[0].get(key, np.nan)
             for variant, values in zip(variants[1:], of_variants[1:], strict=True):
@@ -160,29 +156,29 @@ def common_sensors(machines: Sequence[MachineParameters]) -> list[str]:
 
 def remarks(variants: Sequence[Variant]) -> list[str]:
     """Return what a reader must know about variants whose conditions differ, as sentences."""
-    found = []
+    sentences = []
     first = variants[0]
     for variant in variants[1:]:
         for a, b in zip(first.result.results, variant.result.results, strict=True):
             both = f"'{first.name}' and '{variant.name}'"
             if a.case.load != b.case.load:
-                found.append(f"Load {a.case.name} is not the same in {both}.")
+                sentences.append(f"Load {a.case.name} is not the same in {both}.")
         if first.result.results[0].case.profile != variant.result.results[0].case.profile:
-            found.append(f"{both} follow different spin profiles.")
+            sentences.append(f"{both} follow different spin profiles.")
     machines = [variant.result.parameters for variant in variants]
     shared = common_sensors(machines)
     for machine in machines:
-        alone = [name for name in machine.sensors if name not in shared]
-        if alone:
-            found.append(
-                f"Not all machines have the sensors {', '.join(alone)} of '{machine.name}'; the "
+        unshared = [name for name in machine.sensors if name not in shared]
+        if unshared:
+            sentences.append(
+                f"Not all machines have the sensors {', '.join(unshared)} of '{machine.name}'; the "
                 "figures leave them out."
             )
         for name in shared:
             axes = machines[0].sensors[name].axis, machine.sensors[name].axis
             if axes[0] != axes[1]:
-                found.append(
+                sentences.append(
                     f"Sensor {name} measures along {axes[0]} in '{machines[0].name}' and along "
                     f"{axes[1]} in '{machine.name}'."
                 )
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(sentences))

@@ -1,16 +1,14 @@
 """Spin runs: cases with their records and measures, in one or several processes."""
 
-import multiprocessing
 import os
 import time
 import warnings
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
-from queue import Empty
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
@@ -21,6 +19,7 @@ from wm_drake.simulation.cases import Case, is_as_measured
 from wm_drake.simulation.measures import Measures, measure
 from wm_drake.simulation.records import Record
 from wm_drake.simulation.runs import DEFAULT_ENGINE, DivergenceWarning, checked_step, simulate
+from wm_drake.studies.spin.processes import can_start_processes, map_in_processes
 
 if TYPE_CHECKING:
     from wm_drake.studies.modes.study import NaturalModes
@@ -55,6 +54,13 @@ class Comparison(Enum):
     AS_MEASURED = "as measured"
     ALL = "all"
     NONE = "none"
+
+
+def compared_cases(measured: Sequence[Path] | None, sets: Sequence[str] | None) -> Comparison:
+    """Return which cases are compared with measured amplitudes, from the options of a command."""
+    if measured:
+        return Comparison.ALL
+    return Comparison.NONE if sets else Comparison.AS_MEASURED
 
 
 @dataclass(frozen=True)
@@ -111,7 +117,8 @@ def run_spin(
         step: Step size; None for that of the machine. [s]
         progress: Called with the index of a case and the fraction of it that is done.
         workers: Number of processes for an engine that needs processes; None for the number of
-            cores. A single case always runs in this process.
+            cores. A single case always runs in this process, and all cases do in a daemon process,
+            which cannot start others.
         comparison: Which cases are compared with the measured amplitudes of the machine.
         modes: Whether to compute the natural modes with the load of the first case.
 
@@ -129,8 +136,8 @@ def run_spin(
     count = min(workers or os.cpu_count() or 1, len(cases))
     work_items = [_WorkItem(parameters, case, engine, step) for case in cases]
     machine = None
-    if engine in _IN_PROCESSES and count > 1:
-        results = _run_in_processes(work_items, count, progress)
+    if engine in _IN_PROCESSES and count > 1 and can_start_processes():
+        results = map_in_processes(_build_and_run, work_items, count, progress)
     else:
         machine, scene = build_machine(parameters), Scene(parameters)
         results = [
@@ -146,50 +153,17 @@ def _modes_of(machine: Machine, case: Case) -> "NaturalModes | None":
     from wm_drake.studies.modes.study import three_linearisations
 
     try:
-        found = three_linearisations(
+        natural = three_linearisations(
             machine, case.load, parameters=case.parameters, gasket=case.gasket
         )
     except InputError:  # its cabinet moves, or the compiled engine does not represent it
         return None
-    return replace(found, load=case.name)
+    return replace(natural, load=case.name)
 
 
-def _run_in_processes(
-    work_items: list[_WorkItem], count: int, progress: Callable[[int, float], None]
-) -> list[CaseResult]:
-    # Drake diagrams cannot be pickled and forks of Drake processes are not safe, so new
-    # interpreters are started and build the machine from its parameters
-    method = multiprocessing.get_context("spawn")
-    with method.Manager() as manager, ProcessPoolExecutor(count, mp_context=method) as pool:
-        reports = manager.Queue()
-        futures: list[Future[CaseResult]] = [
-            pool.submit(_run_and_report, item, i, reports) for i, item in enumerate(work_items)
-        ]
-        try:
-            unfinished = set(futures)
-            while unfinished:
-                unfinished = wait(unfinished, timeout=0.2, return_when=FIRST_COMPLETED).not_done
-                _pass_on(reports, progress)
-            _pass_on(reports, progress)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for process in multiprocessing.active_children():
-                process.terminate()
-            raise
-        return [future.result() for future in futures]
-
-
-def _pass_on(reports: Any, progress: Callable[[int, float], None]) -> None:
-    try:
-        while True:
-            progress(*reports.get_nowait())
-    except Empty:
-        pass
-
-
-def _run_and_report(item: _WorkItem, index: int, reports: Any) -> CaseResult:
-    machine, scene = build_machine(item.parameters), Scene(item.parameters)
-    return _run(item, machine, scene, lambda fraction: reports.put((index, fraction)))
+def _build_and_run(item: _WorkItem, report: Callable[[float], None]) -> CaseResult:
+    """Return the result of a case in a process that has no built machine yet."""
+    return _run(item, build_machine(item.parameters), Scene(item.parameters), report)
 
 
 def _run(

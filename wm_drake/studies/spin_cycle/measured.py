@@ -121,13 +121,13 @@ def _file_of(folder: Path, case: str) -> Path | None:
     Raises:
         InputError: there are several.
     """
-    found = [
+    files = [
         path for suffix in (".csv", *SUFFIXES) if (path := folder / f"{case}{suffix}").is_file()
     ]
-    if len(found) > 1:
-        names = " and ".join(path.name for path in found)
+    if len(files) > 1:
+        names = " and ".join(path.name for path in files)
         raise input_error(f"has {names}; give one file for each case", where=str(folder))
-    return found[0] if found else None
+    return files[0] if files else None
 
 
 def _words(labels: Mapping[str, Sequence[str]]) -> list[str]:
@@ -139,8 +139,8 @@ def _samples(path: Path, words: list[str], channels: Mapping[str, str]) -> Float
     """Return time [s] and accelerations [m/s^2] of a file, one row a sample."""
     if is_lab_file(path) or channels:
         units = dict.fromkeys(words, ACCELERATION)
-        time, found = lab_signals(path, units, "m/s^2", channels)
-        return np.column_stack([time, *found.values()])
+        time, signals = lab_signals(path, units, "m/s^2", channels)
+        return np.column_stack([time, *signals.values()])
     return (
         read_csv(path, ["time_s", *words])
         .apply(pd.to_numeric, errors="coerce")

@@ -7,12 +7,12 @@ from typing import TypeAlias
 import numpy as np
 import xarray as xr
 
-from wm_drake.batch import MEASURES as KNOWN_MEASURES
 from wm_drake.errors import input_error
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.measures import MEASURES as KNOWN_MEASURES
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.outputs import AXES
 from wm_drake.simulation.vibration import relative_error
@@ -97,7 +97,7 @@ def forces_of(
     measures = forces_measured(parameters)
     if "drive" in measures:
         coordinates["order"] = ["cosine", "sine"]
-    names = [name for measure in measures for name in KNOWN_MEASURES[measure]]
+    names = [name for measure in measures for name in KNOWN_MEASURES[measure].names]
     variables = {name: (("case", *table[name].dims[1:]), table[name].values) for name in names}
     return xr.Dataset(variables, coordinates)
 

@@ -5,16 +5,29 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
-from wm_drake.errors import input_error, nearest_names
-from wm_drake.parameters import MachineParameters, SpinProfile, quantities, with_values
+from wm_drake.errors import InputError, Problem, input_error
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import (
+    Change,
+    MachineParameters,
+    SpinProfile,
+    Variation,
+    apply,
+    load_profile,
+    machine_yaml,
+    with_values,
+)
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
-from wm_drake.parameters.units import Unit
+from wm_drake.parameters.variation import number_at, range_of
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.fitting import (
     Fit,
@@ -26,7 +39,16 @@ from wm_drake.studies.fitting import (
     least_squares,
     verdict_of,
 )
+from wm_drake.studies.inputs import channels_of
+from wm_drake.studies.run import Executor
+from wm_drake.studies.spin_cycle.inputs import MeasuredFiles, cases_of_table
+from wm_drake.studies.spin_cycle.measured import rms_table
 from wm_drake.studies.spin_cycle.study import DIMS, average_errors, labels_of, runs_of
+from wm_drake.studies.spin_identification.options import SpinIdentifyOptions
+from wm_drake.studies.study import Facts, Result, Task
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 SPAN = 1.5
 """Default bounds of an unknown: the number of the machine divided and multiplied by this."""
@@ -62,14 +84,24 @@ Regions: TypeAlias = Callable[[Iterable[Case]], xr.Dataset]
 
 @dataclass(frozen=True)
 class Sought:
-    """An unknown, and the keys of the machine's numbers that are equal to it."""
+    """An unknown: a variation with bounds.
 
-    keys: tuple[str, ...]
+    Attributes:
+        variation: Numbers of the machine that are equal to the unknown.
+        unknown: The unknown of the fit.
+    """
+
+    variation: Variation
     unknown: Unknown
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Key paths of the numbers."""
+        return self.variation.keys
 
 
 @dataclass(frozen=True)
-class SpinIdentification:
+class SpinIdentification(Result):
     """Result of an identification.
 
     Attributes:
@@ -126,61 +158,175 @@ class SpinIdentification:
         """Relative error of each unknown in a virtual experiment; None for a real experiment."""
         return None if self.planted is None else self.fit.values / self.planted - 1.0
 
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return the unknowns, and measured and computed RMS displacements."""
+        from wm_drake.studies.spin_identification.page import values_table
 
-def sought_of(
-    parameters: MachineParameters,
-    keys: Sequence[str],
-    bounds: tuple[float, float] | None = None,
-    span: float = SPAN,
-) -> Sought:
+        return {
+            "parameters": values_table(self),
+            "measured": rms_table(self.measured),
+            "rms": rms_table(self.after),
+        }
+
+    def write(self, folder: Path) -> None:
+        """Write the identified machine and the tables."""
+        text = machine_yaml(identified_machine(self))
+        (folder / "identified.yaml").write_text(text, encoding="utf-8")
+        for name, table in self.tables().items():
+            digits = "%.7g" if name == "parameters" else self.float_format
+            table.to_csv(folder / f"{name}.csv", index=False, float_format=digits)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the result for JSON."""
+        shown = self.fit.as_dict()
+        entries = zip(self.sought, shown["unknowns"].values(), strict=True)
+        for k, (sought, entry) in enumerate(entries):
+            value, identifiable = self.fit.estimates[k].value, self.identifiable[k]
+            entry |= {"keys": list(sought.keys), "found": value, "identifiable": identifiable}
+            if self.planted is not None and self.recovered is not None:
+                entry |= {"planted": float(self.planted[k]), "error": float(self.recovered[k])}
+        return {
+            "machine": self.parameters.name,
+            "virtual_experiment": self.planted is not None,
+            "cases": [case.name for case in self.cases],
+            "average_error_before": float(average_errors(self.before, self.measured).mean()),
+            "average_error_after": self.error_after,
+            "verdict": self.verdict,
+            **shown,
+        }
+
+    def terminal(self) -> "list[Table | str]":
+        """Return summary, values, and what the data do not determine."""
+        from wm_drake.studies.spin_identification.page import terminal_lines
+
+        return [*terminal_lines(self)]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        from wm_drake.studies.spin_identification.page import spin_identify_page
+
+        return spin_identify_page(self, facts)
+
+
+class SpinIdentifyTask(Task):
+    """The study with checked options."""
+
+    def __init__(self, options: SpinIdentifyOptions, machine: Machine) -> None:
+        """Check the unknowns, the cases and the profile, and read the measurements.
+
+        Raises:
+            InputError: one of them is wrong.
+        """
+        self.options, self.machine = options, machine
+        self.profile = load_profile(options.profile)
+        names = options.case or (() if options.cases else DEFAULT_CASES)
+        self.cases = cases_of_table(options.cases, names)
+        files = MeasuredFiles(
+            options.measured, options.accelerations, channels_of(options.channels)
+        )
+        self.measured = files.read(machine.parameters, self.cases, self.profile)
+        self.sought = unknowns_of(machine.parameters, options.unknown)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the runs beside the machine."""
+        measured = "none" if self.measured is None else self.measured.values
+        return {
+            "cases": self.cases,
+            "profile": self.profile,
+            "measurements": measured,
+            "unknowns": [{"keys": s.keys, "unknown": s.unknown} for s in self.sought],
+            "noise": f"{self.options.noise:g}, seed {self.options.seed}",
+        }
+
+    def run(self, executor: Executor) -> SpinIdentification:
+        """Identify the unknowns, from measurements or from a virtual experiment."""
+        seed, measured, planted = self.options.seed, self.measured, None
+        with executor.fraction("search") as report:
+            regions = partial(executor.simulate, self.machine, ("regions",))
+            model = SpinModel(
+                self.machine.parameters, self.profile, tuple(self.cases), self.sought, regions
+            )
+            if measured is None:
+                planted = planted_values(self.sought, seed)
+                measured = virtual_experiment(model, planted, self.options.noise, seed)
+            return identify_from_spin(
+                model,
+                measured,
+                planted=planted,
+                seed=seed,
+                progress=lambda fraction, least: report(fraction),
+            )
+
+
+def unknowns_of(parameters: MachineParameters, texts: Sequence[str]) -> tuple[Sought, ...]:
+    """Return the unknowns of KEYS[=RANGE] texts, or those of [A] Table 8 if there are none.
+
+    Raises:
+        InputError: a key or a range is wrong, or the machine does not have the numbers of Table 8.
+    """
+    if not texts:
+        if not parameters.bushing_types or parameters.gasket is None:
+            raise input_error(
+                f"machine '{parameters.name}' does not have the numbers of [A] Table 8; give keys "
+                "of this machine",
+                where="--unknown",
+            )
+        return tuple(sought_of(parameters, keys) for keys in TABLE_8)
+    unknowns = []
+    for text in texts:
+        names, _, bounds = (part.strip() for part in text.partition("="))
+        keys = [key.strip() for key in names.split(JOIN)]
+        try:
+            unknowns.append(sought_of(parameters, keys, bounds))
+        except InputError as error:
+            raise InputError(
+                Problem("--unknown", p.key, p.message) for p in error.problems
+            ) from None
+    return tuple(unknowns)
+
+
+def sought_of(parameters: MachineParameters, keys: Sequence[str], bounds: str = "") -> Sought:
     """Return an unknown of a machine; the search uses its logarithm if the bounds are positive.
 
     Args:
         parameters: The machine; its number is the start value.
         keys: Key paths of numbers that are equal.
-        bounds: Bounds of the search, in SI units. If None, they are the machine's number divided
-            and multiplied by `span`.
-        span: Factor of the default bounds.
+        bounds: Bounds of the search, ``LOW..HIGH`` or ``(LOW, HIGH) UNIT``. If empty, they are the
+            machine's number divided and multiplied by `SPAN`.
 
     Raises:
         InputError: a key is unknown or not a number, the numbers have different units, or bounds
-            are needed because the number is not positive.
+            are wrong, or are needed because the number is not positive.
     """
-    known = {
-        key: (value, unit)
-        for key, value, unit in quantities(parameters)
-        if isinstance(value, float)
-    }
-    for key in keys:
-        if key not in known:
-            raise input_error(
-                f"no number '{key}' in machine '{parameters.name}'{nearest_names(key, known)}",
-                key=key,
-            )
-    value, unit = known[keys[0]]
-    if any(known[key][1] != unit for key in keys):
+    numbers = tuple(number_at(parameters, key) for key in keys)
+    for number in numbers:
+        if number.is_table:
+            raise input_error("is a table; an unknown is a number", key=number.key)
+    first = numbers[0]
+    if any(number.unit != first.unit for number in numbers):
         raise input_error(
             f"{', '.join(keys)} have different units; equal numbers need the same unit",
-            key=keys[0],
+            key=first.key,
         )
-    if bounds is None and value <= 0.0:
-        raise input_error(
-            "is not positive, so its range must be given; write KEY=LOW..HIGH", key=keys[0]
-        )
-    lower, upper = bounds or (value / span, value * span)
-    start = value if lower <= value <= upper else None
+    value = first.nominal
+    if bounds:
+        ends = range_of(bounds)
+        if ends is None:
+            example = f"(1, 2) {first.unit.shown}"
+            message = f"'{bounds}' is not a range; write for example '{example}'"
+            raise input_error(message, key=first.key)
+        lower, upper = map(first.resolved, ends)
+    elif value is None or value <= 0.0:
+        message = "is not positive, so its range must be given; write KEY=LOW..HIGH"
+        raise input_error(message, key=first.key)
+    else:
+        lower, upper = value / SPAN, value * SPAN
+    start = value if value is not None and lower <= value <= upper else None
+    name = JOIN.join(keys)
     return Sought(
-        tuple(keys), Unknown(JOIN.join(keys), lower, upper, unit, start, logarithmic=lower > 0.0)
-    )
-
-
-def unit_of_key(parameters: MachineParameters, key: str) -> Unit:
-    """Return the unit of a number of a machine.
-
-    For an unknown key any unit is returned, because `sought_of` reports the error.
-    """
-    return next(
-        (unit for known, _, unit in quantities(parameters) if known == key), Unit("m", "mm")
+        Variation(name, numbers, Change.VALUE, first.unit),
+        Unknown(name, lower, upper, first.unit, start, logarithmic=lower > 0.0),
     )
 
 
@@ -188,9 +334,7 @@ def at_point(
     parameters: MachineParameters, sought: Sequence[Sought], values: FloatArray
 ) -> MachineParameters:
     """Return the machine with values of the unknowns, in SI units."""
-    return with_values(
-        parameters, {key: float(v) for s, v in zip(sought, values, strict=True) for key in s.keys}
-    )
+    return apply(parameters, [s.variation for s in sought], map(float, values))
 
 
 def planted_values(sought: Sequence[Sought], seed: int) -> FloatArray:

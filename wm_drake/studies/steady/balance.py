@@ -20,9 +20,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
+from wm_drake.elements.rubber import FRICTION, MAXWELL
+from wm_drake.elements.state_map import ANGLE, ELEMENT_STATE, SPONGE, TUBES
+from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE
 from wm_drake.engines.compiled.slopes import SlopedDerivative
-from wm_drake.engines.compiled.tubes import DEFORMATION, TUBES_STATE_SIZE
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.modes.fixed_cabinet import check_fixed_cabinet
@@ -94,8 +95,8 @@ class HarmonicBalance:
         """
         check_fixed_cabinet(setup.parameters)
         self.derivative, self.series = SlopedDerivative(setup), series
-        self.scale = _scale(self.derivative, setup)
-        self.held = _held(self.derivative, setup)
+        self.scale = _scale(self.derivative)
+        self.held = _held(self.derivative)
         self.is_held = np.isin(np.arange(self.size), self.held)
         self.kinematics = kinematics_of(self.derivative, setup)
 
@@ -166,23 +167,17 @@ class HarmonicBalance:
         return float(np.linalg.norm(coefficients * self.scale))
 
 
-def _scale(derivative: SlopedDerivative, setup: Setup) -> FloatArray:
+def _scale(derivative: SlopedDerivative) -> FloatArray:
     scale = np.where(derivative.is_velocity, 0.0, 1.0)
-    scale[:3] = ANGLE_ARM
-    tubes, own = derivative.layout.elements.tubes, TUBES_STATE_SIZE
-    angles = [tubes + own * i + k for i in range(len(setup.telescopes)) for k in range(3)]
-    scale[np.isin(derivative.free, angles)] = ANGLE_ARM
-    if setup.bearing:
-        begin = derivative.layout.carrier_begin
-        scale[np.isin(derivative.free, range(begin, begin + 3))] = ANGLE_ARM
+    scale[np.isin(derivative.free, derivative.layout.states.indices(ANGLE))] = ANGLE_ARM
     return scale
 
 
-def _held(derivative: SlopedDerivative, setup: Setup) -> np.ndarray:
+def _held(derivative: SlopedDerivative) -> np.ndarray:
     """Return the indices among the free numbers of tube angles and of own states of elements."""
-    tubes, own = derivative.layout.elements.tubes, TUBES_STATE_SIZE
-    held = [STATE_SIZE + k for k in range(len(setup.dampers))]
-    for i in range(len(setup.telescopes)):
-        held += [tubes + own * i + k for k in (0, 1, 2, DEFORMATION)]
-    held += range(derivative.layout.branches_begin, len(derivative.rest))
+    states = derivative.layout.states
+    held = [
+        *states.indices(ANGLE, kinds=[TUBES]),
+        *states.indices(SPONGE, FRICTION, MAXWELL, ELEMENT_STATE),
+    ]
     return np.flatnonzero(np.isin(derivative.free, held))

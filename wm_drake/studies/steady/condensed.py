@@ -84,10 +84,10 @@ class Corrections:
             residual: Of the balance; None for zero.
             last: Value that the left side of the last equation takes.
         """
-        wanted = np.zeros(self.at.residual.shape) if residual is None else residual
-        right = right_side(wanted, last, self._partition, self._condensed)
+        residual = np.zeros(self.at.residual.shape) if residual is None else residual
+        right = right_side(residual, last, self._partition, self._condensed)
         solved = lu_solve(self._factors, right, trans=1, check_finite=False)
-        change = whole_change(solved, wanted, self.at.speed, self._partition, self._condensed)
+        change = whole_change(solved, residual, self.at.speed, self._partition, self._condensed)
         return change, float(solved[-1])
 
 
@@ -132,12 +132,12 @@ def condense(
     rates = np.empty((size * p, borders.shape[2]))
     for q in range(borders.shape[2]):
         rates[:, q] = rates_of(borders[:, :, q], partition, by_rates)
-    beside = np.dot(by_velocity, rates)
+    by_borders = np.dot(by_velocity, rates)
     for h in range(size):
         for row in range(m):
             for q in range(borders.shape[2]):
                 matrix[h * m + row, size * m + q] = (
-                    borders[h, partition.dynamic[row], q] - beside[h * m + row, q]
+                    borders[h, partition.dynamic[row], q] - by_borders[h * m + row, q]
                 )
     return Condensed(by_velocity, by_angles, by_rates, rates)
 
@@ -179,13 +179,13 @@ def subtract_turns(
         matrix: Changed. Columns of numbers that are no velocities.
     """
     p, m, places = len(partition.positions), len(partition.others), partition.places
-    own = np.empty((len(by_velocity), len(rates)))
-    for row in range(len(own)):
+    of_body = np.empty((len(by_velocity), len(rates)))
+    for row in range(len(of_body)):
         for c in range(len(rates) // 3):
             for k in range(3):
-                own[row, 3 * c + k] = by_velocity[row, c * p + 3 * b + k]
-    moved = np.dot(own, rates)
-    for row in range(len(own)):
+                of_body[row, 3 * c + k] = by_velocity[row, c * p + 3 * b + k]
+    moved = np.dot(of_body, rates)
+    for row in range(len(of_body)):
         for c in range(len(rates) // 3):
             for k in range(3):
                 matrix[row, c * m + places[3 * b + k]] -= moved[row, 3 * c + k]
@@ -214,11 +214,11 @@ def rates_of(values: FloatArray, partition: Partition, by_rates: FloatArray) -> 
 @long_running
 def columns_of(values: FloatArray, numbers: np.ndarray) -> FloatArray:
     """Return some columns of values. (2 N + 1, numbers)"""
-    found = np.empty((len(values), len(numbers)))
+    columns = np.empty((len(values), len(numbers)))
     for h in range(len(values)):
         for k in range(len(numbers)):
-            found[h, k] = values[h, numbers[k]]
-    return found
+            columns[h, k] = values[h, numbers[k]]
+    return columns
 
 
 @long_running

@@ -143,18 +143,22 @@ def follow(
         length = reach if landing else step
         begin = place.coefficients + length * place.along
         ahead = target if landing else place.speed + length * place.speed_along
-        found = _step(balance, metric, place, length, begin, ahead, landing)
-        if found is not None and not landing and (found[0].speed - target) * place.speed_along > 0:
+        reached = _step(balance, metric, place, length, begin, ahead, landing)
+        if (
+            reached is not None
+            and not landing
+            and (reached[0].speed - target) * place.speed_along > 0
+        ):
             # the branch reached the speed of the grid before its tangent did: stop there first
-            share = (target - place.speed) / (found[0].speed - place.speed)
-            begin = place.coefficients + share * (found[0].coefficients - place.coefficients)
-            found = _step(balance, metric, place, length, begin, target, landing := True)
-        if found is None:
+            share = (target - place.speed) / (reached[0].speed - place.speed)
+            begin = place.coefficients + share * (reached[0].coefficients - place.coefficients)
+            reached = _step(balance, metric, place, length, begin, target, landing := True)
+        if reached is None:
             step = 0.5 * min(step, reach, 4.0)
             if step < SHORTEST_STEP:
                 break
             continue
-        place, quick = found
+        place, quick = reached
         if quick:
             step *= 2.0
         if not low - 1e-9 <= place.speed <= high + 1e-9:

@@ -1,5 +1,6 @@
 """Which numbers of the state are positions and velocities of bodies, and which spins are free."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -7,10 +8,18 @@ from typing import NamedTuple
 import numpy as np
 
 from wm_drake.compiler.vectors import rotation_from_sines
-from wm_drake.elements.motion import TREE_STATE, rpy_rates
-from wm_drake.engines.compiled.bearing import CARRIER_STATE
+from wm_drake.elements.motion import rpy_rates
+from wm_drake.elements.state_map import (
+    ANGLE,
+    ANGULAR_VELOCITY,
+    JOINT,
+    JOINT_VELOCITY,
+    ORDER,
+    POSITION,
+    TUBES,
+    VELOCITY,
+)
 from wm_drake.engines.compiled.slopes import SlopedDerivative
-from wm_drake.engines.compiled.tubes import TUBES_STATE, TUBES_STATE_SIZE
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 
@@ -116,39 +125,31 @@ class Spin:
 def kinematics_of(derivative: SlopedDerivative, setup: Setup) -> Kinematics:
     """Return the kinematics of a machine."""
     place = {int(number): index for index, number in enumerate(derivative.free)}
-    tree = TREE_STATE.offsets
-    tubes = derivative.layout.elements.tubes + TUBES_STATE.offsets["tubes"]
-    begins = [tubes + TUBES_STATE_SIZE * i for i in range(len(setup.telescopes))]
-    three = np.arange(3)
-    bodies = [
-        (at + tree["angles"] + three, at + tree["angular_velocity"] + three) for at in (0, *begins)
-    ]
-    moves = [(at + tree["position"] + three, at + tree["velocity"] + three) for at in (0, *begins)]
-    joints = [
-        (np.array([at + tree["joint_position"]]), np.array([at + tree["joint_rate"]]))
-        for at in begins
-    ]
-    if setup.bearing:
-        at, own = derivative.layout.carrier_begin, CARRIER_STATE.offsets
-        bodies.append((at + own["angles"] + three, at + own["angular_velocity"] + three))
-        moves.append((at + own["position"] + three, at + own["velocity"] + three))
+    states = derivative.layout.states
 
-    def indices(pairs: list[tuple[np.ndarray, np.ndarray]], side: int) -> np.ndarray:
-        return np.array([place[int(k)] for pair in pairs for k in pair[side]])
+    def places(*roles: str, kinds: Sequence[str] = ORDER) -> list[int]:
+        return [place[k] for k in states.indices(*roles, kinds=kinds).tolist()]
 
+    angles, positions = places(ANGLE), places(POSITION)
+    rates, velocities = places(ANGULAR_VELOCITY), places(VELOCITY)
+    angles_of_tubes = np.reshape(places(ANGLE, kinds=[TUBES]), (-1, 3))
+    positions_of_tubes = np.reshape(places(POSITION, kinds=[TUBES]), (-1, 3))
     spins = [
         Spin(
             name,
-            indices([bodies[1 + i]], 0),
-            indices([moves[1 + i]], 0),
+            angles_of_tubes[i],
+            positions_of_tubes[i],
             telescope.axis,
             telescope.tub_bushing.ground_side_point,
         )
         for i, (name, telescope) in enumerate(setup.telescopes.items())
     ]
     return Kinematics(
-        (indices(bodies, 0).reshape(-1, 3), indices(bodies, 1).reshape(-1, 3)),
-        (indices(moves + joints, 0), indices(moves + joints, 1)),
+        (np.reshape(angles, (-1, 3)), np.reshape(rates, (-1, 3))),
+        (
+            np.array(positions + places(JOINT, kinds=[TUBES])),
+            np.array(velocities + places(JOINT_VELOCITY, kinds=[TUBES])),
+        ),
         tuple(spin for spin in spins if _is_neutral(spin, derivative)),
         len(derivative.free),
     )

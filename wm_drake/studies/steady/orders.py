@@ -75,8 +75,8 @@ def read_signals(path: Path, unit: str, channels: Mapping[str, str] | None = Non
         return _read_csv(path, unit)
     if channels:
         raise input_error("a netCDF record has no channels to choose", where="--channels")
-    wanted = {"time": ("time",), "displacement": ("time", "sensor"), "drum_angle": ("time",)}
-    record = read_measured(path, wanted)
+    dimensions = {"time": ("time",), "displacement": ("time", "sensor"), "drum_angle": ("time",)}
+    record = read_measured(path, dimensions)
     time, angle = record.time.values, record.drum_angle.values
     values = 1e3 * record.displacement.values
     names = [str(name) for name in record.sensor.values]

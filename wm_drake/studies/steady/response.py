@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
+from wm_drake.elements.state_map import CARRIER, ELEMENT, STRETCHES, TUB
 from wm_drake.engines.trajectory import COORDINATES, Trajectory
 from wm_drake.errors import input_error
 from wm_drake.model.machine import Machine, Setup
@@ -137,16 +138,20 @@ def trajectory_of_period(
     """Return a revolution of a periodic motion; it has no torque and no accelerations (NaN)."""
     phase = 2.0 * np.pi * np.arange(samples) / samples
     states = balance.states(coefficients, speed, phase)
-    motion, deformation, tubes, carrier, stretches = balance.derivative.layout.parts(states)
+    parts = balance.derivative.layout.states
+    motion, carrier, stretches = (
+        np.ascontiguousarray(parts.take(states, kind)) for kind in (TUB, CARRIER, STRETCHES)
+    )
     return Trajectory(
         phase / speed,
-        np.ascontiguousarray(motion),
-        np.ascontiguousarray(deformation),
+        motion,
+        parts.deformation(states),
         np.full(samples, np.nan),
         np.full((samples, 6), np.nan),
-        tubes,
-        np.ascontiguousarray(carrier),
-        np.ascontiguousarray(stretches),
+        parts.tubes(states),
+        carrier,
+        stretches,
+        element_states=parts.take(states, ELEMENT),
     )
 
 
@@ -205,7 +210,7 @@ def _joined(balance: HarmonicBalance, points: list[Point]) -> Trajectory:
     names = ("time", "state", "deformation", "motor_torque", "acceleration", "tubes", "carrier")
     parts: dict[str, Any] = {
         name: np.concatenate([getattr(period, name) for period in periods])
-        for name in (*names, "stretches")
+        for name in (*names, "stretches", "element_states")
     }
     return Trajectory(**parts)
 

@@ -75,5 +75,5 @@ class Series:
             samples: (samples, k, n) samples of the factor of each number k in each sum n.
         """
         flat = np.ascontiguousarray(samples).reshape(self.samples, -1)
-        found = (self.double @ flat).reshape(-1, *samples.shape[1:])
-        return np.ascontiguousarray(found.transpose(0, 2, 1))
+        coefficients = (self.double @ flat).reshape(-1, *samples.shape[1:])
+        return np.ascontiguousarray(coefficients.transpose(0, 2, 1))

@@ -5,6 +5,7 @@ It is an independent check of harmonic balance, and a first guess where no bette
 
 import numpy as np
 
+from wm_drake.elements.state_map import CARRIER, ELEMENT, STRETCHES
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.machine import Setup
@@ -35,17 +36,7 @@ def settled_trajectory(
     step = min(setup.parameters.step, period / samples)
     run = run_compiled(setup, profile, step, lambda fraction: None, period / samples)
     kept = slice(-samples - 1, -1) if run.divergence is None else slice(0, 0)
-    return Trajectory(
-        run.time[kept],
-        run.state[kept],
-        run.deformation[kept],
-        run.motor_torque[kept],
-        run.acceleration[kept],
-        run.tubes[kept],
-        run.carrier[kept],
-        run.stretches[kept],
-        run.divergence,
-    )
+    return run.part(kept)
 
 
 def settled_coefficients(balance: HarmonicBalance, setup: Setup, speed: float) -> FloatArray:
@@ -53,14 +44,14 @@ def settled_coefficients(balance: HarmonicBalance, setup: Setup, speed: float) -
     run = settled_trajectory(setup, speed, balance.series.samples)
     if run.divergence is not None:
         return np.full((balance.series.size, balance.size), np.nan)
-    return coefficients_of(balance, setup, run)
+    return coefficients_of(balance, run)
 
 
-def coefficients_of(balance: HarmonicBalance, setup: Setup, run: Trajectory) -> FloatArray:
+def coefficients_of(balance: HarmonicBalance, run: Trajectory) -> FloatArray:
     """Return the Fourier coefficients of a revolution at the samples of a balance."""
-    tubes = np.concatenate(
-        [run.tubes, run.deformation[:, len(setup.dampers) :, None]], axis=2
-    ).reshape(len(run.time), -1)
-    own = run.deformation[:, : len(setup.dampers)]
-    states = np.hstack([run.state, own, tubes, run.carrier, run.stretches])
+    others = {CARRIER: run.carrier, STRETCHES: run.stretches}
+    if run.element_states is not None:
+        others[ELEMENT] = run.element_states
+    layout = balance.derivative.layout
+    states = layout.states.joined(run.state, run.deformation, run.tubes, others)
     return np.asarray(balance.series.analysis @ states[:, balance.derivative.free])

@@ -18,7 +18,7 @@ from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.measures import envelopes
+from wm_drake.simulation.displacements import envelopes
 from wm_drake.simulation.records import Record
 from wm_drake.studies.steady.balance import HARMONICS, SAMPLES
 from wm_drake.studies.steady.response import response_of
@@ -117,8 +117,8 @@ def run_steady_study(
 
     def solve(index: int) -> tuple[xr.Dataset, float]:
         start, name = time.perf_counter(), pairs[index][0]
-        found = _response(setups[index], name, speeds, harmonics, samples, done.of(index))
-        return found, time.perf_counter() - start
+        response = _response(setups[index], name, speeds, harmonics, samples, done.of(index))
+        return response, time.perf_counter() - start
 
     # the matrices are small: several threads each would be slower
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(threads) as pool:
@@ -184,10 +184,10 @@ def _records(machine: Machine, cases: list[Case], workers: int | None) -> list[R
 def _envelopes(record: Record | None) -> xr.Dataset | None:
     if record is None:
         return None
-    found = envelopes(record)
-    if np.isnan(found.upper.values).all():
+    edges = envelopes(record)
+    if np.isnan(edges.upper.values).all():
         return None
-    return found.assign(speed=("time", record.drum_speed.values))
+    return edges.assign(speed=("time", record.drum_speed.values))
 
 
 def sweep_profile(first: float, last: float, rate: float) -> SpinProfile:

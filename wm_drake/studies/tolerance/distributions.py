@@ -37,12 +37,12 @@ class Marginal:
         """Return the quantity at standard normal scores."""
         bounded = np.clip(scores, -LARGEST_SCORE, LARGEST_SCORE)
         # the upper tail keeps its digits if it is taken as a lower tail
-        found = np.where(
+        quantiles = np.where(
             bounded < 0.0,
             self.frozen.ppf(stats.norm.cdf(np.minimum(bounded, 0.0))),
             self.frozen.isf(stats.norm.cdf(-np.maximum(bounded, 0.0))),
         )
-        return np.exp(found) if self.is_log else found
+        return np.exp(quantiles) if self.is_log else quantiles
 
     def ends(self) -> tuple[float, float]:
         """Return the smallest and the largest value that any sample has."""
@@ -111,8 +111,8 @@ class Joint:
 
     def values(self, scores: FloatArray) -> FloatArray:
         """Return the quantities at independent standard normal scores. (n, size)"""
-        own = scores if self.factor is None else scores @ self.factor.T
-        columns = [m.values(own[:, i]) for i, m in enumerate(self.marginals)]
+        correlated = scores if self.factor is None else scores @ self.factor.T
+        columns = [m.values(correlated[:, i]) for i, m in enumerate(self.marginals)]
         return np.column_stack(columns)
 
 

@@ -104,10 +104,10 @@ def subset_simulation(
     evaluations = samples + len(thresholds) * (samples - chains)
     failed = values <= 0.0
     share, smallest = float(np.mean(failed)), float(np.min(values))
-    found = scores[failed]
+    seeds = scores[failed]
     if share == 0.0:
         ends = 0.0, bound_if_none(samples)
-        return RareEvent(0.0, *ends, math.inf, tuple(thresholds), evaluations, found, smallest)
+        return RareEvent(0.0, *ends, math.inf, tuple(thresholds), evaluations, seeds, smallest)
     errors.append(_deviation((history <= 0.0).astype(float)))
     variance = sum(error * error for error in errors)
     variance += 2.0 * NEIGHBOURS * sum(map(operator.mul, errors, errors[1:]))
@@ -115,7 +115,7 @@ def subset_simulation(
     # the estimate is a product, so its logarithm is about normal
     width = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE)) * math.sqrt(math.log1p(variance))
     ends = estimate * math.exp(-width), min(1.0, estimate * math.exp(width))
-    return RareEvent(estimate, *ends, deviation, tuple(thresholds), evaluations, found, smallest)
+    return RareEvent(estimate, *ends, deviation, tuple(thresholds), evaluations, seeds, smallest)
 
 
 def _evaluated(limit: Callable[[FloatArray], FloatArray], scores: FloatArray) -> FloatArray:

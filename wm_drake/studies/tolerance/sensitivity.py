@@ -76,12 +76,12 @@ def sobol_indices(
     random = np.random.default_rng(seed)
     rows = [np.arange(n), *(random.integers(n, size=n) for _ in range(RESAMPLES))]
     twice = np.concatenate([parts[1:], parts[-1:]])  # scipy fails on a single quantity
-    found = []
+    estimates = []
     for row in rows:
         values = {"f_A": at_a[None, row], "f_B": parts[:1, row], "f_AB": twice[:, None, row]}
         result = stats.sobol_indices(func=values, n=n)
-        found.append([result.first_order[:-1], result.total_order[:-1]])
-    indices = np.array(found)  # (resample, first or total, quantity)
+        estimates.append([result.first_order[:-1], result.total_order[:-1]])
+    indices = np.array(estimates)  # (resample, first or total, quantity)
     lower, upper = np.percentile(indices[1:], PERCENTILES, axis=0)
     return [
         Index(*map(float, (i[0], low[0], high[0], i[1], low[1], high[1])))

@@ -11,9 +11,8 @@ import xarray as xr
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.parameters.tolerances import Limit, fraction
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit, convert, split
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.gasket.responses import GAP, Response
+from wm_drake.simulation.measures.responses import GAP, Response
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.rare import RareEvent, subset_simulation
 from wm_drake.studies.tolerance.sensitivity import Index, exchanged, sobol_indices
@@ -173,7 +172,7 @@ def limits_of(
     Raises:
         InputError: a limit names a response that is not measured, or has a wrong unit.
     """
-    found, problems = [], []
+    resolved, problems = [], []
     names = {response.name: response for response in chosen}
     names |= {"smallest_gap": names[GAP]} if GAP in names else {}
     for place, limit in enumerate(limits):
@@ -181,37 +180,20 @@ def limits_of(
         response = names.get(limit.quantity)
         if response is None:
             known = ", ".join(list(names)[:12])
-            problems.append(
-                Problem(
-                    "",
-                    f"{key}.quantity",
-                    f"'{limit.quantity}' is not measured; add it with --response, or use one of "
-                    f"{known}, ...",
-                )
+            message = (
+                f"'{limit.quantity}' is not measured; add it with --response, or use one of "
+                f"{known}, ..."
             )
+            problems.append(Problem("", f"{key}.quantity", message))
             continue
         try:
-            found.append((limit, response, in_unit_of(limit.text, response.unit)))
-        except InputError as error:
-            problems += [Problem("", key, p.message) for p in error.problems]
+            value = response.unit.from_si(response.unit.number(limit.text))
+            resolved.append((limit, response, value))
+        except ValueError as error:
+            problems.append(Problem("", key, str(error)))
     if problems:
         raise InputError(problems)
-    return found
-
-
-def in_unit_of(text: str, unit: Unit) -> float:
-    """Return a number with a unit as a number in the unit for reading.
-
-    Raises:
-        InputError: the text is not a number with a unit that fits.
-    """
-    try:
-        numbers, given, several = split(text)
-        if several:
-            raise ValueError(f"'{text}' is more than one number")
-        return unit.from_si(convert(numbers[0], given or None, unit))
-    except ValueError as error:
-        raise input_error(str(error)) from None
+    return resolved
 
 
 def run_tolerances(
@@ -260,8 +242,8 @@ def judged(values: pd.DataFrame, limit: Limit, response: Response, number: float
         response: Its response.
         number: The limit. [unit of the response]
     """
-    found = values[measure_key(response)].to_numpy()
-    kept = found >= number if limit.at_least is not None else found <= number
+    values_of_limit = values[measure_key(response)].to_numpy()
+    kept = values_of_limit >= number if limit.at_least is not None else values_of_limit <= number
     broken, allowed = share_of(np.asarray(~kept)), fraction(limit.allowed_share, "allowed_share")
     word = "pass" if broken.upper <= allowed else "fail" if broken.lower > allowed else "undecided"
     return Verdict(limit, measure_key(response), number, allowed, broken, word)
@@ -300,22 +282,22 @@ def _indices(
         return {}, reason, 0
     others = exchanged(scores[0][:count], scores[1][:count])
     at_others = _measures(run(machine.cases(others, settings.samples + 1), "sensitivity"), chosen)
-    found: dict[str, list[Index]] = {}
+    indices: dict[str, list[Index]] = {}
     missing = []
     for name in values:
-        own = sobol_indices(
+        estimated = sobol_indices(
             values[name].to_numpy()[:count], at_others[name].to_numpy(), seed=settings.seed
         )
-        if own is None:
+        if estimated is None:
             missing.append(str(name))
         else:
-            found[str(name)] = own
+            indices[str(name)] = estimated
     reason = (
         f"No Sobol indices of {', '.join(missing)}: a run failed, or the measure does not vary."
         if missing
         else ""
     )
-    return found, reason, len(others)
+    return indices, reason, len(others)
 
 
 def _contact(

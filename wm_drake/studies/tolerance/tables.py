@@ -1,66 +1,71 @@
-"""Tables of a tolerance study, for CSV files and JSON."""
+"""Tables of a tolerance study: values for CSV files and JSON, and what page and terminal show."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from wm_drake.studies.gasket.tables import finite
+from wm_drake.report.formatting import MISSING, shape_name, significant, with_interval
+from wm_drake.report.table import Column, Table, line, table_of
 from wm_drake.studies.tolerance.shares import PERCENTILES, percentile_of
 from wm_drake.studies.tolerance.study import ToleranceResult
-from wm_drake.studies.tolerance.variables import PERCENT, Variable
+from wm_drake.studies.tolerance.words import in_a_million, measure_titles, quantity_words
+
+KINDS = {"pass": "ours", "fail": "alarm", "undecided": ""}
+"""Style of the row of a limit by its verdict."""
 
 
-def shown_values(result: ToleranceResult) -> pd.DataFrame:
-    """Return the uncertain quantities of each sample in their units for reading."""
-    values = result.machine.joint.values(result.scores)
-    columns = {}
-    for variable, column in zip(result.machine.variables, values.T, strict=True):
-        columns[f"{variable.name} [{unit_text(variable)}]"] = factor_for_reading(variable) * column
-    return pd.DataFrame(columns)
-
-
-def unit_text(variable: Variable) -> str:
-    """Return the unit of a quantity for reading; "%" for one relative to the machine's number."""
-    if variable.form == PERCENT or variable.unit is None:
-        return "%"
-    return variable.unit.shown.replace("*", " ")
-
-
-def factor_for_reading(variable: Variable) -> float:
-    """Return the factor from the number of a quantity to its unit for reading."""
-    if variable.form == PERCENT or variable.unit is None:
-        return 100.0
-    return variable.unit.from_si(1.0)
-
-
-def samples_table(result: ToleranceResult) -> pd.DataFrame:
+def samples_frame(result: ToleranceResult) -> pd.DataFrame:
     """Return quantities and measures of each sample, and the reason if its run failed."""
-    table = pd.concat([shown_values(result), result.values], axis=1)
-    table.insert(0, "sample", range(1, len(table) + 1))
-    table["failed"] = [result.failed.get(i, "") for i in range(len(table))]
-    return table
+    columns: dict[str, Any] = {"sample": range(1, len(result.values) + 1)}
+    values = result.machine.joint.values(result.scores)
+    for variable, column in zip(result.machine.variables, values.T, strict=True):
+        unit = variable.variation.unit
+        columns[f"{variable.name} [{unit.label}]"] = unit.from_si(1.0) * column
+    failed = [result.failed.get(i, "") for i in range(len(result.values))]
+    return pd.concat([pd.DataFrame(columns), result.values], axis=1).assign(failed=failed)
 
 
-def measures_table(result: ToleranceResult) -> pd.DataFrame:
+def measures_frame(result: ToleranceResult) -> pd.DataFrame:
     """Return mean, deviation and percentiles of each measure, with intervals of the percentiles."""
     rows = []
     for name, column in result.values.items():
         good = column.dropna().to_numpy()
         row: dict[str, Any] = {"measure": name, "mean": np.mean(good), "deviation": np.std(good)}
         for percent in PERCENTILES:
-            found = percentile_of(good, percent)
-            row |= {
-                f"p{percent}": found.value,
-                f"p{percent}_lower": found.lower,
-                f"p{percent}_upper": found.upper,
-            }
+            percentile = percentile_of(good, percent)
+            row[f"p{percent}"] = percentile.value
+            row |= {f"p{percent}_{end}": getattr(percentile, end) for end in ("lower", "upper")}
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def sobol_table(result: ToleranceResult) -> pd.DataFrame:
+MEASURES = {
+    "measure": Column("measure"),
+    "unit": Column("unit"),
+    "mean": Column("mean"),
+    "deviation": Column("deviation"),
+    "p5": Column("5 %"),
+    "p50": Column("median"),
+    "p95": Column("95 %"),
+}
+"""Columns of the table of measures."""
+
+
+def measures_table(result: ToleranceResult, *, is_short: bool = False) -> Table:
+    """Return the measures with words and unit; the short form has percentiles alone."""
+    frame, titles = measures_frame(result), measure_titles(result)
+    words = [titles[str(name)] for name in frame["measure"]]
+    frame["measure"], frame["unit"] = ([pair[index] for pair in words] for index in (0, 1))
+    names = [name for name in MEASURES if not (is_short and name in ("mean", "deviation"))]
+    for name in [f"p{percent}" for percent in PERCENTILES if not is_short]:
+        ends = frame[[name, f"{name}_lower", f"{name}_upper"]].itertuples(index=False)
+        frame[name] = [with_interval(*each) for each in ends]
+    caption = "Measures over all samples; percentiles with 95 % intervals of order statistics."
+    return table_of(frame[names], caption, MEASURES)
+
+
+def sobol_frame(result: ToleranceResult) -> pd.DataFrame:
     """Return the Sobol indices: one row for each measure and quantity."""
     return pd.DataFrame(
         {"measure": name, "quantity": variable.name, **vars(index)}
@@ -69,38 +74,54 @@ def sobol_table(result: ToleranceResult) -> pd.DataFrame:
     )
 
 
-def contact_table(result: ToleranceResult) -> pd.DataFrame:
-    """Return the share of the samples in which each pair of shapes touches or is nearest."""
-    contact = result.contact
-    names = dict.fromkeys([*contact.pairs, *contact.nearest]) if contact else {}
-    assert contact is not None or not names
-    rows = []
-    for name in names:
-        assert contact is not None
-        moving, fixed = name.split("|")
-        share = contact.pairs.get(name)
-        rows.append(
-            {
-                "moving": moving,
-                "fixed": fixed,
-                "touches": share.estimate if share else 0.0,
-                "lower": share.lower if share else 0.0,
-                "upper": share.upper if share else np.nan,
-                "nearest_in": contact.nearest.get(name, 0),
-            }
-        )
-    return pd.DataFrame(
-        rows, columns=["moving", "fixed", "touches", "lower", "upper", "nearest_in"]
+def sobol_table(result: ToleranceResult) -> Table:
+    """Return the total Sobol indices, a column for each quantity."""
+    names = (quantity_words(variable.name) for variable in result.machine.variables)
+    titles = measure_titles(result)
+    caption = (
+        "Total Sobol indices of all measures. First-order indices and 95 % intervals are in "
+        "sobol.csv."
     )
+    groups = (
+        line(titles[name][0], [index.total for index in indices])
+        for name, indices in result.indices.items()
+    )
+    columns = tuple(Column(name, decimals=2) for name in names)
+    return Table(caption, ("measure", *columns), tuple(groups))
 
 
-def limits_table(result: ToleranceResult) -> pd.DataFrame:
+def contact_frame(result: ToleranceResult) -> pd.DataFrame:
+    """Return the share of the samples in which each pair of shapes touches or is nearest."""
+    rows, contact = [], result.contact
+    if contact:
+        for name in dict.fromkeys([*contact.pairs, *contact.nearest]):
+            share = contact.pairs.get(name)
+            ends = (share.estimate, share.lower, share.upper) if share else (0.0, 0.0, np.nan)
+            rows.append((*name.split("|"), *ends, contact.nearest.get(name, 0)))
+    names = ["moving", "fixed", "touches", "lower", "upper", "nearest_in"]
+    return pd.DataFrame(rows, columns=names)
+
+
+def contact_table(result: ToleranceResult) -> Table:
+    """Return how often each pair of shapes touches and is nearest."""
+    rows = []
+    for moving, fixed, share, low, high, count in contact_frame(result).to_numpy().tolist():
+        ends = f"{in_a_million(low)} to {in_a_million(high)}" if share else MISSING
+        nearest = 100.0 * count / result.settings.samples
+        cells = (shape_name(fixed), in_a_million(share), ends, nearest)
+        rows.append(line(shape_name(moving), cells))
+    caption = (
+        "Contact by pair of shapes among the samples. A run may touch at several places. Last "
+        "column: share of the runs in which the pair has the smallest gap. Intervals: 95 %, "
+        "Clopper and Pearson."
+    )
+    header = ("moves with the tub", "housing", "touch, in a million", "interval")
+    return Table(caption, (*header, Column("nearest", "%", 1)), tuple(rows), text_columns=2)
+
+
+def limits_frame(result: ToleranceResult) -> pd.DataFrame:
     """Return the verdict on each limit."""
-    return pd.DataFrame(_limits(result))
-
-
-def _limits(result: ToleranceResult) -> list[dict[str, Any]]:
-    return [
+    return pd.DataFrame(
         {
             "quantity": v.limit.quantity,
             "side": "at_least" if v.limit.at_least is not None else "at_most",
@@ -112,58 +133,36 @@ def _limits(result: ToleranceResult) -> list[dict[str, Any]]:
             "verdict": v.word,
         }
         for v in result.verdicts
-    ]
+    )
 
 
-def write_tables(result: ToleranceResult, folder: Path) -> None:
-    """Write the CSV files of a study into a folder."""
-    tables = {
-        "samples": samples_table(result),
-        "measures": measures_table(result),
-        "sobol": sobol_table(result),
-        "contact": contact_table(result),
-        "limits": limits_table(result),
-    }
-    for name, table in tables.items():
-        if len(table.columns):
-            table.to_csv(folder / f"{name}.csv", index=False)
+def limits_table(result: ToleranceResult) -> Table:
+    """Return the verdict on each limit with the words of its quantity."""
+    titles, rows = measure_titles(result), []
+    for v in result.verdicts:
+        side = "at least" if v.limit.at_least is not None else "at most"
+        ends = " to ".join(significant(100.0 * x, 3) for x in (v.broken.lower, v.broken.upper))
+        share = significant(100.0 * v.broken.estimate, 3)
+        cells = (f"{side} {v.limit.text}", 100.0 * v.allowed, share, ends, v.word)
+        rows.append(line(titles[v.key][0], cells, KINDS[v.word]))
+    caption = (
+        "Limits: share of the runs that break each one. The verdict is pass if the whole 95 % "
+        "interval is allowed, fail if none of it is, else undecided: more samples decide it."
+    )
+    header = ("quantity", "limit", "allowed, %", "break it, %", "interval, %", "verdict")
+    return Table(caption, header, tuple(rows), text_columns=2)
 
 
-def as_plain_data(result: ToleranceResult) -> dict[str, Any]:
-    """Return a result as data for JSON."""
-    contact = result.contact
-    measures = {
-        row.pop("measure"): {name: finite(float(value)) for name, value in row.items()}
-        for row in measures_table(result).to_dict("records")
-    }
-    names = [variable.name for variable in result.machine.variables]
-    return {
-        "samples": result.settings.samples,
-        "seed": result.settings.seed,
-        "runs": result.runs,
-        "failed": len(result.failed),
-        "measures": measures,
-        "contact_probability": None
-        if contact is None
-        else {
-            "estimate": contact.estimate,
-            "lower": contact.lower,
-            "upper": contact.upper,
-            "method": contact.method,
-            "runs": contact.crude.samples,
-            "touching": contact.crude.count,
-            "pairs": {
-                name: {"estimate": s.estimate, "lower": s.lower, "upper": s.upper}
-                for name, s in contact.pairs.items()
-            },
-        },
-        "sobol": {
-            measure: {
-                name: {k: finite(v) for k, v in vars(index).items()}
-                for name, index in zip(names, indices, strict=True)
-            }
-            for measure, indices in result.indices.items()
-        },
-        "sobol_refused": result.refused,
-        "limits": _limits(result),
-    }
+def quantities_table(result: ToleranceResult) -> Table:
+    """Return what scatters."""
+    rows = (
+        line(
+            quantity_words(v.name),
+            (", ".join(v.variation.keys) or "load", v.text, v.source or MISSING),
+        )
+        for v in result.machine.variables
+    )
+    caption = "What scatters. Percents are of the machine's number."
+    return Table(
+        caption, ("quantity", "keys", "distribution", "source"), tuple(rows), text_columns=4
+    )

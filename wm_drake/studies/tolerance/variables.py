@@ -2,7 +2,6 @@
 
 import dataclasses
 import itertools
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,19 +11,20 @@ from pydantic import ValidationError
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.parameters import (
-    ForceTable,
+    Change,
     Load,
     MachineParameters,
-    TorqueTable,
     Unbalance,
-    quantities,
+    Variation,
+    apply,
+    variation_of,
     with_values,
 )
-from wm_drake.parameters.factors import nominal_at, scaled_table, value_at
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.tolerances import LAUNDRY, TRUNCATED, Laundry, Spread, Tolerances
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit, convert, split
+from wm_drake.parameters.units import Share, Unit
+from wm_drake.parameters.variation import change_of, changes_of, owned_twice
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.tolerance.distributions import (
     Joint,
@@ -35,21 +35,15 @@ from wm_drake.studies.tolerance.distributions import (
     uniform,
 )
 
-PERCENT, VALUE, DISTANCE = "percent", "value", "distance"
-"""Forms of the numbers of a distribution: in percent of the machine's number, a value with a unit,
-a distance from the machine's number."""
-
 KEPT_MACHINES = 2048
 """How many machines are cached."""
 
-_NOMINAL = re.compile(r"nominal\s*(?:([+-])\s*(.+))?")
-
-_LAUNDRY_UNITS = {
+_LAUNDRY_UNITS: dict[str, Unit] = {
     "mass": Unit("kg", "g"),
     "angle": Unit("rad", "deg"),
     "y": Unit("m", "mm"),
     "radius": Unit("m", "mm"),
-    "second_share": None,
+    "second_share": Share(),
     "second_angle": Unit("rad", "deg"),
     "second_y": Unit("m", "mm"),
 }
@@ -67,32 +61,29 @@ _TYPES = {
 
 @dataclass(frozen=True)
 class Variable:
-    """An uncertain quantity.
+    """An uncertain quantity: a variation with a distribution.
 
     Attributes:
-        name: Name of the quantity.
-        keys: Key paths of the numbers that it changes; empty for the laundry.
-        form: PERCENT, VALUE or DISTANCE.
-        marginal: Distribution. [1 for PERCENT, else SI]
-        unit: Unit of its numbers; None if they have none.
+        variation: What it changes; no numbers for the laundry.
+        marginal: Distribution. [1 for percent, else SI]
         text: The distribution in words.
         source: Where its numbers come from.
-        about: Description.
     """
 
-    name: str
-    keys: tuple[str, ...]
-    form: str
+    variation: Variation
     marginal: Marginal
-    unit: Unit | None
     text: str
     source: str
-    about: str
+
+    @property
+    def name(self) -> str:
+        """Name of the quantity."""
+        return self.variation.name
 
     @property
     def is_laundry(self) -> bool:
         """Whether it is a quantity of the laundry."""
-        return not self.keys
+        return not self.variation.numbers
 
 
 @dataclass(frozen=True)
@@ -124,50 +115,37 @@ class UncertainMachine:
         Raises:
             InputError: a sample is not a machine.
         """
-        found = []
+        cases = []
         for number, values in enumerate(self.joint.values(scores), start=first):
             try:
-                found.append(self._case(f"sample {number}", values.tolist()))
+                cases.append(self._case(f"sample {number}", values.tolist()))
             except InputError as error:
                 raise InputError(
                     replace(p, where=f"sample {number}") for p in error.problems
                 ) from None
-        return found
+        return cases
 
     def _case(self, name: str, values: Sequence[float]) -> Case:
-        changes: dict[str, Any] = {}
-        laundry: dict[str, float] = {}
-        for variable, value in zip(self.variables, values, strict=True):
-            if variable.is_laundry:
-                laundry[variable.name.removeprefix(f"{LAUNDRY}.")] = value
-            for key in variable.keys:
-                changes[key] = value
-        parameters = self._machine_with(changes) if changes else self.parameters
+        pairs = list(zip(self.variables, values, strict=True))
+        laundry = {v.name.removeprefix(f"{LAUNDRY}."): x for v, x in pairs if v.is_laundry}
+        parameters = self._machine_with(tuple(x for v, x in pairs if not v.is_laundry))
         load = laundry_load(laundry) if laundry else parameters.loads[self.case.name]
         return Case(name, load, self.case.profile, parameters=parameters)
 
-    def _machine_with(self, drawn: dict[str, float]) -> MachineParameters:
-        """Return the machine with drawn values by key path, the same one for the same values.
+    def _machine_with(self, values: tuple[float, ...]) -> MachineParameters:
+        """Return the machine with values of its variations, the same one for the same values.
 
         The samples of Sobol indices exchange one quantity at a time: half of their machines differ
         in the laundry only, and each machine is prepared once.
         """
-        values = tuple(drawn.values())
+        if not values:
+            return self.parameters
         if values not in self._known:
             if len(self._known) >= KEPT_MACHINES:
                 del self._known[next(iter(self._known))]
-            forms = {key: variable for variable in self.variables for key in variable.keys}
-            changes = {key: self._changed(forms[key], key, v) for key, v in drawn.items()}
-            self._known[values] = with_values(self.parameters, changes)
+            variations = [v.variation for v in self.variables if not v.is_laundry]
+            self._known[values] = apply(self.parameters, variations, values)
         return self._known[values]
-
-    def _changed(self, variable: Variable, key: str, value: float) -> Any:
-        if variable.form == VALUE:
-            return value
-        nominal = value_at(self.parameters, key)
-        if isinstance(nominal, ForceTable | TorqueTable):
-            return scaled_table(nominal, value)
-        return nominal * value if variable.form == PERCENT else nominal + value
 
     def check(self, is_usable: Callable[[Case], None]) -> None:
         """Check the machine at both ends of each quantity, the others at their medians.
@@ -245,21 +223,18 @@ def uncertain_machine(
             name an unknown quantity.
     """
     variables: list[Variable] = []
-    problems: list[Problem] = []
-    owner: dict[str, str] = {}
+    groups = {name: quantity.keys for name, quantity in tolerances.quantities.items()}
+    problems = owned_twice(groups, "quantity")
     for name, quantity in tolerances.quantities.items():
         try:
-            parameters, groups = _groups(parameters, name, quantity.keys, quantity.draws)
-            for own, keys in groups.items():
-                for key in keys:
-                    if owner.setdefault(key, name) != name:
-                        raise input_error(f"belongs to quantity {owner[key]} already", key=key)
-                variables.append(_variable(parameters, own, keys, quantity, quantity.about))
+            parameters, draws = _groups(parameters, name, quantity.keys, quantity.draws)
+            for draw, keys in draws.items():
+                variables.append(_variable(parameters, draw, keys, quantity, quantity.about))
         except InputError as error:
             problems += [Problem(f"quantity {name}", p.key, p.message) for p in error.problems]
     if tolerances.laundry is not None:
-        found, wrong = _laundry_variables(tolerances.laundry)
-        variables, problems = [*variables, *found], [*problems, *wrong]
+        laundry, wrong = _laundry_variables(tolerances.laundry)
+        variables, problems = [*variables, *laundry], [*problems, *wrong]
     if problems:
         raise InputError(problems)
     factor = _correlation_factor(tolerances, [v.name for v in variables])
@@ -283,17 +258,17 @@ def _groups(
         table, _, rest = key.partition(".")
         kind, _, field = rest.partition(".")
         if table in _TYPES and field and kind in getattr(parameters, table):
-            parameters, own = with_own_types(parameters, table, kind)
-            groups |= {f"{name}.{part}": (f"{table}.{t}.{field}",) for part, t in own.items()}
+            parameters, types = with_types_apart(parameters, table, kind)
+            groups |= {f"{name}.{part}": (f"{table}.{t}.{field}",) for part, t in types.items()}
         else:
             groups[f"{name}.{key}" if len(keys) > 1 else name] = (key,)
     return parameters, groups
 
 
-def with_own_types(
+def with_types_apart(
     parameters: MachineParameters, table: str, kind: str
 ) -> tuple[MachineParameters, dict[str, str]]:
-    """Return a machine in which each part has a type of its own, and the types by part.
+    """Return a machine in which each part has a separate type, and the types by part.
 
     Args:
         parameters: The machine.
@@ -302,95 +277,77 @@ def with_own_types(
     """
     types = dict(getattr(parameters, table))
     changes: dict[str, Any] = {}
-    own: dict[str, str] = {}
+    by_part: dict[str, str] = {}
     for parts, field in _TYPES[table]:
         for part, element in getattr(parameters, parts).items():
             if getattr(element, field) == kind:
                 label = f"{part}_{field.removesuffix('_bushing')}" if "bushing" in field else part
-                own[label] = f"{kind}_{label}"[-64:]
-                types[own[label]] = types[kind]
-                changes[f"{parts}.{part}.{field}"] = own[label]
-    if len(own) < 2:
-        only = next(iter(own), "")
+                by_part[label] = f"{kind}_{label}"[-64:]
+                types[by_part[label]] = types[kind]
+                changes[f"{parts}.{part}.{field}"] = by_part[label]
+    if len(by_part) < 2:
+        only = next(iter(by_part), "")
         return parameters, {only: kind} if only else {kind: kind}
-    return with_values(with_values(parameters, {table: types}), changes), own
+    return with_values(with_values(parameters, {table: types}), changes), by_part
 
 
 def _laundry_variables(laundry: Laundry) -> tuple[list[Variable], list[Problem]]:
     variables, problems = [], []
     for field, spread in laundry.spreads().items():
         name, unit = f"{LAUNDRY}.{field}", _LAUNDRY_UNITS[field]
+        variation = Variation(name, (), Change.VALUE, unit)
         try:
-            form, marginal = marginal_of(spread, unit, None)
-            if unit is not None and form != VALUE:
+            change, values = changes_of(_places(spread), unit, name)
+            if change is not Change.VALUE:
                 raise input_error(f"needs values with a unit, such as '1 {unit.shown}'", key=name)
+            variables.append(_with_spread(variation, spread, values, name))
         except InputError as error:
             problems += [Problem(LAUNDRY, p.key or name, p.message) for p in error.problems]
-            continue
-        text = _text(spread)
-        variables.append(Variable(name, (), VALUE, marginal, unit, text, spread.source, ""))
     return variables, problems
 
 
 def _variable(
     parameters: MachineParameters, name: str, keys: tuple[str, ...], spread: Spread, about: str
 ) -> Variable:
-    known = {key: (value, unit) for key, value, unit in quantities(parameters)}
-    units = []
-    for key in keys:
-        number, unit = nominal_at(parameters, known, key)
-        form, marginal = marginal_of(spread, unit, number, key)
-        is_table = isinstance(value_at(parameters, key), ForceTable | TorqueTable)
-        if is_table and form != PERCENT:
-            raise input_error("is a table; give its distribution in percent", key=key)
-        units.append(unit)
-    return Variable(name, keys, form, marginal, units[0], _text(spread), spread.source, about)
+    variation, values = variation_of(parameters, name, keys, _places(spread), about)
+    return _with_spread(variation, spread, values, keys[-1])
 
 
-def marginal_of(
-    spread: Spread, unit: Unit | None, nominal: float | None, key: str = ""
-) -> tuple[str, Marginal]:
-    """Return form and distribution of a spread.
+def _places(spread: Spread) -> dict[str, str]:
+    """Return the texts of a distribution by name, without its standard deviation."""
+    texts = {name: getattr(spread, name) for name in ("mean", "mode", "low", "high")}
+    return {name: text for name, text in texts.items() if text is not None}
+
+
+def _with_spread(
+    variation: Variation, spread: Spread, values: dict[str, float], key: str
+) -> Variable:
+    """Return a variation with a distribution.
 
     Args:
-        spread: The spread.
-        unit: Unit of the number; None if it has none.
-        nominal: Number of the machine; None for the laundry.
+        variation: The variation.
+        spread: The distribution in the file.
+        values: Values of `_places`. [1 for percent, else SI]
         key: Key path for messages.
 
     Raises:
-        InputError: a number has another form or unit, or the ends are not in order.
+        InputError: the deviation has another form or unit, or the ends are not in order.
     """
-    is_share = unit is None and nominal is None
-    numbers: dict[str, float] = {}
-    forms: dict[str, str] = {}
-    for field in ("mean", "mode", "low", "high"):
-        text = getattr(spread, field)
-        if text is not None:
-            forms[field], numbers[field] = _number(
-                text, unit, f"{key}.{field}".lstrip("."), is_share
-            )
-    if len(set(forms.values())) > 1:
-        raise input_error(
-            f"{' and '.join(forms)} have different forms; write all in percent, all as values or "
-            "all as nominal + distance",
-            key=key,
-        )
-    form = next(iter(forms.values()))
-    if form != VALUE and nominal is None:
-        raise input_error("has no number of a machine; write values with a unit", key=key)
-    if form == PERCENT and nominal == 0.0:
-        raise input_error("is 0, so percents of it are 0; write values with a unit", key=key)
+    change = variation.change
     if spread.deviation is not None:
-        d_key = f"{key}.deviation".lstrip(".")
-        d_form, numbers["deviation"] = _number(spread.deviation, unit, d_key, is_share)
-        if (d_form == PERCENT) != (form == PERCENT) or numbers["deviation"] <= 0.0:
-            what = "in percent" if form == PERCENT else "a value with a unit"
-            raise input_error(f"'{spread.deviation}' is not {what} above 0", key=d_key)
-    return form, _made(spread, form, numbers, key)
+        form = Change.PERCENT if change is Change.PERCENT else Change.VALUE
+        unit = variation.numbers[0].unit if variation.numbers else variation.unit
+        given, deviation = change_of(spread.deviation, unit, f"{key}.deviation")
+        if given is not form or deviation <= 0.0:
+            what = "in percent" if form is Change.PERCENT else "a value with a unit"
+            message = f"'{spread.deviation}' is not {what} above 0"
+            raise input_error(message, key=f"{key}.deviation")
+        values = values | {"deviation": deviation}
+    marginal = _marginal(spread, values, key, can_be_negative=change is Change.DISTANCE)
+    return Variable(variation, marginal, _text(spread), spread.source)
 
 
-def _made(spread: Spread, form: str, n: dict[str, float], key: str) -> Marginal:
+def _marginal(spread: Spread, n: dict[str, float], key: str, *, can_be_negative: bool) -> Marginal:
     kind = spread.distribution
     order = [n[f] for f in ("low", "mode", "high") if f in n]
     is_ordered = all(a <= b for a, b in itertools.pairwise(order))
@@ -405,35 +362,9 @@ def _made(spread: Spread, form: str, n: dict[str, float], key: str) -> Marginal:
     ends = {end: n[end] for end in ("low", "high") if end in n}
     if kind == "normal":
         return normal(n["mean"], n["deviation"], **ends)
-    if form == DISTANCE or n["mean"] <= 0.0 or ends.get("high", 1.0) <= 0.0:
+    if can_be_negative or n["mean"] <= 0.0 or ends.get("high", 1.0) <= 0.0:
         raise input_error("a lognormal distribution needs a mean and an end above 0", key=key)
     return lognormal(n["mean"], n["deviation"], **ends)
-
-
-def _number(text: str, unit: Unit | None, key: str, is_share: bool) -> tuple[str, float]:
-    """Return form and number of a text; a percent is a fraction of 1."""
-    try:
-        relative = _NOMINAL.fullmatch(text.strip())
-        if relative:
-            sign, distance = -1.0 if relative[1] == "-" else 1.0, relative[2]
-            return DISTANCE, sign * _plain(distance, unit) if distance else 0.0
-        if text.strip().endswith("%"):
-            percent = 0.01 * _plain(text.strip().removesuffix("%"), None)
-            return VALUE if is_share else PERCENT, percent
-        return VALUE, _plain(text, unit)
-    except ValueError as error:
-        raise input_error(str(error), key=key) from None
-
-
-def _plain(text: str, unit: Unit | None) -> float:
-    numbers, given, several = split(text.strip())
-    if several:
-        raise ValueError(f"'{text}' is more than one number")
-    if unit is not None:
-        return convert(numbers[0], given or None, unit)
-    if given:
-        raise ValueError(f"'{text}' has a unit; the number has none")
-    return numbers[0]
 
 
 def _text(spread: Spread) -> str:

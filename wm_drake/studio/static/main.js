@@ -169,12 +169,22 @@ async function rank() {
 
 /** Take the seven numbers that change the chosen measure most. */
 function chooseTurned() {
-  const name = byId('rank-by').value;
-  const size = (of) => Math.max(0, ...of[name].map((value) => Math.abs(value ?? 0)));
-  const wanted = ranking.map((of) => ({key: of.key, size: size(of)})).filter((of) => of.size > 0);
-  wanted.sort((a, b) => b.size - a.size);
-  turned = wanted.slice(0, 7).map((of) => of.key);
+  if (!answer) return;
+  const kind = byId('rank-by').value;
+  const size = (of) => Math.max(0, ...of.changes.map((value, place) => (answer.rows[place]?.kind === kind ? Math.abs(value ?? 0) : 0)));
+  const influences = ranking.map((of) => ({key: of.key, size: size(of)})).filter((of) => of.size > 0);
+  influences.sort((a, b) => b.size - a.size);
+  turned = influences.slice(0, 7).map((of) => of.key);
   run();
+}
+
+/** Offer every kind of measure of the first answer for the choice of the seven numbers. */
+function offerKinds() {
+  const choice = byId('rank-by');
+  if (choice.options.length) return;
+  const kinds = [...new Set(answer.rows.map((row) => row.kind))];
+  choice.replaceChildren(...kinds.map((kind) => make('option', {value: kind}, kind)));
+  if (ranking.length) chooseTurned();
 }
 
 /* ---- drawing ---- */
@@ -198,7 +208,8 @@ const sizeOf = (bands) => Math.max(0, ...bands.map((band) => band
 
 function showAnswer() {
   if (!answer) return;
-  showMeasures(byId('measures'), answer, ghost, machine, labelOf);
+  offerKinds();
+  showMeasures(byId('measures'), answer, ghost, labelOf);
   list.show(state.values, answer.values);
   showEnvelopes();
   showForces();
@@ -332,15 +343,14 @@ function showHistory() {
 
 function showVariants() {
   const columns = [{name: 'now', state, answer}, ...variants];
-  const gap = (of) => (of.answer?.gap ? fixed(of.answer.gap.distance, 2) : '–');
-  const largest = (of, name, decimals) => (of.answer ? fixed(Math.max(...of.answer[name].filter((v) => v !== null)), decimals) : '–');
-  const rows = [
-    ...Object.keys(machine.sensors).map((name, index) => [`${name}, mm`, (of) => (of.answer ? fixed(of.answer.amplitude[index], 2) : '–')]),
-    ['smallest gap, mm', gap],
-    ['largest gasket force, N', (of) => largest(of, 'gasket_force', 1)],
-    ['largest gasket moment, N m', (of) => largest(of, 'gasket_moment', 2)],
-    ['largest mount force, N', (of) => largest(of, 'mount_peak', 1)],
-  ];
+  const largest = (of, group) => (of.answer ? Math.max(...of.answer.rows.filter((row) => row.group === group).map((row) => row.value ?? -Infinity)) : null);
+  const text = (value, decimals) => (Number.isFinite(value) ? fixed(value, decimals) : '–');
+  const groups = new Map();
+  answer.rows.forEach((row) => {
+    if (!row.group) groups.set(row.title, (of) => text(of.answer?.rows.find(({title}) => title === row.title)?.value, row.decimals));
+    else if (!groups.has(row.group)) groups.set(row.group, (of) => text(largest(of, row.group), row.decimals));
+  });
+  const rows = [...groups];
   const what = (of) => [of.state.machine, of.state.masses.length ? 'described load' : of.state.load, of.state.gasket ? '' : 'no gasket',
     ...Object.entries(of.state.values).map(([key, text]) => `${key} = ${text}`)].filter(Boolean).join('; ');
   const head = columns.map((of, index) => (index === 0 ? make('th', {}, 'now') : make('th', {title: what(of)},

@@ -2,19 +2,6 @@
 
 import {digits, fixed, make} from './dom.js';
 
-/** Return the rows of an answer: title, decimals, now, and how to find it in arrows. */
-export function rowsOf(answer, machine) {
-  const rows = Object.entries(machine.sensors).map(([name], index) => ({
-    title: `${name}, mm`, name: 'amplitude', index, sensor: name, value: answer.amplitude[index], decimals: 2,
-  }));
-  rows.push({title: 'smallest gap, mm', name: 'gap', index: 0, value: answer.gap?.distance ?? null, decimals: 2, isGap: true});
-  'xyz'.split('').forEach((axis, index) => rows.push({title: `D${axis}, mm`, name: 'detergent', index, value: answer.detergent[index], decimals: 2}));
-  'xyz'.split('').forEach((axis, index) => rows.push({title: `gasket F${axis}, N`, name: 'gasket_force', index, value: answer.gasket_force[index], decimals: 1}));
-  'xyz'.split('').forEach((axis, index) => rows.push({title: `gasket M${axis}, N m`, name: 'gasket_moment', index, value: answer.gasket_moment[index], decimals: 2}));
-  answer.mounts.forEach((mount, index) => rows.push({title: `${mount}, N`, name: 'mount_peak', index, value: answer.mount_peak[index], decimals: 1}));
-  return rows;
-}
-
 function arrow(change, largest, step) {
   if (change === null || change === undefined) return make('td', {class: 'none'}, '–');
   const share = largest > 0 ? Math.abs(change) / largest : 0;
@@ -24,22 +11,21 @@ function arrow(change, largest, step) {
   return make('td', {class: count === 0 ? 'none' : change > 0 ? 'up' : 'down', title: `${sign}${digits(change, 3)} for +${step}`}, glyph, ` ${sign}${digits(change, 2)}`);
 }
 
-export function showMeasures(table, answer, ghost, machine, label) {
+export function showMeasures(table, answer, ghost, label) {
   const measured = answer.measured;
   const head = make('tr', {},
     make('th', {}), make('th', {}, 'now'), make('th', {}, 'as it was'), make('th', {}, 'change'),
     ...measured.map(({source}) => make('th', {class: 'source'}, source)),
     ...answer.arrows.map(({key, step}) => make('th', {class: 'turned', title: key}, `${label(key).name}, +${digits(step, 3)} ${label(key).unit}`)));
-  const before = ghost ? rowsOf(ghost, machine) : [];
-  const body = rowsOf(answer, machine).map((row, place) => {
+  const before = ghost ? ghost.rows : [];
+  const body = answer.rows.map((row, place) => {
     const was = before[place]?.value ?? null;
     const change = was && row.value !== null ? `${row.value >= was ? '+' : '−'}${fixed(Math.abs((100 * (row.value - was)) / was), 0)} %` : '–';
-    const changes = answer.arrows.map((of) => of[row.name][row.index]);
+    const changes = answer.arrows.map((of) => of.changes[place]);
     const largest = Math.max(0, ...changes.map((value) => Math.abs(value ?? 0)));
-    const touches = row.isGap && row.value !== null && row.value <= 0;
     return make('tr', {'data-row': row.title},
       make('th', {}, row.title),
-      make('td', {class: touches ? 'now alarm' : 'now'}, row.value === null ? '–' : fixed(row.value, row.decimals)),
+      make('td', {class: row.alarm ? 'now alarm' : 'now'}, row.value === null ? '–' : fixed(row.value, row.decimals)),
       make('td', {}, was === null ? '–' : fixed(was, row.decimals)),
       make('td', {}, change),
       ...measured.map(({amplitude}) => make('td', {}, row.sensor ? fixed(amplitude[row.sensor], 1) : '')),

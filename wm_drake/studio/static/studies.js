@@ -3,18 +3,14 @@
 import {byId, make} from './dom.js';
 import {get, post} from './server.js';
 
-const HINTS = {
-  '--trials': 'all', '--design': 'd-optimal', '--model': 'main+2fi', '--load': 'middle and counter', '--samples': '4096',
-  '--sensitivity': '512', '--subset': '1000', '--case': 'all',
-};
 const PERIOD = 1000;
 
 export class Studies {
-  /** `state()` returns the state of the page; `show(error)` shows an error. */
-  constructor(options, state) {
-    this.options = options;
+  /** `forms` has the fields of each study; `state()` returns the state of the page. */
+  constructor(forms, state) {
+    this.forms = forms;
     this.state = state;
-    byId('study').replaceChildren(...Object.keys(options).map((name) => make('option', {value: name}, name)));
+    byId('study').replaceChildren(...Object.keys(forms).map((name) => make('option', {value: name}, name)));
     byId('study').addEventListener('change', () => this.choose());
     byId('start').addEventListener('click', () => this.start());
     this.choose();
@@ -22,15 +18,15 @@ export class Studies {
   }
 
   choose() {
-    const names = this.options[byId('study').value];
-    byId('study-options').replaceChildren(...names.map((name) =>
-      make('label', {}, ` ${name.slice(2)} `, make('input', {size: Math.max(8, (HINTS[name] ?? '').length), placeholder: HINTS[name] ?? '', 'data-option': name, autocomplete: 'off'}))));
+    byId('study-options').replaceChildren(...this.forms[byId('study').value].map((field) =>
+      make('label', {title: field.description}, ` ${field.name.replaceAll('_', ' ')} `, input(field))));
   }
 
   async start() {
     const options = {};
     for (const input of byId('study-options').querySelectorAll('input')) {
-      if (input.value.trim()) options[input.dataset.option] = input.value.trim();
+      const text = input.type === 'checkbox' ? (input.checked ? 'true' : '') : input.value.trim();
+      if (text) options[input.dataset.option] = text;
     }
     await this.act(() => post('studies', {state: this.state(), study: byId('study').value, options}));
   }
@@ -72,4 +68,14 @@ export class Studies {
       make('div', {}, make('code', {}, study.command)),
       study.output ? make('pre', {}, study.output.trim()) : null);
   }
+}
+
+/** Return the input of a field of a form. */
+function input(field) {
+  const size = Math.max(8, field.default.length);
+  const shown = {'data-option': field.name, placeholder: field.default, autocomplete: 'off', size: String(size)};
+  if (field.kind === 'boolean') return make('input', {type: 'checkbox', 'data-option': field.name});
+  if (field.kind === 'text') return make('input', shown);
+  const limits = Object.fromEntries([['min', field.ge], ['max', field.le]].filter(([, limit]) => limit !== undefined).map(([name, limit]) => [name, String(limit)]));
+  return make('input', {type: 'number', step: field.kind === 'integer' ? '1' : 'any', ...shown, ...limits});
 }

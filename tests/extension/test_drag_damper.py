@@ -1,0 +1,299 @@
+"""Element kinds of other packages, through every door that elements of this package have."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drag_damper import DRAG_DAMPER
+from energy_book import EnergyBook, dense_record
+from maxwell_strut import MAXWELL_STRUT
+from moving_cabinet import with_moving_cabinet
+from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
+
+import wm_drake as wm
+from wm_drake.elements.kind import Ends, placed_element
+from wm_drake.engines.compiled.derivative import StateDerivative
+from wm_drake.errors import InputError
+from wm_drake.model.build import build_machine
+from wm_drake.model.replay import Motion, replay_page
+from wm_drake.parameters import MachineParameters, SpinProfile, load_machine
+from wm_drake.parameters.file_keys import file_schema, key_groups
+from wm_drake.parameters.files import machine_yaml
+from wm_drake.parameters.keys import quantities
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.runs import simulate
+from wm_drake.studies.description.schema import Description
+from wm_drake.studies.modes.linearisation import Linearisation, drake_spectrum
+from wm_drake.systems.element_system import ElementSystem
+
+FRAMES = {"tub_frame": "damper_left_tub", "housing_frame": "damper_left_housing"}
+DRAG = {"kind": "drag_damper", **FRAMES, "coefficient": 4000.0}  # N s^2/m^2
+MAXWELL = {"kind": "maxwell_strut", **FRAMES, "stiffness": 9e3, "damping": 250.0}  # N/m, N s/m
+ELEMENTS = {
+    "drag": {"slow": DRAG},
+    "maxwell": {"slow": MAXWELL},
+    "both": {"first": DRAG, "second": MAXWELL, "third": {**DRAG, "coefficient": 900.0}},
+}
+PROFILE = SpinProfile(time=(0.0, 1.0, 1.5), speed=(5.0, 30.0, 30.0))
+FILE = """\
+extends: reference
+elements:
+  slow:
+    kind: drag_damper
+    tub_frame: damper_left_tub
+    housing_frame: damper_left_housing
+    coefficient: 4000 N*s^2/m^2
+"""
+wm.register_element(DRAG_DAMPER)
+wm.register_element(MAXWELL_STRUT)
+
+
+def with_elements(parameters=None, elements=ELEMENTS["both"], **parts):
+    """Return a machine with elements of other packages."""
+    tree = (parameters or load_machine("reference")).model_dump(exclude_unset=True)
+    return MachineParameters.model_validate(tree | {"elements": elements} | parts)
+
+
+@pytest.fixture(scope="module", params=ELEMENTS)
+def with_kind(request):
+    """Return a built machine with elements of each kind."""
+    return build_machine(with_elements(elements=ELEMENTS[request.param]))
+
+
+def test_a_kind_is_registered_once():
+    assert wm.register_element(DRAG_DAMPER) is DRAG_DAMPER
+    other = wm.ElementKind(
+        name="drag_damper",
+        parameters=DRAG_DAMPER.parameters,
+        layout=DRAG_DAMPER.layout,
+        numbers=DRAG_DAMPER.numbers,
+        evaluate=DRAG_DAMPER.evaluate,
+    )
+    with pytest.raises(ValueError, match=r"drag_damper.*registered already"):
+        wm.register_element(other)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("4000 N*s^2/m^2", "4000 N*s/m", "7: elements.slow.coefficient: unit .* does not fit"),
+        ("4000 N*s^2/m^2", "-1 N*s^2/m^2", "7: elements.slow.coefficient: .* out of range"),
+        ("coefficient", "coeficient", "unknown key 'coeficient'.*coefficient"),
+        ("kind: drag_damper", "kind: drag_dampr", "4: elements.slow.kind: .*drag_damper"),
+        ("    kind: drag_damper\n", "", "elements.slow.kind: is missing"),
+        ("damper_left_tub", "damper_left_tb", "no frame 'damper_left_tb'.*damper_left_tub"),
+        ("damper_left_tub", "damper_left_housing", "is not fixed to the tub"),
+    ],
+)
+def test_errors_of_a_machine_file_name_line_and_key(old, new, message, tmp_path, wm_drake):
+    path = tmp_path / "mine.yaml"
+    path.write_text(FILE.replace(old, new), encoding="utf-8")
+    result = wm_drake("machine", "check", path)
+    assert result.code == 2
+    assert len(result.messages) <= 2
+    assert re.search(message, result.err), result.err
+
+
+def test_numbers_are_found_changed_and_written(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(FILE, encoding="utf-8")
+    parameters = load_machine(path)
+    key = "elements.slow.coefficient"
+    assert {name: value for name, value, _ in quantities(parameters)}[key] == 4000.0
+    changed = wm.with_value(parameters, key, "2 kN*s^2/m^2")
+    assert changed.elements["slow"].coefficient == 2000.0
+    path.write_text(machine_yaml(changed), encoding="utf-8")
+    assert load_machine(path).elements == changed.elements
+    with pytest.raises(InputError, match="coefficient"):
+        wm.with_value(parameters, "elements.slow.coefficent", 1.0)
+
+
+def test_schema_and_manual_have_the_keys():
+    schema = json.dumps(file_schema())
+    assert "Tension over the square of the velocity" in schema
+    groups = [group for group in key_groups() if "elements.NAME" in group.places]
+    assert {"Drag damper", "Maxwell strut"} <= {group.title for group in groups}
+
+
+def test_description_of_the_machine_has_the_elements(with_kind):
+    description = wm.describe(with_kind)
+    Description.model_validate(description)
+    assert set(description["elements"]) == set(with_kind.parameters.elements)
+
+
+def test_both_engines_agree_at_random_states(with_kind):
+    """Compare the derivatives of all states, with sponges and own states."""
+    setup = with_kind.set_up("middle")
+    derivative, context = StateDerivative(setup), setup.context
+    size, rng = context.num_continuous_states(), np.random.default_rng(3)
+    assert size == derivative.layout.states.size
+    sizes = np.concatenate([[0.3] * 3, [0.05] * 3, [30.0], [2.0] * 3, [1.0] * 3, [100.0]])
+    sizes = np.append(sizes, np.full(size - 14, 1e-3))
+    for _ in range(100):
+        state, acceleration = sizes * rng.uniform(-1.0, 1.0, size), rng.uniform(-20.0, 20.0)
+        context.SetContinuousState(state)
+        with_kind.set_drum_acceleration(context, acceleration)
+        drake = with_kind.diagram.EvalTimeDerivatives(context).CopyToVector()
+        compiled = derivative(state, drake[13])
+        for part in (slice(0, 3), slice(7, 10), slice(10, 13), slice(14, None)):
+            scale = np.abs(drake[part]).max()
+            np.testing.assert_allclose(compiled[part], drake[part], rtol=0, atol=1e-10 * scale)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("integrator", ["multistep", "runge_kutta"])
+def test_both_engines_move_alike(integrator):
+    machine = build_machine(with_elements())
+    case = Case("middle", machine.parameters.loads["middle"], PROFILE)
+    ours = simulate(machine, case, integrator=integrator, step=5e-4)
+    drake = simulate(machine, case, "drake", step=5e-4)
+    for name in ("displacement", "drag_damper_tension", "maxwell_strut_tension", "mount_force"):
+        size = float(np.abs(drake[name]).max())
+        np.testing.assert_allclose(ours[name], drake[name], atol=2e-3 * size)
+    assert list(ours.mount.values[-3:]) == ["elements.first", "elements.second", "elements.third"]
+    assert list(ours.drag_damper.values) == ["first", "third"]
+
+
+def test_eight_runs_side_by_side_are_single_runs():
+    machine = build_machine(with_elements())
+    parameters = machine.parameters
+    cases = [
+        Case(
+            f"{number}",
+            parameters.loads["middle"],
+            PROFILE,
+            parameters=wm.with_value(parameters, "elements.first.coefficient", 500.0 * number),
+        )
+        for number in range(1, 10)
+    ]
+    table = wm.simulate_many(machine, cases, measures=["extremes"])
+    single = wm.measure(simulate(machine, cases[4]))
+    np.testing.assert_allclose(table.gasket_force[4], single.gasket_force, rtol=1e-9)
+    assert len(set(table.gasket_force.sel(axis="x").values)) == 9
+
+
+@pytest.mark.parametrize(("kind", "numbers"), [(DRAG_DAMPER, DRAG), (MAXWELL_STRUT, MAXWELL)])
+def test_derivatives_of_the_system_are_those_of_differences(kind, numbers):
+    """Compare AutoDiffXd with central differences, by the state of the plant and own states."""
+    point, ground = np.array([-0.1, 0.02, -0.2]), np.array([-0.25, 0.03, -0.5])
+    ends = Ends(point, np.eye(3), ground, np.eye(3))
+    placed = placed_element(kind, kind.parameters.model_validate(numbers), ends)
+    system = ElementSystem(kind, placed.packed(), placed.state_size)
+    rng = np.random.default_rng(1)
+    state = rng.uniform(-0.2, 0.2, 14 + placed.state_size)
+
+    def force(system, values):
+        context = system.CreateDefaultContext()
+        system.GetInputPort("plant_state").FixValue(context, values[:14])
+        if placed.state_size:
+            context.SetContinuousState(values[14:])
+        return system.GetOutputPort("generalized_force").Eval(context)
+
+    slopes = ExtractGradient(force(system.ToScalarType[AutoDiffXd](), InitializeAutoDiff(state)))
+    steps = 1e-6 * np.eye(len(state))
+    differences = [(force(system, state + h) - force(system, state - h)) / 2e-6 for h in steps]
+    np.testing.assert_allclose(slopes, np.transpose(differences), rtol=1e-6, atol=1e-4)
+
+
+def test_modes_are_those_of_drakes_linearize(with_kind):
+    setup = with_kind.set_up()
+    ours, drake = Linearisation(setup).spectrum(), drake_spectrum(setup)
+    np.testing.assert_allclose(ours.first(6).frequency_hz, drake.first(6).frequency_hz, rtol=1e-6)
+    assert len(Linearisation(setup).wrench_slopes()) == len(Linearisation(setup).names)
+
+
+def test_equilibrium_stays_where_it_is_without_force_at_rest(with_kind, machine):
+    setup, plain = with_kind.set_up(), machine.set_up()
+    np.testing.assert_allclose(setup.rest_pose, plain.rest_pose, atol=1e-12)
+    tensions = [[spring.preload for spring in s.springs.values()] for s in (setup, plain)]
+    np.testing.assert_allclose(*tensions, rtol=1e-12)
+
+
+def test_energy_balances():
+    """Dissipate c |v|^3 in the drag dampers, v from the motion of their ends in the record."""
+    coefficient = 4e5  # N s^2/m^2
+    parameters = with_elements(elements={"slow": {**DRAG, "coefficient": coefficient}})
+    profile = SpinProfile(time=(0.0, 2.0, 3.0), speed=(12.0, 24.0, 24.0))
+    case = Case("middle", parameters.loads["middle"], profile)
+    setup, record = dense_record(build_machine(parameters), case, 3.125e-4)
+    book = EnergyBook(setup, case.load, record)
+    work, change, dissipated = book.balance()
+    ends = setup.elements.others["slow"].ends
+    arm = book.rotation.apply(ends.tub_point)
+    line = book.position + arm - ends.housing_point
+    rate = np.sum(line * (book.v + np.cross(book.w, arm)), axis=1) / np.linalg.norm(line, axis=1)
+    in_drag = book.integral(coefficient * np.abs(rate) ** 3)
+    assert in_drag > 0.05  # J
+    assert work - change - dissipated == pytest.approx(in_drag, rel=5e-3)
+    tension = record.drag_damper_tension.values[:, 0]
+    np.testing.assert_allclose(tension, coefficient * np.abs(rate) * rate, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_cabinet_that_moves_carries_the_elements():
+    """Compare both engines at random states of a machine whose cabinet moves."""
+    machine = build_machine(with_elements(with_moving_cabinet()))
+    case = Case("middle", machine.parameters.loads["middle"], PROFILE)
+    ours = simulate(machine, case, step=5e-4)
+    drake = simulate(machine, case, "drake", step=5e-4)
+    for name in ("displacement", "mount_force", "maxwell_strut_tension"):
+        size = float(np.abs(drake[name]).max())
+        np.testing.assert_allclose(ours[name], drake[name], atol=5e-3 * size)
+
+
+def test_other_elements_need_another_built_machine(with_kind):
+    parameters = with_kind.parameters
+    name = next(iter(parameters.elements))
+    fewer = {key: value for key, value in parameters.elements.items() if key != name}
+    with pytest.raises(InputError, match=f"elements: '{name}' is not in both machines"):
+        with_kind.set_up(parameters=parameters.model_copy(update={"elements": fewer}))
+
+
+@pytest.mark.parametrize("elements", [{}, ELEMENTS["drag"]])
+def test_replay_draws_a_strut(elements):
+    motion = Motion(np.array([0.0, 0.1]), np.zeros((2, 7)), np.ones(2))
+    page = replay_page(with_elements(elements=elements, dampers={}), motion)
+    assert ("</span> damper" in page) == bool(elements)
+
+
+def test_an_entry_point_makes_a_kind_known_to_every_command(tmp_path):
+    """Install a package that has only the file and its metadata; run commands in new processes."""
+    folder = tmp_path / "drag-1.0.dist-info"
+    folder.mkdir()
+    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: drag\nVersion: 1.0\n")
+    entry = "[wm_drake.elements]\nquadratic_drag = drag_damper:DRAG_DAMPER\n"
+    (folder / "entry_points.txt").write_text(entry)
+    (tmp_path / "mine.yaml").write_text(FILE, encoding="utf-8")
+    (tmp_path / "short.csv").write_text("time_s,speed_rpm\n0,50\n1,100\n")
+    paths = [str(tmp_path), str(Path(__file__).parent), *sys.path]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+
+    def run(*words):
+        command = [sys.executable, "-m", "wm_drake", *words]
+        found = subprocess.run(
+            command, cwd=tmp_path, env=environment, capture_output=True, text=True
+        )
+        assert found.returncode == 0, found.stderr
+        return found.stdout
+
+    assert "is valid" in run("machine", "check", "mine.yaml")
+    set_ = ("--set", "elements.slow.coefficient=800 N*s^2/m^2")
+    shown = json.loads(run("machine", "show", "mine.yaml", "--json", *set_))
+    assert shown["elements"]["slow"]["coefficient"] == 800.0
+    words = (
+        "spin",
+        "--machine",
+        "mine.yaml",
+        "--load",
+        "middle",
+        "--profile",
+        "short.csv",
+        "--json",
+    )
+    result = run(*words)
+    assert "elements.slow" in result

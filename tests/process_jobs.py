@@ -1,0 +1,25 @@
+"""Work of processes that tests start; a process of its own must be able to import it."""
+
+import os
+import signal
+import time
+
+from wm_drake.errors import input_error
+from wm_drake.studies.spin.processes import can_start_processes
+
+
+def doubled(item, report):
+    """Return twice a number; a string is a fault: a name of a signal, or a wrong key."""
+    if item == "SIGKILL":
+        os.kill(os.getpid(), signal.SIGKILL)
+    if isinstance(item, str):
+        raise input_error("not a number", key=item)
+    report(0.5)
+    time.sleep(item)
+    report(1.0)
+    return 2 * item
+
+
+def answer(connection):
+    """Send whether this process may start others."""
+    connection.send(can_start_processes())

@@ -1,0 +1,147 @@
+"""Every study does what the driver promises: JSON, files, resumption, interruption, refusals."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from every_page import KINDS, _write_inputs
+
+import wm_drake as wm
+from wm_drake.batch.ledger import Ledger
+from wm_drake.errors import InputError
+from wm_drake.studies import run
+from wm_drake.studies.result_folder import LEDGER
+from wm_drake.studies.run import options_of_driver
+from wm_drake.studies.study import STUDIES
+
+REQUIRED = {"calibrate": KINDS["calibration"].commands[0][1:]}
+"""Options of studies that cannot run without any."""
+MINUTES = {"calibrate", "gasket-damping", "spin-identify"}
+"""Studies that take more than ten seconds even with `--quick`."""
+SLOWLY = [
+    pytest.param(name, marks=[pytest.mark.slow] if name in MINUTES else []) for name in STUDIES
+]
+
+
+@pytest.fixture
+def study(wm_drake):
+    """Return a function that runs a study with `--quick` and more arguments."""
+    _write_inputs(Path())
+
+    def command(name, *arguments, out="out"):
+        words = [*STUDIES[name].command.split(), *REQUIRED.get(name, ()), "--quick"]
+        return wm_drake(*words, "--out", out, *arguments)
+
+    return command
+
+
+def files():
+    return {path.name for path in Path("out").iterdir()}
+
+
+def interrupted(*_, **__):
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("name", SLOWLY)
+def test_interrupted_at_the_end_it_keeps_its_runs_and_writes_what_it_promises(
+    study, name, monkeypatch
+):
+    resume = []
+    if STUDIES[name].has_runs:
+        with monkeypatch.context() as patched:
+            patched.setattr(Ledger, "mark_finished", interrupted)
+            ended = study(name)
+        assert (ended.code, ended.out) == (130, "")
+        assert "finished runs are kept in out/ledger.sqlite; continue with --resume" in ended.err
+        assert files() == {LEDGER}
+        refused = study(name)
+        assert refused.code == 2
+        assert "go on from there with --resume" in refused.err
+        resume = ["--resume"]
+        monkeypatch.setattr(Ledger, "put_all", None)  # whoever stores a run now, runs it again
+    ended = study(name, "--json", *resume)
+    assert ended.code == 0, ended.err
+    assert json.loads(ended.out, parse_constant=pytest.fail)["wall_s"] > 0.0
+    made = json.loads(Path("out/run.json").read_text())
+    assert made["command"] == STUDIES[name].command
+    assert {"report.html", *made["files"], "run.json"} == files() - {LEDGER}
+    assert any(file.endswith(".csv") for file in made["files"])
+    options = STUDIES[name].options(**made["options"])
+    assert options.model_dump(mode="json") == made["options"]
+    page = Path("out/report.html").read_text(encoding="utf-8")
+    assert "<code>wm-drake " in page
+    if not STUDIES[name].has_runs:
+        ended = study(name)
+        assert ended.code == 2
+        assert "add --overwrite to replace it" in ended.err
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_interrupted_before_a_run_it_leaves_nothing(study, name, monkeypatch):
+    before = set(Path().iterdir())
+    monkeypatch.setattr(run.Executor, "__init__", interrupted)
+    ended = study(name)
+    assert (ended.code, ended.out) == (130, "")
+    assert ended.messages[-1] == "interrupted; nothing was written"
+    assert set(Path().iterdir()) == before
+
+
+@pytest.mark.parametrize("name", STUDIES)
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--machine", "nosuch"), "no such file, and no shipped machine"),
+        (("--set", "gravty=9.8 m/s^2"), "did you mean 'gravity'"),
+        (("--out", ""), "--out: is empty; name a folder"),
+        (("--nonsense",), "--nonsense"),
+    ],
+)
+def test_bad_options_are_refused_before_any_work(study, name, arguments, message):
+    before = set(Path().iterdir())
+    ended = study(name, *arguments)
+    assert (ended.code, ended.out) == (2, "")
+    assert message in ended.err
+    assert set(Path().iterdir()) == before
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_results_of_another_command_are_never_touched(study, name):
+    Path("out").mkdir()
+    Path("out/run.json").write_text(
+        '{"command": "rig damper", "date": "", "identity": {}, "files": ["a.csv"]}'
+    )
+    ended = study(name, "--overwrite")
+    assert ended.code == 2
+    assert "holds results of 'wm-drake rig damper'" in ended.err
+    assert files() == {"run.json"}
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_each_option_is_described_in_help_and_schema(study, name):
+    declared = STUDIES[name]
+    shown = study(name, "--help").out
+    for model in (declared.options, options_of_driver(declared)):
+        schema = model.model_json_schema()
+        for field, described in schema["properties"].items():
+            assert len(described["description"]) > 10, field
+            if described.get("flag") != "argument":
+                assert described.get("flag", f"--{field.replace('_', '-')}") in shown
+    assert set(declared.quick) <= set(declared.options.model_fields)
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_python_refuses_an_unknown_option(name):
+    with pytest.raises(InputError, match="nonsense"):
+        wm.run_study(name, nonsense=1)
+
+
+def test_declarations_do_not_import_what_is_slow():
+    code = (
+        "import sys; from wm_drake.studies.study import STUDIES; list(STUDIES); "
+        "print({'pydrake', 'pandas', 'scipy', 'plotly', 'matplotlib'} & set(sys.modules))"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ended.stdout == "set()\n"

@@ -1,0 +1,363 @@
+"""Element kinds: one declaration of all that the program needs to know of a kind of element.
+
+    DRAG_DAMPER = ElementKind(
+        name="drag_damper",
+        parameters=DragDamper,
+        layout=NUMBERS,
+        numbers=numbers,
+        evaluate=drag_damper_wrench,
+        outputs=(Output("tension", "N", "tension of the drag dampers"),),
+    )
+    wm_drake.register_element(DRAG_DAMPER)
+
+From it follow the keys of the machine file, the LeafSystem and its ports, the compiled engine, the
+states, equilibrium, forces on the cabinet, records and pictures.
+"""
+
+import functools
+from collections import namedtuple
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from wm_drake.compiler.chosen import ChosenLaw
+from wm_drake.compiler.elementary import numbers
+from wm_drake.compiler.packed import PackedLayout, generated
+from wm_drake.elements.motion import tub_motion, write_generalized_force
+from wm_drake.parameters.element_kinds import ELEMENT_KINDS, Element
+from wm_drake.parameters.types import FloatArray
+
+
+@dataclass(frozen=True)
+class Ends:
+    """The two frames of an element, as drawn.
+
+    Attributes:
+        tub_point, tub_rotation: Origin and rotation of the frame on the tub, in T. (3,) [m], (3, 3)
+        housing_point, housing_rotation: The same of the frame on the housing, in W.
+    """
+
+    tub_point: FloatArray
+    tub_rotation: FloatArray
+    housing_point: FloatArray
+    housing_rotation: FloatArray
+
+
+@dataclass(frozen=True)
+class Output:
+    """A named output of an element.
+
+    Attributes:
+        name: Name of the port, and of the variable in a record behind the name of the kind.
+        unit: SI unit.
+        words: What it is, for records and pages.
+        size: 1, or 3 for a vector.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> wm.Output("tension", "N", "tension of the drag dampers").size
+        1
+    """
+
+    name: str
+    unit: str
+    words: str = ""
+    size: int = 1
+
+
+@dataclass(frozen=True)
+class State:
+    """A continuous state of an element.
+
+    Attributes:
+        name: Name of the state.
+        unit: SI unit.
+        initial: Value at the start of a run and at rest.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> wm.State("stretch", "m").initial
+        0.0
+    """
+
+    name: str
+    unit: str
+    initial: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class ElementKind:
+    """A kind of element.
+
+    Attributes:
+        name: Name in machine files.
+        parameters: Type of its parameters in a machine file, with units; for a kind of another
+            package a subclass of `Element`.
+        layout: Packed numbers.
+        outputs: Named outputs of an element, one after the other.
+        numbers: Function (parameters, `Ends`) that returns the values of the layout's fields by
+            name.
+        evaluate: Law (motion, state, p, at). motion: `TubMotion` of the tub, in the frame of the
+            housing; state: named tuple of the states; p, at: array that holds the packed numbers,
+            and index where they begin, as `layout.read` takes them. It returns the moment about To
+            and the force on the tub (six numbers, W), a tuple with the outputs, and a tuple with
+            the time derivatives of the states. It has no branches: `where` chooses. None for a kind
+            with `on_plant`.
+        states: Continuous states.
+        acts_at_rest: Whether its force counts in the static equilibrium; False for a damper.
+        frictionless: Values of fields of the layout that take the dry friction out, for modes.
+        words: What an element of the kind is, for pages.
+        picture: What pictures draw: a strut between the two points, or nothing but its end points.
+        on_plant: Law (plant_state, state, p, generalized_force, written, rate) that writes the last
+            three, see `wm_drake.systems.element_system`. By default it is generated from
+            `evaluate`.
+        trees: Number of trees of the plant that `on_plant` acts on.
+
+    Example:
+        >>> from wm_drake.elements.spring import SPRING_STRUT
+        >>> [(output.name, output.unit) for output in SPRING_STRUT.outputs]
+        [('force', 'N')]
+    """
+
+    name: str
+    parameters: type[Any]
+    layout: PackedLayout
+    outputs: tuple[Output, ...] = ()
+    numbers: Callable[[Any, Ends], Mapping[str, Any]] | None = None
+    evaluate: Any = None
+    states: tuple[State, ...] = ()
+    acts_at_rest: bool = True
+    frictionless: Mapping[str, Any] = field(default_factory=dict)
+    words: str = ""
+    picture: Literal["strut", "points"] = "strut"
+    on_plant: Any = None
+    trees: int = 1
+
+    def __post_init__(self) -> None:
+        """Generate `on_plant`.
+
+        Raises:
+            ValueError: a part of the declaration is missing or has no meaning.
+        """
+        if self.on_plant is None:
+            if self.evaluate is None or self.numbers is None:
+                raise ValueError(f"element kind '{self.name}' needs numbers and evaluate")
+            if not issubclass(self.parameters, Element):
+                raise ValueError(f"element kind '{self.name}': parameters must extend Element")
+            if not self.name.isidentifier():
+                raise ValueError(f"element kind '{self.name}': the name must be an identifier")
+            object.__setattr__(self, "on_plant", _on_plant(self))
+
+    @property
+    def output_parts(self) -> dict[str, slice]:
+        """Return the part of each output in the own numbers of an element, by name."""
+        ends = np.cumsum([output.size for output in self.outputs]).tolist()
+        pairs = zip(self.outputs, ends, strict=True)
+        return {output.name: slice(end - output.size, end) for output, end in pairs}
+
+    @property
+    def output_size(self) -> int:
+        """Return the number of own numbers of an element."""
+        return sum(output.size for output in self.outputs)
+
+    @property
+    def title(self) -> str:
+        """Return the name of the kind in diagrams, such as SpringStrut."""
+        return "".join(word.capitalize() for word in self.name.split("_"))
+
+
+def register_element(kind: ElementKind) -> ElementKind:
+    """Make an element kind of another package known, and return it.
+
+    Machine files then have it in the section `elements`. In the metadata of a package, an entry
+    point of the group `wm_drake.elements` does the same.
+
+    Args:
+        kind: The declaration.
+
+    Raises:
+        ValueError: another kind has this name.
+
+    Example:
+        A shipped kind has a section of the machine file of its own, so it is refused here.
+
+        >>> import wm_drake as wm
+        >>> from wm_drake.elements.spring import SPRING_STRUT
+        >>> wm.register_element(SPRING_STRUT)
+        Traceback (most recent call last):
+        ValueError: element kind 'spring_strut' needs a law `evaluate`
+    """
+    if kind.evaluate is None:
+        raise ValueError(f"element kind '{kind.name}' needs a law `evaluate`")
+    ELEMENT_KINDS.register(kind)
+    return kind
+
+
+def element_kind(name: str) -> ElementKind:
+    """Return the registered kind of a name.
+
+    Raises:
+        InputError: there is no such kind.
+    """
+    kind = ELEMENT_KINDS.find(name, key="elements")
+    assert isinstance(kind, ElementKind)
+    return kind
+
+
+@dataclass(frozen=True)
+class PlacedElement:
+    """An element of another package in its place.
+
+    Attributes:
+        kind: Its kind.
+        ends: Its frames.
+        packed_numbers: Numbers of `ElementKind.layout`.
+    """
+
+    kind: ElementKind
+    ends: Ends
+    packed_numbers: FloatArray
+
+    @property
+    def structure(self) -> list[int]:
+        """Return what must be equal in a batch: numbers of points of tables."""
+        return self.kind.layout.structure(self.packed_numbers)
+
+    @property
+    def state_size(self) -> int:
+        """Return the number of its states."""
+        return len(self.kind.states)
+
+    @property
+    def initial(self) -> FloatArray:
+        """Return the values of its states at rest."""
+        return np.array([state.initial for state in self.kind.states])
+
+    def without_friction(self) -> "PlacedElement":
+        """Return the element without dry friction."""
+        changed = self.kind.layout.replaced(self.packed_numbers, **self.kind.frictionless)
+        return PlacedElement(self.kind, self.ends, changed)
+
+    def packed(self) -> FloatArray:
+        """Return its packed numbers."""
+        return self.packed_numbers.copy()
+
+
+def placed_element(kind: ElementKind, parameters: Element, ends: Ends) -> PlacedElement:
+    """Return an element of another package in its place."""
+    assert kind.numbers is not None  # the declaration has been checked
+    return PlacedElement(kind, ends, kind.layout.pack(**kind.numbers(parameters, ends)))
+
+
+RegisteredLaws = namedtuple("RegisteredLaws", ("wrench", "outputs", "at", "states"))
+"""Elements of other packages in a machine, for compiled functions.
+
+wrench: `ChosenLaw` (i, x, dx, motion, p, at, first) that returns moment about To and force of
+element i on the tub, and writes the time derivatives of its states unless dx is None; outputs:
+`ChosenLaw` (i, x, motion, p, at, first, answer, column) that writes its outputs and returns the
+index behind them; at, states: index of each element in the packed numbers, and of its first state.
+A machine without such elements has None in place of this.
+"""
+
+
+def registered_laws(
+    kinds: Sequence[ElementKind], at: Sequence[int], states: Sequence[int]
+) -> RegisteredLaws | None:
+    """Return the laws of the elements of other packages; None without any.
+
+    Args:
+        kinds: Kind of each element.
+        at, states: Index of each element in the packed numbers, and of its first state.
+    """
+    if not kinds:
+        return None
+    indices = (np.array(values, dtype=np.int64) for values in (at, states))
+    return RegisteredLaws(*_laws_of(tuple(kinds)), *indices)
+
+
+@functools.lru_cache(maxsize=64)
+def _laws_of(kinds: tuple[ElementKind, ...]) -> tuple[ChosenLaw, ChosenLaw]:
+    """Return the laws `wrench` and `outputs` of `RegisteredLaws`."""
+    laws = []
+    for word, arguments, law_of in (
+        ("wrench", "x, dx, motion, p, at, first", _wrench_law),
+        ("outputs", "x, motion, p, at, first, answer, column", _outputs_law),
+    ):
+        lines = [f"def element_{word}(i, {arguments}):"]
+        names = {}
+        for i, kind in enumerate(kinds):
+            names[f"law_{i}"] = law_of(kind)
+            last = i == len(kinds) - 1
+            lines += [] if last else [f"    if i == {i}:"]
+            lines.append(f"    {'' if last else '    '}return law_{i}({arguments})")
+        compiled = generated(f"element_{word}", "\n".join(lines) + "\n", names)
+        title = "+".join(f"{kind.name}({kind.layout.name})" for kind in kinds)
+        laws.append(ChosenLaw(compiled, f"{word} of {title}"))
+    return laws[0], laws[1]
+
+
+@functools.cache
+def _wrench_law(kind: ElementKind) -> Any:
+    """Return the law (x, dx, motion, p, at, first) of an element of a kind."""
+    rates = [f"        dx[first + {k}] = rates[{k}]" for k in range(len(kind.states))]
+    put = [f"def {kind.name}_rates(dx, first, rates):", "    if dx is not None:"]
+    names: dict[str, Any] = _names(kind)
+    write = ""
+    if rates:
+        names["put"] = generated(f"{kind.name}_rates", "\n".join([*put, *rates]) + "\n", {})
+        write = "    put(dx, first, rates)\n"
+    source = (
+        f"def {kind.name}_wrench(x, dx, motion, p, at, first):\n"
+        f"    wrench, outputs, rates = evaluate(motion, {_states(kind, 'x', 'first')}, p, at)\n"
+        f"{write}    return wrench\n"
+    )
+    return generated(f"{kind.name}_wrench", source, names)
+
+
+@functools.cache
+def _outputs_law(kind: ElementKind) -> Any:
+    """Return the law (x, motion, p, at, first, answer, column) of an element of a kind."""
+    size = kind.output_size
+    lines = [f"    answer[column + {k}] = outputs[{k}]" for k in range(size)]
+    source = (
+        f"def {kind.name}_outputs(x, motion, p, at, first, answer, column):\n"
+        f"    wrench, outputs, rates = evaluate(motion, {_states(kind, 'x', 'first')}, p, at)\n"
+    )
+    source += "\n".join([*lines, f"    return column + {size}"]) + "\n"
+    return generated(f"{kind.name}_outputs", source, _names(kind))
+
+
+def _on_plant(kind: ElementKind) -> Any:
+    """Return the law (plant_state, state, p, generalized_force, written, rate) of a kind."""
+    lines = [
+        f"def {kind.name}_on_plant(x, state, p, generalized_force, written, rate):",
+        "    motion = tub_motion(numbers(x))",
+        f"    wrench, outputs, rates = evaluate(motion, {_states(kind, 'state')}, numbers(p), 0)",
+        "    write_generalized_force(generalized_force, 0, wrench, 0.0 * wrench[0])",
+        *(f"    written[{k}] = outputs[{k}]" for k in range(kind.output_size)),
+        *(f"    rate[{k}] = rates[{k}]" for k in range(len(kind.states))),
+    ]
+    names = _names(kind) | {
+        "tub_motion": tub_motion,
+        "numbers": numbers,
+        "write_generalized_force": write_generalized_force,
+    }
+    return generated(f"{kind.name}_on_plant", "\n".join(lines) + "\n", names)
+
+
+def _names(kind: ElementKind) -> dict[str, Any]:
+    """Return the global names of the generated laws of a kind."""
+    names: dict[str, Any] = {"evaluate": kind.evaluate}
+    if kind.states:
+        names["States"] = namedtuple(f"{kind.name}_states", [state.name for state in kind.states])
+    return names
+
+
+def _states(kind: ElementKind, array: str, first: str = "") -> str:
+    """Return the source of the named tuple of states in an array, from an index on."""
+    if not kind.states:
+        return "()"
+    begin = f"{first} + " if first else ""
+    return f"States({', '.join(f'{array}[{begin}{k}]' for k in range(len(kind.states)))})"

@@ -1,0 +1,121 @@
+"""Names in the SDF of a machine, and the problems of a machine file that uses others."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+from weakref import WeakKeyDictionary
+
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame, RigidBody
+
+from wm_drake.errors import Problem, nearest_names
+from wm_drake.parameters import MachineParameters
+
+
+@dataclass(frozen=True)
+class SdfNames:
+    """Names in the SDF of a machine.
+
+    Attributes:
+        frames: Frames and links to which elements attach, sorted.
+        movable_frames: Those whose position can be overridden.
+        links: Links that are not fixed to the world.
+        welded: For each frame, its body and all that are welded to it.
+    """
+
+    frames: tuple[str, ...]
+    movable_frames: tuple[str, ...]
+    links: tuple[str, ...]
+    welded: dict[str, frozenset[str]]
+
+
+_NAMES: WeakKeyDictionary[MultibodyPlant, SdfNames] = WeakKeyDictionary()
+
+
+def sdf_names(plant: MultibodyPlant) -> SdfNames:
+    """Return the names in the SDF of a finalized plant; they are read once for each plant."""
+    names = _NAMES.get(plant)
+    if names is None:
+        names = _NAMES[plant] = _names_of(plant)
+    return names
+
+
+def _names_of(plant: MultibodyPlant) -> SdfNames:
+    """Read the names in the SDF of a plant."""
+    model = plant.GetBodyByName("tub").model_instance()
+    frames = {frame.name(): frame for frame in map(plant.get_frame, plant.GetFrameIndices(model))}
+    frames.pop("__model__", None)
+    fixed = [body.index() for body in plant.GetBodiesWeldedTo(plant.world_body())]
+    links = map(plant.get_body, plant.GetBodyIndices(model))
+    return SdfNames(
+        tuple(sorted(frames)),
+        tuple(name for name in sorted(frames) if isinstance(frames[name], FixedOffsetFrame)),
+        tuple(link.name() for link in links if link.index() not in fixed),
+        {
+            name: frozenset(body.name() for body in plant.GetBodiesWeldedTo(frame.body()))
+            for name, frame in frames.items()
+        },
+    )
+
+
+def tubes_of(plant: MultibodyPlant, joint: str) -> tuple[RigidBody, RigidBody]:
+    """Return outer and inner tube of the joint of a telescopic damper."""
+    telescope = plant.GetJointByName(joint)
+    return telescope.parent_body(), telescope.child_body()
+
+
+def frame_problems(plant: MultibodyPlant, parameters: MachineParameters) -> list[Problem]:
+    """Return one problem for each wrong name of a frame or body in a machine."""
+    names = sdf_names(plant)
+    problems = []
+    for key, body, frame in _attachments(plant, parameters):
+        if frame not in names.frames:
+            message = f"no frame '{frame}' in the SDF{nearest_names(frame, names.frames)}"
+            problems.append(Problem("", key, message))
+        elif body not in names.welded[frame]:
+            problems.append(Problem("", key, f"frame '{frame}' is not fixed to the {body}"))
+    for name in parameters.bodies:
+        if name not in names.links:
+            message = f"no moving link '{name}' in the SDF{nearest_names(name, names.links)}"
+            problems.append(Problem("", f"bodies.{name}", message))
+    for name in parameters.frames:
+        if name not in names.movable_frames:
+            message = (
+                f"no frame '{name}' in the SDF{nearest_names(name, names.movable_frames)}; "
+                "attached_to: LINK makes it a new frame"
+            )
+            problems.append(Problem("", f"frames.{name}", message))
+    return problems
+
+
+def _attachments(
+    plant: MultibodyPlant, parameters: MachineParameters
+) -> Iterable[tuple[str, str, str]]:
+    """Yield key path, body to be fixed to, and name of each frame that a machine file uses."""
+    for table, name, element in _placed_elements(parameters):
+        for end in ("tub", "housing"):
+            key = f"{table}.{name}.{end}_frame" if name else f"{table}.{end}_frame"
+            yield key, end, getattr(element, f"{end}_frame")
+    for name, damper in parameters.telescopic_dampers.items():
+        outer, inner = (body.name() for body in tubes_of(plant, damper.joint))
+        for end, body in (
+            ("tub", "tub"),
+            ("outer", outer),
+            ("inner", inner),
+            ("housing", "housing"),
+        ):
+            key = f"telescopic_dampers.{name}.{end}_frame"
+            yield key, body, getattr(damper, f"{end}_frame")
+    for table in ("sensors", "accelerometers"):
+        for name, sensor in getattr(parameters, table).items():
+            yield f"{table}.{name}.frame", "tub", sensor.frame
+    yield "clearance.detergent_frame", "tub", parameters.clearance.detergent_frame
+
+
+def _placed_elements(parameters: MachineParameters) -> Iterable[tuple[str, str, Any]]:
+    """Yield table, name and parameters of each element with a frame on tub and on housing."""
+    for table in ("springs", "dampers", "bushings", "elements"):
+        for name, element in getattr(parameters, table).items():
+            yield table, name, element
+    if parameters.gasket:
+        yield "gasket", "", parameters.gasket

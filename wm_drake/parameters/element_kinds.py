@@ -1,0 +1,77 @@
+"""Elements of other packages in a machine file: `elements: {NAME: {kind: KIND, ...}}`."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypeAlias
+
+from pydantic import SerializeAsAny, ValidationError, ValidationInfo, WrapValidator
+
+from wm_drake.errors import Problem, nearest_names, shortened
+from wm_drake.parameters.elements import Frozen
+from wm_drake.parameters.problems import ProblemsInsideError, problems_of
+from wm_drake.registry import Registry
+
+
+class Element(Frozen):
+    """An element in its place; the parameters of an element kind extend this type.
+
+    Attributes:
+        kind: Name of an element kind that a package registered.
+        tub_frame, housing_frame: Frames of the two ends, on the tub and on the housing.
+
+    Example:
+        >>> from typing import Annotated
+        >>> import wm_drake as wm
+        >>> from wm_drake.parameters.units import Unit
+        >>> class DragDamper(wm.Element):
+        ...     coefficient: Annotated[float, Unit("N*s^2/m^2", "N*s^2/m^2")]
+        >>> ends = {"tub_frame": "hook", "housing_frame": "anchor"}
+        >>> DragDamper(kind="drag_damper", coefficient="400 N*s^2/m^2", **ends).coefficient
+        400.0
+    """
+
+    kind: str
+    tub_frame: str
+    housing_frame: str
+
+
+class HasParameters(Protocol):
+    """What a machine file needs of an element kind."""
+
+    @property
+    def name(self) -> str:
+        """Name of the kind in a machine file."""
+
+    @property
+    def parameters(self) -> type[Element]:
+        """Type of its parameters."""
+
+
+ELEMENT_KINDS: Registry[HasParameters] = Registry("element kind", "wm_drake.elements")
+"""Element kinds of other packages, `wm_drake.elements.kind.ElementKind`, by name."""
+
+
+def _validated(value: Any, handler: Any, info: ValidationInfo) -> Any:
+    """Return an element as an instance of the parameters of its kind.
+
+    Raises:
+        ProblemsInsideError: the kind is unknown, or a value is wrong.
+    """
+    if isinstance(value, Element) or not isinstance(value, Mapping):
+        return handler(value)
+    name = value.get("kind")
+    if not isinstance(name, str) or name not in ELEMENT_KINDS:
+        text = "is missing" if name is None else f"'{shortened(str(name), 60)}' is not known"
+        hint = nearest_names(str(name), ELEMENT_KINDS) if ELEMENT_KINDS else "; none is registered"
+        raise ProblemsInsideError([Problem("", "kind", text + hint)])
+    parameters = ELEMENT_KINDS[name].parameters
+    try:
+        return parameters.model_validate(value, context=info.context)
+    except ValidationError as error:
+        raise ProblemsInsideError(problems_of(error, parameters)) from None
+
+
+if TYPE_CHECKING:
+    AnyElement: TypeAlias = Element
+else:
+    AnyElement = Annotated[SerializeAsAny[Element], WrapValidator(_validated)]
+"""An element of any registered kind."""

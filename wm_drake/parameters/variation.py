@@ -1,0 +1,282 @@
+"""Variations: numbers of a machine that change together.
+
+A factor is a variation with levels, an uncertain quantity one with a distribution, a design
+variable one with a range, an unknown of a fit one with bounds, a slider one with two ends.
+"""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from typing import Any, TypeAlias
+
+from pydantic import BaseModel
+
+from wm_drake.errors import Problem, input_error
+from wm_drake.parameters.elements import Table
+from wm_drake.parameters.keys import field_at, unit_of, with_values
+from wm_drake.parameters.machine import MachineParameters
+from wm_drake.parameters.units import PureNumber, Share, Unit
+
+Value: TypeAlias = float | Table
+
+_NOMINAL = re.compile(r"nominal\s*(?:([+-])\s*(.+))?")
+_RANGE = re.compile(r"\(([^(),]+),([^(),]+)\)(.*)")
+
+
+class Change(StrEnum):
+    """How the value of a variation changes a number of the machine."""
+
+    VALUE = "value"
+    """The value takes the place of the number. [SI]"""
+    PERCENT = "percent"
+    """The value is a factor of the number; of a table, a factor of its forces. [1]"""
+    DISTANCE = "distance"
+    """The value is added to the number. [SI]"""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number of a machine, or a table of a stiffness.
+
+    Attributes:
+        key: Key path.
+        original: Value of the machine, SI; None if only the SDF has it. The column of a table is a
+            tuple of numbers.
+        unit: Unit; that of a table is the unit of its stiffness.
+        takes_numbers: Whether the machine accepts a number here; some tables cannot be one.
+    """
+
+    key: str
+    original: float | tuple[float, ...] | Table | None
+    unit: Unit
+    takes_numbers: bool = True
+
+    @cached_property
+    def nominal(self) -> float | None:
+        """Value of the machine, or nominal stiffness of its table; None if only the SDF has it."""
+        if isinstance(self.original, Table):
+            return self.original.nominal_stiffness
+        assert not isinstance(self.original, tuple)
+        return self.original
+
+    @property
+    def is_table(self) -> bool:
+        """Whether the machine has a table here."""
+        return isinstance(self.original, Table)
+
+    def changed(self, change: Change, value: float) -> Any:
+        """Return what `value` makes of this number: a number, a table, or the column of one."""
+        original = self.original
+        if change is Change.VALUE:
+            return value
+        if isinstance(original, Table):
+            return original.scaled(value)
+        if isinstance(original, tuple):
+            return tuple(value * number for number in original)
+        assert original is not None
+        return original * value if change is Change.PERCENT else original + value
+
+    def resolved(self, text: str) -> float:
+        """Return the value that a text means here, in SI; of a table it is a stiffness.
+
+        Raises:
+            InputError: the text is not a value of this number.
+        """
+        change, value = change_of(text, self.unit, self.key)
+        if change is Change.VALUE:
+            return value
+        if self.nominal is None:
+            raise input_error(
+                f"is in the SDF but not in the machine file, so '{text}' is unknown; write a value "
+                "with a unit",
+                key=self.key,
+            )
+        return value * self.nominal if change is Change.PERCENT else self.nominal + value
+
+
+@dataclass(frozen=True)
+class Variation:
+    """Numbers of a machine that change together.
+
+    Attributes:
+        name: Name.
+        numbers: The numbers; none for a quantity that is not in the machine file.
+        change: How a value changes them.
+        unit: Unit for reading of a value.
+        about: Description.
+    """
+
+    name: str
+    numbers: tuple[Number, ...]
+    change: Change
+    unit: Unit
+    about: str = ""
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Key paths of the numbers."""
+        return tuple(number.key for number in self.numbers)
+
+    @property
+    def nominal(self) -> float:
+        """Value at which the machine is as it was; that of the first number if they differ."""
+        if self.change is Change.VALUE:
+            return float(self.numbers[0].nominal or 0.0)
+        return 1.0 if self.change is Change.PERCENT else 0.0
+
+    def changes(self, value: float) -> dict[str, Any]:
+        """Return new values of the machine by key path."""
+        return {number.key: number.changed(self.change, value) for number in self.numbers}
+
+
+def apply(
+    parameters: MachineParameters, variations: Iterable[Variation], values: Iterable[float]
+) -> MachineParameters:
+    """Return the machine with a value of each variation.
+
+    Args:
+        parameters: The machine.
+        variations: Variations of this machine.
+        values: One value for each. [1 for PERCENT, else SI]
+
+    Raises:
+        InputError: the result is not a machine.
+    """
+    changes: dict[str, Any] = {}
+    for variation, value in zip(variations, values, strict=True):
+        changes |= variation.changes(value)
+    return with_values(parameters, changes)
+
+
+def variation_of(
+    parameters: MachineParameters,
+    name: str,
+    keys: Sequence[str],
+    texts: Mapping[str, str],
+    about: str = "",
+) -> tuple[Variation, dict[str, float]]:
+    """Return a variation and its values, given as texts of one form.
+
+    Args:
+        parameters: The machine.
+        name: Name of the variation.
+        keys: Key paths of its numbers.
+        texts: Values such as low and high: "95 %", "9 N/mm", or "nominal + 2 mm".
+        about: Description.
+
+    Raises:
+        InputError: the machine does not have a key, or a text is not a value of it.
+    """
+    numbers = tuple(number_at(parameters, key) for key in keys)
+    for number in numbers:
+        change, values = changes_of(texts, number.unit, number.key)
+        if change is not Change.VALUE and number.nominal is None:
+            raise input_error(
+                "has no number of a machine; write values with a unit", key=number.key
+            )
+        if change is Change.PERCENT and number.nominal == 0.0:
+            message = "is 0, so percents of it are 0; write values with a unit"
+            raise input_error(message, key=number.key)
+        if number.is_table and change is not Change.PERCENT:
+            raise input_error("is a table; write values in percent", key=number.key)
+    unit = Share() if change is Change.PERCENT else numbers[0].unit
+    return Variation(name, numbers, change, unit, about), values
+
+
+def changes_of(texts: Mapping[str, str], unit: Unit, key: str) -> tuple[Change, dict[str, float]]:
+    """Return the common form of several texts, and their values by name.
+
+    Raises:
+        InputError: a text is not a value, or the texts have different forms.
+    """
+    read = {name: change_of(text, unit, f"{key}.{name}") for name, text in texts.items()}
+    if len({change for change, _ in read.values()}) > 1:
+        raise input_error(
+            f"{' and '.join(read)} have different forms; write all in percent, all as values or "
+            "all as nominal + distance",
+            key=key,
+        )
+    return next(change for change, _ in read.values()), {n: value for n, (_, value) in read.items()}
+
+
+def change_of(text: str, unit: Unit, key: str) -> tuple[Change, float]:
+    """Return form and value of a text such as "95 %", "9 N/mm", "nominal" or "nominal + 2 mm".
+
+    Args:
+        text: The text.
+        unit: Unit of the number. Of a share, a percent is a value.
+        key: Key path for the message.
+
+    Raises:
+        InputError: the text has none of these forms, or its unit does not fit.
+    """
+    text = text.strip()
+    try:
+        relative = _NOMINAL.fullmatch(text)
+        if relative:
+            distance = unit.number(relative[2]) if relative[2] else 0.0
+            return Change.DISTANCE, -distance if relative[1] == "-" else distance
+        if text.endswith("%") and not isinstance(unit, Share):
+            return Change.PERCENT, 0.01 * PureNumber().number(text.removesuffix("%"))
+        return Change.VALUE, unit.number(text)
+    except ValueError as error:
+        raise input_error(str(error), key=key) from None
+
+
+def range_of(text: str) -> tuple[str, str] | None:
+    """Return the ends of a range ``LOW..HIGH`` or ``(LOW, HIGH) UNIT`` as texts; None if neither.
+
+    Example:
+        >>> range_of("2 N/mm..4000 N/m"), range_of("(1, 2) mm"), range_of("3 mm")
+        (('2 N/mm', '4000 N/m'), ('1 mm', '2 mm'), None)
+    """
+    bracket = _RANGE.fullmatch(text.strip())
+    if bracket:
+        return f"{bracket[1].strip()}{bracket[3]}", f"{bracket[2].strip()}{bracket[3]}"
+    low, dots, high = (part.strip() for part in text.partition(".."))
+    return (low, high) if dots and low and high else None
+
+
+def owned_twice(groups: Mapping[str, Sequence[str]], kind: str) -> list[Problem]:
+    """Return a problem for each key that two variations change.
+
+    Args:
+        groups: Key paths by name of the variation.
+        kind: What the variations are, for the message.
+    """
+    problems, owner = [], dict[str, str]()
+    for name, keys in groups.items():
+        for key in keys:
+            if owner.setdefault(key, name) != name:
+                message = f"belongs to {kind} {owner[key]} already; a key may be in one {kind} only"
+                problems.append(Problem(f"{kind} {name}", key, message))
+    return problems
+
+
+def number_at(parameters: MachineParameters, key: str) -> Number:
+    """Return a number of a machine by key path; a table is a number, its nominal stiffness.
+
+    Raises:
+        InputError: the machine has no such key, or it is not that of a number.
+    """
+    value, field = field_at(parameters, key)
+    unit = None if field is None else unit_of(field.annotation, field.metadata)
+    if isinstance(value, Table):
+        return Number(key, value, value.stiffness_unit, takes_numbers=unit is not None)
+    if isinstance(value, tuple) and unit is not None:
+        message = f"is a list of numbers; name one of them by its index, for example {key}.0"
+        raise input_error(message, key=key)
+    if unit is None or isinstance(value, BaseModel):
+        raise input_error("is not a number of the machine", key=key)
+    return Number(key, value, unit)
+
+
+def value_at(parameters: MachineParameters, key: str) -> Any:
+    """Return the value at a key path; None if only the SDF has a value.
+
+    Raises:
+        InputError: the machine has no such key.
+    """
+    return field_at(parameters, key)[0]

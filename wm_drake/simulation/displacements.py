@@ -1,0 +1,241 @@
+"""Displacements of a record: filtered to the band of [B], envelopes, amplitudes, orbits."""
+
+import functools
+from collections.abc import Callable
+
+import numpy as np
+import xarray as xr
+
+from wm_drake.compiler.lanes import WIDTH
+from wm_drake.engines.compiled.packing import aligned
+from wm_drake.model.scene import REPLAY_RATE
+from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.outputs import point_positions
+from wm_drake.simulation.records import Record, sample_period
+from wm_drake.simulation.signals import filter_both_ways, largest_peaks
+
+BAND_HZ = (0.5, 20.0)
+"""Pass band of the displacements ([B] section 2.2)."""
+
+FILTER_ORDER = 4
+"""Order of the Butterworth filter ([B] section 2.2).
+
+The filter runs forwards and backwards, so that it shifts no phase.
+"""
+
+PADDING = 5.0
+"""Length by which displacements are mirrored at both ends before filtering. [s]
+
+It is two and a half periods of the lower band edge. With the padding that scipy chooses, a record
+that ends at a resonance would show peaks that are a third too large near its end.
+"""
+
+REPLAY_SPAN = 8.0
+"""Length of a replay. [s]"""
+
+
+def filtered(displacement: FloatArray, period: float) -> FloatArray:
+    """Return displacements filtered to the band 0.5-20 Hz, without phase shift.
+
+    The filter is a Butterworth filter of fourth order.
+
+    Args:
+        displacement: (n, k) one column per signal. [m]
+        period: Time between samples. [s]
+
+    Returns:
+        (n, k) filtered displacements. [m] NaN if there are fewer samples than the filter needs, for
+        example because the run diverged at once.
+    """
+    rows, columns = displacement.shape
+    groups = -(-columns // WIDTH)
+    lanes = aligned(rows * groups * WIDTH)
+    side_by_side = lanes.reshape(rows, groups * WIDTH)
+    side_by_side[:, :columns] = displacement
+    return filtered_lanes(side_by_side, groups, period)[:, :columns].copy()
+
+
+def filtered_lanes(
+    signals: FloatArray,
+    groups: int,
+    period: float,
+    array: Callable[[str, int], FloatArray] = lambda name, size: aligned(size * WIDTH),
+) -> FloatArray:
+    """Return the first groups of `WIDTH` signals of an array, as from `filtered`.
+
+    Args:
+        signals: (n, >= groups * WIDTH), contiguous; the number of columns is a multiple of `WIDTH`.
+            [m]
+        groups: Number of groups to filter.
+        period: Time between samples. [s]
+        array: Function that returns an array of lanes, given a name and a size. A caller that
+            filters often can use the same memory again.
+    """
+    rows, columns = signals.shape
+    padding = min(round(PADDING / period), rows - 1)
+    if padding <= 6 * FILTER_ORDER + 3:  # the padding that sosfiltfilt chooses by default
+        return np.full((rows, groups * WIDTH), np.nan)
+    answer, work = array("filtered", rows * groups), array("filter", rows + 2 * padding)
+    shape = (rows, groups, columns // WIDTH)
+    filter_both_ways(signals.ravel(), shape, *_band_pass(period), padding, work, answer)
+    return answer.reshape(rows, groups * WIDTH)
+
+
+@functools.cache
+def _band_pass(period: float) -> tuple[FloatArray, FloatArray]:
+    """Return the sections of the filter, and their states at a constant signal, flat."""
+    from scipy.signal import butter, sosfilt_zi  # slow to import: measures that filter
+
+    sections = butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=1.0 / period, output="sos")
+    return sections.ravel(), sosfilt_zi(sections).ravel()
+
+
+def filtered_displacement(record: Record) -> xr.DataArray:
+    """Return the displacements (time, sensor) of a record, filtered to 0.5-20 Hz. [m]
+
+    Example:
+        >>> import wm_drake as wm
+        >>> record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
+        >>> wm.filtered_displacement(record).dims
+        ('time', 'sensor')
+    """
+    raw = record.displacement
+    return raw.copy(data=filtered(raw.values, sample_period(record)))
+
+
+def power_means(displacement: FloatArray) -> FloatArray:
+    """Return the power mean of order 20, (mean |d|^20)^(1/20), of each signal.
+
+    The power mean is close to the largest absolute value but is a smooth function of all
+    parameters. The largest value itself is not: it has a kink where another peak becomes the
+    largest one, and searches that use slopes fail there.
+
+    Args:
+        displacement: (n, k) one column per signal.
+
+    Returns:
+        (k,) in the unit of the signals.
+    """
+    fourth = np.square(np.square(displacement))
+    return np.asarray(np.mean(np.square(np.square(fourth)) * fourth, axis=0) ** (1.0 / 20.0))
+
+
+def amplitudes(displacement: FloatArray) -> tuple[FloatArray, np.ndarray]:
+    """Return the largest absolute value of the envelopes of each signal, and where it occurs.
+
+    An envelope is a straight line from peak to peak, so its largest value is at a peak.
+
+    Args:
+        displacement: (n, k) one column per signal.
+
+    Returns:
+        The largest value in the unit of the signals and the index of its sample, each (k,). A
+        signal that is empty or starts with NaN gives NaN and 0.
+    """
+    sizes = np.empty(displacement.shape[1])
+    samples = np.empty(displacement.shape[1], dtype=np.int64)
+    largest_peaks(np.ascontiguousarray(displacement), sizes, samples)
+    return sizes, samples
+
+
+def moment_of_largest_amplitude(record: Record) -> int:
+    """Return the sample at which the largest amplitude of all sensors occurs.
+
+    Report, orbit and replay show this moment. In a record that is too short for the filter, it is
+    the sample of the largest displacement.
+    """
+    size, samples = amplitudes(filtered_displacement(record).values)
+    if np.isnan(size).all():
+        return int(abs(record.displacement).max("sensor").argmax("time"))
+    return int(samples[np.nanargmax(size)])
+
+
+def envelopes(record: Record) -> xr.Dataset:
+    """Return the upper and lower envelope (time, sensor) of the filtered displacements. [m]
+
+    An envelope consists of straight lines from peak to peak.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
+        >>> envelope = wm.envelopes(record)
+        >>> bool((envelope.upper >= envelope.lower).all())
+        True
+    """
+    displacement = filtered_displacement(record)
+    time = displacement.time.values
+    upper = np.stack([peak_line(time, column) for column in displacement.values.T], axis=1)
+    lower = np.stack([-peak_line(time, -column) for column in displacement.values.T], axis=1)
+    return xr.Dataset(
+        {"upper": displacement.copy(data=upper), "lower": displacement.copy(data=lower)}
+    )
+
+
+def peak_line(time: FloatArray, signal: FloatArray) -> FloatArray:
+    """Return the line through the local maxima of a signal.
+
+    The line is constant before the first maximum and after the last one. A signal without a local
+    maximum is returned unchanged.
+    """
+    from scipy.signal import find_peaks  # slow to import: envelopes
+
+    peaks = find_peaks(signal)[0]
+    return np.interp(time, time[peaks], signal[peaks]) if len(peaks) else signal
+
+
+def smooth_envelope(record: Record) -> xr.DataArray:
+    """Return the smooth envelope (time, sensor) of the filtered displacements. [m]
+
+    It is the magnitude of the analytic signal d + i H(d), with the Hilbert transform H; the lower
+    envelope is its negative. Unlike a line from peak to peak it is a smooth function of all
+    parameters: a line jumps where a small peak appears. The record is mirrored at both ends,
+    because the transform continues it periodically.
+    """
+    from scipy.signal import hilbert  # slow to import: envelopes
+
+    displacement = filtered_displacement(record)
+    values = displacement.values
+    padding = min(round(PADDING / sample_period(record)), len(values) - 1)
+    if padding < 1:
+        return displacement.copy(data=np.abs(values))
+    mirrored = np.pad(values, ((padding, padding), (0, 0)), mode="reflect")
+    return displacement.copy(data=np.abs(hilbert(mirrored, axis=0))[padding:-padding])
+
+
+def percent_difference(value: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
+    """Return the difference 100 (value - reference) / reference; [B] Eq. (1). [%]"""
+    return 100.0 * (value - reference) / reference
+
+
+def axis_motion(record: Record, y: float) -> FloatArray:
+    """Return the path (n, 3) in W of the point of the drum axis at depth y in T, for orbits. [m]"""
+    pose = np.column_stack([record.tub_angle.values, record.tub_position.values])
+    return point_positions(pose, np.array([[0.0, y, 0.0]]))[:, 0]
+
+
+def largest_motion(record: Record, largest: int | None = None) -> tuple[FloatArray, FloatArray]:
+    """Return the motion around the largest amplitude of a record, sampled for a replay.
+
+    Args:
+        record: The record.
+        largest: `moment_of_largest_amplitude` if it is known already.
+
+    Returns:
+        Times (n,) and positions of the plant (n, >= 7): roll, pitch, yaw, x, y, z of the tub and
+        the drum angle; then, for each damper tube that is a body, roll, pitch, yaw, x, y, z of the
+        outer tube and the extension of the damper. [s; rad, m]
+    """
+    largest = moment_of_largest_amplitude(record) if largest is None else largest
+    middle = float(record.time[largest])
+    tubes = [f"tube_{part}" for part in ("angle", "position", "extension") if "tube" in record.dims]
+    moving = record[["tub_angle", "tub_position", "drum_angle", *tubes]]
+    stretch = moving.sel(time=slice(middle - REPLAY_SPAN / 2, middle + REPLAY_SPAN / 2))
+    period = (
+        float(record.time[1] - record.time[0]) if record.sizes["time"] > 1 else 1.0 / REPLAY_RATE
+    )
+    frames = stretch.isel(time=slice(None, None, max(1, round(1.0 / (REPLAY_RATE * period)))))
+    parts = [frames.tub_angle.values, frames.tub_position.values, frames.drum_angle.values]
+    for tube in frames.tube.values if "tube" in frames.dims else ():
+        one = frames.sel(tube=tube)
+        parts += [one.tube_angle.values, one.tube_position.values, one.tube_extension.values]
+    return frames.time.values, np.column_stack(parts)

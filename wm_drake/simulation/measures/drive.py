@@ -1,0 +1,107 @@
+"""The drive: torque, power, energy, speed ripple, speed at the end, and capture at a resonance."""
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
+from wm_drake.simulation.drive import measured_drive
+from wm_drake.simulation.measures.kind import Better, Measure, Variable, each_run
+from wm_drake.simulation.measures.run import Run
+
+_TORQUE, _SPEED = Unit("N*m", "N*m"), Unit("rad/s", "rpm")
+_RIPPLE = Unit("dimensionless", "percent")
+
+
+def _drive(run: Run) -> list[FloatArray]:
+    return measured_drive(run.time, run.drum_angle, run.drum_speed, run.motor_torque, run.profile)
+
+
+def _number(name: str, unit: Unit, about: str, better: Better, json: str | None) -> Variable:
+    """Return a variable that is one number of the run and a response of studies."""
+    return Variable(
+        f"drive_{name}",
+        (),
+        unit,
+        f"{name.replace('_', ' ')} of the drive",
+        about,
+        better=better,
+        is_response=not name.startswith("caught"),
+        json=json and f"motor/{json}",
+        studio=None,
+    )
+
+
+def _of_order_one(name: str, unit: str, about: str) -> Variable:
+    """Return a variable with the parts of a signal that go round with the drum."""
+    return Variable(
+        f"drive_{name}_order_one",
+        ("order",),
+        Unit(unit, unit),
+        f"{name} of order one",
+        about,
+        is_response=False,
+        json=None,
+        studio=None,
+    )
+
+
+DRIVE = Measure(
+    "drive",
+    (
+        _number(
+            "peak_torque",
+            _TORQUE,
+            "largest torque of the motor on the drum",
+            "smaller",
+            "peak_torque_Nm",
+        ),
+        _number(
+            "mean_torque",
+            _TORQUE,
+            "largest torque of the motor averaged over a revolution",
+            "smaller",
+            "mean_torque_Nm",
+        ),
+        _number(
+            "mean_torque_speed",
+            _SPEED,
+            "speed of the drum at the largest mean torque",
+            "",
+            "mean_torque_rpm",
+        ),
+        _number(
+            "peak_power", Unit("W", "W"), "largest power of the motor", "smaller", "peak_power_W"
+        ),
+        _number("energy", Unit("J", "J"), "work of the motor over the run", "smaller", "energy_J"),
+        _number(
+            "speed_ripple",
+            _RIPPLE,
+            "largest coefficient of fluctuation of the speed",
+            "smaller",
+            "speed_ripple_percent",
+        ),
+        _number(
+            "end_speed",
+            _SPEED,
+            "speed of the drum at the end, averaged over a revolution",
+            "larger",
+            None,
+        ),
+        _number(
+            "caught_speed",
+            _SPEED,
+            "speed at which the drum is caught; NaN if it is not",
+            "",
+            "caught_rpm",
+        ),
+        _number(
+            "caught_torque",
+            _TORQUE,
+            "mean torque of the motor where the drum is caught",
+            "",
+            "caught_mean_torque_Nm",
+        ),
+        _of_order_one("torque", "N*m", "torque with cosine and sine of the drum angle"),
+        _of_order_one("acceleration", "rad/s^2", "acceleration of the drum with them"),
+    ),
+    each_run(_drive),
+    has_table=False,
+)

@@ -1,0 +1,44 @@
+"""D, F and M of [B]: largest displacement near the detergent box, and gasket force and moment."""
+
+from wm_drake.parameters.units import Unit
+from wm_drake.simulation.measures.kind import Measure, Variable, each_run
+
+EXTREMES = Measure(
+    "extremes",
+    (
+        Variable(
+            "detergent_displacement",
+            ("axis",),
+            Unit("m", "mm"),
+            "displacement",
+            "largest displacement, from the rest position, of the tub point nearest to the "
+            "detergent box",
+            group="D",
+            short="D{}",
+            json="detergent_box_mm/D*",
+        ),
+        Variable(
+            "gasket_force",
+            ("axis",),
+            Unit("N", "N"),
+            "force",
+            "largest force of the gasket on the housing",
+            group="F",
+            short="gasket F{}",
+            json="gasket_force_N/F*",
+            studio=1,
+        ),
+        Variable(
+            "gasket_moment",
+            ("axis",),
+            Unit("N*m", "N*m"),
+            "moment",
+            "largest moment of the gasket on the housing",
+            group="M",
+            short="gasket M{}",
+            json="gasket_moment_Nm/M*",
+        ),
+    ),
+    each_run(lambda run: [*run.largest]),
+    has_table=False,
+)

@@ -1,0 +1,46 @@
+"""RMS displacements of the accelerometers in the regions of the spin profile."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
+from wm_drake.simulation.measures.kind import Measure, Variable, each_run
+from wm_drake.simulation.measures.run import Run
+from wm_drake.simulation.vibration import region_displacements
+
+DIMS = ("region", "accelerometer", "axis")
+
+
+def _regions(run: Run) -> Sequence[FloatArray]:
+    motion = np.ascontiguousarray(run.tub_motion)
+    at_points = run.accelerometer_points, run.rest_pose, run.period, run.profile
+    return region_displacements(motion, run.tub_acceleration, *at_points)
+
+
+REGIONS = Measure(
+    "regions",
+    (
+        Variable(
+            "region_displacement",
+            DIMS,
+            Unit("m", "mm"),
+            "RMS displacement",
+            "RMS displacement in each region of the spin profile",
+            json=None,
+            studio=None,
+        ),
+        Variable(
+            "region_displacement_integrated",
+            DIMS,
+            Unit("m", "mm"),
+            "RMS displacement from acceleration",
+            "RMS displacement in each region, from the acceleration integrated twice",
+            json=None,
+            studio=None,
+        ),
+    ),
+    each_run(_regions),
+    ("tub",),
+)

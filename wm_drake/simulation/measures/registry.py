@@ -1,0 +1,63 @@
+"""All measures by name: those of this package, then those that users register."""
+
+from wm_drake.registry import Registry
+from wm_drake.simulation.measures.kind import Measure, Variable
+
+
+def _register_all() -> None:
+    from wm_drake.simulation.measures import (
+        amplitudes,
+        drive,
+        extremes,
+        feet,
+        gap,
+        mounts,
+        regions,
+        springs,
+    )
+
+    for measure in (
+        extremes.EXTREMES,
+        amplitudes.AMPLITUDES,
+        amplitudes.IN_REGIONS,
+        amplitudes.POWER_MEANS,
+        gap.GAP,
+        gap.CONTACTS,
+        regions.REGIONS,
+        mounts.MOUNTS,
+        drive.DRIVE,
+        feet.FEET,
+        feet.IN_REGIONS,
+        mounts.CABINET,
+        springs.TENSIONS,
+    ):
+        MEASURES.register(measure)
+
+
+MEASURES: Registry[Measure] = Registry("measure", "wm_drake.measures", _register_all)
+"""Measures by name. Files of results depend on the order of those of this package."""
+
+
+def tabulated() -> list[Variable]:
+    """Return the variables of every spin run that pages and terminal show by their declaration."""
+    shown = (measure for measure in MEASURES.values() if measure.has_table)
+    return [one for measure in shown for one in measure.variables if one.json is not None]
+
+
+def register_measure(measure: Measure) -> Measure:
+    """Add a measure to those that every study, page and command knows, and return it.
+
+    Raises:
+        ValueError: another measure has this name.
+
+    Example:
+        >>> import numpy as np
+        >>> import wm_drake as wm
+        >>> from wm_drake.parameters.units import Unit
+        >>> from wm_drake.simulation.measures import MEASURES, Measure, Variable, each_run
+        >>> turns = Variable("turns", (), Unit("rad", "rad"), "angle", "angle at the end")
+        >>> at_end = Measure("turns", (turns,), each_run(lambda run: [run.drum_angle[-1]]))
+        >>> at_end.names
+        ('turns',)
+    """
+    return MEASURES.register(measure)

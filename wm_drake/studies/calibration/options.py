@@ -1,0 +1,79 @@
+"""Options of `wm-drake calibrate`, and its declaration."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wm_drake.studies.study import Options, Study, Task, option
+
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    from wm_drake.model.machine import Machine
+
+
+class CalibrateOptions(Options):
+    """Options of a calibration."""
+
+    free: Path = option(..., "YAML file of the free quantities, bounds and priors.", "FILE")
+    targets: tuple[Path, ...] = option(
+        (),
+        "Measured amplitudes, or other responses (docs/how-to/calibrate.md). Repeatable. Default: "
+        "those of the machine file.",
+        "CSV",
+    )
+    method: str = option(
+        "least-squares",
+        "Search method: least-squares, basin-hopping (slower, searches more widely) or evolution.",
+        "NAME",
+    )
+    starts: int = option(8, "Number of searches, each with its own starting point.")
+    iterations: int = option(
+        0, "Largest number of iterations per search; 0: default of the method.", ge=0
+    )
+    seed: int = option(0, "Seed of the random starting points.", "N", ge=0)
+    deviation: tuple[str, ...] = option(
+        (),
+        "Standard deviation of a measured amplitude, in percent (default: 5), or that of other "
+        "responses by name or kind, such as Fx=8 or moment=15 (default: 10). Repeatable.",
+        "PERCENT|NAME=PERCENT",
+    )
+    resolution: float = option(0.1, "Step to which measured amplitudes are rounded, in mm.")
+    weight: tuple[str, ...] = option(
+        (),
+        "Weight of a load, a sensor, a response, a kind of response, or LOAD:NAME. Default: 1. "
+        "Repeatable.",
+        "NAME=NUMBER",
+    )
+    limit: tuple[str, ...] = option(
+        (),
+        "Largest accepted difference of all amplitudes, in percent, or that of a load, a sensor, a "
+        "response, a kind of response or LOAD:NAME, such as moment=50. A value beyond its limit "
+        "costs much more. Repeatable.",
+        "PERCENT|NAME=PERCENT",
+    )
+    leave_out: tuple[str, ...] = option(
+        (),
+        "Loads to hold out: calibrate without them, then predict them. Repeatable.",
+        "LOAD[,LOAD]",
+    )
+    fewer: str | None = option(
+        None,
+        "Fit again with fewer free quantities and show what that costs, such as 30,20,10. The "
+        "others keep their expected values.",
+        "COUNT[,COUNT]",
+    )
+
+
+def _begin(options: CalibrateOptions, machine: "Machine") -> Task:
+    from wm_drake.studies.calibration.study import CalibrateTask
+
+    return CalibrateTask(options, machine)
+
+
+CALIBRATE = Study(
+    "calibrate",
+    "Fit unknown numbers of a machine to measured amplitudes, within bounds and with priors.",
+    CalibrateOptions,
+    _begin,
+    quick={"starts": 1, "iterations": 3},
+    has_cluster=False,
+    group="",
+)

@@ -1,0 +1,316 @@
+"""Command `calibrate`: calibration, predictions of held-out loads, fits with fewer quantities."""
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from rich.table import Table
+
+from wm_drake.errors import InputError, input_error
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import MachineParameters, located, machine_yaml
+from wm_drake.parameters.free import load_free
+from wm_drake.parameters.measured import measured_amplitudes, measured_responses
+from wm_drake.parameters.units import plain_number
+from wm_drake.studies.calibration.calibration import (
+    RELATIVE_DEVIATION,
+    Calibration,
+    Plan,
+    calibrate,
+)
+from wm_drake.studies.calibration.computed import Runner
+from wm_drake.studies.calibration.fewer import Simpler, check_counts, fewer_table, fit_with_fewer
+from wm_drake.studies.calibration.options import CalibrateOptions
+from wm_drake.studies.calibration.outcome import (
+    amplitude_rows,
+    mean_and_largest,
+    quantity_table,
+    response_table,
+    solved_machine,
+    values_beyond,
+)
+from wm_drake.studies.calibration.parameter_map import parameter_map_of
+from wm_drake.studies.calibration.prediction import Prediction, check_held_out, predict
+from wm_drake.studies.calibration.response_targets import with_deviations
+from wm_drake.studies.calibration.targets import AMPLITUDE, Targets, targets_of
+from wm_drake.studies.inputs import existing_file, pairs_of, problems_of_option, with_measured
+from wm_drake.studies.run import Executor
+from wm_drake.studies.study import Facts, Result, Task
+
+
+@dataclass(frozen=True)
+class CalibrateResult(Result):
+    """A calibration, predictions of held-out loads, and fits with fewer quantities."""
+
+    calibration: Calibration
+    predictions: Sequence[Prediction] = ()
+    fewer: Sequence[Simpler] = ()
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return quantities, amplitudes, and, if there are any, other responses and fewer fits."""
+        shown = {
+            "quantities": quantity_table(self.calibration),
+            "amplitudes": amplitude_rows(self.calibration),
+        }
+        if self.calibration.targets.responses:
+            shown["responses"] = response_table(self.calibration)
+        return shown | ({"fewer": fewer_table(self.fewer)} if self.fewer else {})
+
+    def write(self, folder: Path) -> None:
+        """Write the machine of each solution and the tables."""
+        for number, solution in enumerate(self.calibration.solutions, start=1):
+            text = machine_yaml(solved_machine(self.calibration.parameter_map, solution, number))
+            (folder / f"machine_{number}.yaml").write_text(text, encoding="utf-8")
+        for name, table in self.tables().items():
+            digits = "%.4f" if name == "amplitudes" else self.float_format
+            table.to_csv(folder / f"{name}.csv", index=False, float_format=digits)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the result for JSON."""
+        calibration, targets = self.calibration, self.calibration.targets
+        return {
+            "searches": len(calibration.ended),
+            "solutions": [
+                {
+                    "start": s.start,
+                    "cost": s.cost,
+                    "data_cost": s.data_cost,
+                    **_percents(s.errors(targets)),
+                    "other_responses": _percents(s.response_errors(targets))
+                    if targets.responses
+                    else None,
+                }
+                for s in calibration.solutions
+            ],
+            "quantities": json.loads(quantity_table(calibration).to_json(orient="records")),
+            "predictions": [
+                {"loads": list(p.loads)}
+                | {
+                    kind: _percents(getattr(p, kind))
+                    for kind in ("calibrated", "predicted", "seen")
+                }
+                | {"covered_percent": 100 * p.covered}
+                for p in self.predictions
+            ],
+            "fewer": json.loads(fewer_table(self.fewer).to_json(orient="records")),
+        }
+
+    def terminal(self) -> Iterator[Table | str]:
+        """Yield the quantities, the errors, predictions, and fits with fewer quantities."""
+        calibration, targets = self.calibration, self.calibration.targets
+        yield _values_table(calibration)
+        best = calibration.solutions[0]
+        yield (
+            f"Searches: {len(calibration.ended)}. Distinct good solutions: "
+            f"{len(calibration.solutions)}."
+        )
+        yield "Absolute differences of the amplitudes from the experiment:"
+        yield f"  best solution: {_in_words(best.errors(targets))}"
+        if targets.responses:
+            yield "Absolute differences of the other responses:"
+            yield f"  best solution: {_in_words(best.response_errors(targets))}"
+        yield from (f"  beyond its limit: {text}" for text in values_beyond(best, targets))
+        for prediction in self.predictions:
+            yield f"  load {', '.join(prediction.loads)}:"
+            yield f"    used for the calibration: {_in_words(prediction.calibrated)}"
+            yield f"    held out and predicted: {_in_words(prediction.predicted)}"
+            yield f"    other loads in that calibration: {_in_words(prediction.seen)}"
+            covered = f"{100 * prediction.covered:.0f} %"
+            yield f"    95 % intervals contain {covered} of the held-out amplitudes"
+        if self.fewer:
+            yield _fewer_table(self.fewer)
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        from wm_drake.studies.calibration.page import calibration_page
+
+        return calibration_page(self, facts)
+
+
+def _percents(errors: np.ndarray) -> dict[str, float]:
+    mean, largest = mean_and_largest(errors)
+    return {"mean_percent": 100 * mean, "largest_percent": 100 * largest}
+
+
+def _in_words(errors: np.ndarray) -> str:
+    mean, largest = mean_and_largest(errors)
+    return f"mean {100 * mean:.1f} %, largest {100 * largest:.1f} %"
+
+
+def _values_table(calibration: Calibration) -> Table:
+    """Return the quantities of the best solution; the deviation is that given data and prior."""
+    table = Table(title="Best solution, machine_1.yaml")
+    table.add_column("quantity", no_wrap=True)
+    for head in ("value", "± deviation", "expected"):
+        table.add_column(head, justify="right")
+    for head in ("unit", "determined by"):
+        table.add_column(head)
+    for row in quantity_table(calibration).to_dict("records"):
+        numbers = (f"{row[key]:.4g}" for key in ("value_1", "deviation_1", "expected"))
+        table.add_row(str(row["quantity"]), *numbers, str(row["unit"]), str(row["held_by_1"]))
+    return table
+
+
+def _fewer_table(fits: Sequence[Simpler]) -> Table:
+    table = Table(title="Cost against number of free quantities")
+    frame = fewer_table(fits).drop(columns="set_to_expected")
+    for head in frame.columns:
+        table.add_column(head.replace("_", " "), justify="right")
+    for row in frame.itertuples(index=False):
+        table.add_row(str(row[0]), *("–" if math.isnan(x) else f"{x:.3g}" for x in row[1:]))
+    return table
+
+
+class CalibrateTask(Task):
+    """A calibration with checked options."""
+
+    def __init__(self, options: CalibrateOptions, machine: Machine) -> None:
+        """Read targets and free file, and check the settings of the searches.
+
+        Raises:
+            InputError: an option or a file is wrong.
+        """
+        self.held_out, self.counts = _groups(options.leave_out), _counts(options.fewer)
+        measured = with_measured(machine.parameters, options.targets, "--targets")
+        deviations = _fractions(options.deviation, "--deviation")
+        amplitude = deviations.pop(AMPLITUDE, RELATIVE_DEVIATION)
+        targets = _targets(measured, deviations).weighted(_numbers(options.weight, "--weight"))
+        with problems_of_option("--limit"):
+            self.targets = targets.limited(_fractions(options.limit, "--limit"))
+        # the calibrated machine names the targets as its measurements
+        self.machine = build_machine(measured) if options.targets else machine
+        resolution = 1e-3 * options.resolution
+        self.plan = Plan(
+            options.method,
+            options.starts,
+            options.seed,
+            options.iterations,
+            amplitude,
+            resolution,
+        )
+        self.free = load_free(existing_file(options.free, "--free"))
+        self.plan.check()
+        check_held_out(self.targets, self.held_out)
+        check_counts(self.counts, len(self.free.quantities))
+        try:
+            parameter_map_of(self.machine, self.free)
+        except InputError as error:
+            raise located(error, options.free) from None
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the searches beside the machine."""
+        return {
+            "free": self.free,
+            "targets": self.targets,
+            "plan": self.plan,
+            "leave_out": "; ".join(map(",".join, self.held_out)),
+            "fewer": ",".join(map(str, self.counts)),
+        }
+
+    def run(self, executor: Executor) -> CalibrateResult:
+        """Calibrate, predict the held-out loads, and fit again with fewer quantities."""
+        assert executor.ledger is not None  # the study is declared with runs
+        runner = Runner(self.machine, executor.ledger, executor.workers)
+        with _searches(executor, runner, self.plan.starts) as shown:
+            calibration = calibrate(shown, self.free, self.targets, self.plan)
+        with _searches(executor, runner, len(self.held_out) * self.plan.starts) as shown:
+            predictions = predict(shown, self.free, calibration, self.held_out)
+        fits: list[Simpler] = []
+        if self.counts:
+            with _searches(executor, runner, len(self.counts)) as shown:
+                fits = fit_with_fewer(shown, calibration, self.counts)
+        return CalibrateResult(calibration, predictions, fits)
+
+
+@contextmanager
+def _searches(executor: Executor, runner: Runner, searches: int) -> Iterator[Runner]:
+    """Yield the runner with a progress bar of searches, machines and the least cost."""
+    with executor.progress(searches, "searches") as bar:
+        ended, last = 0, (0, 0)
+
+        def report(search: int, evaluations: int, best: float) -> None:
+            nonlocal ended, last
+            if last[1] > evaluations or last[0] != search:  # another search has begun
+                ended += 1
+            last = search, evaluations
+            bar(ended, f"{evaluations} machines, least cost {best:.1f}")
+
+        yield replace(runner, report=report)
+
+
+def _targets(parameters: MachineParameters, deviations: Mapping[str, float]) -> Targets:
+    if not parameters.measured:
+        raise input_error(
+            f"machine '{parameters.name}' names no measured amplitudes of its own; name a CSV file",
+            where="--targets",
+        )
+    targets = targets_of(
+        parameters,
+        measured_amplitudes(parameters),
+        ", ".join(Path(name).name for name in parameters.measured),
+        measured_responses(parameters),
+    )
+    with problems_of_option("--deviation"):
+        return replace(targets, responses=with_deviations(targets.responses, deviations))
+
+
+def _fractions(entries: Sequence[str], option: str) -> dict[str, float]:
+    """Return the numbers of NAME=PERCENT entries; one without a name is that of all amplitudes."""
+    plain = [entry for entry in entries if "=" not in entry]
+    if len(plain) > 1:
+        raise input_error(
+            f"{' and '.join(plain)} are given; one number without a name is allowed, that of the "
+            "amplitudes",
+            where=option,
+        )
+    named = [entry for entry in entries if "=" in entry]
+    named += [f"{AMPLITUDE}={entry}" for entry in plain]
+    return {name: number / 100.0 for name, number in _numbers(named, option, zero=False).items()}
+
+
+def _numbers(entries: Sequence[str], option: str, zero: bool = True) -> dict[str, float]:
+    """Return the numbers of NAME=NUMBER entries, each finite and above 0, or 0 where allowed."""
+    numbers: dict[str, float] = {}
+    for name, text in pairs_of(entries, option):
+        try:
+            number = plain_number(text)
+        except ValueError as error:
+            raise input_error(str(error), where=option, key=name) from None
+        if not 0.0 <= number < math.inf or (number == 0.0 and not zero):
+            allowed = ">= 0" if zero else "> 0"
+            raise input_error(
+                f"'{text}' is not allowed; must be {allowed} and finite", where=option, key=name
+            )
+        if name in numbers:
+            raise input_error("is given twice", where=option, key=name)
+        numbers[name] = number
+    return numbers
+
+
+def _groups(entries: Sequence[str]) -> list[list[str]]:
+    """Return the groups of loads that `--leave-out` names."""
+    groups = [[name.strip() for name in entry.split(",")] for entry in entries]
+    for names in groups:
+        for name in names:
+            if names.count(name) > 1:
+                raise input_error(f"'{name}' is given twice", where="--leave-out")
+    return groups
+
+
+def _counts(entry: str | None) -> list[int]:
+    """Return the numbers of free quantities that `--fewer` names."""
+    texts = [text.strip() for text in entry.split(",")] if entry is not None else []
+    for text in texts:
+        if not (text.isascii() and text.isdigit() and len(text) < 6):
+            raise input_error(
+                f"'{text[:20]}' is not a whole number; write for example 30,20,10", where="--fewer"
+            )
+    return [int(text) for text in texts]

@@ -1,0 +1,50 @@
+"""Options of the drive study, and its declaration."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wm_drake.studies.study import LOADS, PROFILE, SEED, Options, Study, Task, option
+
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    from wm_drake.model.machine import Machine
+    from wm_drake.parameters import MachineParameters
+
+
+class DriveOptions(Options):
+    """Options of the drive study."""
+
+    machine: str = option(
+        "motor",
+        "Name of a shipped machine, or machine file. A prescribed speed is replaced by the default "
+        "motor.",
+        "NAME|FILE",
+    )
+    load: tuple[str, ...] = LOADS
+    profile: Path | None = PROFILE
+    torques: int = option(9, "Torque limits of the map.", "N", ge=2, le=50)
+    unbalances: int = option(6, "Unbalances of the map.", "N", ge=2, le=50)
+    loads: int = option(48, "Random loads of the estimation of unbalance; 0 for none.", "N", ge=0)
+    speed: float = option(90.0, "Speed of the estimation. [rpm]", ge=30.0, le=300.0)
+    seed: int = SEED
+
+
+def _begin(options: DriveOptions, machine: "Machine") -> Task:
+    from wm_drake.studies.drive.study import DriveTask
+
+    return DriveTask(options, machine)
+
+
+def _with_motor(parameters: "MachineParameters") -> "MachineParameters":
+    from wm_drake.studies.inputs import with_drive
+
+    return with_drive(parameters, "motor")
+
+
+DRIVE = Study(
+    "drive",
+    "Find the weakest motor that passes every critical speed, and estimate the unbalance.",
+    DriveOptions,
+    _begin,
+    quick={"load": ("middle",), "torques": 2, "unbalances": 2, "loads": 3},
+    adapt=_with_motor,
+)

@@ -1,0 +1,192 @@
+"""Draw the page of the drive study: smallest torque limits, map, estimated unbalance."""
+
+from dataclasses import replace
+
+import numpy as np
+from rich import table as terminal
+
+from wm_drake.report.figure import (
+    MARK,
+    MEASURED,
+    OURS,
+    QUIET,
+    Axis,
+    Figure,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Text,
+)
+from wm_drake.report.formatting import MISSING, RPM_PER_RAD_S, number
+from wm_drake.report.page import Picture, picture
+from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.table import Group, Row, Table
+from wm_drake.studies.drive.study import PASSES, DriveResult, Threshold, motor_with_limit
+from wm_drake.studies.drive.tables import error_measures
+from wm_drake.studies.study import Facts
+
+
+def drive_page(result: DriveResult, facts: Facts) -> str:
+    """Return the page as text of one self-contained HTML file."""
+    sections = [Section("map", "Torque limit and unbalance", (map_picture(result),))]
+    if result.estimation:
+        seen = (estimation_picture(result),)
+        sections.append(Section("estimation", "Unbalance seen by the drive", seen))
+    limits = (thresholds_table(result),)
+    sections.append(Section("thresholds", "Smallest torque limit", tables=limits))
+    if result.estimation:
+        errors = (errors_table(result),)
+        sections.append(Section("errors", "Errors of the estimation", tables=errors))
+    made = [
+        ("Machine", result.parameters.name),
+        ("Runs", f"{result.runs} in {facts.wall_s:.0f} s"),
+        ("Duration of a run", f"{result.profile.duration:g} s"),
+        *facts.rows(),
+    ]
+    title = f"Drive of machine {result.parameters.name}"
+    return SectionedPage(
+        title, summary(result), sections, made, result.parameters, facts.warnings
+    ).html()
+
+
+def summary(result: DriveResult) -> str:
+    """Return the result in a few sentences."""
+    ratio = motor_with_limit(result.parameters)[0].belt_ratio
+    passing = [t for t in result.thresholds if np.isfinite(t.passes_from)]
+    sentences = []
+    if len(passing) < len(result.thresholds):
+        names = ", ".join(t.load for t in result.thresholds if not np.isfinite(t.passes_from))
+        sentences.append(f"With the torque limit of the machine the drum does not pass: {names}.")
+    if passing:
+        worst = max(passing, key=lambda t: t.passes_from)
+        sentences.append(
+            f"Load {worst.load} needs the strongest motor: {number(worst.passes_from, 3)} N m, "
+            f"{number(ratio * worst.passes_from, 2)} N m at the drum."
+        )
+    if errors := error_measures(result):
+        sentences.append(
+            f"The unbalance estimated from torque and speed is wrong by {number(errors['rms_gm'])} "
+            f"g m (RMS) at a mean of {number(errors['mean_planted_gm'], 0)} g m; 95 % of the "
+            f"errors are below {number(errors['p95_gm'])} g m."
+        )
+    return " ".join(sentences)
+
+
+def threshold_cells(result: DriveResult, threshold: Threshold) -> tuple[str, str, str]:
+    """Return limit at the motor and at the drum, and where the drum is caught just below."""
+    ratio = motor_with_limit(result.parameters)[0].belt_ratio
+    if np.isfinite(threshold.passes_from):
+        limits = (
+            f"{'' if threshold.caught_below else '≤ '}{number(threshold.passes_from, 3)}",
+            f"{'' if threshold.caught_below else '≤ '}{number(ratio * threshold.passes_from, 2)}",
+        )
+    else:
+        limits = (
+            f"> {number(threshold.caught_below, 3)}",
+            (f"> {number(ratio * threshold.caught_below, 2)}"),
+        )
+    caught = MISSING
+    if np.isfinite(threshold.caught_speed):
+        caught = f"{number(RPM_PER_RAD_S * threshold.caught_speed, 0)} rpm"
+    return *limits, caught
+
+
+def terminal_table(result: DriveResult) -> terminal.Table:
+    """Return the smallest torque limits for the terminal."""
+    title = f"Smallest torque limit of machine '{result.parameters.name}'"
+    return thresholds_table(result).terminal(title)
+
+
+def thresholds_table(result: DriveResult) -> Table:
+    """Return the smallest torque limit of each load."""
+    groups = tuple(Group(t.load, (Row(threshold_cells(result, t)),)) for t in result.thresholds)
+    caption = (
+        "Smallest torque of the motor with which the drum passes every critical speed, by "
+        "bisection to 2 %: it has at least "
+        f"{100.0 * PASSES:g} % of the wanted speed at the end of the profile. Where the torque is "
+        "a little smaller, the drum stays at the last column's speed: near 0 rpm the motor cannot "
+        "lift the unbalance, above that the drum is caught at a resonance. A profile that begins "
+        "at the speed at which laundry lies at the wall shows the resonances alone."
+    )
+    header = ("load", "at the motor, N\u00a0m", "at the drum, N\u00a0m", "caught just below at")
+    return Table(caption, header, groups)
+
+
+def map_picture(result: DriveResult) -> Picture:
+    """Return the map over torque limit and unbalance."""
+    grid = result.map
+    ratio = motor_with_limit(result.parameters)[0].belt_ratio
+    good = grid.end_speed >= PASSES * result.profile.speed[-1]
+    torque, unbalance = np.meshgrid(ratio * grid.torques, 1e3 * grid.unbalance)
+    key = "does not pass; speed at the end, rpm"
+    marks: list[Mark] = [
+        Points(torque[good], unbalance[good], size=9.0, key="passes"),
+        Points(torque[~good], unbalance[~good], symbol="square", color=MEASURED, size=9.0, key=key),
+    ]
+    rpm = RPM_PER_RAD_S * grid.end_speed[~good]
+    for x, y, speed in zip(torque[~good], unbalance[~good], rpm, strict=True):
+        above = Text(float(x), float(y), f"{speed:.0f}", color=MEASURED, size=11.0, up="bottom")
+        marks.append(replace(above, shift=(0.0, 6.0)))
+    panel = Panel(
+        marks=tuple(marks),
+        x=Axis(label="torque limit at the drum, N\u00a0m"),
+        y=Axis(label="unbalance, sum of mass times radius, g\u00a0m"),
+    )
+    figure = Figure(panels=(panel,), height=360.0)
+    passed = int(good.sum())
+    caption = (
+        f"Load {grid.load} with its masses multiplied by {grid.factors[0]:g} to "
+        f"{grid.factors[-1]:g}, over the torque limit: where the drum passes and where not."
+    )
+    return picture(figure, f"{passed} of {good.size} runs pass.", caption)
+
+
+def errors_table(result: DriveResult) -> Table:
+    """Return bias and spread of the estimated unbalance."""
+    errors, estimation = error_measures(result), result.estimation
+    assert errors is not None
+    assert estimation is not None
+    cells = tuple(number(errors[key]) for key in ("mean_planted_gm", "bias_gm", "rms_gm", "p95_gm"))
+    caption = (
+        f"Error of the unbalance estimated at a constant {RPM_PER_RAD_S * estimation.speed:.0f} "
+        "rpm, over loads of two masses at random places. Estimate: parts of motor torque and speed "
+        "that go round with the drum, m r = |T - J dw/dt| / g, with the inertia of the empty drum. "
+        "What remains: inertia of the load, and a tub that moves."
+    )
+    header = (
+        "random loads",
+        "mean planted, g\u00a0m",
+        "bias, g\u00a0m",
+        "RMS, g\u00a0m",
+        "95 % below, g\u00a0m",
+    )
+    return Table(caption, header, (Group(f"{errors['loads']:.0f}", (Row(cells),)),))
+
+
+def estimation_picture(result: DriveResult) -> Picture:
+    """Return estimated over planted unbalance."""
+    estimation = result.estimation
+    assert estimation is not None
+    planted = 1e3 * estimation.planted
+    top = 1.02 * planted.max()
+    ripple, torque = "speed ripple alone, J dw/dt", "torque alone"
+    marks: tuple[Mark, ...] = (
+        Points(planted, 1e3 * estimation.from_speed, symbol="triangle-up", color=QUIET, key=ripple),
+        Points(
+            planted,
+            1e3 * estimation.from_torque,
+            symbol="triangle-down",
+            color=MEASURED,
+            key=torque,
+        ),
+        Points(planted, 1e3 * estimation.estimated, color=OURS, key="both"),
+        Line([0.0, top], [0.0, top], color=MARK, key="planted"),
+    )
+    x, y = Axis(label="planted unbalance, g\u00a0m"), Axis(label="estimated unbalance, g\u00a0m")
+    figure = Figure(panels=(Panel(marks=marks, x=x, y=y),), height=340.0)
+    caption = (
+        "Estimated over planted unbalance. Torque or speed alone see only their share of it, which "
+        "depends on the controller."
+    )
+    return picture(figure, f"{len(planted)} random loads.", caption)

@@ -1,0 +1,110 @@
+"""Grid search of [B] section 3.1.2, and a bounded Nelder-Mead search to compare with.
+
+The first grid covers the region. Each further grid is centred at the best point so far. Its spacing
+is halved only if the last grid gave no better point; otherwise the grid moves on with the same
+spacing. So the search follows a diagonal valley, where the best point of a grid is far from the
+optimum. This is a pattern search; it ends when the spacing is as fine as demanded.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.fitting.problem import Problem
+from wm_drake.studies.fitting.search import Optimum, Search
+
+POINTS_PER_AXIS = 5
+"""Points of a grid along each axis: 25 points for two unknowns, as in [B]."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """One grid.
+
+    Attributes:
+        points: Its new points. [SI]
+        values: Cost at these points.
+        best: The best point so far. [SI]
+        best_value: Cost at the best point.
+        spacing: Distance of neighbouring points, as a part of the region.
+    """
+
+    points: FloatArray
+    values: FloatArray
+    best: FloatArray
+    best_value: float
+    spacing: float
+
+
+def grid_search(problem: Problem, mesh: float) -> tuple[Optimum, tuple[Round, ...]]:
+    """Minimize the cost by grids that move to the best point and are refined there.
+
+    Points of a grid that are outside the region are omitted. Points that are known already are not
+    computed again. The number of grids is finite: each one either finds a better point of the same
+    mesh or is the last one of its spacing.
+
+    Args:
+        problem: A problem whose unknowns have no priors: the region is the unit cube.
+        mesh: Spacing at which the search ends, as a part of the region, > 0. The last grid has at
+            most this spacing, and no point of it is better than its centre.
+
+    Returns:
+        The optimum, and the grids.
+    """
+    search, size = Search(problem), len(problem.unknowns)
+    known: dict[tuple[float, ...], float] = {}
+    steps = _offsets(size)
+    centre, spacing = np.full(size, 0.5), 1.0 / (POINTS_PER_AXIS - 1)
+    rounds = list[Round]()
+    while True:
+        # the coordinates are dyadic fractions, which floats hold exactly
+        grid = centre + spacing * steps
+        inside = grid[np.all((grid >= 0.0) & (grid <= 1.0), axis=1)]
+        new = np.array([point for point in inside if tuple(point) not in known]).reshape(-1, size)
+        values = search.costs(new) if len(new) else np.empty(0)
+        known |= {tuple(map(float, p)): float(v) for p, v in zip(new, values, strict=True)}
+        best = min(known, key=lambda point: known[point])
+        is_better = known[best] < known[tuple(map(float, centre))]
+        centre = np.array(best) if is_better else centre
+        best_value = known[tuple(map(float, centre))]
+        points, best_point = problem.points_at(new), problem.points_at(centre)
+        rounds.append(Round(points, values, best_point, best_value, spacing))
+        if not is_better:
+            if spacing <= mesh:
+                break
+            spacing *= 0.5
+    return Optimum(centre, best_value, len(known)), tuple(rounds)
+
+
+def _offsets(size: int) -> FloatArray:
+    """Return the points of a grid with spacing 1 around its centre, one row per point."""
+    along = [np.arange(POINTS_PER_AXIS) - POINTS_PER_AXIS // 2] * size
+    return np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, size).astype(float)
+
+
+def simplex_search(problem: Problem, stop: float) -> Optimum:
+    """Minimize the cost by scipy's Nelder-Mead method, from near the middle of the region.
+
+    This method needs no derivatives; envelopes have kinks.
+
+    Args:
+        problem: A problem whose unknowns have no priors: the region is the unit cube.
+        stop: The search ends when the costs at the corners of the simplex differ by less than this,
+            and the corners by less than 0.1 % of the region.
+    """
+    search, size = Search(problem), len(problem.unknowns)
+    end = minimize(
+        lambda point: float(search.costs(point[None])[0]),
+        np.full(size, 0.5),
+        method="Nelder-Mead",
+        bounds=[(0.0, 1.0)] * size,
+        options={"fatol": stop, "xatol": 1e-3, "initial_simplex": _simplex(size)},
+    )
+    return Optimum(end.x, float(end.fun), int(end.nfev))
+
+
+def _simplex(size: int) -> FloatArray:
+    """Return a start simplex near the middle of the region, with edges of a quarter of its size."""
+    return np.vstack([np.full(size, 0.4), 0.4 + 0.25 * np.eye(size)])

@@ -1,0 +1,156 @@
+"""What the pages of all fits share: values with intervals, what is not determined, the search."""
+
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+import pandas as pd
+
+from wm_drake.parameters.units import Unit
+from wm_drake.report.figure import Axis, Figure, Line, Panel
+from wm_drake.report.formatting import MISSING, number
+from wm_drake.report.page import Picture, picture
+from wm_drake.report.sections import Section
+from wm_drake.report.table import Table, line
+from wm_drake.studies.fitting.fit import Estimate, Fit
+
+FixedNumber: TypeAlias = tuple[str, float, Unit]
+"""Name, SI value and unit of a number that was not searched."""
+
+FIXED = "fixed"
+"""Remark on a number that was not searched."""
+
+
+def unit_text(unit: Unit) -> str:
+    """Return the display unit of a number for reading."""
+    return unit.shown.replace("*", " ")
+
+
+def estimate_rows(fit: Fit) -> list[dict[str, Any]]:
+    """Return value, interval, unit and bounds of each unknown, in its unit for reading."""
+    rows = []
+    for e, unknown in zip(fit.estimates, fit.problem.unknowns, strict=True):
+        value, lower, upper = (
+            unknown.unit.from_si(v) if np.isfinite(v) else np.nan
+            for v in (e.value, e.lower, e.upper)
+        )
+        rows.append(
+            {
+                "unknown": e.name,
+                "value": value if e.determined else np.nan,
+                "lower_95": lower,
+                "upper_95": upper,
+                "unit": unknown.unit.shown,
+                "lower_bound": unknown.unit.from_si(unknown.lower),
+                "upper_bound": unknown.unit.from_si(unknown.upper),
+            }
+        )
+    return rows
+
+
+def estimates_frame(fit: Fit, fixed: Sequence[FixedNumber] = ()) -> pd.DataFrame:
+    """Return `estimate_rows` with remarks, and the fixed numbers, as a table for a file."""
+    rows = [
+        row | {"remark": _remark(e)}
+        for row, e in zip(estimate_rows(fit), fit.estimates, strict=True)
+    ]
+    rows += [
+        {"unknown": name, "value": unit.from_si(value), "unit": unit.shown, "remark": FIXED}
+        for name, value, unit in fixed
+    ]
+    return pd.DataFrame(rows)
+
+
+ESTIMATE_HEADS = ("unknown", "value", "95 % interval", "unit", "remark")
+"""Heads of the columns of `estimate_cells`."""
+
+
+def estimate_cells(fit: Fit, fixed: Sequence[FixedNumber] = ()) -> list[tuple[str, ...]]:
+    """Return name, value, interval, unit and remark of each unknown and fixed number as text."""
+    cells: list[tuple[str, ...]] = []
+    for e, unknown in zip(fit.estimates, fit.problem.unknowns, strict=True):
+        unit, interval = unknown.unit, MISSING
+        if np.isfinite(e.lower):
+            interval = f"{unit.from_si(e.lower):.5g} to {unit.from_si(e.upper):.5g}"
+        shown = f"{unit.from_si(e.value):.5g}" if e.determined else MISSING
+        cells.append((e.name, shown, interval, unit_text(unit), _remark(e)))
+    for name, value, unit in fixed:
+        cells.append((name, f"{unit.from_si(value):.5g}", MISSING, unit_text(unit), FIXED))
+    return cells
+
+
+def _remark(e: Estimate) -> str:
+    if not e.determined:
+        return "not determined by the data"
+    return f"at its {e.at_bound} bound" if e.at_bound else ""
+
+
+def undetermined_sentences(fit: Fit) -> list[str]:
+    """Return a sentence for each unknown, or joint change of unknowns, that is not determined."""
+    sentences = []
+    for direction in fit.undetermined:
+        if len(direction.names) == 1:
+            sentences.append(
+                f"{direction.names[0]} can take any value within its bounds without a visible "
+                "change of the computed values."
+            )
+            continue
+        pairs = zip(direction.names, direction.parts, strict=True)
+        parts = ", ".join(f"{name} {part:+.2g}" for name, part in pairs)
+        sentences.append(
+            "These unknowns can change together, by the given fractions of their ranges, without a "
+            f"visible change of the computed values: {parts}."
+        )
+    return sentences
+
+
+def values_section(fit: Fit, fixed: Sequence[FixedNumber] = ()) -> Section:
+    """Return the section of the values with their intervals."""
+    caption = (
+        "Estimated values with 95 % confidence intervals. There is no interval if the value is at "
+        "a bound, if the data do not determine it or if it was fixed."
+    )
+    groups = tuple(line(name, cells) for name, *cells in estimate_cells(fit, fixed))
+    table = Table(caption, ESTIMATE_HEADS, groups, text_columns=5)
+    text = " ".join(undetermined_sentences(fit))
+    return Section("values", "Values", tables=(table,), text=text)
+
+
+def correlations_table(fit: Fit) -> Table:
+    """Return the standard deviations of the unknowns, and the correlations between them."""
+    deviation = np.sqrt(np.diag(fit.covariance))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlation = fit.covariance / np.outer(deviation, deviation)
+    groups = []
+    for u, s, row in zip(fit.problem.unknowns, deviation, correlation, strict=True):
+        size = f"{u.unit.from_si(s):.3g} {unit_text(u.unit)}" if np.isfinite(s) else MISSING
+        groups.append(line(u.name, [size, *(number(value, 2) for value in row)]))
+    caption = "Standard deviations of the unknowns, and the correlations between them."
+    names = [u.name for u in fit.problem.unknowns]
+    return Table(caption, ("unknown", "standard deviation", *names), tuple(groups), text_columns=2)
+
+
+def history_picture(fit: Fit, unit: str) -> Picture:
+    """Return the smallest RMSE, with its unit, after each round of the search."""
+    history = np.maximum(fit.log.history, 1e-300)
+    curve = Line(range(1, len(history) + 1), history, symbol="circle", size=5.0)
+    x, y = Axis(label="round of the search"), Axis(label=f"smallest RMSE, {unit}", is_log=True)
+    return picture(
+        Figure(panels=(Panel(marks=(curve,), x=x, y=y),), height=180.0),
+        "Smallest RMSE after each round of the search.",
+        "Smallest RMSE that was found up to the end of each round of the search.",
+    )
+
+
+def search_facts(fit: Fit) -> list[tuple[str, str]]:
+    """Return how the search went, as pairs of word and text."""
+    return [
+        ("Method", fit.log.method),
+        ("Seed", str(fit.log.seed)),
+        ("Evaluated points", str(fit.log.evaluations)),
+        (
+            "Condition number",
+            f"{fit.condition:.3g} (Jacobian, with each unknown scaled by its range)",
+        ),
+        *(("Note", note) for note in fit.log.notes),
+    ]

@@ -1,0 +1,246 @@
+"""The gasket study: its task, and its result as files, JSON and page."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+import xarray as xr
+
+from wm_drake.errors import InputError, input_error, nearest_names
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import (
+    GASKET_FACTORS,
+    TABLES,
+    FactorLevels,
+    MachineParameters,
+    at_levels,
+    factor_of_text,
+    levels_of,
+    load_factors,
+    place_of,
+    published_results,
+)
+from wm_drake.simulation.cases import Case, is_as_measured
+from wm_drake.studies.doe import DESIGNS, MODELS, Design, make_design, read_design, write_design
+from wm_drake.studies.gasket import tables
+from wm_drake.studies.gasket.check import Check, Setting, run_check
+from wm_drake.studies.gasket.compared import NOT_COMPARED, Compared
+from wm_drake.studies.gasket.level_zero import run_level_zero
+from wm_drake.studies.gasket.options import GasketOptions
+from wm_drake.studies.gasket.published import Published, published_for
+from wm_drake.studies.gasket.screening import Screening, check_degrees_of_freedom, run_screening
+from wm_drake.studies.gasket.study import LOADS, GasketTrials
+from wm_drake.studies.gasket.surface import surfaces
+from wm_drake.studies.gasket.words import Words
+from wm_drake.studies.inputs import existing_file, pairs_of, problems_of_option, selected_cases
+from wm_drake.studies.run import Executor, machine_text
+from wm_drake.studies.study import Facts, Result, Task
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+@dataclass(frozen=True)
+class GasketResult(Result):
+    """Result of the study.
+
+    Attributes:
+        screening: Effects of the factors.
+        trials: Trials that were run.
+        compared: What the effects are compared with.
+    """
+
+    screening: Screening
+    trials: GasketTrials
+    compared: Compared = NOT_COMPARED
+
+    # more digits than the results are accurate to
+    float_format = "%.9g"
+
+    @property
+    def words(self) -> Words:
+        """Words for factors and responses."""
+        return Words(self.trials.factors, self.screening.responses.meanings)
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return all tables but the design."""
+        return tables.all_tables(self.screening, self.trials.factors, self.compared)
+
+    def write(self, folder: Path) -> None:
+        """Write the tables and the design. One screening always results in the same bytes."""
+        values = tables.physical_values(self.screening.design, self.trials.factors)
+        write_design(self.screening.design, folder / "design.csv", values)
+        super().write(folder)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the result for JSON."""
+        return tables.as_plain_data(self.screening, self.compared)
+
+    def terminal(self) -> "list[Table | str]":
+        """Return percentages of the variance, the check and a summary."""
+        from wm_drake.studies.gasket.findings import summary
+        from wm_drake.studies.gasket.terminal import check_table, variance_table
+
+        published, check = self.compared.published, self.compared.check
+        shown: list[Table | str] = [variance_table(self.screening, self.words, published)]
+        if published.has_terms:
+            shown.append("In parentheses: the published percentage of a leading term.")
+        if check is not None:
+            shown.append(check_table(check))
+        return [*shown, *summary(self.screening, self.words, self.compared)]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        from wm_drake.studies.gasket.page import gasket_page
+
+        return gasket_page(self, facts)
+
+    def warnings(self) -> list[str]:
+        """Return what limits the use of the result."""
+        from wm_drake.studies.gasket.findings import warnings
+
+        return warnings(self.screening, self.words)
+
+    def failures(self) -> list[str]:
+        """Return a line for each run that diverged."""
+        failed = self.screening.responses.failed.items()
+        return [f"trial {trial + 1}, load {load}: {why}" for (trial, load), why in failed]
+
+
+class GasketTask(Task):
+    """The study with checked options."""
+
+    def __init__(self, options: GasketOptions, machine: Machine) -> None:
+        """Read factors, settings, design, loads, responses and published results.
+
+        Raises:
+            InputError: one of them is wrong.
+        """
+        self.options, self.parameters = options, machine.parameters
+        parameters, levels = self.parameters, _factors(machine.parameters, options)
+        self.settings = [_setting(parameters, levels, text) for text in options.check]
+        self.design = _design(options, tuple(factor.name for factor in levels))
+        check_degrees_of_freedom(self.design)
+        default = [name for name in LOADS if name in parameters.loads]
+        loads = options.load or default
+        self.cases = selected_cases(parameters, loads, True, options.profile)
+        middle = at_levels(parameters, levels, [0] * len(levels))
+        with problems_of_option("--response"):
+            self.trials = GasketTrials(middle, levels, self.cases, options.response)
+        self.published = self._published()
+
+    def _published(self) -> Published:
+        """Return the published results that are compared, of some loads."""
+        options, parameters = self.options, self.parameters
+        files = [
+            str(existing_file(path, "--published").resolve()) for path in options.published
+        ] or parameters.published
+        loads = [case.name for case in self.cases]
+        if not options.published:
+            is_other = options.sets or options.factor or options.factors
+            loads = [case.name for case in self.cases if is_as_measured(parameters, case)]
+            loads = [] if is_other else loads
+        labels = [(load, response.name) for load in loads for response in self.trials.chosen]
+        names = ", ".join(Path(path).name for path in files)
+        return published_for(published_results(tuple(files)), labels, names)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the runs."""
+        from wm_drake.batch.ledger import key_of
+
+        plan, trials = self.design, self.trials
+        levels = key_of(levels=plan.levels, settings=[f.settings for f in trials.factors])[:8]
+        loads = key_of(loads=[(case.load, case.profile) for case in trials.loads])[:8]
+        return {
+            "machine": machine_text(trials.parameters),
+            "design": f"{plan.kind}, {plan.trials} trials, {levels}",
+            "loads": f"{', '.join(case.name for case in trials.loads)}, {loads}",
+            "measures": ", ".join(trials.measures),
+        }
+
+    def run(self, executor: Executor) -> GasketResult:
+        """Run the trials, level 0 with each treatment of tables, and the settings to check."""
+        trials, options = self.trials, self.options
+        middle = build_machine(trials.parameters)
+        run = partial(executor.simulate, middle, trials.measures)
+        with executor.progress(self.design.trials * len(trials.loads)):
+            screening = run_screening(self.design, lambda design: trials.responses(design, run))
+
+        def run_variant(machine: MachineParameters, cases: Sequence[Case]) -> xr.Dataset:
+            built = build_machine(machine)
+            return executor.simulate(built, trials.measures, cases, "level 0")
+
+        every = {
+            name: _factors(self.parameters, options.model_copy(update={"tables": name}))
+            for name in TABLES
+        }
+        zero = run_level_zero(
+            self.parameters, every, options.tables, self.cases, trials.chosen, run_variant
+        )
+        check: Check | None = None
+        if self.settings:
+            models = surfaces(screening)
+            check = run_check(trials, self.settings, models, partial(run, what="check"))
+        return GasketResult(screening, trials, Compared(self.published, zero, check))
+
+
+def _factors(parameters: MachineParameters, options: GasketOptions) -> tuple[FactorLevels, ...]:
+    """Return the levels of the factors that the options select."""
+    named, file, treatment = options.factor, options.factors, options.tables
+    if treatment not in TABLES:
+        hint = nearest_names(treatment, TABLES)
+        raise input_error(f"unknown treatment '{treatment}'{hint}", where="--tables")
+    known = load_factors(GASKET_FACTORS if file is None else existing_file(file, "--factors"))
+    try:
+        chosen = dict(factor_of_text(text, known) for text in named) if named else known
+    except InputError as error:
+        raise InputError(replace(p, where="--factor") for p in error.problems) from None
+    if named and len(chosen) < len(named):
+        raise input_error("a factor is given twice", where="--factor")
+    try:
+        return levels_of(parameters, chosen, treatment)
+    except InputError as error:
+        origin = "--factor" if named else str(file) if file else ""
+        raise InputError(
+            replace(p, where=": ".join(filter(None, [origin, p.where]))) for p in error.problems
+        ) from None
+
+
+def _setting(parameters: MachineParameters, levels: tuple[FactorLevels, ...], text: str) -> Setting:
+    """Return the setting of the factors that an option `--check` means."""
+    places = {factor.name: 0.0 for factor in levels}
+    by_name = {factor.name: factor for factor in levels}
+    for name, value in pairs_of(text.split(","), "--check"):
+        if name not in by_name:
+            hint = nearest_names(name, by_name)
+            raise input_error(f"unknown factor '{name}'{hint}", where="--check")
+        try:
+            places[name] = place_of(parameters, by_name[name], value)
+        except InputError as error:
+            raise InputError(replace(p, where="--check") for p in error.problems) from None
+    return Setting(text, tuple(places.values()))
+
+
+def _design(options: GasketOptions, names: tuple[str, ...]) -> Design:
+    """Return the design that the options select, for factors with these names."""
+    kind, model, trials = options.design, options.model, options.trials
+    if model not in MODELS:
+        raise input_error(f"unknown model '{model}'{nearest_names(model, MODELS)}", where="--model")
+    if kind in DESIGNS:
+        return make_design(kind, names, trials=trials, model=model, seed=options.seed)
+    if not Path(kind).is_file():
+        hint = nearest_names(kind, DESIGNS)
+        raise input_error(
+            f"'{kind}' is neither a kind of design nor a file{hint}", where="--design"
+        )
+    if trials is not None:
+        raise input_error(
+            "not allowed with a design from a file, which has its own number of trials",
+            where="--trials",
+        )
+    return read_design(Path(kind), names, model)

@@ -1,0 +1,50 @@
+"""Options of the gasket-damping study, and its declaration."""
+
+from typing import TYPE_CHECKING
+
+from wm_drake.studies.study import Options, Study, Task, option
+
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    from wm_drake.model.machine import Machine
+
+
+class GasketDampingOptions(Options):
+    """Options of the gasket-damping study."""
+
+    record: tuple[str, ...] = option(
+        (),
+        "Measured displacements of a load: CSV with time_s, Xr, Yr, ... in mm, or netCDF record of "
+        "the command spin. Repeatable. Default: the records of a virtual experiment.",
+        "LOAD=FILE",
+    )
+    planted_linear: str = option(
+        "0.0287 N s/mm", "Linear damping C_L of the virtual experiment.", "VALUE"
+    )
+    planted_torsional: str = option(
+        "87 N mm s/deg", "Torsional damping C_T of the virtual experiment.", "VALUE"
+    )
+    seed: int = option(0, "Seed of the noise of the virtual experiment.", "N", ge=0)
+    mesh: float = option(
+        0.1,
+        "Spacing at which the grid search ends, in percent of the region (0 to 0.05 N s/mm, 0 to "
+        "200 N mm s/deg).",
+        "PERCENT",
+        ge=1e-3,
+        le=25.0,
+    )
+
+
+def _begin(options: GasketDampingOptions, machine: "Machine") -> Task:
+    from wm_drake.studies.gasket_damping.study import GasketDampingTask
+
+    return GasketDampingTask(options, machine)
+
+
+GASKET_DAMPING = Study(
+    "gasket-damping",
+    "Find the gasket damping for which computed and measured envelopes agree best.",
+    GasketDampingOptions,
+    _begin,
+    quick={"mesh": 20.0},
+    has_runs=False,
+)

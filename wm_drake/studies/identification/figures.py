@@ -1,0 +1,150 @@
+"""Figures of a component identification: measured and fitted loops, progress of the search."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.report.figure import (
+    MEASURED,
+    OURS,
+    Figure,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    in_grid,
+)
+from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion
+from wm_drake.studies.fitting import Fit
+from wm_drake.studies.rig.figures import force_scale, loop_panel, motion_scale
+
+COLUMNS = 4
+"""Largest number of panels in a row."""
+
+
+def motion_text(measured: MeasuredMotion) -> str:
+    """Return frequency and amplitude of a measured loop with their units; of another motion, range.
+
+    The range goes from the least to the greatest displacement.
+    """
+    factor, _, unit = motion_scale(measured.loop.rotates)
+    if not isinstance(measured, HarmonicMotion):
+        ends = [float(factor * side(measured.position)) for side in (np.min, np.max)]
+        negligible = 1e-9 * (ends[1] - ends[0])  # rounding of an end at zero
+        low, high = (0.0 if abs(end) < negligible else end for end in ends)
+        return f"as recorded, {low:.3g} to {high:.3g} {unit}"
+    return f"{measured.motion.frequency:.3g} Hz, {factor * measured.motion.amplitude:.3g} {unit}"
+
+
+def loops_figure(fit: Fit, motions: Sequence[MeasuredMotion], *, over: str) -> Figure:
+    """Draw measured samples and the fitted loop without offset and drift, one panel per file.
+
+    Args:
+        fit: Fit to these motions.
+        motions: Measured motions, at least one.
+        over: Abscissa: displacement or velocity.
+    """
+    panels = []
+    for index, measured in enumerate(motions):
+        offset = measured.baseline @ fit.baselines[index]
+        computed = fit.computed[fit.problem.slices[index]] - offset
+        panels.append(_panel(measured, offset, {"fitted": (OURS, computed)}, over))
+    return _figure(panels)
+
+
+def _figure(panels: list[Panel]) -> Figure:
+    columns = min(COLUMNS, max(2, len(panels)))
+    lowest = max(0, len(panels) - columns)
+    shown = [
+        replace(
+            panel,
+            x=panel.x if index >= lowest else replace(panel.x, label=""),
+            y=replace(panel.y, label="") if index % columns else panel.y,
+        )
+        for index, panel in enumerate(panels)
+    ]
+    return Figure(panels=in_grid(shown, columns), height=170.0, widths=(1.0,) * columns)
+
+
+def _panel(
+    measured: MeasuredMotion,
+    offset: FloatArray,
+    lines: Mapping[str, tuple[str, FloatArray]],
+    over: str,
+) -> Panel:
+    """Return the samples of a test and computed lines.
+
+    Args:
+        measured: The test.
+        offset: Offset and drift that are taken from its force.
+        lines: By entry of the legend: colour and force (n,).
+        over: Abscissa: displacement or velocity.
+    """
+    factor, name, unit = motion_scale(measured.loop.rotates)
+    x = factor * (measured.position if over == "displacement" else measured.rate)
+    order = drawing_order(measured)
+    force = measured.loop.force - offset
+    samples = Points(x, force, color=MEASURED, size=3.0, opacity=0.4, key="measured")
+    marks: list[Mark] = [samples]
+    for key, (color, computed) in lines.items():
+        marks.append(Line(x[order], computed[order], color=color, width=2.0, key=key))
+    label = f"{name}, {unit}" if over == "displacement" else f"velocity, {unit}/s"
+    y = ", ".join(force_scale(measured.loop.rotates))
+    return loop_panel(motion_text(measured), marks, label, y)
+
+
+MOST_PANELS = 12
+"""Largest number of tests in a figure of several laws."""
+
+LAW_COLOURS = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#d55e00")
+"""Colours of laws, of Okabe and Ito."""
+
+
+def measured_files(motions: Sequence[MeasuredMotion]) -> list[int]:
+    """Return the indices of at most `MOST_PANELS` tests, evenly chosen."""
+    places = np.linspace(0, len(motions) - 1, min(MOST_PANELS, len(motions)))
+    return [round(place) for place in places]
+
+
+def rival_loops_figure(
+    fits: Mapping[str, Fit],
+    motions: Sequence[MeasuredMotion],
+    chosen: Sequence[int],
+    *,
+    best: str,
+    over: str,
+) -> Figure:
+    """Draw measured samples and the loop of each law, one panel per test.
+
+    The offset and drift that the best law finds are taken from the samples and from all laws, so
+    that each law lies beside the samples as its error says.
+
+    Args:
+        fits: Fit or evaluation on all motions, by law.
+        motions: Measured motions.
+        chosen: Indices of the motions that are drawn.
+        best: The best law.
+        over: Abscissa: displacement or velocity.
+    """
+    panels = []
+    for index in chosen:
+        offset = motions[index].baseline @ fits[best].baselines[index]
+        lines = {
+            law: (
+                LAW_COLOURS[k % len(LAW_COLOURS)],
+                fit.computed[fit.problem.slices[index]] - offset,
+            )
+            for k, (law, fit) in enumerate(fits.items())
+        }
+        panels.append(_panel(motions[index], offset, lines, over))
+    return _figure(panels)
+
+
+def drawing_order(measured: MeasuredMotion) -> np.ndarray:
+    """Return the order of samples along a line: by phase and closed for a sine, else by time."""
+    if not isinstance(measured, HarmonicMotion):
+        return np.arange(len(measured.position))
+    order = np.argsort(measured.phase)
+    return np.append(order, order[0])

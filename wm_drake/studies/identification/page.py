@@ -1,0 +1,223 @@
+"""Page and tables of a fit to the loops of a component."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from wm_drake.report.formatting import number
+from wm_drake.report.page import picture
+from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.table import Table, line
+from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion, RecordedMotion
+from wm_drake.studies.fitting import Fit
+from wm_drake.studies.fitting.page import (
+    FixedNumber,
+    correlations_table,
+    history_picture,
+    search_facts,
+    values_section,
+)
+from wm_drake.studies.identification.figures import loops_figure, motion_text
+from wm_drake.studies.identification.judgement import Judgement, per_cent
+from wm_drake.studies.identification.models import unit_of_field
+from wm_drake.studies.rig.figures import force_scale, motion_scale
+from wm_drake.studies.study import Facts
+
+if TYPE_CHECKING:
+    from wm_drake.studies.identification.study import FitResult
+
+METHOD = (
+    "The RMSE is that of [A] Eq. (1) and [C] Eq. (5), over all samples of all files. The offset "
+    "and drift of each force signal are removed from its residuals. The offset and drift of each "
+    "displacement signal are removed from its motion; the middle of the motion is taken as the "
+    "zero position of the component. The intervals are valid if the model is right. They take the "
+    "correlation of neighbouring residuals into account. Covariance and condition number follow "
+    "from the derivatives of the residuals at the end of the search."
+)
+
+
+def identify_page(result: "FitResult", facts: Facts) -> str:
+    """Return the page as text of one self-contained HTML file."""
+    fit, motions, judgement = result.fit, result.motions, result.judgement
+    loops = tuple(
+        picture(
+            loops_figure(fit, motions, over=over),
+            f"Measured samples and the fitted loop, one panel per file, over {over}.",
+            f"Force over {over}: measured samples and fitted loop. The offset and drift of the "
+            "instrument are removed from both.",
+        )
+        for over in ("displacement", "velocity")
+    )
+    sections = [Section("loops", "Measured and fitted loops", loops)]
+    if fit.log.history:
+        unit = force_scale(motions[0].loop.rotates)[1]
+        sections.append(Section("search", "Search", (history_picture(fit, unit),)))
+    sections += [
+        values_section(fit, fixed_numbers(result.model.fixed)),
+        Section("errors", "Errors", tables=(_errors(fit, motions, judgement),)),
+    ]
+    if fit.estimates:
+        sections.append(Section("correlations", "Correlations", tables=(correlations_table(fit),)))
+    made = [*search_facts(fit), *(("Motion", text) for text in motion_sentences(motions))]
+    return SectionedPage(
+        f"Identification of {result.title}",
+        _summary(fit, motions, judgement),
+        sections,
+        [*made, *facts.rows()],
+        warnings=_warnings(fit, judgement),
+        about=f"Fit to {len(motions)} measured loop{'s' if len(motions) > 1 else ''}.",
+        method=METHOD,
+    ).html()
+
+
+def fixed_numbers(fixed: Mapping[str, float]) -> list[FixedNumber]:
+    """Return fixed numbers with their units."""
+    units = {name: unit_of_field(name) for name in fixed}
+    return [(name, fixed[name], unit) for name, unit in units.items() if unit]
+
+
+def errors_table(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) -> pd.DataFrame:
+    """Return the RMSE of each test, as [A] Tables 2, 4, 5 and 7, with noise and lack of fit."""
+    rows = []
+    for test, measured, judged in zip(fit.tests, motions, judgement.loops, strict=True):
+        factor, _, unit = motion_scale(measured.loop.rotates)
+        force = force_scale(measured.loop.rotates)[1].replace(" ", "")
+        rows.append(
+            {
+                "file": measured.loop.path,
+                "frequency_hz": frequency_of(measured),
+                f"amplitude_{unit}": factor * measured.stroke,
+                f"rmse_{force}": test.rmse,
+                "rmse_by_largest_force": test.normalised,
+                f"noise_{force}": judged.noise,
+                "lack_of_fit_by_rms_force": judged.missed,
+                "work_per_cycle_J": judged.work,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def motion_sentences(motions: Sequence[MeasuredMotion]) -> list[str]:
+    """Return a sentence for each test whose own displacement drives the law, on its smoothing."""
+    sentences = []
+    for m in motions:
+        if not isinstance(m, RecordedMotion):
+            continue
+        factor, _, unit = motion_scale(m.loop.rotates)
+        smoothing = (
+            f"smoothed by a cubic spline that halves a motion at {m.cutoff:.3g} Hz; "
+            f"{factor * m.noise:.2g} {unit} (root mean square) is taken out as noise"
+            if np.isfinite(m.cutoff)
+            else "interpolated by a cubic spline without smoothing"
+        )
+        begin = (
+            "a sponge begins in the steady state of the first period"
+            if m.repeats
+            else "a sponge begins without deformation"
+        )
+        sentences.append(
+            f"{m.loop.name} is no sine: its displacement drives the law as recorded, {smoothing}; "
+            f"{begin}."
+        )
+    return sentences
+
+
+def frequency_of(measured: MeasuredMotion) -> float:
+    """Return the frequency of a sine; NaN for another motion. [Hz]"""
+    return measured.motion.frequency if isinstance(measured, HarmonicMotion) else float("nan")
+
+
+def fitted_loops(fit: Fit, motions: Sequence[MeasuredMotion]) -> pd.DataFrame:
+    """Return the measured and the fitted force at every sample. [SI]"""
+    parts = [
+        pd.DataFrame(
+            {
+                "file": measured.loop.name,
+                "time_s": measured.loop.time,
+                "phase_rad": measured.phase if isinstance(measured, HarmonicMotion) else np.nan,
+                "measured": measured.loop.force,
+                "fitted": fit.computed[where],
+            }
+        )
+        for measured, where in zip(motions, fit.problem.slices, strict=True)
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
+def _errors(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) -> Table:
+    unit = force_scale(motions[0].loop.rotates)[1]
+    groups = tuple(
+        line(
+            measured.loop.name,
+            [
+                motion_text(measured),
+                str(len(measured.position)),
+                f"{test.rmse:.4g}",
+                number(test.normalised, 4),
+                f"{judged.noise:.2g}",
+                per_cent(judged.missed),
+            ],
+        )
+        for test, measured, judged in zip(fit.tests, motions, judgement.loops, strict=True)
+    )
+    name = force_scale(motions[0].loop.rotates)[0]
+    caption = (
+        "Root mean square error (RMSE) of each test, absolute and relative to the largest measured "
+        f"{name}, as [A] Tables 2, 4, 5 and 7. The noise follows from the differences between "
+        "samples of nearly the same phase. The lack of fit is what the noise does not explain, "
+        f"relative to the root mean square of the measured {name}."
+    )
+    return Table(
+        caption,
+        (
+            "file",
+            "motion",
+            "samples",
+            f"RMSE, {unit}",
+            f"RMSE / largest {name}",
+            f"noise, {unit}",
+            "lack of fit",
+        ),
+        groups,
+        text_columns=2,
+    )
+
+
+def _warnings(fit: Fit, judgement: Judgement) -> list[str]:
+    # A rise of a monotone curve that is zero means a flat piece, which needs no warning.
+    flat = [e.name for e in fit.estimates if ".rise_" in e.name and e.at_bound == "lower"]
+    is_good = judgement.verdict == "good"
+    warnings = [*judgement.sentences[1 if is_good else 0 :]]
+    warnings += [
+        f"The value of {e.name} is at its {e.at_bound} bound."
+        for e in fit.estimates
+        if e.at_bound and e.name not in flat
+    ]
+    unknown = [e.name for e in fit.estimates if not e.determined]
+    if unknown:
+        warnings.append(f"The data do not determine {', '.join(unknown)}.")
+    return warnings
+
+
+def _summary(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) -> str:
+    name, unit = force_scale(motions[0].loop.rotates)
+    normalised = [test.normalised for test in fit.tests]
+    determined = sum(e.determined for e in fit.estimates)
+    least, most = (per_cent(value) for value in (min(normalised), max(normalised)))
+    opening = judgement.sentences[0] + " " if judgement.verdict == "good" else ""
+    if not fit.estimates:
+        ending = "All numbers were given; nothing was searched."
+    elif judgement.verdict == "poor":
+        ending = (
+            f"The data give a best value of {determined} of {len(fit.estimates)} unknowns, but the "
+            "law does not describe the loops."
+        )
+    else:
+        ending = f"The data determine {determined} of {len(fit.estimates)} unknowns."
+    return (
+        f"{opening}The root mean square difference (RMSE) between fitted and measured loops is "
+        f"{fit.rmse:.3g} {unit} over all samples. For single tests it is {least} to {most} of "
+        f"the largest {name}. {ending}"
+    )

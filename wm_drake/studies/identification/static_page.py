@@ -1,0 +1,164 @@
+"""Page and tables of quasi-static tests."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from wm_drake.report.figure import MEASURED, QUIET, Figure, Line, Mark, Panel, in_grid
+from wm_drake.report.page import picture
+from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.table import Group, Row, Table
+from wm_drake.rigs import AXES
+from wm_drake.studies.identification.static import NOMINAL, StaticCurve
+from wm_drake.studies.rig.figures import force_scale, loop_panel, motion_scale
+from wm_drake.studies.study import Facts
+
+MM_PER_M = 1e3
+
+
+METHOD = (
+    "Each test is split at its reversals into branches. The first 10 % of a branch, in which "
+    "friction turns round, do not count. The mean curve is half the sum of loading and unloading. "
+    "Near an end, where only the branch that arrives there counts, the half width next to it is "
+    "taken off. The mean curve is shifted to zero force at zero displacement, the rest position of "
+    "the component."
+)
+
+
+def static_page(title: str, curves: Sequence[StaticCurve], facts: Facts) -> str:
+    """Return the page as text of one self-contained HTML file. `title`: of the component."""
+    fallen = [
+        f"{_name(c)}: the mean of loading and unloading falls by up to {c.fallen:.3g} "
+        f"{force_scale(c.rotates)[1]}; a table cannot fall, so it stays level there."
+        for c in curves
+        if c.fallen > 0.02 * float(np.max(np.abs(c.elastic)))
+    ]
+    shown = picture(
+        static_figure(curves),
+        "Force over displacement and moment over angle of each axis.",
+        "Force over displacement and moment over angle (form of [B] Fig. 6): samples, loading and "
+        "unloading, and their mean, which is the table. The offset of the instrument is removed.",
+    )
+    return SectionedPage(
+        f"Quasi-static tests of {title}",
+        summary(curves),
+        [
+            Section("curves", "Force and hysteresis", (shown,)),
+            Section("measures", "Values", tables=(_measures(curves),)),
+        ],
+        [("Files", ", ".join(loop.path for c in curves for loop in c.loops)), *facts.rows()],
+        warnings=fallen,
+        about=f"{len(curves)} {'axis' if len(curves) == 1 else 'axes'}.",
+        method=METHOD,
+    ).html()
+
+
+def summary(curves: Sequence[StaticCurve]) -> str:
+    """Return stiffness and hysteresis of each axis as one paragraph."""
+    sentences = [
+        f"Axis {axis}: {stiffness} from {reach}, with a hysteresis of ±{friction}."
+        for axis, reach, stiffness, friction, *_ in static_cells(curves)
+    ]
+    table = "The force table is the mean of loading and unloading, without the instrument's offset."
+    return " ".join([*sentences, table])
+
+
+def static_figure(curves: Sequence[StaticCurve]) -> Figure:
+    """Draw samples, branches and table of each axis, translations above rotations."""
+    ordered = sorted(curves, key=lambda c: AXES.index(c.axis))
+    kinds = [[c for c in ordered if c.rotates == kind] for kind in (False, True)]
+    columns = max(2, *map(len, kinds))
+    panels: list[Panel | None] = []
+    for curves_of_kind in filter(None, kinds):
+        panels += map(_panel, curves_of_kind)
+        panels += [None] * (columns - len(curves_of_kind))
+    return Figure(panels=in_grid(panels, columns), height=220.0, widths=(1.0,) * columns)
+
+
+def _panel(curve: StaticCurve) -> Panel:
+    """Return samples, branches and table of an axis."""
+    factor, name, unit = motion_scale(curve.rotates)
+    marks: list[Mark] = []
+    faint = Line((), (), color=QUIET, opacity=0.6, key="samples")
+    marks += [
+        replace(faint, x=factor * loop.displacement, y=loop.force - curve.offset)
+        for loop in curve.loops
+    ]
+    x = factor * curve.position
+    for branch in (curve.loading, curve.unloading):
+        marks.append(Line(x, branch, color=MEASURED, width=1.8, key="loading and unloading"))
+    marks.append(Line(x, curve.elastic, width=2.4, key="mean (table)"))
+    return loop_panel(_name(curve), marks, f"{name}, {unit}", ", ".join(force_scale(curve.rotates)))
+
+
+def static_table(curves: Sequence[StaticCurve]) -> pd.DataFrame:
+    """Return the curves of each axis. [SI]"""
+    parts = [
+        pd.DataFrame(
+            {
+                "axis": c.axis,
+                "displacement_or_angle": c.position,
+                "loading": c.loading,
+                "unloading": c.unloading,
+                "mean": c.elastic,
+                "half_width_of_hysteresis": c.half_width,
+            }
+        )
+        for c in curves
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
+def static_header() -> tuple[str, ...]:
+    """Return the column heads for the cells of `static_cells`."""
+    return (
+        "axis",
+        "range",
+        "nominal stiffness",
+        "half width of hysteresis",
+        "energy per cycle, mJ",
+        "offset",
+        "median rate",
+        "tests",
+    )
+
+
+def static_cells(curves: Sequence[StaticCurve]) -> list[tuple[str, ...]]:
+    """Return the measures of each axis as text, with units."""
+    cells: list[tuple[str, ...]] = []
+    for c in sorted(curves, key=lambda c: AXES.index(c.axis)):
+        factor, _, unit = motion_scale(c.rotates)
+        force = force_scale(c.rotates)[1]
+        stiffness = (
+            f"{c.stiffness:.4g} N m/rad" if c.rotates else f"{c.stiffness / MM_PER_M:.4g} N/mm"
+        )
+        cells.append(
+            (
+                _name(c),
+                f"{factor * c.position[0]:.3g} to {factor * c.position[-1]:.3g} {unit}",
+                stiffness,
+                f"{c.friction:.3g} {force}",
+                f"{1e3 * c.energy:.3g}",
+                f"{c.offset:.3g} {force}",
+                f"{factor * c.fastest:.3g} {unit}/s",
+                str(len(c.loops)),
+            )
+        )
+    return cells
+
+
+def _measures(curves: Sequence[StaticCurve]) -> Table:
+    caption = (
+        f"Measures of each axis. Nominal stiffness: line through zero, fitted to the first "
+        f"{100 * NOMINAL:.0f} % of the mean curve, as in [B] section 4. Half width of hysteresis: "
+        "half the difference of loading and unloading, median over the range; a friction that does "
+        "not depend on the rate has this force. At the median rate a damping adds to it."
+    )
+    groups = tuple(Group(cells[0], (Row(cells[1:]),)) for cells in static_cells(curves))
+    return Table(caption, static_header(), groups, text_columns=8)
+
+
+def _name(curve: StaticCurve) -> str:
+    return curve.axis.replace("_", " ")

@@ -1,0 +1,137 @@
+"""`identify gasket --static`: force tables with hysteresis from quasi-static tests."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pandas as pd
+from rich.table import Table
+
+from wm_drake.errors import input_error
+from wm_drake.parameters import MeasuredLoop
+from wm_drake.studies.components import axes_of, target_of
+from wm_drake.studies.identification.fragment import Destination, table_entry, written_fragment
+from wm_drake.studies.identification.inputs import loops_of
+from wm_drake.studies.identification.options import AxisFitOptions
+from wm_drake.studies.identification.static import StaticCurve, static_curve
+from wm_drake.studies.inputs import pairs_of
+from wm_drake.studies.run import Executor
+from wm_drake.studies.study import Facts, Result, Task
+
+
+@dataclass(frozen=True)
+class StaticResult(Result):
+    """Curves of quasi-static tests.
+
+    Attributes:
+        title: Component, for headings.
+        curves: One for each tested axis, by all axes that get it.
+        knots: Points of a table on each side of zero.
+        destination: Where the tables go.
+    """
+
+    title: str
+    curves: dict[tuple[str, ...], StaticCurve]
+    knots: int
+    destination: Destination
+    float_format: ClassVar[str] = "%.7g"
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return the curves."""
+        from wm_drake.studies.identification.static_page import static_table
+
+        return {"static": static_table(list(self.curves.values()))}
+
+    def write(self, folder: Path) -> None:
+        """Write the tables for a machine, the curves, and their measures as JSON."""
+        super().write(folder)
+        entries = {
+            f"{curve.field[:-1]}{axis[-1]}": table_entry(curve.table(self.knots), _source(curve))
+            for axes, curve in self.curves.items()
+            for axis in axes
+        }
+        head = ["Tables from quasi-static tests: mean of loading and unloading."]
+        text = written_fragment(entries, head, self.destination)
+        (folder / "identified.yaml").write_text(text, encoding="utf-8")
+        text = json.dumps(self.as_json(), indent=1)
+        (folder / "static.json").write_text(text, encoding="utf-8")
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the measures of each axis for JSON, in SI."""
+        axes = [curve.as_dict() for curve in self.curves.values()]
+        return {"component": self.destination.target.component.name, "axes": axes}
+
+    def terminal(self) -> list[Table | str]:
+        """Return the measures of each axis."""
+        from wm_drake.studies.identification.static_page import static_cells, static_header
+
+        table = Table(title="Quasi-static tests")
+        for head in static_header():
+            table.add_column(head, no_wrap=head == "axis")
+        for cells in static_cells(list(self.curves.values())):
+            table.add_row(*cells)
+        return [table]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        from wm_drake.studies.identification.static_page import static_page
+
+        return static_page(self.title, list(self.curves.values()), facts)
+
+
+def _source(curve: StaticCurve) -> str:
+    names = ", ".join(loop.name for loop in curve.loops)
+    friction = f"{curve.friction:.3g} {'N m' if curve.rotates else 'N'}"
+    return f"quasi-static test {names}; half width of hysteresis {friction}"
+
+
+class StaticTask(Task):
+    """Quasi-static tests with checked options."""
+
+    def __init__(self, kind: str, options: AxisFitOptions) -> None:
+        """Find the component and read the tests of each axis.
+
+        Raises:
+            InputError: an option or a file is wrong.
+        """
+        self.options, self.target = options, target_of(kind, options)
+        name = self.target.component.name
+        self.title = kind if name == kind else f"{kind} {name}"
+        by_axis = _files_by_axis(options.files, options.axis)
+        self.tests = {axes: _loops(paths, options, axes[0]) for axes, paths in by_axis.items()}
+
+    def run(self, executor: Executor) -> StaticResult:
+        """Compute the curve of each axis."""
+        curves = {axes: static_curve(axes[0], loops) for axes, loops in self.tests.items()}
+        changes = dict(pairs_of(self.options.sets, "--set"))
+        destination = Destination(self.target, executor.out or Path(), changes)
+        return StaticResult(self.title, curves, self.options.knots, destination)
+
+
+def _files_by_axis(files: Sequence[Path], axis: str | None) -> dict[tuple[str, ...], list[Path]]:
+    """Return the files of each axis, of AXIS=FILE or all of one axis."""
+    by_axis: dict[tuple[str, ...], list[Path]] = {}
+    for path in files:
+        word, separator, name = str(path).partition("=")
+        if axis is not None:
+            word, name = axis, str(path)
+        elif not separator:
+            raise input_error(
+                f"'{path}' names no axis; write for example radial={path}, or --axis", where="FILES"
+            )
+        by_axis.setdefault(axes_of(word), []).append(Path(name))
+    used = [one for axes in by_axis for one in axes]
+    for one in used:
+        if used.count(one) > 1:
+            raise input_error(f"axis {one} is tested under two names", where="FILES")
+    return by_axis
+
+
+def _loops(paths: Sequence[Path], options: AxisFitOptions, axis: str) -> list[MeasuredLoop]:
+    loops = loops_of(paths, options)
+    if loops[0].rotates != axis.startswith("about"):
+        needs = "angles and moments" if axis.startswith("about") else "displacements and forces"
+        raise input_error(f"axis {axis} needs {needs}", where=loops[0].path)
+    return loops

@@ -1,0 +1,364 @@
+"""The commands `identify damper`, `bushing` and `gasket`: fits, their judgement and comparison."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from rich.table import Table
+
+from wm_drake.errors import input_error
+from wm_drake.parameters.units import Unit
+from wm_drake.rigs.measured import MeasuredMotion
+from wm_drake.studies.components import Target, axes_of, existing_files, mass_of, target_of
+from wm_drake.studies.fitting import Fit
+from wm_drake.studies.identification.comparison import (
+    Comparison,
+    SplitTests,
+    check_blind,
+    compare_laws,
+    fit_law,
+)
+from wm_drake.studies.identification.fragment import Destination, fragment, missing_numbers
+from wm_drake.studies.identification.inputs import given_by_law, kept_fields, motions_of
+from wm_drake.studies.identification.judgement import Judgement, judge
+from wm_drake.studies.identification.models import (
+    ComponentModel,
+    TestedAxis,
+    bushing_model,
+    damper_model,
+)
+from wm_drake.studies.identification.options import AxisFitOptions, DamperFitOptions, FitOptions
+from wm_drake.studies.inputs import pairs_of, quantities_of
+from wm_drake.studies.run import Executor
+from wm_drake.studies.study import Facts, Result, Task
+
+
+@dataclass(frozen=True)
+class FittedComponent:
+    """A component and how its numbers are written.
+
+    Attributes:
+        title: Component, for headings.
+        target: The component as it was.
+        changes: Other numbers of the machine that the user changed: text by key path.
+        copies: Fields of each law that get the value of another field.
+        out: Folder of the results, from which a file names the machine.
+    """
+
+    title: str
+    target: Target
+    changes: Mapping[str, str]
+    copies: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    out: Path = Path()
+
+    def write(self, path: Path, fit: Fit, model: ComponentModel, remarks: Sequence[str]) -> None:
+        """Write the identified numbers as a machine or component file, if they are complete."""
+        if self.missing(path.name, fit, model):
+            return
+        destination = Destination(self.target, self.out, self.changes)
+        text = fragment(fit, model, destination, self.copies.get(model.law), remarks)
+        path.write_text(text, encoding="utf-8")
+
+    def missing(self, name: str, fit: Fit, model: ComponentModel) -> list[str]:
+        """Return a sentence that names the numbers that a file lacks, so that it is not written."""
+        missing = missing_numbers(fit, model, self.target.component)
+        if not missing:
+            return []
+        return [
+            f"{name} is not written: the data do not determine {', '.join(missing)}, which the law "
+            f"{model.law} needs and {self.target.component.name} did not have; give a value with "
+            "--fix."
+        ]
+
+
+@dataclass(frozen=True)
+class FitResult(Result):
+    """Fit of one law.
+
+    Attributes:
+        component: The component.
+        model: Its model.
+        fit: The fit.
+        motions: The measured motions.
+    """
+
+    component: FittedComponent
+    model: ComponentModel
+    fit: Fit
+    motions: Sequence[MeasuredMotion]
+
+    @property
+    def title(self) -> str:
+        """Component and law, for headings."""
+        return f"{self.component.title}, law {self.model.law}"
+
+    @property
+    def judgement(self) -> Judgement:
+        """Judgement of the fit."""
+        return judge(self.fit, self.motions)
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return the values, the error of each test, and all samples."""
+        from wm_drake.studies.fitting.page import estimates_frame
+        from wm_drake.studies.identification.page import (
+            errors_table,
+            fitted_loops,
+            fixed_numbers,
+        )
+
+        return {
+            "parameters": estimates_frame(self.fit, fixed_numbers(self.model.fixed)),
+            "errors": errors_table(self.fit, self.motions, self.judgement),
+            "loops": fitted_loops(self.fit, self.motions),
+        }
+
+    def write(self, folder: Path) -> None:
+        """Write tables, identified numbers, and the fit as JSON."""
+        _write_tables(self.tables(), folder)
+        path = folder / "identified.yaml"
+        self.component.write(path, self.fit, self.model, self.judgement.sentences)
+        text = json.dumps(self._fit_as_dict(), indent=1)
+        (folder / "fit.json").write_text(text, encoding="utf-8")
+
+    def _fit_as_dict(self) -> dict[str, Any]:
+        from wm_drake.studies.identification.page import fixed_numbers
+
+        return {
+            **self.fit.as_dict(),
+            "fixed": {
+                name: {"value": value, "unit": unit.si}
+                for name, value, unit in fixed_numbers(self.model.fixed)
+            },
+            "judgement": self.judgement.as_dict(),
+        }
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the fit for JSON, in SI."""
+        return {"component": self.title, **self._fit_as_dict()}
+
+    def terminal(self) -> list[Table | str]:
+        """Return the judgement, the values, and remarks."""
+        from wm_drake.studies.fitting.page import (
+            ESTIMATE_HEADS,
+            estimate_cells,
+            undetermined_sentences,
+        )
+        from wm_drake.studies.identification.page import fixed_numbers, motion_sentences
+        from wm_drake.studies.rig.figures import force_scale
+
+        fit, unit = self.fit, force_scale(self.motions[0].loop.rotates)[1]
+        table = Table(title=f"{self.title}: RMSE {fit.rmse:.4g} {unit} by {fit.log.method}")
+        for head in ESTIMATE_HEADS:
+            table.add_column(head, no_wrap=head == "unknown")
+        for cells in estimate_cells(fit, fixed_numbers(self.model.fixed)):
+            table.add_row(*cells)
+        remarks = [*undetermined_sentences(fit), *fit.log.notes]
+        remarks += self.component.missing("identified.yaml", fit, self.model)
+        return [*self.judgement.sentences, *motion_sentences(self.motions), table, *remarks]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        from wm_drake.studies.identification.page import identify_page
+
+        return identify_page(self, facts)
+
+
+@dataclass(frozen=True)
+class ComparisonResult(Result):
+    """Several laws that were fitted to the same tests.
+
+    Attributes:
+        component: The component.
+        comparison: The laws.
+    """
+
+    component: FittedComponent
+    comparison: Comparison
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return measures, values and errors of the laws, and all samples."""
+        from wm_drake.studies.identification.comparison_page import (
+            errors_by_law,
+            laws_table,
+            loops_by_law,
+            parameters_by_law,
+        )
+
+        return {
+            "laws": laws_table(self.comparison),
+            "parameters": parameters_by_law(self.comparison),
+            "errors": errors_by_law(self.comparison),
+            "loops": loops_by_law(self.comparison),
+        }
+
+    def write(self, folder: Path) -> None:
+        """Write tables, the identified numbers of each law, and the comparison as JSON."""
+        _write_tables(self.tables(), folder)
+        for law in self.comparison.results:
+            path = folder / f"identified_{law.law}.yaml"
+            self.component.write(path, law.fit, law.model, law.judgement.sentences)
+        text = json.dumps(self.comparison.as_dict(), indent=1)
+        (folder / "fit.json").write_text(text, encoding="utf-8")
+
+    @property
+    def missing(self) -> list[str]:
+        """Sentences on files that are not written."""
+        return [
+            sentence
+            for law in self.comparison.results
+            for sentence in self.component.missing(f"identified_{law.law}.yaml", law.fit, law.model)
+        ]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the comparison for JSON, in SI."""
+        return {"component": self.component.title, **self.comparison.as_dict()}
+
+    def terminal(self) -> list[Table | str]:
+        """Return what the data say about the laws, their measures, and remarks."""
+        from wm_drake.studies.identification.comparison_page import (
+            bounds_sentences,
+            law_cells,
+            law_header,
+        )
+        from wm_drake.studies.identification.page import motion_sentences
+
+        comparison = self.comparison
+        table = Table(title=self.component.title)
+        for head in law_header(comparison):
+            table.add_column(head, no_wrap=head == "law")
+        for cells in law_cells(comparison):
+            table.add_row(*cells)
+        motions = (*comparison.motions, *comparison.validation)
+        sentences = (*comparison.sentences, *motion_sentences(motions))
+        return [*sentences, table, *bounds_sentences(comparison), *self.missing]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        from wm_drake.studies.identification.comparison_page import comparison_page
+
+        return comparison_page(self, facts)
+
+
+def _write_tables(tables: Mapping[str, pd.DataFrame], folder: Path) -> None:
+    """Write tables as CSV: samples with seven digits, others with all."""
+    for name, table in tables.items():
+        digits = "%.7g" if name == "loops" else None
+        table.to_csv(folder / f"{name}.csv", index=False, float_format=digits)
+
+
+class FitTask(Task):
+    """Fit of one law to measured loops, or of several with a comparison."""
+
+    options: FitOptions
+    component: FittedComponent
+    models: Mapping[str, ComponentModel]
+    motions: list[MeasuredMotion]
+    validation: list[MeasuredMotion]
+
+    def _read_validation(self, driven_mass: float = 0.0) -> None:
+        options, self.validation = self.options, []
+        if options.validation:
+            check_blind(options.files, existing_files(options.validation))
+            self.validation = motions_of(
+                options.validation,
+                options,
+                rotates=self.motions[0].loop.rotates,
+                driven_mass=driven_mass,
+            )
+
+    def run(self, executor: Executor) -> Result:
+        """Fit one law, or compare several."""
+        names, options = list(self.models), self.options
+        component = replace(self.component, out=executor.out or Path())
+        if len(names) == 1 and not self.validation:
+            (model,) = self.models.values()
+            with executor.fraction("identify") as bar:
+                fit = fit_law(
+                    model,
+                    self.motions,
+                    options.method,
+                    seed=options.seed,
+                    progress=lambda fraction, least: bar(fraction),
+                )
+            return FitResult(component, model, fit, self.motions)
+        with executor.fractions(names) as bars:
+            comparison = compare_laws(
+                self.models,
+                SplitTests(tuple(self.motions), tuple(self.validation)),
+                options.method,
+                seed=options.seed,
+                progress=lambda law, fraction: bars(names.index(law), fraction),
+            )
+        return ComparisonResult(component, comparison)
+
+
+class DamperFitTask(FitTask):
+    """Fit of a friction damper."""
+
+    def __init__(self, options: DamperFitOptions) -> None:
+        """Find the damper and read its loops.
+
+        Raises:
+            InputError: an option or a file is wrong.
+        """
+        self.options = options
+        target = target_of("damper", options)
+        law = str(getattr(target.component.parameters, "law"))  # noqa: B009
+        sponge = mass_of(options.sponge_mass, "--sponge-mass")
+        driven = mass_of(options.outer_mass, "--outer-mass")
+        driven += mass_of(options.jig_mass, "--jig-mass")
+        given = given_by_law(options.law or law, "", options)
+        self.motions = motions_of(options.files, options, rotates=False, driven_mass=driven)
+        self.models = {
+            one: damper_model(one, self.motions, numbers, kept_fields(target, one, numbers), sponge)
+            for one, numbers in given.items()
+        }
+        parts = [f"damper {target.component.name}"]
+        parts += [f"sponge of {1e3 * sponge:g} g"] if sponge else []
+        parts += [f"less the inertia of {driven:g} kg at the driven end"] if driven else []
+        changes = dict(pairs_of(options.sets, "--set"))
+        self.component = FittedComponent(", ".join(parts), target, changes)
+        self._read_validation(driven)
+
+
+class AxisFitTask(FitTask):
+    """Fit of one axis of a bushing or of the gasket."""
+
+    def __init__(self, kind: str, options: AxisFitOptions) -> None:
+        """Find the component and read its loops.
+
+        Raises:
+            InputError: an option or a file is wrong.
+        """
+        self.options = options
+        target = target_of(kind, options)
+        if options.axis is None:
+            raise input_error("is needed, for example --axis radial", where="--axis")
+        axes = axes_of(options.axis)
+        arm = quantities_of(options.arm, Unit("m", "mm"), "--arm")[0] if options.arm else 0.0
+        given = given_by_law(options.law, axes[0], options)
+        rotates = axes[0].startswith("about") and not arm
+        self.motions = motions_of(options.files, options, rotates=rotates)
+        base: Any = target.component.parameters
+        tested = TestedAxis(base, axes[0], arm)
+        self.models = {
+            law: bushing_model(law, self.motions, tested, numbers) for law, numbers in given.items()
+        }
+        self.component = FittedComponent(
+            f"{target.component.name}, {options.axis.replace('_', ' ')}",
+            target,
+            dict(pairs_of(options.sets, "--set")),
+            {law: _copies(model, axes) for law, model in self.models.items()},
+        )
+        self._read_validation()
+
+
+def _copies(model: ComponentModel, axes: tuple[str, ...]) -> dict[str, str]:
+    """Return the fields of a bushing's other axes, and the field that each is copied from."""
+    ours, others = axes[0][-1], [other[-1] for other in axes[1:]]
+    names = [*(unknown.name for unknown in model.unknowns), *model.fixed]
+    fields = list(dict.fromkeys(name.split(".")[0] for name in names))
+    return {f"{name[: -len(ours)]}{other}": name for name in fields for other in others}

@@ -1,0 +1,288 @@
+"""Input of studies and commands: machines with changed numbers, cases, files, built machines."""
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wm_drake.errors import InputError, Problem, input_error, nearest_names
+
+DRIVES = ("prescribed", "motor")
+"""Drives of the option `--drive`."""
+
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    from wm_drake.model.machine import Machine
+    from wm_drake.parameters import MachineParameters, SpinProfile
+    from wm_drake.parameters.keys import Tree
+    from wm_drake.parameters.units import Unit
+    from wm_drake.simulation.cases import Case
+
+
+@contextmanager
+def located_in(file: str) -> Iterator[None]:
+    """Add file and line of a machine file to the problems that the block raises."""
+    from wm_drake.parameters import located, machine_path
+
+    try:
+        yield
+    except InputError as error:
+        raise located(error, machine_path(file)) from None
+
+
+@contextmanager
+def problems_of_file(path: Path) -> Iterator[None]:
+    """Add the path of a file to the problems that the block raises."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(
+            Problem(": ".join(filter(None, [str(path), p.where])), p.key, p.message)
+            for p in error.problems
+        ) from None
+
+
+@contextmanager
+def problems_of_option(option: str) -> Iterator[None]:
+    """Name an option, and no key, in the problems that the block raises."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(Problem(option, "", p.message) for p in error.problems) from None
+
+
+def profile_of(parameters: "MachineParameters", path: Path | None) -> "SpinProfile":
+    """Return the spin profile of the option `--profile`; that of the machine without it."""
+    from wm_drake.parameters import load_profile
+
+    return parameters.profile if path is None else load_profile(existing_file(path, "--profile"))
+
+
+def load_parameters(
+    file: str,
+    sets: Sequence[str] | None,
+    change: "Callable[[MachineParameters], MachineParameters]" = lambda machine: machine,
+) -> "MachineParameters":
+    """Return the machine of a file or a shipped name, changed by the `--set` options.
+
+    Args:
+        file: Name or path.
+        sets: Changes of numbers.
+        change: Change of the machine before them.
+    """
+    from wm_drake.parameters import load_machine
+
+    parameters = change(load_machine(file))
+    changed, sources = with_sets(parameters, parameters.sources, sets)
+    return changed.model_copy(update={"sources": sources})
+
+
+def with_sets(
+    parameters: "Tree", sources: Mapping[str, str], sets: Sequence[str] | None
+) -> "tuple[Tree, dict[str, str]]":
+    """Return parameters and the sources of their numbers, changed by the `--set` options.
+
+    All changes are applied before the result is checked, so their order does not matter: two
+    numbers may need each other. Of two values of one key the last one counts.
+    """
+    from wm_drake.parameters import with_values
+
+    changes: dict[str, str | None] = {}
+    for key, text in pairs_of(sets, "--set"):
+        changes.pop(key, None)
+        changes[key] = None if text in ("null", "~") else text
+    if not changes:
+        return parameters, dict(sources)
+    try:
+        changed = with_values(parameters, changes)
+    except InputError as error:
+        raise InputError(Problem("--set", p.key, p.message) for p in error.problems) from None
+    return changed, {**sources, **dict.fromkeys(changes, "set on the command line")}
+
+
+def pairs_of(entries: Sequence[str] | None, option: str) -> list[tuple[str, str]]:
+    """Return the keys and values of a repeatable option KEY=VALUE."""
+    pairs = []
+    for entry in entries or []:
+        key, separator, text = entry.partition("=")
+        if not separator:
+            raise input_error(f"'{entry}' does not have the form KEY=VALUE", where=option)
+        pairs.append((key.strip(), text.strip()))
+    return pairs
+
+
+def machine_warnings(parameters: "MachineParameters") -> list[str]:
+    """Return warnings of what a machine has and runs of its loads do not use."""
+    from wm_drake.simulation.cases import UNUSED_PHASE_ERROR
+
+    return [UNUSED_PHASE_ERROR] if parameters.imperfections.phase_error else []
+
+
+def selected_cases(
+    parameters: "MachineParameters", loads: Sequence[str] | None, gasket: bool, profile: Path | None
+) -> "list[Case]":
+    """Return the cases that `--load`, `--no-gasket` and `--profile` select."""
+    from wm_drake.parameters import load_load
+    from wm_drake.parameters.text_files import is_file
+    from wm_drake.simulation.cases import Case
+
+    spin_profile = profile_of(parameters, profile)
+    cases = []
+    for name in loads or list(parameters.loads):
+        if name in parameters.loads:
+            cases.append(Case(name, parameters.loads[name], spin_profile, gasket))
+        elif is_file(Path(name)):
+            cases.append(Case(Path(name).stem, load_load(Path(name)), spin_profile, gasket))
+        else:
+            hint = nearest_names(name, parameters.loads)
+            raise input_error(
+                f"'{name}' is neither a load of machine '{parameters.name}' nor a file{hint}",
+                where="--load",
+            )
+    names = [case.name for case in cases]
+    for name in names:
+        if names.count(name) > 1:
+            raise input_error(
+                f"'{name}' is given twice, but file record_{name}.nc can hold only one run",
+                where="--load",
+            )
+    return cases
+
+
+def with_measured(
+    parameters: "MachineParameters", files: Sequence[Path] | None, option: str
+) -> "MachineParameters":
+    """Return the machine with other files of measured amplitudes, if any are given."""
+    if not files:
+        return parameters
+    paths = tuple(str(existing_file(path, option).resolve()) for path in files)
+    return parameters.model_copy(update={"measured": paths})
+
+
+def existing_file(path: Path, option: str) -> Path:
+    """Return the path if it is a file; otherwise raise an InputError for the option."""
+    from wm_drake.parameters.text_files import is_file
+
+    if not is_file(path):
+        raise input_error(f"no such file '{path}'", where=option)
+    return path
+
+
+def check_buildable(file: str, parameters: "MachineParameters") -> "tuple[Problem, ...]":
+    """Raise an InputError for faults that only building the machine reveals.
+
+    Returns:
+        Values of the machine that are legal but unusual, with file and line.
+    """
+    return _built(file, parameters)[1]
+
+
+def build_checked(file: str, parameters: "MachineParameters") -> "Machine":
+    """Return the built machine, after the checks of `check_buildable`."""
+    return _built(file, parameters)[0]
+
+
+def _built(file: str, parameters: "MachineParameters") -> "tuple[Machine, tuple[Problem, ...]]":
+    from wm_drake.engines.compiled.packing import pack
+    from wm_drake.engines.compiled.stepping import choose_stepping
+    from wm_drake.model.build import build_machine
+    from wm_drake.model.expectations import unexpected
+    from wm_drake.model.plausibility import unusual_values
+    from wm_drake.model.scene import Scene
+    from wm_drake.parameters import located, machine_path, measured_amplitudes, published_results
+    from wm_drake.parameters.files import check_tables
+    from wm_drake.simulation.runs import checked_step
+
+    with located_in(file):
+        check_tables(parameters)
+        measured_amplitudes(parameters)
+        published_results(parameters.published)
+        step = checked_step(parameters, None)
+        machine = build_machine(parameters)
+        setup = machine.set_up()
+        choose_stepping(setup, *pack(setup), parameters.profile, step, parameters.integrator)
+        scene = Scene(parameters)
+    unusual = [*unusual_values(setup), *unexpected(setup, scene)]
+    problems = located(InputError(unusual), machine_path(file)).problems if unusual else ()
+    return machine, problems
+
+
+def with_drive(parameters: "MachineParameters", drive: str | None) -> "MachineParameters":
+    """Return a machine with the drive of the option `--drive`, with the sources of its numbers.
+
+    Raises:
+        InputError: there is no such drive.
+    """
+    from wm_drake.parameters import Drive, load_machine, with_value
+    from wm_drake.parameters.drive import motor_of
+
+    if drive is None or drive == parameters.drive.kind:
+        return parameters
+    if drive not in DRIVES:
+        raise input_error(f"no drive '{drive}'{nearest_names(drive, DRIVES)}", where="--drive")
+    joint, others = parameters.drive.joint, dict(parameters.sources)
+    if drive == "prescribed":
+        return with_value(parameters, "drive", Drive(joint=joint))
+    shipped = load_machine("motor")
+    motor = motor_of(shipped.drive)
+    assert motor  # that is what this machine is for
+    sources = {key: text for key, text in shipped.sources.items() if key.startswith("drive")}
+    changed = with_value(parameters, "drive", motor.model_copy(update={"joint": joint}))
+    return changed.model_copy(update={"sources": others | sources})
+
+
+def quantities_of(text: str, unit: "Unit", option: str) -> tuple[float, ...]:
+    """Return numbers with one unit, ``(1, 3, 5) mm`` or ``1,3,5 mm``, in SI."""
+    from wm_drake.parameters.units import convert, plain_number
+
+    body = text.strip()
+    if not body.startswith("("):
+        size = len(_digits(body))
+        body = f"({body[:size]}) {body[size:]}"
+    numbers, _, written = body[1:].partition(")")
+    try:
+        values = [plain_number(part) for part in numbers.split(",")]
+    except ValueError:
+        raise input_error(
+            f"'{text}' is not a number with a unit; write for example '1 {unit.shown}'",
+            where=option,
+        ) from None
+    try:
+        return tuple(convert(value, written.strip() or None, unit) for value in values)
+    except ValueError as error:
+        raise input_error(f"'{text}': {error}", where=option) from None
+
+
+def _digits(text: str) -> str:
+    """Return the leading numbers of a text, with the commas between them."""
+    match = re.match(
+        r"[\s,]*(?:[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[\s,]*)*", text.strip()
+    )
+    return match[0] if match else ""
+
+
+LOOP_WORDS = ("time", "displacement", "angle", "force", "moment")
+"""Words of a force loop, for `channels_of`."""
+
+
+def channels_of(text: str | None, words: tuple[str, ...] = ()) -> dict[str, str]:
+    """Return the names of the channels of the option `--channels`, by word.
+
+    Args:
+        text: The option.
+        words: Allowed words; any word if empty.
+
+    Raises:
+        InputError: a part is not WORD=NAME, a word is not allowed or there twice.
+    """
+    channels: dict[str, str] = {}
+    for part in text.split(",") if text else []:
+        word, separator, name = (piece.strip() for piece in part.partition("="))
+        if not (separator and name and word):
+            raise input_error(f"'{part.strip()}' is not WORD=NAME", where="--channels")
+        if words and word not in words:
+            raise input_error(f"no word '{word}'{nearest_names(word, words)}", where="--channels")
+        if word in channels:
+            raise input_error(f"'{word}' is there twice", where="--channels")
+        channels[word] = name
+    return channels

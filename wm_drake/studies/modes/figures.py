@@ -1,0 +1,287 @@
+"""Figures of the modes of a machine."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from wm_drake.model.scene import Outline
+from wm_drake.parameters.types import FloatArray
+from wm_drake.report.figure import (
+    COLOURS,
+    MARK,
+    MEASURED,
+    OURS,
+    QUIET,
+    Axis,
+    Bars,
+    Figure,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Rule,
+    Scale,
+    Text,
+    in_grid,
+    named,
+)
+from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
+from wm_drake.simulation.outputs import point_positions
+from wm_drake.studies.modes.sensitivity import Sensitivity
+from wm_drake.studies.modes.shapes import Mode
+from wm_drake.studies.modes.study import ORDERS, SLIDING, STUCK, MachineModes
+
+VIEWS = (("front", 0, 2), ("side", 1, 2), ("top", 0, 1))
+"""Views of the tub, with the coordinate across and the one upwards."""
+
+SHOWN_MOTION = 0.18
+"""Largest displacement of a drawn mode shape, as part of the tub's radius."""
+
+SHOWN_NUMBERS = 8
+"""Number of bars of a panel."""
+
+TITLES = {SLIDING: "friction slides", STUCK: "friction sticks"}
+
+ELEMENT_COLOURS = (
+    "#1f77b4", "#aec7e8",
+    "#ff7f0e", "#ffbb78",
+    "#2ca02c", "#98df8a",
+    "#d62728", "#ff9896",
+    "#9467bd", "#c5b0d5",
+    "#8c564b", "#c49c94",
+    "#e377c2", "#f7b6d2",
+    "#7f7f7f", "#c7c7c7",
+    "#bcbd22", "#dbdb8d",
+    "#17becf", "#9edae5",
+)  # fmt: skip
+"""Colours of elements: ten hues, each dark and light."""
+
+
+def campbell_figure(result: MachineModes) -> Figure:
+    """Return the Campbell diagrams: natural frequencies over the speed, coloured by damping."""
+    ratios = np.concatenate([d.damping_ratio.ravel() for d in result.diagrams.values()])
+    scale = Scale(low=0.0, high=max(0.05, float(np.nanmax(ratios))), shades="-viridis")
+    top = 1.08 * max(float(np.nanmax(d.frequency_hz)) for d in result.diagrams.values())
+    panels = [_campbell(result, name, scale, top) for name in (SLIDING, STUCK)]
+    panels[-1] = replace(
+        panels[-1], marks=tuple(_with_bar(mark, scale) for mark in panels[-1].marks)
+    )
+    return Figure(panels=in_grid(panels, 2, share="y"), height=430.0)
+
+
+def _with_bar(mark: Mark, scale: Scale) -> Mark:
+    """Return a mark whose colours are explained by a colour bar beside the panel."""
+    if not isinstance(mark, Points) or mark.scale is None:
+        return mark
+    return replace(mark, scale=replace(scale, label="damping ratio"))
+
+
+def _campbell(result: MachineModes, name: str, scale: Scale, top: float) -> Panel:
+    """Return the diagram of one linearisation.
+
+    Args:
+        result: The modes.
+        name: Linearisation.
+        scale: Colours of the damping ratios.
+        top: Highest frequency. [Hz]
+    """
+    diagram = result.diagrams[name]
+    rpm = RPM_PER_RAD_S * diagram.speed
+    last = float(rpm[-1])
+    marks: list[Mark] = []
+    for mode, column in enumerate(diagram.frequency_hz.T):
+        marks.append(Line(rpm, column, color=QUIET, width=1.1))
+        mode_name = result.modes[name][mode].name
+        points = Points(rpm, column, values=diagram.damping_ratio[:, mode], name=mode_name)
+        marks.append(replace(points, scale=scale, size=5.0))
+    for order in ORDERS:
+        key = "order of the drum speed"
+        marks.append(Line(rpm, order * rpm / 60.0, color=MARK, dash="dashed", key=key))
+        at = min(0.93 * last, 0.93 * top * 60.0 / order)
+        text = Text(at, order * at / 60.0, f"{order:g}×", is_bold=True, across="right")
+        marks.append(replace(text, up="bottom", shift=(-5.0, 6.0)))
+    marks += _critical_marks(result, name)
+    if result.run_up is not None:
+        speeds = RPM_PER_RAD_S * result.run_up.critical_speed.values.ravel()
+        speeds = np.unique(np.round(speeds[np.isfinite(speeds)]))
+        key = "largest amplitude of a sensor in a run-up"
+        marks.append(Points(speeds, speeds / 60.0, symbol="triangle-down", opacity=0.75, key=key))
+    marks += _mode_names(result, name, last, top)
+    x = Axis(label="drum speed, rpm", range=(0.0, 1.16 * last))
+    y = Axis(label="natural frequency, Hz", range=(0.0, top))
+    return Panel(title=TITLES[name], marks=tuple(marks), x=x, y=y)
+
+
+def _critical_marks(result: MachineModes, name: str) -> list[Mark]:
+    critical = result.critical[name]
+    if not critical:
+        return []
+    rpm = np.array([RPM_PER_RAD_S * one.speed for one in critical])
+    hertz = np.array([one.order for one in critical]) * rpm / 60.0
+    key = "critical speed"
+    marks: list[Mark] = [Points(rpm, hertz, color=MEASURED, is_open=True, size=10.0, key=key)]
+    for one, x, y in zip(critical, rpm, hertz, strict=True):
+        if one.order == 1.0:
+            text = Text(float(x), float(y), number(x, 0), color=MEASURED, size=11.0)
+            marks.append(replace(text, across="left", up="top", shift=(6.0, -4.0)))
+    return marks
+
+
+def _mode_names(result: MachineModes, name: str, last_rpm: float, top: float) -> list[Mark]:
+    """Return the names of the modes at the right end, apart from each other."""
+    ends = result.diagrams[name].frequency_hz[-1]
+    order = np.argsort(ends)
+    places = ends[order].copy()
+    for index in range(1, len(places)):
+        places[index] = max(places[index], places[index - 1] + 0.042 * top)
+    return [
+        Text(1.015 * last_rpm, place, result.modes[name][mode].name, size=12.0, across="left")
+        for place, mode in zip(places, order, strict=True)
+    ]
+
+
+def amplitude_figure(result: MachineModes) -> Figure:
+    """Return frequency and damping ratio of each mode over its amplitude."""
+    panels = []
+    for label, quantity in (("frequency, Hz", "frequency_hz"), ("damping ratio", "damping_ratio")):
+        marks: list[Mark] = [
+            Line(MM_PER_M * mode.amplitude, getattr(mode, quantity), color=color, key=mode.name)
+            for color, mode in zip(COLOURS, result.over_amplitude, strict=False)
+        ]
+        marks.append(Rule(MM_PER_M * result.amplitude, "y", color=MARK, dash="dotted"))
+        x, y = Axis(label="amplitude, mm", is_log=True), Axis(label=label, range=(0.0, None))
+        panels.append(Panel(name=label.split(",")[0], marks=tuple(marks), x=x, y=y))
+    return Figure(panels=in_grid(panels, 2), height=310.0)
+
+
+def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> Figure:
+    """Return the tub in each mode, in three views: at rest, and at both ends of the motion."""
+    lines = tub_lines(outlines)
+    reach = max(float(np.abs(line).max()) for line in lines)
+    ends = [_ends_of_motion(mode, lines, reach) for mode in modes]
+    panels = []
+    for row, (view, across, up) in enumerate(VIEWS):
+        for column, (mode, poses) in enumerate(zip(modes, ends, strict=True)):
+            marks = [
+                Line(pose[:, across], pose[:, up], color=color)
+                for pose, color in zip(poses, (QUIET, OURS, MEASURED), strict=True)
+            ]
+            label = "" if column else f"{view}: {'xyz'[up]} over {'xyz'[across]}"
+            panel = replace(view_panel(tuple(marks), reach), y=view_axis(reach, label))
+            if not row:
+                hertz, ratio = number(mode.frequency_hz, 2), number(mode.damping_ratio, 3)
+                panel = replace(panel, title=mode.name, subtitle=f"{hertz} Hz\nζ {ratio}")
+            panels.append(panel)
+    return Figure(panels=in_grid(panels, len(modes)), height=900.0 / len(modes))
+
+
+def view_axis(reach: float, label: str = "") -> Axis:
+    """Return an axis of a view of the tub, without ticks. `reach`: largest coordinate. [m]"""
+    return Axis(label=label, range=(-1.35 * reach, 1.35 * reach), ticks=(), has_grid=False)
+
+
+def view_panel(marks: tuple[Mark, ...], reach: float) -> Panel:
+    """Return a view of the tub."""
+    return Panel(marks=marks, x=view_axis(reach), y=view_axis(reach), is_square=True)
+
+
+def tub_lines(outlines: Mapping[str, Outline]) -> list[FloatArray]:
+    """Return lines (n, 3) in T that show the tub: circles and generators of its largest cylinder.
+
+    Without a cylinder among the shapes they are those of one of 0.5 m diameter and 0.35 m length.
+    """
+    rounds = [outline for outline in outlines.values() if outline.is_round]
+    largest = max(rounds, key=lambda outline: float(np.prod(outline.half)), default=None)
+    if largest is None:
+        axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
+        largest = Outline(np.zeros(3), axes, np.array([0.25, 0.25, 0.175]), is_round=True)
+    angle = np.linspace(0.0, 2.0 * np.pi, 49)
+    circle = np.column_stack([np.cos(angle), np.sin(angle), np.ones_like(angle)])
+    ends = [circle * [1.0, 1.0, side] for side in (-1.0, 1.0)]
+    sides = [np.stack([ends[0][k], ends[1][k]]) for k in range(0, 48, 6)]
+    return [largest.centre + (line * largest.half) @ largest.axes for line in (*ends, *sides)]
+
+
+def joined(points: FloatArray, lines: list[FloatArray]) -> FloatArray:
+    """Return points of lines as one line with gaps, which is drawn faster than many lines.
+
+    Args:
+        points: Points of all lines, one line after the other. (n, k)
+        lines: Lines, for the number of points of each.
+    """
+    ends = np.cumsum([len(line) for line in lines])[:-1]
+    return np.insert(points, ends, np.nan, axis=0)
+
+
+def _ends_of_motion(mode: Mode, lines: list[FloatArray], reach: float) -> list[FloatArray]:
+    """Return the lines at rest and at both ends of the motion, enlarged to be seen."""
+    points = np.concatenate(lines)
+    poses = np.outer([1e-3, 0.0], mode.real_shape)
+    moved = point_positions(poses, points)
+    largest = float(np.abs(moved[0] - moved[1]).max())
+    scale = 1e-3 * SHOWN_MOTION * reach / largest
+    poses = np.outer([0.0, scale, -scale], mode.real_shape)
+    return [joined(pose, lines) for pose in point_positions(poses, points)]
+
+
+def energy_figure(result: MachineModes) -> Figure:
+    """Return which elements store the strain energy of each mode, and which dissipate energy."""
+    elements = [name.replace("_", " ") for name in result.elements]
+    panels = []
+    for name in (SLIDING, STUCK):
+        modes = result.modes[name]
+        y = Axis(ticks=named(mode.name for mode in modes), has_grid=False)
+        y = replace(y, range=(len(modes) - 0.5, -0.5))
+        for kind, words in (("strain_energy", "strain energy"), ("dissipation", "dissipation")):
+            left, marks = np.zeros(len(modes)), []
+            for index, element in enumerate(elements):
+                share = 100.0 * np.array([max(getattr(m, kind)[index], 0.0) for m in modes])
+                bars = Bars(range(len(modes)), share, base=left, is_across=True, key=element)
+                marks.append(replace(bars, color=ELEMENT_COLOURS[index % len(ELEMENT_COLOURS)]))
+                left = left + share
+            title = f"{words}, {TITLES[name]}, %"
+            panels.append(Panel(title=title, marks=tuple(marks), x=Axis(range=(0, 102)), y=y))
+    placed = in_grid(panels, 2, share="y")
+    return Figure(panels=placed, height=30.0 * len(result.modes[SLIDING]) + 30.0)
+
+
+def sensitivity_figure(result: MachineModes, name: str, quantity: str) -> Figure:
+    """Return the numbers that move each mode most, as sorted bars.
+
+    Args:
+        result: The modes.
+        name: Linearisation.
+        quantity: frequency or damping.
+    """
+    modes = result.modes[name]
+    relative = [entry for entry in result.sensitivities[name] if not entry.per_unit]
+    factor = 1.0 if quantity == "frequency" else 10.0
+    panels = []
+    for index, mode in enumerate(modes):
+        chosen = strongest(relative, quantity, index)
+        values = [factor * float(getattr(entry, quantity)[index]) for entry in chosen]
+        colors = tuple(OURS if value >= 0.0 else MEASURED for value in values)
+        bars = Bars(range(len(chosen)), values, colors=colors, is_across=True)
+        names = named(_short(entry.key) for entry in chosen)
+        y = Axis(ticks=names, range=(len(chosen) - 0.5, -0.5), has_grid=False, size=11.0)
+        marks = (bars, Rule(0.0, "y", color=MARK))
+        panels.append(Panel(title=mode.name, marks=marks, y=y))
+    text = (
+        "change of the frequency in % for 1 % more"
+        if quantity == "frequency"
+        else "change of the damping ratio in 0.001 for 1 % more"
+    )
+    return Figure(panels=in_grid(panels, 2), height=150.0, x_label=text)
+
+
+def strongest(entries: list[Sensitivity], quantity: str, mode: int) -> list[Sensitivity]:
+    """Return the numbers that a mode depends on most, strongest first."""
+    ranked = sorted(entries, key=lambda entry: -abs(float(getattr(entry, quantity)[mode])))
+    return ranked[:SHOWN_NUMBERS]
+
+
+def _short(key: str) -> str:
+    """Return a key path that fits beside a bar: without the group that its name follows."""
+    parts = key.split(".")
+    return ".".join(parts[1:] if parts[0].endswith("_types") else parts)

@@ -1,0 +1,246 @@
+"""What the design study shows: files, JSON, terminal, and a page on which designs are picked."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wm_drake.parameters import machine_yaml
+from wm_drake.report.formatting import MISSING, MM_PER_M, plain, significant, with_interval
+from wm_drake.report.page import Picture, as_json, picture, render
+from wm_drake.report.table import Table, Value, line
+from wm_drake.studies.pareto import tables
+from wm_drake.studies.pareto.envelopes import Envelopes
+from wm_drake.studies.pareto.figures import (
+    DESIGNS,
+    PICKED,
+    envelopes_figure,
+    first_picked,
+    front_figure,
+    history_figure,
+    pairs_of,
+)
+from wm_drake.studies.pareto.robust import FRESH, Promise
+from wm_drake.studies.pareto.study import COMPROMISE, ParetoFront
+from wm_drake.studies.study import Facts, Result
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from rich import table as terminal
+
+
+@dataclass(frozen=True)
+class DesignResult(Result):
+    """Result of the study.
+
+    Attributes:
+        front: Pareto front.
+        promises: Check of a robust front on fresh samples; empty for a nominal one.
+        envelopes: Envelopes of the designs of the front; None without a front.
+        about: Description in the design file.
+    """
+
+    front: ParetoFront
+    promises: list[Promise]
+    envelopes: Envelopes | None
+    about: str
+
+    float_format = None
+
+    def tables(self) -> "dict[str, pd.DataFrame]":
+        """Return front, history and, of a robust front, the check on fresh samples."""
+        frames = {
+            "front": tables.front_table(self.front),
+            "history": tables.history_table(self.front),
+        }
+        return frames | ({"robust": tables.promises_table(self.promises)} if self.promises else {})
+
+    def write(self, folder: Path) -> None:
+        """Write the tables, and the machine files of chosen designs."""
+        super().write(folder)
+        for name, number in self.front.chosen.items():
+            machine = self.front.machine(number)
+            about = f"Design '{name}' of a design study of machine {machine.name}"
+            copy = machine.model_copy(update={"about": about, "measured": ()})
+            path = folder / tables.machine_file_name(name)
+            path.write_text(machine_yaml(copy), encoding="utf-8")
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the result for JSON."""
+        front = self.front
+        goals = zip(front.designs.objectives, front.nominal_objectives, strict=True)
+        shown = {
+            "robust": tables.promises_table(self.promises).to_dict("records"),
+            "evaluations": front.search.evaluations,
+            "front": tables.designs_as_json(front),
+            "hypervolume": front.search.hypervolume,
+            "chosen": {name: number + 1 for name, number in front.chosen.items()},
+            "nominal": {goal.key: value for goal, value in goals},
+        }
+        return plain(shown)
+
+    def terminal(self) -> "Iterable[terminal.Table | str]":
+        """Yield the chosen designs, if there are any, and a summary."""
+        if self.front.chosen:
+            yield _chosen(self.front).terminal("Chosen designs of the front")
+        yield summary(self.front, self.promises)
+
+    def page(self, facts: Facts) -> str:
+        """Return the page: front with designs to pick, search, chosen designs."""
+        front, shown, search = self.front, self.envelopes, self.front.search
+        designs, has_front = front.designs, bool(len(front.objectives))
+        evaluated = f"{search.evaluations}, each {designs.scenarios} runs, {facts.wall_s:.0f} s"
+        made = [
+            ("Machine", designs.parameters.name),
+            ("Designs", evaluated),
+            ("Hypervolume", significant(search.hypervolume)),
+            *facts.rows(),
+        ]
+        none = [] if has_front else ["No design meets all constraints."]
+        return render(
+            Path(__file__).with_name("page.html"),
+            title=f"Designs of machine {designs.parameters.name}",
+            about=self.about,
+            summary=summary(front, self.promises),
+            warnings=[*facts.warnings, *none],
+            front=_front(front) if has_front and len(designs.objectives) > 1 else None,
+            picked=as_json(_picked(front, shown)) if has_front and shown else None,
+            envelopes=_envelopes(front, shown) if has_front and shown else None,
+            chosen=_chosen(front) if has_front else None,
+            promises=_promises(self.promises) if self.promises else None,
+            history=_history(front),
+            facts=[(word, text) for word, text in made if text],
+        )
+
+
+def summary(front: ParetoFront, kept: Sequence[Promise] = ()) -> str:
+    """Return the findings as one paragraph."""
+    designs, count = front.designs, len(front.objectives)
+    if not count:
+        return f"None of {front.search.evaluations} designs meets all constraints."
+    goals = listed([g.given.quantity for g in designs.objectives])
+    text = f"{front.search.evaluations} designs give a front of {count} for {goals}."
+    parts = []
+    number = front.chosen.get(COMPROMISE, next(iter(front.chosen.values())))
+    for goal, value, nominal in zip(
+        designs.objectives, front.objectives[number], front.nominal_objectives, strict=True
+    ):
+        unit = goal.unit.shown.replace("*", " ")
+        parts.append(
+            f"{goal.given.quantity} {_text(value)} {unit} in place of {_text(nominal)} {unit}"
+        )
+    judged = [p.is_kept for p in kept if p.is_kept is not None]
+    robust = (
+        f" On fresh samples {sum(judged)} of {len(judged)} values of the chosen designs keep what "
+        "they promised."
+        if judged
+        else ""
+    )
+    name = "The compromise" if COMPROMISE in front.chosen else "The best design"
+    return f"{text} {name} has {listed(parts)} of the machine itself.{robust}"
+
+
+def listed(words: list[str]) -> str:
+    """Return words as a list in a sentence: a, b and c."""
+    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
+
+
+def _text(value: float) -> str:
+    return significant(float(value)) if np.isfinite(value) else MISSING
+
+
+def _front(front: ParetoFront) -> Picture:
+    """Return the picture of the front, in which a design can be picked."""
+    caption = (
+        "Each point is a design; no other design is better in every objective. The circle is the "
+        "picked design; the cross is the machine itself."
+    )
+    count = len(front.objectives)
+    return picture(front_figure(front), f"Front of {count} designs.", caption)
+
+
+def _envelopes(front: ParetoFront, shown: Envelopes) -> Picture:
+    """Return the picture of the envelopes of the picked design."""
+    caption = (
+        f"Largest envelope of the filtered displacements over time: {shown.of}. Coloured: the "
+        "picked design; grey: the machine itself."
+    )
+    alternative = "Envelopes of the picked design at each sensor."
+    return picture(envelopes_figure(shown, first_picked(front)), alternative, caption)
+
+
+def _picked(front: ParetoFront, shown: Envelopes) -> dict[str, Any]:
+    """Return the numbers of each design that the page needs to show it when it is picked."""
+    return {
+        "rows": _rows(front),
+        "picked": first_picked(front),
+        "pairs": pairs_of(front),
+        "objectives": front.objectives,
+        "envelopes": np.round(MM_PER_M * shown.designs, 2),
+        "labels": {"picked": PICKED, "designs": DESIGNS},
+    }
+
+
+def _rows(front: ParetoFront) -> list[list[tuple[str, str, str]]]:
+    """Return kind, name and value of each number of each design, for the picked one."""
+    designs, entries = front.designs, []
+    for number, design in enumerate(front.search.designs):
+        rows = [
+            ("objective", g.given.quantity, f"{_text(v)} {g.unit.shown.replace('*', ' ')}")
+            for g, v in zip(designs.objectives, front.objectives[number], strict=True)
+        ]
+        for goal, value in zip(designs.constraints, front.constraints[number], strict=True):
+            unit = goal.unit.shown.replace("*", " ")
+            side = "at most" if goal.is_small_better else "at least"
+            margin = abs(float(value) - goal.limit)
+            text = f"{_text(value)} {unit}, {side} {_text(goal.limit)} {unit}"
+            text += f": margin {_text(margin)} {unit}"
+            rows.append(("constraint", goal.given.quantity, text))
+        for dimension, place in zip(designs.dimensions, design, strict=True):
+            value, unit = dimension.shown(float(place))
+            shown = value if isinstance(value, str) else _text(value)
+            rows.append(("variable", dimension.name, f"{shown} {unit.replace('*', ' ')}"))
+        entries.append(rows)
+    return entries
+
+
+def _chosen(front: ParetoFront) -> Table:
+    rows = _rows(front)
+    groups = [line("design", ["", *(f"{number + 1}" for number in front.chosen.values())])]
+    for index, (kind, name, _) in enumerate(rows[0]):
+        cells = [rows[number][index][2].split(", at")[0] for number in front.chosen.values()]
+        groups.append(line(name, [kind, *cells]))
+    groups.append(line("machine file", ["", *map(tables.machine_file_name, front.chosen)]))
+    caption = (
+        "Chosen designs. The compromise is nearest to the best of all objectives, each scaled to "
+        "the range of the front. Each has a machine file for --machine."
+    )
+    return Table(caption, ("name", "kind", *front.chosen), tuple(groups), text_columns=2)
+
+
+def _promises(kept: Sequence[Promise]) -> Table:
+    """Return what the chosen designs of a robust front promised and keep on fresh samples."""
+    groups = []
+    for p in kept:
+        unit = p.goal.unit.shown.replace("*", " ")
+        cells: list[Value] = [f"{p.goal.given.quantity}, {p.goal.given.over}", unit]
+        cells += [with_interval(v.value, v.lower, v.upper) for v in (p.promised, p.fresh)]
+        groups.append(line(p.design, [*cells, p.is_kept], "alarm" if p.is_kept is False else ""))
+    caption = (
+        f"Chosen designs on {FRESH} times as many fresh samples. In brackets: 95 % intervals. A "
+        "promise is kept if the fresh value is not worse than the worse end of its interval. The "
+        "worst of the samples has no interval: it grows with their number."
+    )
+    header = ("design", "quantity", "unit", "promised", "fresh samples", "kept")
+    return Table(caption, header, tuple(groups), text_columns=3)
+
+
+def _history(front: ParetoFront) -> Picture:
+    caption = (
+        "Hypervolume of the front after each generation. Objectives are scaled so that the first "
+        "population reaches from 0 to 1. A level curve means that more evaluations find little."
+    )
+    alternative = "Hypervolume over the number of evaluated designs."
+    return picture(history_figure(front), alternative, caption)

@@ -1,0 +1,112 @@
+"""The task of the design study: options and files checked, and runs."""
+
+from functools import partial
+from typing import Any
+
+from wm_drake.errors import input_error, nearest_names
+from wm_drake.model.bodies import with_sdf_values
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import MachineParameters
+from wm_drake.parameters import designs as design_files
+from wm_drake.parameters.tolerances import Tolerances, check_load, load_tolerances, tolerances_path
+from wm_drake.simulation.measures import MEASURES
+from wm_drake.studies.inputs import problems_of_file, selected_cases
+from wm_drake.studies.pareto.envelopes import front_envelopes
+from wm_drake.studies.pareto.options import DesignOptions
+from wm_drake.studies.pareto.page import DesignResult
+from wm_drake.studies.pareto.problem import MachineDesigns, machine_designs
+from wm_drake.studies.pareto.robust import promises
+from wm_drake.studies.pareto.search import check_search
+from wm_drake.studies.pareto.study import SEARCHES, run_designs
+from wm_drake.studies.run import Executor, machine_text
+from wm_drake.studies.study import Task
+from wm_drake.studies.tolerance.distributions import base_samples
+from wm_drake.studies.tolerance.variables import UncertainMachine, uncertain_machine
+
+
+class DesignTask(Task):
+    """The study with checked options."""
+
+    def __init__(self, options: DesignOptions, machine: Machine) -> None:
+        """Read the design file and the tolerances that it names.
+
+        Raises:
+            InputError: an option or a file is wrong.
+        """
+        if options.search not in SEARCHES:
+            hint = nearest_names(options.search, SEARCHES)
+            raise input_error(f"no search '{options.search}'{hint}", where="--search")
+        check_search(options.evaluations, options.population)
+        self.options, self.file = options, design_files.load_design(options.file)
+        with problems_of_file(design_files.design_path(options.file)):
+            self.machine, self.designs = self._designs(machine)
+        needed = {response.measure for response in self.designs.responses} or {"extremes"}
+        self.measures = tuple(name for name in MEASURES if name in needed)
+
+    def _designs(self, machine: Machine) -> tuple[Machine, MachineDesigns]:
+        """Return the built machine and its designs."""
+        task, profile = self.file, self.options.profile
+        tolerances = load_tolerances(task.robust.tolerances) if task.robust else None
+        keys = [key for key in self._keys(tolerances) if key.startswith(("frames.", "bodies."))]
+        full = with_sdf_values(machine.plant, machine.parameters, keys)
+        if tolerances is None or task.robust is None:
+            design_files.check_loads(task, full)
+            cases = selected_cases(full, list(task.loads), True, profile)
+            return build_machine(full), machine_designs(full, task, cases)
+        check_load(tolerances, full, tolerances_path(task.robust.tolerances))
+        load = tolerances.load or next(iter(full.loads))
+        (case,) = selected_cases(full, [load], True, profile)
+
+        def scattered(changed: MachineParameters) -> UncertainMachine:
+            return uncertain_machine(changed, tolerances, case)
+
+        uncertain = scattered(full)
+        scores, _ = base_samples(uncertain.joint.size, task.robust.samples, self.options.seed)
+        designs = machine_designs(full, task, [case], scattered, scores)
+        return build_machine(uncertain.parameters), designs
+
+    def _keys(self, tolerances: Tolerances | None) -> list[str]:
+        """Return the keys of all numbers that the study changes or reads."""
+        task = self.file
+        keys = [key for variable in task.variables.values() for key in variable.keys]
+        keys += [
+            key
+            for choice in task.choices.values()
+            for values in choice.options.values()
+            for key in values
+        ]
+        keys += [goal.quantity for goal in task.objectives]
+        keys += [goal.quantity for goal in task.constraints]
+        if tolerances:
+            keys += [key for quantity in tolerances.quantities.values() for key in quantity.keys]
+        return keys
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the runs."""
+        return {
+            "machine": machine_text(self.designs.parameters),
+            "design": self.file,
+            "measures": ", ".join(self.measures),
+            "seed": str(self.options.seed),
+        }
+
+    def run(self, executor: Executor) -> DesignResult:
+        """Search the front, check a robust one on fresh samples, and run it with histories."""
+        options, run = self.options, partial(executor.simulate, self.machine, self.measures)
+        with executor.progress(options.evaluations * self.designs.scenarios):
+            front = run_designs(
+                self.designs,
+                run,
+                evaluations=options.evaluations,
+                population=options.population,
+                seed=options.seed,
+                search=options.search,
+            )
+        checked = promises(front, partial(run, what="fresh samples"), options.seed)
+        envelopes = None
+        if len(front.objectives):
+            histories = partial(executor.records, self.machine, what="envelopes of the front")
+            envelopes = front_envelopes(front, histories)
+        return DesignResult(front, checked, envelopes, self.file.about)

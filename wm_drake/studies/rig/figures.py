@@ -1,0 +1,162 @@
+"""Figures of force loops over displacement, velocity and time, single or overlaid."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.report.figure import (
+    MEASURED,
+    OURS,
+    QUIET,
+    Axis,
+    Figure,
+    Line,
+    Mark,
+    Panel,
+    Rule,
+    in_grid,
+    shade,
+)
+from wm_drake.report.formatting import MM_PER_M
+from wm_drake.rigs import ForceLoop, RigRun
+from wm_drake.rigs.run import slider_friction_curves
+
+COLUMNS = 4
+"""Largest number of panels in a row."""
+
+DEG_PER_RAD = 180.0 / math.pi
+
+
+def motion_scale(rotates: bool) -> tuple[float, str, str]:
+    """Return the factor from SI to the unit for reading, the name, and this unit of a motion.
+
+    Args:
+        rotates: Whether the motion is an angle in deg, not a displacement in mm.
+    """
+    return (DEG_PER_RAD, "angle", "deg") if rotates else (MM_PER_M, "displacement", "mm")
+
+
+def force_scale(rotates: bool) -> tuple[str, str]:
+    """Return the name and unit of a force, or of a moment if the motion is a rotation."""
+    return ("moment", "N m") if rotates else ("force", "N")
+
+
+def frequency_text(loop: ForceLoop) -> str:
+    """Return the frequency of a loop with its unit."""
+    return f"{loop.motion.frequency:.3g} Hz"
+
+
+def amplitude_text(loop: ForceLoop) -> str:
+    """Return the amplitude of a loop with its unit."""
+    factor, _, unit = motion_scale(loop.rotates)
+    return f"{factor * loop.motion.amplitude:.3g} {unit}"
+
+
+def overlaid_figure(
+    loops: Sequence[ForceLoop],
+    panel: Callable[[ForceLoop], str],
+    line: Callable[[ForceLoop], str],
+    *,
+    over: str,
+) -> Figure:
+    """Draw loops in panels, several per panel, as [C] Figs. 6, 7, 14 and [A] Figs. 5, 8, 12 (B).
+
+    Args:
+        loops: At least one loop.
+        panel: Function that returns the title of the panel in which a loop is drawn.
+        line: Function that returns the legend text of a loop. It also selects the colour.
+        over: Abscissa: displacement or velocity.
+    """
+    rising = sorted(loops, key=lambda loop: (loop.motion.frequency, loop.motion.amplitude))
+    by_amplitude = sorted(loops, key=lambda loop: (loop.motion.amplitude, loop.motion.frequency))
+    order = {
+        text: index
+        for index, text in enumerate(
+            [*map(frequency_text, rising), *map(amplitude_text, by_amplitude)]
+        )
+    }
+    panels, lines = (
+        sorted({text(loop) for loop in loops}, key=order.__getitem__) for text in (panel, line)
+    )
+    columns = min(COLUMNS, max(2, len(panels)))
+    rotates = loops[0].rotates
+    factor, name, unit = motion_scale(rotates)
+    x = f"{name}, {unit}"
+    if over != "displacement":
+        x = f"{'rate' if rotates else 'velocity'}, {unit}/s"
+    shown = []
+    for title in panels:
+        marks: list[Mark] = []
+        for loop in (loop for loop in loops if panel(loop) == title):
+            values = factor * (loop.displacement if over == "displacement" else loop.velocity)
+            key = line(loop)
+            color = _color(lines.index(key), len(lines))
+            marks.append(Line(_closed(values), _closed(loop.force), color=color, key=key))
+        shown.append(loop_panel(title, marks, x, ", ".join(force_scale(rotates))))
+    placed = in_grid(shown, columns, share="y")
+    return Figure(panels=placed, height=190.0, widths=(1.0,) * columns, keys=tuple(lines))
+
+
+def time_figure(loop: ForceLoop) -> Figure:
+    """Draw motion and force over one period and the loop, as [A] Figs. 5, 8, 12, [C] Figs. 4, 5."""
+    factor, name, unit = motion_scale(loop.rotates)
+    force = ", ".join(force_scale(loop.rotates))
+    time = np.append(loop.time, 1.0 / loop.motion.frequency)
+    motion = Line(time, factor * _closed(loop.displacement), color=QUIET, dash="dashed")
+    of_time = Line(time, _closed(loop.force), width=2.2, is_second=True)
+    reach, largest = (1.13 * float(np.abs(one.y).max()) or 1.0 for one in (motion, of_time))
+    panels = [
+        Panel(
+            marks=(Rule(0.0, color=QUIET), motion, of_time),
+            x=Axis(label="time, s"),
+            y=Axis(label=f"{name}, {unit} (dashed)", color=QUIET, range=(-reach, reach)),
+            second=Axis(label=force, color=OURS, range=(-largest, largest)),
+        )
+    ]
+    speed = f"{'rate' if loop.rotates else 'velocity'}, {unit}/s"
+    for x, label in ((loop.displacement, f"{name}, {unit}"), (loop.velocity, speed)):
+        curve = Line(factor * _closed(x), _closed(loop.force), width=2.2)
+        panels.append(loop_panel("", [curve], label, force))
+    return Figure(panels=in_grid(panels, 3), height=220.0)
+
+
+def friction_law_figure(run: RigRun) -> Figure | None:
+    """Draw friction over slider velocity at constant deformation rates, as [C] Fig. 12.
+
+    The result is None for a law without MSTV friction.
+    """
+    rates_mm_s = (1.0, 5.0, 20.0, 60.0)
+    w = np.concatenate([-np.geomspace(0.08, 1e-5, 200), np.geomspace(1e-5, 0.08, 200)])
+    curves = slider_friction_curves(run.bench, [u / MM_PER_M for u in rates_mm_s], w)
+    if curves is None:
+        return None
+    marks = [
+        Line(
+            MM_PER_M * w,
+            curve,
+            color=_color(k, len(rates_mm_s)),
+            width=2.0,
+            key=f"deformation rate of the sponge {u:g} mm/s",
+        )
+        for k, (u, curve) in enumerate(zip(rates_mm_s, curves, strict=True))
+    ]
+    x, y = "sliding velocity of the sponge on the tube, mm/s", "friction force on the sponge, N"
+    return Figure(panels=(loop_panel("", marks, x, y),), height=240.0)
+
+
+def loop_panel(title: str, marks: Sequence[Mark], x: str, y: str) -> Panel:
+    """Return a panel with a zero line. `x`, `y`: labels."""
+    shown = (Rule(0.0, color=QUIET, width=0.8), *marks)
+    return Panel(title=title, marks=shown, x=Axis(label=x), y=Axis(label=y))
+
+
+def _closed(values: Any) -> FloatArray:
+    return np.append(values, values[0])
+
+
+def _color(index: int, count: int) -> str:
+    """Return a colour of the scale from blue to yellow; for one or two lines a fixed colour."""
+    return (OURS, MEASURED)[index] if count <= 2 else shade(0.88 * index / (count - 1))

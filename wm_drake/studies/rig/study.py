@@ -1,0 +1,188 @@
+"""A bench test: the component and the motions of the options, and the result."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import pandas as pd
+from rich.table import Table
+
+from wm_drake.errors import input_error, nearest_names
+from wm_drake.parameters import Component, quantities
+from wm_drake.parameters.units import Unit
+from wm_drake.report.table import readable
+from wm_drake.rigs import (
+    JIG_ARM,
+    MATRICES,
+    Bench,
+    BushingBench,
+    Harmonic,
+    RigRun,
+    beyond_tables,
+    bushing_bench,
+    damper_bench,
+    run_rig,
+)
+from wm_drake.studies.components import axes_of, mass_of, target_of
+from wm_drake.studies.inputs import quantities_of
+from wm_drake.studies.rig.options import AxisRigOptions, DamperRigOptions, RigOptions
+from wm_drake.studies.run import Executor
+from wm_drake.studies.study import Facts, Result, Task
+
+
+@dataclass(frozen=True)
+class RigResult(Result):
+    """Result of a bench test.
+
+    Attributes:
+        run: Loops of the component.
+        massless: Its loops without masses; None if it has none.
+        beyond: Sentences on tables that the motions leave.
+    """
+
+    run: RigRun
+    massless: RigRun | None = None
+    beyond: Sequence[str] = ()
+    float_format: ClassVar[str] = "%.9g"
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return each loop, what is derived from the loops, and the effect of masses."""
+        from wm_drake.studies.rig.page import loop_file, loop_table, masses_table, measures_table
+
+        loops = {loop_file(loop).removesuffix(".csv"): loop_table(loop) for loop in self.run.loops}
+        shown = {"measures": measures_table(self.run), **loops}
+        if self.massless is not None:
+            shown["masses"] = masses_table(self.run, self.massless)
+        return shown
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what is derived from the loops for JSON: of one loop, or a list of several."""
+        from wm_drake.studies.rig.page import measures_table
+
+        text = measures_table(self.run).to_json(orient="records", double_precision=15)
+        rows = json.loads(text)
+        shown = rows[0] if len(rows) == 1 else {"loops": rows}
+        return {"component": self.run.title, **shown}
+
+    def terminal(self) -> list[Table | str]:
+        """Return what is derived from the loops, and the effect of masses."""
+        from wm_drake.studies.rig.page import measures_cells, measures_header
+
+        table = Table(title=self.run.title)
+        for name in measures_header(self.run):
+            table.add_column(name, justify="right")
+        for cells in measures_cells(self.run):
+            table.add_row(*cells)
+        return [table, *([self.effect] if self.effect else [])]
+
+    @property
+    def effect(self) -> str:
+        """Sentence on the effect of masses; "" without masses."""
+        from wm_drake.studies.rig.page import masses_sentence
+
+        return "" if self.massless is None else masses_sentence(self.run, self.massless)
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        from wm_drake.studies.rig.page import rig_page
+
+        return rig_page(self, facts)
+
+    def warnings(self) -> Sequence[str]:
+        """Return a warning for a table that the motions leave."""
+        return self.beyond
+
+
+class RigTask(Task):
+    """A bench test with checked options."""
+
+    def __init__(self, kind: str, options: RigOptions) -> None:
+        """Find the component, put it on the bench, and read its motions.
+
+        Raises:
+            InputError: an option is wrong.
+        """
+        self.component = target_of(kind, options).component
+        self.massless: Bench | None = None
+        if isinstance(options, DamperRigOptions):
+            self._set_damper(options)
+        else:
+            assert isinstance(options, AxisRigOptions)
+            self._set_axis(kind, options)
+        self.motions = _motions(kind, self.bench, options)
+
+    def _set_damper(self, options: DamperRigOptions) -> None:
+        sponge = mass_of(options.sponge_mass, "--sponge-mass")
+        driven = mass_of(options.outer_mass, "--outer-mass")
+        driven += mass_of(options.jig_mass, "--jig-mass")
+        damper: Any = self.component.parameters
+        self.bench: Bench = damper_bench(damper, sponge, driven)
+        if sponge or driven:
+            self.massless = damper_bench(damper)
+        parts = [f"damper {self.component.name}", f"law {damper.law}"]
+        parts += [f"sponge of {1e3 * sponge:g} g"] if sponge else []
+        parts += [f"{driven:g} kg at the driven end"] if driven else []
+        self.title = ", ".join(parts)
+
+    def _set_axis(self, kind: str, options: AxisRigOptions) -> None:
+        axis, name = axes_of(options.axis)[0], self.component.name
+        arm = quantities_of(options.arm, Unit("m", "mm"), "--arm")[0] if options.arm else 0.0
+        if options.matrix is not None and axis.startswith("about") and not options.arm:
+            arm = JIG_ARM
+        bushing: Any = self.component.parameters
+        self.bench = bushing_bench(bushing, axis, arm)
+        what = kind if name == kind else f"{kind} {name}"
+        through = f", through an arm of {1e3 * arm:g} mm" if arm else ""
+        self.title = f"{what}, axis {axis.replace('_', ' ')}{through}"
+
+    def run(self, executor: Executor) -> RigResult:
+        """Run all motions, also without the masses if there are any."""
+        numbers = _numbers(self.component)
+        with executor.progress(len(self.motions), "loops") as progress:
+            run = run_rig(self.title, self.bench, self.motions, numbers, progress)
+        massless = None
+        if self.massless is not None:
+            massless = run_rig(self.title, self.massless, self.motions)
+        return RigResult(run, massless, beyond_tables(self.bench, self.motions))
+
+
+def _motions(kind: str, bench: Bench, options: RigOptions) -> list[Harmonic]:
+    """Return the motions of `--matrix`, or of `--frequency` and `--amplitude`."""
+    matrix, frequency, amplitude = options.matrix, options.frequency, options.amplitude
+    if matrix is not None:
+        if frequency or amplitude:
+            raise input_error(
+                "has its own frequencies and amplitudes; leave -f and -a out", where="--matrix"
+            )
+        rotates = isinstance(bench, BushingBench) and bench.axis.startswith("about")
+        if kind == "gasket" and rotates:
+            raise input_error("[A] does not rotate the gasket; give -f and -a", where="--matrix")
+        papers = MATRICES[f"{kind} about" if rotates else kind]
+        if matrix not in papers:
+            raise input_error(
+                f"no matrix '{matrix}' for a {kind}{nearest_names(matrix, papers)}",
+                where="--matrix",
+            )
+        return list(papers[matrix])
+    if not (frequency and amplitude):
+        raise input_error(
+            "needs -f and -a (for example -f '3 Hz' -a '5 mm'), or --matrix", where=f"rig {kind}"
+        )
+    unit = Unit("rad", "deg") if bench.rotates else Unit("m", "mm")
+    return [
+        Harmonic(f, a)
+        for f in quantities_of(frequency, Unit("Hz", "Hz"), "--frequency")
+        for a in quantities_of(amplitude, unit, "--amplitude")
+    ]
+
+
+def _numbers(component: Component) -> tuple[tuple[str, str, str], ...]:
+    """Return key, value with unit and source of each number that is on the bench."""
+    rows = []
+    for key, value, unit in quantities(component.parameters):
+        if key.startswith("end_bushing"):
+            continue
+        sources = (component.sources.get(part) for part in (key, key.split(".")[0]))
+        rows.append((key, readable(value, unit), next(filter(None, sources), "")))
+    return tuple(rows)

@@ -1,0 +1,500 @@
+"""Run any study: from checked input to a result folder, with a ledger of finished runs."""
+
+import tempfile
+import time
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from wm_drake.errors import InputError, InputNotice, Problem, input_error
+from wm_drake.report.progress import progress_bar, progress_bars
+from wm_drake.report.provenance import command_line
+from wm_drake.report.terminal import QUIET, say
+from wm_drake.studies.inputs import build_checked, load_parameters, machine_warnings
+from wm_drake.studies.result_folder import (
+    FIGURES,
+    LEDGER,
+    RUN_FILE,
+    Run,
+    check_folders,
+    check_is_folder,
+    prepare_folder,
+    result_folder,
+)
+from wm_drake.studies.study import STUDIES, Facts, OptionModel, Options, Result, Study, option
+
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    import xarray as xr
+
+    from wm_drake.batch.ledger import Ledger
+    from wm_drake.model.machine import Machine
+    from wm_drake.parameters import MachineParameters
+    from wm_drake.simulation.cases import Case
+    from wm_drake.simulation.records import Record
+
+RUNS_KEPT = (
+    "all runs are kept, so repeat the command to write the results without running them again"
+)
+"""What is kept if the results of a study cannot be written."""
+
+
+class RunOptions(OptionModel):
+    """Options of the driver for every study.
+
+    Attributes:
+        out: Folder; None writes nothing.
+    """
+
+    out: Path | None = option(None, "Folder for the results.", "DIR")
+    overwrite: bool = option(
+        False, "Replace the results of an earlier run of this command in the folder."
+    )
+    figures: Path | None = option(
+        None,
+        "Write each picture of the page to this folder as PDF, SVG and PNG, 180 mm wide, with its "
+        "data as CSV.",
+        "DIR",
+    )
+    quick: bool = option(False, "Small sizes for a first look, where no other option sets them.")
+
+
+class LedgerOptions(RunOptions):
+    """Options of the driver for studies with a ledger."""
+
+    workers: int | None = option(None, "Number of cores. Default: all.", "N", ge=1)
+    resume: bool = option(False, "Continue an unfinished study in the same folder.")
+
+
+class BatchOptions(LedgerOptions):
+    """Options of the driver for studies that run cases by `Executor.simulate`."""
+
+    cluster: str | None = option(
+        None, "Run on a dask.distributed cluster with the scheduler at this address.", "ADDRESS"
+    )
+
+
+class StudyInterrupted(KeyboardInterrupt):
+    """Ctrl-C was pressed during a study; the text says what is kept."""
+
+
+@dataclass
+class Executor:
+    """Run cases for a task: on the cores of this computer or on a cluster, with a progress bar.
+
+    Attributes:
+        ledger: Finished runs; None for a study without runs.
+        workers: Number of threads; None for the number of cores.
+        client: Client of a cluster, or None.
+        out: Folder of the results, or None.
+        runs: Number of runs so far.
+    """
+
+    ledger: "Ledger | None" = None
+    workers: int | None = None
+    client: Any = None
+    out: Path | None = None
+    runs: int = 0
+    _report: Callable[..., None] | None = field(default=None, repr=False)
+    _reported: int = field(default=0, repr=False)
+
+    def simulate(
+        self,
+        machine: "Machine",
+        measures: tuple[str, ...],
+        cases: "Iterable[Case]",
+        what: str = "runs",
+    ) -> "xr.Dataset":
+        """Run cases that the ledger does not have, and return the table of all.
+
+        The table is that of `wm_drake.simulate_many`, with the step and the integrator of the
+        machine.
+
+        Args:
+            machine: Built machine.
+            measures: Names of measures.
+            cases: Cases.
+            what: Word beside the progress bar.
+        """
+        if self._report is not None:
+            return self._counted(machine, measures, cases)
+        listed = list(cases)
+        with progress_bar(len(listed), what) as report:
+            return self._run(machine, measures, listed, report)
+
+    def records(
+        self,
+        machine: "Machine",
+        cases: "Sequence[Case]",
+        keep: "Callable[[int, Record], None]",
+        what: str = "records",
+    ) -> None:
+        """Run cases on this computer and pass the number and the record of each to a function.
+
+        Records are too large for a ledger.
+        """
+        from wm_drake.batch import RunResult, simulate_many
+
+        def collect(run: RunResult) -> None:
+            assert run.record is not None
+            keep(run.number, run.record)
+
+        with progress_bar(len(cases), what) as report:
+            simulate_many(
+                machine,
+                cases,
+                measures=("extremes",),
+                histories=True,
+                workers=self.workers,
+                progress=report,
+                finished=collect,
+            )
+
+    @contextmanager
+    def progress(self, total: int, what: str = "runs") -> Iterator[Callable[..., None]]:
+        """Show one progress bar, which all calls of `simulate` in the block move together.
+
+        Args:
+            total: Number of runs or steps of the block.
+            what: Word beside the bar.
+
+        Yields:
+            Function to call with the number of finished steps, and with words to show beside it, if
+            the block does not simulate.
+        """
+        with progress_bar(total, what) as report:
+            self._report, self._reported = report, 0
+            try:
+                yield report
+            finally:
+                self._report = None
+
+    @contextmanager
+    def fraction(self, what: str) -> Iterator[Callable[[float], None]]:
+        """Show a progress bar in percent; yield the function to call with the finished fraction.
+
+        Calls of `simulate` in the block show no bar of their own.
+        """
+        with progress_bars([what]) as report:
+            self._report, self._reported = (lambda done: None), 0
+            try:
+                yield lambda done: report(0, done)
+            finally:
+                self._report = None
+
+    @contextmanager
+    def fractions(self, names: Sequence[str]) -> Iterator[Callable[[int, float], None]]:
+        """Show a bar in percent for each name; yield the function of number and fraction."""
+        with progress_bars(names) as report:
+            yield report
+
+    def _counted(
+        self, machine: "Machine", measures: tuple[str, ...], cases: "Iterable[Case]"
+    ) -> "xr.Dataset":
+        report, before = self._report, self._reported
+        assert report is not None
+        table = self._run(machine, measures, cases, lambda done: report(before + done))
+        self._reported += table.sizes["run"]
+        return table
+
+    def _run(
+        self,
+        machine: "Machine",
+        measures: tuple[str, ...],
+        cases: "Iterable[Case]",
+        report: Callable[[int], None],
+    ) -> "xr.Dataset":
+        from wm_drake.batch import simulate_remembered
+        from wm_drake.batch.cluster import simulate_on_cluster
+
+        assert self.ledger is not None, "a study that runs cases is declared with has_runs=True"
+        run: Callable[..., xr.Dataset] = partial(simulate_remembered, workers=self.workers)
+        if self.client is not None:
+            run = partial(simulate_on_cluster, client=self.client)
+        table = run(machine, cases, self.ledger, measures=measures, progress=report)
+        self.runs += table.sizes["run"]
+        return table
+
+
+@dataclass(frozen=True)
+class Order:
+    """A study with all its options.
+
+    Attributes:
+        study: The study.
+        options: Options of the study.
+        run: Options of the driver.
+        command: Command line or Python call.
+        parameters: Machine in place of that of `options.machine`.
+    """
+
+    study: Study
+    options: Options
+    run: RunOptions
+    command: str = field(default_factory=command_line)
+    parameters: "MachineParameters | None" = None
+
+
+def run_study(name: str, machine: Any = None, *, quiet: bool = False, **options: Any) -> Result:
+    """Run a study and return its result.
+
+    Args:
+        name: Name of the study, such as "drive".
+        machine: Name of a shipped machine, machine file, or parameters. Default: that of the study.
+        quiet: Whether progress and warnings are not printed.
+        options: Options of the command by their Python name, such as `samples=256`. With `out`, the
+            result folder is written as by the command; without it, nothing is written.
+
+    Raises:
+        InputError: an option or the machine is wrong.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> result = wm.run_study("drive", load=["middle"], quick=True, quiet=True)
+        >>> list(result.tables())
+        ['thresholds', 'map', 'estimation']
+    """
+    study = STUDIES.find(name)
+    if machine is not None:
+        options["machine"] = machine if isinstance(machine, (str, Path)) else machine.name
+    shown = ", ".join([repr(name), *(f"{key}={value!r}" for key, value in options.items())])
+    order = order_of(study, options, f"wm_drake.run_study({shown})")
+    if machine is not None and not isinstance(machine, (str, Path)):
+        order = Order(study, order.options, order.run, order.command, machine)
+    token = QUIET.set(quiet or QUIET.get())
+    try:
+        return execute(order)[0]
+    finally:
+        QUIET.reset(token)
+
+
+def order_of(study: Study, given: Mapping[str, Any], command: str = "") -> Order:
+    """Return a study with options by their Python names, checked.
+
+    Args:
+        study: The study.
+        given: Options of the study and of the driver that the user has set.
+        command: Command line or Python call.
+
+    Raises:
+        InputError: an option is unknown or has a wrong value.
+    """
+    model = options_of_driver(study)
+    running = {name: value for name, value in given.items() if name in model.model_fields}
+    others = {name: value for name, value in given.items() if name not in running}
+    if running.get("figures") and not running.get("out"):
+        raise input_error("needs a folder of results too (out)", where="figures")
+    if "machine" in others:
+        others["machine"] = str(others["machine"])
+    sizes = study.quick if running.get("quick") else {}
+    try:
+        return Order(study, study.options(**{**sizes, **others}), model(**running), command)
+    except ValidationError as error:
+        raise InputError(
+            Problem("", ".".join(map(str, fault["loc"])), fault["msg"]) for fault in error.errors()
+        ) from None
+
+
+def options_of_driver(study: Study) -> type[RunOptions]:
+    """Return the model of the options that the driver has for a study."""
+    if not study.has_runs:
+        return RunOptions
+    return BatchOptions if study.has_cluster else LedgerOptions
+
+
+def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
+    """Run a study.
+
+    Returns:
+        Result, how it was computed, and the names of the files that were written.
+
+    Raises:
+        InputError: the input is wrong, or the folder must not or cannot be written to.
+        StudyInterrupted: Ctrl-C was pressed.
+    """
+    begin, study, options = time.perf_counter(), order.study, order.options
+    machine = _machine_of(order) if study.has_machine else None
+    about_machine = tuple(machine_warnings(machine.parameters)) if machine else ()
+    for text in about_machine:
+        say(f"warning: {text}", err=True)
+    task = study.begin(options, machine)
+    run = Run(
+        study.folder_owner,
+        order.run.overwrite,
+        _identity(study, machine, task.identity) if study.has_runs and machine else {},
+        order.command,
+        options.model_dump(mode="json"),
+    )
+    with (
+        _figures_in(order.run.figures),
+        _notices_once(),
+        _executor(order, run) as executor,
+    ):
+        result = task.run(executor)
+        if executor.ledger is not None:
+            executor.ledger.mark_finished()
+        step, integrator = _stepping(machine)
+        wall_s = time.perf_counter() - begin
+        warned = (*about_machine, *_friction_warning(machine))
+        facts = Facts(order.command, wall_s, warned, step, integrator)
+        files = _written(result, facts, order.run.out, run)
+    return result, facts, files
+
+
+def _machine_of(order: Order) -> "Machine":
+    """Return the built machine of a study, changed and checked."""
+    study, options = order.study, order.options
+    if order.parameters is None:
+        parameters = load_parameters(options.machine, options.sets, study.adapt)
+    else:
+        parameters = changed_parameters(study.adapt(order.parameters), options.sets)
+    return build_checked(options.machine, parameters)
+
+
+def _friction_warning(machine: "Machine | None") -> tuple[str, ...]:
+    """Return the warning of friction that no fixed step resolves; runs print it as a notice."""
+    from wm_drake.simulation.cases import JUMPING_FRICTION, has_jumping_friction
+
+    jumps = machine is not None and has_jumping_friction(machine.parameters)
+    return (JUMPING_FRICTION,) if jumps else ()
+
+
+def _stepping(machine: "Machine | None") -> tuple[float, str]:
+    """Return step size and integrator of a machine; (0, "") without one. [s]"""
+    from wm_drake.simulation.runs import checked_integrator, checked_step
+
+    if machine is None:
+        return 0.0, ""
+    return checked_step(machine.parameters, None), checked_integrator(machine.parameters, None)
+
+
+def changed_parameters(parameters: "MachineParameters", sets: Sequence[str]) -> "MachineParameters":
+    """Return parameters with the changes of `--set`."""
+    from wm_drake.studies.inputs import with_sets
+
+    changed, sources = with_sets(parameters, parameters.sources, sets)
+    return changed.model_copy(update={"sources": sources})
+
+
+def _written(result: Result, facts: Facts, out: Path | None, run: Run) -> tuple[str, ...]:
+    if out is None:
+        return ()
+    with result_folder(out, run, RUNS_KEPT if run.identity else "") as folder:
+        result.write(folder)
+        (folder / "report.html").write_text(result.page(facts), encoding="utf-8")
+        names = sorted(path.name for path in folder.iterdir())
+    return ("report.html", *(name for name in names if name != "report.html"))
+
+
+def machine_text(parameters: "MachineParameters") -> str:
+    """Return name and hash of the numbers of a machine, for the identity of a study."""
+    from wm_drake.batch.ledger import key_of
+
+    words = {"name", "about", "sources", "measured", "published"}
+    numbers = parameters.model_dump_json(exclude=words)
+    return f"{parameters.name} {key_of(numbers=numbers)[:8]}"
+
+
+def _identity(study: Study, machine: "Machine", parts: Mapping[str, Any]) -> dict[str, str]:
+    """Return the properties that distinguish a study from others, for its ledger."""
+    from wm_drake.batch import sources_version
+    from wm_drake.batch.ledger import key_of
+
+    return {
+        "study": study.name,
+        "machine": machine_text(machine.parameters),
+        **{
+            name: part if isinstance(part, str) else key_of(part=part)[:8]
+            for name, part in parts.items()
+        },
+        "sources": sources_version(),
+    }
+
+
+@contextmanager
+def _notices_once() -> Iterator[None]:
+    """Show a notice once, not for each batch of runs."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("default", InputNotice)
+        yield
+
+
+@contextmanager
+def _figures_in(folder: Path | None) -> Iterator[None]:
+    """Make `result_folder` write the pictures of pages to a folder."""
+    token = FIGURES.set(folder)
+    try:
+        yield
+    finally:
+        FIGURES.reset(token)
+
+
+@contextmanager
+def _executor(order: Order, run: Run) -> Iterator[Executor]:
+    """Yield what runs the cases of a study, with an open ledger if the study has runs.
+
+    Raises:
+        StudyInterrupted: Ctrl-C was pressed in the block.
+    """
+    chosen, kept = order.run, "nothing was written"
+    try:
+        if not isinstance(chosen, LedgerOptions):
+            if chosen.out is not None:
+                check_folders(chosen.out, run)
+            yield Executor(out=chosen.out)
+            return
+        with ExitStack() as stack:
+            client = None
+            if isinstance(chosen, BatchOptions) and chosen.cluster is not None:
+                from wm_drake.batch.cluster import cluster_client
+
+                client = stack.enter_context(cluster_client(chosen.cluster))
+            ledger = stack.enter_context(_ledger(chosen, run))
+            try:
+                yield Executor(ledger, chosen.workers, client, chosen.out)
+            finally:
+                if chosen.out is not None and len(ledger):
+                    kept = (
+                        f"{len(ledger)} finished runs are kept in {ledger.path}; continue with "
+                        "--resume"
+                    )
+    except KeyboardInterrupt:
+        raise StudyInterrupted(f"interrupted; {kept}") from None
+
+
+@contextmanager
+def _ledger(chosen: LedgerOptions, run: Run) -> "Iterator[Ledger]":
+    """Open the ledger of a study in its folder, or in a temporary one if nothing is written.
+
+    If this function created the folder, and no run finished and no result was written, it removes
+    the folder again.
+    """
+    from wm_drake.batch.ledger import open_ledger
+
+    if chosen.out is None:
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            open_ledger(Path(folder) / LEDGER, dict(run.identity)) as ledger,
+        ):
+            yield ledger
+        return
+    out, kept = chosen.out, 0
+    check_is_folder(out)
+    created = not out.exists()
+    prepare_folder(out, run)
+    options = {"resume": chosen.resume, "replace": run.overwrite}
+    try:
+        with open_ledger(out / LEDGER, run.identity, **options) as ledger:
+            try:
+                yield ledger
+            finally:
+                kept = len(ledger)
+    finally:
+        if created and not kept and not (out / RUN_FILE).exists():
+            for path in (*out.glob(f"{LEDGER}*"), out):
+                path.unlink() if path.is_file() else path.rmdir()

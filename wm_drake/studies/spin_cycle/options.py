@@ -1,0 +1,70 @@
+"""Options of the study of a spin cycle, and its declaration."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wm_drake.studies.study import Options, Study, Task, option
+
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    from wm_drake.model.machine import Machine
+
+CASE: Any = option((), "Run only this case. Repeatable.", "NAME")
+
+
+class CycleOptions(Options):
+    """Options of all studies of a spin cycle: profile, unbalance cases, and measurements."""
+
+    machine: str = option("free_stroke", "Name of a shipped machine, or machine file.", "NAME|FILE")
+    profile: str = option(
+        "spin_cycle",
+        "Name of a shipped profile (spin_cycle, run_up, ifb_9kg), or file with regions.",
+        "NAME|FILE",
+    )
+    cases: Path | None = option(
+        None,
+        "CSV file of cases: case, front_g, rear_g, phase_deg. Default: the 33 cases of [A] Table "
+        "9.",
+        "FILE",
+    )
+    case: tuple[str, ...] = CASE
+    measured: Path | None = option(
+        None,
+        "CSV file of measured RMS displacements: case, region, sensor, axis, rms_mm.",
+        "FILE",
+    )
+    accelerations: Path | None = option(
+        None,
+        "Folder of measured accelerations, one file CASE.csv per case: time_s, S1_x, S1_y, ... in "
+        "m/s^2.",
+        "DIR",
+    )
+    channels: str | None = option(
+        None,
+        "Names in the files: 'S1_x=Acc 1,S1_y=Acc 2' (also time, and speed in a record).",
+        "WORD=NAME,...",
+    )
+
+
+class SpinCycleOptions(CycleOptions):
+    """Options of the study of a spin cycle."""
+
+    engine: str = option(
+        "compiled",
+        "Engine that integrates the motion: compiled, or drake (takes minutes per case).",
+        "NAME",
+    )
+
+
+def _begin(options: SpinCycleOptions, machine: "Machine") -> Task:
+    from wm_drake.studies.spin_cycle.task import SpinCycleTask
+
+    return SpinCycleTask(options, machine)
+
+
+SPIN_CYCLE = Study(
+    "spin-cycle",
+    "Run a spin cycle with many unbalances, and report RMS displacements per region and sensor.",
+    SpinCycleOptions,
+    _begin,
+    quick={"case": ("2",)},
+)

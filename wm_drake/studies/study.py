@@ -1,0 +1,274 @@
+"""Declare a study once: its options, its work, and what its result shows.
+
+Everything else follows from the declaration: the command `wm-drake study NAME` with its help, the
+Python call `wm_drake.run_study(NAME, ...)`, the form of the studio and the manual's reference. The
+driver `wm_drake.studies.run` does the rest for every study: it loads, changes and builds the
+machine, warns of what no fixed step resolves, opens the ledger, runs cases on all cores or on a
+cluster with the step and the integrator of the machine, resumes, shows progress, ends on Ctrl-C,
+and writes the result folder, the JSON, the terminal tables, the page and its figures.
+
+A study has three parts, as in `studies/drive`:
+
+    options.py   class DriveOptions(Options) and DRIVE = Study(...), which `_load` below lists. It
+                 is imported for `--help`, so it must not import Drake, pandas, scipy or plotting.
+    study.py     class DriveTask(Task): checks the options and runs; class DriveResult(Result). Of
+                 a large study, both are in task.py.
+    page.py      the page: sections of pictures and tables, or a template `page.html` beside it.
+
+A task gets an `Executor` and calls it for tables of runs, as often as it needs: once for a plain
+study, many times for an adaptive one. So optimisers of libraries and bisections are written as
+plain functions, and tests can pass any other function of the same form.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from wm_drake.registry import Registry
+
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    import pandas as pd
+    from rich.table import Table
+
+    from wm_drake.parameters import MachineParameters
+    from wm_drake.studies.run import Executor
+
+
+def option(default: Any, help_text: str, metavar: str = "", flag: str = "", **limits: Any) -> Any:
+    """Return a field of an options model.
+
+    The type of the field decides the form on the command line: `bool` is a flag, `tuple[str, ...]`
+    a repeatable option.
+
+    Args:
+        default: Default value; ... if the user must give one.
+        help_text: One sentence or a few; for the help, the manual and the studio.
+        metavar: What a value is, such as NAME or FILE.
+        flag: Option name, or several separated by blanks; by default made from the name of the
+            field. "argument" makes it a positional argument.
+        limits: Limits of pydantic, such as `ge` and `le`.
+    """
+    extra = {"metavar": metavar, "flag": flag}
+    shown: dict[str, Any] = {name: text for name, text in extra.items() if text}
+    return Field(default, description=help_text, json_schema_extra=shown, **limits)
+
+
+class OptionModel(BaseModel):
+    """Options of one kind, checked when they are set."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Options(OptionModel):
+    """Options of all studies: the machine, and changes of its numbers."""
+
+    machine: str = option("reference", "Name of a shipped machine, or machine file.", "NAME|FILE")
+    sets: tuple[str, ...] = option(
+        (),
+        "Change a number of the machine file: gasket.stiffness_x='5 N/mm'; null removes an "
+        "element: dampers.left=null. Repeatable.",
+        "KEY=VALUE",
+        "--set",
+    )
+
+
+PROFILE: Any = option(
+    None, "Spin profile, YAML or CSV (time_s, speed_rpm). Default: that of the machine.", "FILE"
+)
+LOADS: Any = option(
+    (), "Load of the machine, or load file. Repeatable. Default: all loads.", "NAME|FILE"
+)
+MEASURED: Any = option(
+    (),
+    "Measured amplitudes to compare with: load, gasket, source, and a column per sensor in mm. "
+    "Repeatable. Default: those of the machine file, for its own numbers, loads and profile.",
+    "CSV",
+)
+SEED: Any = option(0, "Seed of all random numbers.", "N", ge=0)
+
+
+@dataclass(frozen=True)
+class Facts:
+    """How a result was computed.
+
+    Attributes:
+        command: Command line or Python call.
+        wall_s: Duration. [s]
+        warnings: Warnings of the machine, without those of the result.
+        step: Step size of the compiled engine; 0 without runs of a machine. [s]
+        integrator: Integrator of the compiled engine.
+    """
+
+    command: str = ""
+    wall_s: float = 0.0
+    warnings: tuple[str, ...] = ()
+    step: float = 0.0
+    integrator: str = ""
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return the facts as pairs of word and text, for the end of a page."""
+        from wm_drake.batch import sources_version
+
+        step = f"{1e3 * self.step:g} ms, integrator {self.integrator}"
+        return [
+            *([("Step", step)] if self.step else []),
+            ("Sources", sources_version()),
+            ("Command", self.command),
+        ]
+
+
+class Result(ABC):
+    """Result of a study."""
+
+    float_format: ClassVar[str | None] = "%.6g"
+    """Format of numbers in CSV files; None for all digits."""
+
+    @abstractmethod
+    def tables(self) -> "Mapping[str, pd.DataFrame]":
+        """Return the tables of the result by the name of their CSV file, without suffix."""
+
+    @abstractmethod
+    def as_json(self) -> dict[str, Any]:
+        """Return the result for JSON; None stands for NaN."""
+
+    @abstractmethod
+    def terminal(self) -> "Iterable[Table | str]":
+        """Return tables and sentences for the terminal."""
+
+    @abstractmethod
+    def page(self, facts: Facts) -> str:
+        """Return the page `report.html` as text of one self-contained file."""
+
+    def write(self, folder: Path) -> None:
+        """Write the tables as CSV; a study that writes other files too extends this."""
+        for name, table in self.tables().items():
+            path = folder / f"{name}.csv"
+            table.to_csv(path, index=False, float_format=self.float_format)
+
+    def warnings(self) -> Sequence[str]:
+        """Return warnings of the result for the terminal."""
+        return ()
+
+    def failures(self) -> Sequence[str]:
+        """Return a line for each run that diverged; if there are any, the exit code is 1."""
+        return ()
+
+
+class Task(ABC):
+    """A study with checked options, ready to run."""
+
+    @property
+    def identity(self) -> Mapping[str, Any]:
+        """Return what determines the runs beside the machine, by short names.
+
+        Texts are shown if a ledger belongs to another study; other values are shown by a hash. The
+        number of runs should not be among them, so that a larger study continues a smaller one.
+        """
+        return {}
+
+    @abstractmethod
+    def run(self, executor: "Executor") -> Result:
+        """Run the study; `executor.simulate` runs cases and returns the table of their measures."""
+
+
+def _unchanged(parameters: "MachineParameters") -> "MachineParameters":
+    return parameters
+
+
+@dataclass(frozen=True)
+class Study:
+    """Declaration of a study.
+
+    Attributes:
+        name: Name of the command and of the Python call.
+        about: One line of help.
+        options: Model of the options.
+        begin: Checks options for a built machine, which the driver has checked, and returns the
+            task. Whatever is wrong with the input raises an `InputError` here, before any work.
+        quick: Options of `--quick`: small sizes, for a first look and for tests.
+        has_runs: Whether the task has runs or other values that a ledger keeps. If so, the command
+            has the options `--workers`, `--cluster` and `--resume`, and the folder a ledger.
+        has_cluster: Whether the runs can be computed on a cluster: all by `Executor.simulate`.
+        adapt: Change of the machine before the options `--set`.
+        group: Group of the command; "" for a command of its own.
+        has_machine: Whether the driver loads, checks and builds the machine. If not, the task gets
+            None: a study of a component finds it by the options.
+        folder: Default result folder; made from the name if empty.
+    """
+
+    name: str
+    about: str
+    options: type[Options]
+    begin: "Callable[[Any, Any], Task]"
+    quick: Mapping[str, Any] = field(default_factory=dict)
+    has_runs: bool = True
+    adapt: "Callable[[MachineParameters], MachineParameters]" = _unchanged
+    has_cluster: bool = True
+    group: str = "study"
+    has_machine: bool = True
+    folder: str = ""
+
+    @property
+    def command(self) -> str:
+        """Words of the command after the program's name."""
+        return f"{self.group} {self.name}".strip()
+
+    @property
+    def folder_owner(self) -> str:
+        """Command whose results a folder holds; those of `rig` or `identify` share one folder."""
+        return self.group if self.group and self.group != "study" else self.command
+
+
+def _load() -> None:
+    from wm_drake.studies.calibration.options import CALIBRATE
+    from wm_drake.studies.drive.options import DRIVE
+    from wm_drake.studies.gasket.options import GASKET
+    from wm_drake.studies.gasket_damping.options import GASKET_DAMPING
+    from wm_drake.studies.gasket_effect.options import GASKET_EFFECT
+    from wm_drake.studies.modes.options import MODES
+    from wm_drake.studies.pareto.options import DESIGN
+    from wm_drake.studies.spin_cycle.options import SPIN_CYCLE
+    from wm_drake.studies.spin_identification.options import SPIN_IDENTIFY
+    from wm_drake.studies.steady.options import RESPONSE
+    from wm_drake.studies.tolerance.options import TOLERANCE
+
+    studies = (
+        CALIBRATE,
+        DESIGN,
+        DRIVE,
+        GASKET,
+        GASKET_DAMPING,
+        GASKET_EFFECT,
+        MODES,
+        RESPONSE,
+        SPIN_CYCLE,
+        SPIN_IDENTIFY,
+        TOLERANCE,
+    )
+    for study in studies:
+        STUDIES.register(study)
+
+
+STUDIES: Registry[Study] = Registry("study", "wm_drake.studies", _load)
+"""Studies by name."""
+
+
+def register_study(study: Study) -> Study:
+    """Add a study, and return it; see `wm_drake.studies.study` for its parts.
+
+    Raises:
+        ValueError: another study has this name.
+
+    Example:
+        The same declaration may be registered twice.
+
+        >>> import wm_drake as wm
+        >>> from wm_drake.studies.drive.options import DRIVE
+        >>> wm.register_study(DRIVE).name
+        'drive'
+    """
+    return STUDIES.register(study)

@@ -1,0 +1,120 @@
+"""The task of the tolerance study: options and files checked, and runs."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from wm_drake.engines.compiled.step_check import check_step
+from wm_drake.errors import InputError
+from wm_drake.model.bodies import with_sdf_values
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
+from wm_drake.parameters.tolerances import (
+    Limit,
+    check_load,
+    load_limits,
+    load_tolerances,
+    tolerances_path,
+)
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.measures import MEASURES
+from wm_drake.simulation.measures.responses import Response, chosen_responses, has_gap, measures_of
+from wm_drake.simulation.runs import checked_step
+from wm_drake.studies.inputs import (
+    existing_file,
+    problems_of_file,
+    problems_of_option,
+    profile_of,
+)
+from wm_drake.studies.run import Executor, machine_text
+from wm_drake.studies.study import Task
+from wm_drake.studies.tolerance.options import ToleranceOptions
+from wm_drake.studies.tolerance.page import ToleranceReport
+from wm_drake.studies.tolerance.study import (
+    CONTACTS,
+    DEFAULT,
+    Settings,
+    limits_of,
+    run_tolerances,
+)
+from wm_drake.studies.tolerance.variables import UncertainMachine, uncertain_machine
+
+
+class ToleranceTask(Task):
+    """The study with checked options."""
+
+    def __init__(self, options: ToleranceOptions, machine: Machine) -> None:
+        """Read tolerances and limits, and check the uncertain quantities at their ends.
+
+        Raises:
+            InputError: an option or a file is wrong.
+        """
+        sensitivity = options.sensitivity
+        if sensitivity is None:
+            sensitivity = min(512, options.samples)
+        self.settings = Settings(options.samples, sensitivity, options.subset, options.seed)
+        self.tolerances = load_tolerances(options.file)
+        limits: tuple[Limit, ...] = ()
+        if options.limits is not None:
+            limits = load_limits(existing_file(options.limits, "--limits"))
+        self.machine, self.uncertain = self._uncertain(options, machine)
+        self.responses, self.measures = _measures(self.uncertain, options.response)
+        try:
+            self.limits = limits_of(limits, self.responses)
+        except InputError as error:
+            where = str(options.limits)
+            raise InputError(replace(p, where=where) for p in error.problems) from None
+
+    def _uncertain(
+        self, options: ToleranceOptions, machine: Machine
+    ) -> tuple[Machine, UncertainMachine]:
+        """Return the built machine and its uncertain quantities, checked at their ends."""
+        parameters, tolerances = machine.parameters, self.tolerances
+        spin = profile_of(parameters, options.profile)
+        path = tolerances_path(options.file)
+        check_load(tolerances, parameters, path)
+        load = next(iter(parameters.loads.values()))
+        if tolerances.load:
+            load = parameters.loads[tolerances.load]
+        keys = [key for quantity in tolerances.quantities.values() for key in quantity.keys]
+        with problems_of_file(path):
+            full = with_sdf_values(machine.plant, parameters, keys)
+            case = Case(tolerances.load or "laundry", load, spin)
+            uncertain = uncertain_machine(full, tolerances, case)
+            built = build_machine(uncertain.parameters)
+            step = checked_step(uncertain.parameters, None)
+            uncertain.check(lambda case: check_step(built.set_up(parameters=case.parameters), step))
+        return built, uncertain
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the runs."""
+        return {
+            "machine": machine_text(self.uncertain.parameters),
+            "tolerances": self.tolerances,
+            "profile": self.uncertain.case.profile,
+            "measures": ", ".join(self.measures),
+            "seed": str(self.settings.seed),
+        }
+
+    def run(self, executor: Executor) -> ToleranceReport:
+        """Run samples, Sobol indices and rare contact."""
+        run = partial(executor.simulate, self.machine, self.measures)
+        result = run_tolerances(self.uncertain, self.responses, run, self.settings, self.limits)
+        return ToleranceReport(result, self.tolerances.about)
+
+
+def _measures(
+    uncertain: UncertainMachine, names: Sequence[str]
+) -> tuple[tuple[Response, ...], tuple[str, ...]]:
+    """Return the responses and the measures of `simulate_many`."""
+    parameters, profile = uncertain.parameters, uncertain.case.profile
+    listed = list(names) or [n for n in DEFAULT if n != "gap" or has_gap(parameters)]
+    with problems_of_option("--response"):
+        chosen = chosen_responses(parameters, profile, listed)
+    if names and not any(r.name == "gap" for r in chosen) and has_gap(parameters):
+        chosen += chosen_responses(parameters, profile, ["gap"])
+    measures = set(measures_of(parameters, chosen))
+    measures |= {CONTACTS} if "gap" in measures else set()
+    return chosen, tuple(name for name in MEASURES if name in measures)

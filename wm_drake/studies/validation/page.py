@@ -1,0 +1,160 @@
+"""Write verification, validation and prediction in Markdown, with a reason per row."""
+
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from textwrap import fill
+from typing import Any
+
+import pandas as pd
+
+from wm_drake.report.provenance import now, program
+from wm_drake.studies.validation.rows import FITTED, MISSED, PREDICTED, Row, counts
+
+WIDTH = 100
+"""Largest length of a line of prose. [characters]"""
+
+COLUMNS = ("quantity", "published", "ours", "difference", "verdict", "reason")
+
+UNEXPLAINED = "not explained yet"
+"""Reason of a row that is missed and has no explanation."""
+
+HEADS = {
+    FITTED: (
+        "Validation",
+        "Do the equations describe the machines of [A], [B] and [C]? These published numbers were "
+        "targets of the calibration.",
+    ),
+    PREDICTED: (
+        "Prediction",
+        "Does the model predict what it was not fitted to? These published numbers were no targets "
+        "of the calibration.",
+    ),
+}
+"""Heading and first sentences of a part, by the kind of its rows."""
+
+VERIFICATION = (
+    "Does the program solve its equations? Each row is compared by tests or by a command. The "
+    "tests are part of the test suite: some have the marker `slow`, those with the marker `hours` "
+    "are run by hand. `pytest -m ''` followed by the name of a test runs it alone, whatever its "
+    "marker."
+)
+
+BEGIN, END = "<!-- validation: begin -->\n", "<!-- validation: end -->"
+
+
+def renewed(page: str, text: str) -> str:
+    """Return a page with a new text between its marks."""
+    before, rest = page.split(BEGIN)
+    return f"{before}{BEGIN}{text}{END}{rest.split(END)[1]}"
+
+
+def origin(command: str, notes: Sequence[str]) -> str:
+    """Return the part that says how the text was made.
+
+    Args:
+        command: Command that writes the text.
+        notes: Sentences on what was run.
+    """
+    about = f"Written {now()} by {program()}. A script writes this and the parts below:"
+    lines = [fill(about, WIDTH), "", "```text", command, "```", ""]
+    lines += [fill(f"- {note}", WIDTH, subsequent_indent="  ") for note in notes]
+    return "\n".join(lines) + "\n"
+
+
+def compared(
+    rows: Sequence[Row],
+    kind: str,
+    reasons: Mapping[str, str],
+    tables: Mapping[str, pd.DataFrame] = {},
+) -> str:
+    """Return the part of the rows of one kind as Markdown.
+
+    Args:
+        rows: All rows; those of one section follow each other.
+        kind: `FITTED` or `PREDICTED`.
+        reasons: Explanations by section, by `SECTION | QUANTITY`, and command and tolerance of a
+            section by `SECTION | command` and `SECTION | tolerance`.
+        tables: Tables without verdicts by heading, for the end of the part.
+    """
+    chosen = [row for row in rows if row.kind == kind]
+    heading, about = HEADS[kind]
+    text = ["", f"## {heading}", "", fill(about, WIDTH), "", *_summary(chosen, kind)]
+    for section, group in groupby(chosen, key=lambda row: row.section):
+        text += ["", f"### {section}", "", *_head_of_section(section, reasons)]
+        text += _line(COLUMNS), _line(["---"] * len(COLUMNS))
+        text += [_line(_cells(row, reasons)) for row in group]
+    for name, table in tables.items():
+        text += ["", f"### {name}", "", *_head_of_section(name, reasons)]
+        text += _line(list(map(str, table.columns))), _line(["---"] * len(table.columns))
+        text += [_line(list(map(str, row))) for row in table.itertuples(index=False)]
+    return "\n".join(text) + "\n"
+
+
+def verified(
+    groups: Mapping[str, Sequence[Mapping[str, Any]]], outcomes: Mapping[str, tuple[int, int]]
+) -> str:
+    """Return the part of the verification as Markdown.
+
+    Args:
+        groups: Rows by heading, each with what, against, agreement, and tests or a command.
+        outcomes: How many tests ran and how many of them failed, by test or file of tests; empty
+            if they were not run.
+    """
+    text = ["", "## Verification", "", fill(VERIFICATION, WIDTH)]
+    columns = ["what", "against", "agreement", "run by", *(["last run"] if outcomes else [])]
+    for heading, rows in groups.items():
+        text += ["", f"### {heading}", "", _line(columns), _line(["---"] * len(columns))]
+        for row in rows:
+            tests = list(row.get("tests", ()))
+            run_by = [f"`{name}`" for name in tests]
+            run_by += [f"`{row['command']}`"] if "command" in row else []
+            cells = [row["what"], row["against"], row["agreement"], "<br>".join(run_by)]
+            if outcomes:
+                cells.append(_outcome([outcomes.get(name, (0, 0)) for name in tests]))
+            text.append(_line(cells))
+    return "\n".join(text) + "\n"
+
+
+def _outcome(of_row: Sequence[tuple[int, int]]) -> str:
+    """Return what the tests of a row gave, in words; empty for a row without tests."""
+    if not of_row:
+        return ""
+    if not all(ran for ran, _ in of_row):
+        return "not run: marked `hours`, or skipped"
+    ran, failed = map(sum, zip(*of_row, strict=True))
+    return f"**{failed} of {ran} failed**" if failed else f"{ran} passed"
+
+
+def _head_of_section(section: str, reasons: Mapping[str, str]) -> list[str]:
+    """Return explanation, command and tolerance of a section."""
+    lines = [fill(reasons[section], WIDTH), ""] if section in reasons else []
+    for name in ("command", "tolerance"):
+        words = reasons.get(f"{section} | {name}")
+        if words:
+            code = "; ".join(f"`{part}`" for part in words.split("; "))
+            sentence = f"{name.capitalize()}: {code if name == 'command' else words}."
+            lines += [sentence if name == "command" else fill(sentence, WIDTH), ""]
+    return lines
+
+
+def _cells(row: Row, reasons: Mapping[str, str]) -> list[str]:
+    known = reasons.get(f"{row.section} | {row.quantity}", "")
+    if row.verdict == MISSED and not known:
+        known = UNEXPLAINED
+    why = "; ".join(filter(None, [row.reason, known if row.verdict == MISSED else ""]))
+    verdict = f"**{row.verdict}**" if row.verdict == MISSED else row.verdict
+    return [row.quantity, row.published, row.ours, row.difference, verdict, why]
+
+
+def _summary(rows: Sequence[Row], kind: str) -> list[str]:
+    if not rows:
+        return ["Nothing was compared."]
+    table = counts(rows).droplevel(1)
+    lines = [_line(["section", *table.columns]), _line(["---"] * (1 + len(table.columns)))]
+    lines += [_line(list(map(str, row))) for row in table.reset_index().itertuples(index=False)]
+    missed = sum(row.verdict == MISSED for row in rows)
+    return [*lines, "", f"Of {len(rows)} {kind} results, {missed} are missed."]
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cell.replace('|', '/') for cell in cells)} |"

@@ -1,0 +1,111 @@
+"""Forms of studies: fields from their options models, and what a user fills in as arguments."""
+
+import re
+import types
+import typing
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic.fields import FieldInfo
+
+from wm_drake.errors import InputError, Problem, input_error
+from wm_drake.studies.run import options_of_driver
+from wm_drake.studies.study import STUDIES, Study
+
+NOT_OFFERED = {"machine", "sets"}
+"""Options that the page sets itself."""
+
+_TEXT = re.compile(r"\w[\w.,+ %=-]*")
+"""Form of a text that a page may give: no path and no option."""
+
+
+def forms() -> dict[str, list[dict[str, Any]]]:
+    """Return the fields of the form of each study that a page may start.
+
+    A field has its name, kind (integer, number, boolean, text), description, default, and limits.
+    """
+    return {name: _fields(study) for name, study in STUDIES.items() if study.group == "study"}
+
+
+def arguments(name: str, given: dict[str, str]) -> list[str]:
+    """Return what a user has filled in as arguments of the command of a study.
+
+    Args:
+        name: Name of the study.
+        given: Texts by name of the field.
+
+    Raises:
+        InputError: there is no such study or field, or a value is not allowed.
+    """
+    offered = forms()
+    if name not in offered:
+        raise input_error(f"no study '{name}'; allowed are {', '.join(offered)}", key="study")
+    names = [field["name"] for field in offered[name]]
+    options = _options(STUDIES[name])
+    values: dict[str, Any] = {}
+    for field, text in given.items():
+        if field not in names:
+            raise input_error(
+                f"no option of 'study {name}' here; allowed are {', '.join(names)}", key=field
+            )
+        if not _TEXT.fullmatch(text):
+            raise input_error(f"'{text}' is not allowed", key=field)
+        parts = tuple(part.strip() for part in text.split(","))
+        values[field] = parts if _is_repeatable(options[field]) else text
+    try:
+        STUDIES[name].options(**{k: value for k, value in values.items() if k != "quick"})
+    except ValidationError as error:
+        raise InputError(
+            Problem("", ".".join(map(str, fault["loc"])), fault["msg"]) for fault in error.errors()
+        ) from None
+    return [word for k, value in values.items() for word in _words(k, options[k], value)]
+
+
+def _fields(study: Study) -> list[dict[str, Any]]:
+    fields = []
+    for name, option in _options(study).items():
+        kind = _kind(option)
+        if kind is None or name in NOT_OFFERED:
+            continue
+        limits = {
+            word: getattr(limit, word)
+            for limit in option.metadata
+            for word in ("ge", "le")
+            if hasattr(limit, word)
+        }
+        default = "" if option.default in (None, (), False) else str(option.default)
+        about = {"name": name, "kind": kind, "description": option.description}
+        fields.append({**about, "default": default, **limits})
+    return fields
+
+
+def _options(study: Study) -> dict[str, FieldInfo]:
+    """Return the options of a study, and `--quick`."""
+    quick = options_of_driver(study).model_fields["quick"]
+    return {**study.options.model_fields, "quick": quick}
+
+
+def _kind(option: FieldInfo) -> str | None:
+    """Return the kind of a field; None for a path, which a page may not give."""
+    kind: Any = option.annotation
+    if isinstance(kind, types.UnionType):
+        kind = next(part for part in typing.get_args(kind) if part is not type(None))
+    if typing.get_origin(kind) is tuple:
+        kind = typing.get_args(kind)[0]
+    return {int: "integer", float: "number", bool: "boolean", str: "text"}.get(kind)
+
+
+def _is_repeatable(option: FieldInfo) -> bool:
+    return typing.get_origin(option.annotation) is tuple
+
+
+def _words(name: str, option: FieldInfo, value: Any) -> list[str]:
+    """Return the words of an option on the command line."""
+    extra = option.json_schema_extra
+    flag = str((extra if isinstance(extra, dict) else {}).get("flag", ""))
+    if flag == "argument":
+        return [value]
+    flag = flag or f"--{name.replace('_', '-')}"
+    if option.annotation is bool:
+        return [flag] if value == "true" else []
+    return [f"{flag}={part}" for part in (value if _is_repeatable(option) else [value])]
