@@ -72,7 +72,7 @@ def main() -> None:
         middle,
         levels,
         [Case(name, middle.loads[name], profile) for name in LOADS],
-        wanted=("D", "F", "M"),
+        ("D", "F", "M"),
     )
     made = designs(tuple(known), trials)
     *_, (full, _) = made.values()
