@@ -33,10 +33,11 @@ from wm_drake.report.progress import progress_bar
 from wm_drake.simulation.measures.responses import known_responses
 from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate, identity_of
 from wm_drake.studies.calibration.computed import Runner
-from wm_drake.studies.calibration.fewer import fewer_table, fit_with_fewer
-from wm_drake.studies.calibration.outcome import mean_and_largest, solved_machine
-from wm_drake.studies.calibration.prediction import Prediction, predict, prediction_table
-from wm_drake.studies.calibration.solutions import Solution
+from wm_drake.studies.calibration.fewer import fit_with_fewer
+from wm_drake.studies.calibration.machines import solved_machine
+from wm_drake.studies.calibration.prediction import Prediction, predict
+from wm_drake.studies.calibration.solutions import Solution, percents_of
+from wm_drake.studies.calibration.tables import KINDS, fewer_table, prediction_table
 from wm_drake.studies.calibration.targets import Targets, targets_of
 
 FREE = Path(__file__).with_name("reference_free.yaml")
@@ -176,33 +177,28 @@ def _arguments() -> argparse.Namespace:
 
 def _lines(calibration: Calibration, predictions: list[Prediction]) -> list[str]:
     targets, best = calibration.targets, calibration.solutions[0]
-    errors = 100.0 * best.errors(targets)
+    errors = best.errors
     lines = [
         f"searches: {len(calibration.ended)}, distinct good solutions: {len(calibration.solutions)}"
     ]
     for (load, gasket), row in zip(targets.loads, errors, strict=True):
         shown = "  ".join(
-            f"{name} {value:+5.1f}" for name, value in zip(targets.sensors, row, strict=True)
+            f"{name} {100.0 * value:+5.1f}"
+            for name, value in zip(targets.sensors, row, strict=True)
         )
         lines.append(
             f"{load:8s} {'with' if gasket else 'without':7s} gasket, difference in %: {shown}"
         )
     with_gasket = [gasket for _, gasket in targets.loads]
-    for name, part in (("all", errors), ("with gasket", errors[with_gasket])):
-        mean, largest = mean_and_largest(part)
-        lines.append(f"{name}: mean {mean:.1f} %, largest {largest:.1f} %")
+    lines += [f"all: {percents_of(errors)}", f"with gasket: {percents_of(errors[with_gasket])}"]
     if targets.responses:
-        lines += _lines_of_means(targets, best)
+        lines += _lines_of_means(best)
     lines += [
         f"{relation.name}: ratio {float(relation.at(best.point[None])[0]):.2f}"
         for relation in calibration.parameter_map.relations
     ]
     for prediction in predictions:
-        parts = (prediction.calibrated, prediction.predicted, prediction.seen)
-        texts = [
-            "mean {:.1f} %, largest {:.1f} %".format(*mean_and_largest(100.0 * part))
-            for part in parts
-        ]
+        texts = [str(percents_of(getattr(prediction, kind))) for kind in KINDS]
         lines.append(
             f"{', '.join(prediction.loads)}: calibrated {texts[0]}; held out {texts[1]} "
             f"(other loads: {texts[2]}); 95 % intervals contain {100.0 * prediction.covered:.0f} %"
@@ -210,19 +206,19 @@ def _lines(calibration: Calibration, predictions: list[Prediction]) -> list[str]
     return lines
 
 
-def _lines_of_means(targets: Targets, best: Solution) -> list[str]:
-    means = 100.0 * best.response_errors(targets)
+def _lines_of_means(best: Solution) -> list[str]:
+    errors = best.response_errors
     return [
         *(
-            f"{target.load:8s} mean of {target.response.name}, difference in %: {error:+5.1f}"
-            for target, error in zip(targets.responses, means, strict=True)
+            f"{target.load:8s} mean of {target.response.name}, difference in %: {value:+5.1f}"
+            for target, value in zip(best.targets.responses, 100.0 * errors, strict=True)
         ),
-        "means: mean {:.1f} %, largest {:.1f} %".format(*mean_and_largest(means)),
+        f"means: {percents_of(errors)}",
     ]
 
 
 def _write(calibration: Calibration) -> None:
-    solved = solved_machine(calibration.parameter_map, calibration.solutions[0])
+    solved = solved_machine(calibration.solutions[0])
     path, model = machine_path("reference"), sdf_path(solved.model)
     keys = [value.key for value in calibration.parameter_map.values]
     file_keys = [key for key in dict.fromkeys(keys) if not key.startswith(("bodies.", "frames."))]

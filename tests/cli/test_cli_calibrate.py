@@ -124,9 +124,7 @@ FAULTS = {
     "no free file": (["--free", "none.yaml"], "--free: no such file 'none.yaml'"),
     "no targets file": (["--targets", "none.csv"], "--targets: no such file 'none.csv'"),
     "unknown method": (["--method", "luck"], "no method 'luck'"),
-    "no start": (["--starts", "0"], "0 starts"),
     "deviation": (["--deviation", "0"], "deviation"),
-    "resolution": (["--resolution", "-1"], "resolution"),
     "unknown load left out": (
         ["--leave-out", "bck"],
         "no measured load 'bck' (did you mean 'back'?",

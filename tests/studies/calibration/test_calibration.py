@@ -15,16 +15,17 @@ from wm_drake.parameters.files import yaml_text
 from wm_drake.parameters.free import Measured, load_free
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
 from wm_drake.studies.calibration.computed import Evaluation, Runner
-from wm_drake.studies.calibration.fewer import fewer_table, fit_with_fewer
-from wm_drake.studies.calibration.outcome import (
-    amplitude_rows,
-    quantity_table,
-    solved_machine,
-    values_beyond,
-)
+from wm_drake.studies.calibration.fewer import check_counts, fit_with_fewer
+from wm_drake.studies.calibration.machines import solved_machine
 from wm_drake.studies.calibration.parameter_map import parameter_map_of
-from wm_drake.studies.calibration.prediction import check_held_out, predict, prediction_table
+from wm_drake.studies.calibration.prediction import check_held_out, predict
 from wm_drake.studies.calibration.solutions import Solution, distinct
+from wm_drake.studies.calibration.tables import (
+    amplitude_rows,
+    fewer_table,
+    prediction_table,
+    quantity_table,
+)
 from wm_drake.studies.calibration.targets import Targets, targets_of
 from wm_drake.studies.fitting.posterior import Posterior
 
@@ -347,9 +348,9 @@ def test_wrong_limits_are_refused(limits, message):
 
 
 def test_values_beyond_their_limits_are_named():
-    found = solution([0.0], [1.0], np.zeros((1, 1)))
+    found = solution([0.0], [1.0], np.zeros((1, 1)), targets=limited_pair())
     found = replace(found, amplitude=np.array([[1.05, 0.7], [1.4, 9.0]]))
-    assert values_beyond(found, limited_pair()) == ["a without gasket Y -30 % (20 %)"]
+    assert found.values_beyond() == ["a without gasket Y -30 % (20 %)"]
 
 
 def test_search_keeps_a_limit_that_the_cost_alone_does_not(short, tmp_path):
@@ -364,7 +365,7 @@ def test_search_keeps_a_limit_that_the_cost_alone_does_not(short, tmp_path):
             (found,) = calibrate(
                 Runner(short, ledger), free, targets.limited(limits), Plan(starts=1, iterations=20)
             ).ended
-        errors.append(abs(found.errors(targets)[0, place]))
+        errors.append(abs(found.errors[0, place]))
     assert errors[0] > 0.05
     assert errors[1] < 0.035
 
@@ -398,12 +399,12 @@ def recovered(short, tmp_path_factory):
 
 
 def test_known_machine_is_recovered_within_its_standard_deviations(recovered):
-    truth, _, targets, _, calibration, _, _ = recovered
+    truth, _, _, _, calibration, _, _ = recovered
     best = calibration.solutions[0]
     parameter_map = calibration.parameter_map
     posterior = best.posterior.spread() * parameter_map.deviation
     assert np.all(np.abs(best.point - truth) < 3.0 * posterior + 0.02 * parameter_map.deviation)
-    assert np.nanmax(np.abs(best.errors(targets))) < 0.01
+    assert np.nanmax(np.abs(best.errors)) < 0.01
     # friction and lean change the amplitudes; the mass of the motor hardly does
     assert np.all(best.posterior.spread()[:2] < 0.2)
     assert np.sum(best.posterior.directions() > 1.0) >= 2
@@ -486,7 +487,7 @@ def test_interrupted_calibration_continues_where_it_stopped(short, tmp_path, rec
 
 def test_solved_machine_has_the_source_of_each_number(recovered):
     calibration = recovered[4]
-    solved = solved_machine(calibration.parameter_map, calibration.solutions[0])
+    solved = solved_machine(calibration.solutions[0])
     value = f"{solved.damper_types['friction'].friction_force:.10g}"
     text = solved.sources["damper_types.friction.friction_force"]
     assert text.startswith(f"fit: friction {value} ± ")
@@ -517,14 +518,17 @@ def test_unknown_load_or_all_loads_cannot_be_held_out():
         check_held_out(targets, [["a", "b"]])
 
 
-def solution(coordinates, amplitude, slopes, cost=1.0):
+ONE_VALUE = Targets((("a", True),), ("X",), np.array([[1.0]]), np.ones((1, 1)))
+
+
+def solution(coordinates, amplitude, slopes, cost=1.0, targets=ONE_VALUE):
     posterior = Posterior(np.array(coordinates), np.array(slopes), len(slopes))
-    amplitudes = np.array([amplitude])
-    return Solution(0, np.array(coordinates), amplitudes, np.empty(0), cost, 0.0, posterior, 1)
+    computed = np.array([amplitude]), np.empty(0)
+    at = np.array(coordinates)
+    return Solution(None, targets, 0, at, *computed, cost, 0.0, posterior, 1)
 
 
 def test_distinct_solutions_are_good_and_far_apart():
-    targets = Targets((("a", True),), ("X",), np.array([[1.0]]), np.ones((1, 1)))
     best, near, far, bad = (
         solution(at, [1.0 + error], [[1.0, 0.0]], cost)
         for at, error, cost in (
@@ -534,7 +538,7 @@ def test_distinct_solutions_are_good_and_far_apart():
             ([-2, 0], 0.5, 9.0),
         )
     )
-    assert distinct([bad, far, near, best], targets) == [best, far]
+    assert distinct([bad, far, near, best]) == [best, far]
 
 
 KNOWN = """
@@ -552,8 +556,8 @@ def test_known_quantities_enter_like_free_ones(short, tmp_path):
     made = parameter_map.parameters_at(np.array([40.0, 0.03, 5.5, 10.0]))
     assert made.gasket.stiffness_x.force == pytest.approx((-100.0, 0.0, 100.0))
     found = solution([0.0] * 4, [1.0], np.zeros((1, 4)))
-    found = replace(found, point=parameter_map.expected)
-    text = solved_machine(parameter_map, found).sources["gasket.stiffness_x.force"]
+    found = replace(found, parameter_map=parameter_map, point=parameter_map.expected)
+    text = solved_machine(found).sources["gasket.stiffness_x.force"]
     assert text.startswith("fit: hardening 20 ± 20 N (expected 20 ± 20 N); assumption: ")
     assert text.endswith("slope 3 N/mm (data sheet)")
 
@@ -582,3 +586,9 @@ def test_slack_springs_are_residuals(short, tmp_path):
     assert residuals == pytest.approx((0.1 - elongation) / 0.002)
     enough = parameter_map_of(short, free_file(tmp_path, limits.replace("100", "-90") + FREE))
     assert not known_residuals(short, enough, points).any()
+
+
+@pytest.mark.parametrize("counts", [[3], [0], [2, 2], [1, 2], [-1]])
+def test_counts_must_fall_from_the_number_of_free_quantities(counts):
+    with pytest.raises(InputError, match="falling numbers from 2 to 1; 3 quantities are free"):
+        check_counts(counts, 3)

@@ -67,28 +67,14 @@ class Plan:
     draws: int = 200
 
     def check(self) -> None:
-        """Check the settings.
+        """Check the method; the options of the study have the limits of the numbers.
 
         Raises:
-            InputError: the method is unknown or a number is out of range.
+            InputError: the method is unknown.
         """
         if self.method not in METHODS:
             raise input_error(
                 f"no method '{self.method}'{nearest_names(self.method, METHODS)}", key="method"
-            )
-        if self.starts < 1:
-            raise input_error(f"{self.starts} starts; allowed is 1 or more", key="starts")
-        if self.iterations < 0:
-            raise input_error(f"{self.iterations} is not allowed; must be >= 0", key="iterations")
-        if self.seed < 0:
-            raise input_error(f"{self.seed} is not allowed; must be >= 0", key="seed")
-        if not 0.0 < self.deviation < np.inf:
-            raise input_error(
-                f"{self.deviation:g} is not allowed; must be > 0 and finite", key="deviation"
-            )
-        if not 0.0 <= self.resolution < np.inf:
-            raise input_error(
-                f"{self.resolution:g} is not allowed; must be >= 0 and finite", key="resolution"
             )
 
     def spread(self, amplitude: FloatArray) -> FloatArray:
@@ -150,25 +136,24 @@ def calibrate(runner: Runner, free: FreeFile, targets: Targets, plan: Plan) -> C
     plan.check()
     parameter_map = parameter_map_of(runner.machine, free)
     values = runner.values(parameter_map, targets)
-    problem = calibration_problem(parameter_map, targets, plan, values)
+    problem = calibration_problem(values, plan)
     ended = []
     for number in range(plan.starts):
         search = Search(problem, runner.report_of(number))
         start = start_number(search, number, plan.seed)
         iterations = plan.iterations or ITERATIONS[plan.method]
         end = METHODS[plan.method](search, start, iterations, plan.seed + number)
-        ended.append(_solution(number, search, end.point, targets, values))
-    return Calibration(parameter_map, targets, plan, tuple(distinct(ended, targets)), tuple(ended))
+        ended.append(_solution(number, search, end.point, values))
+    return Calibration(parameter_map, targets, plan, tuple(distinct(ended)), tuple(ended))
 
 
-def calibration_problem(
-    parameter_map: ParameterMap, targets: Targets, plan: Plan, values: StoredValues
-) -> PriorProblem:
-    """Return the problem of the free quantities.
+def calibration_problem(values: StoredValues, plan: Plan) -> PriorProblem:
+    """Return the problem of the free quantities of an evaluation.
 
     The first `targets.count` residuals are those of the data. Those of values that have a limit
     follow, then those of what is known beside the priors of the quantities.
     """
+    parameter_map, targets = values.evaluation.parameter_map, values.evaluation.targets
     spread = plan.spread(targets.amplitude)
     unknowns = tuple(
         Unknown(
@@ -216,11 +201,10 @@ def _solution(
     number: int,
     search: Search[PriorProblem],
     coordinates: FloatArray,
-    targets: Targets,
     values: StoredValues,
 ) -> Solution:
     """Return the end of a search as a solution."""
-    problem = search.problem
+    problem, targets = search.problem, values.evaluation.targets
     point = problem.points_at(coordinates)
     data, prior = costs_at(problem, coordinates, targets)
     computed = values(point[None])
@@ -229,6 +213,8 @@ def _solution(
     limits = slice(targets.count, targets.count + limited)
     slopes = np.delete(smooth_jacobian(search, coordinates), limits, axis=0)
     return Solution(
+        parameter_map=values.evaluation.parameter_map,
+        targets=targets,
         start=number,
         point=point,
         amplitude=computed.amplitude[0],

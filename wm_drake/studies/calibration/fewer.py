@@ -1,10 +1,9 @@
 """Simpler machines: what the fit loses when quantities keep their expected values."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 
 from wm_drake.errors import input_error
 from wm_drake.parameters.types import FloatArray
@@ -15,7 +14,7 @@ from wm_drake.studies.calibration.calibration import (
     costs_at,
 )
 from wm_drake.studies.calibration.computed import Runner
-from wm_drake.studies.calibration.outcome import mean_and_largest
+from wm_drake.studies.calibration.solutions import Percents, percents_of
 from wm_drake.studies.fitting.kinks import least_squares_search, smooth_jacobian
 from wm_drake.studies.fitting.posterior import least_needed_out
 from wm_drake.studies.fitting.search import Search
@@ -30,15 +29,15 @@ class Simpler:
         fixed: Names of those that keep their expected values here, but were free in the fit before.
         data_cost, prior_cost: Half the sums of squares of data and prior.
         amplitudes, responses: Mean and largest absolute relative difference of the amplitudes and
-            of the other responses. (NaN, NaN) if there are none.
+            of the other responses; NaN if there are none.
     """
 
     count: int
     fixed: tuple[str, ...]
     data_cost: float
     prior_cost: float
-    amplitudes: tuple[float, float]
-    responses: tuple[float, float]
+    amplitudes: Percents
+    responses: Percents
 
     @property
     def cost(self) -> float:
@@ -87,21 +86,18 @@ def fit_with_fewer(
     names = parameter_map.names
     check_counts(counts, len(names))
     values = runner.values(parameter_map, targets)
-    problem = calibration_problem(parameter_map, targets, plan, values)
+    problem = calibration_problem(values, plan)
     iterations = plan.iterations or ITERATIONS["least-squares"]
     best = calibration.solutions[0]
 
     def simpler(point: FloatArray, free: np.ndarray, fixed: Sequence[str]) -> Simpler:
         computed = values(problem.points_at(point)[None])
-        end = replace(best, amplitude=computed.amplitude[0], responses=computed.responses[0])
         return Simpler(
             len(free),
             tuple(fixed),
             *costs_at(problem, point, targets),
-            mean_and_largest(end.errors(targets)),
-            mean_and_largest(end.response_errors(targets))
-            if targets.responses
-            else (np.nan, np.nan),
+            percents_of(targets.errors(computed.amplitude[0])),
+            percents_of(targets.response_errors(computed.responses[0])),
         )
 
     point, slopes, free = best.coordinates, best.posterior.all_slopes, np.arange(len(names))
@@ -118,22 +114,3 @@ def fit_with_fewer(
         slopes = smooth_jacobian(search, end.point)
         fits.append(simpler(point, free, fixed))
     return fits
-
-
-def fewer_table(fits: Sequence[Simpler]) -> pd.DataFrame:
-    """Return a table with a row for each fit; differences in percent, names separated by blanks."""
-    return pd.DataFrame(
-        [
-            {
-                "free_quantities": fit.count,
-                "cost": fit.cost,
-                "cost_of_data": fit.data_cost,
-                "amplitudes_mean_percent": 100.0 * fit.amplitudes[0],
-                "amplitudes_largest_percent": 100.0 * fit.amplitudes[1],
-                "responses_mean_percent": 100.0 * fit.responses[0],
-                "responses_largest_percent": 100.0 * fit.responses[1],
-                "set_to_expected": " ".join(fit.fixed),
-            }
-            for fit in fits
-        ]
-    )

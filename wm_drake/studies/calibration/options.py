@@ -24,7 +24,7 @@ class CalibrateOptions(Options):
         "Search method: least-squares, basin-hopping (slower, searches more widely) or evolution.",
         "NAME",
     )
-    starts: int = option(8, "Number of searches, each with its own starting point.")
+    starts: int = option(8, "Number of searches, each with its own starting point.", ge=1)
     iterations: int = option(
         0, "Largest number of iterations per search; 0: default of the method.", ge=0
     )
@@ -35,7 +35,9 @@ class CalibrateOptions(Options):
         "responses by name or kind, such as Fx=8 or moment=15 (default: 10). Repeatable.",
         "PERCENT|NAME=PERCENT",
     )
-    resolution: float = option(0.1, "Step to which measured amplitudes are rounded, in mm.")
+    resolution: float = option(
+        0.1, "Step to which measured amplitudes are rounded, in mm.", ge=0, allow_inf_nan=False
+    )
     weight: tuple[str, ...] = option(
         (),
         "Weight of a load, a sensor, a response, a kind of response, or LOAD:NAME. Default: 1. "

@@ -7,26 +7,26 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.model.build import build_machine
-from wm_drake.report.formatting import MISSING, MM_PER_M, number, percent, shape_name
+from wm_drake.report.formatting import MM_PER_M, number, percent, shape_name
 from wm_drake.report.page import Picture, picture, versions_of
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.spin import tables
 from wm_drake.report.spin.cases import case_title
 from wm_drake.report.spin.figures import envelopes_figure
-from wm_drake.report.table import Group, Row, Table, line
+from wm_drake.report.table import Column, Group, Row, Table, line
 from wm_drake.simulation.cases import case_of
 from wm_drake.studies.calibration.calibration import BEYOND_LIMIT, Calibration
-from wm_drake.studies.calibration.fewer import Simpler
 from wm_drake.studies.calibration.figures import errors_figure, modes_figure, quantities_figure
-from wm_drake.studies.calibration.outcome import (
-    mean_and_largest,
-    quantity_table,
-    solved_machine,
-    values_beyond,
-)
+from wm_drake.studies.calibration.machines import solved_machine
 from wm_drake.studies.calibration.prediction import Prediction
-from wm_drake.studies.calibration.response_targets import TRIALS
+from wm_drake.studies.calibration.solutions import percents_of
 from wm_drake.studies.calibration.study import CalibrateResult
+from wm_drake.studies.calibration.tables import (
+    fewer_shown,
+    predictions_shown,
+    quantities_shown,
+    responses_shown,
+)
 from wm_drake.studies.description.modal import Modes, natural_modes
 from wm_drake.studies.spin.study import Comparison, SpinResult, run_spin
 from wm_drake.studies.study import Facts
@@ -38,7 +38,7 @@ def calibration_page(result: CalibrateResult, facts: Facts) -> str:
     Spin runs and modes of the best solution are computed for it.
     """
     calibration = result.calibration
-    solved = solved_machine(calibration.parameter_map, calibration.solutions[0])
+    solved = solved_machine(calibration.solutions[0])
     cases = [case_of(solved, name, gasket=gasket) for name, gasket in calibration.targets.loads]
     built = build_machine(solved)
     titles = {False: "without gasket", True: "with gasket"} if solved.gasket else {False: "modes"}
@@ -100,22 +100,22 @@ def _table_sections(
     result: CalibrateResult, best: SpinResult, table: pd.DataFrame
 ) -> list[Section]:
     calibration, predictions = result.calibration, result.predictions
-    responses, effects = responses_table(calibration), effects_table(calibration)
-    relations = relations_table(calibration)
+    effects, relations = effects_table(calibration), relations_table(calibration)
     sections = [Section("amplitudes", "Amplitudes", tables=(tables.comparison(best, table),))]
-    if responses:
-        sections.append(Section("responses", "Other responses", tables=(responses,)))
+    if calibration.targets.responses:
+        responses = (responses_shown(calibration),)
+        sections.append(Section("responses", "Other responses", tables=responses))
     if effects:
         sections.append(Section("gasket", "Effect of the gasket", tables=(effects,)))
     if predictions:
         intervals = (intervals_table(calibration, p) for p in predictions)
-        shown = (predictions_table(predictions), *intervals)
+        shown = (predictions_shown(predictions), *intervals)
         sections.append(Section("prediction", "Prediction", tables=shown, text=PREDICTION))
-    quantities = (quantities_of(calibration), *([relations] if relations else []))
+    quantities = (quantities_shown(calibration), *([relations] if relations else []))
     sections.append(Section("quantities", "Quantities", tables=quantities))
     if result.fewer:
-        fits = simpler_table(result.fewer)
-        sections.append(Section("fewer", "Fewer free quantities", tables=(fits,)))
+        fits = (fewer_shown(result.fewer),)
+        sections.append(Section("fewer", "Fewer free quantities", tables=fits))
     speeds = tables.critical_speeds(best), tables.smallest_gaps(best)
     sections.append(Section("speeds", "Critical speeds and smallest gaps", tables=speeds))
     return [*sections, Section("searches", "Searches", tables=(searches_table(calibration),))]
@@ -158,8 +158,7 @@ def _method(calibration: Calibration) -> str:
 def summary(calibration: Calibration, predictions: Sequence[Prediction]) -> str:
     """Return one paragraph about the agreement and the certainty of the best solution."""
     targets, best = calibration.targets, calibration.solutions[0]
-    errors = best.errors(targets)
-    mean, _ = mean_and_largest(errors)
+    errors = best.errors
     case, sensor = np.unravel_index(int(np.nanargmax(np.abs(errors))), errors.shape)
     name, gasket = targets.loads[case]
     count = len(calibration.solutions)
@@ -167,27 +166,27 @@ def summary(calibration: Calibration, predictions: Sequence[Prediction]) -> str:
     determined = int(np.sum(best.posterior.directions() > 1.0))
     text = (
         f"The best machine is compared with {np.isfinite(errors).sum()} measured amplitudes. The "
-        f"mean absolute difference is {number(100 * mean)} %. The largest difference is "
-        f"{percent(100 * errors[case, sensor])}, at sensor {targets.sensors[sensor]} with load "
+        f"mean absolute difference is {number(percents_of(errors).mean)} %. The largest difference "
+        f"is {percent(100 * errors[case, sensor])}, at sensor {targets.sensors[sensor]} with load "
         f"{name} ({'with' if gasket else 'without'} gasket). "
         f"{searches} {'search' if searches == 1 else 'searches'} found {count} distinct good "
         f"{'solution' if count == 1 else 'solutions'}. The data determine {determined} of "
         f"{quantities} independent combinations of the free quantities better than the priors do."
     )
     if targets.responses:
-        mean, largest = mean_and_largest(best.response_errors(targets))
+        others = percents_of(best.response_errors)
         text += (
             f" Of {len(targets.responses)} other responses, the mean absolute difference is "
-            f"{number(100 * mean)} % and the largest {number(100 * largest)} %."
+            f"{number(others.mean)} % and the largest {number(others.largest)} %."
         )
-    if beyond := values_beyond(best, targets):
+    if beyond := best.values_beyond():
         text += f" Beyond their limits: {', '.join(beyond)}."
     if predictions:
         covered = float(np.mean([p.covered for p in predictions]))
-        worst = max(predictions, key=lambda p: mean_and_largest(p.predicted)[0])
+        worst = max(predictions, key=lambda p: percents_of(p.predicted).mean)
         text += (
             " Held-out loads are predicted with a mean absolute difference of at most "
-            f"{number(100 * mean_and_largest(worst.predicted)[0])} % (worst case: "
+            f"{number(percents_of(worst.predicted).mean)} % (worst case: "
             f"{', '.join(worst.loads)}). Their 95 % intervals contain "
             f"{number(100 * covered, 0)} % of the measured amplitudes."
         )
@@ -209,7 +208,7 @@ def warnings_of(best: SpinResult) -> list[str]:
 def certainty(calibration: Calibration) -> list[tuple[str, str]]:
     """Return which quantities the data determine, and which only the priors: heading and text."""
     best, names = calibration.solutions[0], calibration.parameter_map.names
-    column = quantity_table(calibration)["held_by_1"]
+    verdicts = best.verdicts()
     sizes = best.posterior.directions()
     rows = [
         (
@@ -222,7 +221,7 @@ def certainty(calibration: Calibration) -> list[tuple[str, str]]:
     for verdict, text in _VERDICTS.items():
         held = [
             name.replace("_", " ")
-            for name, word in zip(names, column, strict=True)
+            for name, word in zip(names, verdicts, strict=True)
             if word == verdict
         ]
         rows.append((text, ", ".join(held) or "none"))
@@ -262,35 +261,6 @@ def effects_table(calibration: Calibration) -> Table | None:
         "([B] Table 1)."
     )
     return Table(caption, ("load", "source", *targets.sensors), tuple(groups), text_columns=2)
-
-
-def responses_table(calibration: Calibration) -> Table | None:
-    """Return the targets that are no amplitudes, beside those of the best solution."""
-    targets, best = calibration.targets, calibration.solutions[0]
-    if not targets.responses:
-        return None
-    errors = best.responses / [target.value for target in targets.responses] - 1.0
-    groups = [
-        line(
-            f"{target.load}, {'with' if target.gasket else 'without'} gasket",
-            [
-                target.response.name,
-                "mean over the design" if target.of_design else "the machine",
-                target.response.unit_text,
-                f"{target.value:.4g}",
-                f"{value:.4g}",
-                percent(100 * error) if target.weight > 0.0 else MISSING,
-            ],
-        )
-        for target, value, error in zip(targets.responses, best.responses, errors, strict=True)
-    ]
-    caption = (
-        "Responses that are no amplitudes of sensors. A mean over the design is the mean over "
-        f"{TRIALS} trials of an orthogonal array of the gasket's factors ([B] section 4). A "
-        "response without a difference was not used."
-    )
-    header = ("load", "response", "of", "unit", "target", "calibrated machine", "difference")
-    return Table(caption, header, tuple(groups), text_columns=4)
 
 
 def relations_table(calibration: Calibration) -> Table | None:
@@ -339,115 +309,37 @@ def intervals_table(calibration: Calibration, prediction: Prediction) -> Table:
     return Table(caption, ("load", "source", *targets.sensors), tuple(groups), text_columns=2)
 
 
-def predictions_table(predictions: Sequence[Prediction]) -> Table:
-    """Return the errors of loads when they were used for the calibration and when held out."""
-    groups = []
-    for prediction in predictions:
-        kinds = (prediction.calibrated, prediction.predicted, prediction.seen)
-        cells = [number(100 * v) for errors in kinds for v in mean_and_largest(errors)]
-        cells.append(number(100 * prediction.covered, 0))
-        groups.append(line(", ".join(prediction.loads), cells))
-    errors = ("mean, %", "largest, %")
-    header = (
-        "held-out loads",
-        *(f"{kind}: {error}" for kind in ("calibrated", "predicted", "others") for error in errors),
-        "in the 95 % intervals, %",
-    )
-    caption = (
-        "Absolute differences from the experiment. Calibrated: these loads in the calibration "
-        "above, which used them. Predicted: these loads when they were held out. Others: the "
-        "remaining loads in the calibration without them."
-    )
-    return Table(caption, header, tuple(groups))
-
-
-def quantities_of(calibration: Calibration) -> Table:
-    """Return the prior and the solutions of every free quantity, and what determines its value."""
-    table = quantity_table(calibration)
-    others = range(2, len(calibration.solutions) + 1)
-    groups = []
-    for row in table.to_dict("records"):
-        cells = [
-            str(row["held_by_1"]),
-            str(row["unit"]) or MISSING,
-            f"{row['lower']:.4g} to {row['upper']:.4g}".replace("-", "−"),
-            f"{row['expected']:.4g} ± {row['deviation']:.2g}".replace("-", "−"),
-            f"{row['value_1']:.4g} ± {row['deviation_1']:.2g}".replace("-", "−"),
-            *(f"{row[f'value_{n}']:.4g}".replace("-", "−") for n in others),
-        ]
-        groups.append(line(str(row["quantity"]), cells))
-    header = (
-        "quantity",
-        "determined by",
-        "unit",
-        "bounds",
-        "expected",
-        "solution 1",
-        *(f"solution {n}" for n in others),
-    )
-    return Table(
-        "Free quantities, with their standard deviations before and after the fit.",
-        header,
-        tuple(groups),
-        text_columns=3,
-    )
-
-
-def simpler_table(fits: Sequence[Simpler]) -> Table:
-    """Return what the fit loses with fewer free quantities."""
-    groups = []
-    for fit in fits:
-        percents = (100 * x for x in (*fit.amplitudes, *fit.responses))
-        cells = [number(fit.cost), number(fit.data_cost)]
-        cells += [MISSING if np.isnan(x) else number(x) for x in percents]
-        names = ", ".join(name.replace("_", " ") for name in fit.fixed) or MISSING
-        groups.append(line(str(fit.count), [*cells, names]))
-    header = (
-        "free quantities",
-        "cost",
-        "cost of the data",
-        "amplitudes: mean error, %",
-        "largest, %",
-        "other responses: mean error, %",
-        "largest, %",
-        "set to expected values here",
-    )
-    caption = (
-        "Best fit with fewer free quantities. Each row frees those of the row above but for the "
-        "named ones, whose loss raises the cost least in the linearised fit."
-    )
-    return Table(caption, header, tuple(groups))
-
-
 def searches_table(calibration: Calibration) -> Table:
     """Return the end point of every search."""
-    groups = []
-    for end in calibration.ended:
-        rank = next(
-            (str(n) for n, s in enumerate(calibration.solutions, start=1) if s is end), MISSING
+    ranks = {solution.start: n for n, solution in enumerate(calibration.solutions, start=1)}
+    groups = tuple(
+        line(
+            end.start + 1,
+            (
+                ranks.get(end.start),
+                end.data_cost,
+                end.prior_cost,
+                *percents_of(end.errors),
+                end.evaluations,
+            ),
         )
-        mean, largest = mean_and_largest(end.errors(calibration.targets))
-        cells = [
-            rank,
-            *map(number, (end.data_cost, end.prior_cost, 100 * mean, 100 * largest)),
-            str(end.evaluations),
-        ]
-        groups.append(line(str(end.start + 1), cells))
-    header = (
-        "start",
-        "solution",
-        "cost of the data",
-        "cost of the priors",
-        "mean error, %",
-        "largest error, %",
-        "machines tried",
+        for end in calibration.ended
+    )
+    columns = (
+        Column("start", decimals=0),
+        Column("solution", decimals=0),
+        Column("cost of the data", decimals=1),
+        Column("cost of the priors", decimals=1),
+        Column("mean error", "%", 1),
+        Column("largest error", "%", 1),
+        Column("machines tried", decimals=0),
     )
     caption = (
         "End point of each search. A solution is good if its mean error is close to that of the "
         "best solution. It is distinct if it differs from every better solution by at least half a "
         "prior standard deviation (root mean square over the quantities)."
     )
-    return Table(caption, header, tuple(groups))
+    return Table(caption, columns, groups)
 
 
 def _other_models(table: pd.DataFrame) -> list[str]:

@@ -111,6 +111,16 @@ class ParameterMap:
     elongation: tuple[float, float] | None
     relations: tuple[KnownRatio, ...]
 
+    @property
+    def prior(self) -> tuple[FloatArray, FloatArray]:
+        """Expected values and standard deviations."""
+        return self.expected, self.deviation
+
+    def in_units(self, values: FloatArray) -> FloatArray:
+        """Return values (quantity) in the units in which the quantities are written."""
+        pairs = zip(values.tolist(), self.units, strict=True)
+        return np.array([from_base(value, unit) for value, unit in pairs])
+
     def prior_residuals(
         self, points: FloatArray, preload: FloatArray, elongation: FloatArray
     ) -> FloatArray:

@@ -9,14 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate
 from wm_drake.studies.calibration.computed import Runner, StoredValues
-from wm_drake.studies.calibration.outcome import mean_and_largest
 from wm_drake.studies.calibration.targets import Targets
 
 
@@ -92,28 +90,12 @@ def predict(
                 loads,
                 calibration.solutions[0].amplitude[cases] / targets.amplitude[cases] - 1.0,
                 best.amplitude[cases] / targets.amplitude[cases] - 1.0,
-                best.errors(seen)[~cases],
+                best.errors[~cases],
                 limits[:, cases] / targets.amplitude[cases] - 1.0,
                 scatter,
             )
         )
     return predictions
-
-
-def prediction_table(predictions: Sequence[Prediction]) -> pd.DataFrame:
-    """Return a table with a row for each group of held-out loads; differences in percent."""
-    rows = []
-    for prediction in predictions:
-        row: dict[str, object] = {"held_out": " ".join(prediction.loads)}
-        row["amplitudes"] = prediction.predicted.size
-        for kind in ("calibrated", "predicted", "seen"):
-            mean, largest = mean_and_largest(getattr(prediction, kind))
-            row |= {
-                f"{kind}_mean_percent": 100.0 * mean,
-                f"{kind}_largest_percent": 100.0 * largest,
-            }
-        rows.append(row | {"in_intervals_percent": 100.0 * prediction.covered})
-    return pd.DataFrame(rows)
 
 
 def _interval(calibration: Calibration, values: StoredValues) -> tuple[FloatArray, float]:
@@ -122,9 +104,9 @@ def _interval(calibration: Calibration, values: StoredValues) -> tuple[FloatArra
     Machines are drawn in equal numbers from the normal distributions around all distinct good
     solutions, because the data cannot tell these apart.
     """
-    targets, plan, parameter_map = calibration.targets, calibration.plan, calibration.parameter_map
+    plan, parameter_map = calibration.plan, calibration.parameter_map
     generator = np.random.default_rng([plan.seed, plan.draws])
-    logarithms = np.log1p(calibration.solutions[0].errors(targets))
+    logarithms = np.log1p(calibration.solutions[0].errors)
     scatter = max(plan.deviation, float(np.sqrt(np.nanmean(logarithms**2))))
     each = -(-plan.draws // len(calibration.solutions))
     drawn = np.concatenate(

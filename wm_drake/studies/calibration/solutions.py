@@ -1,12 +1,14 @@
 """Solutions of a calibration: errors, uncertainties, and the choice of distinct solutions."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.calibration.parameter_map import ParameterMap
 from wm_drake.studies.calibration.targets import Targets
-from wm_drake.studies.fitting.posterior import Posterior
+from wm_drake.studies.fitting.posterior import AT_BOUND, DETERMINED, UNDETERMINED, Posterior
 
 GOOD = 1.25
 """Largest ratio of the mean error of a good solution to that of the best solution."""
@@ -15,11 +17,36 @@ DISTINCT = 0.5
 """Least distance between distinct solutions: RMS over the quantities, in prior deviations."""
 
 
+class Percents(NamedTuple):
+    """Mean and largest absolute value of relative errors, in percent; NaN without errors."""
+
+    mean: float
+    largest: float
+
+    def named(self, prefix: str = "") -> dict[str, float]:
+        """Return both by name, such as `mean_percent`, for files."""
+        return {f"{prefix}{name}_percent": value for name, value in self._asdict().items()}
+
+    def __str__(self) -> str:
+        """Return both as words."""
+        return f"mean {self.mean:.1f} %, largest {self.largest:.1f} %"
+
+
+def percents_of(errors: FloatArray) -> Percents:
+    """Return mean and largest absolute value of relative errors; NaN values are ignored."""
+    if not errors.size:
+        return Percents(np.nan, np.nan)
+    sizes = np.abs(errors)
+    return Percents(100.0 * float(np.nanmean(sizes)), 100.0 * float(np.nanmax(sizes)))
+
+
 @dataclass(frozen=True)
 class Solution:
     """The end point of a search.
 
     Attributes:
+        parameter_map: Map from the free quantities to the machine.
+        targets: Targets of the search.
         start: Number of the start.
         point: (n) values of the free quantities, in SI units.
         amplitude: (case, sensor) computed amplitudes. [m]
@@ -29,6 +56,8 @@ class Solution:
         evaluations: Number of points that the search evaluated.
     """
 
+    parameter_map: ParameterMap
+    targets: Targets
     start: int
     point: FloatArray
     amplitude: FloatArray
@@ -48,26 +77,49 @@ class Solution:
         """Point in units of the prior: (quantity - expected) / deviation. (n)"""
         return self.posterior.coordinates
 
-    def response_errors(self, targets: Targets) -> FloatArray:
-        """Return (computed - target) / target (response); NaN where the weight is 0."""
-        values = np.array([target.value for target in targets.responses])
-        return np.where(targets.response_weight > 0.0, self.responses / values - 1.0, np.nan)
+    @property
+    def errors(self) -> FloatArray:
+        """(computed - measured) / measured (case, sensor); NaN where the weight is 0."""
+        return self.targets.errors(self.amplitude)
 
-    def errors(self, targets: Targets) -> FloatArray:
-        """Return (computed - measured) / measured (case, sensor); NaN where the weight is 0."""
-        return np.where(targets.weight > 0.0, self.amplitude / targets.amplitude - 1.0, np.nan)
+    @property
+    def response_errors(self) -> FloatArray:
+        """(computed - target) / target (response); NaN where the weight is 0."""
+        return self.targets.response_errors(self.responses)
+
+    def verdicts(self) -> list[str]:
+        """Return what determines each quantity: "data", "prior", "data and prior" or "bound"."""
+        lower, upper = self.parameter_map.lower, self.parameter_map.upper
+        at_bound = np.minimum(self.point - lower, upper - self.point) < AT_BOUND * (upper - lower)
+        spread = self.posterior.spread()
+        cases = [at_bound, spread < DETERMINED, spread > UNDETERMINED]
+        return list(map(str, np.select(cases, ["bound", "data", "prior"], "data and prior")))
+
+    def values_beyond(self) -> list[str]:
+        """Return a text for each value beyond its limit, such as ``middle Xf +23 % (20 %)``."""
+        targets = self.targets
+        loads = [f"{name}{'' if gasket else ' without gasket'}" for name, gasket in targets.loads]
+        names = [f"{load} {sensor}" for load in loads for sensor in targets.sensors]
+        names += [f"{target.load} {target.response.name}" for target in targets.responses]
+        errors = np.concatenate([self.errors.ravel(), self.response_errors])
+        used = [(name, e) for name, e in zip(names, errors, strict=True) if e == e]
+        return [
+            f"{name} {100.0 * error:+.0f} % ({100.0 * limit:g} %)"
+            for (name, error), limit in zip(used, targets.limit_of_each(), strict=True)
+            if abs(error) > limit
+        ]
 
 
-def distinct(solutions: list[Solution], targets: Targets) -> list[Solution]:
+def distinct(solutions: list[Solution]) -> list[Solution]:
     """Return the good solutions, best first, without those that are close to a better one."""
     ordered = sorted(solutions, key=lambda solution: solution.cost)
-    limit = GOOD * float(np.nanmean(np.abs(ordered[0].errors(targets))))
+    limit = GOOD * percents_of(ordered[0].errors).mean
     kept: list[Solution] = []
     for solution in ordered:
         far = all(
             np.sqrt(np.mean((solution.coordinates - other.coordinates) ** 2)) > DISTINCT
             for other in kept
         )
-        if far and np.nanmean(np.abs(solution.errors(targets))) <= limit:
+        if far and percents_of(solution.errors).mean <= limit:
             kept.append(solution)
     return kept

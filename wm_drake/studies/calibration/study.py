@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 from rich.table import Table
 
@@ -26,19 +25,23 @@ from wm_drake.studies.calibration.calibration import (
     calibrate,
 )
 from wm_drake.studies.calibration.computed import Runner
-from wm_drake.studies.calibration.fewer import Simpler, check_counts, fewer_table, fit_with_fewer
+from wm_drake.studies.calibration.fewer import Simpler, check_counts, fit_with_fewer
+from wm_drake.studies.calibration.machines import solved_machine
 from wm_drake.studies.calibration.options import CalibrateOptions
-from wm_drake.studies.calibration.outcome import (
-    amplitude_rows,
-    mean_and_largest,
-    quantity_table,
-    response_table,
-    solved_machine,
-    values_beyond,
-)
 from wm_drake.studies.calibration.parameter_map import parameter_map_of
 from wm_drake.studies.calibration.prediction import Prediction, check_held_out, predict
 from wm_drake.studies.calibration.response_targets import with_deviations
+from wm_drake.studies.calibration.solutions import percents_of
+from wm_drake.studies.calibration.tables import (
+    KINDS,
+    amplitude_rows,
+    fewer_shown,
+    fewer_table,
+    predictions_shown,
+    quantities_shown,
+    quantity_table,
+    response_table,
+)
 from wm_drake.studies.calibration.targets import AMPLITUDE, Targets, targets_of
 from wm_drake.studies.inputs import existing_file, pairs_of, problems_of_option, with_measured
 from wm_drake.studies.run import Executor
@@ -66,7 +69,7 @@ class CalibrateResult(Result):
     def write(self, folder: Path) -> None:
         """Write the machine of each solution and the tables."""
         for number, solution in enumerate(self.calibration.solutions, start=1):
-            text = machine_yaml(solved_machine(self.calibration.parameter_map, solution, number))
+            text = machine_yaml(solved_machine(solution, number))
             (folder / f"machine_{number}.yaml").write_text(text, encoding="utf-8")
         for name, table in self.tables().items():
             digits = "%.4f" if name == "amplitudes" else self.float_format
@@ -82,8 +85,8 @@ class CalibrateResult(Result):
                     "start": s.start,
                     "cost": s.cost,
                     "data_cost": s.data_cost,
-                    **_percents(s.errors(targets)),
-                    "other_responses": _percents(s.response_errors(targets))
+                    **percents_of(s.errors).named(),
+                    "other_responses": percents_of(s.response_errors).named()
                     if targets.responses
                     else None,
                 }
@@ -92,10 +95,7 @@ class CalibrateResult(Result):
             "quantities": json.loads(quantity_table(calibration).to_json(orient="records")),
             "predictions": [
                 {"loads": list(p.loads)}
-                | {
-                    kind: _percents(getattr(p, kind))
-                    for kind in ("calibrated", "predicted", "seen")
-                }
+                | {kind: percents_of(getattr(p, kind)).named() for kind in KINDS}
                 | {"covered_percent": 100 * p.covered}
                 for p in self.predictions
             ],
@@ -104,68 +104,30 @@ class CalibrateResult(Result):
 
     def terminal(self) -> Iterator[Table | str]:
         """Yield the quantities, the errors, predictions, and fits with fewer quantities."""
-        calibration, targets = self.calibration, self.calibration.targets
-        yield _values_table(calibration)
-        best = calibration.solutions[0]
+        best = self.calibration.solutions[0]
+        yield quantities_shown(self.calibration, is_short=True).terminal(
+            "Best solution, machine_1.yaml"
+        )
         yield (
-            f"Searches: {len(calibration.ended)}. Distinct good solutions: "
-            f"{len(calibration.solutions)}."
+            f"Searches: {len(self.calibration.ended)}. Distinct good solutions: "
+            f"{len(self.calibration.solutions)}."
         )
         yield "Absolute differences of the amplitudes from the experiment:"
-        yield f"  best solution: {_in_words(best.errors(targets))}"
-        if targets.responses:
+        yield f"  best solution: {percents_of(best.errors)}"
+        if best.targets.responses:
             yield "Absolute differences of the other responses:"
-            yield f"  best solution: {_in_words(best.response_errors(targets))}"
-        yield from (f"  beyond its limit: {text}" for text in values_beyond(best, targets))
-        for prediction in self.predictions:
-            yield f"  load {', '.join(prediction.loads)}:"
-            yield f"    used for the calibration: {_in_words(prediction.calibrated)}"
-            yield f"    held out and predicted: {_in_words(prediction.predicted)}"
-            yield f"    other loads in that calibration: {_in_words(prediction.seen)}"
-            covered = f"{100 * prediction.covered:.0f} %"
-            yield f"    95 % intervals contain {covered} of the held-out amplitudes"
+            yield f"  best solution: {percents_of(best.response_errors)}"
+        yield from (f"  beyond its limit: {text}" for text in best.values_beyond())
+        if self.predictions:
+            yield predictions_shown(self.predictions).terminal("Held-out loads")
         if self.fewer:
-            yield _fewer_table(self.fewer)
+            yield fewer_shown(self.fewer).terminal("Cost against number of free quantities")
 
     def page(self, facts: Facts) -> str:
         """Return the page."""
         from wm_drake.studies.calibration.page import calibration_page
 
         return calibration_page(self, facts)
-
-
-def _percents(errors: np.ndarray) -> dict[str, float]:
-    mean, largest = mean_and_largest(errors)
-    return {"mean_percent": 100 * mean, "largest_percent": 100 * largest}
-
-
-def _in_words(errors: np.ndarray) -> str:
-    mean, largest = mean_and_largest(errors)
-    return f"mean {100 * mean:.1f} %, largest {100 * largest:.1f} %"
-
-
-def _values_table(calibration: Calibration) -> Table:
-    """Return the quantities of the best solution; the deviation is that given data and prior."""
-    table = Table(title="Best solution, machine_1.yaml")
-    table.add_column("quantity", no_wrap=True)
-    for head in ("value", "± deviation", "expected"):
-        table.add_column(head, justify="right")
-    for head in ("unit", "determined by"):
-        table.add_column(head)
-    for row in quantity_table(calibration).to_dict("records"):
-        numbers = (f"{row[key]:.4g}" for key in ("value_1", "deviation_1", "expected"))
-        table.add_row(str(row["quantity"]), *numbers, str(row["unit"]), str(row["held_by_1"]))
-    return table
-
-
-def _fewer_table(fits: Sequence[Simpler]) -> Table:
-    table = Table(title="Cost against number of free quantities")
-    frame = fewer_table(fits).drop(columns="set_to_expected")
-    for head in frame.columns:
-        table.add_column(head.replace("_", " "), justify="right")
-    for row in frame.itertuples(index=False):
-        table.add_row(str(row[0]), *("–" if math.isnan(x) else f"{x:.3g}" for x in row[1:]))
-    return table
 
 
 class CalibrateTask(Task):

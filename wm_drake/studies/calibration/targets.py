@@ -54,6 +54,15 @@ class Targets:
         """Weights of the other responses. (response)"""
         return np.array([target.weight for target in self.responses])
 
+    def errors(self, amplitude: FloatArray) -> FloatArray:
+        """Return (computed - measured) / measured (case, sensor); NaN where the weight is 0."""
+        return np.where(self.weight > 0.0, amplitude / self.amplitude - 1.0, np.nan)
+
+    def response_errors(self, responses: FloatArray) -> FloatArray:
+        """Return (computed - target) / target (response); NaN where the weight is 0."""
+        values = np.array([target.value for target in self.responses])
+        return np.where(self._used, responses / values - 1.0, np.nan)
+
     def residuals(
         self, amplitude: FloatArray, responses: FloatArray, spread: FloatArray
     ) -> FloatArray:
