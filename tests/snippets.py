@@ -165,7 +165,7 @@ def write_commands_page(folder):
         encoding="utf-8",
     )
     shutil.copy(TABLE_1, folder / "amplitudes.csv")
-    shutil.copy(TABLE_1.with_name("sanchez_tabuenca_2020_table5_means.csv"), folder / "results.csv")
+    shutil.copy(TABLE_1.with_name("sanchez_tabuenca_2020_tables45.csv"), folder / "results.csv")
     shutil.copy(CYCLES / "profile_spin_cycle.yaml", folder / "my_cycle.yaml")
     cases = (CYCLES / "cases_table9.csv").read_text(encoding="utf-8").splitlines()
     (folder / "my_cases.csv").write_text("\n".join(cases[:4]) + "\n", encoding="utf-8")

@@ -392,7 +392,7 @@ CSV = {
     "targets": (MACHINES_FOLDER / "sanchez_tabuenca_2020_table3.csv").read_text(encoding="utf-8"),
     "loop": loop_text(),
     "design": "C_L\n-1\n0\n1\n",
-    "published": (MACHINES_FOLDER / "sanchez_tabuenca_2020_table5_means.csv").read_text("utf-8"),
+    "published": (MACHINES_FOLDER / "sanchez_tabuenca_2020_tables45.csv").read_text("utf-8"),
     "signals": "time_s,speed_rpm,Xr,Zf\n" + "".join(
         f"{0.01 * n:g},{0.3 * n:g},{n % 7},{n % 5}\n" for n in range(3000)
     ),

@@ -1,9 +1,11 @@
 """Published results of a gasket study: what a file may contain, and what is refused."""
 
+import numpy as np
 import pytest
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import load_machine, published_results
+from wm_drake.parameters.published import OF_RESPONSE
 
 HEADER = "load,response,term,percent,effects\n"
 
@@ -18,11 +20,36 @@ def write(tmp_path):
     return written
 
 
-def test_reference_machine_has_the_grand_means_of_table_5(reference):
+def test_reference_machine_has_tables_4_and_5(reference):
     found = published_results(reference.published)
     assert len(found) == 18
     assert found["middle", "My"]["constant"].effects == (5.72,)
-    assert found["counter", "Dz"]["constant"].effects == (3.3,)
+    assert found["counter", "Dz"]["range"].effects == (2.1, 5.2)
+    assert found["middle", "Dx"]["interactions"].percent == 29.41
+    mains = [
+        term
+        for terms in found.values()
+        for name, term in terms.items()
+        if name not in OF_RESPONSE and ":" not in name
+    ]
+    assert len(mains) == 30
+    assert all(len(term.effects) == 3 for term in mains)
+
+
+def test_contributions_and_effects_of_table_5_belong_together(reference):
+    """Sums of squares of the effects of a response have the ratios of its contributions.
+
+    They do so only if the effect at level 1 is minus the sum of the two that are printed.
+    """
+    for terms in published_results(reference.published).values():
+        ratios = [
+            np.square(term.effects).sum() / term.percent
+            for name, term in terms.items()
+            if name not in OF_RESPONSE and ":" not in name
+        ]
+        assert max(ratios) / min(ratios) < 1.08
+        sums = terms["main effects"].percent + terms["interactions"].percent
+        assert 97.0 < sums <= 100.0
 
 
 def test_means_contributions_and_effects_are_read(write):
@@ -56,6 +83,8 @@ def test_effects_at_two_levels_are_completed_to_a_sum_of_zero(write):
         ("middle,Dx,constant,,\n", "constant has 0 percentages and 0 effects"),
         ("middle,Dx,C_L,40,1 2 3 4\n", "allowed are one percentage and 2 or 3 effects"),
         ("middle,Dx,a:b:c,40,\n", "a term has at most 2 factors"),
+        ("middle,Dx,range,,1\n", "range has 0 percentages and 1 effects"),
+        ("middle,Dx,main effects,90,1\n", "allowed are one percentage and no effects"),
         ("middle,Dx,C_L,40 50,\n", "has 2 percentages"),
         ("middle,Dx,C_L,much,\n", "percent: 'much' is not a finite number"),
         ("middle,Dx,C_L,40,1 inf 2\n", "effects: 'inf' is not a finite number"),

@@ -16,6 +16,18 @@ COLUMNS = ["load", "response", "term", "percent", "effects"]
 CONSTANT = "constant"
 """Term whose only effect is the grand mean of the response."""
 
+RANGE = "range"
+"""Term whose two effects are the smallest and the largest value of the response."""
+
+MAIN, INTERACTIONS = "main effects", "interactions"
+"""Terms whose percentages are those of all main effects and of all interactions."""
+
+OF_RESPONSE = (CONSTANT, RANGE, MAIN, INTERACTIONS)
+"""Terms that belong to a response as a whole, not to a term of the model."""
+
+
+NUMBER_OF_EFFECTS = {CONSTANT: {1}, RANGE: {2}, MAIN: {0}, INTERACTIONS: {0}}
+"""Allowed numbers of effects of the terms that are no factors."""
 
 MOST_FACTORS = 2
 """Largest number of factors of a term: the models of the study have main effects and pairs."""
@@ -27,9 +39,9 @@ class PublishedTerm:
 
     Attributes:
         percent: Contribution to the variance; None if it was not published. [%]
-        effects: Grand mean of the constant, else the effects at the levels -1, 0, 1; 3^k numbers
-            for k factors, the level of the first factor changes slowest. Empty if they were not
-            published. [unit of the response]
+        effects: Grand mean of the constant, smallest and largest value of the range, else the
+            effects at the levels -1, 0, 1; 3^k numbers for k factors, the level of the first
+            factor changes slowest. Empty if they were not published. [unit of the response]
     """
 
     percent: float | None
@@ -44,8 +56,10 @@ def published_results(paths: Sequence[str], key: str = "published") -> Published
     """Read the published results of a gasket study.
 
     A file has the columns load, response, term, percent and effects. The term `constant` has the
-    grand mean as its effect. Effects are separated by spaces. They are given at the levels -1, 0
-    and 1, or at -1 and 0 only, as in [B] Table 5; effects sum to zero, so the others follow.
+    grand mean as its effect, `range` the smallest and the largest value; `main effects` and
+    `interactions` have the percentages of all of them together. Effects are separated by spaces.
+    They are given at the levels -1, 0 and 1, or at -1 and 0 only, as in [B] Table 5; effects sum
+    to zero, so the others follow.
 
     Args:
         paths: The CSV files.
@@ -116,14 +130,14 @@ def _term(term: str, row: _Row) -> PublishedTerm:
     order = term.count(":") + 1
     if order > MOST_FACTORS:
         raise row.error(f"a term has at most {MOST_FACTORS} factors")
-    allowed = {1} if term == CONSTANT else {0, 2**order, 3**order}
+    allowed = NUMBER_OF_EFFECTS.get(term, {0, 2**order, 3**order})
     if len(percents) > 1 or len(effects) not in allowed:
-        texts = " or ".join(str(n) for n in sorted(allowed) if n)
+        texts = " or ".join(str(n) for n in sorted(allowed) if n) or "no"
         raise row.error(
             f"{term} has {len(percents)} percentages and {len(effects)} effects; allowed are one "
             f"percentage and {texts} effects"
         )
-    if term != CONSTANT and len(effects) == 2**order:
+    if term not in OF_RESPONSE and len(effects) == 2**order:
         effects = _completed(effects)
     return PublishedTerm(percents[0] if percents else None, effects)
 

@@ -51,6 +51,8 @@ def published():
             "constant": PublishedTerm(None, (16.0,)),
             "C_L": PublishedTerm(60.0, (1.0, 0.5, -1.5)),
             "K_Lx": PublishedTerm(29.0, ()),
+            "main effects": PublishedTerm(95.0, ()),
+            "range": PublishedTerm(None, (15.0, 17.0)),
         },
         ("middle", "Dy"): {
             "constant": PublishedTerm(None, (6.0,)),
@@ -70,6 +72,9 @@ def test_differences_from_the_published_results(screening, published):
     far = published.far_means(screening)
     assert far == {("middle", "Dy"): pytest.approx(100.0 * 4.0 / 6.0)}
     # ours are 100 and 0; 29 points are not far, 40 are
+    assert published.leaders(screening)["middle", "Dx"] == ("C_L", "C_L")
+    assert published.range(("middle", "Dx")) == (15.0, 17.0)
+    assert published.sums(("middle", "Dx")) == (95.0, None)
     points = published.far_contributions(screening)
     assert points == {(("middle", "Dx"), "C_L"): pytest.approx(40.0)}
 
@@ -80,6 +85,19 @@ def test_term_with_its_factors_in_another_order_is_found(screening, published):
     effects = published.effects(("middle", "Dy"), term)
     # in the file K_Lx is the first factor: its level changes slowest
     assert (effects[-1, -1], effects[0, -1], effects[-1, 0], effects[1, 1]) == (0.0, 1.0, 3.0, 8.0)
+
+
+def test_effects_with_another_sign_are_marked(screening):
+    known = {("middle", "Dx"): {"C_L": PublishedTerm(90.0, (-1.0, 0.0, 1.0))}}
+    turned = published_for(known, screening.tables, "table.csv")
+    assert turned.other_signs(screening) == [(("middle", "Dx"), "C_L")]
+    shown = texts.leading(screening, "middle", Words(levels(screening), {}), turned)
+    (row,) = [row for row in shown.groups[0].rows if "sign differs" in row.cells[0]]
+    assert row.kind == "alarm"
+    text = " ".join(summary(screening, Words((), {}), Compared(turned)))
+    assert "The most influential factor is the published one in 1 of 1 cases." in text
+    assert "differ from the published ones by 10.0 points of percent in the mean" in text
+    assert "another sign than the published ones: 1 of 1: C_L on Dx, load middle." in text
 
 
 def test_summary_says_what_is_far(screening, published):
@@ -115,17 +133,21 @@ def test_tables_and_files_have_published_numbers_beside_ours(screening, publishe
         ("0.0", "29.0"),
     ]
     assert ("published effect", "", "", "1.00", "0.500", "−1.50") in cells
-    assert len(texts.variance(screening, words).header) == len(found.header) - 2
+    assert len(texts.variance(screening, words).header) == len(found.header) - 5
 
     GasketResult(screening, SimpleNamespace(factors=()), Compared(published)).write(tmp_path)
     table = pd.read_csv(tmp_path / "published.csv").set_index(["response", "term"])
     assert table.loc[("Dx", "constant"), "published_effect"] == 16.0
     assert table.loc[("Dx", "C_L"), "published_percent"].tolist() == [60.0] * 3
+    assert table.loc[("Dx", "range"), "published_effect"].tolist() == [15.0, 17.0]
+    assert table.loc[("Dx", "main effects"), "published_percent"] == 95.0
     data = as_plain_data(screening, Compared(published))
     response = data["responses"]["middle"]["Dx"]
     assert (data["published"], response["published_mean"]) == ("table.csv", 16.0)
     assert response["mean_difference_percent"] == pytest.approx(25.0)
     assert response["terms"][0]["published_effects"] == {"-1": 1.0, "0": 0.5, "1": -1.5}
+    assert response["terms"][0]["sign_differs"] is False
+    assert (response["published_main_percent"], response["published_range"]) == (95.0, [15.0, 17.0])
     assert "published_mean" not in data["responses"]["counter"]["Dx"]
     assert "published" not in as_plain_data(screening)
 

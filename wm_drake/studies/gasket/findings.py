@@ -78,6 +78,7 @@ def _against_published(screening: Screening, words: Words, published: Published)
             f"{FAR:g} %{_listed(named)}."
         )
     if published.has_terms:
+        texts += _against_published_effects(screening, words, published)
         points = published.far_contributions(screening)
         terms = sorted(points, key=lambda key: -abs(points[key]))
         named = [
@@ -89,6 +90,32 @@ def _against_published(screening: Screening, words: Words, published: Published)
             f"Contributions beside the published ones: {len(points)} differ by more than "
             f"{FAR:g} points of percent{_listed(named)}."
         )
+    return texts
+
+
+def _against_published_effects(
+    screening: Screening, words: Words, published: Published
+) -> list[str]:
+    """Return sentences on leading factors, contributions and signs beside the published ones."""
+    leaders = published.leaders(screening)
+    same = sum(ours == theirs for ours, theirs in leaders.values())
+    texts = [f"The most influential factor is the published one in {same} of {len(leaders)} cases."]
+    points = list(map(abs, published.main_points(screening).values()))
+    if points:
+        texts.append(
+            f"Contributions of main effects differ from the published ones by "
+            f"{number(sum(points) / len(points), 1)} points of percent in the mean and by "
+            f"{number(max(points), 0)} points at most."
+        )
+    other = [
+        f"{words.term(term)} on {words.response(name)}, load {load}"
+        for (load, name), term in published.other_signs(screening)
+    ]
+    known = [t for label, t in published.compared_terms(screening) if published.effects(label, t)]
+    texts.append(
+        f"Effects with another sign than the published ones: {len(other)} of {len(known)}"
+        f"{_listed(other)}."
+    )
     return texts
 
 

@@ -1,5 +1,6 @@
 """Tables of text with the results of a screening study."""
 
+import math
 from collections.abc import Sequence
 
 from wm_drake.parameters import FactorLevels
@@ -19,6 +20,9 @@ from wm_drake.studies.gasket.screening import (
 )
 from wm_drake.studies.gasket.words import LEVELS, Words
 
+OTHER_SIGN = "sign differs"
+"""Mark of a term whose effects have another sign than the published ones."""
+
 MOST_TOUCHING = 20
 """Largest number of runs that the table of contacts shows."""
 
@@ -32,6 +36,10 @@ def digits(value: float) -> str:
         value,
         0 if size >= 100 else 1 if size >= 10 else 2 if size >= 1 else 3 if size >= 0.1 else 4,
     )
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
 def r2_text(r2: float) -> str:
@@ -61,7 +69,13 @@ def variance(screening: Screening, words: Words, published: Published = NOT_PUBL
             cells = [digits(table.constant), digits(values.min()), digits(values.max())]
             if published.has_means:
                 cells[1:1] = published_cells(screening, published, (load, name))
-            percents = (table.main_percent, table.interaction_percent, table.residual_percent)
+            if published.has_ranges:
+                cells.append(" to ".join(map(digits, published.range((load, name)))) or MISSING)
+            percents = [table.main_percent, table.interaction_percent, table.residual_percent]
+            if published.has_sums:
+                main, interactions = published.sums((load, name))
+                percents[1:1] = [_or_nan(main)]
+                percents[3:3] = [_or_nan(interactions)]
             rows.append(
                 Row(
                     (
@@ -84,8 +98,11 @@ def variance(screening: Screening, words: Words, published: Published = NOT_PUBL
         *(("published mean", "difference") if published.has_means else ()),
         "smallest",
         "largest",
+        *(("published range",) if published.has_ranges else ()),
         "main effects, %",
+        *(("published main effects, %",) if published.has_sums else ()),
         "interactions, %",
+        *(("published interactions, %",) if published.has_sums else ()),
         "residual, %",
         "adjusted R²",
         "predicted R²",
@@ -119,7 +136,8 @@ def leading(
         if mean is not None:
             rows.append(_row("published constant", "", "", (digits(mean), "", ""), published))
         shown = leading_terms(table)
-        shown += [t for t in table.terms if t not in shown and _is_published(published, label, t)]
+        compared = [t for of, t in published.compared_terms(screening) if of == label]
+        shown += [t for t in compared if t not in shown]
         for term in shown:
             rows += _effect_rows(term, words, published, label)
         groups.append(Group(f"{words.response(name)}, {unit}", tuple(rows)))
@@ -131,7 +149,10 @@ def leading(
         "of its first factor, and each column a value of its second factor."
     )
     if published:
-        caption += f" Published numbers: from {published.source}; their levels are those of [B]."
+        caption += (
+            f" Published numbers: from {published.source}; their levels are those of [B]. A term "
+            f"whose effect at the lowest level has another sign is marked: {OTHER_SIGN}."
+        )
     heads = ("published percent",) if published.has_terms else ()
     return Table(
         caption,
@@ -153,19 +174,16 @@ def _row(
     return Row((name, ours, *((theirs,) if published.has_terms else ()), *cells), kind)
 
 
-def _is_published(published: Published, label: Label, term: Term) -> bool:
-    known = published.percent(label, term) is not None
-    return known or bool(published.effects(label, term))
-
-
 def _effect_rows(term: Term, words: Words, published: Published, label: Label) -> list[Row]:
     """Return a line with the values of the last factor, and the lines with the effects there."""
     *first, last = term.factors
     theirs, known = published.percent(label, term), published.effects(label, term)
     shown = MISSING if theirs is None else number(theirs, 1)
     values = tuple(words.value(last, level) for level in LEVELS)
-    title = words.term(term.name)
-    rows = [_row(title, number(term.percent, 1), shown, values, published, "other")]
+    title, kind = words.term(term.name), "other"
+    if published.sign_differs(label, term):
+        title, kind = f"{title} ({OTHER_SIGN})", "alarm"
+    rows = [_row(title, number(term.percent, 1), shown, values, published, kind)]
     for level in LEVELS if first else (None,):
         where = "" if level is None else f" at {first[0]} = {words.value(first[0], level)}"
         for source, effects in (("effect", term.effects), ("published effect", known)):

@@ -1,11 +1,11 @@
 """Published results of a gasket study beside those of a screening."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import product
 
 from wm_drake.parameters import PublishedResults, PublishedTerm
-from wm_drake.parameters.published import CONSTANT
+from wm_drake.parameters.published import CONSTANT, INTERACTIONS, MAIN, OF_RESPONSE, RANGE
 from wm_drake.studies.doe.anova import Combination, Term
 from wm_drake.studies.gasket.screening import Label, Screening
 
@@ -40,12 +40,33 @@ class Published:
     @property
     def has_terms(self) -> bool:
         """Whether anything else than grand means was published."""
-        return any(set(terms) - {CONSTANT} for terms in self.terms.values())
+        return any(set(terms) - set(OF_RESPONSE) for terms in self.terms.values())
+
+    @property
+    def has_sums(self) -> bool:
+        """Whether percentages of all main effects or all interactions were published."""
+        return any({MAIN, INTERACTIONS} & set(terms) for terms in self.terms.values())
+
+    @property
+    def has_ranges(self) -> bool:
+        """Whether any range was published."""
+        return any(RANGE in terms for terms in self.terms.values())
 
     def mean(self, label: Label) -> float | None:
         """Return the published grand mean of a response. [unit of the response]"""
         term = self.terms.get(label, {}).get(CONSTANT)
         return None if term is None else term.effects[0]
+
+    def range(self, label: Label) -> tuple[float, ...]:
+        """Return the published smallest and largest value; empty without. [unit of the response]"""
+        term = self.terms.get(label, {}).get(RANGE)
+        return () if term is None else term.effects
+
+    def sums(self, label: Label) -> tuple[float | None, float | None]:
+        """Return the published percentages of all main effects and of all interactions. [%]"""
+        terms = self.terms.get(label, {})
+        main, interactions = (terms.get(name) for name in (MAIN, INTERACTIONS))
+        return main and main.percent, interactions and interactions.percent
 
     def mean_difference(self, screening: Screening, label: Label) -> float | None:
         """Return how much our grand mean is above the published one. [%]
@@ -69,6 +90,47 @@ class Published:
         turned = (combination[::-1] if is_turned else combination for combination in levels)
         return dict(zip(turned, published.effects, strict=True))
 
+    def sign_differs(self, label: Label, term: Term) -> bool:
+        """Return whether the effect at the lowest levels has another sign than the published one.
+
+        It is False if no effects were published, or if the published one is zero.
+        """
+        effects = self.effects(label, term)
+        lowest = (LEVELS[0],) * len(term.factors)
+        return bool(effects) and effects[lowest] * term.effects[lowest] < 0.0
+
+    def compared_terms(self, screening: Screening) -> Iterator[tuple[Label, Term]]:
+        """Yield the terms of a screening of which a contribution or effects were published."""
+        for label, table in screening.tables.items():
+            for term in table.terms:
+                if self.percent(label, term) is not None or self.effects(label, term):
+                    yield label, term
+
+    def other_signs(self, screening: Screening) -> list[tuple[Label, str]]:
+        """Return label and name of the terms whose effects have another sign."""
+        terms = self.compared_terms(screening)
+        return [(label, term.name) for label, term in terms if self.sign_differs(label, term)]
+
+    def main_points(self, screening: Screening) -> dict[tuple[Label, str], float]:
+        """Return contribution less published contribution of main effects, by label and term."""
+        differences = {}
+        for label, term in self.compared_terms(screening):
+            published = self.percent(label, term)
+            if published is not None and len(term.factors) == 1:
+                differences[label, term.name] = term.percent - published
+        return differences
+
+    def leaders(self, screening: Screening) -> dict[Label, tuple[str, str]]:
+        """Return our largest main effect and the published one of each response with any."""
+        largest = {}
+        for label, table in screening.tables.items():
+            mains = [term for term in table.terms if len(term.factors) == 1]
+            known = {term.name: self.percent(label, term) or 0.0 for term in mains}
+            if any(known.values()):
+                ours = max(mains, key=lambda term: term.percent).name
+                largest[label] = (ours, max(known, key=lambda name: known[name]))
+        return largest
+
     def _published_term(
         self, label: Label, factors: tuple[str, ...]
     ) -> tuple[PublishedTerm | None, bool]:
@@ -85,11 +147,10 @@ class Published:
     def far_contributions(self, screening: Screening) -> dict[tuple[Label, str], float]:
         """Return the contributions that differ by more than `FAR`, by label and term. [points]"""
         differences = {}
-        for label, table in screening.tables.items():
-            for term in table.terms:
-                published = self.percent(label, term)
-                if published is not None and abs(term.percent - published) > FAR:
-                    differences[label, term.name] = term.percent - published
+        for label, term in self.compared_terms(screening):
+            published = self.percent(label, term)
+            if published is not None and abs(term.percent - published) > FAR:
+                differences[label, term.name] = term.percent - published
         return differences
 
 

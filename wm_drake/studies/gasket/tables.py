@@ -1,14 +1,14 @@
 """Results of a screening as tables and plain data, for files and other programs."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from wm_drake.parameters import FactorLevels
-from wm_drake.parameters.published import CONSTANT
+from wm_drake.parameters.published import CONSTANT, INTERACTIONS, MAIN, RANGE
 from wm_drake.studies.doe import Design
 from wm_drake.studies.doe.anova import Term
 from wm_drake.studies.gasket.compared import NOT_COMPARED, Compared
@@ -172,8 +172,10 @@ def leading_table(screening: Screening) -> pd.DataFrame:
 def published_table(screening: Screening, published: Published) -> pd.DataFrame:
     """Return our numbers and the published ones of each term that was published.
 
-    Grand means are in the rows of the term `constant`; the columns are those of `leading_table`,
-    with the published percentage and effect.
+    Grand means are in the rows of the term `constant`, smallest and largest values in those of the
+    term `range`, percentages of all main effects and all interactions in those of `main effects`
+    and `interactions`. The columns are those of `leading_table`, with the published percentage and
+    effect, and with "yes" where the effects of a term have another sign than the published ones.
     """
     rows: list[dict[str, Any]] = []
     for (load, name), table in screening.tables.items():
@@ -183,10 +185,12 @@ def published_table(screening: Screening, published: Published) -> pd.DataFrame:
         if mean is not None:
             row = {"term": CONSTANT, "effect": table.constant, "published_effect": mean}
             rows.append(head | row | {"levels": ""})
-        for term in table.terms:
-            percent, effects = published.percent(label, term), published.effects(label, term)
-            if percent is None and not effects:
+        rows += [head | row for row in _published_sums(screening, published, label)]
+        for of_label, term in published.compared_terms(screening):
+            if of_label != label:
                 continue
+            percent, effects = published.percent(label, term), published.effects(label, term)
+            differs = "yes" if published.sign_differs(label, term) else ""
             for levels, effect in term.effects.items():
                 row = {
                     "term": term.name,
@@ -195,10 +199,30 @@ def published_table(screening: Screening, published: Published) -> pd.DataFrame:
                     "levels": ":".join(map(str, levels)),
                     "effect": effect,
                     "published_effect": effects.get(levels),
+                    "sign_differs": differs,
                 }
                 rows.append(head | row)
     columns = ("percent", "published_percent", "levels", "effect", "published_effect")
-    return pd.DataFrame(rows, columns=["load", "response", "unit", "term", *columns])
+    heads = ("load", "response", "unit", "term", *columns, "sign_differs")
+    return pd.DataFrame(rows, columns=heads)
+
+
+def _published_sums(
+    screening: Screening, published: Published, label: Label
+) -> Iterator[dict[str, Any]]:
+    """Yield the published range and sums of percentages of a response beside ours."""
+    table, values = screening.tables[label], screening.responses.values[label[0]][label[1]]
+    known_range = zip(
+        ("smallest", "largest"), (values.min(), values.max()), published.range(label), strict=False
+    )
+    for level, value, theirs in known_range:
+        yield {"term": RANGE, "levels": level, "effect": value, "published_effect": theirs}
+    percents = (table.main_percent, table.interaction_percent)
+    for term, percent, known in zip(
+        (MAIN, INTERACTIONS), percents, published.sums(label), strict=True
+    ):
+        if known is not None:
+            yield {"term": term, "levels": "", "percent": percent, "published_percent": known}
 
 
 def effects_of(term: Term) -> dict[str, float]:
@@ -274,12 +298,19 @@ def as_plain_data(screening: Screening, compared: Compared = NOT_COMPARED) -> di
 
 
 def _published_mean(screening: Screening, published: Published, label: Label) -> dict[str, Any]:
-    """Return the published grand mean of a response and the difference of ours from it."""
+    """Return what was published of a response as a whole, and the difference of the means."""
     mean = published.mean(label)
     if mean is None:
         return {}
     difference = published.mean_difference(screening, label)
-    return {"published_mean": mean, "mean_difference_percent": difference}
+    entries: dict[str, Any] = {"published_mean": mean, "mean_difference_percent": difference}
+    main, interactions = published.sums(label)
+    known = {
+        "published_main_percent": main,
+        "published_interaction_percent": interactions,
+        "published_range": list(published.range(label)) or None,
+    }
+    return entries | {key: value for key, value in known.items() if value is not None}
 
 
 def _published_term(published: Published, label: Label, term: Term) -> dict[str, Any]:
@@ -290,6 +321,7 @@ def _published_term(published: Published, label: Label, term: Term) -> dict[str,
         entries["published_percent"] = percent
     if effects:
         entries["published_effects"] = {":".join(map(str, k)): v for k, v in effects.items()}
+        entries["sign_differs"] = published.sign_differs(label, term)
     return entries
 
 

@@ -83,12 +83,15 @@ class GasketResult(Result):
     def terminal(self) -> "list[Table | str]":
         """Return percentages of the variance, the check and a summary."""
         from wm_drake.studies.gasket.findings import summary
-        from wm_drake.studies.gasket.terminal import check_table, variance_table
+        from wm_drake.studies.gasket.terminal import SIGN_MARK, check_table, variance_table
 
         published, check = self.compared.published, self.compared.check
         shown: list[Table | str] = [variance_table(self.screening, self.words, published)]
         if published.has_terms:
-            shown.append("In parentheses: the published percentage of a leading term.")
+            shown.append(
+                f"In parentheses: the published percentage of a leading term;{SIGN_MARK} if its "
+                "effect has another sign."
+            )
         if check is not None:
             shown.append(check_table(check))
         return [*shown, *summary(self.screening, self.words, self.compared)]

@@ -13,6 +13,9 @@ from wm_drake.studies.gasket.words import Words
 WIDE = 100
 """Width of a terminal from which on its table has the leading terms. [characters]"""
 
+SIGN_MARK = " \N{NOT EQUAL TO}\N{PLUS-MINUS SIGN}"
+"""Mark of a term whose effect has another sign than the published one."""
+
 
 def variance_table(screening: Screening, words: Words, published: Published) -> Table:
     """Return the percentages of the variance, with published means and terms if there are any."""
@@ -42,7 +45,8 @@ def _leading_texts(table: AnovaTable, published: Published, label: Label) -> lis
     texts = []
     for term in leading_terms(table):
         known = published.percent(label, term)
-        theirs = "" if known is None else f" ({known:.0f})"
+        mark = SIGN_MARK if published.sign_differs(label, term) else ""
+        theirs = "" if known is None else f" ({known:.0f}{mark})"
         texts.append(f"{term.name.replace(':', ' × ')} {term.percent:.0f}{theirs}")
     return texts
 
