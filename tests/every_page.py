@@ -96,7 +96,13 @@ KINDS = {
         "--model", "main", "--load", "back", "--response", "mount_force_peak", "--response", "amplitude",
     ),
     "gasket_effect": _one("gasket_effect/page.html", "study", "gasket-effect", "--load", "middle"),
-    "gasket_damping": _one("sections.html", "study", "gasket-damping", "--mesh", "20"),
+    "gasket_damping": Kind(
+        "sections.html",
+        (
+            ("spin", "--load", "middle", "--out", "bench"),
+            (*["study", "gasket-damping", "--mesh", "20", "--record"], "middle=bench/record_middle.nc"),
+        ),
+    ),
     "spin_cycle": _one(
         "sections.html", "study", "spin-cycle", "--case", "2", "--case", "29"
     ),

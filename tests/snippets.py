@@ -76,8 +76,8 @@ TABLE_3 = TABLE_1.with_name("sanchez_tabuenca_2020_table3.csv")
 CYCLES = CHECKOUT / "wm_drake" / "data" / "cycles"
 
 
-def prepare(folder, page):
-    """Write the files that the commands of a page name: of its own blocks, and of a laboratory."""
+def prepare(folder, page, chosen):
+    """Write the files that the chosen commands of a page name: its own blocks, and a laboratory's."""
     (folder / "mine.yaml").write_text(MINE, encoding="utf-8")
     for name, mass in (
         ("a", "9 kg"),
@@ -99,7 +99,7 @@ def prepare(folder, page):
     for name, block in zip(FILES.get(page, []), files, strict=True):
         (folder / name).write_text("\n".join(block.lines) + "\n", encoding="utf-8")
     if page == "docs/how-to/commands.md":
-        write_commands_page(folder)
+        write_commands_page(folder, " ".join(chosen))
 
 
 def write_laboratory(folder):
@@ -152,13 +152,36 @@ def write_spin_cycle(path):
     rms_table(result.displacement).to_csv(path, index=False)
 
 
-def write_commands_page(folder):
-    """Write the records, cases and designs that docs/how-to/commands.md names."""
+def write_design(path):
+    """Write an orthogonal design of the factors of the gasket."""
     from wm_drake.studies.doe import make_design
 
     names = ("C_L", "C_T", "K_Lx", "K_Ly", "K_Lz", "K_Tx", "K_Ty", "K_Tz")
     design = make_design("orthogonal", names, trials=243)
-    pd.DataFrame(design.levels, columns=names).to_csv(folder / "design.csv", index=False)
+    pd.DataFrame(design.levels, columns=names).to_csv(path, index=False)
+
+
+def write_record(path):
+    """Write the displacements of a run-up."""
+    load = {"m": "middle", "c": "counter"}[path.stem]
+    record = simulate(build_machine(load_machine("reference")), load)
+    (1e3 * record.displacement).to_pandas().rename_axis("time_s").to_csv(path)
+
+
+COMPUTED = {
+    "design.csv": write_design,
+    "rms.csv": write_spin_cycle,
+    "m.csv": write_record,
+    "c.csv": write_record,
+}
+"""Files that take seconds to compute, written where a command names them."""
+
+
+def write_commands_page(folder, text):
+    """Write the records, cases and designs that docs/how-to/commands.md names."""
+    for name, write in COMPUTED.items():
+        if re.search(rf"\b{name}", text):
+            write(folder / name)
     (folder / "tolerances.yaml").write_text(
         "load: middle\nquantities:\n  friction: {keys: [damper_types.friction.friction_force], "
         "distribution: uniform, low: 35 N, high: 45 N}\n",
@@ -169,16 +192,9 @@ def write_commands_page(folder):
     shutil.copy(CYCLES / "profile_spin_cycle.yaml", folder / "my_cycle.yaml")
     cases = (CYCLES / "cases_table9.csv").read_text(encoding="utf-8").splitlines()
     (folder / "my_cases.csv").write_text("\n".join(cases[:4]) + "\n", encoding="utf-8")
-    write_spin_cycle(folder / "rms.csv")
     time = np.arange(0.0, 40.0, 2e-3)
     rpm = 60.0 + 6.0 * time
     angle = np.cumsum(rpm) * 2e-3 * np.pi / 30.0
     pd.DataFrame({"time_s": time, "speed_rpm": rpm, "front": np.sin(angle)}).to_csv(
         folder / "vibration.csv", index=False
     )
-    machine = build_machine(load_machine("reference"))
-    for name, load in (("m", "middle"), ("c", "counter")):
-        record = simulate(machine, load)
-        table = (1e3 * record.displacement).to_pandas()
-        table.index.name = "time_s"
-        table.to_csv(folder / f"{name}.csv")

@@ -106,7 +106,7 @@ def test_every_file_block_has_a_name():
 
 def run_all(wm_drake, folder, page, chosen):
     """Run commands of a page in its folder, one after the other, and return those that failed."""
-    prepare(folder, page)
+    prepare(folder, page, chosen)
     failed = []
     for command in chosen:
         if command.startswith("printf "):

@@ -12,9 +12,9 @@ import xarray as xr
 from machines_of_each_kind import machines_of_each_kind
 from simple_machines import with_gasket_tables
 
-from wm_drake.batch import SimulationInterrupted, simulate_many
+from wm_drake.batch import SimulationInterrupted, simulate_many, work_items
 from wm_drake.batch.runs import Runner
-from wm_drake.batch.work_items import KEPT_NUMBERS, Preparation
+from wm_drake.batch.work_items import Preparation
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import InputError, InputNotice
 from wm_drake.model.build import build_machine
@@ -303,7 +303,9 @@ def test_a_bad_case_is_named_and_what_had_ended_is_not_lost(machine, reference, 
 
 
 @pytest.mark.slow
-def test_memory_does_not_grow_with_the_number_of_runs(reference, machine):
+def test_memory_does_not_grow_with_the_number_of_runs(reference, machine, monkeypatch):
+    kept = 100
+    monkeypatch.setattr(work_items, "KEPT_NUMBERS", kept)
     profile = SpinProfile(time=(0.0, 0.1), speed=(0.0, 1.0))
 
     def many(count):
@@ -319,7 +321,7 @@ def test_memory_does_not_grow_with_the_number_of_runs(reference, machine):
 
     simulate_many(machine, many(WIDTH), measures=["extremes"])
     peaks = []
-    counts = KEPT_NUMBERS + 50, KEPT_NUMBERS + 850  # what is kept for the next load is full
+    counts = kept + 50, kept + 450  # what is kept for the next load is full
     for count in counts:
         tracemalloc.start()
         simulate_many(machine, many(count), measures=["extremes"], workers=1)

@@ -1,6 +1,7 @@
 """The compiled engine against the Drake engine: trajectories, peaks, every kind of machine, divergence, repetition."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -87,20 +88,16 @@ def test_70_s_trajectories_agree_to_a_micrometre_when_both_are_refined(
         np.testing.assert_allclose(found[:, columns], expected[:, columns], rtol=0.0, atol=1e-6)
 
 
+@pytest.mark.parametrize(("load", "gasket"), [("middle", True), ("back", True), ("counter", False)])
 @pytest.mark.parametrize(
-    ("load", "gasket"),
-    [
-        pytest.param("middle", True, marks=pytest.mark.slow),
-        pytest.param("counter", True, marks=pytest.mark.hours),
-        pytest.param("back", True, marks=pytest.mark.slow),
-        pytest.param("front", True, marks=pytest.mark.hours),
-        pytest.param("middle", False, marks=pytest.mark.hours),
-        pytest.param("counter", False, marks=pytest.mark.slow),
-    ],
+    "rate",
+    [pytest.param(4.0, marks=pytest.mark.slow), pytest.param(1.0, marks=pytest.mark.hours)],
 )
-def test_peaks_at_default_steps_agree(machine, reference, load, gasket):
-    """Check the default step of 2.5 ms: 0.05 % in peaks with gasket, 0.2 % without."""
-    case = case_of(reference, load, gasket=gasket)
+def test_peaks_at_default_steps_agree(machine, reference, load, gasket, rate):
+    """Check the default step of 2.5 ms: 0.1 % in peaks with gasket, 0.3 % without."""
+    profile = reference.profile
+    faster = SpinProfile(time=tuple(t / rate for t in profile.time), speed=profile.speed)
+    case = replace(case_of(reference, load, gasket=gasket), profile=faster)
     drake, compiled = (measure(simulate(machine, case, engine)) for engine in ("drake", "compiled"))
     for peak in PEAKS:
         np.testing.assert_allclose(

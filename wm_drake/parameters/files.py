@@ -7,7 +7,9 @@ import io
 import re
 import warnings
 from collections.abc import Iterable, Mapping
+from copy import deepcopy
 from dataclasses import replace
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -279,7 +281,7 @@ class _TextResolver(VersionedResolver):
     Numbers need units, so they are parsed later. Dates and huge integers need no special treatment.
     """
 
-    @property
+    @cached_property
     def versioned_resolver(self) -> dict[str, list[tuple[Any, Any]]]:
         null = "tag:yaml.org,2002:null"
         kept = {
@@ -348,6 +350,14 @@ def _yaml() -> YAML:
     return yaml
 
 
+@lru_cache(maxsize=8)
+def _tree_of(text: str) -> Any:
+    """Return the content of a YAML text, parsed once: machines extend the same few files."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ReusedAnchorWarning)
+        return _yaml().load(text)
+
+
 def read_yaml(path: Path) -> CommentedMap:
     """Return the mapping in a YAML file, with every plain scalar except null as text.
 
@@ -356,9 +366,7 @@ def read_yaml(path: Path) -> CommentedMap:
     """
     text = read_text(path, largest=LARGEST_YAML)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ReusedAnchorWarning)
-            tree = _yaml().load(text)
+        tree = deepcopy(_tree_of(text))
     except YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f"{path}:{mark.line + 1}" if mark else str(path)
