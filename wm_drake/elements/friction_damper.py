@@ -15,11 +15,12 @@ from wm_drake.elements.damper_law import (
     law_structure,
     packed_damper_law,
 )
-from wm_drake.elements.kind import ElementKind, Output
+from wm_drake.elements.kind import ElementKind, Ends, Output
 from wm_drake.elements.layouts import layout_of, packed_fields, packed_once
 from wm_drake.elements.motion import tub_motion, write_generalized_force
 from wm_drake.elements.strut import strut_line, transverse, wrench_at_origin
 from wm_drake.laws.strut import bending_moment, transverse_couple
+from wm_drake.parameters.damper_laws import DamperNumbers
 from wm_drake.parameters.elements import Damper, EndBushing
 from wm_drake.parameters.types import FloatArray
 
@@ -183,10 +184,17 @@ def evaluate_friction_damper(x, state, p, generalized_force, force, rate):
         rate[0] = deformation_rate
 
 
+def placed_damper(ends: Ends, _: Damper, type_: DamperNumbers) -> FrictionDamperParameters:
+    """Return a damper that is a massless strut in its place."""
+    points = ends.tub_point, ends.housing_point
+    return FrictionDamperParameters(*points, type_.end_bushing, packed_damper_law(type_))
+
+
 FRICTION_DAMPER_STRUT = ElementKind(
     name="friction_damper",
     parameters=Damper,
     layout=FRICTION_DAMPER,
+    place=placed_damper,
     outputs=(Output("force", "N", "tension of a damper, > 0"),),
     acts_at_rest=False,
     words="damper as a massless strut between a point of the tub and a point of the housing",

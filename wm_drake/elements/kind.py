@@ -18,7 +18,7 @@ import functools
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -30,8 +30,7 @@ from wm_drake.parameters.element_kinds import ELEMENT_KINDS, Element
 from wm_drake.parameters.types import FloatArray
 
 
-@dataclass(frozen=True)
-class Ends:
+class Ends(NamedTuple):
     """The two frames of an element, as drawn.
 
     Attributes:
@@ -114,6 +113,8 @@ class ElementKind:
             three, see `wm_drake.systems.element_system`. By default it is generated from
             `evaluate`.
         trees: Number of trees of the plant that `on_plant` acts on.
+        place: Function (ends, parameters, *types) that returns an element in its place; types are
+            those that its section of the machine file names. By default a `PlacedElement`.
 
     Example:
         >>> from wm_drake.elements.spring import SPRING_STRUT
@@ -134,6 +135,7 @@ class ElementKind:
     picture: Literal["strut", "points"] = "strut"
     on_plant: Any = None
     trees: int = 1
+    place: Callable[..., Any] | None = None
 
     def __post_init__(self) -> None:
         """Generate `on_plant`.
@@ -149,6 +151,8 @@ class ElementKind:
             if not self.name.isidentifier():
                 raise ValueError(f"element kind '{self.name}': the name must be an identifier")
             object.__setattr__(self, "on_plant", _on_plant(self))
+        if self.place is None and self.numbers is not None:
+            object.__setattr__(self, "place", functools.partial(_placed, self))
 
     @property
     def output_parts(self) -> dict[str, slice]:
@@ -245,7 +249,7 @@ class PlacedElement:
         return self.packed_numbers.copy()
 
 
-def placed_element(kind: ElementKind, parameters: Element, ends: Ends) -> PlacedElement:
+def _placed(kind: ElementKind, ends: Ends, parameters: Element) -> PlacedElement:
     """Return an element of another package in its place."""
     assert kind.numbers is not None  # the declaration has been checked
     return PlacedElement(kind, ends, kind.layout.pack(**kind.numbers(parameters, ends)))

@@ -3,6 +3,7 @@
 A mount is everything that connects the oscillating group to the cabinet (the housing of the SDF).
 """
 
+import functools
 from collections import namedtuple
 from collections.abc import Mapping, Sequence
 
@@ -71,9 +72,21 @@ def mounts_at(
         kinds: Kinds of the others.
         states: States of the machine.
     """
-    springs, dampers, bushings, telescopes = (
-        np.array(begins.get(kind, ()), dtype=np.int64)
-        for kind in ("springs", "dampers", "bushings", "telescopes")
+    fields = ("springs", "dampers", "bushings", "telescopes", "others")
+    parts = (tuple(begins.get(field, ())) for field in fields)
+    return _mounts_at(tuple(parts), tuple(rubber), tuple(kinds), states)
+
+
+@functools.lru_cache(maxsize=64)  # thousands of machines of a study have the same indices
+def _mounts_at(
+    begins: tuple[tuple[int, ...], ...],
+    rubber: tuple[int, ...],
+    kinds: tuple[ElementKind, ...],
+    states: StateMap,
+) -> Mounts:
+    """Return the indices of mounts; see `mounts_at`."""
+    springs, dampers, bushings, telescopes, others = (
+        np.array(indices, dtype=np.int64) for indices in begins
     )
     branches = None
     if len(rubber):
@@ -85,7 +98,7 @@ def mounts_at(
         bushings,
         telescopes if len(telescopes) else None,
         branches,
-        registered_laws(kinds, begins.get("others", ()), states.begins_of(ELEMENT).tolist()),
+        registered_laws(kinds, others.tolist(), states.begins_of(ELEMENT).tolist()),
         states.begins.sponges,
         states.begins.tubes,
     )

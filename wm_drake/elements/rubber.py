@@ -36,7 +36,7 @@ from wm_drake.elements.bushing import (
     read_bushing,
     six_component_bushing_wrench,
 )
-from wm_drake.elements.kind import ElementKind
+from wm_drake.elements.kind import ElementKind, Ends
 from wm_drake.elements.motion import tub_motion, write_generalized_force
 from wm_drake.elements.strut import wrench_at_origin
 from wm_drake.laws.rubber import dahl_rate, maxwell_rate
@@ -152,18 +152,9 @@ class RubberBushingParameters(SixComponentBushingParameters):
         return RUBBER_BUSHING.pack(bushing=super().packed(), rubber=self.packed_rubber)
 
 
-def placed_bushing(
-    bushing: RubberBushingType,
-    tub_side: tuple[FloatArray, FloatArray],
-    ground_side: tuple[FloatArray, FloatArray],
-) -> SixComponentBushingParameters:
-    """Return a bushing in its place, with branches only if it uses one.
-
-    Args:
-        bushing: Its type.
-        tub_side, ground_side: Point and rotation of the frame on each side.
-    """
-    place = (*tub_side, *ground_side, packed_bushing_law(bushing))
+def placed_bushing(ends: Ends, bushing: RubberBushingType) -> SixComponentBushingParameters:
+    """Return a bushing in its place, with branches only if it uses one."""
+    place = (*ends, packed_bushing_law(bushing))
     branches = packed_branches(bushing)
     if branches is None:
         return SixComponentBushingParameters(*place)
@@ -345,6 +336,7 @@ SIX_COMPONENT_BUSHING_OF_RUBBER = ElementKind(
     name="rubber_bushing",
     parameters=Bushing,
     layout=RUBBER_BUSHING,
+    place=placed_bushing,
     outputs=WRENCH_OUTPUTS,
     words="six-component bushing of rubber, with a state for the stretch of each branch in use",
     picture="points",

@@ -1,19 +1,19 @@
 """Suspension spring between a point of the tub and a point of the housing."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import numbers
 from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import rotate, scale
-from wm_drake.elements.kind import ElementKind, Output
-from wm_drake.elements.layouts import packed_once
+from wm_drake.elements.kind import ElementKind, Ends, Output
+from wm_drake.elements.layouts import packed_once, packed_stiffness
 from wm_drake.elements.motion import tub_motion, write_generalized_force
 from wm_drake.elements.strut import strut_line, wrench_at_origin
 from wm_drake.laws.spring import spring_tension
 from wm_drake.laws.table import CURVE, stiffness_force
-from wm_drake.parameters.elements import Spring
+from wm_drake.parameters.elements import Spring, SpringType
 from wm_drake.parameters.types import FloatArray
 
 SPRING = PackedLayout(
@@ -147,10 +147,26 @@ def evaluate_spring_strut(x, state, p, generalized_force, force, rate):
     force[0] = tension
 
 
+def placed_spring(ends: Ends, spring: Spring, type_: SpringType) -> SpringStrutParameters:
+    """Return a spring in its place; preload 0 if it follows from static equilibrium."""
+    strut = SpringStrutParameters(
+        ends.tub_point,
+        ends.housing_point,
+        0.0,
+        packed_stiffness(type_.stiffness),
+        pushes=type_.action == "tension-compression",
+    )
+    preload = spring.preload
+    if type_.free_length is not None:
+        preload = -stiffness_force(type_.free_length - strut.rest_length, strut.packed_stiffness, 0)
+    return strut if preload is None else replace(strut, preload=float(preload), is_given=True)
+
+
 SPRING_STRUT = ElementKind(
     name="spring_strut",
     parameters=Spring,
     layout=SPRING,
+    place=placed_spring,
     outputs=(Output("force", "N", "tension of a spring, > 0"),),
     words="suspension spring between a point of the tub and a point of the housing",
     on_plant=evaluate_spring_strut,

@@ -124,6 +124,14 @@ class StateMap:
 
     parts: tuple[Part, ...]
 
+    def __hash__(self) -> int:
+        """Return a hash, which is computed once: thousands of runs are sorted by their states."""
+        return self._hash
+
+    @functools.cached_property
+    def _hash(self) -> int:
+        return hash(self.parts)
+
     @classmethod
     def of(cls, parts: Iterable[Part]) -> "StateMap":
         """Return the map of parts in any order; those of one kind keep theirs."""

@@ -19,7 +19,6 @@ from wm_drake.model.bodies import add_load, set_bodies
 from wm_drake.model.cabinet import cabinet_at_rest
 from wm_drake.model.equilibrium import force_as_drawn, preloaded, put_to_rest, rest_pose
 from wm_drake.model.placed_elements import AppliedForce, PlacedElements, placed_elements
-from wm_drake.model.same_elements import check_same_elements
 from wm_drake.model.set_up_cache import SetUpCache
 from wm_drake.model.state_layout import StateLayout
 from wm_drake.model.tub_points import TubPoints, measured_points, tub_points
@@ -240,7 +239,7 @@ class MachineSystems:
                 there is no equilibrium.
         """
         parameters = parameters or self.parameters
-        check_same_elements(self.parameters, parameters)
+        self.cache.check(self.parameters, parameters)
         load = self._load(load, parameters)
         layout, poses = self.state_layout, self.cache.frame_poses(self.plant, parameters)
         systems = systems or bool(layout.attached.size or self.motor or self.cabinet)
@@ -254,7 +253,7 @@ class MachineSystems:
         else:
             as_drawn = force_as_drawn(self.plant, plant_context, layout, unloaded.at_rest())
         balanced = (*unloaded.springs.values(), as_drawn.tobytes())
-        springs = poses.placed("springs", balanced, lambda: preloaded(unloaded, as_drawn).springs)
+        springs = poses.placed("preloads", balanced, lambda: preloaded(unloaded, as_drawn).springs)
         elements = replace(unloaded, springs=springs)
         elements = elements if gasket else elements.without_gasket()
         elements = elements if dampers else elements.without_dampers()
@@ -389,7 +388,7 @@ class MachineSystems:
     def _set_drive(self, context: Context, parameters: MachineParameters) -> None:
         """Set the numbers of a motor in a root Context, and its state before a run."""
         if drive := motor_of(parameters.drive):
-            assert self.motor  # check_same_elements has seen to it
+            assert self.motor  # the parameters have been checked
             self.motor.set_drive(context, drive)
 
     def _set_feet(self, context: Context, cabinet: CabinetOnFeet | None) -> None:

@@ -4,7 +4,7 @@ import functools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -12,18 +12,15 @@ from pydrake.multibody.plant import MultibodyPlant
 from wm_drake.elements.bearing import DRUM_BEARING
 from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bushing_law
 from wm_drake.elements.damper_law import packed_damper_law
-from wm_drake.elements.friction_damper import FrictionDamperParameters
-from wm_drake.elements.kind import (
-    ElementKind,
-    Ends,
-    PlacedElement,
-    element_kind,
-    placed_element,
-)
-from wm_drake.elements.layouts import packed_stiffness
+from wm_drake.elements.friction_damper import FRICTION_DAMPER_STRUT, FrictionDamperParameters
+from wm_drake.elements.kind import ElementKind, Ends, PlacedElement, element_kind
 from wm_drake.elements.mount import Mounts, mounts_at
-from wm_drake.elements.rubber import MOST_STATES, RubberBushingParameters, placed_bushing
-from wm_drake.elements.spring import SpringStrutParameters
+from wm_drake.elements.rubber import (
+    MOST_STATES,
+    SIX_COMPONENT_BUSHING_OF_RUBBER,
+    RubberBushingParameters,
+)
+from wm_drake.elements.spring import SPRING_STRUT, SpringStrutParameters
 from wm_drake.elements.state_map import (
     StateMap,
     cabinet_part,
@@ -37,12 +34,10 @@ from wm_drake.elements.state_map import (
 )
 from wm_drake.elements.telescopic_damper import TelescopicDamperParameters
 from wm_drake.errors import input_error
-from wm_drake.laws.table import stiffness_force
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.state_layout import StateLayout
 from wm_drake.parameters import MachineParameters
-from wm_drake.parameters.damper_laws import DamperNumbers
-from wm_drake.parameters.elements import Damper, Spring, SpringType
+from wm_drake.parameters.sections import GASKET, SECTIONS, Section
 from wm_drake.parameters.types import FloatArray
 
 SHORTEST_STRUT = 1e-3
@@ -51,7 +46,14 @@ SHORTEST_STRUT = 1e-3
 _RELAXED = np.zeros(MOST_STATES)
 """States at rest of an element of this package; it has fewer or none."""
 
-ON_TUB = ("springs", "dampers", "bushings", "others")
+SHIPPED = {
+    "springs": SPRING_STRUT,
+    "dampers": FRICTION_DAMPER_STRUT,
+    "bushings": SIX_COMPONENT_BUSHING_OF_RUBBER,
+}
+"""Kinds of elements on the tub by their section of a machine file, in packed order."""
+
+ON_TUB = (*SHIPPED, "others")
 """Kinds of elements whose forces depend on the motion of the tub only, in packed order."""
 
 
@@ -143,14 +145,18 @@ class PlacedElements:
             drive, cabinet: Whether there are those of a drive with a motor, and of a cabinet that
                 moves.
         """
+        return _states(self._with_states, bearing=bool(self.bearing), drive=drive, cabinet=cabinet)
+
+    @functools.cached_property
+    def _with_states(self) -> "WithStates":
+        """Return the elements that have states."""
         rubber = tuple(
             (name, tuple(bushing.state_kinds))
             for name, bushing in self.bushings.items()
             if isinstance(bushing, RubberBushingParameters)
         )
         others = tuple((name, len(e.kind.states)) for name, e in self.others.items())
-        parts = tuple(self.dampers), tuple(self.telescopes), rubber, others
-        return _states(*parts, bearing=bool(self.bearing), drive=drive, cabinet=cabinet)
+        return WithStates(tuple(self.dampers), tuple(self.telescopes), rubber, others)
 
     def mounts(self, begins: Mapping[str, Sequence[int]], states: StateMap) -> Mounts:
         """Return the indices of the elements on the tub for compiled functions.
@@ -164,38 +170,43 @@ class PlacedElements:
 
     def by_tree(self) -> Iterator[tuple[str, Any, ElementKind, int]]:
         """Yield label, element, kind, and the tree it acts on beside tub and drum; 0 for none."""
-        for word, elements in (("spring", self.springs), ("damper", self.dampers)):
-            for name, element in elements.items():
-                yield f"{word}_{name}", element, element.kind, 0
-        for name, bushing in self.bushings.items():
-            yield "gasket" if name == "gasket" else f"bushing_{name}", bushing, bushing.kind, 0
-        for name, other in self.others.items():
-            yield f"element_{name}", other, other.kind, 0
+        for word, field in zip(("spring", "damper", "bushing", "element"), ON_TUB, strict=True):
+            for name, element in getattr(self, field).items():
+                is_gasket = field == "bushings" and name == GASKET
+                yield name if is_gasket else f"{word}_{name}", element, element.kind, 0
         for tree, (name, telescope) in enumerate(self.telescopes.items(), start=1):
             yield f"damper_{name}", telescope, telescope.kind, tree
         if self.bearing:
             yield "drum_bearing", self.bearing, DRUM_BEARING, 1 + len(self.telescopes)
 
 
-@functools.lru_cache(maxsize=256)  # thousands of machines of a study have the same parts
-def _states(
-    dampers: tuple[str, ...],
-    telescopes: tuple[str, ...],
-    rubber: tuple[tuple[str, tuple[str, ...]], ...],
-    others: tuple[tuple[str, int], ...],
-    **has: bool,
-) -> StateMap:
-    """Return the states of a machine with elements of these names.
+class WithStates(NamedTuple):
+    """The elements of a machine that have states.
 
-    Args:
+    Attributes:
         dampers, telescopes: Names of strut dampers and of telescopic dampers.
         rubber: Name of each bushing of rubber, and the role of each of its states.
         others: Name of each element of another package, and the number of its states.
+    """
+
+    dampers: tuple[str, ...]
+    telescopes: tuple[str, ...]
+    rubber: tuple[tuple[str, tuple[str, ...]], ...]
+    others: tuple[tuple[str, int], ...]
+
+
+@functools.lru_cache(maxsize=256)  # thousands of machines of a study have the same parts
+def _states(elements: WithStates, **has: bool) -> StateMap:
+    """Return the states of a machine with some elements.
+
+    Args:
+        elements: The elements that have states.
         has: Whether there are states of "bearing", "drive" and "cabinet".
     """
-    parts = [tub_part(), *map(sponge_part, dampers), *map(tubes_part, telescopes)]
-    parts += [stretches_part(*bushing) for bushing in rubber]
-    parts += [element_part(*element) for element in others]
+    parts = [tub_part(), *map(sponge_part, elements.dampers)]
+    parts += map(tubes_part, elements.telescopes)
+    parts += [stretches_part(*bushing) for bushing in elements.rubber]
+    parts += [element_part(*element) for element in elements.others]
     extra = {"bearing": carrier_part(), "drive": drive_part(), "cabinet": cabinet_part()}
     return StateMap.of([*parts, *(part for name, part in extra.items() if has[name])])
 
@@ -262,89 +273,60 @@ def placed_elements(
     Raises:
         InputError: a spring or damper whose ends coincide.
     """
+    shipped = {section: _on_tub(poses, parameters, SECTIONS[section]) for section in SHIPPED}
     return PlacedElements(
-        _springs(poses, parameters),
-        _dampers(poses, parameters),
-        _bushings(poses, parameters),
-        _telescopes(plant, poses, parameters),
-        _bearing(plant, parameters),
-        _others(poses, parameters),
+        **shipped,
+        telescopes=_telescopes(plant, poses, parameters),
+        bearing=_bearing(plant, parameters),
+        others=_on_tub(poses, parameters, SECTIONS["elements"]),
     )
 
 
-def _ends(poses: FramePoses, element: Any) -> tuple[FloatArray, FloatArray]:
-    """Return the tub end in T and the housing end in W of an element. [m]"""
-    return poses("tub", element.tub_frame)[0], poses("world", element.housing_frame)[0]
+def _on_tub(poses: FramePoses, parameters: MachineParameters, section: Section) -> dict[str, Any]:
+    """Place the elements of a section, each between a frame of the tub and one of the housing.
+
+    A section whose elements and types are those of the last machine is placed already.
+    """
+    tables = tuple(getattr(parameters, table) for table in section.tables)
+    place = functools.partial(_placed_one_by_one, poses, parameters, section)
+    return poses.placed(section.name, tables, place)
 
 
-def _strut_ends(poses: FramePoses, element: Any, key: str) -> tuple[FloatArray, FloatArray]:
-    """Return the ends of an element that acts along the line between them; see `_ends`."""
-    tub_end, housing_end = _ends(poses, element)
-    if not math.dist(tub_end, housing_end) > SHORTEST_STRUT:
+def _placed_one_by_one(
+    poses: FramePoses, parameters: MachineParameters, section: Section
+) -> dict[str, Any]:
+    """Place the elements of a section as far as they differ from those of the last machine."""
+    placed = {}
+    for name, element in section.elements(parameters).items():
+        key, parts = section.key(name), tuple(section.parts(parameters, element).values())
+        place = functools.partial(_placed, poses, key, SHIPPED.get(section.name), parts)
+        placed[name] = poses.placed(key, parts, place)
+    return placed
+
+
+def _placed(poses: FramePoses, key: str, kind: ElementKind | None, parts: Sequence[Any]) -> Any:
+    """Return an element in its place.
+
+    Args:
+        poses: Poses of the frames.
+        key: Key path of the element.
+        kind: Its kind; None for one of another package.
+        parts: The element, and the types that it names.
+
+    Raises:
+        InputError: the ends of a strut coincide.
+    """
+    element, kind = parts[0], kind or element_kind(parts[0].kind)
+    ends = Ends(*poses("tub", element.tub_frame), *poses("world", element.housing_frame))
+    is_strut = kind.picture == "strut"
+    if is_strut and not math.dist(ends.tub_point, ends.housing_point) > SHORTEST_STRUT:
         raise input_error(
             f"frames '{element.tub_frame}' and '{element.housing_frame}' are at the same place; "
             f"they must be more than {1e3 * SHORTEST_STRUT:g} mm apart",
             key=key,
         )
-    return tub_end, housing_end
-
-
-def _springs(poses: FramePoses, parameters: MachineParameters) -> dict[str, SpringStrutParameters]:
-    """Place the springs, without the preloads that follow from static equilibrium."""
-    placed = {}
-    for name, spring in parameters.springs.items():
-        kind, key = parameters.spring_types[spring.type], f"springs.{name}"
-        place = functools.partial(_placed_spring, poses, spring, kind, key)
-        placed[name] = poses.placed(key, (spring, kind), place)
-    return placed
-
-
-def _placed_spring(
-    poses: FramePoses, spring: Spring, kind: SpringType, key: str
-) -> SpringStrutParameters:
-    """Place a spring; preload 0 if none is given."""
-    strut = SpringStrutParameters(
-        *_strut_ends(poses, spring, key),
-        0.0,
-        packed_stiffness(kind.stiffness),
-        pushes=kind.action == "tension-compression",
-    )
-    preload = spring.preload
-    if kind.free_length is not None:
-        preload = -stiffness_force(kind.free_length - strut.rest_length, strut.packed_stiffness, 0)
-    return strut if preload is None else replace(strut, preload=float(preload), is_given=True)
-
-
-def _dampers(
-    poses: FramePoses, parameters: MachineParameters
-) -> dict[str, FrictionDamperParameters]:
-    """Place the dampers that are massless struts."""
-    placed = {}
-    for name, damper in parameters.dampers.items():
-        kind, key = parameters.damper_types[damper.type], f"dampers.{name}"
-        place = functools.partial(_placed_damper, poses, damper, kind, key)
-        placed[name] = poses.placed(key, (damper, kind), place)
-    return placed
-
-
-def _placed_damper(
-    poses: FramePoses, damper: Damper, kind: DamperNumbers, key: str
-) -> FrictionDamperParameters:
-    """Place a damper that is a massless strut."""
-    ends = _strut_ends(poses, damper, key)
-    return FrictionDamperParameters(*ends, kind.end_bushing, packed_damper_law(kind))
-
-
-def _bushings(
-    poses: FramePoses, parameters: MachineParameters
-) -> dict[str, SixComponentBushingParameters]:
-    """Place the bushings between tub and housing, the gasket among them."""
-    placed = {}
-    for name, bushing in parameters.all_bushings().items():
-        ends = poses("tub", bushing.tub_frame), poses("world", bushing.housing_frame)
-        place = functools.partial(placed_bushing, bushing, *ends)
-        placed[name] = poses.placed(f"bushings.{name}", (bushing,), place)
-    return placed
+    assert kind.place is not None  # the declaration has been checked
+    return kind.place(ends, *parts)
 
 
 def _telescopes(
@@ -393,16 +375,3 @@ def _bearing(
     return SixComponentBushingParameters(
         point, rotation, point, rotation, packed_bushing_law(bearing.as_bushing())
     )
-
-
-def _others(poses: FramePoses, parameters: MachineParameters) -> dict[str, PlacedElement]:
-    """Place the elements of kinds of other packages."""
-    placed = {}
-    for name, element in parameters.elements.items():
-        kind, key = element_kind(element.kind), f"elements.{name}"
-        if kind.picture == "strut":
-            _strut_ends(poses, element, key)
-        ends = Ends(*poses("tub", element.tub_frame), *poses("world", element.housing_frame))
-        place = functools.partial(placed_element, kind, element, ends)
-        placed[name] = poses.placed(key, (element,), place)
-    return placed

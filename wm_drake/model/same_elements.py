@@ -2,20 +2,35 @@
 
 import functools
 import typing
-from collections.abc import Iterator
 from typing import Any
 
 from pydantic import BaseModel
 
 from wm_drake.elements.motor import motor_structure
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import InputError, input_error, nearest_names
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.elements import ForceTable, TorqueTable
+from wm_drake.parameters.sections import SECTIONS, Section
+
+BUILT_IN = {"kind": "kind", "law": "law", "joint": "joint", "branches_in_use": "branches of rubber"}
+"""What a built machine keeps of an element or its type, beside the size of tables, in words."""
 
 
-def check_same_elements(built: MachineParameters, requested: MachineParameters) -> None:
-    """Raise InputError if a machine has other elements, laws or joints than the built one."""
+def check_same_elements(
+    built: MachineParameters, requested: MachineParameters, checked: MachineParameters | None = None
+) -> None:
+    """Check that a machine has the elements, laws and joints of the built one.
+
+    Args:
+        built: Machine that was built.
+        requested: Machine whose numbers are to be set in it.
+        checked: A machine that was checked already; what the requested one shares with it is not
+            looked at again.
+
+    Raises:
+        InputError: they differ; the machine must be built again.
+    """
     for key in ("model", "gravity"):
         if getattr(requested, key) != getattr(built, key):
             raise input_error(
@@ -23,9 +38,8 @@ def check_same_elements(built: MachineParameters, requested: MachineParameters) 
                 "rebuild the machine",
                 key=key,
             )
-    if requested is built:
+    if requested is built or requested is checked:
         return
-    _check_names(built, requested)
     _check_frames(built, requested)
     if (requested.imperfections.bearing is None) != (built.imperfections.bearing is None):
         kinds = ("compliant", "rigid")
@@ -43,25 +57,64 @@ def check_same_elements(built: MachineParameters, requested: MachineParameters) 
             f"this cabinet {now}, that of the built machine {before}; rebuild the machine",
             key="cabinet.moves",
         )
-    _check_kinds(built, requested)
-    _check_laws(built, requested)
-    _check_branches(built, requested)
-    _check_tables(built, requested)
+    for section in SECTIONS.values():
+        for known in (checked or built, built):
+            if all(getattr(known, t) is getattr(requested, t) for t in section.tables):
+                break
+        else:
+            _check_section(section, built, requested)
 
 
-def _check_branches(built: MachineParameters, requested: MachineParameters) -> None:
-    """Raise InputError if a bushing uses other branches of rubber."""
-    others = built.all_bushings()
-    for name, bushing in requested.all_bushings().items():
-        if bushing is others[name]:
-            continue
-        if bushing.branches_in_use != others[name].branches_in_use:
-            now, before = (", ".join(b.branches_in_use) or "none" for b in (bushing, others[name]))
-            raise input_error(
-                f"uses other branches of rubber ({now}) than the built machine ({before}); "
-                "rebuild the machine",
-                key=name if name == "gasket" else f"bushings.{name}",
-            )
+def _check_section(
+    section: Section, built: MachineParameters, requested: MachineParameters
+) -> None:
+    """Raise InputError if the elements of a section have other names, or are built otherwise."""
+    others, elements = section.elements(built), section.elements(requested)
+    if elements.keys() != others.keys():
+        other = sorted(elements.keys() ^ others.keys())[0]
+        raise input_error(
+            f"'{other}' is not in both machines{nearest_names(other, set(others))}; "
+            "rebuild the machine",
+            key=section.name,
+        )
+    for name, element in elements.items():
+        parts, of_built = section.parts(requested, element), section.parts(built, others[name])
+        for field, part in parts.items():
+            if part is not of_built[field]:
+                at = "" if field == "type" else field  # a type is part of the element itself
+                key = ".".join(filter(None, [section.key(name), at]))
+                _check_part(of_built[field], part, key)
+
+
+def _check_part(built: BaseModel, requested: BaseModel, key: str) -> None:
+    """Raise InputError if an element or a type is not built as another one."""
+    for field in _built_in(type(requested)) | _built_in(type(built)):
+        now, before = getattr(requested, field, None), getattr(built, field, None)
+        if now != before:
+            raise _not_as_built(f"has {BUILT_IN[field]} {_words(now)}", _words(before), key)
+    now, before = (_points(part) for part in (requested, built))
+    if sorted(now.values()) == sorted(before.values()):
+        return  # the packed numbers take as much room
+    for field in now.keys() | before.keys():
+        if now.get(field, 0) != before.get(field, 0):
+            points = now.get(field, 0) or "no"
+            raise _not_as_built(f"{field} has {points} points", before.get(field, 0) or "none", key)
+
+
+@functools.cache
+def _built_in(kind: type[BaseModel]) -> frozenset[str]:
+    """Return the names in `BUILT_IN` that a type has."""
+    return frozenset(name for name in BUILT_IN if name in kind.model_fields or hasattr(kind, name))
+
+
+def _not_as_built(now: str, before: object, key: str) -> InputError:
+    """Return the error for a part of a machine that is not as it was built."""
+    return input_error(f"{now}, that of the built machine {before}; rebuild the machine", key=key)
+
+
+def _words(value: Any) -> str:
+    """Return a name in quotes, or the names of a tuple."""
+    return (", ".join(value) or "none") if isinstance(value, tuple) else f"'{value}'"
 
 
 def _check_drive(built: MachineParameters, requested: MachineParameters) -> None:
@@ -86,21 +139,6 @@ def _check_drive(built: MachineParameters, requested: MachineParameters) -> None
         )
 
 
-def _check_names(built: MachineParameters, requested: MachineParameters) -> None:
-    """Raise InputError if an element is in one of the machines only."""
-    for table in ("springs", "dampers", "all_bushings", "telescopic_dampers", "elements"):
-        if getattr(built, table) is getattr(requested, table):
-            continue
-        names = [set(t() if callable(t := getattr(p, table)) else t) for p in (built, requested)]
-        if names[0] != names[1]:
-            other = sorted(names[0] ^ names[1])[0]
-            raise input_error(
-                f"'{other}' is not in both machines{nearest_names(other, names[0])}; "
-                "rebuild the machine",
-                key=table.removeprefix("all_"),
-            )
-
-
 def _check_frames(built: MachineParameters, requested: MachineParameters) -> None:
     """Raise InputError if a new frame is on another link, turned, or in one machine only."""
     if built.frames is requested.frames:
@@ -116,73 +154,6 @@ def _check_frames(built: MachineParameters, requested: MachineParameters) -> Non
                 "rebuild the machine",
                 key=f"frames.{name}",
             )
-
-
-def _check_kinds(built: MachineParameters, requested: MachineParameters) -> None:
-    """Raise InputError if an element of another package has another kind."""
-    for name, element in requested.elements.items():
-        if element.kind != built.elements[name].kind:
-            raise input_error(
-                f"kind '{element.kind}' is not the built machine's "
-                f"'{built.elements[name].kind}'; rebuild the machine",
-                key=f"elements.{name}",
-            )
-
-
-def _check_laws(built: MachineParameters, requested: MachineParameters) -> None:
-    """Raise InputError if a damper has another law or another joint."""
-    for table in ("dampers", "telescopic_dampers"):
-        for name, damper in getattr(requested, table).items():
-            built_damper = getattr(built, table)[name]
-            types = built.damper_types[built_damper.type], requested.damper_types[damper.type]
-            if damper is built_damper and types[0] is types[1]:
-                continue
-            built_law, law = (type_.law for type_ in types)
-            if law != built_law:
-                raise input_error(
-                    f"law '{law}' is not the built machine's '{built_law}'; rebuild the machine",
-                    key=f"{table}.{name}",
-                )
-            if getattr(damper, "joint", "") != getattr(built_damper, "joint", ""):
-                raise input_error(
-                    "is not the built machine's joint; rebuild the machine",
-                    key=f"{table}.{name}.joint",
-                )
-
-
-def _check_tables(built: MachineParameters, requested: MachineParameters) -> None:
-    """Raise InputError if an element has a table where the other has none or fewer points."""
-    others = dict(_types_of_elements(built))
-    for key, type_ in _types_of_elements(requested):
-        if type_ is others[key]:
-            continue
-        now, before = _points(type_), _points(others[key])
-        if sorted(now.values()) == sorted(before.values()):
-            continue  # the packed numbers take as much room
-        for field in now.keys() | before.keys():
-            if now.get(field, 0) != before.get(field, 0):
-                raise input_error(
-                    f"{field} has {now.get(field, 0) or 'no'} points, that of the built machine "
-                    f"{before.get(field, 0) or 'none'}; rebuild the machine",
-                    key=key,
-                )
-
-
-def _types_of_elements(machine: MachineParameters) -> Iterator[tuple[str, BaseModel]]:
-    """Yield key path and type of each element whose type may have tables."""
-    for name, spring in machine.springs.items():
-        yield f"springs.{name}", machine.spring_types[spring.type]
-    for name, damper in machine.dampers.items():
-        yield f"dampers.{name}", machine.damper_types[damper.type]
-    for name, bushing in machine.all_bushings().items():
-        yield name if name == "gasket" else f"bushings.{name}", bushing
-    for name, element in machine.elements.items():
-        yield f"elements.{name}", element
-    for name, telescope in machine.telescopic_dampers.items():
-        key = f"telescopic_dampers.{name}"
-        yield key, machine.damper_types[telescope.type]
-        yield f"{key}.tub_bushing", machine.bushing_types[telescope.tub_bushing]
-        yield f"{key}.housing_bushing", machine.bushing_types[telescope.housing_bushing]
 
 
 def _points(type_: BaseModel) -> dict[str, int]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 from weakref import WeakKeyDictionary
 
 from pydrake.multibody.plant import MultibodyPlant
@@ -10,6 +9,7 @@ from pydrake.multibody.tree import FixedOffsetFrame, RigidBody
 
 from wm_drake.errors import Problem, nearest_names
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.sections import SECTIONS
 
 
 @dataclass(frozen=True)
@@ -92,30 +92,15 @@ def _attachments(
     plant: MultibodyPlant, parameters: MachineParameters
 ) -> Iterable[tuple[str, str, str]]:
     """Yield key path, body to be fixed to, and name of each frame that a machine file uses."""
-    for table, name, element in _placed_elements(parameters):
-        for end in ("tub", "housing"):
-            key = f"{table}.{name}.{end}_frame" if name else f"{table}.{end}_frame"
-            yield key, end, getattr(element, f"{end}_frame")
-    for name, damper in parameters.telescopic_dampers.items():
-        outer, inner = (body.name() for body in tubes_of(plant, damper.joint))
-        for end, body in (
-            ("tub", "tub"),
-            ("outer", outer),
-            ("inner", inner),
-            ("housing", "housing"),
-        ):
-            key = f"telescopic_dampers.{name}.{end}_frame"
-            yield key, body, getattr(damper, f"{end}_frame")
+    for section in SECTIONS.values():
+        for name, element in section.elements(parameters).items():
+            bodies = {"tub": "tub", "housing": "housing"}
+            if joint := getattr(element, "joint", None):
+                tubes = (body.name() for body in tubes_of(plant, joint))
+                bodies |= dict(zip(("outer", "inner"), tubes, strict=True))
+            for end, body in bodies.items():
+                yield f"{section.key(name)}.{end}_frame", body, getattr(element, f"{end}_frame")
     for table in ("sensors", "accelerometers"):
         for name, sensor in getattr(parameters, table).items():
             yield f"{table}.{name}.frame", "tub", sensor.frame
     yield "clearance.detergent_frame", "tub", parameters.clearance.detergent_frame
-
-
-def _placed_elements(parameters: MachineParameters) -> Iterable[tuple[str, str, Any]]:
-    """Yield table, name and parameters of each element with a frame on tub and on housing."""
-    for table in ("springs", "dampers", "bushings", "elements"):
-        for name, element in getattr(parameters, table).items():
-            yield table, name, element
-    if parameters.gasket:
-        yield "gasket", "", parameters.gasket

@@ -6,13 +6,14 @@ from typing import Any
 from pydrake.multibody.plant import MultibodyPlant
 
 from wm_drake.model.frame_poses import FramePoses
+from wm_drake.model.same_elements import check_same_elements
 from wm_drake.model.scene import Scene
 from wm_drake.model.tub_statics import Weight
 from wm_drake.parameters import MachineParameters
 
 
 class SetUpCache:
-    """Frame poses and weight of the last set-up, and scenes of the machine that no thread uses.
+    """Parameters, frame poses and weight of the last set-up, and scenes that no thread uses.
 
     Threads may share it: each value is replaced as a whole, and a thread that misses computes it.
 
@@ -25,6 +26,12 @@ class SetUpCache:
         self.scenes: list[Scene] = []
         self._poses: FramePoses | None = None
         self._weight: tuple[Any, Weight] | None = None
+        self._checked: MachineParameters | None = None
+
+    def check(self, built: MachineParameters, requested: MachineParameters) -> None:
+        """Check that a machine has the elements of the built one; see `check_same_elements`."""
+        check_same_elements(built, requested, self._checked)
+        self._checked = requested
 
     def frame_poses(self, plant: MultibodyPlant, parameters: MachineParameters) -> FramePoses:
         """Return the frame poses; those of the last set-up if its overrides were the same."""

@@ -21,6 +21,7 @@ from wm_drake.parameters.elements import (
     TelescopicDamper,
 )
 from wm_drake.parameters.inertia import InertiaMatrix
+from wm_drake.parameters.sections import SECTIONS
 from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$")]
@@ -217,10 +218,7 @@ class MachineParameters(Frozen):
     @field_validator("springs", "dampers", "telescopic_dampers")
     @classmethod
     def _type_is_known(cls, places: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
-        tables = {"type": "spring_types" if info.field_name == "springs" else "damper_types"}
-        if info.field_name == "telescopic_dampers":
-            tables |= {"tub_bushing": "bushing_types", "housing_bushing": "bushing_types"}
-        for key, table in tables.items():
+        for key, table in SECTIONS[info.field_name or ""].types.items():
             known = info.data.get(table)
             if known is None:  # the table itself is wrong, which is reported already
                 continue
@@ -309,4 +307,4 @@ class MachineParameters(Frozen):
 
     def all_bushings(self) -> dict[str, Bushing]:
         """Return the six-component bushings by name, including the gasket as 'gasket'."""
-        return ({"gasket": self.gasket} if self.gasket else {}) | self.bushings
+        return SECTIONS["bushings"].elements(self)

@@ -173,6 +173,8 @@ class RubberBranches(BaseModel):
     @property
     def branches_in_use(self) -> tuple[str, ...]:
         """Return the branches in use, and "cross_stiffness" if there is any."""
+        if self.model_fields_set.isdisjoint(RubberBranches.model_fields):
+            return ()
         return (*self.stretched_branches, *(["cross_stiffness"] if any(self.cross) else []))
 
 

@@ -10,6 +10,7 @@ from wm_drake.elements.state_map import CARRIER, ELEMENT, STRETCHES
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.machine import Setup
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.sections import SECTIONS
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.mount_histories import (
     SIGNAL_SIZE,
@@ -30,15 +31,8 @@ def mount_names(parameters: MachineParameters) -> tuple[str, ...]:
 
     The order is that of `wm_drake.elements.mount.Mounts`.
     """
-    bushings = (
-        name if name == "gasket" else f"bushings.{name}" for name in parameters.all_bushings()
-    )
-    return (
-        *(f"springs.{name}" for name in parameters.springs),
-        *(f"dampers.{name}" for name in parameters.dampers),
-        *bushings,
-        *(f"telescopic_dampers.{name}" for name in parameters.telescopic_dampers),
-        *(f"elements.{name}" for name in parameters.elements),
+    return tuple(
+        section.key(name) for section in SECTIONS.values() for name in section.elements(parameters)
     )
 
 

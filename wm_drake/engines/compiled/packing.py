@@ -69,12 +69,12 @@ class Layout:
     others: tuple[int, ...] = ()
     kinds: tuple[ElementKind, ...] = ()
 
-    @property
+    @functools.cached_property
     def mounts(self) -> Mounts:
         """Return the indices of the mounts in the form that compiled functions use."""
         return mounts_at(vars(self), self.rubber, self.kinds, self.states)
 
-    @property
+    @functools.cached_property
     def elements(self) -> Elements:
         """Return the indices in the form that compiled functions use.
 
@@ -128,20 +128,28 @@ def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
         control_period = drive.controller.sample_time or 0.0
     if setup.cabinet:
         cabinet = add(np.concatenate([pack_rigid(setup, CABINET), setup.cabinet.packed()]))
-    return np.concatenate(parts), Layout(
-        **indices,
-        telescopes=tuple(telescopes),
-        rubber=setup.elements.rubber_begins(indices),
-        tubes=tuple(tubes),
-        bearing=bearing,
-        motor=motor,
-        cabinet=cabinet,
-        gasket=dict(zip(setup.bushings, indices["bushings"], strict=True)).get("gasket", -1),
-        control_period=control_period,
-        structure=tuple(structure),
-        states=state_map(setup),
-        kinds=tuple(element.kind for element in setup.elements.others.values()),
+    return np.concatenate(parts), _shared(
+        Layout(
+            **indices,
+            telescopes=tuple(telescopes),
+            rubber=setup.elements.rubber_begins(indices),
+            tubes=tuple(tubes),
+            bearing=bearing,
+            motor=motor,
+            cabinet=cabinet,
+            gasket=dict(zip(setup.bushings, indices["bushings"], strict=True)).get("gasket", -1),
+            control_period=control_period,
+            structure=tuple(structure),
+            states=state_map(setup),
+            kinds=tuple(element.kind for element in setup.elements.others.values()),
+        )
     )
+
+
+@functools.lru_cache(maxsize=64)
+def _shared(layout: Layout) -> Layout:
+    """Return the first layout that equals this one, whose indices exist already."""
+    return layout
 
 
 def state_map(setup: Setup) -> StateMap:
@@ -169,7 +177,11 @@ def fill_lanes(lanes: FloatArray, runs: list[FloatArray]) -> FloatArray:
         The array of lanes.
     """
     idle = WIDTH - len(runs)
-    lanes.reshape(-1, WIDTH)[:] = np.stack([*runs, *runs[-1:] * idle], axis=1)
+    rows = lanes.reshape(-1, WIDTH)
+    if len(runs) == 1:
+        rows[:] = runs[0][:, None]
+    else:
+        np.stack([*runs, *runs[-1:] * idle], axis=1, out=rows)
     return lanes
 
 
@@ -183,8 +195,10 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     x: FloatArray = np.zeros(states.size)
     x[: POSE.fixed_size] = setup.rest_pose
     x[DRUM_RATE] = profile.speed[0]
-    x[states.indices(*PLACES, kinds=[TUBES])] = setup.tube_rest.ravel()
-    x[states.indices(*PLACES, kinds=[CARRIER_STATES])] = setup.carrier_rest
+    if setup.telescopes:
+        x[states.indices(*PLACES, kinds=[TUBES])] = setup.tube_rest.ravel()
+    if setup.bearing:
+        x[states.indices(*PLACES, kinds=[CARRIER_STATES])] = setup.carrier_rest
     if setup.elements.others:
         x[states.span(ELEMENT)] = setup.elements.initial_of_others()
     return x
