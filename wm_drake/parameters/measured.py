@@ -1,7 +1,10 @@
 """Measured amplitudes and other responses, from the files that a machine file names."""
 
+import math
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -9,6 +12,7 @@ import pandas as pd
 from wm_drake.errors import input_error
 from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header
 from wm_drake.parameters.machine import MachineParameters
+from wm_drake.parameters.published import COLUMNS, CONSTANT, OF_RESPONSE, published_results
 
 _KEYS = ["load", "gasket", "source"]
 
@@ -32,8 +36,12 @@ class NamedValue:
         of: `MACHINE` or `DESIGN`.
         name: Name of the response, such as ``Dx``.
         value: The value, in `unit`.
-        unit: Unit in the head of the column.
+        unit: Unit in the head of the column; "" for that in which the response is displayed.
         where: The file, for messages.
+        factor: Factor of the design to which the value belongs; "" if it belongs to all trials.
+        level: Level -1, 0 or 1 of which the value is the effect; None if the value is the
+            contribution of the factor in percent.
+        mean: Grand mean to which an effect is compared, in `unit`; NaN for other values.
     """
 
     load: str
@@ -44,6 +52,9 @@ class NamedValue:
     value: float
     unit: str
     where: str
+    factor: str = ""
+    level: int | None = None
+    mean: float = math.nan
 
 
 def measured_amplitudes(parameters: MachineParameters) -> pd.DataFrame:
@@ -67,17 +78,45 @@ def measured_responses(parameters: MachineParameters) -> list[NamedValue]:
     Returns:
         All values of the files of responses in `measured`. Such a file has the columns ``load``,
         ``gasket`` (yes, no), ``source``, ``of`` (machine, design) and one for each response, with
-        its unit in the head: ``Fx [N]``.
+        its unit in the head: ``Fx [N]``. Or it has the form of the results of a gasket study
+        (`published_results`): means, effects at the levels -1 and 0, and contributions of the main
+        effects are read; interactions, sums and ranges are not.
 
     Raises:
         InputError: a file is missing, has another column, or contains a value that is not allowed.
     """
-    paths = [path for path in parameters.measured if _has_responses(path)]
-    return [value for path in paths for value in _responses(path)]
+    values: list[NamedValue] = []
+    for path in parameters.measured:
+        if _is_of_study(path):
+            values += _of_study(path)
+        elif _has_responses(path):
+            values += _responses(path)
+    return values
 
 
 def _has_responses(path: str) -> bool:
-    return OF in read_header(Path(path), key="measured")
+    return OF in read_header(Path(path), key="measured") or _is_of_study(path)
+
+
+def _is_of_study(path: str) -> bool:
+    return read_header(Path(path), key="measured") == COLUMNS
+
+
+def _of_study(path: str) -> Iterator[NamedValue]:
+    """Yield the results of a gasket study as values of its design."""
+    source = Path(path).name
+    for (load, name), terms in published_results([path], "measured").items():
+        named = partial(NamedValue, load, True, source, DESIGN, name, unit="", where=path)
+        mean = terms[CONSTANT].effects[0] if CONSTANT in terms else math.nan
+        if CONSTANT in terms:
+            yield named(mean)
+        mains = {k: v for k, v in terms.items() if k not in OF_RESPONSE and ":" not in k}
+        for factor, term in mains.items():
+            # the effect at level 1 is minus the sum of the others
+            for level, effect in zip((-1, 0), term.effects, strict=False):
+                yield named(effect, factor=factor, level=level, mean=mean)
+            if term.percent is not None:
+                yield named(term.percent, factor=factor)
 
 
 def _responses(path: str) -> list[NamedValue]:

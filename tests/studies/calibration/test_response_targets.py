@@ -1,5 +1,7 @@
 """Targets that are no amplitudes: files, means over a design, and what is known of ratios."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ from wm_drake.studies.calibration.computed import Evaluation
 from wm_drake.studies.calibration.parameter_map import parameter_map_of
 from wm_drake.studies.calibration.response_targets import (
     ComputedResponses,
+    _Design,
     response_targets_of,
     with_deviations,
 )
@@ -107,6 +110,55 @@ def test_a_mean_over_the_design_is_that_of_its_trials(short, tmp_path):
         [table.gasket_force.values[:, 0].mean(), table.gasket_moment.values[:, 1].mean()], rel=1e-12
     )
     assert np.array_equal(computed[0], computed[1])
+
+
+OF_STUDY = """load,response,term,percent,effects
+middle,Fx,constant,,40
+middle,Fx,main effects,99,
+middle,Fx,K_Lx,90,-20 1
+middle,My,C_L,0.5,
+"""
+
+
+def test_effects_and_contributions_of_a_design_are_targets(short, tmp_path):
+    """Take the values from trials of a known law: 40 + 20 K_Lx - 3 K_Lx^2 + 2."""
+    targets = response_targets_of(short.parameters, named(short, tmp_path, OF_STUDY))
+    assert [target.of for target in targets] == ["design", "K_Lx at -1", "K_Lx at 0", "K_Lx", "C_L"]
+    assert [target.deviation for target in targets] == [0.10, 0.03, 0.03, 0.10, 0.10]
+    design = _Design.of(short.parameters)
+    level = design.levels[:, list(load_factors(GASKET_FACTORS)).index("K_Lx")].astype(float)
+    other = design.levels[:, 0].astype(float)
+    runs = (40.0 + 20.0 * level - 3.0 * level**2 + 2.0 + 4.0 * other)[None]
+    found = [float(design.statistic(target, runs)[0]) for target in targets]
+    assert found[:3] == pytest.approx([40.0, -21.0, 2.0])
+    sums = np.square([-21.0, 2.0, 19.0]).sum(), 2.0 * 4.0**2
+    assert found[3:] == pytest.approx([100.0 * s / sum(sums) for s in sums])
+    of_all = targets_of(
+        short.parameters, measured_amplitudes(load_machine("reference")), responses=()
+    )
+    of_all = replace(of_all, responses=targets)
+    errors = of_all.response_errors(np.array(found))
+    assert errors[:3] == pytest.approx([0.0, -1.0 / 40.0, 1.0 / 40.0])
+    assert errors[4] == pytest.approx((found[4] - 0.5) / 100.0)
+    residuals = of_all.residuals(of_all.amplitude, np.array(found), np.ones((6, 6)))
+    assert residuals[36:] == pytest.approx(errors / [0.1, 0.03, 0.03, 0.1, 0.1])
+    limited = of_all.limited({"effect": 0.01})
+    beyond = limited.excesses(of_all.amplitude, np.array(found), np.ones((6, 6)))
+    assert beyond == pytest.approx([-0.5, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ("middle,Fx,K_Lq,90,-20 1\n", "no factor 'K_Lq'"),
+        ("middle,Fx,K_Lx,90,-20 1\n", "has effects and no constant above 0"),
+    ],
+)
+def test_wrong_results_of_a_study_are_refused(short, tmp_path, row, message):
+    values = named(short, tmp_path, "load,response,term,percent,effects\n" + row)
+    with pytest.raises(InputError) as refused:
+        response_targets_of(short.parameters, values)
+    assert message in refused.value.problems[0].message
 
 
 def test_weights_and_deviations_go_by_name_and_by_kind(short, tmp_path):

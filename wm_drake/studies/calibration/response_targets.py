@@ -11,7 +11,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import FactorLevels, MachineParameters, at_levels, levels_of, load_factors
 from wm_drake.parameters.factors import GASKET_FACTORS
-from wm_drake.parameters.measured import DESIGN, NamedValue
+from wm_drake.parameters.measured import DESIGN, MACHINE, NamedValue
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import dimension, from_base, to_base
 from wm_drake.simulation.cases import Case
@@ -34,6 +34,14 @@ amplitudes miss the experiment by 7.8 % in the mean).
 """
 
 
+EFFECT, CONTRIBUTION = "effect", "contribution"
+"""Names of all level effects and of all contributions, for deviations, weights and limits."""
+
+DEVIATIONS = {"": DEVIATION, EFFECT: 0.03, CONTRIBUTION: 0.10}
+"""Default deviation of each kind of value: a fraction of the value, of the grand mean for an
+effect, and of the variance for a contribution."""
+
+
 @dataclass(frozen=True)
 class ResponseTarget:
     """A value that a response of the machine should have.
@@ -41,12 +49,16 @@ class ResponseTarget:
     Attributes:
         load: Name of the load.
         gasket: Whether the machine has its gasket.
-        of_design: Whether the value is the mean over a design of gasket factors. Otherwise it
-            belongs to the machine itself.
+        of_design: Whether the value belongs to a design of gasket factors: its mean, the effect of
+            a factor or the contribution of one. Otherwise it belongs to the machine itself.
         response: The response.
-        value: The value. [unit for reading of the response]
-        weight: Weight of its squared log ratio; 0 if it is not used.
-        deviation: Relative standard deviation.
+        value: The value. [unit for reading of the response; % for a contribution]
+        weight: Weight of its squared residual; 0 if it is not used.
+        deviation: Standard deviation, as a fraction of the value, of the mean for an effect, or of
+            the variance for a contribution.
+        factor: Factor of an effect or a contribution; "" for a mean.
+        level: Level of an effect; None for a contribution.
+        mean: Grand mean of which an effect is a fraction. [unit for reading of the response]
     """
 
     load: str
@@ -56,6 +68,32 @@ class ResponseTarget:
     value: float
     weight: float = 1.0
     deviation: float = DEVIATION
+    factor: str = ""
+    level: int | None = None
+    mean: float = np.nan
+
+    @property
+    def of(self) -> str:
+        """What the value belongs to, for tables."""
+        if self.factor:
+            return f"{self.factor} at {self.level}" if self.level is not None else self.factor
+        return DESIGN if self.of_design else MACHINE
+
+    @property
+    def statistic(self) -> str:
+        """`EFFECT`, `CONTRIBUTION`, or "" for a value that is never below 0."""
+        return (EFFECT if self.level is not None else CONTRIBUTION) if self.factor else ""
+
+    def errors(self, values: FloatArray) -> FloatArray:
+        """Return differences from the target, as fractions like `deviation`."""
+        if not self.factor:
+            return values / self.value - 1.0
+        scale = self.mean if self.level is not None else 100.0
+        return (values - self.value) / scale
+
+    def misfits(self, values: FloatArray) -> FloatArray:
+        """Return the logarithms of the ratios to the target, or `errors` of effects and such."""
+        return self.errors(values) if self.factor else np.log(values / self.value)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -63,6 +101,7 @@ class ResponseTarget:
         return (
             f"{self.load}:{self.response.name}",
             self.response.name,
+            *((self.statistic,) if self.factor else ()),
             self.response.group,
             self.response.kind,
             self.load,
@@ -87,17 +126,27 @@ def response_targets_of(
     targets: dict[tuple[object, ...], ResponseTarget] = {}
     for value in values:
         message = _problem(parameters, known, value)
-        key = (value.load, value.gasket, value.of, value.name)
+        key = (value.load, value.gasket, value.of, value.name, value.factor, value.level)
         if not message and key in targets:
             message = f"'{value.name}' of load '{value.load}' occurs twice"
         if message:
             problems.append(Problem(value.where, "measured", message))
             continue
         response = known[value.name]
-        number = from_base(to_base(value.value, value.unit), response.unit.shown)
-        targets[key] = ResponseTarget(
-            value.load, value.gasket, value.of == DESIGN, response, number
+        number = value.value
+        if value.unit:
+            number = from_base(to_base(number, value.unit), response.unit.shown)
+        target = ResponseTarget(
+            value.load,
+            value.gasket,
+            value.of == DESIGN,
+            response,
+            number,
+            factor=value.factor,
+            level=value.level,
+            mean=value.mean,
         )
+        targets[key] = replace(target, deviation=DEVIATIONS[target.statistic])
     if problems:
         raise InputError(problems)
     return tuple(targets.values())
@@ -113,11 +162,13 @@ def _problem(
         return f"no response '{value.name}'{nearest_names(value.name, known)}"
     shown = known[value.name].unit.shown
     try:
-        fits = dimension(value.unit) == dimension(shown)
+        fits = not value.unit or dimension(value.unit) == dimension(shown)
     except ValueError as error:
         return f"column '{value.name}': {error}"
     if not fits:
         return f"column '{value.name}' is in {value.unit}; it needs a unit such as {shown}"
+    if value.factor:
+        return _problem_of_factor(value)
     if not value.value > 0.0:
         return (
             f"{value.name} of load '{value.load}' is {value.value:g}; it must be above 0, so that "
@@ -127,6 +178,19 @@ def _problem(
         return f"load '{value.load}' is with gasket, and the machine has none"
     if value.of == DESIGN and not value.gasket:
         return f"load '{value.load}': a mean over the gasket's design needs the gasket"
+    return ""
+
+
+def _problem_of_factor(value: NamedValue) -> str:
+    """Return what is wrong with an effect or a contribution; "" if nothing is."""
+    factors = load_factors(GASKET_FACTORS)
+    if value.factor not in factors:
+        return f"no factor '{value.factor}'{nearest_names(value.factor, factors)}"
+    if value.level is not None and not value.mean > 0.0:
+        return (
+            f"{value.name} of load '{value.load}' has effects and no constant above 0; effects are "
+            "compared as fractions of it"
+        )
     return ""
 
 
@@ -232,7 +296,8 @@ class ComputedResponses:
         for place, target in zip(places, evaluated, strict=True):
             values = np.where(ended, target.response.values(table), np.nan)
             runs = values.reshape(len(machines), -1, len(loads))
-            result[:, place] = runs[..., loads.index((target.load, target.gasket))].mean(axis=1)
+            of_load = runs[..., loads.index((target.load, target.gasket))]
+            result[:, place] = way.statistic(target, of_load)
 
 
 @dataclass(frozen=True)
@@ -245,10 +310,17 @@ class _Itself:
     def trials(self, parameters: MachineParameters) -> Iterable[MachineParameters]:
         return [parameters]
 
+    def statistic(self, _target: ResponseTarget, runs: FloatArray) -> FloatArray:
+        """Return the value of each machine from its one run (machine, trial)."""
+        return np.asarray(runs[:, 0])
+
 
 @dataclass(frozen=True)
 class _Design:
-    """Evaluation of a response as the mean over the trials of the gasket study of [B]."""
+    """Evaluation of a response over the trials of the gasket study of [B].
+
+    Stiffness tables are replaced by their slopes at rest, as in [B] section 4.
+    """
 
     machine: Machine
     levels: Levels
@@ -262,8 +334,23 @@ class _Design:
 
     @staticmethod
     def _factors(parameters: MachineParameters) -> tuple[FactorLevels, ...]:
-        return levels_of(parameters, load_factors(GASKET_FACTORS))
+        return levels_of(parameters, load_factors(GASKET_FACTORS), "linear")
 
     def trials(self, parameters: MachineParameters) -> Iterable[MachineParameters]:
         factors = self._factors(parameters)
         return (at_levels(parameters, factors, row.tolist()) for row in self.levels)
+
+    def statistic(self, target: ResponseTarget, runs: FloatArray) -> FloatArray:
+        """Return mean, effect or contribution [%] of each machine from its runs (machine, trial).
+
+        Of an orthogonal array, the sum of squares of a factor is that of its effects.
+        """
+        mean = runs.mean(axis=1)
+        if not target.factor:
+            return np.asarray(mean)
+        levels = self.levels[:, list(load_factors(GASKET_FACTORS)).index(target.factor)]
+        effects = [runs[:, levels == level].mean(axis=1) - mean for level in (-1, 0, 1)]
+        if target.level is not None:
+            return np.asarray(effects[target.level + 1])
+        of_factor = np.square(effects).mean(axis=0)
+        return np.asarray(100.0 * of_factor / np.square(runs - mean[:, None]).mean(axis=1))

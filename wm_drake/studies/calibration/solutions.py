@@ -100,7 +100,10 @@ class Solution:
         targets = self.targets
         loads = [f"{name}{'' if gasket else ' without gasket'}" for name, gasket in targets.loads]
         names = [f"{load} {sensor}" for load in loads for sensor in targets.sensors]
-        names += [f"{target.load} {target.response.name}" for target in targets.responses]
+        names += [
+            " ".join(filter(None, (target.load, target.response.name, target.factor and target.of)))
+            for target in targets.responses
+        ]
         errors = np.concatenate([self.errors.ravel(), self.response_errors])
         used = [(name, e) for name, e in zip(names, errors, strict=True) if e == e]
         return [

@@ -5,12 +5,11 @@ from typing import Any
 
 import pandas as pd
 
-from wm_drake.parameters.measured import DESIGN, MACHINE
 from wm_drake.report.table import Column, Table, table_of
 from wm_drake.studies.calibration.calibration import Calibration
 from wm_drake.studies.calibration.fewer import Simpler
 from wm_drake.studies.calibration.prediction import Prediction
-from wm_drake.studies.calibration.response_targets import TRIALS
+from wm_drake.studies.calibration.response_targets import CONTRIBUTION, TRIALS
 from wm_drake.studies.calibration.solutions import percents_of
 from wm_drake.studies.calibration.targets import EXPERIMENT, MILLIMETRE
 
@@ -87,16 +86,16 @@ def amplitude_rows(calibration: Calibration) -> pd.DataFrame:
 def response_table(calibration: Calibration) -> pd.DataFrame:
     """Return the targets that are no amplitudes, and those responses of each solution.
 
-    Columns: load, gasket (yes, no), of (machine, design), response, unit, target, deviation in
-    percent, and one for each solution.
+    Columns: load, gasket (yes, no), of (machine, design, factor at a level, factor), response,
+    unit, target, deviation in percent, and one for each solution.
     """
     rows = [
         {
             "load": target.load,
             "gasket": "yes" if target.gasket else "no",
-            "of": DESIGN if target.of_design else MACHINE,
+            "of": target.of,
             "response": target.response.name,
-            "unit": target.response.unit_text,
+            "unit": "%" if target.statistic == CONTRIBUTION else target.response.unit_text,
             "target": target.value,
             "deviation_percent": 100.0 * target.deviation,
         }
@@ -120,8 +119,10 @@ def responses_shown(calibration: Calibration) -> Table:
     frame["difference"] = 100.0 * calibration.solutions[0].response_errors
     caption = (
         "Responses that are no amplitudes of sensors. A value of the design is the mean over "
-        f"{TRIALS} trials of an orthogonal array of the gasket's factors ([B] section 4). A "
-        "response without a difference was not used."
+        f"{TRIALS} trials of an orthogonal array of the gasket's factors ([B] section 4); one of a "
+        "factor at a level is its effect, with the difference in percent of the mean; one of a "
+        "factor alone is its contribution in percent of the variance, with the difference in "
+        "points. A response without a difference was not used."
     )
     return table_of(frame[list(RESPONSES)], caption, RESPONSES)
 

@@ -59,14 +59,19 @@ class Targets:
         return np.where(self.weight > 0.0, amplitude / self.amplitude - 1.0, np.nan)
 
     def response_errors(self, responses: FloatArray) -> FloatArray:
-        """Return (computed - target) / target (response); NaN where the weight is 0."""
-        values = np.array([target.value for target in self.responses])
-        return np.where(self._used, responses / values - 1.0, np.nan)
+        """Return (computed - target) / target (response); NaN where the weight is 0.
+
+        Effects are compared as fractions of the mean, contributions as fractions of the variance.
+        """
+        errors = [t.errors(responses[..., k]) for k, t in enumerate(self.responses)]
+        return np.where(self._used, _stacked(errors, responses), np.nan)
 
     def residuals(
         self, amplitude: FloatArray, responses: FloatArray, spread: FloatArray
     ) -> FloatArray:
         """Return the weighted logarithms of the ratios of computed to wanted values.
+
+        Effects and contributions, which may be 0 or below, enter with their differences.
 
         Args:
             amplitude: (..., case, sensor) computed amplitudes. [m]
@@ -77,7 +82,7 @@ class Targets:
             (..., n) residuals of the values that are used, in standard deviations.
         """
         weights = np.concatenate([self.weight[self.weight > 0.0], self.response_weight[self._used]])
-        return self._logarithms(amplitude, responses) * np.sqrt(weights) / self._deviations(spread)
+        return self._misfits(amplitude, responses) * np.sqrt(weights) / self._deviations(spread)
 
     def excesses(
         self, amplitude: FloatArray, responses: FloatArray, spread: FloatArray
@@ -91,10 +96,14 @@ class Targets:
         """
         limit = self.limit_of_each()
         limited = np.isfinite(limit)
-        logarithms, limit = self._logarithms(amplitude, responses)[..., limited], limit[limited]
+        misfits, limit = self._misfits(amplitude, responses)[..., limited], limit[limited]
+        of_factor = np.array([bool(target.factor) for target in self.responses], dtype=bool)
+        amplitudes = np.zeros(np.count_nonzero(self.weight > 0.0), dtype=bool)
+        is_linear = np.concatenate([amplitudes, of_factor[self._used]])[limited]
         with np.errstate(divide="ignore"):  # no value is 100 % too small
-            above, below = np.log1p(limit), np.log1p(-np.minimum(limit, 1.0))
-        beyond = np.maximum(logarithms - above, 0.0) + np.minimum(logarithms - below, 0.0)
+            above = np.where(is_linear, limit, np.log1p(limit))
+            below = np.where(is_linear, -limit, np.log1p(-np.minimum(limit, 1.0)))
+        beyond = np.maximum(misfits - above, 0.0) + np.minimum(misfits - below, 0.0)
         return np.asarray(beyond / self._deviations(spread)[limited])
 
     @property
@@ -102,12 +111,12 @@ class Targets:
         """Whether each of the other responses is used. (response)"""
         return self.response_weight > 0.0
 
-    def _logarithms(self, amplitude: FloatArray, responses: FloatArray) -> FloatArray:
-        """Return the logarithms of the ratios of computed to wanted values that are used."""
-        values = np.array([target.value for target in self.responses])
+    def _misfits(self, amplitude: FloatArray, responses: FloatArray) -> FloatArray:
+        """Return the logarithms of the ratios of amplitudes, then `ResponseTarget.misfits`."""
         ratios = (amplitude / self.amplitude)[..., self.weight > 0.0]
-        others = (responses / values)[..., self._used]
-        return np.asarray(np.log(np.concatenate([ratios, others], axis=-1)))
+        misfits = [t.misfits(responses[..., k]) for k, t in enumerate(self.responses)]
+        others = _stacked(misfits, responses)[..., self._used]
+        return np.concatenate([np.log(ratios), others], axis=-1)
 
     def _deviations(self, spread: FloatArray) -> FloatArray:
         """Return the standard deviations of the logarithms of the values that are used. (n)"""
@@ -227,6 +236,11 @@ class Targets:
             for name, gasket in self.loads
             if not gasket and (name, True) in row
         }
+
+
+def _stacked(columns: list[FloatArray], like: FloatArray) -> FloatArray:
+    """Return columns (...) as an array (..., column), which may be empty."""
+    return np.stack(columns, axis=-1) if columns else np.empty((*like.shape[:-1], 0))
 
 
 def targets_of(
