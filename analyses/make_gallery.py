@@ -102,7 +102,11 @@ ENTRIES = (
         page="",
     ),
     Entry("gasket", "Which number of the gasket matters?", "wm-drake study gasket --trials 200"),
-    Entry("gasket-effect", "What does the gasket do?", "wm-drake study gasket-effect"),
+    Entry(
+        "gasket-effect",
+        "What does the gasket do?",
+        "wm-drake spin --compare-gasket --load middle --load counter",
+    ),
     Entry(
         "gasket-damping",
         "Damping of the gasket from records",

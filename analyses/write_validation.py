@@ -18,6 +18,7 @@ import argparse
 import subprocess
 import sys
 import tempfile
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -37,18 +38,19 @@ from wm_drake.parameters import (
 )
 from wm_drake.parameters.files import read_yaml
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
-from wm_drake.report.spin.report import amplitude_table
 from wm_drake.rigs import Harmonic
 from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket.screening import Screening, run_screening
 from wm_drake.studies.gasket.study import GasketTrials
-from wm_drake.studies.gasket_effect.study import effect_table, run_gasket_effect
 from wm_drake.studies.identification.drift import (
     coulomb_fits,
     mstv_motions,
     mstv_of_c,
     printed_table,
 )
+from wm_drake.studies.spin.gasket_effect import effect_table
+from wm_drake.studies.spin.study import run_spin
+from wm_drake.studies.spin.tables import amplitude_table
 from wm_drake.studies.spin_cycle.runs import compiled_runs
 from wm_drake.studies.spin_cycle.study import run_spin_cycle
 from wm_drake.studies.validation import page, rows
@@ -89,11 +91,13 @@ def coulomb(quick: bool) -> pd.DataFrame:
 def compared(reference: MachineParameters, quick: bool, means_kind: str) -> list[rows.Row]:
     """Return a row for each published number; with --quick, without the spin cycle."""
     cases = [Case(name, load, reference.profile) for name, load in reference.loads.items()]
-    effect = run_gasket_effect(reference, cases)
-    both = [amplitude_table(result) for result in (effect.without, effect.with_gasket)]
-    table = rows.amplitude_rows(pd.concat(both))
+    both = [
+        run_spin(reference, [replace(case, gasket=gasket) for case in cases])
+        for gasket in (False, True)
+    ]
+    table = rows.amplitude_rows(pd.concat([amplitude_table(result) for result in both]))
     table += rows.held_out_rows(pd.read_csv(HELD_OUT))
-    table += rows.effect_rows(effect_table(effect))
+    table += rows.effect_rows(effect_table(*both))
     published = published_results(reference.published)
     table += rows.mean_rows(grand_means(reference, quick), published, means_kind)
     if not quick:

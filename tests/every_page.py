@@ -46,15 +46,15 @@ def _fit(template: str, bench: tuple[str, ...], *words: str) -> Kind:
 
 
 KINDS = {
-    "spin": _one("spin/page.html", "spin"),
+    "spin": _one("sections.html", "spin"),
     "spin_of_motor": _one(
-        "spin/page.html", "spin", "--machine", "motor", "--load", "middle", "--detail"
+        "sections.html", "spin", "--machine", "motor", "--load", "middle", "--detail"
     ),
     "spin_of_cabinet": _one(
-        "spin/page.html", "spin", "--machine", "light_cabinet", "--load", "middle"
+        "sections.html", "spin", "--machine", "light_cabinet", "--load", "middle"
     ),
     "comparison": _one(
-        "spin/comparison.html", "spin", "--compare-gasket", "--load", "middle", "--load", "front",
+        "sections.html", "spin", "--compare-gasket", "--load", "middle", "--load", "front",
     ),
     "rig_damper": _one(
         "sections.html", "rig", "damper", *DAMPER, "-f", "1,10 Hz", "-a", "0.3,1 mm"
@@ -95,7 +95,6 @@ KINDS = {
         "gasket/page.html", "study", "gasket", "--design", "orthogonal", "--trials", "243",
         "--model", "main", "--load", "back", "--response", "mount_force_peak", "--response", "amplitude",
     ),
-    "gasket_effect": _one("gasket_effect/page.html", "study", "gasket-effect", "--load", "middle"),
     "gasket_damping": Kind(
         "sections.html",
         (
@@ -116,7 +115,7 @@ KINDS = {
         "--harmonics", "3", "--rate", "20 rpm/s", "--rate", "50 rpm/s",
     ),
     "orders": Kind(
-        "orders/page.html",
+        "sections.html",
         (("spin", "--load", "middle", "--out", "bench"), ("record", "orders", "record")),
     ),
     "tolerance": _one(

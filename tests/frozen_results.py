@@ -48,7 +48,7 @@ PRINTED = {
     "spin_drake": ("spin", "--load", "middle", "--engine", "drake", "--json"),
     "modes_json": ("study", "modes", "--json"),
     "gasket_json": ("study", "gasket", "--trials", "150", "--response", "amplitude", "--json"),
-    "effect_json": ("study", "gasket-effect", "--load", "middle", "--json"),
+    "effect_json": ("spin", "--compare-gasket", "--load", "middle", "--json"),
     "cycle_json": ("study", "spin-cycle", "--case", "2", "--json"),
 }  # fmt: skip
 """Commands whose standard output is frozen."""

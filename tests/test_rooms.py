@@ -32,11 +32,6 @@ ORDER = (
     {"__main__"},
 )
 LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}
-PAGES_BEFORE_THEIR_MOVE = {
-    "orders",
-    "spin",
-}
-"""Folders of report that still import studies; they move to `studies/NAME/page.py`."""
 DRAWING = {"page", "figures", "tables", "words"}
 """Modules of a study that may import a plotting library."""
 WITHOUT_DRAKE = {
@@ -78,9 +73,6 @@ def _reason(name, target):
     room, *places = name.split(".")[1:]
     if top == "wm_drake":
         other = below[0] if below else ""
-        is_old_page = room == "report" and {*places[:1]} <= PAGES_BEFORE_THEIR_MOVE
-        if is_old_page and other == "studies":
-            return ""
         if other != room and LEVEL.get(other, len(ORDER)) >= LEVEL[room]:
             return "not a room before it"
     if top in ("analyses", "tests", "conftest"):
@@ -116,15 +108,6 @@ def modules():
 def test_every_room_of_the_order_exists():
     rooms = {name.split(".")[1] for name, _, _ in modules() if name != "wm_drake"}
     assert set(LEVEL) <= rooms
-
-
-def test_list_of_old_pages_has_no_page_that_moved():
-    old = {
-        name.split(".")[2]
-        for name, source, _ in modules()
-        if name.startswith("wm_drake.report.") and "wm_drake.studies" in source
-    }
-    assert old == PAGES_BEFORE_THEIR_MOVE
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,6 @@ HOURS = (  # commands of more than ten seconds of processor time; the marker `ho
     "wm-drake identify damper fit/*.csv",
     "wm-drake identify table2",
 )
-SHORT = ("wm-drake study gasket-effect",)  # of those, the ones that are quick
 COMMANDS = {}
 for _block in BLOCKS:
     if _block.page not in ELSEWHERE and _block.commands:
@@ -76,7 +75,7 @@ def reason_not_to_run(command):
 
 def is_long(command):
     """Return whether a command takes longer than a slow test may."""
-    return command.startswith(HOURS) and not command.startswith(SHORT)
+    return command.startswith(HOURS)
 
 
 def test_every_block_is_of_a_known_kind():
@@ -92,7 +91,7 @@ def test_every_command_line_is_a_command():
 
 def test_a_reason_and_a_mark_belong_to_a_command():
     lines = [line for commands in COMMANDS.values() for line in commands]
-    for begin in (*NOT_RUN, *HOURS, *SHORT):
+    for begin in (*NOT_RUN, *HOURS):
         assert any(line.startswith(begin) for line in lines), begin
 
 

@@ -11,13 +11,13 @@ from hand_made_records import case_result, spin_result
 from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors, load_machine
 from wm_drake.report.figure import MARK, MEASURED, Axis, Figure, Line, Panel, Rule, Span, in_grid
 from wm_drake.report.page import picture, render
-from wm_drake.report.spin.report import spin_report
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket.screening import Meaning, Responses, run_screening
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.surface import surfaces
 from wm_drake.studies.gasket.task import GasketResult
+from wm_drake.studies.spin.page import spin_page as page_of_spin
 from wm_drake.studies.study import Facts
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -63,7 +63,9 @@ def screening(machine):
 
 def spin_page(machine, _):
     names = ("middle", "back")
-    return spin_report(spin_result(machine, [case_result(machine, n, samples=4000) for n in names]))
+    return page_of_spin(
+        spin_result(machine, [case_result(machine, n, samples=4000) for n in names])
+    )
 
 
 def gasket_page(_, screening):

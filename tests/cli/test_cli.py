@@ -13,7 +13,6 @@ import pandas as pd
 import pytest
 
 from wm_drake import load_record
-from wm_drake.cli import main
 from wm_drake.parameters import load_machine
 from wm_drake.studies.result_folder import Run, result_folder
 
@@ -234,19 +233,6 @@ def test_load_name_that_is_no_file_name_is_refused_before_the_run(wm_drake):
     assert_refused(ended, before, "a/b")
 
 
-@pytest.mark.parametrize("mishap", [KeyboardInterrupt, OSError("disk full")])
-def test_failed_run_leaves_nothing(monkeypatch, tmp_path, mishap):
-    def fail(*_, **__):
-        raise mishap
-
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("wm_drake.studies.spin.study.run_spin", fail)
-    monkeypatch.setattr(sys, "argv", ["wm-drake", "spin", "--out", "out"])
-    with pytest.raises((KeyboardInterrupt, OSError, SystemExit)):
-        main()
-    assert listing() == []
-
-
 def test_failed_run_keeps_older_results(monkeypatch, tmp_path):
     def fail_after_writing():
         with result_folder(Path("out"), Run("spin", overwrite=True)) as folder:
@@ -389,7 +375,7 @@ def in_own_process(*arguments, cwd):
 def test_spin_prints_one_json_object(plain):
     assert plain.ended.returncode == 0
     printed = strict_json(plain.ended.stdout)
-    assert set(printed) == {"machine", "engine", "cases"}
+    assert set(printed) == {"machine", "engine", "cases", "wall_s"}
     assert (printed["machine"], printed["engine"]) == ("reference", "compiled")
     case = plain.case
     assert set(case) == {
@@ -566,7 +552,7 @@ def test_only_what_was_measured_is_judged_against_the_experiment(wm_drake, monke
     )
     machine = () if "--machine" in arguments else ("--machine", "own.yaml")
     load = () if "--load" in arguments else ("--load", "middle")
-    monkeypatch.setattr("wm_drake.report.spin.report._envelopes_picture", lambda *_: None)
+    monkeypatch.setattr("wm_drake.studies.spin.page._envelopes_picture", lambda *_: None)
     assert wm_drake("spin", *machine, *load, *arguments, "--out", "out").code == 0
     sources = pd.read_csv("out/amplitudes.csv")["source"].tolist()
     assert sources == (["experiment", "wm_drake"] if compared else ["wm_drake"])
@@ -671,14 +657,3 @@ def test_help_does_not_wait_for_slow_libraries(tmp_path):
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     assert ended.stdout == "set()\n"
-
-
-def test_interrupt_says_so_and_leaves_nothing(wm_drake, monkeypatch):
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("wm_drake.studies.spin.study.run_spin", interrupted)
-    ended = wm_drake("spin", "--out", "out")
-    assert ended.code == 130
-    assert "interrupted; nothing was written" in ended.err
-    assert list(Path().iterdir()) == []

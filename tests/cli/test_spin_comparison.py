@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from wm_drake.cli.spin_comparison import file_parts
+from wm_drake.studies.spin.task import file_parts
 
 PROFILE = "steps:\n- {ramp_to: 100 rpm, rate: 50 rpm/s}\n"
 SOFT = (
@@ -102,7 +102,7 @@ def test_two_machines_on_one_page(wm_drake, monkeypatch):
     ended = spin(wm_drake, *of_machines("reference", "soft.yaml"), "--json", "--replay")
     assert (ended.code, ended.err) == (0, "")
     printed = json.loads(ended.out, parse_constant=pytest.fail)
-    assert set(printed) == {"engine", "variants", "differences"}
+    assert set(printed) == {"engine", "variants", "differences", "wall_s"}
     assert [(v["name"], v["machine"]) for v in printed["variants"]] == [
         ("reference", "reference"),
         ("soft", "soft"),
@@ -141,14 +141,26 @@ def test_two_machines_on_one_page(wm_drake, monkeypatch):
 
 def test_with_and_without_gasket(wm_drake, monkeypatch):
     monkeypatch.setattr("wm_drake.report.page.plotly_of", lambda figure: {})
-    ended = spin(wm_drake, "--compare-gasket", "--load", "middle")
-    assert ended.code == 0
-    assert "with gasket, middle: smallest gap" in ended.out
+    Path("steady.yaml").write_text("time: (0, 2, 6) s\nspeed: (0, 200, 200) rpm\n")
+    arguments = ("--compare-gasket", "--load", "middle", "--profile", "steady.yaml", "--json")
+    ended = wm_drake("spin", *arguments, "--out", "out")
+    assert ended.code == 0, ended.err
     table = pd.read_csv("out/differences.csv").set_index(["measure", "name"])
     assert table.loc[("gasket force", "x"), "reference_value"] > 0.0
     assert pd.isna(table.loc[("gasket force", "x"), "value"])
     sources = pd.read_csv("out/amplitudes.csv")[["variant", "gasket"]].drop_duplicates()
     assert sources.to_numpy().tolist() == [["with gasket", "yes"], ["without gasket", "no"]]
+    printed = json.loads(ended.out, parse_constant=pytest.fail)
+    assert printed["steady_window_s"] == [4.0, 6.0]
+    effect = pd.read_csv("out/effect.csv")
+    assert effect["sensor"].tolist() == [row["sensor"] for row in printed["effect"]]
+    for row in printed["effect"]:
+        assert row["percent"] == pytest.approx(100 * (row["with_mm"] / row["without_mm"] - 1))
+        assert row["experiment_percent"] is None  # another profile than the measured one
+    assert abs(effect["percent"][0]) > 0.1
+    page = Path("out/report.html").read_text()
+    assert "<h2>Effect of the gasket</h2>" in page
+    assert "Amplitudes at constant speed" in page
 
 
 def test_parts_of_file_names_are_safe_and_differ():

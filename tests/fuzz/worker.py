@@ -34,7 +34,7 @@ COMPUTATIONS = (
     "wm_drake.studies.pareto.study.run_designs",
     "wm_drake.studies.steady.study.run_steady_study",
     "wm_drake.studies.modes.study.modes",
-    "wm_drake.report.orders.report.orders_report",
+    "wm_drake.studies.orders.study.orders_of",
     "wm_drake.rigs.run_rig",
     "wm_drake.studies.description.description.describe",
 )

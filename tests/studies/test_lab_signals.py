@@ -7,8 +7,8 @@ import scipy.io
 from wm_drake.errors import InputError
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.spin import Region
+from wm_drake.studies.orders.study import read_signals
 from wm_drake.studies.spin_cycle.measured import read_accelerations
-from wm_drake.studies.steady.orders import read_signals
 
 TIME = np.linspace(0.0, 20.0, 4001)
 NAMES = ("S1_x", "S1_y", "S1_z")

@@ -12,13 +12,13 @@ from typing import Annotated
 
 import typer
 
-from wm_drake.cli import identify, machine, record, rig, spin, studio, study
+from wm_drake.cli import identify, machine, record, rig, studio, study
 from wm_drake.cli.common import HELP_OPTIONS
-from wm_drake.cli.figures import writes_pages
 from wm_drake.cli.options import command_of
 from wm_drake.cli.quiet import give_quiet
 from wm_drake.errors import Problem, WmDrakeError, reason_of
 from wm_drake.studies.calibration.options import CALIBRATE
+from wm_drake.studies.spin.options import SPIN
 
 app = typer.Typer(
     help="Dynamics of front-loading washing machines.",
@@ -31,8 +31,8 @@ app.add_typer(machine.app, name="machine")
 app.add_typer(record.app, name="record")
 app.add_typer(rig.app, name="rig")
 app.add_typer(study.app, name="study")
-app.command()(writes_pages(spin.spin))
-app.command("calibrate")(command_of(CALIBRATE))
+for declared in (SPIN, CALIBRATE):
+    app.command(declared.name)(command_of(declared))
 app.command()(studio.studio)
 give_quiet(app)
 

@@ -19,6 +19,7 @@ class Section:
         tables: Tables.
         text: Sentences.
         facts: Pairs of word and text.
+        links: Names of files beside the page, and the words that link to them.
     """
 
     anchor: str
@@ -27,6 +28,12 @@ class Section:
     tables: tuple[Table, ...] = ()
     text: str = ""
     facts: Sequence[tuple[str, str]] = ()
+    links: Sequence[tuple[str, str]] = ()
+
+    @property
+    def has_content(self) -> bool:
+        """Whether the section shows anything; a page leaves an empty one out."""
+        return any((self.pictures, self.tables, self.text, self.facts, self.links))
 
 
 @dataclass(frozen=True)
@@ -42,6 +49,7 @@ class SectionedPage:
         warnings: Sentences in a box at the top.
         about: What the page is about, below the title; by default the words of the machine.
         method: Sentences on the method, below the facts.
+        tables: Tables of what was run, below them.
     """
 
     title: str
@@ -52,6 +60,7 @@ class SectionedPage:
     warnings: Sequence[str] = ()
     about: str = ""
     method: str = ""
+    tables: Sequence[Table] = ()
 
     def html(self) -> str:
         """Return the page as text of one self-contained file."""
@@ -61,8 +70,9 @@ class SectionedPage:
             about=self.about or (self.machine.about if self.machine else ""),
             summary=self.summary,
             warnings=list(self.warnings),
-            parts=self.sections,
+            parts=[section for section in self.sections if section.has_content],
             facts=[(word, text) for word, text in self.facts if text],
             method=self.method,
+            tables=self.tables,
             numbers=parameter_table(self.machine) if self.machine else None,
         )

@@ -118,6 +118,13 @@ def machine_warnings(parameters: "MachineParameters") -> list[str]:
     return [UNUSED_PHASE_ERROR] if parameters.imperfections.phase_error else []
 
 
+def friction_warnings(parameters: "MachineParameters") -> list[str]:
+    """Return the warning of friction that no fixed step resolves; runs print it as a notice."""
+    from wm_drake.simulation.cases import JUMPING_FRICTION, has_jumping_friction
+
+    return [JUMPING_FRICTION] if has_jumping_friction(parameters) else []
+
+
 def selected_cases(
     parameters: "MachineParameters", loads: Sequence[str] | None, gasket: bool, profile: Path | None
 ) -> "list[Case]":

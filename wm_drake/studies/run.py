@@ -5,7 +5,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,12 @@ from wm_drake.errors import InputError, InputNotice, Problem, input_error
 from wm_drake.report.progress import progress_bar, progress_bars
 from wm_drake.report.provenance import command_line
 from wm_drake.report.terminal import QUIET, say
-from wm_drake.studies.inputs import build_checked, load_parameters, machine_warnings
+from wm_drake.studies.inputs import (
+    build_checked,
+    friction_warnings,
+    load_parameters,
+    machine_warnings,
+)
 from wm_drake.studies.result_folder import (
     FIGURES,
     LEDGER,
@@ -27,7 +32,7 @@ from wm_drake.studies.result_folder import (
     prepare_folder,
     result_folder,
 )
-from wm_drake.studies.study import STUDIES, Facts, OptionModel, Options, Result, Study, option
+from wm_drake.studies.study import PAGE, STUDIES, Facts, OptionModel, Result, Study, option
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
@@ -230,14 +235,20 @@ class Order:
         options: Options of the study.
         run: Options of the driver.
         command: Command line or Python call.
-        parameters: Machine in place of that of `options.machine`.
+        parameters: Machines in place of files, by their names in `options.machine`.
     """
 
     study: Study
-    options: Options
+    options: OptionModel
     run: RunOptions
     command: str = field(default_factory=command_line)
-    parameters: "MachineParameters | None" = None
+    parameters: "Mapping[str, MachineParameters]" = field(default_factory=dict)
+
+    @property
+    def machines(self) -> tuple[str, ...]:
+        """Names or files of the machines that the driver builds."""
+        chosen: Any = getattr(self.options, "machine", ()) if self.study.has_machine else ()
+        return (chosen,) if isinstance(chosen, str) else chosen
 
 
 def run_study(name: str, machine: Any = None, *, quiet: bool = False, **options: Any) -> Result:
@@ -245,7 +256,8 @@ def run_study(name: str, machine: Any = None, *, quiet: bool = False, **options:
 
     Args:
         name: Name of the study, such as "drive".
-        machine: Name of a shipped machine, machine file, or parameters. Default: that of the study.
+        machine: Name of a shipped machine, machine file, or parameters; a list of them for a study
+            that compares machines. Default: that of the study.
         quiet: Whether progress and warnings are not printed.
         options: Options of the command by their Python name, such as `samples=256`. With `out`, the
             result folder is written as by the command; without it, nothing is written.
@@ -260,12 +272,13 @@ def run_study(name: str, machine: Any = None, *, quiet: bool = False, **options:
         ['thresholds', 'map', 'estimation']
     """
     study = STUDIES.find(name)
+    several = machine if isinstance(machine, (list, tuple)) else [machine]
+    loaded = {m.name: m for m in several if not isinstance(m, (str, Path, type(None)))}
     if machine is not None:
-        options["machine"] = machine if isinstance(machine, (str, Path)) else machine.name
+        names = [str(m) if isinstance(m, (str, Path)) else m.name for m in several]
+        options["machine"] = names[0] if machine is several[0] else names
     shown = ", ".join([repr(name), *(f"{key}={value!r}" for key, value in options.items())])
-    order = order_of(study, options, f"wm_drake.run_study({shown})")
-    if machine is not None and not isinstance(machine, (str, Path)):
-        order = Order(study, order.options, order.run, order.command, machine)
+    order = replace(order_of(study, options, f"wm_drake.run_study({shown})"), parameters=loaded)
     token = QUIET.set(quiet or QUIET.get())
     try:
         return execute(order)[0]
@@ -289,7 +302,7 @@ def order_of(study: Study, given: Mapping[str, Any], command: str = "") -> Order
     others = {name: value for name, value in given.items() if name not in running}
     if running.get("figures") and not running.get("out"):
         raise input_error("needs a folder of results too (out)", where="figures")
-    if "machine" in others:
+    if isinstance(others.get("machine"), Path):
         others["machine"] = str(others["machine"])
     sizes = study.quick if running.get("quick") else {}
     try:
@@ -318,11 +331,12 @@ def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
         StudyInterrupted: Ctrl-C was pressed.
     """
     begin, study, options = time.perf_counter(), order.study, order.options
-    machine = _machine_of(order) if study.has_machine else None
-    about_machine = tuple(machine_warnings(machine.parameters)) if machine else ()
-    for text in about_machine:
+    machines = tuple(_machine_of(order, name) for name in order.machines)
+    machine = machines[0] if len(machines) == 1 else None
+    about_machines = _warnings(machines, machine_warnings)
+    for text in about_machines:
         say(f"warning: {text}", err=True)
-    task = study.begin(options, machine)
+    task = study.begin(options, *machines)
     run = Run(
         study.folder_owner,
         order.run.overwrite,
@@ -340,28 +354,40 @@ def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
             executor.ledger.mark_finished()
         step, integrator = _stepping(machine)
         wall_s = time.perf_counter() - begin
-        warned = (*about_machine, *_friction_warning(machine))
+        warned = (*about_machines, *_warnings(machines, friction_warnings))
         facts = Facts(order.command, wall_s, warned, step, integrator)
         files = _written(result, facts, order.run.out, run)
     return result, facts, files
 
 
-def _machine_of(order: Order) -> "Machine":
-    """Return the built machine of a study, changed and checked."""
-    study, options = order.study, order.options
-    if order.parameters is None:
-        parameters = load_parameters(options.machine, options.sets, study.adapt)
-    else:
-        parameters = changed_parameters(study.adapt(order.parameters), options.sets)
-    return build_checked(options.machine, parameters)
+def _machine_of(order: Order, name: str) -> "Machine":
+    """Return a built machine of a study by its name or file, changed and checked."""
+    adapt, sets = order.study.adapt, getattr(order.options, "sets", ())
+    try:
+        if name in order.parameters:
+            adapted = adapt(order.parameters[name], order.options)
+            parameters = changed_parameters(adapted, sets)
+        else:
+            parameters = load_parameters(name, sets, lambda machine: adapt(machine, order.options))
+    except InputError as error:
+        if len(order.machines) == 1:
+            raise
+        raise InputError(
+            replace(p, where=f"--set in machine '{name}'") if p.where == "--set" else p
+            for p in error.problems
+        ) from None
+    return build_checked(name, parameters)
 
 
-def _friction_warning(machine: "Machine | None") -> tuple[str, ...]:
-    """Return the warning of friction that no fixed step resolves; runs print it as a notice."""
-    from wm_drake.simulation.cases import JUMPING_FRICTION, has_jumping_friction
-
-    jumps = machine is not None and has_jumping_friction(machine.parameters)
-    return (JUMPING_FRICTION,) if jumps else ()
+def _warnings(
+    machines: "Sequence[Machine]", of_machine: "Callable[[MachineParameters], Sequence[str]]"
+) -> tuple[str, ...]:
+    """Return warnings of machines; of several ones with their names."""
+    return tuple(
+        text if len(machines) == 1 else f"{machine.parameters.name}: {text}"
+        for machine in machines
+        for text in of_machine(machine.parameters)
+    )
 
 
 def _stepping(machine: "Machine | None") -> tuple[float, str]:
@@ -386,9 +412,10 @@ def _written(result: Result, facts: Facts, out: Path | None, run: Run) -> tuple[
         return ()
     with result_folder(out, run, RUNS_KEPT if run.identity else "") as folder:
         result.write(folder)
-        (folder / "report.html").write_text(result.page(facts), encoding="utf-8")
+        for name, text in result.pages(facts).items():
+            (folder / name).write_text(text, encoding="utf-8")
         names = sorted(path.name for path in folder.iterdir())
-    return ("report.html", *(name for name in names if name != "report.html"))
+    return (PAGE, *(name for name in names if name != PAGE))
 
 
 def machine_text(parameters: "MachineParameters") -> str:

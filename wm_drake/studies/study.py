@@ -91,6 +91,10 @@ MEASURED: Any = option(
 SEED: Any = option(0, "Seed of all random numbers.", "N", ge=0)
 
 
+PAGE = "report.html"
+"""Name of the file of the main page."""
+
+
 @dataclass(frozen=True)
 class Facts:
     """How a result was computed.
@@ -99,7 +103,7 @@ class Facts:
         command: Command line or Python call.
         wall_s: Duration. [s]
         warnings: Warnings of the machine, without those of the result.
-        step: Step size of the compiled engine; 0 without runs of a machine. [s]
+        step: Step size of the compiled engine; 0 without a machine, or with several. [s]
         integrator: Integrator of the compiled engine.
     """
 
@@ -127,6 +131,9 @@ class Result(ABC):
     float_format: ClassVar[str | None] = "%.6g"
     """Format of numbers in CSV files; None for all digits."""
 
+    float_formats: ClassVar[Mapping[str, str]] = {}
+    """Other formats, by the names of tables."""
+
     @abstractmethod
     def tables(self) -> "Mapping[str, pd.DataFrame]":
         """Return the tables of the result by the name of their CSV file, without suffix."""
@@ -141,13 +148,17 @@ class Result(ABC):
 
     @abstractmethod
     def page(self, facts: Facts) -> str:
-        """Return the page `report.html` as text of one self-contained file."""
+        """Return the main page as text of one self-contained file."""
+
+    def pages(self, facts: Facts) -> Mapping[str, str]:
+        """Return the pages by the names of their files; a study with several pages extends this."""
+        return {PAGE: self.page(facts)}
 
     def write(self, folder: Path) -> None:
         """Write the tables as CSV; a study that writes other files too extends this."""
         for name, table in self.tables().items():
-            path = folder / f"{name}.csv"
-            table.to_csv(path, index=False, float_format=self.float_format)
+            digits = self.float_formats.get(name, self.float_format)
+            table.to_csv(folder / f"{name}.csv", index=False, float_format=digits)
 
     def warnings(self) -> Sequence[str]:
         """Return warnings of the result for the terminal."""
@@ -175,7 +186,7 @@ class Task(ABC):
         """Run the study; `executor.simulate` runs cases and returns the table of their measures."""
 
 
-def _unchanged(parameters: "MachineParameters") -> "MachineParameters":
+def _unchanged(parameters: "MachineParameters", _: Any) -> "MachineParameters":
     return parameters
 
 
@@ -187,26 +198,27 @@ class Study:
         name: Name of the command and of the Python call.
         about: One line of help.
         options: Model of the options.
-        begin: Checks options for a built machine, which the driver has checked, and returns the
-            task. Whatever is wrong with the input raises an `InputError` here, before any work.
+        begin: Called with the options and the built machine, which the driver has checked; returns
+            the task. If the option `machine` is repeatable, it gets all machines. Whatever is wrong
+            with the input raises an `InputError` here, before any work.
         quick: Options of `--quick`: small sizes, for a first look and for tests.
         has_runs: Whether the task has runs or other values that a ledger keeps. If so, the command
             has the options `--workers`, `--cluster` and `--resume`, and the folder a ledger.
         has_cluster: Whether the runs can be computed on a cluster: all by `Executor.simulate`.
-        adapt: Change of the machine before the options `--set`.
+        adapt: Change of a machine by the options of the study, before the options `--set`.
         group: Group of the command; "" for a command of its own.
-        has_machine: Whether the driver loads, checks and builds the machine. If not, the task gets
-            None: a study of a component finds it by the options.
+        has_machine: Whether the driver loads, checks and builds the machine. If not, `begin` gets
+            the options only: a study of a component finds it by them.
         folder: Default result folder; made from the name if empty.
     """
 
     name: str
     about: str
-    options: type[Options]
-    begin: "Callable[[Any, Any], Task]"
+    options: type[OptionModel]
+    begin: "Callable[..., Task]"
     quick: Mapping[str, Any] = field(default_factory=dict)
     has_runs: bool = True
-    adapt: "Callable[[MachineParameters], MachineParameters]" = _unchanged
+    adapt: "Callable[[MachineParameters, Any], MachineParameters]" = _unchanged
     has_cluster: bool = True
     group: str = "study"
     has_machine: bool = True
@@ -228,9 +240,9 @@ def _load() -> None:
     from wm_drake.studies.drive.options import DRIVE
     from wm_drake.studies.gasket.options import GASKET
     from wm_drake.studies.gasket_damping.options import GASKET_DAMPING
-    from wm_drake.studies.gasket_effect.options import GASKET_EFFECT
     from wm_drake.studies.modes.options import MODES
     from wm_drake.studies.pareto.options import DESIGN
+    from wm_drake.studies.spin.options import SPIN
     from wm_drake.studies.spin_cycle.options import SPIN_CYCLE
     from wm_drake.studies.spin_identification.options import SPIN_IDENTIFY
     from wm_drake.studies.steady.options import RESPONSE
@@ -242,9 +254,9 @@ def _load() -> None:
         DRIVE,
         GASKET,
         GASKET_DAMPING,
-        GASKET_EFFECT,
         MODES,
         RESPONSE,
+        SPIN,
         SPIN_CYCLE,
         SPIN_IDENTIFY,
         TOLERANCE,

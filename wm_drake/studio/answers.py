@@ -23,7 +23,6 @@ from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.report.spin.figures import ORBIT_REVOLUTIONS, axis_path_mm, orbit_window
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import (
     amplitudes,
@@ -34,6 +33,7 @@ from wm_drake.simulation.displacements import (
 from wm_drake.simulation.measures import MEASURES, Variable
 from wm_drake.simulation.measures.labels import LABELS
 from wm_drake.simulation.records import Record
+from wm_drake.studies.spin.figures import ORBIT_REVOLUTIONS, axis_path_mm, orbit_window
 from wm_drake.studio.machines import OpenMachine, is_same
 from wm_drake.studio.state import State
 

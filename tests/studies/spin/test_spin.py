@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from wm_drake.parameters import SpinProfile, load_machine
-from wm_drake.report.spin.report import spin_report
 from wm_drake.simulation.cases import Case
+from wm_drake.studies.spin.page import spin_page
 from wm_drake.studies.spin.study import run_spin
 
 SHORT = SpinProfile(time=(0.0, 2.0), speed=(0.0, 15.0))
@@ -40,6 +40,6 @@ def test_single_case_runs_in_this_process_and_is_measured():
     assert np.isfinite(result.measures.amplitude).all()
     assert result.measures.smallest_gap.distance > 0.0
     assert run.modes.load == "middle"
-    text = spin_report(run)
+    text = spin_page(run)
     assert "<h2>Natural modes</h2>" in text
     assert f"{run.modes.modes['sliding'][0].frequency_hz:.3f}" in text

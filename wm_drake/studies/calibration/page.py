@@ -10,9 +10,6 @@ from wm_drake.model.build import build_machine
 from wm_drake.report.formatting import MM_PER_M, number, percent, shape_name
 from wm_drake.report.page import Picture, picture, versions_of
 from wm_drake.report.sections import Section, SectionedPage
-from wm_drake.report.spin import tables
-from wm_drake.report.spin.cases import case_title
-from wm_drake.report.spin.figures import envelopes_figure
 from wm_drake.report.table import Column, Group, Row, Table, line
 from wm_drake.simulation.cases import case_of
 from wm_drake.studies.calibration.calibration import BEYOND_LIMIT, Calibration
@@ -28,6 +25,9 @@ from wm_drake.studies.calibration.tables import (
     responses_shown,
 )
 from wm_drake.studies.description.modal import Modes, natural_modes
+from wm_drake.studies.spin import tables
+from wm_drake.studies.spin.cases import case_title
+from wm_drake.studies.spin.figures import envelopes_figure
 from wm_drake.studies.spin.study import Comparison, SpinResult, run_spin
 from wm_drake.studies.study import Facts
 

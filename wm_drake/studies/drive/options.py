@@ -34,7 +34,7 @@ def _begin(options: DriveOptions, machine: "Machine") -> Task:
     return DriveTask(options, machine)
 
 
-def _with_motor(parameters: "MachineParameters") -> "MachineParameters":
+def _with_motor(parameters: "MachineParameters", _: DriveOptions) -> "MachineParameters":
     from wm_drake.studies.inputs import with_drive
 
     return with_drive(parameters, "motor")

@@ -87,7 +87,7 @@ class Table2Options(Options):
     units: str | None = UNITS
 
 
-def _begin(kind: str, options: Any, _: Any) -> Task:
+def _begin(kind: str, options: Any) -> Task:
     from wm_drake.studies.identification import study
 
     if kind == "table2":

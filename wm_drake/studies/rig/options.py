@@ -1,7 +1,6 @@
 """Options of `wm-drake rig`, and the declarations of its commands."""
 
 from functools import partial
-from typing import Any
 
 from wm_drake.studies.component_options import ARM, AXIS, JIG_MASS, OUTER_MASS, ComponentOptions
 from wm_drake.studies.study import Study, Task, option
@@ -43,7 +42,7 @@ class AxisRigOptions(RigOptions):
     arm: str | None = ARM
 
 
-def _begin(kind: str, options: RigOptions, _: Any) -> Task:
+def _begin(kind: str, options: RigOptions) -> Task:
     from wm_drake.studies.rig.study import RigTask
 
     return RigTask(kind, options)

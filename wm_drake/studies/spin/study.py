@@ -8,20 +8,27 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.units import Unit
 from wm_drake.simulation.cases import Case, is_as_measured
 from wm_drake.simulation.measures import Measures, measure
-from wm_drake.simulation.records import Record
+from wm_drake.simulation.measures.as_json import as_json
+from wm_drake.simulation.mounts import POINT
+from wm_drake.simulation.records import Record, save_record
 from wm_drake.simulation.runs import DEFAULT_ENGINE, DivergenceWarning, checked_step, simulate
 from wm_drake.studies.spin.processes import can_start_processes, map_in_processes
+from wm_drake.studies.study import Facts, Result
 
 if TYPE_CHECKING:
+    import pandas as pd
+    from rich.table import Table
+
     from wm_drake.studies.modes.study import NaturalModes
 
 _IN_PROCESSES = {"drake"}
@@ -64,7 +71,23 @@ def compared_cases(measured: Sequence[Path] | None, sets: Sequence[str] | None) 
 
 
 @dataclass(frozen=True)
-class SpinResult:
+class Files:
+    """Which files and pictures of spin runs are written beside the usual ones.
+
+    Attributes:
+        replay: A 3D replay for each case.
+        detail: Pictures of vibration for every case, not only for the one with the largest
+            amplitude.
+        part: Part of the names of files that tells machines apart; "" for a single machine.
+    """
+
+    replay: bool = False
+    detail: bool = False
+    part: str = ""
+
+
+@dataclass(frozen=True)
+class SpinResult(Result):
     """Results of all cases, in the order in which the cases were given.
 
     `modes` are the natural modes of the machine with the load of the first case; None if they were
@@ -77,12 +100,97 @@ class SpinResult:
     results: tuple[CaseResult, ...]
     comparison: Comparison = Comparison.AS_MEASURED
     modes: "NaturalModes | None" = None
+    files: Files = Files()
+
+    float_format: ClassVar[str | None] = "%.4f"
 
     def is_compared(self, result: CaseResult) -> bool:
         """Return whether a case is compared with the measured amplitudes of the machine."""
         if self.comparison is not Comparison.AS_MEASURED:
             return self.comparison is Comparison.ALL
         return is_as_measured(self.parameters, result.case)
+
+    def replay_of(self, case: CaseResult) -> str:
+        """Return the name of the file with the 3D replay of a case; "" if there is none."""
+        return f"replay_{self._name_of(case)}.html" if self.files.replay else ""
+
+    def _name_of(self, case: CaseResult) -> str:
+        return "_".join(filter(None, [self.files.part, case.case.name]))
+
+    def tables(self) -> "dict[str, pd.DataFrame]":
+        """Return the amplitudes."""
+        from wm_drake.studies.spin.tables import amplitude_table
+
+        return {"amplitudes": amplitude_table(self)}
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the measures of each case."""
+        cases = [case_as_json(case) for case in self.results]
+        return {"machine": self.parameters.name, "engine": self.engine, "cases": cases}
+
+    def terminal(self) -> "list[Table | str]":
+        """Return the amplitudes, and lines with the other measures of each case."""
+        from wm_drake.studies.spin.terminal import amplitude_lines, case_lines
+
+        title = f"Displacement amplitudes of machine '{self.parameters.name}', in mm"
+        lines = [line for case in self.results for line in case_lines(self.parameters, case)]
+        return [amplitude_lines(title, self.tables()["amplitudes"]), *lines]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        from wm_drake.studies.spin.page import spin_page
+
+        return spin_page(self, facts)
+
+    def write(self, folder: Path) -> None:
+        """Write the amplitudes and the files of the cases."""
+        super().write(folder)
+        self.write_cases(folder)
+
+    def write_cases(self, folder: Path) -> None:
+        """Write the record of each case, and its 3D replay where wanted."""
+        from wm_drake.studies.spin.replay import case_replay
+
+        for case in self.results:
+            save_record(case.record, folder / f"record_{self._name_of(case)}.nc")
+            if file := self.replay_of(case):
+                (folder / file).write_text(case_replay(self.parameters, case), encoding="utf-8")
+
+    def warnings(self) -> list[str]:
+        """Return a warning of springs that go slack, if any do."""
+        from wm_drake.studies.spin.page import slack_springs_warning
+
+        return slack_springs_warning(self)
+
+    def failures(self) -> list[str]:
+        """Return a line for each case that diverged."""
+        return [
+            f"{case.case.name}: {case.record.attrs['diverged']}"
+            for case in self.results
+            if case.record.attrs["diverged"]
+        ]
+
+
+def case_as_json(case: CaseResult) -> dict[str, Any]:
+    """Return the measures of a case as an object for JSON."""
+    measures = case.measures
+    tree = as_json(measures.table)
+    tree["cabinet_wrench"]["about"] = POINT
+    if not measures.has_cabinet:
+        tree["feet"] = None
+    walk = measures.walk
+    return {
+        "load": case.case.name,
+        "gasket": case.record.attrs["gasket"] == "yes",
+        **tree,
+        "walk": walk
+        and {
+            "distance_mm": Unit("m", "mm").from_si(walk.distance),
+            "turn_deg": Unit("rad", "deg").from_si(walk.turn),
+        },
+        "diverged": case.record.attrs["diverged"] or None,
+        "wall_s": case.wall_s,
+    }
 
 
 @dataclass(frozen=True)
@@ -96,7 +204,7 @@ class _WorkItem:
 
 
 def run_spin(
-    parameters: MachineParameters,
+    machine: MachineParameters | Machine,
     cases: Sequence[Case],
     engine: str = DEFAULT_ENGINE,
     *,
@@ -111,7 +219,7 @@ def run_spin(
     The results do not depend on the number of workers.
 
     Args:
-        parameters: The machine.
+        machine: The machine, built or not.
         cases: Cases to run.
         engine: Name of the engine, key of `wm_drake.simulation.runs.ENGINES`.
         step: Step size; None for that of the machine. [s]
@@ -132,19 +240,20 @@ def run_spin(
         >>> result.results[0].case.name
         'middle'
     """
+    built = machine if isinstance(machine, Machine) else build_machine(machine)
+    parameters = built.parameters
     step = checked_step(parameters, step)
     count = min(workers or os.cpu_count() or 1, len(cases))
     work_items = [_WorkItem(parameters, case, engine, step) for case in cases]
-    machine = None
     if engine in _IN_PROCESSES and count > 1 and can_start_processes():
         results = map_in_processes(_build_and_run, work_items, count, progress)
     else:
-        machine, scene = build_machine(parameters), Scene(parameters)
+        scene = Scene(parameters)
         results = [
-            _run(item, machine, scene, partial(progress, index))
+            _run(item, built, scene, partial(progress, index))
             for index, item in enumerate(work_items)
         ]
-    natural = _modes_of(machine or build_machine(parameters), cases[0]) if modes else None
+    natural = _modes_of(built, cases[0]) if modes else None
     return SpinResult(parameters, engine, step, tuple(results), comparison, natural)
 
 

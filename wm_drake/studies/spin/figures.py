@@ -23,8 +23,11 @@ from wm_drake.report.figure import (
     named,
 )
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, shape_name
-from wm_drake.report.spin.cases import case_title, speed_rpm
-from wm_drake.report.spin.panels import (
+from wm_drake.simulation.displacements import axis_motion, envelopes, moment_of_largest_amplitude
+from wm_drake.simulation.outputs import point_positions
+from wm_drake.simulation.records import Record
+from wm_drake.studies.spin.cases import case_title, speed_rpm
+from wm_drake.studies.spin.panels import (
     IN_REVOLUTIONS,
     largest_marks,
     revolution_band,
@@ -33,9 +36,6 @@ from wm_drake.report.spin.panels import (
     time_figure,
     time_panel,
 )
-from wm_drake.simulation.displacements import axis_motion, envelopes, moment_of_largest_amplitude
-from wm_drake.simulation.outputs import point_positions
-from wm_drake.simulation.records import Record
 from wm_drake.studies.spin.study import CaseResult
 
 BoolArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]

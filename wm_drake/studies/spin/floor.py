@@ -1,20 +1,19 @@
 """Section of a spin page about the forces on the cabinet and on the floor under its feet."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figure import COLOURS, MARK, Axis, Figure, Line, Mark, Panel, Rule, in_grid
 from wm_drake.report.formatting import number
 from wm_drake.report.page import Picture, picture
-from wm_drake.report.spin.cases import case_title
-from wm_drake.report.spin.walk import WALKING, walk_view, walk_warning
+from wm_drake.report.sections import Section
 from wm_drake.report.table import Group, Row, Table
 from wm_drake.simulation.feet import MARGINS
 from wm_drake.simulation.measures.record import foot_loads_of
 from wm_drake.simulation.mounts import POINT
+from wm_drake.studies.spin.cases import case_title
 from wm_drake.studies.spin.study import CaseResult, SpinResult
+from wm_drake.studies.spin.walk import WALKING, walk_pictures, walk_table, walk_warning
 
 WINDOW = 0.25
 """Time over which a figure shows the smallest value. [s]"""
@@ -31,43 +30,29 @@ HEADS = (
 """Heads of the columns of `MARGINS`."""
 
 
-@dataclass(frozen=True)
-class FloorView:
-    """Section of the page.
-
-    Attributes:
-        about: Sentences about the model.
-        tables: Tables, the resultant on the cabinet first.
-        pictures: Path of a cabinet that moves; loads and margins over time. None without feet.
-    """
-
-    about: str
-    tables: tuple[Table, ...]
-    pictures: tuple[Picture, ...]
-
-
-def floor_view(result: SpinResult) -> FloorView:
+def floor_section(result: SpinResult) -> Section:
     """Return the section; without cabinet in the machine file it has the resultant only."""
     standing = [case for case in result.results if case.measures.feet is not None]
     cabinet = result.parameters.cabinet
-    if not standing or cabinet is None:
-        about = (
-            "The machine file has no cabinet, so the loads of its feet are unknown. They are shown "
-            "if it has mass, centre of mass, floor, friction and feet under the key 'cabinet'."
-        )
-        return FloorView(about, (resultant_table(result),), ())
-    tables = (resultant_table(result), margins_table(standing), feet_table(standing))
-    pictures = _pictures(standing)
-    if any(case.measures.walk for case in standing):
-        walk = walk_view(standing)
-        return FloorView(WALKING, (*tables, walk.table), (*walk.pictures, *pictures))
-    about = (
-        "Loads of the feet of a rigid cabinet that does not move, on a rigid level floor. Normal "
-        "loads: four feet of equal vertical stiffness that do not pull. Margins: what is missing "
-        f"until the cabinet slides or turns at friction {cabinet.friction:g}, or tips over; below "
-        "0 it does. The model does not let it move, so what happens after that is not computed."
+    shown, pictures = (resultant_table(result),), tuple[Picture, ...]()
+    text = (
+        "The machine file has no cabinet, so the loads of its feet are unknown. They are shown if "
+        "it has mass, centre of mass, floor, friction and feet under the key 'cabinet'."
     )
-    return FloorView(about, tables, pictures)
+    if standing and cabinet is not None:
+        shown = (*shown, margins_table(standing), feet_table(standing))
+        pictures = _pictures(standing)
+        text = (
+            "Loads of the feet of a rigid cabinet that does not move, on a rigid level floor. "
+            "Normal loads: four feet of equal vertical stiffness that do not pull. Margins: what "
+            f"is missing until the cabinet slides or turns at friction {cabinet.friction:g}, or "
+            "tips over; below 0 it does. The model does not let it move, so what happens after "
+            "that is not computed."
+        )
+        if any(case.measures.walk for case in standing):
+            text, shown = WALKING, (*shown, walk_table(standing))
+            pictures = (*walk_pictures(standing), *pictures)
+    return Section("cabinet", "Forces on the cabinet and the floor", pictures, shown, text)
 
 
 def floor_warnings(result: SpinResult) -> list[str]:

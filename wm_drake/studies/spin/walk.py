@@ -1,6 +1,6 @@
 """Part of a spin page about a cabinet that moves: where it stands after the run, and its path."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,10 +9,10 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.figure import COLOURS, OURS, QUIET, Axis, Figure, Line, Mark, Panel, Points
 from wm_drake.report.formatting import number
 from wm_drake.report.page import Picture, picture
-from wm_drake.report.spin.cases import case_title
 from wm_drake.report.table import Group, Row, Table
 from wm_drake.simulation.cabinet import walk
 from wm_drake.simulation.records import cabinet_in
+from wm_drake.studies.spin.cases import case_title
 from wm_drake.studies.spin.study import CaseResult
 
 WALKING = (
@@ -33,24 +33,6 @@ MOST_POINTS = 600
 """Largest number of points of a drawn path."""
 
 MM, DEGREE = Unit("m", "mm"), Unit("rad", "deg")
-
-
-@dataclass(frozen=True)
-class WalkView:
-    """Table of where the cabinet stands after each run, and a picture of its path.
-
-    Attributes:
-        table: Table.
-        pictures: Path of the feet and of the cabinet; none without samples.
-    """
-
-    table: Table
-    pictures: tuple[Picture, ...]
-
-
-def walk_view(cases: list[CaseResult]) -> WalkView:
-    """Return the part of the page for cases of a machine whose cabinet moves."""
-    return WalkView(walk_table(cases), _pictures(cases))
 
 
 def walk_warning(case: CaseResult) -> list[str]:
@@ -84,7 +66,8 @@ def walk_table(cases: list[CaseResult]) -> Table:
     return Table(caption, header, tuple(groups), text_columns=1)
 
 
-def _pictures(cases: list[CaseResult]) -> tuple[Picture, ...]:
+def walk_pictures(cases: list[CaseResult]) -> tuple[Picture, ...]:
+    """Return the path of the feet and of the cabinet; none without samples."""
     shown = [case for case in cases if case.measures.walk and case.record.sizes["time"] > 1]
     if not shown:
         return ()

@@ -1,7 +1,5 @@
 """Section of a spin page about the drive: torque, power, energy, speed ripple, capture."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from wm_drake.elements.motor import evaluate_motor, packed_limit
@@ -23,52 +21,40 @@ from wm_drake.report.figure import (
 )
 from wm_drake.report.formatting import MISSING, RPM_PER_RAD_S, number
 from wm_drake.report.page import Picture, picture
-from wm_drake.report.spin.cases import case_title
-from wm_drake.report.spin.panels import revolution_starts
+from wm_drake.report.sections import Section
 from wm_drake.report.table import Group, Row, Table
 from wm_drake.simulation.drive import CAPTURE_LAG, CAPTURE_TIME, over_revolutions
 from wm_drake.simulation.records import profile_of
+from wm_drake.studies.spin.cases import case_title
+from wm_drake.studies.spin.panels import revolution_starts
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 
-@dataclass(frozen=True)
-class DriveView:
-    """Section of the page.
-
-    Attributes:
-        about: Sentences about the drive.
-        in_short: One sentence for the details of the run.
-        table: Measures of each load.
-        pictures: Speed and torque over time, for each load with a motor.
-    """
-
-    about: str
-    in_short: str
-    table: Table
-    pictures: tuple[Picture, ...]
-
-
-def drive_view(result: SpinResult) -> DriveView:
-    """Return the section."""
-    drive = motor_of(result.parameters.drive)
-    if drive is None:
-        about = (
-            "The drum follows the spin profile exactly, whatever torque that takes. The option "
-            "--drive motor shows what a motor with a torque limit does."
-        )
-        in_short = "The drum follows the spin profile exactly; the motor torque has no limit."
-        return DriveView(about, in_short, drive_table(result), ())
-    n = drive.belt_ratio
-    about = (
-        "A motor with a torque limit and a PI speed controller turns the drum by a belt of ratio "
-        f"{n:g}. Torques are those at the drum; at the motor's shaft they are "
-        f"{n:g} times smaller. None of the motor's numbers is published: see their sources "
-        "in the table of parameters."
+def drive_section(result: SpinResult) -> Section:
+    """Return the section: measures, and speed and torque over time of each load with a motor."""
+    drive, pictures = motor_of(result.parameters.drive), tuple[Picture, ...]()
+    text = (
+        "The drum follows the spin profile exactly, whatever torque that takes. The option "
+        "--drive motor shows what a motor with a torque limit does."
     )
-    in_short = "A motor turns the drum; the spin profile is the speed that its controller wants."
-    shown = [case for case in result.results if case.record.sizes["time"] > 1]
-    pictures = tuple(_picture(result, case) for case in shown)
-    return DriveView(about, in_short, drive_table(result), pictures)
+    if drive is not None:
+        n = drive.belt_ratio
+        text = (
+            "A motor with a torque limit and a PI speed controller turns the drum by a belt of "
+            f"ratio {n:g}. Torques are those at the drum; at the motor's shaft they are {n:g} "
+            "times smaller. None of the motor's numbers is published: see their sources in the "
+            "table of parameters."
+        )
+        shown = [case for case in result.results if case.record.sizes["time"] > 1]
+        pictures = tuple(_picture(result, case) for case in shown)
+    return Section("torques", "Drive", pictures, (drive_table(result),), text)
+
+
+def drive_in_short(result: SpinResult) -> str:
+    """Return one sentence about the drive."""
+    if motor_of(result.parameters.drive) is None:
+        return "The drum follows the spin profile exactly; the motor torque has no limit."
+    return "A motor turns the drum; the spin profile is the speed that its controller wants."
 
 
 def capture_warnings(result: SpinResult) -> list[str]:

@@ -1,11 +1,9 @@
-"""Report of the orders of a record: waterfall and order map of each signal."""
+"""Page of the orders of a record: waterfall and order map of each signal."""
 
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 
-from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figure import (
     MARK,
     MEASURED,
@@ -20,14 +18,13 @@ from wm_drake.report.figure import (
     in_grid,
 )
 from wm_drake.report.formatting import RPM_PER_RAD_S, number
-from wm_drake.report.page import picture, render
-from wm_drake.report.table import Group, Row, Table
+from wm_drake.report.page import picture
+from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.table import Column, Group, Row, Table
 from wm_drake.simulation.orders import REVOLUTIONS
 from wm_drake.simulation.records import versions
-from wm_drake.studies.steady.orders import Orders
-
-SHOWN_ORDERS = (0.5, 1.0, 2.0, 3.0)
-"""Orders of the table and of the CSV file."""
+from wm_drake.studies.orders.study import Orders
+from wm_drake.studies.study import Facts
 
 WATERFALL_LINES = 40
 """Largest number of spectra of a waterfall."""
@@ -37,32 +34,30 @@ MAP_COLUMNS = 400
 """Largest number of columns of an order map."""
 
 
-def orders_report(result: Orders, command: str = "") -> str:
-    """Return the report as text of one self-contained HTML file."""
+def orders_page(result: Orders, facts: Facts) -> str:
+    """Return the page as text of one self-contained HTML file."""
     signals = result.signals
-    return render(
-        "orders/page.html",
-        title=f"Orders of {signals.source}",
-        about="",
-        summary=summary(result),
-        warnings=[],
-        table=_table(result),
-        pictures=[
-            picture(
-                signal_figure(result, index),
-                f"Waterfall and order map of {name}.",
-                f"Signal {name}, {signals.unit}. Left: waterfall, one spectrum for each drum "
-                "speed, slow at the bottom; dashed: orders 1 and 2. Right: order map; amplitude of "
-                f"each order over the drum speed, in windows of {REVOLUTIONS} revolutions.",
-            )
-            for index, name in enumerate(signals.names)
-        ],
-        facts=[
-            ("Command", command),
-            ("File", signals.source),
-            ("Software", ", ".join(f"{name} {text}" for name, text in versions().items())),
-        ],
+    pictures = tuple(
+        picture(
+            signal_figure(result, index),
+            f"Waterfall and order map of {name}.",
+            f"Signal {name}, {signals.unit}. Left: waterfall, one spectrum for each drum speed, "
+            "slow at the bottom; dashed: orders 1 and 2. Right: order map; amplitude of each order "
+            f"over the drum speed, in windows of {REVOLUTIONS} revolutions.",
+        )
+        for index, name in enumerate(signals.names)
     )
+    software = ", ".join(f"{name} {text}" for name, text in versions().items())
+    return SectionedPage(
+        f"Orders of {signals.source}",
+        summary(result),
+        [
+            Section("maps", "Waterfall and order map", pictures),
+            Section("orders", "Largest orders", tables=(_table(result),)),
+        ],
+        [("File", signals.source), ("Software", software), *facts.rows()],
+        warnings=facts.warnings,
+    ).html()
 
 
 def summary(result: Orders) -> str:
@@ -79,35 +74,17 @@ def summary(result: Orders) -> str:
     )
 
 
-def _at_order(result: Orders, order: float) -> FloatArray:
-    """Return the amplitude of the nearest order of the map. (times, signals)"""
-    return np.asarray(result.orders.sel(order=order, method="nearest").values)
-
-
-def _orders(result: Orders) -> list[float]:
-    highest = float(result.orders.order.values[-1])
-    return [order for order in SHOWN_ORDERS if order <= highest]
-
-
 def _table(result: Orders) -> Table:
-    groups = []
-    for order in _orders(result):
-        values = _at_order(result, order)
-        rows = (
-            Row(("largest", *(number(float(v), 2) for v in np.nanmax(values, axis=0)))),
-            Row(
-                (
-                    "at, rpm",
-                    *(
-                        number(RPM_PER_RAD_S * float(result.orders.speed.values[at]), 0)
-                        for at in np.nanargmax(values, axis=0)
-                    ),
-                )
-            ),
-        )
+    groups, speed = [], RPM_PER_RAD_S * result.orders.speed.values
+    for order in result.shown_orders():
+        values = result.at_order(order)
+        at = (number(float(rpm), 0) for rpm in speed[np.nanargmax(values, axis=0)])
+        rows = (Row(("largest", *np.nanmax(values, axis=0))), Row(("at, rpm", *at)))
         groups.append(Group(f"order {order:g}", rows))
-    header = ("order", "", *(f"{name}, {result.signals.unit}" for name in result.signals.names))
-    return Table("Largest amplitude of some orders.", header, tuple(groups), text_columns=2)
+    signals = result.signals
+    columns = (Column(name, signals.unit, 2) for name in signals.names)
+    caption = "Largest amplitude of some orders."
+    return Table(caption, ("order", "", *columns), tuple(groups), text_columns=2)
 
 
 def signal_figure(result: Orders, index: int) -> Figure:
@@ -159,16 +136,3 @@ def _waterfall(result: Orders, index: int) -> Panel:
     x = Axis(label="frequency, Hz", range=(0.0, top))
     y = Axis(label="drum speed, rpm", has_grid=False)
     return Panel(name="waterfall", marks=tuple(marks), x=x, y=y)
-
-
-def orders_table(result: Orders) -> pd.DataFrame:
-    """Return amplitudes of some orders over time, for a CSV file."""
-    columns: dict[str, FloatArray] = {
-        "time_s": result.orders.time.values,
-        "speed_rpm": RPM_PER_RAD_S * result.orders.speed.values,
-    }
-    for order in _orders(result):
-        values = _at_order(result, order)
-        for index, name in enumerate(result.signals.names):
-            columns[f"order {order:g} {name}, {result.signals.unit}"] = values[:, index]
-    return pd.DataFrame(columns)

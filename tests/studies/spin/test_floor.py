@@ -7,11 +7,11 @@ import pytest
 from wm_drake.parameters import SpinProfile, with_value
 from wm_drake.parameters.spin import Region
 from wm_drake.report.figure import Line
-from wm_drake.report.spin.floor import floor_figure, floor_view, floor_warnings, windows
-from wm_drake.report.spin.report import spin_report
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import simulate
+from wm_drake.studies.spin.floor import floor_figure, floor_section, floor_warnings, windows
+from wm_drake.studies.spin.page import spin_page
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 PROFILE = SpinProfile(
@@ -35,7 +35,7 @@ def result(machine, reference):
 
 
 def test_tables_have_the_measures(result):
-    view = floor_view(result)
+    view = floor_section(result)
     resultant, margins, feet = view.tables
     measures = result.results[0].measures
     largest = float(measures.cabinet_force_peak.sel(axis="z"))
@@ -46,7 +46,7 @@ def test_tables_have_the_measures(result):
     assert [row.cells[0] for row in feet.groups[0].rows] == [
         *("front left", "front right", "rear right", "rear left")
     ]
-    assert "friction 0.4" in view.about
+    assert "friction 0.4" in view.text
     assert len(view.pictures) == 1
 
 
@@ -57,17 +57,17 @@ def test_a_slippery_floor_is_warned_of(machine, reference):
     (warning,) = floor_warnings(slippery)
     assert warning.startswith("Load counter (with gasket): the cabinet ")
     assert "turns on the floor" in warning
-    assert floor_view(slippery).tables[1].groups[0].rows[0].kind == "alarm"
-    page = spin_report(slippery)
+    assert floor_section(slippery).tables[1].groups[0].rows[0].kind == "alarm"
+    page = spin_page(slippery)
     assert "Forces on the cabinet and the floor" in page
     assert warning in page
 
 
 def test_without_cabinet_the_section_says_so(machine, reference):
     bare = reference.model_copy(update={"cabinet": None})
-    view = floor_view(spin_result(machine, bare))
+    view = floor_section(spin_result(machine, bare))
     assert len(view.tables) == 1
-    assert "has no cabinet" in view.about
+    assert "has no cabinet" in view.text
     assert view.pictures == ()
 
 

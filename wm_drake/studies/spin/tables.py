@@ -16,7 +16,6 @@ from wm_drake.report.formatting import (
     percent,
     shape_name,
 )
-from wm_drake.report.spin.cases import case_title, has_gasket, sensors_of, speed_rpm
 from wm_drake.report.table import (
     MOST_SHOWN,
     Column,
@@ -35,6 +34,7 @@ from wm_drake.simulation.measures.registry import tabulated
 from wm_drake.simulation.mount_forces import MountForce, mount_forces, rms_table, speed_ranges
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.simulation.vibration import sensor_accelerations
+from wm_drake.studies.spin.cases import case_title, has_gasket, sensors_of, speed_rpm
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 OURS = "wm_drake"
@@ -378,7 +378,7 @@ def changed_parameters(result: SpinResult, case: CaseResult) -> Table | None:
         if common.get(key) != value
     )
     return Table(
-        "Parameters of this load that differ from those of the machine.",
+        f"Parameters of load {case_title(case)} that differ from those of the machine.",
         ("key", "value"),
         groups,
         text_columns=2,

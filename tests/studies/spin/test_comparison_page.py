@@ -11,20 +11,24 @@ from pages import without_scripts
 from wm_drake.errors import InputError
 from wm_drake.parameters import SpinProfile, load_machine, with_value
 from wm_drake.report.figure import Area, Rule
-from wm_drake.report.spin.comparison import (
-    COLOURS,
-    comparison_report,
-    differences,
-    different_parameters,
-    overlaid_envelopes_figure,
-)
 from wm_drake.studies.spin.comparison import (
     MOST_VARIANTS,
+    ComparisonResult,
     Variant,
     check_comparable,
     difference_table,
     remarks,
 )
+from wm_drake.studies.spin.comparison_page import (
+    COLOURS,
+    comparison_page,
+    differences,
+    different_parameters,
+    overlaid_envelopes_figure,
+)
+from wm_drake.studies.spin.gasket_effect import effects
+from wm_drake.studies.spin.study import Files
+from wm_drake.studies.study import Facts
 
 
 @pytest.fixture(scope="module")
@@ -51,9 +55,17 @@ def table(variants):
     return difference_table(variants)
 
 
+def page_of(variants, command=""):
+    effect = effects(variants) if variants[1].name == "without gasket" else None
+    comparison = ComparisonResult(tuple(variants), difference_table(variants), effect)
+    return comparison_page(comparison, Facts(command))
+
+
 @pytest.fixture(scope="module")
 def page(variants):
-    return comparison_report(variants, "wm-drake spin --compare-gasket", {"with gasket": "w.html"})
+    files = Files(part="w")
+    first = replace(variants[0], result=replace(variants[0].result, files=files))
+    return page_of([first, variants[1]], "wm-drake spin --compare-gasket")
 
 
 def test_differences_of_planted_values(table, variants):
@@ -121,11 +133,11 @@ def test_page_names_variants_links_and_changes(page):
         "<h1>Comparison of machine reference: with gasket and without gasket</h1>",
         "smallest gap 18.0 mm",
         "without gasket vs. with gasket",
-        '<a href="w.html">Full report of with gasket</a>',
+        '<a href="report_w.html">Full report of with gasket</a>',
         "wm-drake spin --compare-gasket",
     ):
         assert text in page
-    assert page.count("<figure data-picture>") == 2
+    assert page.count("<figure data-picture>") == 4  # envelopes and records of two loads
     assert "Different parameters" not in page  # it is one machine
 
 
@@ -198,7 +210,7 @@ def test_machines_need_names_of_their_own_and_a_common_sensor(machine):
 def test_names_cannot_inject_markup(machine, variants):
     evil = "<script>alert('$x$')</script>"
     named = [variants[0], Variant(evil, replace(variants[1].result, parameters=machine))]
-    page = comparison_report(named, evil)
+    page = page_of(named, evil)
     assert "<script>alert" not in page
     assert "<script" not in without_scripts(page)
     assert html.escape(evil, quote=False).replace("'", "&#39;") in page
@@ -208,8 +220,8 @@ def test_diverged_and_short_runs_still_give_a_page(machine, variants):
     short = [case_result(machine, name, samples=12) for name in ("middle", "back")]
     for case in short:
         case.record.attrs["diverged"] = "the run diverged at 0.06 s"
-    page = comparison_report([variants[0], Variant("short", spin_result(machine, short))])
+    page = page_of([variants[0], Variant("short", spin_result(machine, short))])
     assert "short: Load middle (with gasket): the run diverged at 0.06 s" in page
     assert "Every run of short diverged." in page
     none = [Variant(name, spin_result(machine, short)) for name in ("a", "b")]
-    assert "<figure" not in comparison_report(none)
+    assert "<figure" not in page_of(none)

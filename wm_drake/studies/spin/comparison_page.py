@@ -1,6 +1,7 @@
 """Comparison of spin results: overlaid envelopes, tables of differences, and a page of both."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -8,22 +9,24 @@ import pandas as pd
 from wm_drake.parameters import quantities
 from wm_drake.report.figure import MEASURED, OURS, Figure, Mark
 from wm_drake.report.formatting import MISSING, MM_PER_M, number, percent, shape_name
-from wm_drake.report.page import Picture, picture, render, versions_of
-from wm_drake.report.spin import tables
-from wm_drake.report.spin.cases import speed_rpm
-from wm_drake.report.spin.figures import experiment_rules
-from wm_drake.report.spin.panels import (
+from wm_drake.report.page import Picture, picture, versions_of
+from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.table import Group, Row, Table, line, readable
+from wm_drake.simulation.displacements import envelopes
+from wm_drake.studies.spin import effect_page, tables
+from wm_drake.studies.spin.cases import speed_rpm
+from wm_drake.studies.spin.comparison import ComparisonResult, Variant, common_sensors, remarks
+from wm_drake.studies.spin.figures import experiment_rules
+from wm_drake.studies.spin.page import warnings_of
+from wm_drake.studies.spin.panels import (
     largest_marks,
     symmetric_limits,
     time_band,
     time_figure,
     time_panel,
 )
-from wm_drake.report.spin.report import warnings_of
-from wm_drake.report.table import Group, Row, Table, line, readable
-from wm_drake.simulation.displacements import envelopes
-from wm_drake.studies.spin.comparison import Variant, common_sensors, difference_table, remarks
-from wm_drake.studies.spin.study import CaseResult
+from wm_drake.studies.spin.study import CaseResult, SpinResult
+from wm_drake.studies.study import Facts
 
 COLOURS = (OURS, MEASURED, "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Colours of the variants: those of Okabe and Ito, which the colour-blind can tell apart."""
@@ -217,46 +220,80 @@ def _measured_mm(variants: Sequence[Variant], index: int) -> dict[str, dict[str,
     return different
 
 
-def comparison_report(
-    variants: Sequence[Variant], command: str = "", pages: Mapping[str, str] | None = None
-) -> str:
+def comparison_page(comparison: ComparisonResult, facts: Facts | None = None) -> str:
     """Return the comparison as text of one self-contained HTML file.
 
     Args:
-        variants: At least two, with the same loads.
-        command: Command line of the run, shown on the page.
-        pages: Names of the files with the page of each variant alone, by name of the variant.
+        comparison: At least two variants with the same loads.
+        facts: How the result was computed.
     """
-    table = difference_table(variants)
-    first = variants[0].result
-    views = []
-    for index, case in enumerate(first.results):
-        views.append(
-            {
-                "anchor": f"case-{index + 1}",
-                "title": case.case.name,
-                "facts": _gap_facts(variants, index),
-                "picture": envelopes_picture(variants, index),
-                "table": differences(table, case.case.name),
-            }
+    variants, table, made = comparison.variants, comparison.differences, facts or Facts()
+    machines = [variant.result.parameters for variant in variants]
+    of_each = [
+        Section(
+            f"case-{index + 1}",
+            f"Load {case.case.name}",
+            tuple(filter(None, _pictures(comparison, index))),
+            text=_gap_facts(variants, index),
         )
-    return render(
-        "spin/comparison.html",
-        title=title(variants),
-        about="",
-        summary=summary(variants, table),
-        warnings=[
-            f"{variant.name}: {text}"
-            for variant in variants
-            for text in warnings_of(variant.result)
+        for index, case in enumerate(variants[0].result.results)
+    ]
+    loads = tuple(differences(table, name) for name in table["load"].unique())
+    pages = [(variant.page, f"Full report of {variant.name}") for variant in variants]
+    different = different_parameters(variants)
+    return SectionedPage(
+        title(variants),
+        summary(comparison),
+        [
+            *of_each,
+            *_amplitude_sections(comparison),
+            Section("loads", "Each load", tables=loads),
+            Section("pages", "Full reports", links=pages),
         ],
-        remarks=remarks(variants),
-        amplitudes=amplitudes(variants, table),
-        cases=views,
-        pages=[(variant.name, (pages or {}).get(variant.name, "")) for variant in variants],
-        parameters=different_parameters(variants),
-        facts=facts_of_comparison(variants, command),
-    )
+        facts_of_comparison(variants, made),
+        machines[0] if all(machine == machines[0] for machine in machines) else None,
+        [
+            *made.warnings,
+            *remarks(variants),
+            *(f"{v.name}: {text}" for v in variants for text in warnings_of(v.result)),
+        ],
+        tables=(different,) if different else (),
+    ).html()
+
+
+def _pictures(comparison: ComparisonResult, index: int) -> Iterator[Picture | None]:
+    """Yield overlaid envelopes of a case, and records with and without gasket of each machine."""
+    variants, effect = comparison.variants, comparison.effect
+    yield envelopes_picture(variants, index)
+    for first in range(0, len(variants) if effect is not None else 0, 2):
+        with_gasket, without = (v.result.results[index] for v in variants[first : first + 2])
+        name, rows = variants[first].result.parameters.name, effect
+        if "machine" in effect:
+            rows = effect[effect["machine"] == name]
+        yield effect_page.records_picture(rows, without, with_gasket)
+
+
+def _amplitude_sections(comparison: ComparisonResult) -> list[Section]:
+    """Return the amplitudes of all variants, and the effect of the gasket if that is compared."""
+    variants, effect = comparison.variants, comparison.effect
+    shown = (amplitudes(variants, comparison.differences),)
+    measured = [variant.result for variant in variants if _is_measured(variant.result)]
+    against = tuple(tables.comparison(r, tables.amplitude_table(r)) for r in measured)
+    sections = [
+        Section("amplitudes", "Amplitudes", tables=shown),
+        Section("experiment", "Against the experiment", tables=against),
+    ]
+    if effect is None:
+        return sections
+    steady = effect_page.steady(effect, variants[0].result.results[0])
+    effects = (effect_page.amplitudes(effect), *([steady] if steady else []))
+    return [Section("gasket", "Effect of the gasket", tables=effects), *sections]
+
+
+def _is_measured(result: SpinResult) -> bool:
+    """Return whether a case of a result is compared with measured amplitudes."""
+    table = tables.amplitude_table(result)
+    return any(tables.experiment_mm(table, case) for case in result.results)
 
 
 def title(variants: Sequence[Variant]) -> str:
@@ -267,14 +304,17 @@ def title(variants: Sequence[Variant]) -> str:
     return f"Comparison of machines {names}"
 
 
-def summary(variants: Sequence[Variant], table: pd.DataFrame) -> str:
+def summary(comparison: ComparisonResult) -> str:
     """Return one paragraph: the largest amplitude and the smallest gap of each variant."""
+    variants, table = comparison.variants, comparison.differences
     count = len(variants[0].result.results)
     loads = "1 load was" if count == 1 else f"{count} loads were"
     opening = f"{loads} run for each of {len(variants)} machines or variants."
     sentences = [opening, *(_of_variant(variant) for variant in variants)]
     changes = table[(table["measure"] == "amplitude") & np.isfinite(table["percent"])]
-    if len(changes):
+    if comparison.effect is not None:
+        sentences.append(effect_page.effect_summary(comparison.effect))
+    elif len(changes):
         largest = changes.loc[changes["percent"].abs().idxmax()]
         sentences.append(
             f"The largest change of an amplitude is {percent(largest['percent'])}, at sensor "
@@ -312,7 +352,7 @@ def _gap_facts(variants: Sequence[Variant], index: int) -> str:
     return f"Smallest gap to the housing: {'; '.join(texts)}." if texts else ""
 
 
-def facts_of_comparison(variants: Sequence[Variant], command: str) -> list[tuple[str, str]]:
+def facts_of_comparison(variants: Sequence[Variant], made: Facts) -> list[tuple[str, str]]:
     """Return what was run and with which software, as pairs of heading and text."""
     first = variants[0].result
     facts = []
@@ -320,12 +360,9 @@ def facts_of_comparison(variants: Sequence[Variant], command: str) -> list[tuple
         machine = variant.result.parameters
         step = f"step {1e3 * variant.result.step:g} ms"
         facts.append((variant.name, f"{machine.about} {step.capitalize()}.".strip()))
-    facts += [
-        ("Engine", first.engine),
-        ("Versions", versions_of(first.results[0].record.attrs)),
-        ("Command", command),
-    ]
-    return [(word, text) for word, text in facts if text]
+    versions = versions_of(first.results[0].record.attrs)
+    made = replace(made, step=0.0)  # the lines of the variants have it
+    return [*facts, ("Engine", first.engine), ("Versions", versions), *made.rows()]
 
 
 def _listed(names: Sequence[str]) -> str:

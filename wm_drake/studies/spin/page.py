@@ -1,7 +1,6 @@
-"""Report of a spin run: one self-contained HTML file."""
+"""Page of spin runs: the answer, pictures of each load, tables of all measures."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,106 +8,111 @@ import pandas as pd
 
 from wm_drake.model.scene import Gap
 from wm_drake.parameters.plausibility import unusual_numbers
-from wm_drake.report.formatting import (
-    MM_PER_M,
-    RPM_PER_RAD_S,
-    number,
-    percent,
-    shape_name,
-)
-from wm_drake.report.page import Picture, picture, render, versions_of
-from wm_drake.report.spin import tables
-from wm_drake.report.spin.cases import case_title, has_gasket, speed_rpm
-from wm_drake.report.spin.drive import capture_warnings, drive_view
-from wm_drake.report.spin.figures import envelopes_figure, gaps_figure, gasket_figure, orbits_figure
-from wm_drake.report.spin.floor import floor_view, floor_warnings
-from wm_drake.report.spin.tables import amplitude_table
-from wm_drake.report.spin.vibration_pictures import vibration_pictures
+from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent, shape_name
+from wm_drake.report.page import Picture, picture, versions_of
+from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.springs import slack_warning
-from wm_drake.report.table import Table, parameter_table
-from wm_drake.simulation.cases import UNUSED_PHASE_ERROR
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.studies.modes.page import natural_modes_table
+from wm_drake.studies.spin import tables
+from wm_drake.studies.spin.cases import case_title, has_gasket, speed_rpm
+from wm_drake.studies.spin.drive import capture_warnings, drive_in_short, drive_section
+from wm_drake.studies.spin.figures import (
+    envelopes_figure,
+    gaps_figure,
+    gasket_figure,
+    orbits_figure,
+)
+from wm_drake.studies.spin.floor import floor_section, floor_warnings
 from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
+from wm_drake.studies.spin.tables import amplitude_table
+from wm_drake.studies.spin.vibration import vibration_pictures
+from wm_drake.studies.study import Facts
 
-__all__ = ["amplitude_table", "spin_report"]
+AXES = (
+    "Axes: for a person who faces the door, x points to the right, y along the drum axis from "
+    "front to rear, and z up. The origin is on the drum axis at drum mid-depth, with the tub at "
+    "rest."
+)
 
+ONE_VIBRATION = (
+    "Mount forces, accelerations and spectra are drawn for this load only, that with the largest "
+    "amplitude; the option --detail draws them for every load."
+)
 
-@dataclass(frozen=True)
-class CaseView:
-    """Section of the page about one case.
-
-    Attributes:
-        anchor: Name for links to the section.
-        title: Heading.
-        facts: Short sentences above the figures.
-        pictures: Figures.
-        changed: Parameters of the case that differ from the machine's, if any.
-        replay: Name of the file with the 3D replay, beside the page; empty if there is none.
-    """
-
-    anchor: str
-    title: str
-    facts: str
-    pictures: tuple[Picture, ...]
-    changed: Table | None
-    replay: str = ""
+MODES = (
+    "With load {} in a drum that stands still. The command 'wm-drake study modes' has the mode "
+    "shapes, the Campbell diagram, critical speeds and sensitivities; 'wm-drake study response' "
+    "has the steady response."
+)
 
 
-def spin_report(
-    result: SpinResult,
-    command: str = "",
-    replays: Mapping[str, str] | None = None,
-    *,
-    detail: bool = False,
-) -> str:
-    """Return the report as text of one self-contained HTML file.
+def spin_page(result: SpinResult, facts: Facts | None = None) -> str:
+    """Return the page of spin runs as text of one self-contained HTML file.
 
     Args:
         result: Result with at least one case.
-        command: Command line of the run, shown on the page.
-        replays: Names of the files with a 3D replay, by name of the case.
-        detail: Whether spectra, accelerations and mount forces are drawn for every case; else they
-            are drawn for the case with the largest amplitude.
+        facts: How the result was computed.
 
     Raises:
         InputError: A file of measured amplitudes cannot be used.
     """
-    table = amplitude_table(result)
-    main = max(result.results, key=lambda case: _peak(case)[0])
-    detailed = [case for case in result.results if detail or case is main]
-    return render(
-        "spin/page.html",
-        title=f"Spin run of machine {result.parameters.name}",
-        about=result.parameters.about,
-        summary=summary(result, table),
-        warnings=warnings_of(result),
-        comparison=tables.comparison(result, table),
-        largest_values=tables.largest_values(result),
-        critical_speeds=tables.critical_speeds(result),
-        modes=natural_modes_table(result.modes) if result.modes else None,
-        modes_of=result.modes.load if result.modes else "",
-        accelerations=tables.accelerations(result),
-        mount_forces=tables.mount_force_tables(result),
-        drawn_alone="" if len(detailed) == len(result.results) else case_title(main),
-        floor=floor_view(result),
-        drive=drive_view(result),
-        smallest_gaps=tables.smallest_gaps(result),
-        gaps_picture=_gaps_picture(result),
-        smallest_tensions=tables.smallest_tensions(result),
-        more_measures=tables.more_measures(result),
-        cases=[
-            replace(
-                _case_view(result, index, table, any(case is one for one in detailed)),
-                replay=(replays or {}).get(case.case.name, ""),
-            )
-            for index, case in enumerate(result.results)
-        ],
-        facts=facts_of_run(result, command),
-        loads=tables.loads(result),
-        profiles=tables.profiles(result),
-        numbers=parameter_table(result.parameters),
-    )
+    table, made = amplitude_table(result), facts or Facts()
+    drive, floor, modes = drive_section(result), floor_section(result), result.modes
+    sections = [
+        *_case_sections(result, table),
+        Section("gap", "Smallest gaps", _gaps_pictures(result)),
+        Section("floor", "Feet over time", floor.pictures),
+        Section(
+            "drive", "Speed and torque", drive.pictures, text=drive.text * bool(drive.pictures)
+        ),
+        Section("amplitudes", "Amplitudes", tables=(tables.comparison(result, table),)),
+        Section("speeds", "Critical speeds", tables=(tables.critical_speeds(result),)),
+        Section("smallest", "Smallest gap", tables=(tables.smallest_gaps(result),)),
+        Section("forces", "Detergent box and gasket", tables=(tables.largest_values(result),)),
+        Section(
+            "mounts",
+            "Mounts and accelerations",
+            tables=(*tables.mount_force_tables(result), tables.accelerations(result)),
+        ),
+        replace(floor, pictures=()),
+        replace(drive, pictures=(), text=drive.text * (not drive.pictures)),
+        Section("springs", "Springs", tables=(tables.smallest_tensions(result),)),
+        Section("more", "More measures", tables=tuple(tables.more_measures(result))),
+    ]
+    if modes:
+        shown = (natural_modes_table(modes),)
+        sections.append(
+            Section("modes", "Natural modes", tables=shown, text=MODES.format(modes.load))
+        )
+    changed = (tables.changed_parameters(result, case) for case in result.results)
+    return SectionedPage(
+        f"Spin run of machine {result.parameters.name}",
+        summary(result, table),
+        sections,
+        facts_of_run(result, made),
+        result.parameters,
+        [*made.warnings, *warnings_of(result)],
+        method=f"{AXES} {drive_in_short(result)}",
+        tables=(*filter(None, changed), tables.loads(result), tables.profiles(result)),
+    ).html()
+
+
+def _case_sections(result: SpinResult, table: pd.DataFrame) -> list[Section]:
+    """Return a section for each case; that with the largest amplitude has its vibration too."""
+    main, sections = max(result.results, key=lambda case: _peak(case)[0]), []
+    for index, case in enumerate(result.results, start=1):
+        title, file = case_title(case), result.replay_of(case)
+        words = f"3D replay of load {title} around its largest amplitude"
+        text = _case_facts(case)
+        pictures = [_envelopes_picture(case, table), _orbits_picture(case), _gasket_picture(case)]
+        if (result.files.detail or case is main) and case.record.sizes["time"] > 1:
+            pictures += vibration_pictures(result, case)
+        if case is main and not result.files.detail and len(result.results) > 1:
+            text = f"{text} {ONE_VIBRATION}"
+        shown, links = tuple(filter(None, pictures)), [(file, words)] if file else []
+        sections.append(Section(f"case-{index}", f"Load {title}", shown, text=text, links=links))
+    return sections
 
 
 def summary(result: SpinResult, table: pd.DataFrame) -> str:
@@ -227,8 +231,6 @@ def warnings_of(result: SpinResult) -> list[str]:
     warnings = [
         f"{problem.key}: {problem.message}." for problem in unusual_numbers(result.parameters)
     ]
-    if result.parameters.imperfections.phase_error:
-        warnings.append(UNUSED_PHASE_ERROR)
     for case in result.results:
         gap, title = case.measures.smallest_gap, case_title(case)
         if case.record.attrs["diverged"]:
@@ -255,35 +257,18 @@ def slack_springs_warning(result: SpinResult) -> list[str]:
     )
 
 
-def facts_of_run(result: SpinResult, command: str) -> list[tuple[str, str]]:
+def facts_of_run(result: SpinResult, made: Facts) -> list[tuple[str, str]]:
     """Return what was run and with which software, as pairs of heading and text."""
     attrs = result.results[0].record.attrs
     times = [f"{case_title(case)} {number(case.wall_s)} s" for case in result.results]
-    facts = [
+    return [
         ("Machine", result.parameters.name),
-        ("About", result.parameters.about),
         ("SDF model", Path(result.parameters.model).name),
         ("Engine", f"{result.engine}, step {1e3 * result.step:g} ms"),
         ("Versions", versions_of(attrs)),
         ("Computing time", "; ".join(times)),
-        ("Command", command),
+        *replace(made, step=0.0).rows(),  # the line of the engine has the step
     ]
-    return [(word, text) for word, text in facts if text]
-
-
-def _case_view(result: SpinResult, index: int, table: pd.DataFrame, is_detailed: bool) -> CaseView:
-    case = result.results[index]
-    pictures = [_envelopes_picture(case, table), _orbits_picture(case), _gasket_picture(case)]
-    if is_detailed and case.record.sizes["time"] > 1:
-        pictures += vibration_pictures(result, case)
-    shown = tuple(picture for picture in pictures if picture is not None)
-    return CaseView(
-        f"case-{index + 1}",
-        case_title(case),
-        _case_facts(case),
-        shown,
-        tables.changed_parameters(result, case),
-    )
 
 
 def _has_envelopes(case: CaseResult) -> bool:
@@ -348,16 +333,13 @@ def _gasket_picture(case: CaseResult) -> Picture | None:
     return picture(gasket_figure(case.record), alternative, caption)
 
 
-def _gaps_picture(result: SpinResult) -> Picture | None:
+def _gaps_pictures(result: SpinResult) -> tuple[Picture, ...]:
     cases = [case for case in result.results if case.measures.smallest_gap]
     if len(cases) < 2:
-        return None
+        return ()
     caption = (
         "Smallest gap for each load, the two parts between which it occurs, and the drum speed at "
         "that time."
     )
-    return picture(
-        gaps_figure(cases),
-        "Smallest gap between tub and housing per load; the numbers are in the table above.",
-        caption,
-    )
+    words = "Smallest gap between tub and housing per load; the numbers are in the table below."
+    return (picture(gaps_figure(cases), words, caption),)

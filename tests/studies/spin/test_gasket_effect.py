@@ -1,22 +1,18 @@
 """Effect of the gasket: percent differences and steady amplitudes on records of known answer."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
 
-from wm_drake.errors import InputError
 from wm_drake.parameters import SpinProfile
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import Measures
-from wm_drake.studies.gasket_effect.page import amplitudes, summary
-from wm_drake.studies.gasket_effect.study import (
-    GasketEffect,
+from wm_drake.studies.spin.comparison import Variant
+from wm_drake.studies.spin.effect_page import amplitudes, effect_summary
+from wm_drake.studies.spin.gasket_effect import (
     effect_table,
-    run_gasket_effect,
+    effects,
     steady_amplitudes,
     steady_window,
 )
@@ -70,20 +66,20 @@ def result(parameters, gasket, transient, steady, comparison):
 
 @pytest.mark.parametrize("comparison", [Comparison.AS_MEASURED, Comparison.NONE])
 def test_differences_are_those_of_equation_1(reference, comparison):
-    effect = GasketEffect(
+    effect = effect_table(
         result(reference, False, 0.020, 0.0050, comparison),
         result(reference, True, 0.025, 0.0048, comparison),
     )
-    table = effect_table(effect).set_index("sensor")
+    table = effect.set_index("sensor")
     assert list(table["percent"]) == pytest.approx([25.0] * 6)
     assert (table["without_mm"].iloc[0], table["with_mm"].iloc[0]) == pytest.approx((20.0, 25.0))
     assert list(table["steady_percent"]) == pytest.approx([-4.0] * 6, abs=0.05)
-    text = summary(effect_table(effect))
+    text = effect_summary(effect)
     assert (
         "In the steady state the gasket matters little: amplitudes of at least 1 mm without gasket "
         "differ by up to 4.0 %"
     ) in text
-    shown = amplitudes(effect_table(effect))
+    shown = amplitudes(effect)
     if comparison is Comparison.NONE:
         assert table["experiment_percent"].isna().all()
         assert "experiment" not in text
@@ -114,57 +110,39 @@ def steady_table(without, with_gasket):
 
 
 def test_small_steady_amplitudes_are_judged_in_mm():
-    calm = summary(steady_table([5.0, 1.0, 0.5, 0.9], [4.6, 1.05, 0.2, 0.7]))
+    calm = effect_summary(steady_table([5.0, 1.0, 0.5, 0.9], [4.6, 1.05, 0.2, 0.7]))
     assert calm.endswith(
         "In the steady state the gasket matters little: amplitudes of at least 1 mm without gasket "
         "differ by up to 8.0 % (Xr, load middle: 5.00 mm without, 4.60 mm with gasket). Smaller "
         "ones differ by up to 0.30 mm (Zr, load middle: 0.50 mm without, 0.20 mm with gasket)."
     )
-    strong = summary(steady_table([5.0, 1.0], [4.6, 1.2]))
+    strong = effect_summary(steady_table([5.0, 1.0], [4.6, 1.2]))
     assert "the gasket still matters" in strong
     assert "differ by up to 20.0 % (Yr" in strong
-    only_small = summary(steady_table([0.5, 0.9], [0.2, 0.7]))
+    only_small = effect_summary(steady_table([0.5, 0.9], [0.2, 0.7]))
     assert "matter" not in only_small
     assert (
         "Steady amplitudes, all below 1 mm without gasket, differ by up to 0.30 mm (Xr"
     ) in only_small
-    only_large = summary(steady_table([5.0], [4.6]))
+    only_large = effect_summary(steady_table([5.0], [4.6]))
     assert "Smaller" not in only_large
-    nothing = summary(steady_table([np.nan], [np.nan]))
+    nothing = effect_summary(steady_table([np.nan], [np.nan]))
     assert "steady" not in nothing.lower()
 
 
-def test_machine_without_gasket_is_refused(reference):
-    without = reference.model_copy(update={"gasket": None})
-    with pytest.raises(InputError, match="has no gasket"):
-        run_gasket_effect(without, [])
-
-
-def test_command_writes_page_table_records_and_json(wm_drake):
-    Path("p.yaml").write_text("time: (0, 2, 6) s\nspeed: (0, 200, 200) rpm\n")
-    arguments = ("study", "gasket-effect", "--load", "middle", "--profile", "p.yaml")
-    ended = wm_drake(*arguments, "--out", "out", "--json")
-    assert (ended.code, ended.err.strip()) == (0, "")
-    printed = json.loads(ended.out)
-    assert printed["steady_window_s"] == [4.0, 6.0]
-    assert [row["sensor"] for row in printed["amplitudes"]] == SENSORS
-    for row in printed["amplitudes"]:
-        assert row["percent"] == pytest.approx(100 * (row["with_mm"] / row["without_mm"] - 1))
-        assert row["experiment_percent"] is None  # another profile than the measured one
-    assert abs(printed["amplitudes"][0]["percent"]) > 0.1
-    names = {path.name for path in Path("out").iterdir()}
-    assert {
-        "report.html",
-        "effect.csv",
-        "record_with_gasket_middle.nc",
-        "record_without_gasket_middle.nc",
-    } <= names
-    assert len(pd.read_csv("out/effect.csv")) == 6
-    page = Path("out/report.html").read_text()
-    assert "Effect of the gasket of machine reference" in page
-    assert "without gasket" in page
-
-
-def test_command_refuses_a_machine_without_gasket(wm_drake):
-    ended = wm_drake("study", "gasket-effect", "--machine", "reference", "--set", "gasket=null")
-    assert ended.code == 2
+def test_of_several_machines_each_row_names_its_machine(reference):
+    other = reference.model_copy(update={"name": "other"})
+    variants = [
+        Variant("", result(machine, gasket, size, 0.005, Comparison.NONE))
+        for machine in (reference, other)
+        for gasket, size in ((True, 0.03), (False, 0.02))
+    ]
+    table = effects(variants)
+    assert table["percent"].to_numpy() == pytest.approx(50.0)
+    assert table.groupby("machine", sort=False).size().to_dict() == {"reference": 6, "other": 6}
+    assert effect_summary(table).startswith("Load reference, middle: ")
+    assert [group.heading for group in amplitudes(table).groups] == [
+        "reference, middle",
+        "other, middle",
+    ]
+    assert "machine" not in effects(variants[:2])

@@ -1,1 +1,0 @@
-"""Page of the orders of a record."""

@@ -1,0 +1,156 @@
+"""Task of the command `wm-drake spin`: one machine, or a comparison of several variants."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from wm_drake.errors import input_error, nearest_names, shortened
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import MachineParameters
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.runs import DEFAULT_ENGINE, ENGINES
+from wm_drake.studies.inputs import selected_cases
+from wm_drake.studies.spin.comparison import (
+    MOST_VARIANTS,
+    ComparisonResult,
+    Variant,
+    check_comparable,
+    difference_table,
+)
+from wm_drake.studies.spin.gasket_effect import effects
+from wm_drake.studies.spin.options import SpinOptions
+from wm_drake.studies.spin.study import Files, SpinResult, compared_cases, run_spin
+from wm_drake.studies.study import Task
+
+if TYPE_CHECKING:
+    from wm_drake.studies.run import Executor
+
+LONGEST_FILE_PART = 60
+"""Largest number of characters of a variant in the name of a file."""
+
+
+@dataclass(frozen=True)
+class _Planned:
+    """A variant that is not yet run."""
+
+    name: str
+    machine: Machine
+    cases: list[Case]
+
+
+class SpinTask(Task):
+    """Spin runs of one machine, or of variants that are compared."""
+
+    def __init__(self, options: SpinOptions, machines: Sequence[Machine]) -> None:
+        """Check the options.
+
+        Raises:
+            InputError: an option is wrong, or the machines cannot be compared.
+        """
+        self.options = options
+        self.engine = options.engine or DEFAULT_ENGINE
+        if self.engine not in ENGINES:
+            raise input_error(
+                f"unknown engine '{self.engine}'{nearest_names(self.engine, ENGINES)}",
+                where="--engine",
+            )
+        self._check_variants(machines)
+        parameters = [machine.parameters for machine in machines]
+        loads = list(options.load) or (_common_loads(parameters) if len(machines) > 1 else [])
+        gaskets = (True, False) if options.compare_gasket else (not options.no_gasket,)
+        self.planned = [
+            _Planned(
+                self._name(machine.parameters, gasket),
+                machine,
+                selected_cases(machine.parameters, loads, gasket, options.profile),
+            )
+            for machine in machines
+            for gasket in gaskets
+        ]
+
+    def _check_variants(self, machines: Sequence[Machine]) -> None:
+        """Raise an InputError if the machines or variants cannot be compared."""
+        options = self.options
+        for name in options.machine:
+            if options.machine.count(name) > 1:
+                raise input_error(f"'{name}' is given twice", where="--machine")
+        if options.no_gasket and options.compare_gasket:
+            raise input_error("excludes --no-gasket; give one of them", where="--compare-gasket")
+        count = len(machines) * (2 if options.compare_gasket else 1)
+        if count > MOST_VARIANTS:
+            raise input_error(
+                f"{count} machines or variants are too many for one page; at most {MOST_VARIANTS} "
+                "can be compared",
+                where="--machine",
+            )
+        if len(machines) > 1:
+            check_comparable([machine.parameters for machine in machines], "--machine")
+        for machine in machines if options.compare_gasket else ():
+            if machine.parameters.gasket is None:
+                name = machine.parameters.name
+                raise input_error(f"machine '{name}' has no gasket", where="--compare-gasket")
+
+    def _name(self, parameters: MachineParameters, gasket: bool) -> str:
+        """Return the name of a variant: that of its machine, or what it does with the gasket."""
+        machine = shortened(parameters.name, LONGEST_FILE_PART)
+        words = "with gasket" if gasket else "without gasket"
+        if not self.options.compare_gasket:
+            return machine
+        return words if len(self.options.machine) == 1 else f"{machine}, {words}"
+
+    def run(self, executor: "Executor") -> SpinResult | ComparisonResult:
+        """Run all cases of all variants."""
+        is_one, options = len(self.planned) == 1, self.options
+        changes = options.sets or ((options.drive,) if options.drive else ())
+        comparison = compared_cases(options.measured, changes)
+        names = [
+            case.name if is_one else f"{planned.name}: {case.name}"
+            for planned in self.planned
+            for case in planned.cases
+        ]
+        parts = [""] if is_one else file_parts([planned.name for planned in self.planned])
+        variants, finished = list[Variant](), 0
+        with executor.fractions(names) as progress:
+            for planned, part in zip(self.planned, parts, strict=True):
+
+                def of_all(index: int, fraction: float, before: int = finished) -> None:
+                    progress(before + index, fraction)
+
+                result = run_spin(
+                    planned.machine,
+                    planned.cases,
+                    self.engine,
+                    progress=of_all,
+                    comparison=comparison,
+                    modes=is_one,
+                )
+                files = Files(options.replay, options.detail, part)
+                variants.append(Variant(planned.name, replace(result, files=files)))
+                finished += len(planned.cases)
+        if is_one:
+            return variants[0].result
+        effect = effects(variants) if options.compare_gasket else None
+        return ComparisonResult(tuple(variants), difference_table(variants), effect)
+
+
+def file_parts(names: Sequence[str]) -> list[str]:
+    """Return parts of file names for variants: letters, digits and `_ . -` only, all different."""
+    parts: list[str] = []
+    for index, name in enumerate(names, start=1):
+        part = re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip("_.")[:LONGEST_FILE_PART]
+        taken = {known.lower() for known in parts}  # some file systems ignore case
+        parts.append(part if part and part.lower() not in taken else f"{part}_{index}".strip("_"))
+    return parts
+
+
+def _common_loads(machines: Sequence[MachineParameters]) -> list[str]:
+    """Return the loads that all machines have."""
+    common = [name for name in machines[0].loads if all(name in m.loads for m in machines)]
+    if not common:
+        loads = "; ".join(f"'{m.name}' has {', '.join(m.loads)}" for m in machines)
+        raise input_error(
+            f"the machines have no load of the same name: {loads}; name a load file with --load",
+            where="--machine",
+        )
+    return common
