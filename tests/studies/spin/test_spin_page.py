@@ -305,7 +305,7 @@ def test_names_cannot_inject_markup(machine: MachineParameters) -> None:
         spin_result(
             parameters, [case_result(parameters, evil), case_result(parameters, evil, gasket=False)]
         ),
-        evil,
+        Facts(evil),
     )
     assert "<script>alert" not in page
     assert "<script" not in without_scripts(page)

@@ -97,7 +97,7 @@ class ComparisonResult(Result):
         """Return the measures of each variant, and their differences."""
         first = self.variants[0].result
         cases = [variant.result.as_json()["cases"] for variant in self.variants]
-        tree = {
+        tree: dict[str, Any] = {
             "engine": first.engine,
             "variants": [
                 {"name": v.name, "machine": v.result.parameters.name, "cases": of_variant}
@@ -124,7 +124,10 @@ class ComparisonResult(Result):
             for case in variant.result.results
             if (text := gap_text(case))
         ]
-        shown = [amplitude_lines("Displacement amplitudes, in mm", amplitudes), *gaps]
+        shown: list[Table | str] = [
+            amplitude_lines("Displacement amplitudes, in mm", amplitudes),
+            *gaps,
+        ]
         if self.effect is None:
             return shown
         return [*shown, terminal_table(self.effect), effect_summary(self.effect)]

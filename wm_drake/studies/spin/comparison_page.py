@@ -265,11 +265,13 @@ def _pictures(comparison: ComparisonResult, index: int) -> Iterator[Picture | No
     """Yield overlaid envelopes of a case, and records with and without gasket of each machine."""
     variants, effect = comparison.variants, comparison.effect
     yield envelopes_picture(variants, index)
-    for first in range(0, len(variants) if effect is not None else 0, 2):
+    if effect is None:
+        return
+    for first in range(0, len(variants), 2):
         with_gasket, without = (v.result.results[index] for v in variants[first : first + 2])
-        name, rows = variants[first].result.parameters.name, effect
+        rows = effect
         if "machine" in effect:
-            rows = effect[effect["machine"] == name]
+            rows = effect[effect["machine"] == variants[first].result.parameters.name]
         yield effect_page.records_picture(rows, without, with_gasket)
 
 

@@ -72,7 +72,7 @@ def effect_summary(effect: pd.DataFrame) -> str:
 def _by_load(effect: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
     """Return the rows of each load, with its name; of several machines with theirs too."""
     words = [name for name in ("machine", "load") if name in effect]
-    return [(", ".join(key), rows) for key, rows in effect.groupby(words, sort=False)]
+    return [(", ".join(map(str, key)), rows) for key, rows in effect.groupby(words, sort=False)]
 
 
 def _steady_sentences(effect: pd.DataFrame) -> list[str]:

@@ -34,13 +34,13 @@ def floor_section(result: SpinResult) -> Section:
     """Return the section; without cabinet in the machine file it has the resultant only."""
     standing = [case for case in result.results if case.measures.feet is not None]
     cabinet = result.parameters.cabinet
-    shown, pictures = (resultant_table(result),), tuple[Picture, ...]()
+    shown, pictures = [resultant_table(result)], tuple[Picture, ...]()
     text = (
         "The machine file has no cabinet, so the loads of its feet are unknown. They are shown if "
         "it has mass, centre of mass, floor, friction and feet under the key 'cabinet'."
     )
     if standing and cabinet is not None:
-        shown = (*shown, margins_table(standing), feet_table(standing))
+        shown += [margins_table(standing), feet_table(standing)]
         pictures = _pictures(standing)
         text = (
             "Loads of the feet of a rigid cabinet that does not move, on a rigid level floor. "
@@ -50,9 +50,10 @@ def floor_section(result: SpinResult) -> Section:
             "that is not computed."
         )
         if any(case.measures.walk for case in standing):
-            text, shown = WALKING, (*shown, walk_table(standing))
+            text = WALKING
+            shown.append(walk_table(standing))
             pictures = (*walk_pictures(standing), *pictures)
-    return Section("cabinet", "Forces on the cabinet and the floor", pictures, shown, text)
+    return Section("cabinet", "Forces on the cabinet and the floor", pictures, tuple(shown), text)
 
 
 def floor_warnings(result: SpinResult) -> list[str]:
