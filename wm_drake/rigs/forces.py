@@ -7,7 +7,7 @@ from wm_drake.elements.bushing import read_bushing_law
 from wm_drake.elements.damper_law import damper_response
 from wm_drake.laws.bushing import bushing_force
 from wm_drake.parameters.types import FloatArray
-from wm_drake.rigs.bench import AXES, BushingBench
+from wm_drake.rigs.bench import AXES, BushingBench, Harmonic
 from wm_drake.rigs.integration import PHASE
 from wm_drake.rigs.measured import RecordedMotion
 from wm_drake.rigs.rubber import branch_forces
@@ -58,8 +58,7 @@ def bushing_reactions(position, rate, packed, axis):  # type: ignore[no-untyped-
 
 def harmonic_loads(
     bench: BushingBench,
-    amplitude: float,
-    omega: float,
+    motion: Harmonic,
     phase: FloatArray,
     position: FloatArray,
     rate: FloatArray,
@@ -68,15 +67,15 @@ def harmonic_loads(
 
     Args:
         bench: The bushing.
-        amplitude, omega: Amplitude and angular frequency of the motion. [m or rad, rad/s]
+        motion: The motion.
         phase: Phases, from 0 to 2 pi (n,). [rad]
         position, rate: Motion at these phases. [m, m/s; rad, rad/s if it rotates]
     """
     force = bushing_loads(bench, position, rate)
     if bench.branches is None:
         return force
-    step = np.diff(PHASE) / omega
-    of_branches = _of_branches(bench, step, amplitude * np.sin(PHASE), len(step))
+    step = np.diff(PHASE) / motion.angular_frequency
+    of_branches = _of_branches(bench, step, motion.amplitude * np.sin(PHASE), len(step))
     return force + np.interp(phase, PHASE, of_branches)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from wm_drake.compiler.compilation import long_running
 from wm_drake.elements.damper_law import sponge_with_mass
 from wm_drake.parameters.types import FloatArray
+from wm_drake.rigs.bench import DamperBench, Harmonic
 from wm_drake.rigs.integration import POINTS, STEADY, NotSteadyError, closed_loop
 
 FEWEST_STEPS, MOST_STEPS = 8, 2048
@@ -21,15 +22,14 @@ AGREEMENT = 2e-6
 A point at a reversal, where the force nearly jumps, may differ by a hundred times as much."""
 
 
-def steady_tensions(packed: FloatArray, mass: float, amplitude: float, omega: float) -> FloatArray:
+def steady_tensions(bench: DamperBench, motion: Harmonic) -> FloatArray:
     """Return the tension of a damper whose sponge has a mass over one steady period. [N]
 
     The number of steps is doubled until two extrapolated loops agree.
 
     Args:
-        packed: Law number and parameters of the damper (s,).
-        mass: Mass of the sponge, > 0. [kg]
-        amplitude, omega: Amplitude and angular frequency of the motion. [m, rad/s]
+        bench: The damper; the mass of its sponge is > 0.
+        motion: The motion.
 
     Returns:
         (POINTS,) at the phases `PHASE` without the last.
@@ -38,11 +38,11 @@ def steady_tensions(packed: FloatArray, mass: float, amplitude: float, omega: fl
         NotSteadyError: The motion is not steady, or the loops do not agree.
     """
     steps = FEWEST_STEPS
-    coarse, begin = _steady_loop(packed, mass, amplitude, omega, steps, np.zeros(2))
+    coarse, begin = _steady_loop(bench, motion, steps, np.zeros(2))
     last: FloatArray | None = None
     while steps < MOST_STEPS:
         steps *= 2
-        fine, begin = _steady_loop(packed, mass, amplitude, omega, steps, begin)
+        fine, begin = _steady_loop(bench, motion, steps, begin)
         extrapolated = 2.0 * fine - coarse
         if last is not None:
             limit = AGREEMENT * float(np.max(np.abs(extrapolated)))
@@ -50,26 +50,27 @@ def steady_tensions(packed: FloatArray, mass: float, amplitude: float, omega: fl
                 return np.asarray(extrapolated)
         coarse, last = fine, extrapolated
     raise NotSteadyError(
-        f"a sponge of {1e3 * mass:g} g at {omega / (2.0 * np.pi):g} Hz, {1e3 * amplitude:g} mm: "
-        f"loops of {steps // 2} and {steps} steps between two points do not agree to "
-        f"{AGREEMENT:g} of the largest force; take another sponge mass, or none"
+        f"a sponge of {1e3 * bench.sponge_mass:g} g at {motion.frequency:g} Hz, "
+        f"{1e3 * motion.amplitude:g} mm: loops of {steps // 2} and {steps} steps between two "
+        f"points do not agree to {AGREEMENT:g} of the largest force; take another sponge mass, or "
+        "none"
     )
 
 
 def _steady_loop(
-    packed: FloatArray, mass: float, amplitude: float, omega: float, steps: int, begin: FloatArray
+    bench: DamperBench, motion: Harmonic, steps: int, begin: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return tensions of a steady period [N] and the state of the sponge at its beginning.
 
     The state is the position in amplitudes and the velocity in amplitudes times omega. The position
     creeps, the velocity follows it at once, so the position leaps.
     """
-    tension = np.empty(POINTS + 1)
-    states = np.empty((POINTS + 1, 2))
+    tension, states = np.empty(POINTS + 1), np.empty((POINTS + 1, 2))
+    size = motion.amplitude, motion.angular_frequency
 
     def period(state: FloatArray) -> FloatArray:
         states[0] = state
-        sponge_period(states, tension, packed, mass, amplitude, omega, steps)
+        sponge_period(states, tension, bench.packed, bench.sponge_mass, *size, steps)
         if not np.all(np.isfinite(states)):
             raise NotSteadyError("a sponge on the bench runs away")
         return states.copy()

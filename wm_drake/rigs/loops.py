@@ -69,43 +69,19 @@ def force_loops(bench: Bench, motions: Sequence[Harmonic]) -> list[ForceLoop]:
     """Return the steady loops of a component under several motions, integrated side by side."""
     phase = PHASE[:-1]
     if isinstance(bench, BushingBench):
-        return [
-            _loop(
-                bench,
-                motion,
-                harmonic_loads(
-                    bench,
-                    motion.amplitude,
-                    motion.angular_frequency,
-                    phase,
-                    *_driven(bench, motion, phase),
-                ),
-            )
-            for motion in motions
+        forces = [harmonic_loads(bench, m, phase, *_driven(bench, m, phase)) for m in motions]
+    elif bench.sponge_mass > 0.0:
+        forces = [steady_tensions(bench, m) for m in motions]
+    else:
+        amplitude = np.array([m.amplitude for m in motions])
+        omega = np.array([m.angular_frequency for m in motions])
+        packed = np.tile(bench.packed, (len(motions), 1))
+        deformation = steady_deformations(bench, packed, amplitude, omega)[:, :-1]
+        forces = [
+            damper_tensions(_driven(bench, m, phase)[1], deformations, bench.packed)
+            for m, deformations in zip(motions, deformation, strict=True)
         ]
-    if bench.sponge_mass > 0.0:
-        return [
-            _loop(
-                bench,
-                motion,
-                steady_tensions(
-                    bench.packed, bench.sponge_mass, motion.amplitude, motion.angular_frequency
-                ),
-            )
-            for motion in motions
-        ]
-    amplitude = np.array([motion.amplitude for motion in motions])
-    omega = np.array([motion.angular_frequency for motion in motions])
-    packed = np.tile(bench.packed, (len(motions), 1))
-    deformation = steady_deformations(bench, packed, amplitude, omega)[:, :-1]
-    return [
-        _loop(
-            bench,
-            motion,
-            damper_tensions(_driven(bench, motion, phase)[1], deformations, bench.packed),
-        )
-        for motion, deformations in zip(motions, deformation, strict=True)
-    ]
+    return [_loop(bench, m, force) for m, force in zip(motions, forces, strict=True)]
 
 
 def steady_deformations(

@@ -10,7 +10,6 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.figure import Axis, Figure, Line, Panel
 from wm_drake.report.formatting import MISSING, number
 from wm_drake.report.page import Picture, picture
-from wm_drake.report.sections import Section
 from wm_drake.report.table import Table, line
 from wm_drake.studies.fitting.fit import Estimate, Fit
 
@@ -50,33 +49,15 @@ def estimate_rows(fit: Fit) -> list[dict[str, Any]]:
 
 def estimates_frame(fit: Fit, fixed: Sequence[FixedNumber] = ()) -> pd.DataFrame:
     """Return `estimate_rows` with remarks, and the fixed numbers, as a table for a file."""
-    rows = [
-        row | {"remark": _remark(e)}
-        for row, e in zip(estimate_rows(fit), fit.estimates, strict=True)
-    ]
-    rows += [
+    return pd.DataFrame(_rows(fit, fixed))
+
+
+def _rows(fit: Fit, fixed: Sequence[FixedNumber]) -> list[dict[str, Any]]:
+    pairs = zip(estimate_rows(fit), fit.estimates, strict=True)
+    return [row | {"remark": _remark(e)} for row, e in pairs] + [
         {"unknown": name, "value": unit.from_si(value), "unit": unit.shown, "remark": FIXED}
         for name, value, unit in fixed
     ]
-    return pd.DataFrame(rows)
-
-
-ESTIMATE_HEADS = ("unknown", "value", "95 % interval", "unit", "remark")
-"""Heads of the columns of `estimate_cells`."""
-
-
-def estimate_cells(fit: Fit, fixed: Sequence[FixedNumber] = ()) -> list[tuple[str, ...]]:
-    """Return name, value, interval, unit and remark of each unknown and fixed number as text."""
-    cells: list[tuple[str, ...]] = []
-    for e, unknown in zip(fit.estimates, fit.problem.unknowns, strict=True):
-        unit, interval = unknown.unit, MISSING
-        if np.isfinite(e.lower):
-            interval = f"{unit.from_si(e.lower):.5g} to {unit.from_si(e.upper):.5g}"
-        shown = f"{unit.from_si(e.value):.5g}" if e.determined else MISSING
-        cells.append((e.name, shown, interval, unit_text(unit), _remark(e)))
-    for name, value, unit in fixed:
-        cells.append((name, f"{unit.from_si(value):.5g}", MISSING, unit_text(unit), FIXED))
-    return cells
 
 
 def _remark(e: Estimate) -> str:
@@ -104,16 +85,22 @@ def undetermined_sentences(fit: Fit) -> list[str]:
     return sentences
 
 
-def values_section(fit: Fit, fixed: Sequence[FixedNumber] = ()) -> Section:
-    """Return the section of the values with their intervals."""
+def values_table(fit: Fit, fixed: Sequence[FixedNumber] = ()) -> Table:
+    """Return value, interval, unit and remark of each unknown and fixed number."""
+    groups = []
+    for row in _rows(fit, fixed):
+        interval = MISSING
+        if np.isfinite(row.get("lower_95", np.nan)):
+            interval = f"{row['lower_95']:.5g} to {row['upper_95']:.5g}"
+        value = f"{row['value']:.5g}" if np.isfinite(row["value"]) else MISSING
+        unit = row["unit"].replace("*", " ")
+        groups.append(line(row["unknown"], (value, interval, unit, row["remark"])))
     caption = (
         "Estimated values with 95 % confidence intervals. There is no interval if the value is at "
         "a bound, if the data do not determine it or if it was fixed."
     )
-    groups = tuple(line(name, cells) for name, *cells in estimate_cells(fit, fixed))
-    table = Table(caption, ESTIMATE_HEADS, groups, text_columns=5)
-    text = " ".join(undetermined_sentences(fit))
-    return Section("values", "Values", tables=(table,), text=text)
+    heads = ("unknown", "value", "95 % interval", "unit", "remark")
+    return Table(caption, heads, tuple(groups), text_columns=5)
 
 
 def correlations_table(fit: Fit) -> Table:

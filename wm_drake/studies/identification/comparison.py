@@ -1,7 +1,7 @@
 """Rival laws of one component: fitted to the same tests, judged on tests that no fit has seen."""
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,11 +11,13 @@ from scipy.stats import t as student
 
 from wm_drake.errors import InputError, Problem
 from wm_drake.parameters.types import FloatArray
+from wm_drake.report.formatting import plain
 from wm_drake.rigs.measured import MeasuredMotion
 from wm_drake.studies.fitting import (
     Fit,
     FitProblem,
     Progress,
+    TestError,
     evaluated,
     identify,
     left_out_errors,
@@ -198,6 +200,18 @@ class Comparison:
         """Unit of the errors."""
         return "N m" if self.motions[0].loop.rotates else "N"
 
+    @property
+    def tested(self) -> "Iterator[TestedLoop]":
+        """Fitted tests, then blind ones, each with its index and the fit of each law."""
+        groups = (
+            ("fitted", self.motions, {r.law: r.fit for r in self.results}),
+            ("blind", self.validation, {r.law: r.prediction for r in self.results}),
+        )
+        for kind, motions, fits in groups:
+            known = {law: fit for law, fit in fits.items() if fit is not None}
+            for index, measured in enumerate(motions):
+                yield TestedLoop(measured, kind, index, known)
+
     def as_dict(self) -> dict[str, Any]:
         """Return the comparison for JSON, in SI."""
         return {
@@ -209,12 +223,39 @@ class Comparison:
         }
 
 
+@dataclass(frozen=True)
+class TestedLoop:
+    """A measured loop beside those of the laws.
+
+    Attributes:
+        measured: The loop.
+        kind: "fitted" or "blind".
+        index: Its number among the tests of its kind.
+        fits: Fit, or blind evaluation, of all tests of its kind, by law.
+    """
+
+    __test__ = False  # not one of pytest's
+
+    measured: MeasuredMotion
+    kind: str
+    index: int
+    fits: Mapping[str, Fit]
+
+    def errors(self) -> dict[str, TestError]:
+        """Return the error of this loop by law."""
+        return {law: fit.tests[self.index] for law, fit in self.fits.items()}
+
+    def forces(self) -> dict[str, FloatArray]:
+        """Return the computed force at each sample by law. [N; N m]"""
+        return {law: fit.computed[fit.problem.slices[self.index]] for law, fit in self.fits.items()}
+
+
 def _law_as_dict(r: LawResult) -> dict[str, Any]:
     return {
         **r.fit.as_dict(),
         "judgement": r.judgement.as_dict(),
-        "rmse_left_out": _finite(r.left_out_rmse),
-        "bayesian_information_criterion": _finite(r.criterion),
+        "rmse_left_out": plain(r.left_out_rmse),
+        "bayesian_information_criterion": plain(r.criterion),
         "prediction": None
         if r.prediction is None or r.predicted is None
         else {
@@ -223,10 +264,6 @@ def _law_as_dict(r: LawResult) -> dict[str, Any]:
             "tests": r.prediction.as_dict()["tests"],
         },
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
 
 
 @dataclass(frozen=True)

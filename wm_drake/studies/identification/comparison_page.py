@@ -9,20 +9,17 @@ import pandas as pd
 from wm_drake.report.formatting import MISSING
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
-from wm_drake.report.table import Group, Row, Table
-from wm_drake.rigs.measured import MeasuredMotion
-from wm_drake.studies.fitting import Fit
-from wm_drake.studies.fitting.page import ESTIMATE_HEADS, estimate_cells, estimates_frame
-from wm_drake.studies.identification.comparison import Comparison, LawResult
+from wm_drake.report.table import Column, Group, Row, Table, line, table_of
+from wm_drake.studies.fitting.page import estimates_frame, values_table
+from wm_drake.studies.identification.comparison import Comparison
 from wm_drake.studies.identification.figures import (
-    MOST_PANELS,
-    measured_files,
+    evenly_chosen,
     motion_text,
     rival_loops_figure,
 )
 from wm_drake.studies.identification.judgement import per_cent
 from wm_drake.studies.identification.page import fixed_numbers, frequency_of, motion_sentences
-from wm_drake.studies.rig.figures import force_scale, motion_scale
+from wm_drake.studies.rig.units import units_of
 from wm_drake.studies.study import Facts
 
 if TYPE_CHECKING:
@@ -44,12 +41,13 @@ def comparison_page(result: "ComparisonResult", facts: Facts) -> str:
     count, blind = len(comparison.motions), len(comparison.validation)
     about = f"{_counted(len(comparison.results), 'law')} fitted to {_counted(count, 'test')}"
     about += f", {_counted(blind, 'test')} predicted blind." if blind else "."
-    predicted = _pictures(comparison, _predictions(comparison), comparison.validation, "blind")
-    fitted = _pictures(comparison, [r.fit for r in comparison.results], comparison.motions, "")
+    blind_words = "blind prediction of tests that no fit has seen"
+    predicted = _pictures(comparison, "blind", blind_words)
+    fitted = _pictures(comparison, "fitted", "fit to the tests")
     sections = [Section("blind", "Blind prediction", predicted)] if predicted else []
     sections += [
         Section("fits", "Measured and fitted loops", fitted),
-        Section("laws", "Laws compared", tables=(_laws(comparison),)),
+        Section("laws", "Laws compared", tables=(laws_shown(comparison),)),
         Section("errors", "Errors of each test", tables=(_errors(comparison),)),
         Section("values", "Values", tables=(_estimates(comparison),)),
     ]
@@ -75,49 +73,6 @@ def comparison_page(result: "ComparisonResult", facts: Facts) -> str:
 
 def _counted(count: int, word: str) -> str:
     return f"{count} {word}{'' if count == 1 else 's'}"
-
-
-def _predictions(comparison: Comparison) -> list[Fit]:
-    return [r.prediction for r in comparison.results if r.prediction is not None]
-
-
-def law_header(comparison: Comparison) -> tuple[str, ...]:
-    """Return the column heads for the cells of `law_cells`."""
-    unit = comparison.unit.replace(" ", "\u00a0")
-    return (
-        "law",
-        "unknowns",
-        "not determined",
-        "fit",
-        f"RMSE, {unit}",
-        "lack of fit",
-        f"RMSE left out, {unit}",
-        "BIC above least",
-        *((f"RMSE blind, {unit}", "lack of fit blind") if comparison.validation else ()),
-    )
-
-
-def law_cells(comparison: Comparison) -> list[tuple[str, ...]]:
-    """Return the measures of each law as text, from the best to the worst law."""
-    least = min(r.criterion for r in comparison.results)
-    return [
-        (
-            r.law,
-            str(len(r.model.unknowns)),
-            ", ".join(r.undetermined) or "–",
-            r.judgement.verdict,
-            f"{r.fit.rmse:.4g}",
-            per_cent(r.judgement.missed),
-            f"{r.left_out_rmse:.4g}" if np.isfinite(r.left_out_rmse) else MISSING,
-            f"{r.criterion - least:.4g}",
-            *(
-                (f"{r.prediction.rmse:.4g}", per_cent(r.predicted.missed))
-                if r.prediction and r.predicted
-                else ()
-            ),
-        )
-        for r in comparison.order
-    ]
 
 
 def laws_table(comparison: Comparison) -> pd.DataFrame:
@@ -156,63 +111,61 @@ def parameters_by_law(comparison: Comparison) -> pd.DataFrame:
 
 def errors_by_law(comparison: Comparison) -> pd.DataFrame:
     """Return the RMSE of each test, one column a law; a column says which tests were predicted."""
-    return pd.DataFrame(
-        [
-            *_error_rows(comparison, comparison.motions, [r.fit for r in comparison.results], ""),
-            *_error_rows(comparison, comparison.validation, _predictions(comparison), "blind"),
-        ]
-    )
-
-
-def _error_rows(
-    comparison: Comparison, motions: Sequence[MeasuredMotion], fits: Sequence[Fit], kind: str
-) -> list[dict[str, Any]]:
+    units = units_of(comparison.motions[0].loop.rotates)
     rows = []
-    for index, measured in enumerate(motions):
-        factor, _, unit = motion_scale(measured.loop.rotates)
-        force = comparison.unit.replace(" ", "")
+    for tested in comparison.tested:
         row: dict[str, Any] = {
-            "file": measured.loop.path,
-            "test": kind or "fitted",
-            "frequency_hz": frequency_of(measured),
-            f"amplitude_{unit}": factor * measured.stroke,
+            "file": tested.measured.loop.path,
+            "test": tested.kind,
+            "frequency_hz": frequency_of(tested.measured),
+            f"amplitude_{units.unit}": units.factor * tested.measured.stroke,
         }
-        for r, fit in zip(comparison.results, fits, strict=True):
-            row[f"rmse_{force}_{r.law}"] = fit.tests[index].rmse
-            if not kind:
-                row[f"rmse_left_out_{force}_{r.law}"] = r.left_out[index]
+        for r, error in zip(comparison.results, tested.errors().values(), strict=True):
+            row[f"rmse_{units.in_heads}_{r.law}"] = error.rmse
+            if tested.kind == "fitted":
+                row[f"rmse_left_out_{units.in_heads}_{r.law}"] = r.left_out[tested.index]
         rows.append(row)
-    return rows
+    return pd.DataFrame(rows)
 
 
 def loops_by_law(comparison: Comparison) -> pd.DataFrame:
     """Return the measured force and that of each law at every sample. [SI]"""
-    parts = []
-    groups = (
-        (comparison.motions, [r.fit for r in comparison.results], "fitted"),
-        (comparison.validation, _predictions(comparison), "blind"),
-    )
-    for motions, fits, kind in groups:
-        for index, measured in enumerate(motions):
-            forces = {
-                r.law: fit.computed[fit.problem.slices[index]]
-                for r, fit in zip(comparison.results, fits, strict=True)
+    parts = [
+        pd.DataFrame(
+            {
+                "file": tested.measured.loop.name,
+                "test": tested.kind,
+                "time_s": tested.measured.loop.time,
+                "measured": tested.measured.loop.force,
+                **tested.forces(),
             }
-            parts.append(
-                pd.DataFrame(
-                    {
-                        "file": measured.loop.name,
-                        "test": kind,
-                        "time_s": measured.loop.time,
-                        "measured": measured.loop.force,
-                        **forces,
-                    }
-                )
-            )
+        )
+        for tested in comparison.tested
+    ]
     return pd.concat(parts, ignore_index=True)
 
 
-def _laws(comparison: Comparison) -> Table:
+def laws_shown(comparison: Comparison) -> Table:
+    """Return the measures of each law for reading, from the best to the worst law."""
+    unit, in_heads = comparison.unit, comparison.unit.replace(" ", "")
+    columns = {
+        "law": Column("law"),
+        "not_determined": Column("not determined"),
+        "verdict": Column("fit"),
+        "unknowns": Column("unknowns", decimals=0),
+        f"rmse_{in_heads}": Column("RMSE", unit),
+        "lack_of_fit_by_rms_force": Column("lack of fit"),
+        f"rmse_left_out_{in_heads}": Column("RMSE left out", unit),
+        "bayesian_information_criterion": Column("BIC above least"),
+    }
+    if comparison.validation:
+        columns[f"rmse_blind_{in_heads}"] = Column("RMSE blind", unit)
+        columns["lack_of_fit_blind"] = Column("lack of fit blind")
+    frame = laws_table(comparison)
+    frame["bayesian_information_criterion"] -= frame["bayesian_information_criterion"].min()
+    for name in ("lack_of_fit_by_rms_force", "lack_of_fit_blind"):
+        frame[name] = list(map(per_cent, frame[name]))
+    frame["not_determined"] = frame["not_determined"].str.replace(" ", ", ").replace("", MISSING)
     caption = (
         "Laws from the best to the worst. Lack of fit: what the noise does not explain, by the "
         "root mean square of the measured force. RMSE left out: error of each test at the fit to "
@@ -220,75 +173,52 @@ def _laws(comparison: Comparison) -> Table:
         "samples. The data support, of the laws that are as good as the best, the one with the "
         "fewest unknowns."
     )
-    supported = comparison.supported.law
-    groups = tuple(
-        Group(cells[0], (Row(cells[1:], "ours" if cells[0] == supported else ""),))
-        for cells in law_cells(comparison)
-    )
-    return Table(caption, law_header(comparison), groups, text_columns=4)
+    kinds = ["ours" if supported else "" for supported in frame["supported"]]
+    return table_of(frame[list(columns)], caption, columns, kinds)
 
 
 def _estimates(comparison: Comparison) -> Table:
+    tables = {r.law: values_table(r.fit, fixed_numbers(r.model.fixed)) for r in comparison.order}
     groups = tuple(
-        Group(r.law, tuple(Row(cells) for cells in cells_of) or (Row(("–",) * 5),))
-        for r in comparison.order
-        for cells_of in [estimate_cells(r.fit, fixed_numbers(r.model.fixed))]
+        Group(law, tuple(Row((group.heading, *group.rows[0].cells)) for group in table.groups))
+        for law, table in tables.items()
     )
     caption = "Estimated values of each law with 95 % confidence intervals."
-    return Table(caption, ("law", *ESTIMATE_HEADS), groups, 6)
+    columns = next(iter(tables.values())).columns
+    return Table(caption, ("law", *columns), groups, 6)
 
 
 def _errors(comparison: Comparison) -> Table:
-    tests = (
-        *((m, "fitted", k) for k, m in enumerate(comparison.motions)),
-        *((m, "blind", k) for k, m in enumerate(comparison.validation)),
-    )
     groups = tuple(
-        Group(
-            m.loop.name,
+        line(
+            tested.measured.loop.name,
             (
-                Row(
-                    (
-                        motion_text(m),
-                        kind,
-                        *(_error(r, kind, index) for r in comparison.results),
-                    )
-                ),
+                motion_text(tested.measured),
+                tested.kind,
+                *(f"{e.rmse:.3g} ({per_cent(e.normalised)})" for e in tested.errors().values()),
             ),
         )
-        for m, kind, index in tests
+        for tested in comparison.tested
     )
-    unit = force_scale(comparison.motions[0].loop.rotates)[1].replace(" ", "\u00a0")
     caption = "Root mean square error of each test and law, absolute and by the largest measured."
-    heads = (f"{r.law}, {unit}" for r in comparison.results)
-    return Table(caption, ("file", "motion", "test", *heads), groups, text_columns=3)
+    laws = (Column(r.law, comparison.unit) for r in comparison.results)
+    return Table(caption, ("file", "motion", "test", *laws), groups, text_columns=3)
 
 
-def _error(r: LawResult, kind: str, index: int) -> str:
-    fit = r.prediction if kind == "blind" else r.fit
-    assert fit is not None
-    test = fit.tests[index]
-    return f"{test.rmse:.3g} ({per_cent(test.normalised)})"
-
-
-def _pictures(
-    comparison: Comparison, fits: Sequence[Fit], motions: Sequence[MeasuredMotion], kind: str
-) -> tuple[Picture, ...]:
-    if not motions:
+def _pictures(comparison: Comparison, kind: str, what: str) -> tuple[Picture, ...]:
+    every = [tested for tested in comparison.tested if tested.kind == kind]
+    if not every:
         return ()
-    by_law = {r.law: fit for r, fit in zip(comparison.results, fits, strict=True)}
-    best = comparison.supported.law
-    chosen = measured_files(motions)
+    chosen = evenly_chosen(every)
     number = (
-        f"{len(chosen)} of {len(motions)} tests, evenly chosen; all are in loops.csv. "
-        if len(chosen) < len(motions)
+        f"{len(chosen)} of {len(every)} tests, evenly chosen; all are in loops.csv. "
+        if len(chosen) < len(every)
         else ""
     )
-    what = "blind prediction of tests that no fit has seen" if kind else "fit to the tests"
-    assert len(chosen) <= MOST_PANELS
+    best = comparison.supported.law
     return tuple(
         picture(
-            rival_loops_figure(by_law, motions, chosen, best=best, over=over),
+            rival_loops_figure(chosen, best=best, over=over),
             f"Measured samples and the loop of each law over {over}, {what}.",
             f"Force over {over}, {what} (form of [C] Figs. 13, 15-20). {number}The offset and "
             f"drift that {best} finds for the instrument are removed.",

@@ -18,7 +18,9 @@ from wm_drake.report.figure import (
 )
 from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion
 from wm_drake.studies.fitting import Fit
-from wm_drake.studies.rig.figures import force_scale, loop_panel, motion_scale
+from wm_drake.studies.identification.comparison import TestedLoop
+from wm_drake.studies.rig.figures import loop_panel
+from wm_drake.studies.rig.units import units_of
 
 COLUMNS = 4
 """Largest number of panels in a row."""
@@ -29,13 +31,13 @@ def motion_text(measured: MeasuredMotion) -> str:
 
     The range goes from the least to the greatest displacement.
     """
-    factor, _, unit = motion_scale(measured.loop.rotates)
+    units = units_of(measured.loop.rotates)
     if not isinstance(measured, HarmonicMotion):
-        ends = [float(factor * side(measured.position)) for side in (np.min, np.max)]
+        ends = [float(units.factor * side(measured.position)) for side in (np.min, np.max)]
         negligible = 1e-9 * (ends[1] - ends[0])  # rounding of an end at zero
         low, high = (0.0 if abs(end) < negligible else end for end in ends)
-        return f"as recorded, {low:.3g} to {high:.3g} {unit}"
-    return f"{measured.motion.frequency:.3g} Hz, {factor * measured.motion.amplitude:.3g} {unit}"
+        return f"as recorded, {low:.3g} to {high:.3g} {units.unit}"
+    return f"{measured.motion.frequency:.3g} Hz, {units.text(measured.motion.amplitude)}"
 
 
 def loops_figure(fit: Fit, motions: Sequence[MeasuredMotion], *, over: str) -> Figure:
@@ -82,17 +84,15 @@ def _panel(
         lines: By entry of the legend: colour and force (n,).
         over: Abscissa: displacement or velocity.
     """
-    factor, name, unit = motion_scale(measured.loop.rotates)
-    x = factor * (measured.position if over == "displacement" else measured.rate)
+    units = units_of(measured.loop.rotates)
+    x = units.factor * (measured.position if over == "displacement" else measured.rate)
     order = drawing_order(measured)
     force = measured.loop.force - offset
     samples = Points(x, force, color=MEASURED, size=3.0, opacity=0.4, key="measured")
     marks: list[Mark] = [samples]
     for key, (color, computed) in lines.items():
         marks.append(Line(x[order], computed[order], color=color, width=2.0, key=key))
-    label = f"{name}, {unit}" if over == "displacement" else f"velocity, {unit}/s"
-    y = ", ".join(force_scale(measured.loop.rotates))
-    return loop_panel(motion_text(measured), marks, label, y)
+    return loop_panel(motion_text(measured), marks, units.label(over), units.force_label)
 
 
 MOST_PANELS = 12
@@ -102,43 +102,31 @@ LAW_COLOURS = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#d55e00")
 """Colours of laws, of Okabe and Ito."""
 
 
-def measured_files(motions: Sequence[MeasuredMotion]) -> list[int]:
-    """Return the indices of at most `MOST_PANELS` tests, evenly chosen."""
-    places = np.linspace(0, len(motions) - 1, min(MOST_PANELS, len(motions)))
-    return [round(place) for place in places]
+def evenly_chosen(tests: Sequence[TestedLoop]) -> list[TestedLoop]:
+    """Return at most `MOST_PANELS` of the tests, evenly chosen."""
+    places = np.linspace(0, len(tests) - 1, min(MOST_PANELS, len(tests)))
+    return [tests[round(place)] for place in places]
 
 
-def rival_loops_figure(
-    fits: Mapping[str, Fit],
-    motions: Sequence[MeasuredMotion],
-    chosen: Sequence[int],
-    *,
-    best: str,
-    over: str,
-) -> Figure:
+def rival_loops_figure(tests: Sequence[TestedLoop], *, best: str, over: str) -> Figure:
     """Draw measured samples and the loop of each law, one panel per test.
 
     The offset and drift that the best law finds are taken from the samples and from all laws, so
     that each law lies beside the samples as its error says.
 
     Args:
-        fits: Fit or evaluation on all motions, by law.
-        motions: Measured motions.
-        chosen: Indices of the motions that are drawn.
+        tests: Tests that are drawn, with the fit or the evaluation of each law.
         best: The best law.
         over: Abscissa: displacement or velocity.
     """
     panels = []
-    for index in chosen:
-        offset = motions[index].baseline @ fits[best].baselines[index]
+    for tested in tests:
+        offset = tested.measured.baseline @ tested.fits[best].baselines[tested.index]
         lines = {
-            law: (
-                LAW_COLOURS[k % len(LAW_COLOURS)],
-                fit.computed[fit.problem.slices[index]] - offset,
-            )
-            for k, (law, fit) in enumerate(fits.items())
+            law: (LAW_COLOURS[k % len(LAW_COLOURS)], force - offset)
+            for k, (law, force) in enumerate(tested.forces().items())
         }
-        panels.append(_panel(motions[index], offset, lines, over))
+        panels.append(_panel(tested.measured, offset, lines, over))
     return _figure(panels)
 
 

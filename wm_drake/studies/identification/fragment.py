@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from ruamel.yaml import YAML
 
-from wm_drake.errors import input_error
 from wm_drake.parameters import (
     DAMPER_LAWS,
     Component,
@@ -21,13 +20,12 @@ from wm_drake.parameters import (
 from wm_drake.parameters.units import Unit
 from wm_drake.studies.components import Target
 from wm_drake.studies.fitting import Fit
+from wm_drake.studies.fitting.page import unit_text
 from wm_drake.studies.identification.models import ComponentModel, unit_of_field
-from wm_drake.studies.identification.scales import FORCE, TORQUE
+from wm_drake.studies.identification.scales import ANGLE, FORCE, LENGTH, TORQUE
 
 FIXED = "fixed by the user in an identification"
 """Source of a number that was not searched."""
-
-_LENGTH, _ANGLE = Unit("m", "mm"), Unit("rad", "deg")
 
 
 @dataclass(frozen=True)
@@ -63,11 +61,8 @@ def fragment(
         destination: Where the numbers go.
         copies: Fields that get the value of another, such as z of an axisymmetric bushing from x.
         remarks: Sentences on the fit for the head of the file.
-
-    Raises:
-        InputError: The data do not determine a number that a new law needs.
     """
-    entries, comments = _entries(fit, model, destination.target.component)
+    entries, comments = _entries(fit, model)
     for name, source in (copies or {}).items():
         if source in entries:
             entries[name] = dict(entries[source])
@@ -134,18 +129,17 @@ class _Lines:
         self._lines.append(part if isinstance(part, str) else part.decode())
 
 
-def _entries(
-    fit: Fit, model: ComponentModel, target: Component
-) -> tuple[dict[str, Any], list[str]]:
+def _entries(fit: Fit, model: ComponentModel) -> tuple[dict[str, Any], list[str]]:
     """Return values with sources by field, and comments on what is missing."""
     fields = model.fields(fit.values)
     estimates = {estimate.name: estimate for estimate in fit.estimates}
     units = {unknown.name: unknown.unit for unknown in fit.problem.unknowns}
     entries: dict[str, Any] = {"law": fields["law"]} if "law" in fields else {}
     comments = []
+    source = f"identified from {len(fit.tests)} loops, normalised RMSE {_normalised(fit):.3g}"
     for name, value in fields.items():
         if isinstance(value, dict):
-            entries[name] = _table(value, fit, _fixed_rises(name, model))
+            entries[name] = table_entry(value, source + _fixed_rises(name, model))
             open_ends = [
                 e.name for e in fit.estimates if e.name.startswith(f"{name}.") and not e.determined
             ]
@@ -155,8 +149,7 @@ def _entries(
                     "the table's rises there are not to be trusted."
                 )
         elif name in model.fixed:
-            unit = _unit_of_fixed(name)
-            entries[name] = {"value": f"{unit.from_si(value):.10g} {_plain(unit)}", "source": FIXED}
+            entries[name] = {"value": _text(value, _unit_of_fixed(name), 10), "source": FIXED}
         elif name in estimates:
             estimate, unit = estimates[name], units[name]
             if not estimate.determined:
@@ -164,40 +157,32 @@ def _entries(
                     f"The data do not determine {name}; it is left out and stays what it was."
                 )
                 continue
-            text = f"identified from {len(fit.tests)} loops, normalised RMSE {_normalised(fit):.3g}"
+            text = source
             if estimate.at_bound:
                 text += f"; at the {estimate.at_bound} bound of the search"
             elif np.isfinite(estimate.lower):
                 lower, upper = unit.from_si(estimate.lower), unit.from_si(estimate.upper)
-                text += f"; 95 % interval {lower:.4g} to {upper:.4g} {_plain(unit)}"
-            entries[name] = {"value": f"{unit.from_si(value):.7g} {_plain(unit)}", "source": text}
-    missing = _missing(entries, target)
-    if missing:
-        raise input_error(
-            f"not determined by the data, and {target.name} had another law than {entries['law']}; "
-            "give its value with --fix",
-            key=", ".join(missing),
-        )
+                text += f"; 95 % interval {lower:.4g} to {upper:.4g} {unit_text(unit)}"
+            entries[name] = {"value": _text(value, unit, 7), "source": text}
     return entries, comments
 
 
 def missing_numbers(fit: Fit, model: ComponentModel, target: Component) -> list[str]:
     """Return the numbers of a new law that the data do not determine: a fragment needs them."""
-    undetermined = {e.name for e in fit.estimates if not e.determined}
-    return _missing(
-        {k: v for k, v in model.fields(fit.values).items() if k not in undetermined}, target
-    )
-
-
-def _missing(entries: Mapping[str, Any], target: Component) -> list[str]:
-    if "law" not in entries or entries["law"] == getattr(target.parameters, "law", None):
+    fields = model.fields(fit.values)
+    if not target.is_damper or _keeps_law(fields, target):
         return []
-    return [name for name in _required(target, entries) if name not in entries]
+    undetermined = {e.name for e in fit.estimates if not e.determined}
+    known = [name for name in fields if name not in undetermined]
+    return [name for name in DAMPER_LAWS[fields["law"]].unknowns if name not in known]
 
 
-def _required(target: Component, entries: Mapping[str, Any]) -> list[str]:
-    law = DAMPER_LAWS.get(entries.get("law", "")) if target.is_damper else None
-    return list(law.unknowns) if law else []
+def _keeps_law(entries: Mapping[str, Any], target: Component) -> bool:
+    return "law" not in entries or entries["law"] == getattr(target.parameters, "law", None)
+
+
+def _text(value: float, unit: Unit, digits: int) -> str:
+    return f"{unit.from_si(value):.{digits}g} {unit_text(unit)}"
 
 
 def _normalised(fit: Fit) -> float:
@@ -218,28 +203,18 @@ def _fixed_rises(table: str, model: ComponentModel) -> str:
 
 def table_entry(value: Mapping[str, Sequence[float]], source: str) -> dict[str, str]:
     """Return a table in SI as an entry of a YAML file, with its source."""
-    units = {"displacement": _LENGTH, "angle": _ANGLE, "force": FORCE, "torque": TORQUE}
+    units = {"displacement": LENGTH, "angle": ANGLE, "force": FORCE, "torque": TORQUE}
     shown = {
-        name: f"({', '.join(f'{units[name].from_si(x):.6g}' for x in given)}) {_plain(units[name])}"
+        name: f"({', '.join(f'{unit.from_si(x):.6g}' for x in given)}) {unit_text(unit)}"
         for name, given in value.items()
+        for unit in [units[name]]
     }
     return {**shown, "source": source}
 
 
-def _table(value: Mapping[str, Any], fit: Fit, fixed: str) -> dict[str, str]:
-    return table_entry(
-        value,
-        f"identified from {len(fit.tests)} loops, normalised RMSE {_normalised(fit):.3g}{fixed}",
-    )
-
-
-def _plain(unit: Unit) -> str:
-    return unit.shown.replace("*", " ")
-
-
 def _leaving(entries: dict[str, Any], target: Component) -> dict[str, Any]:
     """Return the entries with null for each number of the component's old law only."""
-    if "law" not in entries or entries["law"] == getattr(target.parameters, "law", None):
+    if _keeps_law(entries, target):
         return entries
     old = target.parameters.model_fields_set - {"law", "end_bushing"}
     return {**entries, **dict.fromkeys(sorted(old - set(entries)))}
@@ -247,7 +222,7 @@ def _leaving(entries: dict[str, Any], target: Component) -> dict[str, Any]:
 
 def _whole(entries: dict[str, Any], target: Component) -> dict[str, Any]:
     """Return a component file: identified numbers, and old ones that still belong to it."""
-    if "law" in entries and entries["law"] != getattr(target.parameters, "law", None):
+    if not _keeps_law(entries, target):
         return entries
     kept = {
         key: {"value": unit.text(value), "source": target.sources.get(key, "as before")}

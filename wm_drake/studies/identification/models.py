@@ -108,16 +108,12 @@ def damper_model(
     Raises:
         InputError: There is no such law, or no such field, or the sponge cannot have a mass.
     """
-    if law not in DAMPER_LAWS:
-        raise input_error(
-            f"no law '{law}' of a damper{nearest_names(law, DAMPER_LAWS)}", where="--law"
-        )
-    given = given or Given()
+    names, given = fields_of_law(law), given or Given()
     registered, scale = DAMPER_LAWS[law], scale_of(motions)
     if sponge_mass > 0.0:
         _check_sponge_mass(registered, motions)
     tables = tuple(OddTable(curve, scale, given.knots) for curve in registered.curves)
-    numbers_of_law = [name for name in registered.fields if name not in registered.curves]
+    numbers_of_law = [name for name in names if name not in registered.curves]
     check_names([*numbers_of_law, *_rises(tables)], given.bounds, given.fixed)
     bounded = {name: ends for name, ends in given.bounds.items() if name in numbers_of_law}
     searched = {**registered.unknowns, **bounded}
@@ -204,11 +200,8 @@ def bushing_model(
     Raises:
         InputError: There is no such law (or not along an axis), or no such field.
     """
-    if law not in BUSHING_LAWS:
-        raise input_error(
-            f"no law '{law}' of a bushing{nearest_names(law, BUSHING_LAWS)}", where="--law"
-        )
     base, axis, given = tested.base, tested.axis, given or Given()
+    fields_of_law(law, axis)  # checks the law
     about = axis.startswith("about")
     if law == "voigt_havsin" and not about:
         raise input_error(

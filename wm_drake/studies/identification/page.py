@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from wm_drake.report.formatting import number
 from wm_drake.report.page import picture
 from wm_drake.report.sections import Section, SectionedPage
-from wm_drake.report.table import Table, line
+from wm_drake.report.table import Column, Table, table_of
 from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion, RecordedMotion
 from wm_drake.studies.fitting import Fit
 from wm_drake.studies.fitting.page import (
@@ -17,12 +16,13 @@ from wm_drake.studies.fitting.page import (
     correlations_table,
     history_picture,
     search_facts,
-    values_section,
+    undetermined_sentences,
+    values_table,
 )
 from wm_drake.studies.identification.figures import loops_figure, motion_text
 from wm_drake.studies.identification.judgement import Judgement, per_cent
 from wm_drake.studies.identification.models import unit_of_field
-from wm_drake.studies.rig.figures import force_scale, motion_scale
+from wm_drake.studies.rig.units import units_of
 from wm_drake.studies.study import Facts
 
 if TYPE_CHECKING:
@@ -52,10 +52,12 @@ def identify_page(result: "FitResult", facts: Facts) -> str:
     )
     sections = [Section("loops", "Measured and fitted loops", loops)]
     if fit.log.history:
-        unit = force_scale(motions[0].loop.rotates)[1]
+        unit = units_of(motions[0].loop.rotates).force_unit
         sections.append(Section("search", "Search", (history_picture(fit, unit),)))
+    values = values_table(fit, fixed_numbers(result.model.fixed))
+    undetermined = " ".join(undetermined_sentences(fit))
     sections += [
-        values_section(fit, fixed_numbers(result.model.fixed)),
+        Section("values", "Values", tables=(values,), text=undetermined),
         Section("errors", "Errors", tables=(_errors(fit, motions, judgement),)),
     ]
     if fit.estimates:
@@ -82,16 +84,15 @@ def errors_table(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgeme
     """Return the RMSE of each test, as [A] Tables 2, 4, 5 and 7, with noise and lack of fit."""
     rows = []
     for test, measured, judged in zip(fit.tests, motions, judgement.loops, strict=True):
-        factor, _, unit = motion_scale(measured.loop.rotates)
-        force = force_scale(measured.loop.rotates)[1].replace(" ", "")
+        units = units_of(measured.loop.rotates)
         rows.append(
             {
                 "file": measured.loop.path,
                 "frequency_hz": frequency_of(measured),
-                f"amplitude_{unit}": factor * measured.stroke,
-                f"rmse_{force}": test.rmse,
+                f"amplitude_{units.unit}": units.factor * measured.stroke,
+                f"rmse_{units.in_heads}": test.rmse,
                 "rmse_by_largest_force": test.normalised,
-                f"noise_{force}": judged.noise,
+                f"noise_{units.in_heads}": judged.noise,
                 "lack_of_fit_by_rms_force": judged.missed,
                 "work_per_cycle_J": judged.work,
             }
@@ -105,10 +106,10 @@ def motion_sentences(motions: Sequence[MeasuredMotion]) -> list[str]:
     for m in motions:
         if not isinstance(m, RecordedMotion):
             continue
-        factor, _, unit = motion_scale(m.loop.rotates)
+        units = units_of(m.loop.rotates)
         smoothing = (
             f"smoothed by a cubic spline that halves a motion at {m.cutoff:.3g} Hz; "
-            f"{factor * m.noise:.2g} {unit} (root mean square) is taken out as noise"
+            f"{units.factor * m.noise:.2g} {units.unit} (root mean square) is taken out as noise"
             if np.isfinite(m.cutoff)
             else "interpolated by a cubic spline without smoothing"
         )
@@ -147,42 +148,30 @@ def fitted_loops(fit: Fit, motions: Sequence[MeasuredMotion]) -> pd.DataFrame:
 
 
 def _errors(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) -> Table:
-    unit = force_scale(motions[0].loop.rotates)[1]
-    groups = tuple(
-        line(
-            measured.loop.name,
-            [
-                motion_text(measured),
-                str(len(measured.position)),
-                f"{test.rmse:.4g}",
-                number(test.normalised, 4),
-                f"{judged.noise:.2g}",
-                per_cent(judged.missed),
-            ],
-        )
-        for test, measured, judged in zip(fit.tests, motions, judgement.loops, strict=True)
+    units = units_of(motions[0].loop.rotates)
+    force, in_heads = units.force, units.in_heads
+    columns = {
+        "file": Column("file"),
+        "motion": Column("motion"),
+        "samples": Column("samples", decimals=0),
+        f"rmse_{in_heads}": Column("RMSE", units.force_unit),
+        "rmse_by_largest_force": Column(f"RMSE / largest {force}", decimals=4),
+        f"noise_{in_heads}": Column("noise", units.force_unit),
+        "lack_of_fit_by_rms_force": Column("lack of fit"),
+    }
+    frame = errors_table(fit, motions, judgement).assign(
+        file=[measured.loop.name for measured in motions],
+        motion=[motion_text(measured) for measured in motions],
+        samples=[len(measured.position) for measured in motions],
+        lack_of_fit_by_rms_force=[per_cent(judged.missed) for judged in judgement.loops],
     )
-    name = force_scale(motions[0].loop.rotates)[0]
     caption = (
         "Root mean square error (RMSE) of each test, absolute and relative to the largest measured "
-        f"{name}, as [A] Tables 2, 4, 5 and 7. The noise follows from the differences between "
+        f"{force}, as [A] Tables 2, 4, 5 and 7. The noise follows from the differences between "
         "samples of nearly the same phase. The lack of fit is what the noise does not explain, "
-        f"relative to the root mean square of the measured {name}."
+        f"relative to the root mean square of the measured {force}."
     )
-    return Table(
-        caption,
-        (
-            "file",
-            "motion",
-            "samples",
-            f"RMSE, {unit}",
-            f"RMSE / largest {name}",
-            f"noise, {unit}",
-            "lack of fit",
-        ),
-        groups,
-        text_columns=2,
-    )
+    return table_of(frame[list(columns)], caption, columns)
 
 
 def _warnings(fit: Fit, judgement: Judgement) -> list[str]:
@@ -202,7 +191,8 @@ def _warnings(fit: Fit, judgement: Judgement) -> list[str]:
 
 
 def _summary(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) -> str:
-    name, unit = force_scale(motions[0].loop.rotates)
+    units = units_of(motions[0].loop.rotates)
+    name, unit = units.force, units.force_unit
     normalised = [test.normalised for test in fit.tests]
     determined = sum(e.determined for e in fit.estimates)
     least, most = (per_cent(value) for value in (min(normalised), max(normalised)))

@@ -65,7 +65,9 @@ def _steady_forces(benches: Sequence[Bench], motions: Sequence[HarmonicMotion]) 
     if isinstance(benches[0], BushingBench):
         return np.array(
             [
-                np.concatenate([_bushing_forces(bench, m) for m in motions])
+                np.concatenate(
+                    [harmonic_loads(bench, m.motion, m.phase, m.position, m.rate) for m in motions]
+                )
                 for bench in benches
                 if isinstance(bench, BushingBench)
             ]
@@ -84,19 +86,12 @@ def _heavy_sponge_forces(bench: Bench, motions: Sequence[HarmonicMotion]) -> Flo
     assert isinstance(bench, DamperBench)
     forces = []
     for m in motions:
-        size = m.motion.amplitude, m.motion.angular_frequency
         try:
-            loop = steady_tensions(bench.packed, bench.sponge_mass, *size)
+            loop = steady_tensions(bench, m.motion)
         except NotSteadyError:
             return np.full(sum(len(each.phase) for each in motions), np.nan)
         forces.append(np.interp(m.phase, PHASE, np.append(loop, loop[0])))
     return np.concatenate(forces)
-
-
-def _bushing_forces(bench: BushingBench, m: HarmonicMotion) -> FloatArray:
-    """Return the forces of a steady loop of a bushing at its samples."""
-    size = m.motion.amplitude, m.motion.angular_frequency
-    return harmonic_loads(bench, *size, m.phase, m.position, m.rate)
 
 
 def _damper_forces(benches: Sequence[Bench], motions: Sequence[HarmonicMotion]) -> FloatArray:

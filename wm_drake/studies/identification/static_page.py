@@ -7,16 +7,15 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.report.figure import MEASURED, QUIET, Figure, Line, Mark, Panel, in_grid
+from wm_drake.report.formatting import MM_PER_M
 from wm_drake.report.page import picture
 from wm_drake.report.sections import Section, SectionedPage
-from wm_drake.report.table import Group, Row, Table
+from wm_drake.report.table import Table, line
 from wm_drake.rigs import AXES
 from wm_drake.studies.identification.static import NOMINAL, StaticCurve
-from wm_drake.studies.rig.figures import force_scale, loop_panel, motion_scale
+from wm_drake.studies.rig.figures import loop_panel
+from wm_drake.studies.rig.units import units_of
 from wm_drake.studies.study import Facts
-
-MM_PER_M = 1e3
-
 
 METHOD = (
     "Each test is split at its reversals into branches. The first 10 % of a branch, in which "
@@ -31,7 +30,7 @@ def static_page(title: str, curves: Sequence[StaticCurve], facts: Facts) -> str:
     """Return the page as text of one self-contained HTML file. `title`: of the component."""
     fallen = [
         f"{_name(c)}: the mean of loading and unloading falls by up to {c.fallen:.3g} "
-        f"{force_scale(c.rotates)[1]}; a table cannot fall, so it stays level there."
+        f"{units_of(c.rotates).force_unit}; a table cannot fall, so it stays level there."
         for c in curves
         if c.fallen > 0.02 * float(np.max(np.abs(c.elastic)))
     ]
@@ -46,7 +45,7 @@ def static_page(title: str, curves: Sequence[StaticCurve], facts: Facts) -> str:
         summary(curves),
         [
             Section("curves", "Force and hysteresis", (shown,)),
-            Section("measures", "Values", tables=(_measures(curves),)),
+            Section("measures", "Values", tables=(measures_shown(curves),)),
         ],
         [("Files", ", ".join(loop.path for c in curves for loop in c.loops)), *facts.rows()],
         warnings=fallen,
@@ -58,8 +57,9 @@ def static_page(title: str, curves: Sequence[StaticCurve], facts: Facts) -> str:
 def summary(curves: Sequence[StaticCurve]) -> str:
     """Return stiffness and hysteresis of each axis as one paragraph."""
     sentences = [
-        f"Axis {axis}: {stiffness} from {reach}, with a hysteresis of ±{friction}."
-        for axis, reach, stiffness, friction, *_ in static_cells(curves)
+        f"Axis {group.heading}: {stiffness} from {reach}, with a hysteresis of ±{friction}."
+        for group in measures_shown(curves).groups
+        for reach, stiffness, friction, *_ in [group.rows[0].cells]
     ]
     table = "The force table is the mean of loading and unloading, without the instrument's offset."
     return " ".join([*sentences, table])
@@ -79,18 +79,18 @@ def static_figure(curves: Sequence[StaticCurve]) -> Figure:
 
 def _panel(curve: StaticCurve) -> Panel:
     """Return samples, branches and table of an axis."""
-    factor, name, unit = motion_scale(curve.rotates)
+    units = units_of(curve.rotates)
     marks: list[Mark] = []
     faint = Line((), (), color=QUIET, opacity=0.6, key="samples")
     marks += [
-        replace(faint, x=factor * loop.displacement, y=loop.force - curve.offset)
+        replace(faint, x=units.factor * loop.displacement, y=loop.force - curve.offset)
         for loop in curve.loops
     ]
-    x = factor * curve.position
+    x = units.factor * curve.position
     for branch in (curve.loading, curve.unloading):
         marks.append(Line(x, branch, color=MEASURED, width=1.8, key="loading and unloading"))
     marks.append(Line(x, curve.elastic, width=2.4, key="mean (table)"))
-    return loop_panel(_name(curve), marks, f"{name}, {unit}", ", ".join(force_scale(curve.rotates)))
+    return loop_panel(_name(curve), marks, units.label("displacement"), units.force_label)
 
 
 def static_table(curves: Sequence[StaticCurve]) -> pd.DataFrame:
@@ -111,53 +111,39 @@ def static_table(curves: Sequence[StaticCurve]) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def static_header() -> tuple[str, ...]:
-    """Return the column heads for the cells of `static_cells`."""
-    return (
-        "axis",
-        "range",
-        "nominal stiffness",
-        "half width of hysteresis",
-        "energy per cycle, mJ",
-        "offset",
-        "median rate",
-        "tests",
-    )
-
-
-def static_cells(curves: Sequence[StaticCurve]) -> list[tuple[str, ...]]:
-    """Return the measures of each axis as text, with units."""
-    cells: list[tuple[str, ...]] = []
+def measures_shown(curves: Sequence[StaticCurve]) -> Table:
+    """Return the measures of each axis with units."""
+    groups = []
     for c in sorted(curves, key=lambda c: AXES.index(c.axis)):
-        factor, _, unit = motion_scale(c.rotates)
-        force = force_scale(c.rotates)[1]
-        stiffness = (
-            f"{c.stiffness:.4g} N m/rad" if c.rotates else f"{c.stiffness / MM_PER_M:.4g} N/mm"
+        units = units_of(c.rotates)
+        low, high = units.factor * c.position[0], units.factor * c.position[-1]
+        cells = (
+            f"{low:.3g} to {high:.3g} {units.unit}",
+            f"{c.stiffness:.4g} N m/rad" if c.rotates else f"{c.stiffness / MM_PER_M:.4g} N/mm",
+            f"{c.friction:.3g} {units.force_unit}",
+            f"{1e3 * c.energy:.3g} mJ",
+            f"{c.offset:.3g} {units.force_unit}",
+            f"{units.factor * c.fastest:.3g} {units.unit}/s",
+            str(len(c.loops)),
         )
-        cells.append(
-            (
-                _name(c),
-                f"{factor * c.position[0]:.3g} to {factor * c.position[-1]:.3g} {unit}",
-                stiffness,
-                f"{c.friction:.3g} {force}",
-                f"{1e3 * c.energy:.3g}",
-                f"{c.offset:.3g} {force}",
-                f"{factor * c.fastest:.3g} {unit}/s",
-                str(len(c.loops)),
-            )
-        )
-    return cells
-
-
-def _measures(curves: Sequence[StaticCurve]) -> Table:
+        groups.append(line(_name(c), cells))
     caption = (
         f"Measures of each axis. Nominal stiffness: line through zero, fitted to the first "
         f"{100 * NOMINAL:.0f} % of the mean curve, as in [B] section 4. Half width of hysteresis: "
         "half the difference of loading and unloading, median over the range; a friction that does "
         "not depend on the rate has this force. At the median rate a damping adds to it."
     )
-    groups = tuple(Group(cells[0], (Row(cells[1:]),)) for cells in static_cells(curves))
-    return Table(caption, static_header(), groups, text_columns=8)
+    heads = (
+        "axis",
+        "range",
+        "nominal stiffness",
+        "half width of hysteresis",
+        "energy per cycle",
+        "offset",
+        "median rate",
+        "tests",
+    )
+    return Table(caption, heads, tuple(groups), text_columns=8)
 
 
 def _name(curve: StaticCurve) -> str:

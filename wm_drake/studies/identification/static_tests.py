@@ -16,6 +16,7 @@ from wm_drake.studies.identification.fragment import Destination, table_entry, w
 from wm_drake.studies.identification.inputs import loops_of
 from wm_drake.studies.identification.options import AxisFitOptions
 from wm_drake.studies.identification.static import StaticCurve, static_curve
+from wm_drake.studies.identification.static_page import measures_shown, static_page, static_table
 from wm_drake.studies.inputs import pairs_of
 from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Facts, Result, Task
@@ -40,8 +41,6 @@ class StaticResult(Result):
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return the curves."""
-        from wm_drake.studies.identification.static_page import static_table
-
         return {"static": static_table(list(self.curves.values()))}
 
     def write(self, folder: Path) -> None:
@@ -65,19 +64,10 @@ class StaticResult(Result):
 
     def terminal(self) -> list[Table | str]:
         """Return the measures of each axis."""
-        from wm_drake.studies.identification.static_page import static_cells, static_header
-
-        table = Table(title="Quasi-static tests")
-        for head in static_header():
-            table.add_column(head, no_wrap=head == "axis")
-        for cells in static_cells(list(self.curves.values())):
-            table.add_row(*cells)
-        return [table]
+        return [measures_shown(list(self.curves.values())).terminal("Quasi-static tests")]
 
     def page(self, facts: Facts) -> str:
         """Return the page."""
-        from wm_drake.studies.identification.static_page import static_page
-
         return static_page(self.title, list(self.curves.values()), facts)
 
 

@@ -14,12 +14,22 @@ from wm_drake.parameters.units import Unit
 from wm_drake.rigs.measured import MeasuredMotion
 from wm_drake.studies.components import Target, axes_of, existing_files, mass_of, target_of
 from wm_drake.studies.fitting import Fit
+from wm_drake.studies.fitting.page import estimates_frame, undetermined_sentences, values_table
 from wm_drake.studies.identification.comparison import (
     Comparison,
     SplitTests,
     check_blind,
     compare_laws,
     fit_law,
+)
+from wm_drake.studies.identification.comparison_page import (
+    bounds_sentences,
+    comparison_page,
+    errors_by_law,
+    laws_shown,
+    laws_table,
+    loops_by_law,
+    parameters_by_law,
 )
 from wm_drake.studies.identification.fragment import Destination, fragment, missing_numbers
 from wm_drake.studies.identification.inputs import given_by_law, kept_fields, motions_of
@@ -31,7 +41,15 @@ from wm_drake.studies.identification.models import (
     damper_model,
 )
 from wm_drake.studies.identification.options import AxisFitOptions, DamperFitOptions, FitOptions
+from wm_drake.studies.identification.page import (
+    errors_table,
+    fitted_loops,
+    fixed_numbers,
+    identify_page,
+    motion_sentences,
+)
 from wm_drake.studies.inputs import pairs_of, quantities_of
+from wm_drake.studies.rig.units import units_of
 from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Facts, Result, Task
 
@@ -102,13 +120,6 @@ class FitResult(Result):
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return the values, the error of each test, and all samples."""
-        from wm_drake.studies.fitting.page import estimates_frame
-        from wm_drake.studies.identification.page import (
-            errors_table,
-            fitted_loops,
-            fixed_numbers,
-        )
-
         return {
             "parameters": estimates_frame(self.fit, fixed_numbers(self.model.fixed)),
             "errors": errors_table(self.fit, self.motions, self.judgement),
@@ -124,8 +135,6 @@ class FitResult(Result):
         (folder / "fit.json").write_text(text, encoding="utf-8")
 
     def _fit_as_dict(self) -> dict[str, Any]:
-        from wm_drake.studies.identification.page import fixed_numbers
-
         return {
             **self.fit.as_dict(),
             "fixed": {
@@ -141,28 +150,15 @@ class FitResult(Result):
 
     def terminal(self) -> list[Table | str]:
         """Return the judgement, the values, and remarks."""
-        from wm_drake.studies.fitting.page import (
-            ESTIMATE_HEADS,
-            estimate_cells,
-            undetermined_sentences,
-        )
-        from wm_drake.studies.identification.page import fixed_numbers, motion_sentences
-        from wm_drake.studies.rig.figures import force_scale
-
-        fit, unit = self.fit, force_scale(self.motions[0].loop.rotates)[1]
-        table = Table(title=f"{self.title}: RMSE {fit.rmse:.4g} {unit} by {fit.log.method}")
-        for head in ESTIMATE_HEADS:
-            table.add_column(head, no_wrap=head == "unknown")
-        for cells in estimate_cells(fit, fixed_numbers(self.model.fixed)):
-            table.add_row(*cells)
+        fit, unit = self.fit, units_of(self.motions[0].loop.rotates).force_unit
+        title = f"{self.title}: RMSE {fit.rmse:.4g} {unit} by {fit.log.method}"
+        table = values_table(fit, fixed_numbers(self.model.fixed)).terminal(title)
         remarks = [*undetermined_sentences(fit), *fit.log.notes]
         remarks += self.component.missing("identified.yaml", fit, self.model)
         return [*self.judgement.sentences, *motion_sentences(self.motions), table, *remarks]
 
     def page(self, facts: Facts) -> str:
         """Return the page."""
-        from wm_drake.studies.identification.page import identify_page
-
         return identify_page(self, facts)
 
 
@@ -180,13 +176,6 @@ class ComparisonResult(Result):
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return measures, values and errors of the laws, and all samples."""
-        from wm_drake.studies.identification.comparison_page import (
-            errors_by_law,
-            laws_table,
-            loops_by_law,
-            parameters_by_law,
-        )
-
         return {
             "laws": laws_table(self.comparison),
             "parameters": parameters_by_law(self.comparison),
@@ -218,27 +207,14 @@ class ComparisonResult(Result):
 
     def terminal(self) -> list[Table | str]:
         """Return what the data say about the laws, their measures, and remarks."""
-        from wm_drake.studies.identification.comparison_page import (
-            bounds_sentences,
-            law_cells,
-            law_header,
-        )
-        from wm_drake.studies.identification.page import motion_sentences
-
         comparison = self.comparison
-        table = Table(title=self.component.title)
-        for head in law_header(comparison):
-            table.add_column(head, no_wrap=head == "law")
-        for cells in law_cells(comparison):
-            table.add_row(*cells)
+        table = laws_shown(comparison).terminal(self.component.title)
         motions = (*comparison.motions, *comparison.validation)
         sentences = (*comparison.sentences, *motion_sentences(motions))
         return [*sentences, table, *bounds_sentences(comparison), *self.missing]
 
     def page(self, facts: Facts) -> str:
         """Return the page."""
-        from wm_drake.studies.identification.comparison_page import comparison_page
-
         return comparison_page(self, facts)
 
 

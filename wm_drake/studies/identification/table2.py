@@ -27,6 +27,7 @@ from wm_drake.studies.identification.drift import (
 )
 from wm_drake.studies.identification.inputs import units_of
 from wm_drake.studies.identification.options import Table2Options
+from wm_drake.studies.identification.table2_page import fits_shown, sentences, table2_page
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Facts, Result, Task
@@ -64,19 +65,10 @@ class Table2Result(Result):
 
     def terminal(self) -> list[Table | str]:
         """Return the fits, and what they and the trend say."""
-        from wm_drake.studies.identification.table2_page import HEADER, fit_cells, sentences
-
-        table = Table(title=self.source)
-        for head in HEADER:
-            table.add_column(head, justify="right")
-        for row in fit_cells(self.fits):
-            table.add_row(*row)
-        return [table, *sentences(self.fits, self.trend)]
+        return [fits_shown(self.fits).terminal(self.source), *sentences(self.fits, self.trend)]
 
     def page(self, facts: Facts) -> str:
         """Return the page."""
-        from wm_drake.studies.identification.table2_page import table2_page
-
         return table2_page(self, facts)
 
 

@@ -6,10 +6,9 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.report.figure import Figure, Line, Mark, Points, in_grid
-from wm_drake.report.formatting import number
 from wm_drake.report.page import picture
 from wm_drake.report.sections import Section, SectionedPage
-from wm_drake.report.table import Group, Row, Table
+from wm_drake.report.table import Column, Table, line, table_of
 from wm_drake.studies.identification.drift import FrequencyTrend
 from wm_drake.studies.identification.figures import LAW_COLOURS
 from wm_drake.studies.rig.figures import loop_panel
@@ -17,17 +16,6 @@ from wm_drake.studies.study import Facts
 
 if TYPE_CHECKING:
     from wm_drake.studies.identification.table2 import Table2Result
-
-HEADER = (
-    "test",
-    "k1 printed, N/mm",
-    "k1 fitted",
-    "ratio",
-    "c1 printed, N s/mm",
-    "c1 fitted",
-    "ratio",
-    "RMSE / peak",
-)
 
 
 def table2_page(result: "Table2Result", facts: Facts) -> str:
@@ -47,7 +35,7 @@ def table2_page(result: "Table2Result", facts: Facts) -> str:
         " ".join(sentences(result.fits, result.trend)),
         [
             Section("comparison", "Fitted against printed", (drift,)),
-            Section("fits", "Fitted and printed values", tables=(_fits(result.fits),)),
+            Section("fits", "Fitted and printed values", tables=(fits_shown(result.fits),)),
             Section("trend", "Force over frequency", tables=(_trends(result.trend),), text=claim),
         ],
         facts.rows(),
@@ -81,31 +69,27 @@ def sentences(fits: pd.DataFrame, trend: FrequencyTrend) -> list[str]:
     return texts
 
 
-def fit_cells(fits: pd.DataFrame) -> list[tuple[str, ...]]:
-    """Return the cells of each test as text, under `HEADER`."""
-    return [
-        (
-            f"{row['frequency_hz']:.3g} Hz, {row['amplitude_mm']:.3g} mm",
-            number(row["k1"], 1),
-            number(row["k1 fitted"], 1),
-            number(row["k1 ratio"], 2),
-            number(row["c1"], 2),
-            number(row["c1 fitted"], 2),
-            number(row["c1 ratio"], 2),
-            number(row["RMSE/peak"], 3),
-        )
-        for row in fits.to_dict("records")
-    ]
+COLUMNS = {
+    "frequency_hz": Column("frequency", "Hz"),
+    "amplitude_mm": Column("amplitude", "mm"),
+    "k1": Column("k1 printed", "N/mm", 1),
+    "k1 fitted": Column("k1 fitted", decimals=1),
+    "k1 ratio": Column("ratio", decimals=2),
+    "c1": Column("c1 printed", "N s/mm", 2),
+    "c1 fitted": Column("c1 fitted", decimals=2),
+    "c1 ratio": Column("ratio", decimals=2),
+    "RMSE/peak": Column("RMSE / peak", decimals=3),
+}
+"""Columns of the fits."""
 
 
-def _fits(fits: pd.DataFrame) -> Table:
+def fits_shown(fits: pd.DataFrame) -> Table:
+    """Return the fit of each test beside the printed one."""
     caption = (
         "Each test fitted alone, within the bounds of [C] section 3.3: k1 from 50 to 300 N/mm, c1 "
         "from 0 to 10 N s/mm."
     )
-    return Table(
-        caption, HEADER, tuple(Group(cells[0], (Row(cells[1:]),)) for cells in fit_cells(fits))
-    )
+    return table_of(fits, caption, COLUMNS)
 
 
 def _trends(trend: FrequencyTrend) -> Table:
@@ -114,11 +98,8 @@ def _trends(trend: FrequencyTrend) -> Table:
         "peak force, c1 and c2 nearly zero": trend.without_dashpots,
         "f_max for the peak of the first": trend.friction,
     }
-    heads = ("loops of 1 mm, N", *(f"{f:g} Hz" for f in trend.frequencies))
-    groups = tuple(
-        Group(name, (Row(tuple(number(value, 1) for value in values)),))
-        for name, values in rows.items()
-    )
+    heads = ("loops of 1 mm, N", *(Column(f"{f:g} Hz", decimals=1) for f in trend.frequencies))
+    groups = tuple(line(name, values) for name, values in rows.items())
     return Table("Peak force of the MSTV damper over frequency.", heads, groups)
 
 

@@ -1,6 +1,5 @@
 """Figures of force loops over displacement, velocity and time, single or overlaid."""
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -23,25 +22,10 @@ from wm_drake.report.figure import (
 from wm_drake.report.formatting import MM_PER_M
 from wm_drake.rigs import ForceLoop, RigRun
 from wm_drake.rigs.run import slider_friction_curves
+from wm_drake.studies.rig.units import units_of
 
 COLUMNS = 4
 """Largest number of panels in a row."""
-
-DEG_PER_RAD = 180.0 / math.pi
-
-
-def motion_scale(rotates: bool) -> tuple[float, str, str]:
-    """Return the factor from SI to the unit for reading, the name, and this unit of a motion.
-
-    Args:
-        rotates: Whether the motion is an angle in deg, not a displacement in mm.
-    """
-    return (DEG_PER_RAD, "angle", "deg") if rotates else (MM_PER_M, "displacement", "mm")
-
-
-def force_scale(rotates: bool) -> tuple[str, str]:
-    """Return the name and unit of a force, or of a moment if the motion is a rotation."""
-    return ("moment", "N m") if rotates else ("force", "N")
 
 
 def frequency_text(loop: ForceLoop) -> str:
@@ -51,8 +35,7 @@ def frequency_text(loop: ForceLoop) -> str:
 
 def amplitude_text(loop: ForceLoop) -> str:
     """Return the amplitude of a loop with its unit."""
-    factor, _, unit = motion_scale(loop.rotates)
-    return f"{factor * loop.motion.amplitude:.3g} {unit}"
+    return units_of(loop.rotates).text(loop.motion.amplitude)
 
 
 def overlaid_figure(
@@ -82,28 +65,23 @@ def overlaid_figure(
         sorted({text(loop) for loop in loops}, key=order.__getitem__) for text in (panel, line)
     )
     columns = min(COLUMNS, max(2, len(panels)))
-    rotates = loops[0].rotates
-    factor, name, unit = motion_scale(rotates)
-    x = f"{name}, {unit}"
-    if over != "displacement":
-        x = f"{'rate' if rotates else 'velocity'}, {unit}/s"
-    shown = []
+    units, shown = units_of(loops[0].rotates), []
     for title in panels:
         marks: list[Mark] = []
         for loop in (loop for loop in loops if panel(loop) == title):
-            values = factor * (loop.displacement if over == "displacement" else loop.velocity)
+            values = units.factor * (loop.displacement if over == "displacement" else loop.velocity)
             key = line(loop)
             color = _color(lines.index(key), len(lines))
             marks.append(Line(_closed(values), _closed(loop.force), color=color, key=key))
-        shown.append(loop_panel(title, marks, x, ", ".join(force_scale(rotates))))
+        shown.append(loop_panel(title, marks, units.label(over), units.force_label))
     placed = in_grid(shown, columns, share="y")
     return Figure(panels=placed, height=190.0, widths=(1.0,) * columns, keys=tuple(lines))
 
 
 def time_figure(loop: ForceLoop) -> Figure:
     """Draw motion and force over one period and the loop, as [A] Figs. 5, 8, 12, [C] Figs. 4, 5."""
-    factor, name, unit = motion_scale(loop.rotates)
-    force = ", ".join(force_scale(loop.rotates))
+    units = units_of(loop.rotates)
+    factor, force = units.factor, units.force_label
     time = np.append(loop.time, 1.0 / loop.motion.frequency)
     motion = Line(time, factor * _closed(loop.displacement), color=QUIET, dash="dashed")
     of_time = Line(time, _closed(loop.force), width=2.2, is_second=True)
@@ -112,14 +90,15 @@ def time_figure(loop: ForceLoop) -> Figure:
         Panel(
             marks=(Rule(0.0, color=QUIET), motion, of_time),
             x=Axis(label="time, s"),
-            y=Axis(label=f"{name}, {unit} (dashed)", color=QUIET, range=(-reach, reach)),
+            y=Axis(
+                label=f"{units.label('displacement')} (dashed)", color=QUIET, range=(-reach, reach)
+            ),
             second=Axis(label=force, color=OURS, range=(-largest, largest)),
         )
     ]
-    speed = f"{'rate' if loop.rotates else 'velocity'}, {unit}/s"
-    for x, label in ((loop.displacement, f"{name}, {unit}"), (loop.velocity, speed)):
+    for x, over in ((loop.displacement, "displacement"), (loop.velocity, "velocity")):
         curve = Line(factor * _closed(x), _closed(loop.force), width=2.2)
-        panels.append(loop_panel("", [curve], label, force))
+        panels.append(loop_panel("", [curve], units.label(over), force))
     return Figure(panels=in_grid(panels, 3), height=220.0)
 
 

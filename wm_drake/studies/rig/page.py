@@ -1,26 +1,24 @@
 """Page and tables of a bench test."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
-from wm_drake.report.formatting import MM_PER_M, number
+from wm_drake.report.formatting import MISSING, MM_PER_M, number
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
-from wm_drake.report.table import Group, Row, Table
+from wm_drake.report.table import Column, Table, line, table_of
 from wm_drake.rigs import ForceLoop, RigRun
 from wm_drake.studies.rig.figures import (
-    DEG_PER_RAD,
     amplitude_text,
-    force_scale,
     frequency_text,
     friction_law_figure,
-    motion_scale,
     overlaid_figure,
     time_figure,
 )
+from wm_drake.studies.rig.units import DEG_PER_RAD, units_of
 from wm_drake.studies.study import Facts
 
 if TYPE_CHECKING:
@@ -45,7 +43,7 @@ def rig_page(result: "RigResult", facts: Facts) -> str:
         f"{_summary(run)} {result.effect}".strip(),
         [
             Section("loops", "Loops", tuple(_pictures(run))),
-            Section("measures", "Derived quantities", tables=(_measures(run),)),
+            Section("measures", "Derived quantities", tables=(measures_shown(run),)),
             Section("parameters", "Parameters", tables=(_numbers(run),)),
         ],
         [("Component", run.title), ("Loops", str(len(run.loops))), *facts.rows()],
@@ -57,15 +55,10 @@ def rig_page(result: "RigResult", facts: Facts) -> str:
 
 def masses_table(run: RigRun, massless: RigRun) -> pd.DataFrame:
     """Return the effect of masses on each loop: differences from the loop without masses. [N]"""
-    return pd.DataFrame(masses_rows(run, massless))
-
-
-def masses_rows(run: RigRun, massless: RigRun) -> list[dict[str, Any]]:
-    """Return the rows of `masses_table`."""
     rows = []
     for loop, bare in zip(run.loops, massless.loops, strict=True):
         difference = loop.force - bare.force
-        peak = float(np.max(np.abs(bare.force)))
+        peak, largest = (float(np.max(np.abs(force))) for force in (bare.force, difference))
         rows.append(
             {
                 "frequency_hz": loop.motion.frequency,
@@ -73,19 +66,17 @@ def masses_rows(run: RigRun, massless: RigRun) -> list[dict[str, Any]]:
                 "peak_force_without_N": peak,
                 "peak_force_N": float(np.max(np.abs(loop.force))),
                 "rms_difference_N": float(np.sqrt(np.mean(np.square(difference)))),
-                "largest_difference_N": float(np.max(np.abs(difference))),
-                "largest_difference_by_peak": float(np.max(np.abs(difference))) / peak
-                if peak
-                else float("nan"),
+                "largest_difference_N": largest,
+                "largest_difference_by_peak": largest / peak if peak else float("nan"),
             }
         )
-    return rows
+    return pd.DataFrame(rows)
 
 
 def masses_sentence(run: RigRun, massless: RigRun) -> str:
     """Return a sentence on the loop that masses change most."""
-    rows: list[dict[str, Any]] = masses_rows(run, massless)
-    worst = max(rows, key=lambda row: row["largest_difference_N"])
+    table = masses_table(run, massless)
+    worst = table.loc[table["largest_difference_N"].idxmax()]
     return (
         f"The masses change the force by up to {worst['largest_difference_N']:.3g} N, "
         f"{100.0 * worst['largest_difference_by_peak']:.2g} % of the peak without them "
@@ -101,13 +92,12 @@ def loop_file(loop: ForceLoop) -> str:
 
 def loop_table(loop: ForceLoop) -> pd.DataFrame:
     """Return a loop as a table that `wm-drake identify` reads, with units in the column heads."""
-    factor, name, unit = motion_scale(loop.rotates)
-    force, newton = force_scale(loop.rotates)
+    units = units_of(loop.rotates)
     columns = {
         "time_s": loop.time,
-        f"{name}_{unit}": factor * loop.displacement,
-        f"{'rate' if loop.rotates else 'velocity'}_{unit}_s": factor * loop.velocity,
-        f"{force}_{newton.replace(' ', '')}": loop.force,
+        f"{units.motion}_{units.unit}": units.factor * loop.displacement,
+        f"{units.rate}_{units.unit}_s": units.factor * loop.velocity,
+        f"{units.force}_{units.in_heads}": loop.force,
     }
     return pd.DataFrame({head: values[::SAMPLES_KEPT] for head, values in columns.items()})
 
@@ -118,84 +108,50 @@ def measures_table(run: RigRun) -> pd.DataFrame:
     All values are in SI except frequency, amplitude and loss angle.
     """
     rotates = run.bench.rotates
-    factor, _, unit = motion_scale(rotates)
-    rows = []
-    for loop, m in zip(run.loops, run.measures, strict=True):
-        forces = (
+    units, per = units_of(rotates), "Nm{}_per_rad" if rotates else "N{}_per_m"
+    return pd.DataFrame(
+        [
             {
-                "peak_moment_Nm": m.peak_force,
+                "frequency_hz": loop.motion.frequency,
+                f"amplitude_{units.unit}": units.factor * loop.motion.amplitude,
+                f"peak_{units.force}_{units.in_heads}": m.peak_force,
                 "energy_per_cycle_J": m.energy_per_cycle,
-                "equivalent_damping_Nms_per_rad": m.equivalent_damping,
-                "dynamic_stiffness_Nm_per_rad": m.dynamic_stiffness,
+                f"equivalent_damping_{per.format('s')}": m.equivalent_damping,
+                f"dynamic_stiffness_{per.format('')}": m.dynamic_stiffness,
+                "loss_angle_deg": DEG_PER_RAD * m.loss_angle,
             }
-            if rotates
-            else {
-                "peak_force_N": m.peak_force,
-                "energy_per_cycle_J": m.energy_per_cycle,
-                "equivalent_damping_Ns_per_m": m.equivalent_damping,
-                "dynamic_stiffness_N_per_m": m.dynamic_stiffness,
-            }
-        )
-        motion = {
-            "frequency_hz": loop.motion.frequency,
-            f"amplitude_{unit}": factor * loop.motion.amplitude,
-        }
-        rows.append({**motion, **forces, "loss_angle_deg": DEG_PER_RAD * m.loss_angle})
-    return pd.DataFrame(rows)
+            for loop, m in zip(run.loops, run.measures, strict=True)
+        ]
+    )
 
 
-def measures_header(run: RigRun) -> tuple[str, ...]:
-    """Return the column heads for the cells of `measures_cells`."""
-    rotates = run.bench.rotates
-    if rotates:
-        units = (
-            "peak moment, N\u00a0m",
-            "energy per cycle, mJ",
-            "equivalent damping, N\u00a0m\u00a0s/rad",
-            "dynamic stiffness, N\u00a0m/rad",
-        )
-    else:
-        units = (
-            "peak force, N",
-            "energy per cycle, mJ",
-            "equivalent damping, N\u00a0s/mm",
-            "dynamic stiffness, N/mm",
-        )
-    return ("frequency, Hz", f"amplitude, {motion_scale(rotates)[2]}", *units, "loss angle, deg")
-
-
-def measures_cells(run: RigRun) -> list[tuple[str, ...]]:
-    """Return the quantities derived from each loop as text, one tuple of cells per loop."""
-    cells: list[tuple[str, ...]] = []
-    per = 1.0 if run.bench.rotates else 1.0 / MM_PER_M
-    for loop, m in zip(run.loops, run.measures, strict=True):
-        cells.append(
-            (
-                f"{loop.motion.frequency:.3g}",
-                amplitude_text(loop).split()[0],
-                number(m.peak_force, 2),
-                f"{1e3 * m.energy_per_cycle:.4g}",
-                number(per * m.equivalent_damping, 3),
-                number(per * m.dynamic_stiffness, 2),
-                number(DEG_PER_RAD * m.loss_angle, 1),
-            )
-        )
-    return cells
-
-
-def _measures(run: RigRun) -> Table:
+def measures_shown(run: RigRun) -> Table:
+    """Return the quantities derived from each loop, in units for reading."""
     caption = (
         "Quantities derived from each loop. Energy: area of the loop. Equivalent damping: "
         "coefficient of the viscous damper that dissipates the same energy per cycle. Dynamic "
         "stiffness and loss angle: amplitude ratio and phase lead of the fundamental of the force "
         "with respect to the motion."
     )
-    groups = tuple(Group(cells[0], (Row(cells[1:]),)) for cells in measures_cells(run))
-    return Table(caption, measures_header(run), groups)
+    rotates = run.bench.rotates
+    units, length = units_of(rotates), "rad" if rotates else "mm"
+    heads = (
+        Column("frequency", "Hz"),
+        Column("amplitude", units.unit),
+        Column(f"peak {units.force}", units.force_unit, 2),
+        Column("energy per cycle", "mJ"),
+        Column("equivalent damping", f"{units.force_unit} s/{length}", 3),
+        Column("dynamic stiffness", f"{units.force_unit}/{length}", 2),
+        Column("loss angle", "deg", 1),
+    )
+    per = 1.0 if rotates else 1.0 / MM_PER_M
+    frame = measures_table(run)
+    frame *= [1.0, 1.0, 1.0, 1e3, per, per, 1.0]
+    return table_of(frame, caption, dict(zip(frame.columns, heads, strict=True)))
 
 
 def _numbers(run: RigRun) -> Table:
-    groups = tuple(Group(key, (Row((value, source or "–")),)) for key, value, source in run.numbers)
+    groups = tuple(line(key, (value, source or MISSING)) for key, value, source in run.numbers)
     caption = "Parameters of the component."
     return Table(caption, ("key", "value", "source"), groups, text_columns=3)
 
@@ -254,7 +210,8 @@ def _distinct(loops: Sequence[ForceLoop], text: Callable[[ForceLoop], str]) -> l
 
 
 def _summary(run: RigRun) -> str:
-    force, unit = force_scale(run.bench.rotates)
+    units = units_of(run.bench.rotates)
+    force, unit = units.force, units.force_unit
     peaks = [m.peak_force for m in run.measures]
     energies = [1e3 * m.energy_per_cycle for m in run.measures]
     if len(run.loops) == 1:

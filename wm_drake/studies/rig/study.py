@@ -27,6 +27,15 @@ from wm_drake.rigs import (
 from wm_drake.studies.components import axes_of, mass_of, target_of
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.rig.options import AxisRigOptions, DamperRigOptions, RigOptions
+from wm_drake.studies.rig.page import (
+    loop_file,
+    loop_table,
+    masses_sentence,
+    masses_table,
+    measures_shown,
+    measures_table,
+    rig_page,
+)
 from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Facts, Result, Task
 
@@ -48,8 +57,6 @@ class RigResult(Result):
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return each loop, what is derived from the loops, and the effect of masses."""
-        from wm_drake.studies.rig.page import loop_file, loop_table, masses_table, measures_table
-
         loops = {loop_file(loop).removesuffix(".csv"): loop_table(loop) for loop in self.run.loops}
         shown = {"measures": measures_table(self.run), **loops}
         if self.massless is not None:
@@ -58,8 +65,6 @@ class RigResult(Result):
 
     def as_json(self) -> dict[str, Any]:
         """Return what is derived from the loops for JSON: of one loop, or a list of several."""
-        from wm_drake.studies.rig.page import measures_table
-
         text = measures_table(self.run).to_json(orient="records", double_precision=15)
         rows = json.loads(text)
         shown = rows[0] if len(rows) == 1 else {"loops": rows}
@@ -67,26 +72,16 @@ class RigResult(Result):
 
     def terminal(self) -> list[Table | str]:
         """Return what is derived from the loops, and the effect of masses."""
-        from wm_drake.studies.rig.page import measures_cells, measures_header
-
-        table = Table(title=self.run.title)
-        for name in measures_header(self.run):
-            table.add_column(name, justify="right")
-        for cells in measures_cells(self.run):
-            table.add_row(*cells)
+        table = measures_shown(self.run).terminal(self.run.title)
         return [table, *([self.effect] if self.effect else [])]
 
     @property
     def effect(self) -> str:
         """Sentence on the effect of masses; "" without masses."""
-        from wm_drake.studies.rig.page import masses_sentence
-
         return "" if self.massless is None else masses_sentence(self.run, self.massless)
 
     def page(self, facts: Facts) -> str:
         """Return the page."""
-        from wm_drake.studies.rig.page import rig_page
-
         return rig_page(self, facts)
 
     def warnings(self) -> Sequence[str]:
