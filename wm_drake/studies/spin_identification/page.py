@@ -1,5 +1,6 @@
 """Page of an identification from a spin cycle."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MISSING, number
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
-from wm_drake.report.table import Column, Table, line
+from wm_drake.report.table import Column, Table, line, table_of
 from wm_drake.simulation.records import versions
 from wm_drake.studies.fitting.page import (
     estimate_rows,
@@ -127,36 +128,28 @@ def warnings_of(result: SpinIdentification) -> list[str]:
 
 def unknowns(result: SpinIdentification) -> Table:
     """Return the value of each unknown before the search, planted and found, with its interval."""
-    virtual = result.planted is not None
-    header = [
-        "unknown",
-        "set to the same value",
-        "before",
-        *(["planted"] if virtual else []),
-        "found",
-        "95 % interval, ±%",
-    ]
-    header += ["error, %"] if virtual else []
-    groups = []
+    rows = []
     for k, (sought, estimate) in enumerate(zip(result.sought, result.fit.estimates, strict=True)):
         unit, half = sought.unknown.unit, 100.0 * float(result.uncertainty[k])
-        shown = [_with_unit(sought.unknown.start, unit)]
-        shown += [_with_unit(float(result.planted[k]), unit)] if result.planted is not None else []
-        shown += [
-            _with_unit(estimate.value, unit),
-            number(half, 2) if np.isfinite(half) else "not determined",
-        ]
-        shown += (
-            [number(100.0 * float(result.recovered[k]), 2)] if result.recovered is not None else []
-        )
-        others = ", ".join(key.rsplit(".", 1)[-1] for key in sought.keys[1:]) or MISSING
-        kind = "ours" if result.identifiable[k] else "other"
-        groups.append(line(sought.keys[0], (others, *shown), kind))
+        row = {
+            "unknown": sought.keys[0],
+            "set to the same value": ", ".join(key.rsplit(".", 1)[-1] for key in sought.keys[1:]),
+            "before": _with_unit(sought.unknown.start, unit),
+        }
+        if result.planted is not None:
+            row["planted"] = _with_unit(float(result.planted[k]), unit)
+        row["found"] = _with_unit(estimate.value, unit)
+        row["95 % interval, ±%"] = number(half, 2) if np.isfinite(half) else "not determined"
+        if result.recovered is not None:
+            row["error, %"] = number(100.0 * float(result.recovered[k]), 2)
+        rows.append(row)
     caption = (
         "Values of the unknowns. Bold: determined to within "
         f"±{number(100 * KNOWN, 0)} % (95 % confidence interval)."
     )
-    return Table(caption, tuple(header), tuple(groups), text_columns=2)
+    kinds = ["ours" if identifiable else "other" for identifiable in result.identifiable]
+    shown = table_of(pd.DataFrame(rows).replace("", MISSING), caption, kinds=kinds)
+    return replace(shown, text_columns=2)
 
 
 def values_table(result: SpinIdentification) -> pd.DataFrame:

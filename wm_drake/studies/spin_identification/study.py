@@ -99,6 +99,11 @@ class Sought:
         """Key paths of the numbers."""
         return self.variation.keys
 
+    @property
+    def guess(self) -> float:
+        """Start of the search; without one, the geometric mean of the bounds. [SI]"""
+        return float(self.unknown.start or np.sqrt(self.unknown.lower * self.unknown.upper))
+
 
 @dataclass(frozen=True)
 class SpinIdentification(Result):
@@ -343,9 +348,9 @@ def planted_values(sought: Sequence[Sought], seed: int) -> FloatArray:
     drawn = np.random.default_rng(seed).uniform(0.3, 1.0, len(sought)) * np.where(
         np.arange(len(sought)) % 2, low, high
     )
-    starts = [s.unknown.start or np.sqrt(s.unknown.lower * s.unknown.upper) for s in sought]
-    bounds = np.array([(s.unknown.lower, s.unknown.upper) for s in sought])
-    return np.clip(np.array(starts) * np.exp(drawn), 1.02 * bounds[:, 0], 0.98 * bounds[:, 1])
+    guesses = np.array([s.guess for s in sought])
+    lower, upper = np.array([(s.unknown.lower, s.unknown.upper) for s in sought]).T
+    return np.clip(guesses * np.exp(drawn), 1.02 * lower, 0.98 * upper)
 
 
 def identified_machine(result: SpinIdentification) -> MachineParameters:
@@ -467,9 +472,7 @@ def identify_from_spin(
     """
     problem = _problem(model, measured)
     fit = least_squares(problem, seed=seed, starts=1, screened=8, progress=progress)
-    start = np.array(
-        [s.unknown.start or np.sqrt(s.unknown.lower * s.unknown.upper) for s in model.sought]
-    )
+    start = np.array([s.guess for s in model.sought])
     before, after = (
         measured.copy(data=values) for values in model.displacements(np.stack([start, fit.values]))
     )

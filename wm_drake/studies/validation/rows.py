@@ -64,6 +64,57 @@ class Row:
     reason: str
 
 
+@dataclass(frozen=True)
+class Pair:
+    """A published number beside ours.
+
+    Attributes:
+        published, ours: The numbers.
+        unit: Their unit.
+        limit: Largest difference that counts as met. [%]
+    """
+
+    published: float
+    ours: float
+    unit: str
+    limit: float
+
+    @property
+    def difference(self) -> float:
+        """Difference from the published number; NaN if the run diverged. [%]"""
+        return 100.0 * (self.ours - self.published) / self.published
+
+    @property
+    def is_met(self) -> bool:
+        """Whether the difference is within its limit; a run that diverged is not."""
+        return abs(self.difference) <= self.limit
+
+    def row(self, section: str, what: str, kind: str, more: str = "") -> Row:
+        """Return the row of the pair.
+
+        Args:
+            section, what, kind: As in `Row`.
+            more: Text behind the reason.
+        """
+        reason = f"{'within' if self.is_met else 'above'} {self.limit:g} %"
+        if not math.isfinite(self.difference):
+            reason = "the run diverged"
+        return Row(
+            section,
+            what,
+            kind,
+            f"{self.published:g} {self.unit}",
+            f"{self.ours:.3g} {self.unit}",
+            f"{_signed(self.difference)} %",
+            _verdict(self.is_met),
+            reason + more,
+        )
+
+
+def _verdict(is_met: bool) -> str:
+    return MET if is_met else MISSED
+
+
 def amplitude_rows(table: pd.DataFrame, kind: str = FITTED) -> list[Row]:
     """Return a row for each measured amplitude, and one for their mean ([B] Tables 1 to 3).
 
@@ -82,21 +133,18 @@ def amplitude_rows(table: pd.DataFrame, kind: str = FITTED) -> list[Row]:
             continue
         for sensor in sensors:
             measured, ours = by_source.loc[["experiment", "wm_drake"], sensor]
-            difference = 100.0 * (ours - measured) / measured
-            every["wm_drake"].append(abs(difference))
-            text = _limit_reason(difference, AMPLITUDE_LIMIT)
+            pair, more = Pair(measured, ours, "mm", AMPLITUDE_LIMIT), ""
+            every["wm_drake"].append(abs(pair.difference))
             for other in others:
                 theirs = 100.0 * (by_source.loc[other, sensor] - measured) / measured
                 every["other"].append(abs(theirs))
-                text += f"; {other}: {_signed(theirs)} %"
+                more += f"; {other}: {_signed(theirs)} %"
             what = f"{load}, {'with' if gasket == 'yes' else 'without'} gasket, {sensor}"
-            rows.append(
-                _number_row(section, what, kind, measured, ours, "mm", AMPLITUDE_LIMIT, text)
-            )
+            rows.append(pair.row(section, what, kind, more))
     if every["wm_drake"]:
         mean, most = np.mean(every["wm_drake"]), np.max(every["wm_drake"])
         limit = float(np.mean(every["other"])) if every["other"] else math.nan
-        verdict = OPEN if math.isnan(limit) else MET if mean <= limit else MISSED
+        verdict = OPEN if math.isnan(limit) else _verdict(mean <= limit)
         reason = f"over {len(every['wm_drake'])} amplitudes; largest {most:.1f} %"
         if not math.isnan(limit):
             reason += f"; [B]'s model: {limit:.1f} % over {len(every['other'])}"
@@ -111,7 +159,7 @@ def held_out_rows(table: pd.DataFrame) -> list[Row]:
     """Return rows for loads that were held out of the calibration and predicted.
 
     Args:
-        table: Table from `wm_drake.studies.calibration.prediction.prediction_table`.
+        table: Table from `wm_drake.studies.calibration.tables.prediction_table`.
     """
     section, rows = "[B] Tables 1 and 3: loads held out of the calibration", list[Row]()
     for group in table.to_dict("records"):
@@ -129,7 +177,7 @@ def held_out_rows(table: pd.DataFrame) -> list[Row]:
                 f"at most {HELD_OUT_LIMIT:g} % (goal)",
                 f"{mean:.1f} %",
                 difference,
-                MET if mean <= HELD_OUT_LIMIT else MISSED,
+                _verdict(mean <= HELD_OUT_LIMIT),
                 f"{'within' if mean <= HELD_OUT_LIMIT else 'above'} {HELD_OUT_LIMIT:g} %",
             ),
             Row(
@@ -139,7 +187,7 @@ def held_out_rows(table: pd.DataFrame) -> list[Row]:
                 f"at least {COVERED_LIMIT:g} % (goal)",
                 f"{covered:.0f} %",
                 "",
-                MET if covered >= COVERED_LIMIT else MISSED,
+                _verdict(covered >= COVERED_LIMIT),
                 f"{'not below' if covered >= COVERED_LIMIT else 'below'} {COVERED_LIMIT:g} %",
             ),
         ]
@@ -167,7 +215,7 @@ def effect_rows(table: pd.DataFrame, kind: str = FITTED) -> list[Row]:
         texts = (f"{_signed(published)} %", f"{_signed(ours)} %")
         points = f"{_signed(ours - published)} points"
         what = f"{row['load']}, {row['sensor']}"
-        rows.append(Row(section, what, kind, *texts, points, MET if is_met else MISSED, reason))
+        rows.append(Row(section, what, kind, *texts, points, _verdict(is_met), reason))
     large = table[table["steady_without_mm"] >= LARGE_STEADY]
     steady = large["steady_percent"].abs()
     if steady.notna().any():
@@ -175,9 +223,9 @@ def effect_rows(table: pd.DataFrame, kind: str = FITTED) -> list[Row]:
         is_met = steady.max() <= SMALL_STEADY
         reason = f"limit {SMALL_STEADY:g} %; worst: {worst['load']}, {worst['sensor']}"
         ours = f"up to {steady.max():.1f} %"
-        verdict = MET if is_met else MISSED
         what = f"difference of steady amplitudes from {LARGE_STEADY:g} mm on"
-        rows.append(Row(section, what, PREDICTED, "negligible", ours, "", verdict, reason))
+        texts = ("negligible", ours, "")
+        rows.append(Row(section, what, PREDICTED, *texts, _verdict(is_met), reason))
     return rows
 
 
@@ -185,27 +233,19 @@ def mean_rows(
     screening: Screening, published: PublishedResults, kind: str = PREDICTED
 ) -> list[Row]:
     """Return a row for each published grand mean ([B] Table 5), and one for all."""
-    section, rows, every = (
-        "[B] Table 5: grand means of the gasket study",
-        list[Row](),
-        list[float](),
-    )
+    section = "[B] Table 5: grand means of the gasket study"
+    rows, every = list[Row](), list[float]()
     for (load, name), terms in published.items():
         if CONSTANT not in terms or (load, name) not in screening.tables:
             continue
         theirs, ours = terms[CONSTANT].effects[0], screening.tables[load, name].constant
-        difference = 100.0 * (ours - theirs) / theirs
-        every.append(abs(difference))
-        unit = screening.responses.units[name]
-        reason = _limit_reason(difference, MEAN_LIMIT)
-        rows.append(
-            _number_row(section, f"{load}, {name}", kind, theirs, ours, unit, MEAN_LIMIT, reason)
-        )
+        pair = Pair(theirs, ours, screening.responses.units[name], MEAN_LIMIT)
+        every.append(abs(pair.difference))
+        rows.append(pair.row(section, f"{load}, {name}", kind))
     if every:
         good = sum(size <= MEAN_LIMIT for size in every)
         reason = f"{good} of {len(every)} within {MEAN_LIMIT:g} %; largest {max(every):.0f} %"
-        verdict = MET if good == len(every) else MISSED
-        mean = f"{np.mean(every):.1f} %"
+        mean, verdict = f"{np.mean(every):.1f} %", _verdict(good == len(every))
         rows.append(Row(section, "mean difference", kind, "", mean, "", verdict, reason))
     return rows
 
@@ -237,10 +277,10 @@ def spin_cycle_rows(result: SpinCycleResult) -> list[Row]:
     ):
         ours = str(values.idxmax("region").item())
         reason = "the region agrees" if ours == region else _runner_up(values, region, ours)
-        verdict = MET if ours == region else MISSED
+        verdict = _verdict(ours == region)
         rows.append(Row(section, what, PREDICTED, region, ours, "", verdict, reason))
     ratio = (opposite.sel(axis="z").max("region") / front.sel(axis="z").max("region")).max()
-    verdict = MET if float(ratio) < REDUCED else MISSED
+    verdict = _verdict(float(ratio) < REDUCED)
     reason = f"largest ratio of all sensors; limit {REDUCED:g}, an assumption"
     what = "400 g at both ends, opposite: z against 400 g at the front"
     texts = ("significantly reduced", f"{float(ratio):.2f}")
@@ -270,40 +310,14 @@ def coulomb_rows(fits: pd.DataFrame) -> list[Row]:
     section, rows = "[C] Table 2: Coulomb fits to loops of the MSTV damper", list[Row]()
     for row in fits.to_dict("records"):
         test = f"{row['frequency_hz']:g} Hz, {row['amplitude_mm']:g} mm"
-        difference = 100.0 * (row["k1 fitted"] - row["k1"]) / row["k1"]
-        reason = _limit_reason(difference, STIFFNESS_LIMIT)
-        numbers = (row["k1"], row["k1 fitted"], "N/mm", STIFFNESS_LIMIT, reason)
-        rows.append(_number_row(section, f"{test}: k1", PREDICTED, *numbers))
+        pair = Pair(row["k1"], row["k1 fitted"], "N/mm", STIFFNESS_LIMIT)
+        rows.append(pair.row(section, f"{test}: k1", PREDICTED))
         ratio = row["c1 fitted"] / row["c1"]
         is_met = 1.0 / DAMPING_FACTOR <= ratio <= DAMPING_FACTOR
         texts = (f"{row['c1']:g} N s/mm", f"{row['c1 fitted']:.2g} N s/mm", f"× {ratio:.2f}")
         reason = f"{'within' if is_met else 'not within'} a factor of {DAMPING_FACTOR:g}"
-        verdict = MET if is_met else MISSED
-        rows.append(Row(section, f"{test}: c1", PREDICTED, *texts, verdict, reason))
+        rows.append(Row(section, f"{test}: c1", PREDICTED, *texts, _verdict(is_met), reason))
     return rows
-
-
-def _number_row(
-    section: str,
-    what: str,
-    kind: str,
-    published: float,
-    ours: float,
-    unit: str,
-    limit: float,
-    reason: str,
-) -> Row:
-    difference = 100.0 * (ours - published) / published
-    verdict = MET if abs(difference) <= limit else MISSED  # a run that diverged gives NaN: missed
-    texts = (f"{published:g} {unit}", f"{ours:.3g} {unit}", f"{_signed(difference)} %")
-    return Row(section, what, kind, *texts, verdict, reason)
-
-
-def _limit_reason(difference: float, limit: float) -> str:
-    """Return how a difference compares with its limit, both in percent."""
-    if not math.isfinite(difference):
-        return "the run diverged"
-    return f"{'within' if abs(difference) <= limit else 'above'} {limit:g} %"
 
 
 def _signed(value: float) -> str:
