@@ -142,9 +142,3 @@ def test_work_of_a_loop_is_its_area():
         judged(damper_model("coulomb", loops), loops).loops, MOTIONS, strict=True
     ):
         assert loop.work == pytest.approx(4.0 * 40.0 * motion.amplitude, rel=0.02)
-
-
-def test_sentences_are_short():
-    loops = recorded(damper_bench(MSTV), sign=-1.0)
-    judgement = judged(damper_model("coulomb", loops), loops)
-    assert max(map(len, judgement.sentences)) < 300

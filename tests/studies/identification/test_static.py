@@ -93,25 +93,17 @@ def write(name, loop, columns):
 
 
 def test_command_gives_all_axes_in_one_plot_and_a_machine(wm_drake):
-    straight, turned = (
-        ("time_s", "displacement_mm", "force_N"),
-        ("time_s", "angle_deg", "moment_Nm"),
-    )
+    straight = ("time_s", "displacement_mm", "force_N")
+    turned = ("time_s", "angle_deg", "moment_Nm")
     write("r.csv", ramps((0.0, 20e-3, 0.0)), straight)
     write("a.csv", ramps((0.0, 15e-3, -15e-3, 0.0)), straight)
     write("t.csv", ramps((0.0, 0.1, 0.0), rotates=True), turned)
     write("w.csv", ramps((0.0, 0.05, 0.0), rotates=True), turned)
-    ended = wm_drake(
-        "identify", "gasket", "--static", "radial=r.csv", "axial=a.csv", "tilt=t.csv", "twist=w.csv",
-        "--out", "fit", "--json",
-    )  # fmt: skip
+    tests = "radial=r.csv axial=a.csv tilt=t.csv twist=w.csv"
+    ended = wm_drake(f"identify gasket --static {tests} --out fit --json")
     assert ended.code == 0
-    assert [axis["axis"] for axis in json.loads(ended.out)["axes"]] == [
-        "x",
-        "y",
-        "about_x",
-        "about_y",
-    ]
+    axes = [axis["axis"] for axis in json.loads(ended.out)["axes"]]
+    assert axes == ["x", "y", "about_x", "about_y"]
     gasket = load_machine("fit/identified.yaml").gasket
     assert gasket.stiffness_x == gasket.stiffness_z
     assert gasket.stiffness_x.force[-1] == pytest.approx(elastic(20e-3), rel=0.01)

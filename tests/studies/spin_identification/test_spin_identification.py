@@ -13,7 +13,7 @@ from wm_drake.parameters import SpinProfile, load_machine, with_value
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.studies.spin_cycle.study import labels_of
-from wm_drake.studies.spin_identification.page import summary, warnings_of
+from wm_drake.studies.spin_identification.page import warnings_of
 from wm_drake.studies.spin_identification.study import (
     SpinModel,
     at_point,
@@ -126,9 +126,8 @@ def test_verdict_is_that_of_the_displacements_not_of_the_intervals(reference):
     poor = identify_from_spin(model, other)
     assert poor.verdict == "poor"
     assert poor.error_after > 0.15
-    assert summary(poor).startswith("Poor fit: ")
-    assert "do not use the values" in warnings_of(poor)[0]
-    assert summary(good).startswith("Good fit: ")
+    assert not warnings_of(good)
+    assert any("Poor" in warning for warning in warnings_of(poor))
 
 
 def test_noise_widens_intervals_until_a_number_is_not_identified(reference):
@@ -174,19 +173,8 @@ def identify(wm_drake):
         text = "time: (0, 4) s\nspeed: (80, 300) rpm\nregions: [{name: A, begin: 0 s, end: 2 s}, {name: B, begin: 2 s, end: 4 s}]\n"
         Path("p.yaml").write_text(text)
         Path("linear.yaml").write_text(LINEAR)
-        common = (
-            "--machine",
-            "linear.yaml",
-            "--profile",
-            "p.yaml",
-            "--case",
-            "2",
-            "--case",
-            "5",
-            "--out",
-            "out",
-        )
-        return wm_drake("study", "spin-identify", *common, *arguments)
+        common = "--machine linear.yaml --profile p.yaml --case 2 --case 5 --out out"
+        return wm_drake(f"study spin-identify {common}", *arguments)
 
     return run
 
@@ -206,15 +194,6 @@ def test_command_names_its_experiment_virtual_and_recovers_the_true_numbers(iden
         entry["identifiable"] and abs(entry["error"]) < 0.02 for entry in shown["unknowns"].values()
     )
     assert shown["average_error_after"] < 1e-3 < shown["average_error_before"]
-    assert sorted(path.name for path in Path("out").iterdir()) == [
-        "identified.yaml",
-        "ledger.sqlite",
-        "measured.csv",
-        "parameters.csv",
-        "report.html",
-        "rms.csv",
-        "run.json",
-    ]
     page = Path("out/report.html").read_text(encoding="utf-8")
     assert "This is a virtual experiment: nothing was measured." in page
     written = load_machine("out/identified.yaml")
@@ -238,12 +217,8 @@ def test_command_names_its_experiment_virtual_and_recovers_the_true_numbers(iden
 
 
 def test_a_key_is_one_line_of_the_terminal(identify):
-    unknowns = (
-        "--unknown",
-        "gasket.stiffness_x+gasket.stiffness_z",
-        "--unknown",
-        "gasket.damping_x",
-    )
+    keys = ("gasket.stiffness_x+gasket.stiffness_z", "gasket.damping_x")
+    unknowns = (word for key in keys for word in ("--unknown", key))
     lines = [line.strip() for line in identify(*unknowns).out.splitlines()]
     assert {"gasket.stiffness_x", "= gasket.stiffness_z", "gasket.damping_x"} <= set(lines)
     assert "report.html, identified.yaml, measured.csv" in lines[-1]
