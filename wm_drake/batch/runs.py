@@ -26,7 +26,6 @@ from wm_drake.engines.trajectory import (
     divergence_text,
     diverging_coordinate,
 )
-from wm_drake.model.machine import OUTPUT_PERIOD
 from wm_drake.model.scene import Gap, Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
@@ -105,7 +104,7 @@ class Runner:
             A result for each work item; none if `stopped` was set meanwhile.
         """
         schedule = schedule_of(
-            key.profile, key.stepping.step, OUTPUT_PERIOD, key.layout.control_period
+            key.profile, key.stepping.step, key.period, key.layout.control_period
         )
         one_derivative = key.stepping.one_derivative(schedule)
         # without amplitudes only the detergent point is followed, which comes last
@@ -141,7 +140,9 @@ class Runner:
             extremes,
             lengths,
         )
-        filtered = self._filtered(moved.reshape(rows, count, WIDTH), extremes[-WIDTH:])
+        filtered = self._filtered(
+            moved.reshape(rows, count, WIDTH), extremes[-WIDTH:], key.period
+        )
         arrays = (
             samples.reshape(rows, size, WIDTH),
             moved.reshape(rows, count, WIDTH),
@@ -171,12 +172,13 @@ class Runner:
         poses_of_runs(samples, rows, size, poses)
         return poses
 
-    def _filtered(self, moved: FloatArray, good: FloatArray) -> FloatArray:
+    def _filtered(self, moved: FloatArray, good: FloatArray, period: float) -> FloatArray:
         """Return the filtered displacements at the sensors of runs side by side, if needed.
 
         Args:
             moved: Displacements at the measured points. (rows, points, lanes) [m]
             good: Number of samples of each run before it diverged. (lanes,)
+            period: Time between samples. [s]
 
         Returns:
             (rows, sensors, lanes); of no rows if no measure needs them or no run is complete. [m]
@@ -184,7 +186,7 @@ class Runner:
         rows, sensors = len(moved), moved.shape[1] - 3
         if "sensors" not in self.needs or not np.any(good == rows):
             return np.empty((0, 0, WIDTH))
-        flat = filtered_lanes(moved.reshape(rows, -1), sensors, OUTPUT_PERIOD, self._array)
+        flat = filtered_lanes(moved.reshape(rows, -1), sensors, period, self._array)
         return flat.reshape(rows, sensors, WIDTH)
 
     def _forces_of_mounts(
@@ -295,7 +297,7 @@ class LaneRun(Run):
     ) -> None:
         """Hold a work item, its schedule, the function that returns the shapes, and its lane."""
         self.item, self.schedule, self._find_scene, self.lane = item, schedule, scene, lane
-        self.profile, self.period = item.case.profile, OUTPUT_PERIOD
+        self.profile, self.period = item.case.profile, item.numbers.setup.parameters.output_period
         self.good = int(lane.extremes[-1])
         self._sensors = lane.moved.shape[1] - 3  # the last three points are the detergent point's
 

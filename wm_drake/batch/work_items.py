@@ -72,6 +72,7 @@ class BatchKey:
     profile: SpinProfile
     layout: Layout
     stepping: Stepping
+    period: float
 
 
 class _Identity:
@@ -118,7 +119,8 @@ class Preparation:
         waiting: dict[BatchKey, list[WorkItem]] = {}
         for number, case in enumerate(cases):
             item = self._work_item(number, case)
-            key = BatchKey(case.profile, item.numbers.layout, item.numbers.stepping)
+            period = item.numbers.setup.parameters.output_period
+            key = BatchKey(case.profile, item.numbers.layout, item.numbers.stepping, period)
             work_items = waiting.setdefault(key, [])
             work_items.append(item)
             if len(work_items) == WIDTH:

@@ -10,7 +10,7 @@ from wm_drake.engines.cabinet_frame import seen_from_cabinet
 from wm_drake.engines.schedule import output_times
 from wm_drake.engines.trajectory import Trajectory, cut_at_divergence, diverging_coordinate
 from wm_drake.errors import shortened
-from wm_drake.model.machine import OUTPUT_PERIOD, Machine, MachineSystems, Setup
+from wm_drake.model.machine import Machine, MachineSystems, Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 
@@ -85,7 +85,7 @@ def run_drake(
     """
     setup.machine.set_profile(setup.context, profile)
     simulator = _simulator(setup, step, scheme, accuracy)
-    samples = _Samples(setup, output_times(profile, OUTPUT_PERIOD))
+    samples = _Samples(setup, output_times(profile, setup.parameters.output_period))
     failure = ""
     try:
         for row, time in enumerate(samples.time):

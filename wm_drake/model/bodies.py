@@ -332,7 +332,36 @@ def with_load(drum: SpatialInertia, load: Load) -> SpatialInertia:
     for unbalance in load.unbalances:
         p_DoU_D = unbalance.position()
         loaded += SpatialInertia(unbalance.mass, p_DoU_D, UnitInertia.PointMass(p_DoU_D))
-    return loaded
+    return _unbalanced(loaded, load) if load.static or load.couple else loaded
+
+
+def _unbalanced(drum: SpatialInertia, load: Load) -> SpatialInertia:
+    """Return the inertia of the drum about Do in D with static and couple unbalance.
+
+    Raises:
+        InputError: no body with the inertia of the drum can have this unbalance.
+    """
+    mass, moment = drum.get_mass(), drum.get_mass() * drum.get_com()
+    inertia = drum.CalcRotationalInertia().CopyToFullMatrix3()
+    products = np.zeros(2)  # of m x y and m z y
+    if load.static:
+        first = load.static.vector()
+        moment = moment + first
+        products += [first[0] * load.static.y, first[2] * load.static.y]
+    if load.couple:
+        products += load.couple.products()
+    try:
+        unit = UnitInertia(
+            *np.diag(inertia) / mass,
+            (inertia[0, 1] - products[0]) / mass,
+            inertia[0, 2] / mass,
+            (inertia[1, 2] - products[1]) / mass,
+        )
+        return SpatialInertia(mass, moment / mass, unit)
+    except RuntimeError:  # Drake: the inertia of no body
+        raise input_error(
+            "static or couple unbalance is too large for mass and inertia of the drum", key="loads"
+        ) from None
 
 
 def _overridden(inertia: SpatialInertia, override: BodyOverride) -> SpatialInertia:

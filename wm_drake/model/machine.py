@@ -33,10 +33,6 @@ from wm_drake.systems.sensors import Sensors
 from wm_drake.systems.speed_source import SpeedSource
 from wm_drake.systems.spin_profile_source import SpinProfileSource
 
-OUTPUT_PERIOD = 5e-3
-"""Time between samples of a record, as in the measurements of [B]. [s]"""
-
-
 @dataclass(frozen=True)
 class Setup:
     """A machine set up in a Context: numbers chosen, preloads solved, at rest at its rest pose.

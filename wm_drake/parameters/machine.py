@@ -28,6 +28,9 @@ Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$
 """Name of an entry. It becomes part of key paths and of file names."""
 
 
+OUTPUT_PERIOD = 5e-3
+"""Default time between samples of a record, as in the measurements of [B]. [s]"""
+
 DEFAULT_STEP = 2.5e-3
 """Default step size; the output period is an integer multiple of it. [s]
 
@@ -164,6 +167,8 @@ class MachineParameters(Frozen):
             folder of the machine file.
         gravity: Acceleration of free fall.
         step: Largest step of the integrator.
+        output_period: Time between samples of a record, an integer multiple of the step. Measures
+            of runs are computed from the samples.
         integrator: `multistep` and `midpoint` (telescopic dampers) take one derivative a step,
             `runge_kutta` four; `auto` takes one of the first two where it suits the machine.
         drive: Prescribed speed of the drum, or a motor.
@@ -190,12 +195,13 @@ class MachineParameters(Frozen):
     model: str = "oscillating_group.sdf"
     gravity: Annotated[u.Acceleration, Field(ge=0.0)]
     step: Annotated[u.Duration, Field(gt=0.0)] = DEFAULT_STEP
+    output_period: Annotated[u.Duration, Field(gt=0.0)] = OUTPUT_PERIOD
     integrator: Integrator = "auto"
     drive: AnyDrive = Drive()
     bodies: dict[Name, BodyOverride] = {}
     frames: dict[Name, FrameOverride] = {}
-    spring_types: dict[Name, SpringType]
-    springs: dict[Name, Spring]
+    spring_types: dict[Name, SpringType] = {}
+    springs: dict[Name, Spring] = {}
     damper_types: dict[Name, DamperType] = {}
     dampers: dict[Name, Damper] = {}
     bushing_types: dict[Name, BushingType] = {}
@@ -253,7 +259,7 @@ class MachineParameters(Frozen):
             raise ValueError(f"{both[0]}: is the name of a damper too; rename one of them")
         return places
 
-    @field_validator("springs", "sensors", "loads")
+    @field_validator("sensors", "loads")
     @classmethod
     def _not_empty(cls, table: dict[str, object]) -> dict[str, object]:
         if not table:

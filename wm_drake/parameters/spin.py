@@ -40,47 +40,128 @@ class Unbalance(Frozen):
         return self.radius * np.sin(self.phase), self.y, self.radius * np.cos(self.phase)
 
 
+class StaticUnbalance(Frozen):
+    """Static unbalance of a rotor: its centre of mass lies beside the drum axis (ISO 21940).
+
+    It adds no mass to the drum.
+
+    Attributes:
+        moment: Mass times distance from the drum axis.
+        y: Position along the drum axis, to the rear, from mid-depth of the drum.
+        phase: Angle from the top, positive as the drum turns.
+    """
+
+    moment: Annotated[u.StaticMoment, Field(ge=0.0)]
+    y: u.Length = 0.0
+    phase: u.Angle = 0.0
+
+    def vector(self) -> tuple[float, float, float]:
+        """Return the first moment of mass in D. [kg m]"""
+        return self.moment * np.sin(self.phase), 0.0, self.moment * np.cos(self.phase)
+
+
+class CoupleUnbalance(Frozen):
+    """Couple unbalance of a rotor: a principal axis of inertia is inclined to the drum axis.
+
+    It adds no mass to the drum. Two masses m at the radius r and at y and -y, on opposite sides of
+    the drum axis, have the moment 2 m r y.
+
+    Attributes:
+        moment: Sum of mass times radius times y.
+        phase: Angle from the top of the side on which mass lies to the rear.
+    """
+
+    moment: Annotated[u.CoupleMoment, Field(ge=0.0)]
+    phase: u.Angle = 0.0
+
+    def products(self) -> tuple[float, float]:
+        """Return the sums of m x y and of m z y in D. [kg m^2]"""
+        return self.moment * np.sin(self.phase), self.moment * np.cos(self.phase)
+
+
 class Load(Frozen):
-    """The laundry, modelled as point masses in the drum.
+    """The laundry, modelled as point masses in the drum, or the unbalance of a rotor.
 
     Attributes:
         unbalances: The masses.
+        static, couple: Unbalance without mass, as balancing machines measure it.
     """
 
-    unbalances: tuple[Unbalance, ...]
+    unbalances: tuple[Unbalance, ...] = ()
+    static: StaticUnbalance | None = None
+    couple: CoupleUnbalance | None = None
+
+    @model_validator(mode="after")
+    def _has_an_unbalance(self) -> "Load":
+        if not (self.model_fields_set & {"unbalances", "static", "couple"}):
+            raise ValueError("needs unbalances, static or couple; no unbalance is `unbalances: []`")
+        return self
 
 
 class _Step(Frozen):
-    """A step of a spin profile: a ramp to a speed, or a constant speed until a time.
+    """A step of a spin profile: a ramp, a constant speed until a time, or a staircase of holds.
 
     Attributes:
         ramp_to: Speed at the end of a ramp.
-        rate: Acceleration of a ramp.
+        rate: Acceleration of a ramp, and between the holds of a staircase.
         hold_until: Time until which the speed is held.
+        stairs_to: Speed of the last hold of a staircase, which goes up or down to it.
+        stair: Difference of speed between two holds. The last one may be smaller.
+        settle: Time after the ramp to a hold before the measurement begins.
+        measure: Duration of the measurement at each hold. It is a region of the profile, `up_1020`
+            or `down_1020` at 1020 rpm.
     """
 
     ramp_to: u.Speed | None = None
     rate: Annotated[u.AngularAcceleration, Field(gt=0.0)] | None = None
     hold_until: u.Duration | None = None
+    stairs_to: u.Speed | None = None
+    stair: Annotated[u.Speed, Field(gt=0.0)] | None = None
+    settle: Annotated[u.Duration, Field(ge=0.0)] | None = None
+    measure: Annotated[u.Duration, Field(gt=0.0)] | None = None
 
     @model_validator(mode="after")
     def _one_form(self) -> "_Step":
-        forms = (
-            self.ramp_to is not None and self.rate is not None and self.hold_until is None
-        ) or (self.hold_until is not None and self.ramp_to is None and self.rate is None)
-        if not forms:
+        given = {name for name, value in self if value is not None}
+        stairs = {"stairs_to", "stair", "rate", "settle", "measure"}
+        if given not in ({"ramp_to", "rate"}, {"hold_until"}, stairs):
             raise ValueError(
-                "a step is either {ramp_to: SPEED, rate: SPEED PER TIME} or {hold_until: TIME}"
+                "a step is {ramp_to: SPEED, rate: SPEED PER TIME}, {hold_until: TIME} or "
+                "{stairs_to: SPEED, stair: SPEED, rate: SPEED PER TIME, settle: TIME, measure: "
+                "TIME}"
             )
         return self
 
-    def after(self, time: float, speed: float) -> tuple[float, float]:
-        """Return time and speed at the end of this step, which begins at `time` and `speed`."""
+    def after(
+        self, time: float, speed: float
+    ) -> tuple[list[tuple[float, float]], list[tuple[str, float, float]]]:
+        """Return the points behind the beginning of this step, and name, begin, end of regions.
+
+        Args:
+            time, speed: Where the step begins. [s, rad/s]
+        """
         if self.hold_until is not None:
-            return self.hold_until, speed
-        assert self.ramp_to is not None  # _one_form has checked this
-        assert self.rate is not None
-        return time + abs(self.ramp_to - speed) / self.rate, self.ramp_to
+            return [(self.hold_until, speed)], []
+        assert self.rate is not None  # _one_form has checked this
+        if self.ramp_to is not None:
+            return [(time + abs(self.ramp_to - speed) / self.rate, self.ramp_to)], []
+        assert self.stairs_to is not None
+        assert self.stair is not None
+        assert self.settle is not None
+        assert self.measure is not None
+        points, regions = list[tuple[float, float]](), list[tuple[str, float, float]]()
+        count = int(np.ceil(abs(self.stairs_to - speed) / self.stair * (1.0 - 1e-9)))
+        sign = 1.0 if self.stairs_to > speed else -1.0
+        for number in range(1, count + 1):
+            target = speed + sign * number * self.stair if number < count else self.stairs_to
+            before = points[-1][1] if points else speed
+            time += abs(target - before) / self.rate
+            begin, end = time + self.settle, time + self.settle + self.measure
+            points += [(time, target), (end, target)]
+            rpm = f"{target * 30.0 / np.pi:.6g}".replace(".", "_")
+            regions.append((f"{'up' if sign > 0.0 else 'down'}_{rpm}", begin, end))
+            time = end
+        return points, regions
 
 
 class Region(Frozen):
@@ -106,7 +187,9 @@ class SpinProfile(Frozen):
 
     Attributes:
         time: Rising times from 0 on. In place of time and speed a file may have
-            `steps: [{ramp_to: 400 rpm, rate: 7 rpm/s}, {hold_until: 70 s}]`.
+            `steps: [{ramp_to: 400 rpm, rate: 7 rpm/s}, {hold_until: 70 s}]`. A staircase of
+            holds, `{stairs_to: 900 rpm, stair: 10 rpm, rate: 100 rpm/s, settle: 1 s, measure: 1 s}`
+            is measured at each of them.
         speed: Drum speed at each of them.
         regions: Time intervals for RMS values.
     """
@@ -138,7 +221,7 @@ class SpinProfile(Frozen):
                 "a profile is either {steps: [...]} or {time: (...) s, speed: (...) rpm}; regions "
                 "are optional"
             )
-        points = [(0.0, 0.0)]
+        points, stairs = [(0.0, 0.0)], list[dict[str, str]]()
         for index, entry in enumerate(steps):
             try:
                 step = _Step.model_validate(entry, context=info.context)
@@ -148,7 +231,12 @@ class SpinProfile(Frozen):
                     for p in problems_of(error, _Step)
                 )
                 raise ValueError(f"steps.{index}: {text}") from None
-            points.append(step.after(*points[-1]))
+            further, holds = step.after(*points[-1])
+            points += further
+            stairs += [
+                {"name": name, "begin": f"{begin!r} s", "end": f"{end!r} s"}
+                for name, begin, end in holds
+            ]
         unit = {name: cls.model_fields[name].metadata[0] for name in ("time", "speed")}
         times, speeds = zip(*points, strict=True)
         # the fields accept numbers as text with a unit; repr keeps all digits
@@ -157,7 +245,7 @@ class SpinProfile(Frozen):
             name: f"({', '.join(map(repr, values))}) {unit[name].si}"
             for name, values in points_of.items()
         }
-        return {**texts, "regions": data.get("regions", ())}
+        return {**texts, "regions": [*stairs, *data.get("regions", ())]}
 
     @model_validator(mode="after")
     def _usable(self) -> "SpinProfile":

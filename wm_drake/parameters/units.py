@@ -405,6 +405,8 @@ class Share(PureNumber):
 Ratio = Annotated[float, PureNumber()]
 Mass = Annotated[float, Unit("kg", "kg")]
 Inertia = Annotated[float, Unit("kg*m^2", "kg*m^2")]
+StaticMoment = Annotated[float, Unit("kg*m", "g*mm")]
+CoupleMoment = Annotated[float, Unit("kg*m^2", "g*mm^2")]
 Length = Annotated[float, Unit("m", "mm")]
 Angle = Annotated[float, Unit("rad", "deg")]
 Speed = Annotated[float, Unit("rad/s", "rpm")]

@@ -11,7 +11,7 @@ from wm_drake.engines.compiled.stepping import choose_stepping
 from wm_drake.engines.drake import run_drake
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.model.machine import OUTPUT_PERIOD, Machine
+from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.machine import Integrator
 from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
@@ -43,14 +43,14 @@ def simulate(
         machine: A built machine.
         case: The case to run, or the name of one of the machine's loads.
         engine: Name of an engine in `ENGINES`.
-        step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
+        step: Step size; the output period of the machine must be an integer multiple of it. If None, the
             step size of the machine is used. [s]
         integrator: Integrator of the compiled engine, "auto", "multistep", "midpoint" or
             "runge_kutta"; None for that of the machine. With "auto" the steps may be shorter.
         progress: Called from time to time with the fraction done.
 
     Returns:
-        The record, sampled every 5 ms; it starts at time 0 in the rest pose. If the run diverges,
+        The record, sampled at the output period; it starts at time 0 in the rest pose. If the run diverges,
         the record ends there, attrs["diverged"] gives the reason, and a DivergenceWarning is
         issued.
 
@@ -121,15 +121,15 @@ def checked_step(parameters: MachineParameters, step: float | None) -> float:
     Raises:
         InputError: the output period is not an integer multiple of the step size.
     """
-    step = parameters.step if step is None else step
+    step, period = parameters.step if step is None else step, parameters.output_period
     if (
         not step > 0.0
-        or abs(OUTPUT_PERIOD / step - round(OUTPUT_PERIOD / step)) > 1e-9
-        or step > OUTPUT_PERIOD
+        or abs(period / step - round(period / step)) > 1e-9
+        or step > period
     ):
         raise input_error(
-            f"{step:g} s does not divide the output period of {OUTPUT_PERIOD:g} s into equal "
-            f"steps; allowed are {OUTPUT_PERIOD:g} s divided by 1, 2, 3, ...",
+            f"{step:g} s does not divide the output period of {period:g} s into equal steps; "
+            f"allowed are {period:g} s divided by 1, 2, 3, ...",
             key="step",
         )
     return step

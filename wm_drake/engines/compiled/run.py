@@ -12,7 +12,7 @@ from wm_drake.engines.compiled.samples import trajectory_of
 from wm_drake.engines.compiled.stepping import Stepping
 from wm_drake.engines.schedule import Schedule, schedule_of
 from wm_drake.engines.trajectory import Trajectory, diverging_coordinate
-from wm_drake.model.machine import OUTPUT_PERIOD, Setup
+from wm_drake.model.machine import Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.machine import Integrator
 from wm_drake.parameters.types import FloatArray
@@ -26,7 +26,7 @@ def run_compiled(
     profile: SpinProfile,
     step: float,
     progress: Callable[[float], None],
-    period: float = OUTPUT_PERIOD,
+    period: float | None = None,
     integrator: Integrator = "runge_kutta",
     relaxation: FloatArray | None = None,
 ) -> Trajectory:
@@ -40,7 +40,7 @@ def run_compiled(
         profile: Drum speed over time; followed exactly.
         step: Step size. [s]
         progress: Called with the fraction done.
-        period: Time between two samples. [s]
+        period: Time between two samples; None for the output period of the machine. [s]
         integrator: "multistep", "midpoint" or "runge_kutta".
         relaxation: As in the `Stepping`, for "midpoint".
 
@@ -51,6 +51,7 @@ def run_compiled(
         InputError: the machine has something that the compiled engine does not represent.
     """
     p, layout = pack(setup)
+    period = period or setup.parameters.output_period
     begin = initial_state(setup, profile)
     schedule = schedule_of(profile, step, period, layout.control_period)
     rows, size = len(schedule.time), len(begin) + layout.states.begins.rates

@@ -30,7 +30,7 @@ from wm_drake.engines.compiled.linear import INTERNAL, PATH, SMOOTH, jacobians
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE
 from wm_drake.engines.compiled.packing import Layout, initial_state, pack
 from wm_drake.errors import input_error
-from wm_drake.model.machine import OUTPUT_PERIOD, Setup
+from wm_drake.model.machine import Setup
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 
@@ -223,7 +223,7 @@ def check_step(setup: Setup, step: float) -> None:
         how = f"decays at {fastest.rate:.4g} 1/s"
     raise input_error(
         f"{1e3 * step:g} ms is too long for {fastest.part}, whose fastest motion {how}; "
-        f"allowed are up to {_allowed(fastest.longest_step)}",
+        f"allowed are up to {_allowed(fastest.longest_step, setup.parameters.output_period)}",
         key="step",
     )
 
@@ -266,14 +266,14 @@ def drum_inertia(setup: Setup) -> float:
     return float(plant.CalcMassMatrix(context)[index, index])
 
 
-def _allowed(longest: float) -> str:
+def _allowed(longest: float, period: float) -> str:
     """Return the longest step that divides the output period, in words."""
-    pieces = int(np.ceil(OUTPUT_PERIOD / longest))
-    text = f"{1e3 * OUTPUT_PERIOD / pieces:.4g} ms"
+    pieces = int(np.ceil(period / longest))
+    text = f"{1e3 * period / pieces:.4g} ms"
     if pieces < MOST_PIECES and 10**9 % pieces:
         # this step has no finite decimal expansion: name one that has
         pieces = next(more for more in itertools.count(pieces) if 10**9 % more == 0)
-        text += f", such as {1e3 * OUTPUT_PERIOD / pieces:g} ms"
+        text += f", such as {1e3 * period / pieces:g} ms"
     return text
 
 

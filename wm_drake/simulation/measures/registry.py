@@ -12,6 +12,7 @@ def _register_all() -> None:
         feet,
         gap,
         mounts,
+        radial,
         regions,
         springs,
     )
@@ -30,6 +31,7 @@ def _register_all() -> None:
         feet.IN_REGIONS,
         mounts.CABINET,
         springs.TENSIONS,
+        radial.RADIAL,
     ):
         MEASURES.register(measure)
 

@@ -11,7 +11,7 @@ from wm_drake.elements.state_map import BEARING_WORDS
 from wm_drake.engines.compiled.step_check import fastest_motions
 from wm_drake.model.bodies import oscillating_bodies
 from wm_drake.model.equilibrium import tensions_at
-from wm_drake.model.machine import OUTPUT_PERIOD, Machine, Setup
+from wm_drake.model.machine import Machine, Setup
 from wm_drake.model.sdf_names import tubes_of
 from wm_drake.model.state_layout import CARRIER
 from wm_drake.parameters import (
@@ -191,7 +191,7 @@ def _numerics(parameters: MachineParameters) -> dict[str, Any]:
     return {
         "integrator": INTEGRATORS[parameters.integrator],
         "step_s": parameters.step,
-        "output_period_s": OUTPUT_PERIOD,
+        "output_period_s": parameters.output_period,
         "displacement_filter": f"Butterworth band-pass of order {FILTER_ORDER}, {both_ways}; ends "
         f"mirrored over {PADDING:g} s",
         "displacement_band_hz": list(BAND_HZ),

@@ -12,7 +12,8 @@ import xarray as xr
 from wm_drake.batch import RunResult, simulate_many
 from wm_drake.errors import input_error
 from wm_drake.model.build import build_machine
-from wm_drake.model.machine import OUTPUT_PERIOD, Machine
+from wm_drake.model.machine import Machine
+from wm_drake.parameters.machine import OUTPUT_PERIOD
 from wm_drake.parameters import (
     GASKET_FACTORS,
     MachineParameters,

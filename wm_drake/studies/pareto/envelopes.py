@@ -7,11 +7,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from wm_drake.model.machine import OUTPUT_PERIOD
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import envelopes
-from wm_drake.simulation.records import Record
+from wm_drake.simulation.records import Record, sample_period
 from wm_drake.studies.pareto.study import ParetoFront
 
 Histories: TypeAlias = Callable[[Sequence[Case], Callable[[int, Record], None]], None]
@@ -74,7 +73,7 @@ def envelope_of(record: Record, duration: float) -> FloatArray:
     sensors = envelopes(record)
     size = np.maximum(np.abs(sensors.upper.values), np.abs(sensors.lower.values))
     answer = np.full((size.shape[1], INTERVALS), np.nan)
-    per_interval = duration / OUTPUT_PERIOD / INTERVALS
+    per_interval = duration / sample_period(record) / INTERVALS
     ends = np.round(np.arange(INTERVALS + 1) * per_interval).astype(int)
     for index, (begin, end) in enumerate(itertools.pairwise(ends)):
         part = size[begin : max(end, begin + 1)]

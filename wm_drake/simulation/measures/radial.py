@@ -1,0 +1,44 @@
+"""Largest radial displacement of points of the tub in each region: the radius of their orbits."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
+from wm_drake.simulation.measures.kind import Measure, Variable, each_run
+from wm_drake.simulation.measures.regions import DIMS
+from wm_drake.simulation.measures.run import Run
+from wm_drake.simulation.outputs import point_displacements
+
+
+def _radial(run: Run) -> Sequence[FloatArray]:
+    points = run.accelerometer_points
+    moved = point_displacements(np.ascontiguousarray(run.tub_motion), points, run.rest_pose)
+    radius = np.hypot(moved[..., 0], moved[..., 2])
+    radii = np.full((len(run.profile.regions), len(points)), np.nan)
+    for row, region in enumerate(run.profile.regions):
+        begin, end = np.searchsorted(run.time, (region.begin, region.end))
+        if end > begin and run.time[-1] >= region.end - run.period:
+            radii[row] = radius[begin:end].max(axis=0)
+    return [radii]
+
+
+RADIAL = Measure(
+    "radial displacements",
+    (
+        Variable(
+            "region_radius",
+            DIMS[:2],
+            Unit("m", "mm"),
+            "radial displacement",
+            "largest distance across the drum axis from the point's place at rest, without a "
+            "filter, in each region of the spin profile",
+            is_response=False,
+            json=None,
+            studio=None,
+        ),
+    ),
+    each_run(_radial),
+    ("tub",),
+)
