@@ -140,9 +140,7 @@ class Runner:
             extremes,
             lengths,
         )
-        filtered = self._filtered(
-            moved.reshape(rows, count, WIDTH), extremes[-WIDTH:], key.period
-        )
+        filtered = self._filtered(moved.reshape(rows, count, WIDTH), extremes[-WIDTH:], key.period)
         arrays = (
             samples.reshape(rows, size, WIDTH),
             moved.reshape(rows, count, WIDTH),

@@ -33,6 +33,7 @@ from wm_drake.systems.sensors import Sensors
 from wm_drake.systems.speed_source import SpeedSource
 from wm_drake.systems.spin_profile_source import SpinProfileSource
 
+
 @dataclass(frozen=True)
 class Setup:
     """A machine set up in a Context: numbers chosen, preloads solved, at rest at its rest pose.

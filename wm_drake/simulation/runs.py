@@ -43,16 +43,16 @@ def simulate(
         machine: A built machine.
         case: The case to run, or the name of one of the machine's loads.
         engine: Name of an engine in `ENGINES`.
-        step: Step size; the output period of the machine must be an integer multiple of it. If None, the
-            step size of the machine is used. [s]
+        step: Step size; the output period of the machine must be an integer multiple of it. If
+            None, the step size of the machine is used. [s]
         integrator: Integrator of the compiled engine, "auto", "multistep", "midpoint" or
             "runge_kutta"; None for that of the machine. With "auto" the steps may be shorter.
         progress: Called from time to time with the fraction done.
 
     Returns:
-        The record, sampled at the output period; it starts at time 0 in the rest pose. If the run diverges,
-        the record ends there, attrs["diverged"] gives the reason, and a DivergenceWarning is
-        issued.
+        The record, sampled at the output period; it starts at time 0 in the rest pose. If the run
+        diverges, the record ends there, attrs["diverged"] gives the reason, and a
+        DivergenceWarning is issued.
 
     Raises:
         InputError: the load or the engine is unknown, the step size does not divide the output
@@ -122,11 +122,7 @@ def checked_step(parameters: MachineParameters, step: float | None) -> float:
         InputError: the output period is not an integer multiple of the step size.
     """
     step, period = parameters.step if step is None else step, parameters.output_period
-    if (
-        not step > 0.0
-        or abs(period / step - round(period / step)) > 1e-9
-        or step > period
-    ):
+    if not step > 0.0 or abs(period / step - round(period / step)) > 1e-9 or step > period:
         raise input_error(
             f"{step:g} s does not divide the output period of {period:g} s into equal steps; "
             f"allowed are {period:g} s divided by 1, 2, 3, ...",

@@ -13,7 +13,6 @@ from wm_drake.batch import RunResult, simulate_many
 from wm_drake.errors import input_error
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
-from wm_drake.parameters.machine import OUTPUT_PERIOD
 from wm_drake.parameters import (
     GASKET_FACTORS,
     MachineParameters,
@@ -22,6 +21,7 @@ from wm_drake.parameters import (
     with_values,
 )
 from wm_drake.parameters.csv_files import finite_numbers, read_csv
+from wm_drake.parameters.machine import OUTPUT_PERIOD
 from wm_drake.parameters.time_stamps import with_distinct_times
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
