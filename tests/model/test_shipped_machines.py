@@ -1,4 +1,4 @@
-"""Shipped machines: every number has its source, every frame its use, and the whole is a plausible washing machine."""
+"""Shipped machines: every number has its source, every frame its use; whole machines are plausible."""
 
 import xml.etree.ElementTree as ET
 
@@ -31,6 +31,13 @@ pytestmark = pytest.mark.parametrize(
 @pytest.fixture(scope="module")
 def machine(request):
     return load_machine(request.param)
+
+
+@pytest.fixture(scope="module")
+def washing_machine(machine):
+    if machine.gasket is None:
+        pytest.skip("a rotor rig, not a washing machine")
+    return machine
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +121,8 @@ def test_measured_tables_are_readable_and_belong_to_the_machine(machine):
     assert ((sizes > 0.0) & (sizes < 100.0)).all(axis=None)  # mm
 
 
-def test_counts(machine):
+def test_counts(washing_machine):
+    machine = washing_machine
     assert len(machine.springs) >= 2
     assert len(machine.dampers) + len(machine.telescopic_dampers) >= 2
     assert len(machine.sensors) == 6
@@ -123,7 +131,8 @@ def test_counts(machine):
     assert machine.profile.duration > 10.0
 
 
-def test_oscillating_mass_is_that_of_the_sdf(machine, built, sdf):
+def test_oscillating_mass_is_that_of_the_sdf(washing_machine, built, sdf):
+    machine = washing_machine
     masses = {
         link.get("name"): float(link.findtext("inertial/mass"))
         for link in sdf.iter("link")
@@ -139,7 +148,8 @@ def test_oscillating_mass_is_that_of_the_sdf(machine, built, sdf):
     assert 20.0 < sum(masses.values()) < 100.0
 
 
-def test_springs_carry_the_weight(machine, built):
+def test_springs_carry_the_weight(washing_machine, built):
+    machine = washing_machine
     setup = built.set_up(gasket=False)
     turned = RollPitchYaw(setup.rest_pose[:3]).ToRotationMatrix().matrix()
     lift = 0.0
@@ -160,7 +170,8 @@ def test_springs_carry_the_weight(machine, built):
     assert abs(setup.rest_pose[3:]).max() < 1.5e-3
 
 
-def test_tub_has_six_soft_modes(machine, built):
+def test_tub_has_six_soft_modes(washing_machine, built):
+    machine = washing_machine
     frequencies = natural_modes(built).frequency_hz
     assert len(frequencies) == 6
     assert 0.5 < frequencies[0] < frequencies[-1] < 10.0

@@ -12,7 +12,9 @@ from wm_drake.parameters.plausibility import RANGES, unusual_numbers, usual_rang
 @pytest.mark.parametrize("name", shipped_machines())
 def test_shipped_machine_has_nothing_unusual(name):
     machine = load_machine(name)
-    assert unusual_values(build_machine(machine).set_up()) == []
+    known = {"profile.speed"} if name == "rodrigues_2010" else set()  # a rotor rig, to 5300 rpm
+    found = unusual_values(build_machine(machine).set_up())
+    assert {problem.key for problem in found} == known
 
 
 SLIPS = {

@@ -5,8 +5,10 @@ import math
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from pydrake.multibody.tree import SpatialInertia, UnitInertia
 
 from wm_drake.errors import InputError
+from wm_drake.model.bodies import with_load
 from wm_drake.parameters import Load, SpinProfile, Unbalance, load_load, load_profile
 
 RPM = 2.0 * math.pi / 60.0
@@ -68,8 +70,8 @@ def test_points(tmp_path):
         ("time: (0, 2) s", "speed: is missing"),
         ("steps: 5", "a profile is either"),
         ("steps: [{hold_until: 1 s}]\ntime: (0, 1) s", "a profile is either"),
-        ("steps: [{ramp_to: 5 rpm}]", "a step is either"),
-        ("steps: [{ramp_to: 5 rpm, rate: 1 rpm/s, hold_until: 9 s}]", "a step is either"),
+        ("steps: [{ramp_to: 5 rpm}]", "a step is"),
+        ("steps: [{ramp_to: 5 rpm, rate: 1 rpm/s, hold_until: 9 s}]", "a step is"),
         ("steps: [{ramp_to: 5 rpm, rate: 0 rpm/s}]", "allowed is > 0"),
         ("steps: [{ramp_to: 5 rpm, rate: -1 rpm/s}]", "allowed is > 0"),
         ("steps: [{ramp_to: 5 rpm, rate: 1 rpm}]", "does not fit"),
@@ -187,3 +189,50 @@ def test_bad_load_file_is_refused(tmp_path, entry, message):
     path.write_text(f"unbalances:\n  - {entry}\n")
     with pytest.raises(InputError, match=message):
         load_load(path)
+
+
+STAIRS = "{{stairs_to: {to} rpm, stair: 40 rpm, rate: 60 rpm/s, settle: 1 s, measure: 2 s}}"
+
+
+def test_staircase_goes_up_and_down_with_a_region_at_each_hold(tmp_path):
+    profile = from_steps(tmp_path, STAIRS.format(to=100), STAIRS.format(to=60))
+    rpm = [speed / RPM for speed in profile.speed]
+    assert rpm == pytest.approx([0.0, 40.0, 40.0, 80.0, 80.0, 100.0, 100.0, 60.0, 60.0])
+    assert [region.name for region in profile.regions] == ["up_40", "up_80", "up_100", "down_60"]
+    for region in profile.regions:
+        assert region.end - region.begin == pytest.approx(2.0)
+        assert profile.speed_at(region.begin - 1.0 + 1e-9) == profile.speed_at(region.end)
+    assert profile.duration == pytest.approx(4 * 3.0 + (40 + 40 + 20 + 40) / 60)
+
+
+def test_load_needs_an_unbalance_of_some_form():
+    with pytest.raises(ValidationError, match="needs unbalances, static or couple"):
+        Load.model_validate({})
+
+
+def test_static_and_couple_unbalance_are_those_of_point_masses():
+    drum = SpatialInertia(9.0, [0.0, 0.06, 0.0], UnitInertia(0.04, 0.04, 0.04))
+    masses = [
+        {"mass": 1e-6, "radius": 1e3, "y": y, "phase": phase}
+        for y, phase in [(0.1, 0.3), (-0.1, 0.3 + math.pi), (0.02, 1.2)]
+    ]
+    parts = {
+        "couple": {"moment": 2 * 1e-3 * 0.1, "phase": 0.3},
+        "static": {"moment": 1e-3, "y": 0.02, "phase": 1.2},
+    }
+    of_masses = with_load(drum, Load.model_validate({"unbalances": masses}))
+    of_parts = with_load(drum, Load.model_validate(parts))
+    np.testing.assert_allclose(
+        of_parts.get_mass() * of_parts.get_com(),
+        of_masses.get_mass() * of_masses.get_com(),
+        atol=1e-15,
+    )
+    inertias = [one.CalcRotationalInertia().CopyToFullMatrix3() for one in (of_parts, of_masses)]
+    np.testing.assert_allclose(inertias[0][0, 1], inertias[1][0, 1], atol=1e-12)
+    np.testing.assert_allclose(inertias[0][2, 1], inertias[1][2, 1], atol=1e-12)
+
+
+def test_unbalance_that_no_drum_can_have_is_refused():
+    drum = SpatialInertia(9.0, [0.0, 0.06, 0.0], UnitInertia(0.04, 0.04, 0.04))
+    with pytest.raises(InputError, match="too large for mass and inertia"):
+        with_load(drum, Load.model_validate({"couple": {"moment": 5.0}}))
