@@ -314,7 +314,7 @@ def searches_table(calibration: Calibration) -> Table:
     ranks = {solution.start: n for n, solution in enumerate(calibration.solutions, start=1)}
     groups = tuple(
         line(
-            end.start + 1,
+            str(end.start + 1),
             (
                 ranks.get(end.start),
                 end.data_cost,

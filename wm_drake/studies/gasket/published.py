@@ -65,8 +65,10 @@ class Published:
     def sums(self, label: Label) -> tuple[float | None, float | None]:
         """Return the published percentages of all main effects and of all interactions. [%]"""
         terms = self.terms.get(label, {})
-        main, interactions = (terms.get(name) for name in (MAIN, INTERACTIONS))
-        return main and main.percent, interactions and interactions.percent
+        main, interactions = (
+            terms[name].percent if name in terms else None for name in (MAIN, INTERACTIONS)
+        )
+        return main, interactions
 
     def mean_difference(self, screening: Screening, label: Label) -> float | None:
         """Return how much our grand mean is above the published one. [%]
