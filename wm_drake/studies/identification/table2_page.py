@@ -8,7 +8,7 @@ import pandas as pd
 from wm_drake.report.figure import Figure, Line, Mark, Points, in_grid
 from wm_drake.report.page import picture
 from wm_drake.report.sections import Section, SectionedPage
-from wm_drake.report.table import Column, Table, line, table_of
+from wm_drake.report.table import Column, Columns, Table, line, table_of
 from wm_drake.studies.identification.drift import FrequencyTrend
 from wm_drake.studies.identification.figures import LAW_COLOURS
 from wm_drake.studies.rig.figures import loop_panel
@@ -98,7 +98,8 @@ def _trends(trend: FrequencyTrend) -> Table:
         "peak force, c1 and c2 nearly zero": trend.without_dashpots,
         "f_max for the peak of the first": trend.friction,
     }
-    heads = ("loops of 1 mm, N", *(Column(f"{f:g} Hz", decimals=1) for f in trend.frequencies))
+    columns = (Column(f"{f:g} Hz", decimals=1) for f in trend.frequencies)
+    heads: Columns = ("loops of 1 mm, N", *columns)
     groups = tuple(line(name, values) for name, values in rows.items())
     return Table("Peak force of the MSTV damper over frequency.", heads, groups)
 

@@ -76,7 +76,7 @@ def masses_table(run: RigRun, massless: RigRun) -> pd.DataFrame:
 def masses_sentence(run: RigRun, massless: RigRun) -> str:
     """Return a sentence on the loop that masses change most."""
     table = masses_table(run, massless)
-    worst = table.loc[table["largest_difference_N"].idxmax()]
+    worst = table.iloc[int(np.argmax(table["largest_difference_N"]))]
     return (
         f"The masses change the force by up to {worst['largest_difference_N']:.3g} N, "
         f"{100.0 * worst['largest_difference_by_peak']:.2g} % of the peak without them "

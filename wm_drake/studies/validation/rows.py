@@ -144,7 +144,7 @@ def amplitude_rows(table: pd.DataFrame, kind: str = FITTED) -> list[Row]:
     if every["wm_drake"]:
         mean, most = np.mean(every["wm_drake"]), np.max(every["wm_drake"])
         limit = float(np.mean(every["other"])) if every["other"] else math.nan
-        verdict = OPEN if math.isnan(limit) else _verdict(mean <= limit)
+        verdict = OPEN if math.isnan(limit) else _verdict(bool(mean <= limit))
         reason = f"over {len(every['wm_drake'])} amplitudes; largest {most:.1f} %"
         if not math.isnan(limit):
             reason += f"; [B]'s model: {limit:.1f} % over {len(every['other'])}"
@@ -224,8 +224,8 @@ def effect_rows(table: pd.DataFrame, kind: str = FITTED) -> list[Row]:
         reason = f"limit {SMALL_STEADY:g} %; worst: {worst['load']}, {worst['sensor']}"
         ours = f"up to {steady.max():.1f} %"
         what = f"difference of steady amplitudes from {LARGE_STEADY:g} mm on"
-        texts = ("negligible", ours, "")
-        rows.append(Row(section, what, PREDICTED, *texts, _verdict(is_met), reason))
+        verdict = _verdict(is_met)
+        rows.append(Row(section, what, PREDICTED, "negligible", ours, "", verdict, reason))
     return rows
 
 
