@@ -23,6 +23,7 @@ ORDER = (
     {"model"},
     {"engines"},
     {"simulation"},
+    {"export"},
     {"batch"},
     {"rigs"},
     {"report"},

@@ -5,7 +5,7 @@
     wm.envelopes(record).upper.sel(sensor="Xr").plot()
 
 The rooms, in the order of the data flow: `parameters`, `laws`, `elements`, `systems`, `model`,
-`engines`, `simulation`, `batch`, `rigs`, `report`, `studies`, `studio`, `cli`.
+`engines`, `simulation`, `export`, `batch`, `rigs`, `report`, `studies`, `studio`, `cli`.
 """
 
 import importlib
@@ -14,6 +14,7 @@ from typing import Any
 
 _HOMES = {
     "Case": "simulation.cases",
+    "FmuOptions": "export.options",
     "Element": "parameters.element_kinds",
     "ElementKind": "elements.kind",
     "Output": "elements.kind",
@@ -24,6 +25,7 @@ _HOMES = {
     "build_machine": "model.build",
     "case_of": "simulation.cases",
     "describe": "studies.description.description",
+    "export_fmu": "export.fmu",
     "envelopes": "simulation.displacements",
     "filtered_displacement": "simulation.displacements",
     "load_load": "parameters",

@@ -53,8 +53,10 @@ def command_of(study: Study) -> Callable[..., None]:
     keyword = inspect.Parameter.KEYWORD_ONLY
     parameters = [
         inspect.Parameter("context", keyword, annotation=typer.Context),
-        *_parameters(study.options),
-        *_parameters(options_of_driver(study), out=Path(study.folder or f"wm-drake-{study.name}")),
+        *parameters_of(study.options),
+        *parameters_of(
+            options_of_driver(study), out=Path(study.folder or f"wm-drake-{study.name}")
+        ),
         inspect.Parameter("as_json", keyword, default=False, annotation=JsonOption),
     ]
     described: Any = run
@@ -70,7 +72,7 @@ def _is_set(context: typer.Context, name: str) -> bool:
     return source is not None and source.name not in ("DEFAULT", "DEFAULT_MAP")
 
 
-def _parameters(model: type[BaseModel], **defaults: Any) -> Iterator[inspect.Parameter]:
+def parameters_of(model: type[BaseModel], **defaults: Any) -> Iterator[inspect.Parameter]:
     """Yield the parameters of a command for the fields of a model."""
     for name, field in model.model_fields.items():
         extra = field.json_schema_extra

@@ -14,6 +14,8 @@ from typing import Any
 from numba import types
 from numba.extending import NativeValue, models, overload, register_model, typeof_impl, unbox
 
+from wm_drake.compiler.numba_internals import lower_constant
+
 _PACKAGE = Path(__file__).parents[1]
 
 
@@ -87,6 +89,11 @@ def _type_of(chosen: ChosenLaw, _context: Any) -> ChosenLawType:
 @unbox(ChosenLawType)
 def _unbox(_kind: Any, _value: Any, c: Any) -> NativeValue:
     return NativeValue(c.context.get_dummy_value())
+
+
+@lower_constant(ChosenLawType)
+def _constant(context: Any, _builder: Any, _kind: Any, _value: Any) -> Any:
+    return context.get_dummy_value()
 
 
 def call(chosen, *arguments):

@@ -82,11 +82,11 @@ def long_running(function: Callable[..., Any]) -> Any:
 def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     options |= {"no_cfunc_wrapper": True}  # no C code calls these; a tenth of the time to compile
     compiled = numba.njit(**options)(function)
-    if not _CACHE_FOLDER:
+    if not CACHE_FOLDER:
         # numba would choose a folder beside the sources, where an edit of a called law goes unseen
         return compiled
     chosen_by_user = config.CACHE_DIR
-    config.CACHE_DIR = _CACHE_FOLDER
+    config.CACHE_DIR = CACHE_FOLDER
     try:
         compiled._cache = LawCache(function)
     except RuntimeError:  # the folder cannot be written to any more
@@ -109,4 +109,5 @@ def generic(compiled: Any) -> Callable[..., Any]:
     )
 
 
-_CACHE_FOLDER = _cache_folder()
+CACHE_FOLDER = _cache_folder()
+"""Folder of compiled code of exactly these sources; "" if none can be written."""

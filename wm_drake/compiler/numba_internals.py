@@ -7,6 +7,7 @@
 - `Conversion`: how a number converts to lanes, the result of the public `Type.can_convert_from`.
 - `AbstractTemplate`, `infer_global`, `signature`: an operation whose arguments convert to other
   types. `numba.extending.type_callable` types a call by its arguments as they are.
+- `lower_constant`: a `ChosenLaw` among the constants of a function that becomes machine code.
 - `cgutils`: declaration of a function of LLVM in the module that is compiled.
 """
 
@@ -14,6 +15,7 @@ from numba.core import cgutils
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult
+from numba.core.imputils import lower_constant
 from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
@@ -28,5 +30,6 @@ __all__ = [
     "JITCodeLibrary",
     "cgutils",
     "infer_global",
+    "lower_constant",
     "signature",
 ]

@@ -337,6 +337,21 @@ class Scene:
                 best = self._smallest_of_pair(pair, direction, best, time[left], poses[left])
         return best
 
+    def separations(self, pose: FloatArray) -> list[tuple[Outline, Outline, FloatArray]]:
+        """Return both outlines of each pair of shapes, and the direction that separates them.
+
+        Args:
+            pose: Pose of the tub: roll, pitch, yaw, x, y, z. (6,) [rad, m]
+
+        Returns:
+            Outline of the shape of the tub group, in T, and of that of the housing, in W; unit
+            vector in W along which the first moves away from the second. (3,)
+        """
+        return [
+            (self._outlines[pair[0]], self._outlines[pair[1]], self._nearest(pose, pair)[2])
+            for pair in self._pairs
+        ]
+
     def pair_names(self) -> list[str]:
         """Return the names of the pairs of shapes: one of the tub group, one of the housing."""
         return list(self._names)

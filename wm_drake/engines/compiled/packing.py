@@ -318,6 +318,16 @@ class DrawnBodies:
             joint_damping=joint.GetDampingVector(context),
         )
 
+    @property
+    def of_point_masses(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return what the packed numbers of point masses in the drum follow from.
+
+        Returns:
+            Matrix from first moment and inertia about O, in T, to the packed harmonics (k, 9);
+            rotation of D in T (3, 3); O from Do in T (3,) [m].
+        """
+        return self._harmonics, self._R_TD.matrix(), self._p_DoO_T
+
     def packed(self, *loads: Load) -> FloatArray:
         """Return the packed bodies (`BODIES`) with loads in the drum."""
         drum = self._drum

@@ -1,0 +1,61 @@
+"""Command `wm-drake export`: a machine as a file for other programs."""
+
+import inspect
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from wm_drake.cli.common import MachineOption, SetOption
+from wm_drake.cli.options import parameters_of
+from wm_drake.export.options import FmuOptions
+from wm_drake.report.terminal import say
+from wm_drake.studies.inputs import load_parameters, located_in, machine_warnings
+
+app = typer.Typer(help="Export a machine to other programs.", no_args_is_help=True)
+
+
+@app.callback()
+def _group() -> None:
+    """Export a machine to other programs."""
+
+
+def fmu(
+    out: Annotated[Path, typer.Option(help="File to write.", metavar="FILE.fmu")],
+    machine: MachineOption = "reference",
+    load: Annotated[
+        str, typer.Option(help="Load with which a run begins.", metavar="NAME")
+    ] = "middle",
+    sets: SetOption = None,
+    **chosen: Any,
+) -> None:
+    """Write a machine as an FMU for co-simulation and model exchange, without Python inside."""
+    from wm_drake.export.fmu import export_fmu, host_platform
+    from wm_drake.export.speed import real_time_factor
+
+    parameters, options = load_parameters(machine, sets), FmuOptions(**chosen)
+    for text in machine_warnings(parameters):
+        say(f"warning: {text}", err=True)
+    with located_in(machine):
+        written = export_fmu(parameters, load, out, options)
+    model = written.model
+    speed = ""
+    if host_platform() in written.platforms:
+        speed = f", {real_time_factor(out):.0f} times real time on one core"
+    say(
+        f"{out}: FMI {options.fmi}.0, {len(model.variables)} variables, {len(model.states)} "
+        f"states, for {', '.join(written.platforms)}; {written.size / 1e3:.0f} kB{speed}"
+    )
+
+
+def _with_options() -> Any:
+    """Return the function of the command, with a signature that typer understands."""
+    signature = inspect.signature(fmu)
+    named = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
+    both = [p.replace(kind=p.KEYWORD_ONLY) for p in (*named, *parameters_of(FmuOptions))]
+    fmu.__signature__ = inspect.Signature(both)  # type: ignore[attr-defined]
+    fmu.__annotations__ = {p.name: p.annotation for p in both}
+    return fmu
+
+
+app.command("fmu")(_with_options())

@@ -1,0 +1,348 @@
+"""Write a machine as an FMU (FMI 2.0 or 3.0) for co-simulation and model exchange.
+
+The machine code is that of the compiled engine. The file needs neither Python nor this package
+where it runs; headers of the standard come from the installed FMPy.
+"""
+
+import csv
+import hashlib
+import html
+import importlib.metadata
+import importlib.util
+import io
+import os
+import platform as host
+import shutil
+import subprocess
+import sys
+import tempfile
+import uuid
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wm_drake.engines.compiled.mechanics import DRUM_RATE
+from wm_drake.engines.compiled.run import run_compiled
+from wm_drake.engines.trajectory import LARGEST_ANGLE, LARGEST_DISPLACEMENT, LARGEST_TILT
+from wm_drake.errors import input_error, nearest_names, shortened
+from wm_drake.export.description import IDENTIFIER, model_description
+from wm_drake.export.kernel import kernel_code
+from wm_drake.export.model import ExportedModel, Variable, exported_model
+from wm_drake.export.object_code import PLATFORMS, Platform, object_files
+from wm_drake.export.options import FmuOptions
+from wm_drake.parameters import MachineParameters
+from wm_drake.simulation.outputs import variables_of
+
+WRAPPER = Path(__file__).parent / "c" / "fmu.c"
+VERSIONS = (2, 3)
+READABLE, SETTABLE = 1, 2
+"""Bits of a variable in the table of the C functions."""
+HOST = {
+    ("Linux", "x86_64"): "linux64",
+    ("Linux", "aarch64"): "aarch64",
+    ("Windows", "AMD64"): "win64",
+    ("Darwin", "x86_64"): "darwin64",
+}
+"""Platform of this computer, by system and processor."""
+LONGEST_REASON = 300
+
+
+@dataclass(frozen=True)
+class ExportedFmu:
+    """An FMU that was written.
+
+    Attributes:
+        path: The file.
+        model: What it contains.
+        platforms: Names of the platforms that it has code for.
+        size: Size of the file. [byte]
+    """
+
+    path: Path
+    model: ExportedModel
+    platforms: tuple[str, ...]
+    size: int
+
+
+def host_platform() -> str:
+    """Return the name of the platform of this computer."""
+    return HOST.get((host.system(), host.machine()), "linux64")
+
+
+def export_fmu(
+    parameters: MachineParameters, load: str, out: str | Path, options: FmuOptions | None = None
+) -> ExportedFmu:
+    """Write a machine with a load as an FMU.
+
+    Args:
+        parameters: The machine.
+        load: Name of one of its loads, with which a run of the FMU begins.
+        out: File to write; it is replaced if it exists.
+        options: How it is written.
+
+    Raises:
+        InputError: an option is not allowed, FMPy or a compiler is missing, or the compiled engine
+            does not represent the machine. Nothing is written then.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> machine = wm.load_machine("reference")
+        >>> wm.export_fmu(machine, "middle", "machine.fmu", wm.FmuOptions(fmi=1))
+        Traceback (most recent call last):
+        wm_drake.errors.InputError: fmi: there is no version 1; allowed are 2 and 3
+    """
+    options = options or FmuOptions()
+    path, fmi, platforms = Path(out), options.fmi, _platforms(options)
+    _check_file(path)
+    headers = _headers()
+    compilers = {platform.name: _compiler(platform) for platform in platforms}
+    model = exported_model(
+        parameters,
+        load,
+        input_kind="torque" if options.input == "torque" else "speed",
+        step=options.step,
+        gasket=not options.no_gasket,
+    )
+    code = kernel_code(model.plan)
+    token = _token(model, code, fmi)
+    files = {
+        "modelDescription.xml": model_description(model, token, fmi, _program()),
+        "documentation/index.html": _documentation(model, fmi),
+    }
+    if model.plan.follows_speed:
+        files["documentation/reference.csv"] = _reference(model)
+    for platform in platforms:
+        name = f"{IDENTIFIER}{platform.suffix}"
+        contents = object_files(code, platform) | {
+            "machine.h": _machine_header(model, token, platform).encode()
+        }
+        command = [*compilers[platform.name], f"-DFMI_VERSION={fmi}", f"-I{headers}"]
+        files[f"binaries/{platform.folder(fmi)}/{name}"] = _library(contents, platform, command)
+    if options.sources:
+        folder = "extra/wm_drake/sources"
+        files[f"{folder}/fmu.c"] = WRAPPER.read_bytes()
+        files[f"{folder}/machine.h"] = _machine_header(model, token, PLATFORMS["win64"]).encode()
+        files |= {f"{folder}/{name}.ll": text.encode() for name, text in code.items()}
+    _write(path, files)
+    names = tuple(platform.name for platform in platforms)
+    return ExportedFmu(path, model, names, path.stat().st_size)
+
+
+def _platforms(options: FmuOptions) -> list[Platform]:
+    """Return the platforms, after checking the options.
+
+    Raises:
+        InputError: an option is not allowed.
+    """
+    if options.fmi not in VERSIONS:
+        raise input_error(f"there is no version {options.fmi}; allowed are 2 and 3", key="fmi")
+    if options.input not in ("speed", "torque"):
+        raise input_error(f"no input '{options.input}'; allowed: speed, torque", key="input")
+    names = [name.strip() for name in options.platform.split(",") if name.strip()]
+    for name in names:
+        if name not in PLATFORMS:
+            near = nearest_names(name, PLATFORMS)
+            raise input_error(f"no platform '{name}'{near}", key="platform")
+    return [PLATFORMS[name] for name in dict.fromkeys(names or [host_platform()])]
+
+
+def _check_file(path: Path) -> None:
+    if path.suffix != ".fmu":
+        raise input_error(f"'{path.name}' must end with .fmu", key="out")
+    if not path.parent.is_dir():
+        raise input_error(f"there is no folder '{path.parent}'", key="out")
+
+
+def _headers() -> Path:
+    """Return the folder of the headers of the standard."""
+    fmpy = importlib.util.find_spec("fmpy")
+    if fmpy is None or fmpy.origin is None:
+        raise input_error(
+            "the headers of the standard come from the package FMPy, which is not installed; "
+            "pip install 'wm-drake[fmu]'",
+            key="export fmu",
+        )
+    return Path(fmpy.origin).parent / "c-code"
+
+
+def _compiler(platform: Platform) -> list[str]:
+    """Return the command that compiles and links for a platform."""
+    if platform.name == host_platform() and host.system() != "Windows":
+        for name in ("cc", "gcc", "clang"):
+            if compiler := shutil.which(name):
+                return [compiler]
+    if importlib.util.find_spec("ziglang"):
+        return [sys.executable, "-m", "ziglang", "cc", "-target", platform.zig]
+    raise input_error(
+        f"no compiler for '{platform.name}'; pip install 'wm-drake[fmu]' installs ziglang, which "
+        "compiles for all platforms",
+        key="platform",
+    )
+
+
+def _program() -> str:
+    return f"wm-drake {importlib.metadata.version('wm-drake')}"
+
+
+def _token(model: ExportedModel, code: Mapping[str, str], fmi: int) -> str:
+    """Return the token of an FMU: equal for equal contents."""
+    digest = hashlib.sha256(f"{fmi} {model.step} {model.variables}".encode())
+    for part in (
+        model.numbers.tobytes(),
+        model.constants.tobytes(),
+        *map(str.encode, code.values()),
+    ):
+        digest.update(part)
+    return str(uuid.UUID(bytes=digest.digest()[:16]))
+
+
+def _library(contents: Mapping[str, bytes], platform: Platform, compiler: list[str]) -> bytes:
+    """Return the shared library of a platform.
+
+    Args:
+        contents: Object files and the header of the machine, by file name.
+        platform: The platform.
+        compiler: Command that compiles and links, with its options for this FMU.
+
+    Raises:
+        InputError: the compiler fails.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        for name, content in contents.items():
+            (place / name).write_bytes(content)
+        library = place / f"{IDENTIFIER}{platform.suffix}"
+        position = [] if platform.suffix == ".dll" else ["-fPIC"]
+        objects = sorted(str(file) for file in place.glob("*.o"))
+        kind = ["-shared", "-O2", "-std=c11", "-fvisibility=hidden", *position]
+        files = [f"-I{place}", str(WRAPPER), *objects, "-o", str(library), "-lm"]
+        command = [*compiler, *kind, *files]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=place)
+        if done.returncode or not library.is_file():
+            reason = shortened(" ".join(done.stderr.split()), LONGEST_REASON)
+            raise input_error(f"the compiler failed: {reason}", key=f"platform {platform.name}")
+        return library.read_bytes()
+
+
+def _machine_header(model: ExportedModel, token: str, platform: Platform) -> str:
+    """Return the C header with the numbers of a machine."""
+    at, begins = model.plan.at, model.plan.elements.begins
+    limits = [v for v in model.variables if v.minimum is not None or v.maximum is not None]
+    rows = [
+        f'{{{v.index}, {_c(v.minimum, "-HUGE_VAL")}, {_c(v.maximum, "HUGE_VAL")}, "{v.name}"}}'
+        for v in limits
+    ]
+    by_index = {v.index: v.nominal or 1.0 for v in model.variables}
+    nominals = [by_index[k] for k in model.states]
+    defines = {
+        "WM_TOKEN": f'"{token}"',
+        "WM_SIZE": at.size,
+        "WM_FAST": int(bool(platform.fast)),
+        "WM_FOLLOWS_SPEED": int(model.plan.follows_speed),
+        "WM_SPEED": at.speed,
+        "WM_ACCELERATION": at.acceleration,
+        "WM_IN_FORCE": at.in_force,
+        "WM_STATE": at.state,
+        "WM_RATE": at.rate,
+        "WM_DRUM_RATE": DRUM_RATE,
+        "WM_STATES": len(model.states),
+        "WM_STEP": _c(model.step),
+        "WM_LARGEST_ANGLE": _c(LARGEST_ANGLE),
+        "WM_LARGEST_SHIFT": _c(LARGEST_DISPLACEMENT),
+        "WM_CABINET": at.state + begins.cabinet if model.setup.cabinet else 0,
+        "WM_LARGEST_TILT": _c(LARGEST_TILT),
+        "WM_LIMITS": len(limits),
+    }
+    lines = [f"#define {name} {value}" for name, value in defines.items()]
+    lines += [
+        f"static const double wm_start[] = {{{', '.join(map(_c, model.numbers))}}};",
+        f"static const double wm_constants[] = {{{', '.join(map(_c, model.constants))}}};",
+        f"static const unsigned wm_states[] = {{{', '.join(map(str, model.states))}}};",
+        f"static const double wm_nominals[] = {{{', '.join(map(_c, nominals))}}};",
+        f"static const unsigned char wm_access[] = {{{', '.join(map(str, _access(model)))}}};",
+        "static const struct { unsigned index; double least, most; const char *name; }",
+        f"    wm_limits[] = {{{', '.join(rows)}}};",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _access(model: ExportedModel) -> list[int]:
+    """Return for each number of an instance whether importers may read and set it."""
+    access = [0] * model.plan.at.size
+    access[0] = READABLE | SETTABLE
+    for variable in model.variables:
+        is_set = variable.causality in ("input", "parameter")
+        access[variable.index] = READABLE | (SETTABLE if is_set else 0)
+    return access
+
+
+def _c(value: float | None, none: str = "0.0") -> str:
+    """Return a number as a constant of C that has all its digits."""
+    return none if value is None else float(value).hex() if value else "0.0"
+
+
+def _reference(model: ExportedModel) -> bytes:
+    """Return the displacements of a run of the engine through the spin profile, as CSV."""
+    profile = model.setup.parameters.profile
+    setup = model.setup.machine.set_up(model.load, gasket=model.plan.gasket >= 0)
+    trajectory = run_compiled(setup, profile, model.step, lambda _: None, integrator="runge_kutta")
+    values = variables_of(setup, trajectory)["displacement"][1]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    names = [f"displacement.{name}" for name in setup.sensors]
+    writer.writerow(["time", "drum_speed", *names])
+    speed = np.interp(trajectory.time, profile.time, profile.speed)
+    for row in np.column_stack([trajectory.time, speed, values]):
+        writer.writerow([f"{number:.12g}" for number in row])
+    return text.getvalue().encode()
+
+
+def _documentation(model: ExportedModel, fmi: int) -> bytes:
+    """Return the page that describes the FMU."""
+    parameters = model.setup.parameters
+    rows = "\n".join(_row(v) for v in model.variables if v.causality != "local")
+    about = html.escape(parameters.about)
+    text = f"""<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><title>{html.escape(parameters.name)}</title>
+<style>body {{ font-family: sans-serif; max-width: 60em; margin: 2em auto; }}
+td, th {{ text-align: left; padding: 0.1em 0.8em; border-bottom: 1px solid #ddd; }}
+td.number {{ text-align: right; }}</style></head><body>
+<h1>Washing machine {html.escape(parameters.name)}, load {html.escape(model.load)}</h1>
+<p>{about} Written by {_program()}; FMI {fmi}.0, co-simulation and model exchange.</p>
+<p>Frame W: origin on the drum axis at mid-depth, x to the right of a person who faces the door, y
+from the front to the rear, z up. A run begins at rest. Co-simulation takes steps of the classical
+Runge-Kutta scheme of at most {1e3 * model.step:g} ms, and divides longer communication steps. Set
+drum_speed and drum_acceleration together: the drum then follows exactly. With drum_speed alone it
+reaches the value one communication step later. A parameter acts from the next step on; the run
+begins at the rest pose of the exported numbers.</p>
+<p>reference.csv in this folder, if there is one: displacements of the compiled engine over the
+spin profile of the machine.</p>
+<table><tr><th>Variable</th><th>Kind</th><th>Start</th><th>Unit</th><th>Meaning</th></tr>
+{rows}
+</table></body></html>
+"""
+    return text.encode()
+
+
+def _row(variable: Variable) -> str:
+    start = "" if variable.start is None else f"{variable.start:.6g}"
+    return (
+        f"<tr><td>{html.escape(variable.name)}</td><td>{variable.causality}</td>"
+        f'<td class="number">{start}</td><td>{variable.unit.replace("*", " ")}</td>'
+        f"<td>{html.escape(variable.words)}</td></tr>"
+    )
+
+
+def _write(path: Path, files: Mapping[str, bytes]) -> None:
+    """Write the FMU as a whole or not at all."""
+    part = path.with_name(f".{path.name}.part")
+    try:
+        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, content in files.items():
+                archive.writestr(name, content)
+        os.replace(part, path)  # noqa: PTH105
+    finally:
+        part.unlink(missing_ok=True)
