@@ -122,9 +122,8 @@ class EnergyBook:
                 power = power + stiffness * z * np.abs(rate[:, axis]) * z / other
             else:
                 stiffness = number
-                power = (
-                    power + (stiffness * z) ** 2 / other
-                )  # the dashpot carries the force of the spring
+                # the dashpot carries the force of the spring
+                power = power + (stiffness * z) ** 2 / other
             stored = stored + 0.5 * stiffness * z**2
         return stored, power
 

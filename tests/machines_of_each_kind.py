@@ -7,16 +7,13 @@ from pydantic import TypeAdapter
 
 from wm_drake.parameters import DamperType, MachineParameters, load_machine
 
-END_BUSHING = {
-    "stiffness": 90.0,
-    "damping": 0.2,
-    "friction_torque": 0.4,
-    "full_friction_rate": 0.8,
-}  # N m/rad, N m s/rad, N m
+# N m/rad, N m s/rad, N m
+END_BUSHING = {"stiffness": 90.0, "damping": 0.2, "friction_torque": 0.4, "full_friction_rate": 0.8}
+# m, N
 LINEAR_TABLE = {
     "displacement": (-0.05, -0.01, 0.0, 0.01, 0.04),
     "force": (-900.0, -50.0, 0.0, 60.0, 300.0),
-}  # m, N
+}
 TORQUE_TABLE = {"angle": (-0.5, -0.1, 0.0, 0.2), "torque": (-60.0, -9.0, 0.0, 30.0)}  # rad, N m
 SPONGE = {
     "displacement": (-0.02, -0.01, -0.003, 0.003, 0.01, 0.02),
@@ -51,6 +48,7 @@ DAMPERS = {
 FRICTION = {f"friction_torque_{axis}": 0.5 for axis in "xyz"} | {
     f"full_friction_rate_{axis}": 1.5 for axis in "xyz"
 }
+# N, m; N m, rad; N/m, N s/m; N m/rad, N m s/rad; N/m, N/rad, N m/rad
 RUBBER = {
     "dahl_force_x": 20.0,
     "dahl_displacement_x": 2e-3,
@@ -67,7 +65,7 @@ RUBBER = {
     "cross_stiffness_x_y": 300.0,
     "cross_stiffness_z_about_x": 20.0,
     "rotational_cross_stiffness_x_y": 5.0,
-}  # N, m; N m, rad; N/m, N s/m; N m/rad, N m s/rad; N/m, N/rad, N m/rad
+}
 TABLES = {f"stiffness_{axis}": LINEAR_TABLE for axis in "xyz"} | {
     f"rotational_stiffness_{axis}": TORQUE_TABLE for axis in "xyz"
 }

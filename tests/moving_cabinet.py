@@ -3,12 +3,13 @@
 from wm_drake.parameters import MachineParameters, load_machine
 
 INERTIA = {"xx": 3.0, "yy": 3.2, "zz": 2.4, "xy": 0.05, "xz": -0.1, "yz": 0.08}  # kg m^2
+# N/m, N s/m
 FEET = {
     "vertical_stiffness": 200e3,
     "vertical_damping": 800.0,
     "horizontal_stiffness": 60e3,
     "horizontal_damping": 300.0,
-}  # N/m, N s/m
+}
 
 
 def with_moving_cabinet(parameters=None, *, foot_type=None, **changes):

@@ -27,14 +27,10 @@ def in_machine(text):
 
 FAULTY_MACHINES = {
     "missing file": ({}, "no such file, and no shipped machine of that name"),
-    "bad YAML": ({"machine.yaml": "name: x\nloads: [1,\n  }\n"}, "is not YAML"),
-    "empty": ({"machine.yaml": ""}, "is empty"),
     "unknown key": (
         in_machine("gasket: {stifness_x: 3 N/mm}"),
         "unknown key 'stifness_x' (did you mean 'stiffness_x'?",
     ),
-    "wrong unit": (in_machine("gasket: {stiffness_x: 3 N}"), "unit 'N' does not fit"),
-    "negative mass": (in_machine("bodies: {tub: {mass: -1 kg}}"), "'-1 kg' is out of range"),
     "inertia not positive definite": (
         in_machine(
             "bodies: {tub: {inertia: {xx: 1 kg m^2, yy: 1 kg m^2, zz: 1 kg m^2, xy: 2 kg m^2}}}"
@@ -68,12 +64,6 @@ FAULTY_MACHINES = {
     ),
     "unknown model": (in_machine("model: nosuch.sdf"), "no SDF file 'nosuch.sdf'"),
     "model that is no SDF": (in_machine("model: machine.yaml"), "cannot be read"),
-    "NaN": (in_machine("gravity: nan m/s^2"), "gravity: 'nan m/s^2' is not a number with a unit"),
-    "empty profile": (in_machine("profile: {steps: []}"), "profile: is empty"),
-    "times that fall": (
-        in_machine("profile: {time: '(0, 2, 1) s', speed: '(0, 1, 2) rpm'}"),
-        "times must rise",
-    ),
     "missing measured table": (
         in_machine("measured: [nosuch.csv]"),
         "machine.yaml:2: measured.0: file 'nosuch.csv': No such file or directory",
@@ -110,21 +100,12 @@ FAULTY_SPINS = {
         ["--set", "gasket.stiffness_x=3"],
         "gasket.stiffness_x: '3' has no unit",
     ),
-    "set negative mass": (
-        {},
-        ["--set", "bodies.tub.mass=-1 kg"],
-        "bodies.tub.mass: '-1 kg' is out of range",
-    ),
     "set unknown link": (
         {},
         ["--set", "bodies.tubb.mass=1 kg"],
         "no moving link 'tubb' in the SDF",
     ),
-    "same load twice": (
-        {},
-        ["--load", "middle", "--load", "middle"],
-        "'middle' is given twice",
-    ),
+    "same load twice": ({}, ["--load", "middle", "--load", "middle"], "'middle' is given twice"),
     "load file named as a load": (
         {"middle.yaml": "unbalances: []\n"},
         ["--load", "middle", "--load", "middle.yaml"],
@@ -136,17 +117,6 @@ FAULTY_SPINS = {
         "l.yaml:1: unbal",
     ),
     "missing profile": ({}, ["--profile", "nosuch.csv"], "no such file 'nosuch.csv'"),
-    "profile without rows": ({"p.csv": "time_s,speed_rpm\n"}, ["--profile", "p.csv"], "p.csv"),
-    "profile that falls": (
-        {"p.csv": "time_s,speed_rpm\n0,0\n2,1\n1,2\n"},
-        ["--profile", "p.csv"],
-        "times must rise",
-    ),
-    "profile with NaN": (
-        {"p.csv": "time_s,speed_rpm\n0,0\n2,nan\n"},
-        ["--profile", "p.csv"],
-        "row 2 of the data",
-    ),
     "out is a file": (
         {"file": ""},
         ["--out", "file"],
@@ -176,15 +146,17 @@ def assert_refused(ended, before, message):
 
 
 @pytest.mark.parametrize(
-    "command", [("machine", "check"), ("machine", "show"), ("spin", "--out", "out", "--machine")]
+    ("fault", "command"),
+    [
+        *((fault, "machine check") for fault in FAULTY_MACHINES),
+        *((fault, "machine show") for fault in ("missing file", "unknown key", "unknown frame")),
+        *((fault, "spin --out out --machine") for fault in ("unknown key", "unknown frame")),
+    ],
 )
-@pytest.mark.parametrize("fault", FAULTY_MACHINES)
 def test_faulty_machine_is_refused_with_one_line_and_nothing_written(wm_drake, fault, command):
     files, message = FAULTY_MACHINES[fault]
-    if fault.startswith("missing ") and "table" in fault and command == ("machine", "show"):
-        pytest.skip("what is shown needs no measured amplitudes")
     before = write_all(files)
-    ended = wm_drake(*command, "machine.yaml")
+    ended = wm_drake(command, "machine.yaml")
     assert_refused(ended, before, message)
     assert "machine.yaml" in ended.err or "nosuch" in ended.err
 
@@ -260,17 +232,8 @@ def test_shown_machine_is_complete(wm_drake, reference):
     shown = json.loads(ended.out)
     assert (ended.code, ended.err) == (0, "")
     assert set(shown) == {
-        *(
-            "machine",
-            "units",
-            "gravity_W",
-            "bodies",
-            "oscillating_mass_kg",
-            "drum_joint",
-            "springs",
-            "dampers",
-            "bushings",
-        ),
+        *("machine", "units", "gravity_W", "bodies", "oscillating_mass_kg", "drum_joint"),
+        *("springs", "dampers", "bushings"),
         *("telescopic_dampers", "drum_bearing", "cabinet", "motor"),
         *("sensors", "detergent_point_T", "loads", "profile", "rest_pose", "equilibrium_residual"),
         "sag_at_rest",
@@ -294,18 +257,11 @@ def test_shown_machine_is_complete(wm_drake, reference):
     for name in ("springs", "dampers", "sensors", "loads"):
         assert set(shown[name]) == set(getattr(reference, name))
     assert set(shown["bushings"]) == {"gasket"}
+    ends = {"tub_point_T", "housing_point_W"}
     for spring in shown["springs"].values():
-        assert {
-            "tub_point_T",
-            "housing_point_W",
-            "stiffness",
-            "preload",
-            "length_at_preload",
-        } <= set(spring)
+        assert {*ends, "stiffness", "preload", "length_at_preload"} <= set(spring)
     for damper in shown["dampers"].values():
-        assert {"tub_point_T", "housing_point_W", "law", "friction_force", "end_bushing"} <= set(
-            damper
-        )
+        assert {*ends, "law", "friction_force", "end_bushing"} <= set(damper)
 
 
 def test_shown_machine_obeys_set(wm_drake):
@@ -353,18 +309,8 @@ class PlainRun:
 def plain(tmp_path_factory):
     folder = tmp_path_factory.mktemp("plain")
     (folder / "profile.yaml").write_text(PROFILE)
-    arguments = [
-        "spin",
-        "--json",
-        "--profile",
-        "profile.yaml",
-        "--out",
-        "out",
-        "--load",
-        "middle",
-        "--replay",
-    ]
-    return PlainRun(in_own_process(*arguments, cwd=folder), folder)
+    command = "spin --json --profile profile.yaml --out out --load middle --replay"
+    return PlainRun(in_own_process(*command.split(), cwd=folder), folder)
 
 
 def in_own_process(*arguments, cwd):
@@ -379,26 +325,9 @@ def test_spin_prints_one_json_object(plain):
     assert (printed["machine"], printed["engine"]) == ("reference", "compiled")
     case = plain.case
     assert set(case) == {
-        *(
-            "load",
-            "gasket",
-            "amplitudes_mm",
-            "detergent_box_mm",
-            "gasket_force_N",
-            "gasket_moment_Nm",
-        ),
-        *(
-            "mount_force_N",
-            "cabinet_wrench",
-            "feet",
-            "walk",
-            "motor",
-            "smallest_gap_mm",
-            "smallest_spring_tension_N",
-            "critical_rpm",
-            "diverged",
-            "wall_s",
-        ),
+        *("load", "gasket", "amplitudes_mm", "detergent_box_mm", "gasket_force_N"),
+        *("gasket_moment_Nm", "mount_force_N", "cabinet_wrench", "feet", "walk", "motor"),
+        *("smallest_gap_mm", "smallest_spring_tension_N", "critical_rpm", "diverged", "wall_s"),
     }
     assert (case["load"], case["gasket"], case["diverged"]) == ("middle", True, None)
     assert list(case["amplitudes_mm"]) == list(case["critical_rpm"]) == SENSORS
@@ -512,13 +441,8 @@ def test_without_gasket_there_is_no_gasket_force(wm_drake):
 
 
 def test_set_changes_the_result_and_is_recorded(wm_drake, plain):
-    _, printed = spin(
-        wm_drake,
-        "--set",
-        "loads.middle.unbalances.0.mass = 500 g",
-        "--set",
-        "gasket.damping_x=0.03 N s/mm",
-    )
+    load = "loads.middle.unbalances.0.mass = 500 g"
+    _, printed = spin(wm_drake, "--set", load, "--set", "gasket.damping_x=0.03 N s/mm")
     assert printed["cases"][0]["amplitudes_mm"]["Xr"] < 0.8 * plain.case["amplitudes_mm"]["Xr"]
     attrs = load_record(Path("out/record_middle.nc")).attrs
     assert json.loads(attrs["load_parameters"])["unbalances"][0]["mass"] == 0.5
@@ -615,28 +539,6 @@ def test_a_machine_too_stiff_for_the_step_is_refused(wm_drake):
     assert "step: 2.5 ms is too long for the tub" in ended.err
     assert "allowed are up to" in ended.err
     assert not Path("out").exists()
-
-
-@pytest.mark.slow
-def test_loads_side_by_side(tmp_path):
-    (tmp_path / "profile.yaml").write_text("time: (0, 0.5) s\nspeed: (0, 60) rpm\n")
-    ended = in_own_process(
-        "spin",
-        "--json",
-        "--profile",
-        "profile.yaml",
-        "--load",
-        "middle",
-        "--load",
-        "counter",
-        "--no-gasket",
-        cwd=tmp_path,
-    )
-    assert (ended.returncode, ended.stderr.strip()) == (0, "")
-    assert [case["load"] for case in strict_json(ended.stdout)["cases"]] == ["middle", "counter"]
-    assert {path.name for path in (tmp_path / "wm-drake-spin").iterdir()} == {
-        *("record_middle.nc", "record_counter.nc", "amplitudes.csv", "report.html", "run.json")
-    }
 
 
 def test_faulty_input_in_a_process_of_its_own(tmp_path):

@@ -29,25 +29,8 @@ def test_study_modes_prints_the_documented_json(wm_drake, tmp_path):
 
 
 def test_study_response_prints_the_documented_json(wm_drake, tmp_path):
-    result = wm_drake(
-        "study",
-        "response",
-        "--json",
-        "--load",
-        "front",
-        "--points",
-        "6",
-        "--harmonics",
-        "3",
-        "--from",
-        "150 rpm",
-        "--to",
-        "200 rpm",
-        "--rate",
-        "50 rpm/s",
-        "--out",
-        "r",
-    )
+    command = "study response --json --load front --points 6 --harmonics 3 --out r"
+    result = wm_drake(command, "--from", "150 rpm", "--to", "200 rpm", "--rate", "50 rpm/s")
     assert result.code == 0, result.err
     found = json.loads(result.out)
     assert [case["gasket"] for case in found["cases"]] == [True, False]

@@ -18,9 +18,10 @@ from wm_drake.elements.strut import strut_line, wrench_at_origin
 from wm_drake.laws import bushing, damper, friction, spring, strut, table
 from wm_drake.parameters.elements import ForceTable
 
+# m, N
 CURVE = packed_stiffness(
     ForceTable(displacement=(-0.02, -0.008, 0.008, 0.02), force=(-90.0, 0.0, 0.0, 120.0))
-)  # m, N
+)
 BUSHING = np.concatenate(
     [
         [
@@ -73,11 +74,7 @@ LAWS = {
         damper.free_stroke_damper,
         lambda f, x: f(0.2 * x[0], 0.015 * x[1], *FREE_STROKE, (CURVE, 0)),
     ),
-    "damper_response": (
-        2,
-        damper_law.damper_response,
-        lambda f, x: f(x[0], 0.01 * x[1], STV, 0),
-    ),
+    "damper_response": (2, damper_law.damper_response, lambda f, x: f(x[0], 0.01 * x[1], STV, 0)),
     "spring_tension": (
         1,
         spring.spring_tension,

@@ -29,9 +29,8 @@ def angle_from(sine, cosine):
     return angle_of(sine, cosine)
 
 
-@pytest.mark.parametrize(
-    "reach", [1e-8, 0.5, 0.7853, 0.7855, 2.0, 100.0, 5e4]
-)  # rad; a quarter of pi is 0.78540
+# rad; a quarter of pi is 0.78540
+@pytest.mark.parametrize("reach", [1e-8, 0.5, 0.7853, 0.7855, 2.0, 100.0, 5e4])
 def test_compiled_sine_and_cosine_are_numpys_to_two_bits(reach):
     for x in np.linspace(-reach, reach, 4001):
         assert sine_cosine_of(x) == pytest.approx((np.sin(x), np.cos(x)), rel=0.0, abs=2.0 * ULP)

@@ -120,17 +120,15 @@ def test_rotation_about_one_fixed_axis_is_plain():
     assert moment_from_rotation_vector(r, w, k) == pytest.approx(w)
 
 
-@pytest.mark.parametrize(
-    "angle", [1e-4, 0.01, 0.05, 0.0999, 0.1001674, 0.1001675, 0.11]
-)  # rad; series below sin = 0.1
+# rad; series below sin = 0.1
+@pytest.mark.parametrize("angle", [1e-4, 0.01, 0.05, 0.0999, 0.1001674, 0.1001675, 0.11])
 def test_series_of_angle_over_sine_meets_its_closed_form(angle):
     sine, cosine = np.sin(angle), np.cos(angle)
     assert angle_over_sine(sine * sine, cosine) == pytest.approx(angle / sine, rel=1e-15, abs=0.0)
 
 
-@pytest.mark.parametrize(
-    "angle", [0.03, 0.0999, 0.0999999, 0.1000001, 0.11]
-)  # rad; series below 0.1
+# rad; series below 0.1
+@pytest.mark.parametrize("angle", [0.03, 0.0999, 0.0999999, 0.1000001, 0.11])
 def test_series_of_the_rotation_vector_coefficient_meets_its_closed_form(angle):
     closed = (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / angle**2
     rounding = 3e-16 / angle**2  # of the closed form: it subtracts from one

@@ -17,11 +17,12 @@ def turned(a, rotation_vector):
 
 
 def test_strut_line_gives_length_direction_and_their_rates():
+    # m
     arm, p_WT, p_WH = (
         np.array([0.2, -0.1, -0.25]),
         np.array([0.01, -0.02, 0.03]),
         np.array([0.3, -0.1, -0.6]),
-    )  # m
+    )
     w, v = np.array([0.3, -0.2, 0.5]), np.array([0.4, 0.1, -0.3])  # rad/s, m/s
     length, rate, direction, v_A, inverse_length = strut_line(
         TubMotion((), tuple(p_WT), tuple(w), tuple(v)), tuple(arm), tuple(p_WH)

@@ -30,10 +30,7 @@ SLACK = ("springs only",)
 """Machines without damping whose springs go slack near resonance: there, Drake at its default accuracy
 is 0.03 mm from the converged motion (tests/engines/test_slack_springs.py compares slack springs)."""
 TWO = Load(
-    unbalances=(
-        Unbalance(mass=0.8, radius=0.25, y=-0.1),
-        Unbalance(mass=0.4, radius=0.2, y=0.1),
-    )
+    unbalances=(Unbalance(mass=0.8, radius=0.25, y=-0.1), Unbalance(mass=0.4, radius=0.2, y=0.1))
 )
 
 
@@ -90,8 +87,7 @@ def test_70_s_trajectories_agree_to_a_micrometre_when_both_are_refined(
 
 @pytest.mark.parametrize(("load", "gasket"), [("middle", True), ("back", True), ("counter", False)])
 @pytest.mark.parametrize(
-    "rate",
-    [pytest.param(4.0, marks=pytest.mark.slow), pytest.param(1.0, marks=pytest.mark.hours)],
+    "rate", [pytest.param(4.0, marks=pytest.mark.slow), pytest.param(1.0, marks=pytest.mark.hours)]
 )
 def test_peaks_at_default_steps_agree(machine, reference, load, gasket, rate):
     """Check the default step of 2.5 ms: 0.1 % in peaks with gasket, 0.3 % without."""

@@ -18,9 +18,8 @@ DAMPING = (50.0, 10.0, 50.0)  # N s/m
 ROTATIONAL_DAMPING = (3.0, 5.0, 7.0)  # N m s/rad
 FRICTION_TORQUE = (3.7, 2.0, 1.0)  # N m
 FULL_FRICTION_RATE = (1.5, 1.0, 0.5)  # rad/s
-CURVE = ForceTable(
-    displacement=(-0.01, -0.002, 0.003, 0.01), force=(-60.0, -4.0, 5.0, 80.0)
-)  # m, N
+# m, N
+CURVE = ForceTable(displacement=(-0.01, -0.002, 0.003, 0.01), force=(-60.0, -4.0, 5.0, 80.0))
 
 vectors = st.tuples(*[st.floats(-2.0, 2.0)] * 3)
 
@@ -73,9 +72,8 @@ def test_hand_values_along_and_about_one_axis():
     force, moment = bushing_force(
         (0.01, 0.0, 0.0), (0.2, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.5, 0.0), p, 0
     )
-    assert force == pytest.approx(
-        (-80.0 - 10.0, 0.0, 0.0)
-    )  # N: 8 N/mm * 10 mm, 0.05 N s/mm * 200 mm/s
+    # N: 8 N/mm * 10 mm, 0.05 N s/mm * 200 mm/s
+    assert force == pytest.approx((-80.0 - 10.0, 0.0, 0.0))
     friction = 2.0 * np.sin(np.pi / 4)  # N m: half the rate of full friction
     assert moment == pytest.approx((0.0, -89.0 - 2.5 - friction, 0.0))  # N m
 
@@ -105,12 +103,10 @@ def test_elastic_energy_comes_back_around_a_closed_path_of_large_rotations():
         powers.append(np.dot(force, d_rate) + np.dot(moment, w))
         naive_powers.append(-np.dot(np.multiply(ROTATIONAL_STIFFNESS, r), w))
     exchanged = np.mean(np.abs(powers))
-    assert (
-        abs(np.mean(powers)) < 1e-6 * exchanged
-    )  # the curve has jumps of curvature: the sum is not exact to rounding
-    assert (
-        abs(np.mean(naive_powers)) > 1e-2 * exchanged
-    )  # the torque on the rotation vector taken for a moment would leak
+    # the curve has jumps of curvature: the sum is not exact to rounding
+    assert abs(np.mean(powers)) < 1e-6 * exchanged
+    # the torque on the rotation vector taken for a moment would leak
+    assert abs(np.mean(naive_powers)) > 1e-2 * exchanged
 
 
 def test_elastic_power_is_the_loss_of_stored_energy():

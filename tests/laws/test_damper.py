@@ -254,9 +254,8 @@ def test_the_damper_with_stv_sponge_never_gives_back_more_than_its_sponge_stores
     assume(c1 + c2 > 0.0)
     tension, deformation_rate = stv_sponge_damper(rate, deformation, f_max, abs(v_st), K1, c1, c2)
     stored = K1 * deformation * deformation_rate  # W
-    parts = (K1 * abs(deformation) + c1 * abs(rate)) * (
-        abs(rate) + abs(deformation_rate)
-    )  # W, of which tension is a difference
+    # W, of which tension is a difference
+    parts = (K1 * abs(deformation) + c1 * abs(rate)) * (abs(rate) + abs(deformation_rate))
     assert tension * rate - stored >= -1e-12 * parts
 
 
@@ -282,9 +281,10 @@ def test_the_free_stroke_damper_never_gives_back_more_than_its_sponge_stores(rat
 
 
 def test_derivatives_of_a_free_stroke_damper_without_main_friction_are_finite():
+    # m, N
     sponge = packed_stiffness(
         ForceTable(displacement=(-0.02, -0.008, 0.008, 0.02), force=(-90.0, 0.0, 0.0, 120.0))
-    )  # m, N
+    )
     rate, deformation = InitializeAutoDiff(np.array([0.1, 0.0])).ravel()  # m/s, m
     _, deformation_rate = generic(free_stroke_damper)(
         rate, deformation, 0.0, 60.0, 1e-6, 10.5, 0.09, (sponge, 0)

@@ -33,18 +33,14 @@ def havsin_of_the_paper(x, x0, h0, x1, h1):
 def test_hand_values():
     assert coulomb_friction(0.1, 60.0) == -60.0  # N
     assert coulomb_friction(0.0, 60.0) == 0.0
-    assert stv_friction(0.03, 0.09, 60.0) == pytest.approx(
-        -20.0
-    )  # a third of the transition velocity
-    assert havsin_friction(0.03, 0.09, 10.5) == pytest.approx(
-        -5.25
-    )  # [A] Table 1: sin(30 deg) of 10.5 N
-    assert mstv_friction(0.1, 0.05, 35.0, 60.0, 1e-6) == pytest.approx(
-        -41.0
-    )  # slips: 35 N + 60 N s/m * 0.1 m/s
-    assert mstv_friction(0.05, 0.199999, 35.0, 60.0, 1e-6) == pytest.approx(
-        -9.5
-    )  # sticks: 38 N * 0.05/0.2
+    # a third of the transition velocity
+    assert stv_friction(0.03, 0.09, 60.0) == pytest.approx(-20.0)
+    # [A] Table 1: sin(30 deg) of 10.5 N
+    assert havsin_friction(0.03, 0.09, 10.5) == pytest.approx(-5.25)
+    # slips: 35 N + 60 N s/m * 0.1 m/s
+    assert mstv_friction(0.1, 0.05, 35.0, 60.0, 1e-6) == pytest.approx(-41.0)
+    # sticks: 38 N * 0.05/0.2
+    assert mstv_friction(0.05, 0.199999, 35.0, 60.0, 1e-6) == pytest.approx(-9.5)
 
 
 @every_law

@@ -7,12 +7,7 @@ import pytest
 
 from wm_drake.compiler.compilation import generic
 from wm_drake.elements.layouts import packed_torque_limit
-from wm_drake.elements.motor import (
-    MOTOR_STATE,
-    motor_response,
-    packed_motor,
-    sampled_state,
-)
+from wm_drake.elements.motor import MOTOR_STATE, motor_response, packed_motor, sampled_state
 from wm_drake.laws.motor import drum_friction, integral_rate, limited, speed_controller
 from wm_drake.laws.motor import torque_limit as limit_at
 from wm_drake.laws.table import pack_number
@@ -70,9 +65,8 @@ def test_the_integral_part_follows_a_limited_torque_instead_of_winding_up():
         torque = limited(demand, limit)
         integral += step * integral_rate.py_func(error, demand, torque, controller)
     assert integral == pytest.approx(limit, rel=1e-4)
-    assert integral_rate.py_func(3.0, 0.1, 0.1, controller) == pytest.approx(
-        0.15
-    )  # no limit: K_i e
+    # no limit: K_i e
+    assert integral_rate.py_func(3.0, 0.1, 0.1, controller) == pytest.approx(0.15)
 
 
 def test_friction_of_the_drum_opposes_it_and_saturates():
@@ -90,9 +84,8 @@ def test_all_numbers_of_motor_and_controller_are_those_of_the_motors_shaft():
     torque, growth = generic(motor_response)(state, 20.0, 20.5, packed, 0)
     assert torque == pytest.approx(10.0 * (0.1 + 0.03))
     assert growth == pytest.approx(0.05 * 5.0)
-    torque, growth = generic(motor_response)(
-        state, 100.0, 300.0, packed, 0
-    )  # 1000 rad/s at the motor
+    # 1000 rad/s at the motor
+    torque, growth = generic(motor_response)(state, 100.0, 300.0, packed, 0)
     assert torque == pytest.approx(10.0 * 500.0 / 1000.0)
     assert growth == pytest.approx(0.05 * 2000.0 + 2.5 * (0.5 - (0.02 * 2000.0 + 0.03)))
 

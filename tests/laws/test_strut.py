@@ -36,11 +36,8 @@ def test_no_moment_at_rest():
 
 def test_a_bent_strut_is_pushed_back_with_stiffness_times_angle():
     for angle in (1e-6, 0.02, 0.6, 2.0):  # rad
-        direction = (
-            float(np.sin(angle)),
-            0.0,
-            float(np.cos(angle)),
-        )  # turned by angle about y, away from z
+        # turned by angle about y, away from z
+        direction = (float(np.sin(angle)), 0.0, float(np.cos(angle)))
         moment = bending_moment(direction, ZERO, (0.0, 0.0, 1.0), K, 0.0, 0.0, V_T)
         assert moment == pytest.approx((0.0, -K * angle, 0.0), rel=1e-12, abs=1e-18)
 
@@ -49,9 +46,8 @@ def test_hand_values_of_damping_and_friction():
     z = (0.0, 0.0, 1.0)
     slow = bending_moment(z, (V_T / 2, 0.0, 0.0), z, 0.0, C, P, V_T)
     assert slow == pytest.approx((-0.3 * 0.25 - 0.9 * np.sin(np.pi / 4), 0.0, 0.0))
-    fast = bending_moment(
-        z, (0.0, -2.0, 0.0), z, 0.0, C, P, V_T
-    )  # the body turns under a strut at rest
+    # the body turns under a strut at rest
+    fast = bending_moment(z, (0.0, -2.0, 0.0), z, 0.0, C, P, V_T)
     assert fast == pytest.approx((0.0, 0.3 * 2.0 + 0.9, 0.0))
 
 
@@ -95,9 +91,10 @@ def test_spin_about_the_struts_own_axis_is_free(direction, spin):
     assert moment == pytest.approx(ZERO, abs=1e-13)
 
 
+# rad/s
 @pytest.mark.parametrize(
     "rate", [0.0, 1e-9, 0.3 * V_T, 0.999999 * V_T, V_T, 1.000001 * V_T, 5.0 * V_T]
-)  # rad/s
+)
 def test_bending_friction_is_that_of_havsin(rate):
     z = (0.0, 0.0, 1.0)
     assert bending_moment(z, (rate, 0.0, 0.0), z, 0.0, 0.0, P, V_T)[0] == pytest.approx(
@@ -105,9 +102,8 @@ def test_bending_friction_is_that_of_havsin(rate):
     )
 
 
-@pytest.mark.parametrize(
-    "angle", [0.0999999, 0.1001674, 0.1001675, 0.11]
-)  # rad; the series gives way at sin = 0.1
+# rad; the series gives way at sin = 0.1
+@pytest.mark.parametrize("angle", [0.0999999, 0.1001674, 0.1001675, 0.11])
 def test_bending_is_smooth_where_the_series_gives_way_to_the_arctangent(angle):
     direction = (float(np.sin(angle)), 0.0, float(np.cos(angle)))
     assert bending_moment(direction, ZERO, (0.0, 0.0, 1.0), K, 0.0, 0.0, V_T)[1] == pytest.approx(

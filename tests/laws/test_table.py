@@ -21,9 +21,8 @@ def tables(draw):
     """Draw rising displacements from -10 mm on, never falling forces, some of them flat."""
     n = draw(st.integers(2, 7))
     steps = draw(st.lists(st.floats(1e-4, 5e-3), min_size=n - 1, max_size=n - 1))  # m
-    rises = draw(
-        st.lists(st.just(0.0) | st.floats(1e-2, 50.0), min_size=n - 1, max_size=n - 1)
-    )  # N
+    # N
+    rises = draw(st.lists(st.just(0.0) | st.floats(1e-2, 50.0), min_size=n - 1, max_size=n - 1))
     x = np.concatenate([[0.0], np.cumsum(steps)]) - 0.01
     y = np.concatenate([[0.0], np.cumsum(rises)]) - 20.0
     return ForceTable(displacement=tuple(map(float, x)), force=tuple(map(float, y)))
@@ -80,9 +79,8 @@ def test_force_and_slope_are_continuous_at_the_ends_of_a_flat_zone_and_of_a_tabl
         left, at, right = (
             stiffness_force(x + h, packed_stiffness(PROGRESSIVE), 0) for h in (-1e-7, 0.0, 1e-7)
         )
-        assert at - left == pytest.approx(
-            right - at, abs=1e-5
-        )  # N; a kink of 1 N/mm would show as 1e-4 N
+        # N; a kink of 1 N/mm would show as 1e-4 N
+        assert at - left == pytest.approx(right - at, abs=1e-5)
 
 
 def test_packed_stiffnesses_stand_one_after_another_in_one_array():

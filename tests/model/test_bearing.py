@@ -64,9 +64,10 @@ def test_the_drum_sags_by_its_weight_over_the_stiffness(whirling, upright):
     setup = whirling.set_up(parameters=with_bearing(upright))
     weight, depth = drum_weight_and_depth(whirling, setup)
     own = own_outputs(whirling.bearing, whirling.bearing.GetMyContextFromRoot(setup.context))
+    # m
     np.testing.assert_allclose(
         own[:3], [0.0, 0.0, -weight / BEARING["radial_stiffness"]], atol=1e-12
-    )  # m
+    )
     moment = weight * (BEARING["y"] - depth)  # its centre of mass hangs in front of the bearing
     np.testing.assert_allclose(
         own[3:6], [moment / BEARING["tilting_stiffness"], 0.0, 0.0], rtol=1e-6, atol=1e-12
@@ -114,14 +115,12 @@ def test_whirl_is_that_of_a_rotor_on_two_springs(balls, ratio):
     expected = two_bodies(
         TUB, STIFFNESS, DAMPING, DRUM + mass, RADIAL, 120.0, speed, mass * 0.25 * speed**2
     )
-    found = response(
-        record, record.drum_displacement, "z", "x"
-    )  # phase 0 points up and turns towards the right
+    # phase 0 points up and turns towards the right
+    found = response(record, record.drum_displacement, "z", "x")
     assert found == pytest.approx(expected, rel=2e-4)
     assert abs(record.drum_displacement.sel(axis="y")).max() < 1e-9
-    assert np.angle(expected) < (
-        -1.5 if ratio > 1.0 else 0.0
-    )  # above its critical speed the drum turns about its centre
+    # above its critical speed the drum turns about its centre
+    assert np.angle(expected) < (-1.5 if ratio > 1.0 else 0.0)
 
 
 @pytest.mark.parametrize("speed", [60.0, 300.0])
@@ -134,10 +133,8 @@ def test_a_couple_tilts_the_drum_as_its_gyroscopic_moment_lets_it(balls, speed):
     record = simulate(balls, Case("two", Load(unbalances=ends), constant_speed(speed, 6.0))).sel(
         time=slice(4.0, None)
     )
-    across, about = (
-        0.2 + 2 * mass * (depth**2 + 0.25**2 / 2),
-        0.3 + 2 * mass * 0.25**2,
-    )  # kg m^2, means
+    # kg m^2, means
+    across, about = (0.2 + 2 * mass * (depth**2 + 0.25**2 / 2), 0.3 + 2 * mass * 0.25**2)
     couple = 2 * mass * 0.25 * depth * speed**2
     # a body that turns about its axis resists circular tilting with J_across - J_about
     expected = two_bodies(5 * 0.3, 4000.0, 40.0, across - about, TILTING, 6.0, speed, couple)
@@ -157,9 +154,8 @@ def test_amplitudes_tend_to_those_of_a_perfect_joint_with_the_give(machine, refe
         moved = simulate(build_machine(parameters), Case("front", load, RUN_UP)).displacement.values
         apart.append(np.abs(moved - perfect).max())
     assert 1e-6 < apart[0] < 1e-3  # m
-    np.testing.assert_allclose(
-        [apart[0] / apart[1], apart[1] / apart[2]], 4.0, rtol=0.1
-    )  # first order
+    # first order
+    np.testing.assert_allclose([apart[0] / apart[1], apart[1] / apart[2]], 4.0, rtol=0.1)
 
 
 def test_energy_of_a_run_is_balanced():
@@ -252,9 +248,8 @@ def test_machines_with_and_without_do_not_mix(whirling, machine, reference):
 
 def test_the_fastest_motion_of_two_bodies_on_a_spring_is_the_closed_form(balls):
     axial = np.sqrt(BEARING["axial_stiffness"] * (1.0 / DRUM + 1.0 / TUB))
-    assert fastest_motion(balls.set_up()).rate == pytest.approx(
-        axial, rel=1e-4
-    )  # rad/s; the stiffest direction
+    # rad/s; the stiffest direction
+    assert fastest_motion(balls.set_up()).rate == pytest.approx(axial, rel=1e-4)
 
 
 @pytest.mark.parametrize(("pieces", "allowed"), [(5, "1 ms"), (7, "0.7143 ms, such as 0.625 ms")])

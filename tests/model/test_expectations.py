@@ -55,10 +55,7 @@ PLANTED = {
     ),
     "concrete": ({"bodies.upper_counterweight.mass": "15 kg"}, "bodies.upper_counterweight.mass"),
     "steel": (
-        {
-            "bodies.motor.mass": "60 kg",
-            "spring_types.suspension.action": "tension-compression",
-        },
+        {"bodies.motor.mass": "60 kg", "spring_types.suspension.action": "tension-compression"},
         "bodies.motor.mass",
     ),
 }

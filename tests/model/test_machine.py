@@ -108,9 +108,10 @@ def assert_change_equals_rebuild(machine, changed):
 def test_an_unbalanced_override_finds_its_own_equilibrium(machine, reference):
     hook = machine.set_up().springs["left"].p_WH
     changed = with_value(reference, "bodies.upper_counterweight.mass", 10.5)
+    # it leans now
     changed = with_value(
         changed, "frames.spring_left_housing.position", tuple(hook + np.array([-0.004, 0.002, 0.0]))
-    )  # it leans now
+    )
     setup = machine.set_up(parameters=changed)
     assert np.max(np.abs(setup.residual)) < 1e-9
     assert 0.0 < np.max(np.abs(setup.rest_pose)) < 0.02

@@ -175,6 +175,5 @@ def test_tub_has_six_soft_modes(washing_machine, built):
     frequencies = natural_modes(built).frequency_hz
     assert len(frequencies) == 6
     assert 0.5 < frequencies[0] < frequencies[-1] < 10.0
-    assert (
-        machine.profile.speed[-1] > 2.0 * 3.1416 * frequencies[-1]
-    )  # the run-up goes through all of them
+    # the run-up goes through all of them
+    assert machine.profile.speed[-1] > 2.0 * 3.1416 * frequencies[-1]

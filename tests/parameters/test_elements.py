@@ -86,9 +86,7 @@ def test_packed_table_is_scipys_monotone_cubic(table):
     assert [stiffness_force(x, packed, 0) for x in inside] == pytest.approx(curve(inside), abs=1e-9)
 
 
-@given(
-    st.lists(st.tuples(st.floats(0.001, 1.0), st.floats(0.0, 100.0)), min_size=2, max_size=6),
-)
+@given(st.lists(st.tuples(st.floats(0.001, 1.0), st.floats(0.0, 100.0)), min_size=2, max_size=6))
 def test_table_never_falls(steps):
     x, y = np.cumsum(steps, axis=0).T
     packed = packed_stiffness(ForceTable(displacement=tuple(x), force=tuple(y)))

@@ -188,11 +188,3 @@ def test_faulty_factor_file_is_refused(tmp_path):
     assert "soft" in str(caught.value)
     assert "unknown key 'lo' (did you mean 'low'?" in str(caught.value)
     assert "empty" in str(caught.value)
-
-
-def test_number_of_the_sdf_has_its_unit(reference):
-    text = "bodies.motor.mass=5 kg..7 kg"
-    (levels,) = levels_of(reference, dict([factor_of_text(text, {})]))
-    assert levels.units == {"bodies.motor.mass": "kg"}
-    assert levels.numbers == {"bodies.motor.mass": (5.0, 6.0, 7.0)}
-    assert levels.shown == ("5 kg", "6 kg", "7 kg")

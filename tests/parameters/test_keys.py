@@ -18,8 +18,6 @@ from wm_drake.parameters import (
 NOT_COMPARED = {"sources", "measured", "published"}
 """Keys of an extended machine that differ from those of its base."""
 
-KEYS = [key for key, _, _ in quantities(load_machine("reference"))]
-
 
 @pytest.mark.parametrize(
     ("key", "value", "si"),
@@ -49,16 +47,10 @@ def test_original_is_unchanged(reference):
     assert reference.model_dump() == before
 
 
-@pytest.mark.parametrize("key", KEYS)
-def test_every_number_can_be_set_to_what_it_is(reference, key):
-    value = {k: v for k, v, _ in quantities(reference)}[key]
-    assert with_value(reference, key, value) == reference
-
-
-@pytest.mark.parametrize("key", KEYS)
-def test_every_number_can_be_set_to_its_own_text(reference, key):
-    value, unit = {k: (v, u) for k, v, u in quantities(reference)}[key]
-    assert with_value(reference, key, unit.text(value)) == reference
+def test_every_number_can_be_set_to_what_it_is_and_to_its_text(reference):
+    for key, value, unit in quantities(reference):
+        assert with_value(reference, key, value) == reference, key
+        assert with_value(reference, key, unit.text(value)) == reference, key
 
 
 def test_numbers_are_listed_with_value_and_unit(reference):
@@ -70,7 +62,7 @@ def test_numbers_are_listed_with_value_and_unit(reference):
         "mm",
     )
     assert listed["profile.speed"] == (reference.profile.speed, "rpm")
-    assert len(listed) == len(KEYS) >= 50
+    assert len(listed) >= 50
     tables = with_gasket_tables(reference)
     listed = {key: (value, unit.shown) for key, value, unit in quantities(tables)}
     assert listed["gasket.stiffness_x.force"] == (tables.gasket.stiffness_x.force, "N")
@@ -250,9 +242,3 @@ def test_number_that_was_not_there_is_checked_against_the_other_parts():
     )
     with pytest.raises(InputError, match="give only one of them"):
         with_values(given, {f"springs.{name}.preload": 50.0})
-
-
-def test_number_that_is_not_allowed_is_told_with_its_key():
-    """Check that the part of the changed number is validated in any case."""
-    with pytest.raises(InputError, match=r"gasket\.damping_x"):
-        with_values(load_machine("reference"), {"gasket.damping_x": -1.0})

@@ -18,12 +18,10 @@ def test_the_33_cases_come_in_the_order_of_table_9():
     shown = [(1e3 * c.front, 1e3 * c.rear, np.rad2deg(c.phase)) for c in cases]
     np.testing.assert_allclose(shown, pairs)
     errors = np.array([case.published_error_percent for case in cases])
-    assert errors.mean() == pytest.approx(
-        20.11, abs=0.01
-    )  # [A] section 4.2 prints mean and standard deviation
-    assert errors.std() == pytest.approx(
-        4.10, abs=0.005
-    )  # standard deviation of the 33 values, not of a sample
+    # [A] section 4.2 prints mean and standard deviation
+    assert errors.mean() == pytest.approx(20.11, abs=0.01)
+    # standard deviation of the 33 values, not of a sample
+    assert errors.std() == pytest.approx(4.10, abs=0.005)
 
 
 def test_a_case_is_a_load_in_the_planes_of_the_machine(reference):
@@ -92,14 +90,8 @@ def test_regions_of_a_csv_reach_from_row_to_row(tmp_path):
     [
         ("[{name: A, begin: 0 s, end: 9 s}]", "end at the end of the profile"),
         ("[{name: A, begin: 1 s, end: 1 s}]", "end after its begin"),
-        (
-            "[{name: A, begin: 0 s, end: 2 s}, {name: B, begin: 1 s, end: 3 s}]",
-            "must begin at",
-        ),
-        (
-            "[{name: A, begin: 0 s, end: 1 s}, {name: A, begin: 1 s, end: 3 s}]",
-            "'A' occurs twice",
-        ),
+        ("[{name: A, begin: 0 s, end: 2 s}, {name: B, begin: 1 s, end: 3 s}]", "must begin at"),
+        ("[{name: A, begin: 0 s, end: 1 s}, {name: A, begin: 1 s, end: 3 s}]", "'A' occurs twice"),
         ("[{name: A, begin: 0, end: 1 s}]", "'0' has no unit"),
         ("[{name: 'a b', begin: 0 s, end: 1 s}]", "is not a name"),
     ],

@@ -50,12 +50,6 @@ def test_text_becomes_si(text, si, value):
     assert to_si(text, IN_FILE, Unit(si, si)) == pytest.approx(value, rel=1e-15)
 
 
-def test_gasket_torsional_damping_of_the_paper_in_si():
-    assert to_si("60 N mm s/deg", IN_FILE, Unit("N*m*s/rad", "N*mm*s/deg")) == pytest.approx(
-        3.4377, abs=5e-5
-    )
-
-
 def test_vector_becomes_si():
     assert to_si_vector("(1, -2.5, 3e1) mm", IN_FILE, LENGTH) == pytest.approx(
         (0.001, -0.0025, 0.03)
@@ -79,11 +73,6 @@ def test_vector_becomes_si():
 def test_another_dimension_is_refused(text, unit):
     with pytest.raises(ValueError, match="does not fit; allowed is a unit such as"):
         to_si(text, IN_FILE, unit)
-
-
-def test_refusal_of_a_vector_names_a_fitting_unit():
-    with pytest.raises(ValueError, match=r"allowed is a unit such as mm$"):
-        to_si_vector("(1, 2, 3) N", IN_FILE, LENGTH)
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,7 @@ from simple_machines import with_gasket_tables
 from wm_drake.errors import InputError
 from wm_drake.parameters import Change, apply, variation_of
 from wm_drake.parameters.units import PureNumber, Share, Unit
-from wm_drake.parameters.variation import (
-    change_of,
-    number_at,
-    owned_twice,
-    range_of,
-)
+from wm_drake.parameters.variation import change_of, number_at, owned_twice, range_of
 
 STIFFNESS = Unit("N/m", "N/mm")
 SPRING = "spring_types.suspension.stiffness"

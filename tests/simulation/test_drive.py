@@ -79,8 +79,7 @@ def slow_runs():
     torque = vibration_torque(speeds)
     top, at = torque.max(), speeds[torque.argmax()]
     parameters = isotropic_motor(
-        torque_limit={"torque": 1.0},
-        controller={"proportional_gain": 0.02, "integral_gain": 0.02},
+        torque_limit={"torque": 1.0}, controller={"proportional_gain": 0.02, "integral_gain": 0.02}
     )
     machine = build_machine(parameters)
     profile = SpinProfile(time=(0.0, 60.0, 90.0), speed=(9.0, 18.0, 18.0))

@@ -88,10 +88,11 @@ def test_machine_at_rest_stands_with_its_weight(machine, reference):
     ] + [np.array(reference.cabinet.centre_of_mass)]
     total, centre = sum(masses), np.average(centres, axis=0, weights=masses)
     found = foot_loads(reference.cabinet, reference.gravity, wrenches_on_cabinet(record))
+    # feet at +-S
     expected = [
         0.25 * total * G * (1.0 + centre[0] * foot.x / S**2 + centre[1] * foot.y / S**2)
         for foot in (reference.cabinet.feet[name] for name in found.feet)
-    ]  # feet at +-S
+    ]
     np.testing.assert_allclose(found.normal[-1], expected, rtol=1e-6)
 
 

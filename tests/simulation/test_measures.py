@@ -138,11 +138,8 @@ def test_measures_read_amplitude_speed_and_forces():
     assert float(measures.amplitude[0]) == pytest.approx(0.01, rel=5e-3)
     assert float(measures.critical_speed[0]) == pytest.approx(20.0, abs=0.2)
     assert measures.detergent_displacement.values.tolist() == [0.001, 0.0, 0.002]
-    assert measures.gasket_force.values.tolist() == [
-        3.0,
-        2.0,
-        1.0,
-    ]  # the other bushing does not count
+    # the other bushing does not count
+    assert measures.gasket_force.values.tolist() == [3.0, 2.0, 1.0]
     assert measures.gasket_moment.values == pytest.approx([0.3, 0.2, 0.1])
     assert measures.smallest_gap is None
 

@@ -22,17 +22,10 @@ def record(gasket="yes"):
     turning = np.stack([5.0 * np.cos(phase) - 5.0, none, 5.0 * np.sin(phase)], axis=1)
     return xr.Dataset(
         {
-            "mount_force": (
-                ("time", "mount", "axis"),
-                np.stack([spring, damper, turning], axis=1),
-            ),
+            "mount_force": (("time", "mount", "axis"), np.stack([spring, damper, turning], axis=1)),
             "drum_speed": ("time", 10.0 * RAD_S * TIME),
         },
-        {
-            "time": TIME,
-            "mount": ["springs.left", "dampers.rear", "gasket"],
-            "axis": list("xyz"),
-        },
+        {"time": TIME, "mount": ["springs.left", "dampers.rear", "gasket"], "axis": list("xyz")},
         {"gasket": gasket},
     )
 

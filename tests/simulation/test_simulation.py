@@ -224,9 +224,8 @@ def test_moving_the_world_moves_the_machine_with_it(machine, upright, engine):
     shifted = Load(unbalances=(Unbalance(mass=0.7, radius=0.25, y=-0.1 + shift[1]),))
     there = simulate(build_machine(moved), Case("one", shifted, profile), engine)
     here = simulate(machine, Case("one", base, profile, parameters=upright), engine)
-    np.testing.assert_allclose(
-        there.displacement, here.displacement, atol=1e-8
-    )  # m; rounding grows at friction's corners, a hundred times more near the resonance
+    # m; rounding grows at friction's corners, a hundred times more near the resonance
+    np.testing.assert_allclose(there.displacement, here.displacement, atol=1e-8)
     np.testing.assert_allclose(there.bushing_force, here.bushing_force, atol=1e-4)  # N
     assert float(np.abs(here.displacement).max()) > 1e-3
 

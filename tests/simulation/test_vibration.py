@@ -196,9 +196,8 @@ class TestClosedForms:
 
     def test_equal_masses_in_opposition_turn_and_do_not_push(self, isotropic):
         acceleration, turning = self.rates(isotropic, np.pi)
-        couple = (
-            2.0 * self.MASS * self.RADIUS * self.Y * self.SPEED**2
-        )  # front up, rear down: about -x
+        # front up, rear down: about -x
+        couple = 2.0 * self.MASS * self.RADIUS * self.Y * self.SPEED**2
         inertia = 6 * 0.3 + 2.0 * self.MASS * (self.RADIUS**2 + self.Y**2)
         np.testing.assert_allclose(acceleration, 0.0, atol=1e-9)
         assert turning[0] == pytest.approx(-couple / inertia, rel=0.02)

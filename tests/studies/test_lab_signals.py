@@ -12,9 +12,8 @@ from wm_drake.studies.spin_cycle.measured import read_accelerations
 
 TIME = np.linspace(0.0, 20.0, 4001)
 NAMES = ("S1_x", "S1_y", "S1_z")
-ACCELERATIONS = [
-    amplitude * np.sin(2.0 * np.pi * 3.0 * TIME) for amplitude in (2.0, 3.0, 1.0)
-]  # m/s^2
+# m/s^2
+ACCELERATIONS = [amplitude * np.sin(2.0 * np.pi * 3.0 * TIME) for amplitude in (2.0, 3.0, 1.0)]
 SPEED = np.linspace(60.0, 400.0, len(TIME))  # rpm
 LABELS = {"case": ["front"], "region": [0], "accelerometer": ["S1"], "axis": ["x", "y", "z"]}
 PROFILE = SpinProfile(

@@ -88,9 +88,8 @@ def our_wrench(bushing, x):
 def relative_difference(amplitude, stiffness_only):
     """Return the largest of ten random motions with angles [rad] and displacements [10 cm] of it."""
     rng = np.random.default_rng(41)
-    sizes = np.array(
-        [1.0] * 3 + [0.1] * 3 + [0.0] + [1.0] * 3 + [0.1] * 3 + [0.0]
-    )  # rad, m, rad/s, m/s
+    # rad, m, rad/s, m/s
+    sizes = np.array([1.0] * 3 + [0.1] * 3 + [0.0] + [1.0] * 3 + [0.1] * 3 + [0.0])
     plant, bushing = drake_plant(stiffness_only), our_bushing(stiffness_only)
     states = amplitude * rng.uniform(-1.0, 1.0, (10, 14)) * sizes
     ours, theirs = (

@@ -34,12 +34,12 @@ from wm_drake.systems.speed_source import REFLECTED_INERTIA, MotorTorque, SpeedS
 from wm_drake.systems.spin_profile_source import SpinProfileSource
 from wm_drake.systems.tub_force import TubForce
 
+# m, N
 SPRING_CURVE = ForceTable(
     displacement=(-0.03, -0.01, 0.0, 0.01, 0.04), force=(-200.0, -50.0, 0.0, 60.0, 300.0)
-)  # m, N
-END_BUSHING = EndBushing(
-    stiffness=6.0, damping=0.2, friction_torque=0.4, full_friction_rate=0.8
-)  # N m/rad, N m s/rad, N m
+)
+# N m/rad, N m s/rad, N m
+END_BUSHING = EndBushing(stiffness=6.0, damping=0.2, friction_torque=0.4, full_friction_rate=0.8)
 GASKET = Bushing(
     tub_frame="tub_front",
     housing_frame="housing_front",
@@ -166,9 +166,8 @@ def test_a_spring_pulls_its_hooks_together(stiffness):
         line = p_WA - placed.p_WH
         length = np.linalg.norm(line)
         stretch = length - np.linalg.norm(placed.p_ToA_T - placed.p_WH)
-        tension = 240.0 + (
-            stiffness * stretch if isinstance(stiffness, float) else curve(stretch)
-        )  # N
+        # N
+        tension = 240.0 + (stiffness * stretch if isinstance(stiffness, float) else curve(stretch))
         force = -tension * line / length
         context = context_of(spring, x)
         assert port(spring, context, "force") == pytest.approx([tension])
@@ -273,9 +272,8 @@ def test_end_bushings_bend_back_a_strut_and_their_moments_are_balanced(damper):
                 - 0.4 * np.sin(np.pi / 2 * min(speed / 0.8, 1.0)) * rate / speed
             )
         couple = np.cross(sum(moments), e) / length
-        np.testing.assert_allclose(
-            sum(moments) + np.cross(length * e, -couple), 0.0, atol=1e-13
-        )  # balance of the strut
+        # balance of the strut
+        np.testing.assert_allclose(sum(moments) + np.cross(length * e, -couple), 0.0, atol=1e-13)
         with_bushings, without = (
             port(d, context_of(d, x, state), "generalized_force") for d in (bent, free)
         )

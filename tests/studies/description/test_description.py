@@ -152,8 +152,7 @@ def test_imperfections_and_points_are_described(machine, reference):
 def test_neutral_direction_is_that_of_the_drawing_not_of_rest():
     """Put a spring hook out of place: the rest pose tilts, end bushings stay neutral as drawn."""
     parameters = with_values(
-        load_machine("reference"),
-        {"frames.spring_left_housing.position": "(-270, -20, 330) mm"},
+        load_machine("reference"), {"frames.spring_left_housing.position": "(-270, -20, 330) mm"}
     )
     plain = describe(build_machine(parameters))
     damper = plain["dampers"]["left"]

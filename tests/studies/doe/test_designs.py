@@ -144,10 +144,11 @@ def test_strength_of_an_unbalanced_array_is_less():
 
 
 def test_small_design_is_the_best_of_all():
+    # all 84 of them
     best = max(
         efficiency(level_matrix(2)[list(rows)], "main")
         for rows in itertools.combinations(range(9), 6)
-    )  # all 84 of them
+    )
     found = max(efficiency(d_optimal_levels(2, 6, "main", seed), "main") for seed in range(5))
     assert found == pytest.approx(best)
 
@@ -174,9 +175,8 @@ def test_efficiency_does_not_depend_on_names_of_factors_and_levels(d_optimal):
 
 
 def test_few_trials_and_large_grids():
-    assert (
-        make_design("d-optimal", NAMES[:4], trials=33).efficiency() > 0.0
-    )  # as many trials as coefficients
+    # as many trials as coefficients
+    assert make_design("d-optimal", NAMES[:4], trials=33).efficiency() > 0.0
     assert make_design("d-optimal", NAMES[:3], trials=27).efficiency() == pytest.approx(100.0)
     ten = make_design("d-optimal", tuple("abcdefghij"), trials=100, model="main")
     assert ten.efficiency() > 95.0
