@@ -199,4 +199,5 @@ def test_the_picture_of_the_architecture_has_all_rooms_and_their_imports(monkeyp
     arcs = [title.text for title in picture.iter("title")]
     assert any(arc.startswith("laws imports compiler ") for arc in arcs)
     assert not any(arc.startswith("compiler imports") for arc in arcs)
-    assert all(architecture.imports()[arc.split()[0]][arc.split()[2]] for arc in arcs)
+    imports = architecture.imports()
+    assert all(imports[arc.split()[0]][arc.split()[2]] for arc in arcs)
