@@ -18,11 +18,11 @@ from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import DivergenceWarning, simulate
 
 MACHINES = machines_of_each_kind()
-RUN_UP = SpinProfile(time=(0.0, 0.501, 3.0, 3.5), speed=(4.0, 6.0, 30.0, 22.0))
+RUN_UP = SpinProfile(time=(0.0, 0.301, 1.6, 1.9), speed=(6.0, 8.0, 30.0, 22.0))
 PEAKS = ("amplitude", "detergent_displacement", "gasket_force", "gasket_moment")
 
 
-SHORT = SpinProfile(time=(0.0, 0.201, 0.6), speed=(12.0, 16.0, 22.0))
+SHORT = SpinProfile(time=(0.0, 0.151, 0.4), speed=(12.0, 16.0, 22.0))
 JUMPS = ("coulomb", "two bushings, five dampers of three laws")
 """Machines with friction that jumps where a damper reverses: rounding grows there, and Drake's error
 control takes its smallest steps, so that they run for a short time only."""
