@@ -20,6 +20,7 @@ LONG = {  # more than five seconds
     "compare_searches.py",
     "compare_speed.py",
     "fit_coulomb_to_mstv.py",
+    "write_paper_b.py",
     "write_validation.py",
 }
 SCRIPTS = [

@@ -90,6 +90,12 @@ def compared(
     return "\n".join(text) + "\n"
 
 
+def table_text(heading: str, columns: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    """Return a heading and a table as Markdown."""
+    rows = [columns, ["---"] * len(columns), *lines]
+    return "\n".join(["", f"## {heading}", "", *map(_line, rows)]) + "\n"
+
+
 def verified(
     groups: Mapping[str, Sequence[Mapping[str, Any]]], outcomes: Mapping[str, tuple[int, int]]
 ) -> str:

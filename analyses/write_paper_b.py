@@ -1,0 +1,179 @@
+"""What does [B] print, table by table, and what do the shipped machines give?
+
+The script runs the machines over the run-up of [B], and its gasket study with linear tables, and
+renews docs/paper-b.md between its marks:
+
+    python analyses/write_paper_b.py --page docs/paper-b.md
+
+A machine whose amplitudes are half of the printed ones by construction is compared with half of
+them; the page says so.
+"""
+
+import argparse
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from wm_drake import Case, build_machine, load_machine, simulate_many
+from wm_drake.parameters import (
+    GASKET_FACTORS,
+    MachineParameters,
+    at_levels,
+    levels_of,
+    load_factors,
+    measured_amplitudes,
+    published_results,
+)
+from wm_drake.studies.doe import make_design
+from wm_drake.studies.gasket.published import Published, published_for
+from wm_drake.studies.gasket.screening import Screening, run_screening
+from wm_drake.studies.gasket.study import GasketTrials
+from wm_drake.studies.validation import page
+from wm_drake.studies.validation.claims import claims
+
+MACHINES = ("reference", "adams_2026")
+LOADS = ("middle", "counter")
+
+
+def screening_of(machine: MachineParameters, trials: int) -> Screening:
+    """Return the gasket study of [B] with linear tables, on an orthogonal design."""
+    levels = levels_of(machine, load_factors(GASKET_FACTORS), "linear")
+    design = make_design("orthogonal", tuple(level.name for level in levels), trials=trials)
+    middle = at_levels(machine, levels, [0] * len(levels))
+    loads = [Case(name, machine.loads[name], machine.profile) for name in LOADS]
+    study = GasketTrials(middle, levels, loads, ["D", "F", "M"])
+    run = partial(simulate_many, build_machine(middle), measures=study.measures)
+    return run_screening(design, lambda plan: study.responses(plan, run))
+
+
+def amplitude_lines(machines: dict[str, MachineParameters]) -> list[list[str]]:
+    """Return a line for each printed amplitude: measured, Adams, and that of each machine."""
+    rows, computed = {}, {}
+    for name, machine in machines.items():
+        table = measured_amplitudes(machine)
+        cases = list(dict.fromkeys(zip(table.load, table.gasket, strict=True)))
+        runs = [Case(n, machine.loads[n], machine.profile, gasket == "yes") for n, gasket in cases]
+        amplitude = 1e3 * simulate_many(build_machine(machine), runs).amplitude.values
+        for case, values in zip(cases, amplitude, strict=True):
+            computed[name, case] = values
+        for row in table.itertuples():
+            key = (row.load, row.gasket), row.source
+            rows.setdefault(key, {})[name] = [getattr(row, sensor) for sensor in machine.sensors]
+    lines = []
+    for (case, source), printed in rows.items():
+        for place, sensor in enumerate(machines[MACHINES[0]].sensors):
+            cells = [f"{case[0]}, {'with' if case[1] == 'yes' else 'without'} gasket, {sensor}"]
+            cells.append(source)
+            for name in machines:
+                theirs, ours = printed[name][place], computed[name, case][place]
+                cells += [f"{theirs:g}", f"{ours:.1f} ({100.0 * (ours / theirs - 1.0):+.0f} %)"]
+            lines.append(cells)
+    return lines
+
+
+def study_lines(
+    screenings: dict[str, Screening], published: Published
+) -> tuple[list[list[str]], list[list[str]]]:
+    """Return the lines of Tables 4 and 5: what is printed, then that of each machine."""
+    sums, terms = [], []
+    first = next(iter(screenings.values()))
+    for label, table in first.tables.items():
+        what, unit = ", ".join(label), first.responses.units[label[1]]
+        ours = [screening.tables[label] for screening in screenings.values()]
+        for name, known, values in zip(
+            ("main effects", "interactions"),
+            published.sums(label),
+            ([t.main_percent for t in ours], [t.interaction_percent for t in ours]),
+            strict=True,
+        ):
+            cells = [f"{value:.1f} %" for value in values]
+            sums.append([f"{what}: {name}", f"{known:g} %", *cells])
+        mean = published.mean(label)
+        cells = [f"{t.constant:.3g} {unit}" for t in ours]
+        terms.append([f"{what}: mean", f"{mean:g} {unit}", *cells])
+        if limits := published.range(label):
+            frames = [s.responses.values[label[0]][label[1]] for s in screenings.values()]
+            cells = [f"{frame.min():.1f} to {frame.max():.1f} {unit}" for frame in frames]
+            terms.append([f"{what}: range", f"{limits[0]:g} to {limits[1]:g} {unit}", *cells])
+        for index, term in enumerate(table.terms):
+            percent, effects = published.percent(label, term), published.effects(label, term)
+            if percent is None:
+                continue
+            values = [t.terms[index] for t in ours]
+            cells = [f"{value.percent:.0f} %" for value in values]
+            terms.append([f"{what}: {term.name}", f"{percent:g} %", *cells])
+            for level in (-1, 0) if effects else ():
+                cells = [
+                    f"{value.effects[(level,)]:.2g}"
+                    + (" **sign**" if level < 0 and published.sign_differs(label, value) else "")
+                    for value in values
+                ]
+                terms.append([f"effect at {level}", f"{effects[(level,)]:.3g}", *cells])
+    return sums, terms
+
+
+def summary(name: str, screening: Screening, published: Published) -> list[str]:
+    """Return the numbers that sum up a machine."""
+    leaders = published.leaders(screening).values()
+    points = np.abs(list(published.main_points(screening).values()))
+    means = [published.mean_difference(screening, label) or 0.0 for label in screening.tables]
+    return [
+        name,
+        f"{sum(ours == theirs for ours, theirs in leaders)} of {len(leaders)}",
+        f"{points.mean():.1f} / {points.max():.0f}",
+        f"{np.abs(means).mean():.1f} / {np.abs(means).max():.0f}",
+        str(len(published.other_signs(screening))),
+    ]
+
+
+def main() -> None:
+    """Run the machines and write the page."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="27 trials in place of 243")
+    parser.add_argument("--page", type=Path, help="page to renew between its marks")
+    parser.add_argument("--out", type=Path, help="also write the text to this file")
+    arguments = parser.parse_args()
+    trials = 27 if arguments.quick else 243
+    machines = {name: load_machine(name) for name in MACHINES}
+    screenings = {name: screening_of(machine, trials) for name, machine in machines.items()}
+    first = screenings[MACHINES[0]]
+    published = published_for(published_results(machines[MACHINES[0]].published), first.tables)
+    sums, terms = study_lines(screenings, published)
+    heads = ["", "printed", *MACHINES]
+    pairs = [text for name in MACHINES for text in (f"{name}: printed, mm", "ours, mm")]
+    text = page.origin(
+        "python analyses/write_paper_b.py --page docs/paper-b.md",
+        [f"Gasket study: {trials} trials, tables linear."],
+    )
+    of_each = [summary(name, s, published) for name, s in screenings.items()]
+    text += page.table_text(
+        "Summary",
+        [
+            "machine",
+            "same leading factor",
+            "contributions: mean / largest difference, points",
+            "means: mean / largest difference, %",
+            "effects with another sign",
+        ],
+        of_each,
+    )
+    text += page.table_text(
+        "Tables 1 to 3: amplitudes", ["", "source", *pairs], amplitude_lines(machines)
+    )
+    text += page.table_text("Table 4: variance explained", heads, sums)
+    text += page.table_text("Table 5 and Fig. 10: means, ranges, contributions", heads, terms)
+    said = [[words, *cells] for words, cells in claims(screenings)]
+    text += page.table_text("Section 4 in words", ["", *MACHINES], said)
+    print(text)
+    if arguments.out:
+        arguments.out.write_text(text, encoding="utf-8")
+    if arguments.page:
+        before = arguments.page.read_text(encoding="utf-8")
+        arguments.page.write_text(page.renewed(before, text), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
