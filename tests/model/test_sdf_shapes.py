@@ -1,5 +1,7 @@
 """Shapes of an SDF file that cannot be measured are refused by `machine check` with their names."""
 
+from xml.etree import ElementTree
+
 import pytest
 
 from wm_drake.errors import InputError
@@ -75,7 +77,7 @@ def test_every_bad_shape_is_reported(tmp_path):
         encoding="utf-8",
     )
     with pytest.raises(InputError) as error:
-        check_shapes(path)
+        check_shapes(path, ElementTree.parse(path).getroot())
     assert len(error.value.problems) == 2
 
 
@@ -87,9 +89,9 @@ def test_pose_too_far_away_is_refused(tmp_path, pose):
         encoding="utf-8",
     )
     with pytest.raises(InputError, match=r"a pose is '.*'; allowed are numbers up to 1000"):
-        check_shapes(path)
+        check_shapes(path, ElementTree.parse(path).getroot())
 
 
 def test_shipped_models_are_accepted():
     for path in SDF_FOLDER.glob("*.sdf"):
-        check_shapes(path)
+        check_shapes(path, ElementTree.parse(path).getroot())

@@ -23,6 +23,7 @@ from pydrake.multibody.tree import (
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names, shortened
 from wm_drake.model.rotor import set_rotor
+from wm_drake.model.sdf_files import LARGEST_SDF, check_mass_properties, sdf_roots
 from wm_drake.model.sdf_names import frame_problems, sdf_names
 from wm_drake.model.sdf_shapes import check_shapes
 from wm_drake.model.state_layout import CABINET, CARRIER
@@ -44,9 +45,6 @@ SDF_FOLDER = _PACKAGE / "sdf" if (_PACKAGE / "sdf").is_dir() else _PACKAGE.paren
 
 LONGEST_REASON = 200
 """Largest number of characters of Drake's reason in a message."""
-
-LARGEST_SDF = 16 << 20
-"""Largest size of an SDF file. [byte]"""
 
 
 def sdf_path(model: str) -> Path:
@@ -100,14 +98,24 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
         InputError: there is no such file, it is not valid SDF, it lacks a body or a joint, or a new
             frame cannot be added.
     """
+    path = sdf_path(parameters.model)
+    roots = sdf_roots(path)
+    for each, root in roots.items():
+        check_shapes(each, root)
+    try:
+        _add_bodies(plant, parameters, path)
+    except (RuntimeError, ValueError, SystemExit) as error:
+        # Drake refuses what it reads or joins; it turns failed assertions into exits
+        raise unusable(path, error) from None
+    fixed = plant.GetBodiesWeldedTo(plant.world_body())
+    check_mass_properties(roots, [body.name() for body in fixed])
+
+
+def _add_bodies(plant: MultibodyPlant, parameters: MachineParameters, path: Path) -> None:
+    """Add the bodies of a checked SDF to a plant and finalize it, as `add_bodies` describes."""
     parser = Parser(plant)
     parser.SetStrictParsing()
-    path = sdf_path(parameters.model)
-    check_shapes(path)
-    try:
-        parser.AddModels(str(path))
-    except (RuntimeError, SystemExit) as error:  # Drake turns failed assertions into exits
-        raise unusable(path, error) from None
+    parser.AddModels(str(path))
     missing = [
         f"link '{name}'" for name in ("housing", "tub", "drum") if not plant.HasBodyNamed(name)
     ]

@@ -3,11 +3,10 @@
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from wm_drake.errors import InputError, Problem
-from wm_drake.parameters.text_files import check_regular, read_text
+from wm_drake.parameters.text_files import check_regular
 
 UNBOUNDED = ("plane", "heightmap")
 SIZES = ("size", "radius", "radii", "length")
@@ -19,23 +18,18 @@ LONGEST_LENGTH = 1000.0
 _LENGTHS = f"numbers up to {LONGEST_LENGTH:g} (metres)"
 
 
-def check_shapes(path: Path) -> None:
+def check_shapes(path: Path, root: Element) -> None:
     """Check that all shapes and poses of an SDF file are bounded and that its meshes can be read.
 
     Args:
         path: The SDF file; names of meshes are relative to it.
+        root: Its root element.
 
     Raises:
         InputError: a shape is unbounded, or a mesh is missing, empty, of another type, has a corner
             that is not finite, or is not a file; or a pose is too far away. There is one problem
             per shape and pose.
     """
-    text = read_text(path, key="model")
-    try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError) as error:
-        message = f"SDF '{path.name}' cannot be read: {error}"
-        raise InputError([Problem("", "model", message)]) from None
     problems = []
     for name, shape in _shapes(root):
         reason = _fault(shape, path)
