@@ -15,6 +15,7 @@ from wm_drake.engines.compiled.packing import (
     pack_elements,
 )
 from wm_drake.engines.compiled.stepping import Stepping, choose_stepping
+from wm_drake.engines.memory import check_size
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.model.machine import Machine, Setup
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
@@ -162,6 +163,7 @@ class Preparation:
         if key not in self._known_numbers:
             if len(self._known_numbers) >= KEPT_NUMBERS:
                 del self._known_numbers[next(iter(self._known_numbers))]
+            check_size(case.profile, self.step)
             empty = self._bodies(case.parameters or self.machine.parameters, None)
             setup = self._set_up(case)
             elements, layout = pack_elements(setup)

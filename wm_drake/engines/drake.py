@@ -7,6 +7,7 @@ from pydrake.systems.analysis import InitializeParams, ResetIntegratorFromFlags,
 
 from wm_drake.elements.cabinet import SLIP_SIZE
 from wm_drake.engines.cabinet_frame import seen_from_cabinet
+from wm_drake.engines.memory import check_size
 from wm_drake.engines.schedule import output_times
 from wm_drake.engines.trajectory import Trajectory, cut_at_divergence, diverging_coordinate
 from wm_drake.errors import shortened
@@ -85,7 +86,9 @@ def run_drake(
     """
     setup.machine.set_profile(setup.context, profile)
     simulator = _simulator(setup, step, scheme, accuracy)
-    samples = _Samples(setup, output_times(profile, setup.parameters.output_period))
+    period = setup.parameters.output_period
+    check_size(profile, step, period)
+    samples = _Samples(setup, output_times(profile, period))
     failure = ""
     try:
         for row, time in enumerate(samples.time):

@@ -53,9 +53,15 @@ def problems_of_option(option: str) -> Iterator[None]:
 
 def profile_of(parameters: "MachineParameters", path: Path | None) -> "SpinProfile":
     """Return the spin profile of the option `--profile`; that of the machine without it."""
+    from wm_drake.engines.memory import check_size
     from wm_drake.parameters import load_profile
 
-    return parameters.profile if path is None else load_profile(existing_file(path, "--profile"))
+    if path is None:
+        return parameters.profile
+    profile = load_profile(existing_file(path, "--profile"))
+    with problems_of_file(path):
+        check_size(profile, parameters.step)
+    return profile
 
 
 def load_parameters(
@@ -192,6 +198,7 @@ def build_checked(file: str, parameters: "MachineParameters") -> "Machine":
 def _built(file: str, parameters: "MachineParameters") -> "tuple[Machine, tuple[Problem, ...]]":
     from wm_drake.engines.compiled.packing import pack
     from wm_drake.engines.compiled.stepping import choose_stepping
+    from wm_drake.engines.memory import check_size
     from wm_drake.model.build import build_machine
     from wm_drake.model.expectations import unexpected
     from wm_drake.model.plausibility import unusual_values
@@ -205,6 +212,7 @@ def _built(file: str, parameters: "MachineParameters") -> "tuple[Machine, tuple[
         measured_amplitudes(parameters)
         published_results(parameters.published)
         step = checked_step(parameters, None)
+        check_size(parameters.profile, step)
         machine = build_machine(parameters)
         setup = machine.set_up()
         choose_stepping(setup, *pack(setup), parameters.profile, step, parameters.integrator)
@@ -240,9 +248,12 @@ def with_drive(parameters: "MachineParameters", drive: str | None) -> "MachinePa
 
 def quantities_of(text: str, unit: "Unit", option: str) -> tuple[float, ...]:
     """Return numbers with one unit, ``(1, 3, 5) mm`` or ``1,3,5 mm``, in SI."""
-    from wm_drake.parameters.units import convert, plain_number
+    from wm_drake.parameters.units import LONGEST_NUMBER, convert, plain_number
 
     body = text.strip()
+    if len(body) > LONGEST_NUMBER:
+        message = f"has {len(body)} characters; allowed are up to {LONGEST_NUMBER}"
+        raise input_error(message, where=option)
     if not body.startswith("("):
         size = len(_digits(body))
         body = f"({body[:size]}) {body[size:]}"
@@ -262,9 +273,8 @@ def quantities_of(text: str, unit: "Unit", option: str) -> tuple[float, ...]:
 
 def _digits(text: str) -> str:
     """Return the leading numbers of a text, with the commas between them."""
-    match = re.match(
-        r"[\s,]*(?:[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[\s,]*)*", text.strip()
-    )
+    number = r"[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]++)?"
+    match = re.match(rf"[\s,]*+(?:{number}[\s,]*+)*+", text.strip())
     return match[0] if match else ""
 
 

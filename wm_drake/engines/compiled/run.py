@@ -10,6 +10,7 @@ from wm_drake.engines.compiled.midpoint import integrate_midpoint_lanes, midpoin
 from wm_drake.engines.compiled.packing import Layout, aligned, fill_lanes, initial_state, pack
 from wm_drake.engines.compiled.samples import trajectory_of
 from wm_drake.engines.compiled.stepping import Stepping
+from wm_drake.engines.memory import check_size
 from wm_drake.engines.schedule import Schedule, schedule_of
 from wm_drake.engines.trajectory import Trajectory, diverging_coordinate
 from wm_drake.model.machine import Setup
@@ -50,6 +51,7 @@ def run_compiled(
     Raises:
         InputError: the machine has something that the compiled engine does not represent.
     """
+    check_size(profile, step, period)
     p, layout = pack(setup)
     period = period or setup.parameters.output_period
     begin = initial_state(setup, profile)
