@@ -44,6 +44,7 @@ _HOMES = {
     "save_record": "simulation.records",
     "simulate": "simulation.runs",
     "simulate_many": "batch",
+    "step_error": "batch",
     "steady_response": "studies.steady.response",
     "with_value": "parameters",
     "with_values": "parameters",

@@ -38,6 +38,7 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
 
     from wm_drake.batch.ledger import Ledger
+    from wm_drake.batch.verification import Sample, StepError
     from wm_drake.model.machine import Machine
     from wm_drake.parameters import MachineParameters
     from wm_drake.simulation.cases import Case
@@ -105,6 +106,7 @@ class Executor:
     client: Any = None
     out: Path | None = None
     runs: int = 0
+    _sample: "Sample | None" = field(default=None, repr=False)
     _report: Callable[..., None] | None = field(default=None, repr=False)
     _reported: int = field(default=0, repr=False)
 
@@ -144,6 +146,8 @@ class Executor:
         Records are too large for a ledger.
         """
         from wm_drake.batch import RunResult, simulate_many
+
+        cases = list(self._sampled(machine, cases))
 
         def collect(run: RunResult) -> None:
             assert run.record is not None
@@ -221,9 +225,29 @@ class Executor:
         run: Callable[..., xr.Dataset] = partial(simulate_remembered, workers=self.workers)
         if self.client is not None:
             run = partial(simulate_on_cluster, client=self.client)
-        table = run(machine, cases, self.ledger, measures=measures, progress=report)
+        sampled = self._sampled(machine, cases)
+        table = run(machine, sampled, self.ledger, measures=measures, progress=report)
         self.runs += table.sizes["run"]
         return table
+
+    def _sampled(self, machine: "Machine", cases: "Iterable[Case]") -> "Iterator[Case]":
+        """Yield cases, and keep a sample of them for `step_error`."""
+        for case in cases:
+            self.verify(machine, [case])
+            yield case
+
+    def verify(self, machine: "Machine", cases: "Iterable[Case]") -> None:
+        """Add cases to those of which a sample is run with half the step, after the study."""
+        from wm_drake.batch.verification import Sample
+
+        if self._sample is None:
+            self._sample = Sample()
+        for case in cases:
+            self._sample.add(machine, case)
+
+    def step_error(self) -> "StepError | None":
+        """Return the error of the steps of a sample of the cases; None without cases."""
+        return None if self._sample is None else self._sample.step_error()
 
 
 @dataclass(frozen=True)
@@ -353,9 +377,14 @@ def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
         if executor.ledger is not None:
             executor.ledger.mark_finished()
         step, integrator = _stepping(machine)
+        error = executor.step_error()
+        not_converged = (error.warning,) if error is not None and error.is_large else ()
+        for text in not_converged:
+            say(f"warning: {text}", err=True)
         wall_s = time.perf_counter() - begin
-        warned = (*about_machines, *_warnings(machines, friction_warnings))
-        facts = Facts(order.command, wall_s, warned, step, integrator)
+        warned = (*about_machines, *_warnings(machines, friction_warnings), *not_converged)
+        verified = "" if error is None else error.text
+        facts = Facts(order.command, wall_s, warned, step, integrator, verified)
         files = _written(result, facts, order.run.out, run)
     return result, facts, files
 
@@ -498,8 +527,8 @@ def _executor(order: Order, run: Run) -> Iterator[Executor]:
 def _ledger(chosen: LedgerOptions, run: Run) -> "Iterator[Ledger]":
     """Open the ledger of a study in its folder, or in a temporary one if nothing is written.
 
-    If this function created the folder, and no run finished and no result was written, it removes
-    the folder again.
+    If the input is refused, or no run finished and no result was written, this function removes
+    what it created: the ledger, and the folder if it was not there.
     """
     from wm_drake.batch.ledger import open_ledger
 
@@ -512,16 +541,22 @@ def _ledger(chosen: LedgerOptions, run: Run) -> "Iterator[Ledger]":
         return
     out, kept = chosen.out, 0
     check_is_folder(out)
-    created = not out.exists()
+    created, earlier = not out.exists(), set(out.glob(f"{LEDGER}*"))
     prepare_folder(out, run)
     options = {"resume": chosen.resume, "replace": run.overwrite}
     try:
         with open_ledger(out / LEDGER, run.identity, **options) as ledger:
             try:
                 yield ledger
-            finally:
                 kept = len(ledger)
+            except InputError:
+                raise
+            except BaseException:
+                kept = len(ledger)
+                raise
     finally:
-        if created and not kept and not (out / RUN_FILE).exists():
-            for path in (*out.glob(f"{LEDGER}*"), out):
-                path.unlink() if path.is_file() else path.rmdir()
+        if not kept and not (out / RUN_FILE).exists():
+            for path in set(out.glob(f"{LEDGER}*")) - earlier:
+                path.unlink()
+            if created and not any(out.iterdir()):
+                out.rmdir()

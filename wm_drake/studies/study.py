@@ -105,6 +105,7 @@ class Facts:
         warnings: Warnings of the machine, without those of the result.
         step: Step size of the compiled engine; 0 without a machine, or with several. [s]
         integrator: Integrator of the compiled engine.
+        verified: What a sample of the runs gave with half the step; "" without runs.
     """
 
     command: str = ""
@@ -112,6 +113,7 @@ class Facts:
     warnings: tuple[str, ...] = ()
     step: float = 0.0
     integrator: str = ""
+    verified: str = ""
 
     def rows(self) -> list[tuple[str, str]]:
         """Return the facts as pairs of word and text, for the end of a page."""
@@ -120,6 +122,7 @@ class Facts:
         step = f"{1e3 * self.step:g} ms, integrator {self.integrator}"
         return [
             *([("Step", step)] if self.step else []),
+            *([("Check of the step", self.verified)] if self.verified else []),
             ("Sources", sources_version()),
             ("Command", self.command),
         ]

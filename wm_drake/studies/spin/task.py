@@ -125,6 +125,8 @@ class SpinTask(Task):
                     comparison=comparison,
                     modes=is_one,
                 )
+                if self.engine == DEFAULT_ENGINE:  # the other one controls its error
+                    executor.verify(planned.machine, planned.cases)
                 files = Files(options.replay, options.detail, part)
                 variants.append(Variant(planned.name, replace(result, files=files)))
                 finished += len(planned.cases)
