@@ -4,6 +4,8 @@ import json
 import signal
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import pytest
 
@@ -80,9 +82,35 @@ def test_study_is_cancelled_and_continued(jobs, opened):
     assert waited(jobs, identifier, "finished")["report"]
 
 
+def test_studies_wait_for_their_turn(jobs, opened, monkeypatch):
+    monkeypatch.setattr(jobs_module, "MOST_RUNNING", 2)
+    monkeypatch.setattr(jobs_module, "MOST_WAITING", 3)
+    with ThreadPoolExecutor(8) as pool:  # pages ask at the same time
+        start = partial(jobs.start, *opened, STATE, "tolerance", {"samples": "16"})
+        started = [future.result() for future in [pool.submit(start) for _ in range(4)]]
+    shown = [jobs.shown(identifier) for identifier in started]
+    assert sorted(one["state"] for one in shown) == ["running"] * 2 + ["waiting"] * 2
+    assert sorted(one["place"] for one in shown if one["place"]) == [1, 2]
+    start()
+    with pytest.raises(InputError, match="3 studies wait already"):
+        start()
+    running = [one["id"] for one in shown if one["state"] == "running"]
+    first, second = sorted((one for one in shown if one["place"]), key=lambda one: one["place"])
+    jobs.cancel(first["id"])
+    assert jobs.shown(first["id"])["state"] == "not finished"
+    assert jobs.shown(second["id"])["place"] == 1
+    waited(jobs, running[0], "running")
+    jobs.cancel(running[0])
+    assert waited(jobs, second["id"], "running")["place"] is None
+
+
 @pytest.mark.parametrize(
     ("study", "options"),
     [
+        ("tolerance", {"load": "--out"}),
+        ("tolerance", {"load": "-h"}),
+        ("tolerance", {"samples": "--out=x"}),
+        ("tolerance", {"quick": "--out"}),
         ("rm", {}),
         ("calibrate", {}),
         ("gasket", {"out": "x"}),

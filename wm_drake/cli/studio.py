@@ -45,14 +45,15 @@ def studio(
     import uvicorn
 
     from wm_drake.parameters import machine_path, shipped_machines
+    from wm_drake.studio.connection import TimedConnection
     from wm_drake.studio.server import Studio, application
 
     given = machine if machine in shipped_machines() else str(machine_path(machine).resolve())
-    _make(folder)
     served = Studio(given, folder.resolve())
     served.machines.open(served.machines.first)  # an error of the file is shown here
     token = secrets.token_urlsafe(24)
     with _loopback(port) as listening:
+        _make(folder)  # last, so that no refused command leaves it
         number = listening.getsockname()[1]
         fragment = link.partition("#")[2]
         address = f"http://127.0.0.1:{number}/{token}/" + (f"#{fragment}" if fragment else "")
@@ -65,6 +66,7 @@ def studio(
             log_level="warning",
             access_log=False,  # it would have the token
             ws="none",
+            http=TimedConnection,
             timeout_graceful_shutdown=3,
         )
         uvicorn.Server(config).run(sockets=[listening])

@@ -1,5 +1,6 @@
 """Let only the page itself in: token in the path, own host, own origin, small bodies."""
 
+import asyncio
 import secrets
 from typing import Any
 
@@ -9,6 +10,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 LARGEST_BODY = 1 << 18
 """Largest body of a request. [byte]"""
+
+BODY_TIMEOUT = 10.0
+"""Time in which the body of a request must arrive. [s]"""
 
 _HEADERS = (
     (
@@ -47,7 +51,15 @@ class Guard:
         if refusal is not None:
             await _refuse(refusal, scope, receive, send)
             return
-        body = await _body(receive)
+        try:
+            async with asyncio.timeout(BODY_TIMEOUT):
+                body = await _body(receive)
+        except TimeoutError:
+            await _refuse((408, "the body did not arrive in time"), scope, receive, send)
+            return
+        except _IncompleteError:  # even if its beginning happens to be a whole request
+            await _refuse((400, "the body is not complete"), scope, receive, send)
+            return
         if body is None:
             await _refuse((413, "the body is too large"), scope, receive, send)
             return
@@ -80,15 +92,26 @@ class Guard:
 
 async def _refuse(refusal: tuple[int, str], scope: Scope, receive: Receive, send: Send) -> None:
     status, reason = refusal
-    headers: dict[str, Any] = {"connection": "close"} if status == 413 else {}
+    closes = status in (400, 408, 413)  # what follows on this connection has no known meaning
+    headers: dict[str, Any] = {"connection": "close"} if closes else {}
     await PlainTextResponse(reason, status, headers)(scope, receive, send)
 
 
+class _IncompleteError(Exception):
+    """A connection ended before the body of its request."""
+
+
 async def _body(receive: Receive) -> bytes | None:
-    """Return the body of a request; None if it grows too large, whatever length was declared."""
+    """Return the body of a request; None if it grows too large, whatever length was declared.
+
+    Raises:
+        _IncompleteError: the connection ended before the body did.
+    """
     body, more = b"", True
     while more:
         message = await receive()
+        if message["type"] == "http.disconnect":
+            raise _IncompleteError
         body += message.get("body", b"")
         more = message.get("more_body", False)
         if len(body) > LARGEST_BODY:

@@ -26,6 +26,9 @@ from wm_drake.studio.state import State
 MOST_RUNNING = 4
 """Largest number of studies that run at a time."""
 
+MOST_WAITING = 20
+"""Largest number of studies that wait for their turn."""
+
 LONGEST_OUTPUT = 20_000
 """Number of characters at the end of the output that a page gets."""
 
@@ -43,7 +46,8 @@ class Jobs:
 
     folder: Path
     _running: dict[str, "subprocess.Popen[bytes]"] = field(default_factory=dict)
-    _lock: threading.Lock = field(default_factory=threading.Lock)
+    _waiting: dict[str, Sequence[str]] = field(default_factory=dict)
+    _lock: threading.RLock = field(default_factory=threading.RLock)
 
     def start(
         self,
@@ -53,15 +57,15 @@ class Jobs:
         study: str,
         options: dict[str, str],
     ) -> str:
-        """Start a study of what a page has chosen, and return its identifier.
+        """Start a study of what a page has chosen, or let it wait, and return its identifier.
 
         Raises:
-            InputError: there is no such study or option, a number is wrong, too many studies run,
+            InputError: there is no such study or option, a number is wrong, too many studies wait,
                 or the folder cannot be written.
         """
         words = arguments(study, options)
-        if sum(self._runs(identifier) for identifier in self._running) >= MOST_RUNNING:
-            raise input_error(f"{MOST_RUNNING} studies run already; wait or cancel one", key=study)
+        if len(self._waiting) >= MOST_WAITING:
+            raise input_error(f"{MOST_WAITING} studies wait already; cancel one", key=study)
         parameters = chosen(machine, state)
         base = machines.name_or_path(state.machine)
         try:
@@ -71,7 +75,7 @@ class Jobs:
             command = ["study", study, "--machine", "machine.yaml", "--out", "results", *words]
             about = {"study": study, "command": command, "started": now(), "machine": state.machine}
             (folder / "job.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
-            self._launch(identifier, command)
+            self._enqueue(identifier, command)
         except OSError as error:
             raise input_error(
                 f"cannot be written to: {reason_of(error)}", where=str(self.folder)
@@ -85,10 +89,10 @@ class Jobs:
             InputError: there is no such study, or it runs.
         """
         about = self._about(identifier)
-        if self._runs(identifier):
+        if self._runs(identifier) or identifier in self._waiting:
             raise input_error("runs already", key=identifier)
         again = ["--resume"] if STUDIES[about["study"]].has_runs else []
-        self._launch(identifier, [*about["command"], *again])
+        self._enqueue(identifier, [*about["command"], *again])
 
     def cancel(self, identifier: str) -> None:
         """Interrupt a study as Ctrl-C does; what it has finished is kept.
@@ -97,6 +101,8 @@ class Jobs:
             InputError: there is no such study.
         """
         self._about(identifier)
+        with self._lock:
+            self._waiting.pop(identifier, None)
         process = self._running.get(identifier)
         if process is not None and process.poll() is None:
             process.send_signal(signal.SIGINT)
@@ -118,7 +124,8 @@ class Jobs:
         folder = self.folder / identifier
         output = _end_of(folder / "output.txt")
         progress = [(int(done), int(of)) for done, of in _PROGRESS.findall(output)]
-        runs = self._runs(identifier)
+        runs, waiting = self._runs(identifier), list(self._waiting)
+        place = waiting.index(identifier) + 1 if identifier in waiting else None
         has_report = (folder / "results" / "report.html").is_file()
         return {
             "id": identifier,
@@ -127,10 +134,11 @@ class Jobs:
             "machine": about["machine"],
             "started": about["started"],
             "command": " ".join(["wm-drake", *about["command"]]),
-            "state": "running" if runs else "finished" if has_report else "not finished",
+            "state": _state(runs, place, has_report),
+            "place": place,
             "progress": progress[-1] if progress else None,
             "output": output,
-            "report": has_report and not runs,
+            "report": has_report and not runs and not place,
         }
 
     def report_file(self, identifier: str, name: str) -> Path:
@@ -152,7 +160,9 @@ class Jobs:
 
     def end(self, timeout: float = 10.0) -> None:
         """Interrupt all studies and wait for them; those that do not end in time are killed."""
-        running = [process for process in self._running.values() if process.poll() is None]
+        with self._lock:
+            self._waiting.clear()
+            running = [process for process in self._running.values() if process.poll() is None]
         for process in running:
             process.send_signal(signal.SIGINT)
         for process in running:
@@ -170,10 +180,23 @@ class Jobs:
             (self.folder / f"{study}-{number}").mkdir(parents=True)
             return f"{study}-{number}"
 
+    def _enqueue(self, identifier: str, command: Sequence[str]) -> None:
+        """Let a study wait for its turn, which may come at once."""
+        with self._lock:
+            self._waiting[identifier] = command
+            self._advance()
+
+    def _advance(self) -> None:
+        """Launch the studies whose turn it is, in the order in which they came."""
+        with self._lock:
+            while self._waiting and sum(map(self._runs, self._running)) < MOST_RUNNING:
+                identifier = next(iter(self._waiting))
+                self._launch(identifier, self._waiting.pop(identifier))
+
     def _launch(self, identifier: str, command: Sequence[str]) -> None:
         folder = self.folder / identifier
         with (folder / "output.txt").open("wb") as output:
-            self._running[identifier] = subprocess.Popen(
+            process = self._running[identifier] = subprocess.Popen(
                 [sys.executable, "-m", "wm_drake", *command],
                 cwd=folder,
                 stdin=subprocess.DEVNULL,
@@ -181,6 +204,12 @@ class Jobs:
                 stderr=subprocess.STDOUT,
                 start_new_session=True,  # Ctrl-C at the server reaches a study through `end` only
             )
+        threading.Thread(target=self._next_after, args=(process,), daemon=True).start()
+
+    def _next_after(self, process: "subprocess.Popen[bytes]") -> None:
+        """Wait for the end of a study, and launch the next one."""
+        process.wait()
+        self._advance()
 
     def _runs(self, identifier: str) -> bool:
         process = self._running.get(identifier)
@@ -196,6 +225,13 @@ class Jobs:
         except (OSError, ValueError, KeyError, TypeError):
             pass
         raise input_error(f"no study '{identifier}'", key="study")
+
+
+def _state(runs: bool, place: int | None, has_report: bool) -> str:
+    """Return the state of a study in words."""
+    if runs or place:
+        return "running" if runs else "waiting"
+    return "finished" if has_report else "not finished"
 
 
 def _end_of(path: Path) -> str:

@@ -82,6 +82,7 @@ class Studio:
         self.jobs = Jobs(folder / "studies")
         self._workers = os.cpu_count() or 1
         self._executor = ThreadPoolExecutor(self._workers, thread_name_prefix="studio")
+        self.cheap = ThreadPoolExecutor(2, thread_name_prefix="studio-cheap")
         self.turns = Turns(self._executor, self._workers)
         self._runners: WeakKeyDictionary[OpenMachine, Runner] = WeakKeyDictionary()
         self._rankings: dict[str, asyncio.Task[list[dict[str, Any]]]] = {}
@@ -127,7 +128,8 @@ class Studio:
     def end(self) -> None:
         """End all studies and threads."""
         self.jobs.end()
-        self._executor.shutdown(wait=False, cancel_futures=True)
+        for executor in (self._executor, self.cheap):
+            executor.shutdown(wait=False, cancel_futures=True)
 
 
 def application(studio: Studio, token: str, port: int) -> Guard:
@@ -146,6 +148,7 @@ def application(studio: Studio, token: str, port: int) -> Guard:
             Route("/api/machines", routes.machines),
             Route("/api/machine", routes.machine),
             Route("/api/run", routes.run, methods=["POST"]),
+            Route("/api/place", routes.place),
             Route("/api/ranking", routes.ranking, methods=["POST"]),
             Route("/api/save", routes.save, methods=["POST"]),
             Route("/api/studies", routes.studies),
@@ -172,7 +175,7 @@ class _Routes:
     async def machines(self, _request: Request) -> Response:
         """Return the machines that can be opened."""
         machines = self.studio.machines
-        listed = await _in_thread(machines.listed)
+        listed = await self._at_once(machines.listed)
         return _json(
             {
                 "machines": [{"id": name, "kind": kind} for name, kind in listed.items()],
@@ -201,6 +204,11 @@ class _Routes:
         except OvertakenError:
             return _json({"overtaken": True})
 
+    async def place(self, request: Request) -> Response:
+        """Return how many runs come before the one that a page waits for."""
+        page = request.query_params.get("page", "")
+        return _json({"place": self.studio.turns.place(f"page {page}")})
+
     async def ranking(self, request: Request) -> Response:
         """Return the arrows of all numbers that influence a run."""
         body = RunRequest.model_validate_json(await request.body())
@@ -221,7 +229,7 @@ class _Routes:
 
     async def studies(self, _request: Request) -> Response:
         """Return all studies."""
-        return _json({"studies": await _in_thread(self.studio.jobs.listed)})
+        return _json({"studies": await self._at_once(self.studio.jobs.listed)})
 
     async def start(self, request: Request) -> Response:
         """Start a study."""
@@ -242,16 +250,20 @@ class _Routes:
         acts = {"cancel": self.studio.jobs.cancel, "resume": self.studio.jobs.resume}
         if act not in acts:
             raise input_error(f"no such act; allowed are {', '.join(acts)}", key="study")
-        await _in_thread(partial(acts[act], identifier))
+        await self._at_once(partial(acts[act], identifier))
         return _json({"id": identifier})
 
     async def report(self, request: Request) -> Response:
         """Return a file of the results of a study."""
         find = self.studio.jobs.report_file
-        path = await _in_thread(
+        path = await self._at_once(
             partial(find, request.path_params["id"], request.path_params["name"])
         )
         return FileResponse(path, headers={"content-security-policy": _REPORT_POLICY})
+
+    async def _at_once(self, answer: Callable[[], Any]) -> Any:
+        """Return an answer that needs no run: it does not wait for those that do."""
+        return await asyncio.get_running_loop().run_in_executor(self.studio.cheap, answer)
 
 
 async def _in_thread(calculate: Callable[[], Any]) -> Any:

@@ -46,6 +46,11 @@ class Turns:
         self._start()
         return await future
 
+    def place(self, page: str) -> int:
+        """Return how many calculations begin before the one that a page waits for; 0 if none."""
+        waiting = list(self._waiting)
+        return waiting.index(page) + len(self._running) if page in waiting else 0
+
     def _start(self) -> None:
         while len(self._running) < self._workers:
             page = self._next()

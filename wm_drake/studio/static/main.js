@@ -120,6 +120,7 @@ function chooseLoad(what) {
 async function run() {
   const number = ++asked;
   showBusy();
+  showPlace(number);
   const begin = performance.now();
   try {
     const found = await post('run', {page: PAGE, state, keys: turned});
@@ -142,6 +143,17 @@ async function run() {
 /** Tell readers of the page, also those of a screen reader, whether an answer is under way. */
 function showBusy() {
   document.body.setAttribute('aria-busy', String(settled < asked));
+}
+
+/** Show how many runs come before the last one, while it waits. */
+async function showPlace(number) {
+  await new Promise((resolve) => setTimeout(resolve, 1000));
+  if (settled >= number || number !== asked) return;
+  try {
+    const {place} = await get(`place?page=${encodeURIComponent(PAGE)}`);
+    if (place && number === asked && settled < number) status(`${place} runs come first`);
+  } catch { return; } // the run itself shows that the server does not answer
+  showPlace(number);
 }
 
 async function runGhost() {

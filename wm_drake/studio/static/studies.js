@@ -51,7 +51,7 @@ export class Studies {
       return;
     }
     byId('studies').replaceChildren(...studies.map((study) => this.row(study)));
-    if (studies.some((study) => study.state === 'running')) this.timer = setTimeout(() => this.update(), PERIOD);
+    if (studies.some(isUnderWay)) this.timer = setTimeout(() => this.update(), PERIOD);
   }
 
   row(study) {
@@ -59,15 +59,20 @@ export class Studies {
     const running = study.state === 'running';
     const [done, all] = study.progress ?? [0, 0];
     return make('div', {class: 'study', 'data-study': study.id},
-      make('strong', {}, study.id), ` · ${study.state} · ${study.machine} · started ${study.started} `,
+      make('strong', {}, study.id), ` · ${study.state}${study.place ? `, place ${study.place} of the queue` : ''} · ${study.machine} · started ${study.started} `,
       running ? make('progress', all ? {max: String(all), value: String(done)} : {}) : null,
       running && all ? ` ${done} of ${all} ` : null,
-      running ? make('button', {onclick: () => this.act(() => post(`${path}/cancel`, {}))}, 'cancel') : null,
+      isUnderWay(study) ? make('button', {onclick: () => this.act(() => post(`${path}/cancel`, {}))}, 'cancel') : null,
       study.state === 'not finished' ? make('button', {onclick: () => this.act(() => post(`${path}/resume`, {}))}, 'continue') : null,
       study.report ? make('a', {href: `reports/${study.id}/report.html`, target: '_blank', rel: 'noopener'}, 'report') : null,
       make('div', {}, make('code', {}, study.command)),
       study.output ? make('pre', {}, study.output.trim()) : null);
   }
+}
+
+/** Return whether a study runs or waits for its turn. */
+function isUnderWay(study) {
+  return study.state === 'running' || study.state === 'waiting';
 }
 
 /** Return the input of a field of a form. */
