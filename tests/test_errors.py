@@ -1,6 +1,13 @@
 """Messages: one printable line of limited length."""
 
-from wm_drake.errors import LONGEST_LINE, MOST_LINES, InputError, Problem, nearest_names, shortened
+from wm_drake.errors import (
+    LONGEST_LINE,
+    LONGEST_MESSAGE,
+    InputError,
+    Problem,
+    nearest_names,
+    shortened,
+)
 
 
 def test_short_text_stays():
@@ -31,13 +38,21 @@ def test_problem_fits_in_a_line():
 
 
 def test_error_lists_the_first_problems():
-    lines = str(InputError(Problem("", "", str(n)) for n in range(1000))).splitlines()
-    assert lines[:2] == ["0", "1"]
-    assert lines[MOST_LINES:] == [f"and {1000 - MOST_LINES} more problems"]
+    text = str(InputError(Problem("", "", f"{n:03d}") for n in range(1000)))
+    *lines, last = text.splitlines()
+    assert lines == [f"{n:03d}" for n in range(len(lines))]
+    assert last == f"and {1000 - len(lines)} more problems"
+    assert LONGEST_LINE - 10 < len(text) <= LONGEST_MESSAGE
+    assert len(str(InputError([Problem("", "", "x " * 1000)] * 9))) <= LONGEST_MESSAGE
+
+
+def test_name_itself_is_no_suggestion():
+    assert nearest_names("mass", ["mass"]) == " (there are none)"
+    assert nearest_names("mass", ["mass", "mask"]) == " (did you mean 'mask'? known: mask)"
 
 
 def test_long_list_of_names_ends_with_their_number():
     hint = nearest_names("nothing like it", [f"name_{n:04d}" for n in range(1000)])
     assert "known: name_0000, name_0001, " in hint
-    assert hint.endswith("973 more)")
+    assert hint.endswith("name_0007, 992 more)")
     assert len(hint) < 350

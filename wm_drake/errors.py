@@ -6,11 +6,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-LONGEST_LINE = 480
-"""Largest number of characters of a problem; a longer one is shortened."""
+LONGEST_MESSAGE = 500
+"""Largest number of characters of the text of an `InputError`."""
 
-MOST_LINES = 20
-"""Largest number of problems that the text of an `InputError` lists."""
+LONGEST_LINE = 470
+"""Largest number of characters of a problem; a longer one is shortened. What is left of the text
+counts the problems that have no place in it."""
+
+MOST_NAMES = 8
+"""Largest number of allowed names that a message lists."""
 
 _LONGEST_WHERE, _LONGEST_KEY, _LONGEST_WORD, _LONGEST_LIST = 220, 80, 60, 300
 
@@ -48,14 +52,23 @@ class InputNotice(UserWarning):
 
 
 class InputError(WmDrakeError):
-    """An input that cannot be used; the message has one line per problem."""
+    """An input that cannot be used.
+
+    The message has one line per problem, as many as `LONGEST_MESSAGE` allows, at least one.
+    """
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         """Store the problems, of which there must be at least one."""
         self.problems = tuple(problems)
-        lines = [str(problem) for problem in self.problems[:MOST_LINES]]
-        if len(self.problems) > MOST_LINES:
-            lines.append(f"and {len(self.problems) - MOST_LINES} more problems")
+        lines, length = list[str](), 0
+        for problem in self.problems:
+            line = str(problem)
+            length += len(line) + 1
+            if lines and length > LONGEST_LINE:
+                left_out = len(self.problems) - len(lines)
+                lines.append(f"and {left_out} more problem{'s' * (left_out > 1)}")
+                break
+            lines.append(line)
         super().__init__("\n".join(lines))
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -109,25 +122,28 @@ def reason_of(error: OSError | ValueError) -> str:
 def nearest_names(name: str, known: Iterable[str]) -> str:
     """Return a hint for an unknown name, such as `` (did you mean 'x'? known: x, y, z)``.
 
-    The hint contains the most similar name if there is one. It lists the known names if they are
-    at most 24, or if none is similar; a long list ends with the number of names left out.
+    The hint contains the most similar other name if there is one, and at most `MOST_NAMES` known
+    names, the most similar ones first; a longer list ends with the number of names left out.
 
     Args:
         name: The unknown name.
         known: All known names.
     """
-    names = sorted(known)
+    names = sorted(set(known) - {name})
     if not names:
         return " (there are none)"
-    close = difflib.get_close_matches(name[:_LONGEST_KEY], names, n=1, cutoff=0.5)
+    short = name[:_LONGEST_KEY]
+    close = difflib.get_close_matches(short, names, n=MOST_NAMES, cutoff=0.5)
     hint = f"did you mean '{close[0]}'? " if close else ""
-    if len(names) <= 24 or not close:
-        shown, length = [], 0
-        for known_name in names:
-            length += len(known_name) + 2
-            if length > _LONGEST_LIST:
-                break
-            shown.append(known_name)
-        left_out = len(names) - len(shown)
-        hint += "known: " + ", ".join([*shown, *([f"{left_out} more"] if left_out else [])])
+    listed = names
+    if len(names) > MOST_NAMES:
+        listed = [*close, *(other for other in names if other not in close)]
+    shown, length = list[str](), 0
+    for other in listed[:MOST_NAMES]:
+        length += len(other) + 2
+        if length > _LONGEST_LIST:
+            break
+        shown.append(other)
+    left_out = len(names) - len(shown)
+    hint += "known: " + ", ".join([*shown, *([f"{left_out} more"] if left_out else [])])
     return f" ({hint.strip()})"

@@ -3,8 +3,11 @@
 The packages asammdf, npTDMS and pyuff are extras (`wm-drake[lab]`); MAT files need scipy only.
 """
 
+import logging
 import math
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -52,7 +55,8 @@ def read_channels(path: Path) -> list[Channel]:
     check_regular(path, largest=LARGEST)
     read, package = _READERS[path.suffix.lower()]
     try:
-        channels = read(path)
+        with _without_remarks():
+            channels = read(path)
     except ImportError:
         raise input_error(
             f"needs the package {package}: pip install 'wm-drake[lab]'", where=str(path)
@@ -65,6 +69,19 @@ def read_channels(path: Path) -> list[Channel]:
     if not channels:
         raise input_error("has no numeric channel", where=str(path))
     return channels
+
+
+@contextmanager
+def _without_remarks() -> Iterator[None]:
+    """Keep remarks of the libraries off the terminal: a damaged file makes hundreds of them."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logging.disable(before)
 
 
 def csv_channels(path: Path) -> list[Channel]:

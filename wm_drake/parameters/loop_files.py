@@ -281,9 +281,10 @@ def _columns(
                 columns[column] = (index, names[word], (match[2] or match[3] or "").strip() or None)
     missing = [column for column in _COLUMNS if column not in columns]
     if missing:
+        among = shortened(", ".join(head), 150)
         raise input_error(
-            f"no column {', '.join(missing)} among '{', '.join(head)}'; needs time, displacement "
-            "(or angle), force (or moment)",
+            f"no column {', '.join(missing)} among '{among}'; needs time, displacement (or angle), "
+            "force (or moment)",
             where=place,
         )
     rotates = columns["displacement"][1] == _ANGLE

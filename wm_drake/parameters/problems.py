@@ -1,5 +1,6 @@
 """Translation of pydantic's validation errors into messages for users."""
 
+import difflib
 import types
 import typing
 from collections.abc import Iterable
@@ -31,7 +32,7 @@ def problems_of(error: ValidationError, root: type[BaseModel], key: str = "") ->
         key: Key path of the model, to which that of each problem is appended.
     """
     problems = []
-    for detail in error.errors():
+    for detail in _kinds_first(error.errors(), root):
         path = [str(part) for part in detail["loc"] if part not in _TAGS]
         cause = detail.get("ctx", {}).get("error")
         if isinstance(cause, ProblemsInsideError):
@@ -44,6 +45,31 @@ def problems_of(error: ValidationError, root: type[BaseModel], key: str = "") ->
             Problem("", ".".join(([key] if key else []) + path), _message(detail, root))
         )
     return problems
+
+
+_KINDS = ("kind", "law")
+"""Keys that choose what other keys a group may have."""
+
+
+def _kinds_first(details: list[Any], root: type[BaseModel]) -> list[Any]:
+    """Return the errors without those of groups whose kind is misspelt: they follow from it.
+
+    A group without its kind is read as one of another kind, whose keys are others.
+    """
+    misspelt = set[tuple[str | int, ...]]()
+    unknown = [detail for detail in details if detail["type"] == "extra_forbidden"]
+    for detail in unknown:
+        *group, name = detail["loc"]
+        kinds = set(_KINDS) & _fields_at(root, tuple(group))
+        if difflib.get_close_matches(str(name), kinds, n=1, cutoff=0.5):
+            misspelt.add(tuple(group))
+            detail["of_kind"] = sorted(kinds)
+    return [
+        detail
+        for detail in details
+        if "of_kind" in detail
+        or not any(detail["loc"][: len(group)] == group for group in misspelt)
+    ]
 
 
 _EXPECTED = {
@@ -67,9 +93,7 @@ def _message(detail: Any, root: type[BaseModel]) -> str:
     if kind == "missing":
         return "is missing"
     if kind == "extra_forbidden":
-        return f"unknown key '{detail['loc'][-1]}'" + nearest_names(
-            str(detail["loc"][-1]), _fields_at(root, detail["loc"][:-1])
-        )
+        return _unknown_key(detail, root)
     if kind in ("greater_than", "greater_than_equal"):
         sign, limit = (">", context["gt"]) if kind == "greater_than" else (">=", context["ge"])
         return f"'{shown}' is out of range; allowed is {sign} {limit:g}"
@@ -89,6 +113,20 @@ def _message(detail: Any, root: type[BaseModel]) -> str:
     if kind == "literal_error":
         return f"'{shown}' is not allowed; allowed are {context['expected']}"
     return f"{detail['msg'][0].lower()}{detail['msg'][1:]}, is {shortened(repr(given), 60)}"
+
+
+def _unknown_key(detail: Any, root: type[BaseModel]) -> str:
+    name, group = str(detail["loc"][-1]), detail["loc"][:-1]
+    known = detail.get("of_kind") or _fields_at(root, group)
+    if name in known:
+        return f"key '{name}' does not belong to this kind of {_group_of(group)}"
+    return f"unknown key '{name}'{nearest_names(name, known)}"
+
+
+def _group_of(group: tuple[str | int, ...]) -> str:
+    """Return the name of a group of values, without the tags of pydantic."""
+    names = [str(part) for part in group if part not in _TAGS]
+    return names[-1] if names else "file"
 
 
 def _fields_at(root: type[BaseModel], path: tuple[str | int, ...]) -> set[str]:

@@ -13,15 +13,25 @@ from pydantic_core.core_schema import with_info_before_validator_function
 
 from wm_drake.errors import shortened
 
-_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+# Possessive (++) and greedy: the time to match any text is proportional to its length.
+_NUMBER = r"[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]++)?"
 _BARE = re.compile(_NUMBER)
-_SCALAR = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*$")
-_DECIMAL_COMMA = re.compile(r"(?<![0-9])[+-]?[0-9]+,[0-9]+")
-_VECTOR = re.compile(r"\s*\(([^()]*)\)\s*(\S.*?)?\s*$")
+_SCALAR = re.compile(rf"({_NUMBER})\s*+(\S.*)?")
+_DECIMAL_COMMA = re.compile(r"(?<![0-9])[+-]?[0-9]++,[0-9]++")
+_VECTOR = re.compile(r"\(([^()]*+)\)\s*+(\S.*)?")
 _NOT_FINITE = re.compile(r"[+-]?(?:nan|inf|infinity)", re.IGNORECASE)
 
 LONGEST_UNIT = 40
 """Largest number of characters of a unit."""
+
+LONGEST_NUMBER = 1000
+"""Largest number of characters of one number with its unit."""
+
+LONGEST_LIST = 1 << 20
+"""Largest number of characters of a list of numbers with its unit."""
+
+LARGEST_NUMBER = 1e15
+"""Largest size of a number in SI units: far above any of a machine, and products stay finite."""
 
 _POWER = r"(?:\^|\*\*)\s*-?[0-9]{1,2}(?![0-9.]|\s*(?:\^|\*\*))"
 _UNIT = re.compile(rf"(?:1\s*/)?(?:[^\W\d]\w*|[°%]|[\s*/().·-]|{_POWER})*")
@@ -62,7 +72,7 @@ def plain_number(text: str) -> float:
     Raises:
         ValueError: the text is not such a number.
     """
-    if not (_BARE.fullmatch(text.strip()) or _NOT_FINITE.fullmatch(text.strip())):
+    if not (_matched(_BARE, text, LONGEST_NUMBER) or _NOT_FINITE.fullmatch(text.strip())):
         raise ValueError(f"'{shortened(text, 40)}' is not a number")
     return float(text)
 
@@ -150,7 +160,7 @@ class Unit:
         Raises:
             ValueError: the text is not a finite number with a fitting unit.
         """
-        match = _SCALAR.fullmatch(text)
+        match = _matched(_SCALAR, text, LONGEST_NUMBER)
         if match is None or (match[2] or "").startswith(","):
             hint = comma_hint(text) or f"; write for example '{self.example()}'"
             raise ValueError(f"'{shortened(text, 60)}' is not a number with a unit{hint}")
@@ -209,9 +219,39 @@ def convert(magnitude: float, unit_text: str | None, unit: Unit) -> float:
         raise ValueError(
             f"unit '{shortened(unit_text, 40)}' is not known; write for example '1 {unit.shown}'"
         ) from error
+    return bounded(value, f"{magnitude:g} {unit_text}")
+
+
+def bounded(value: float, shown: str) -> float:
+    """Return a number in SI units, after checking that a computation can use it.
+
+    Args:
+        value: The number.
+        shown: The number as it was given, for the message.
+
+    Raises:
+        ValueError: it is not finite, or larger than `LARGEST_NUMBER`.
+    """
     if not math.isfinite(value):
-        raise ValueError(f"'{magnitude:g} {unit_text}' is not a finite number")
+        raise ValueError(f"'{shortened(shown, 60)}' is not a finite number")
+    if abs(value) > LARGEST_NUMBER:
+        raise ValueError(
+            f"'{shortened(shown, 60)}' is out of range; allowed are sizes up to "
+            f"{LARGEST_NUMBER:g} in SI units"
+        )
     return value
+
+
+def _matched(form: re.Pattern[str], text: str, longest: int) -> re.Match[str] | None:
+    """Return the match of a whole text, without the blanks around it.
+
+    Raises:
+        ValueError: the text is too long to be parsed.
+    """
+    bare = text.strip()
+    if len(bare) > longest:
+        raise ValueError(f"has {len(bare)} characters; allowed are up to {longest}")
+    return form.fullmatch(bare)
 
 
 _INSTRUMENT_UNITS = {
@@ -247,10 +287,10 @@ def split(text: str) -> tuple[list[float], str, bool]:
     Raises:
         ValueError: the text is not a number or a list of numbers, or the unit is unknown.
     """
-    match = _VECTOR.fullmatch(text)
+    match = _matched(_VECTOR, text, LONGEST_LIST)
     parts = [part.strip() for part in match[1].split(",")] if match else []
     if match is None:
-        match = _SCALAR.fullmatch(text)
+        match = _matched(_SCALAR, text, LONGEST_NUMBER)
         parts = [match[1]] if match else []
     comma = match is not None and (match[2] or "").startswith(",")
     if match is None or comma or not all(_BARE.fullmatch(part) for part in parts):
@@ -260,7 +300,10 @@ def split(text: str) -> tuple[list[float], str, bool]:
         )
     unit = match[2] or ""
     dimension(unit)
-    return [float(part) for part in parts], unit, len(parts) > 1
+    numbers = [float(part) for part in parts]
+    for number in numbers:
+        bounded(to_base(number, unit), f"{number:g} {unit}")
+    return numbers, unit, len(parts) > 1
 
 
 def dimension(unit: str) -> Any:
@@ -314,7 +357,7 @@ def to_si_vector(value: Any, info: ValidationInfo, unit: Unit) -> tuple[float, .
     """
     example = unit.example(is_list=True)
     if isinstance(value, str):
-        match = _VECTOR.fullmatch(value)
+        match = _matched(_VECTOR, value, LONGEST_LIST)
         parts = [] if match is None else [part.strip() for part in match[1].split(",")]
         if match is None or not all(_BARE.fullmatch(part) for part in parts):
             raise ValueError(
@@ -336,7 +379,7 @@ def comma_hint(text: str) -> str:
     Args:
         text: Text that is not a number as it stands, such as ``'6,5 N/mm'``.
     """
-    match = _DECIMAL_COMMA.search(text)
+    match = _DECIMAL_COMMA.search(text[:LONGEST_NUMBER])
     if match is None:
         return ""
     return f"; the decimal sign is a point, not a comma: write {match[0].replace(',', '.')}"
@@ -356,6 +399,7 @@ def _plain_number(value: Any, info: ValidationInfo, unit: Unit, *, is_list: bool
         number = math.inf
     if not math.isfinite(number):
         raise ValueError(f"this is not a finite number; write for example '{example}'")
+    bounded(number, f"{number:g}")
     if not is_pure and info.context and info.context.get("units_required"):
         raise ValueError(f"'{number:g}' has no unit; write for example '{example}'")
     return number
@@ -378,12 +422,10 @@ class PureNumber(Unit):
         Raises:
             ValueError: the text is not a finite number, or it has a unit.
         """
-        if not _BARE.fullmatch(text.strip()):
+        if _matched(_BARE, text, LONGEST_NUMBER) is None:
             hint = comma_hint(text) or "; write for example '1'"
             raise ValueError(f"'{shortened(text, 60)}' is not a number without unit{hint}")
-        if not math.isfinite(float(text)):
-            raise ValueError(f"'{shortened(text, 60)}' is not a finite number")
-        return float(text)
+        return bounded(float(text), text)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,9 @@ LARGEST_NOISE = 0.3
 TRIED = 80
 """Cutoff frequencies among which the smoothing is chosen."""
 
+LOWEST = 0.1
+"""Lowest cutoff that may be asked for, in periods within the record."""
+
 FASTEST = 2.0
 """Highest cutoff that is tried, by the sampling rate; there, next to nothing is smoothed."""
 
@@ -58,10 +61,13 @@ def smoothed(time: FloatArray, values: FloatArray, cutoff: float | None, path: s
         path: File, for messages.
 
     Raises:
-        InputError: The signal is mostly noise at its sampling rate.
+        InputError: The signal is mostly noise at its sampling rate, or nothing of it is below the
+            cutoff.
     """
     step = float(time[-1]) / (len(time) - 1)
     clock = time / step
+    if cutoff is not None:
+        _check_cutoff(cutoff, float(time[-1]), step, path)
     amount = _chosen(clock, values) if cutoff is None else 1.0 / (2.0 * np.pi * cutoff * step) ** 4
     spline = make_smoothing_spline(clock, values, lam=amount)
     position = np.asarray(spline(clock))
@@ -75,6 +81,17 @@ def smoothed(time: FloatArray, values: FloatArray, cutoff: float | None, path: s
         )
     cutoff = (1.0 / amount) ** 0.25 / (2.0 * np.pi * step) if amount > 0.0 else np.inf
     return Smoothed(position, cutoff, noise, spline, step)
+
+
+def _check_cutoff(cutoff: float, duration: float, step: float, path: str) -> None:
+    """Raise InputError if a cutoff [Hz] smooths all of a record, or nothing of it."""
+    low, high = LOWEST / duration, FASTEST / step
+    if not low <= cutoff <= high:
+        raise input_error(
+            f"a cutoff of {cutoff:g} Hz does not suit a record of {duration:g} s sampled at "
+            f"{1.0 / step:g} Hz; allowed are {low:.3g} to {high:.3g} Hz",
+            where=path,
+        )
 
 
 def _chosen(clock: FloatArray, values: FloatArray) -> float:

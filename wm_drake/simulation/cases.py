@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from wm_drake.errors import InputNotice, input_error, nearest_names
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
+from wm_drake.parameters.damper_laws import DamperNumbers
 
 UNUSED_PHASE_ERROR = (
     "imperfections.phase_error has no effect on the loads of a machine, only on the front and rear "
@@ -92,7 +93,12 @@ def has_jumping_friction(parameters: MachineParameters) -> bool:
     """Return whether a damper of a machine has friction that no fixed step resolves."""
     types = {damper.type for damper in parameters.dampers.values()}
     types |= {damper.type for damper in parameters.telescopic_dampers.values()}
-    return any(parameters.damper_types[name].law == "coulomb" for name in types)
+    return any(_jumps(parameters.damper_types[name]) for name in types)
+
+
+def _jumps(damper: DamperNumbers) -> bool:
+    """Return whether the friction of a damper jumps: by its law, or in a transition of no width."""
+    return damper.law == "coulomb" or getattr(damper, "transition_velocity", None) == 0.0
 
 
 def notice_jumping_friction(parameters: MachineParameters) -> None:

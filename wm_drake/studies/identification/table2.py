@@ -82,6 +82,8 @@ class Table2Task(Task):
             InputError: an option or a file is wrong.
         """
         self.damper = _damper(options.friction_force)
+        if units_of(options.units) and not options.files:
+            raise input_error("is about measured files; give at least one", where="--units")
         force = f"f_max = {self._number('friction_force'):g} N."
         if options.files:
             self.source = f"{len(options.files)} measured tests, {force}"

@@ -20,6 +20,9 @@ from wm_drake.studies.spin_cycle.study import DIMS
 RMS_COLUMNS = ["case", "region", "sensor", "axis", "rms_mm"]
 """Columns of a table of RMS displacements, as read by `read_rms` and returned by `rms_table`."""
 
+LEAST_ROWS = 32
+"""Smallest number of samples that the high-pass filter and the removal of the mean need."""
+
 UNEVEN = 1e-3
 """Largest relative deviation of a sampling interval from the mean one."""
 
@@ -155,10 +158,10 @@ def _from_acceleration(
     channels: Mapping[str, str],
 ) -> FloatArray:
     numbers = _samples(path, _words(labels), channels)
-    if not np.isfinite(numbers).all() or len(numbers) < 2:
+    if not np.isfinite(numbers).all() or len(numbers) < LEAST_ROWS:
         raise input_error(
-            "has a value that is not a finite number, or fewer than two rows; at least two rows of "
-            "finite numbers are needed",
+            f"has a value that is not a finite number, or fewer than {LEAST_ROWS} rows; at least "
+            f"{LEAST_ROWS} rows of finite numbers are needed",
             where=str(path),
         )
     numbers = with_distinct_times(numbers, str(path))
