@@ -5,7 +5,6 @@ strikes the floor, a spring that goes slack or a motion that is chaotic shows in
 A run that is converged changes little with half the step.
 """
 
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -14,7 +13,7 @@ import numpy as np
 from wm_drake.batch.runs import Runner
 from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
 from wm_drake.compiler.lanes import WIDTH
-from wm_drake.errors import InputError, InputNotice
+from wm_drake.errors import InputError
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
@@ -134,12 +133,6 @@ def step_error(machine: Machine, cases: Sequence[Case], step: float | None = Non
             difference = _difference(before, after)
             errors.append(StepError(difference, run.case.name, key.stepping.step, len(cases)))
     return max(errors, key=lambda error: error.difference)
-
-
-def notice_step_error(error: StepError | None) -> None:
-    """Issue an `InputNotice` if the results of runs are not converged."""
-    if error is not None and error.is_large:
-        warnings.warn(error.warning, InputNotice, stacklevel=3)
 
 
 def _with_half_step(

@@ -11,7 +11,7 @@ import pandas as pd
 from wm_drake.errors import input_error
 from wm_drake.parameters.text_files import read_text
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import comma_hint
+from wm_drake.parameters.units import LARGEST_NUMBER, comma_hint
 
 _SIGNS = "; columns are separated by commas, and the decimal sign is a point"
 
@@ -64,15 +64,16 @@ def finite_numbers(table: pd.DataFrame, path: str | Path, key: str = "") -> Floa
         key: Key path for messages; empty for the name of the column.
 
     Raises:
-        InputError: a value is not a finite number.
+        InputError: a value is not a finite number, or is out of range.
     """
     numbers = table.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
-    wrong = np.argwhere(~np.isfinite(numbers))
+    wrong = np.argwhere(~(np.abs(numbers) <= LARGEST_NUMBER))  # nan is wrong too
     if len(wrong):
         row, column = wrong[0]
         cell = str(table.iloc[row, column])
         raise input_error(
-            f"row {row + 1} of the data: '{cell}' is not a finite number{comma_hint(cell)}",
+            f"row {row + 1} of the data: '{cell}' is not a finite number of at most "
+            f"{LARGEST_NUMBER:g}{comma_hint(cell)}",
             where=str(path),
             key=key or str(table.columns[column]),
         )

@@ -13,7 +13,7 @@ from wm_drake.parameters.lab_files import Channel, chosen, is_lab_file, read_cha
 from wm_drake.parameters.text_files import read_text
 from wm_drake.parameters.time_stamps import with_distinct_times
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit, comma_hint, factor_of, plain_number
+from wm_drake.parameters.units import LARGEST_NUMBER, Unit, comma_hint, factor_of, plain_number
 
 FEWEST = 20
 """Smallest number of samples of a loop."""
@@ -31,6 +31,10 @@ _COLUMNS = {
     "force": {"force": _FORCE, "f": _FORCE, "moment": _TORQUE, "torque": _TORQUE, "m": _TORQUE},
 }
 _HEAD = re.compile(r"\s*([A-Za-z]+)\s*(?:[\[(]([^\])]*)[\])]|[_ ](.+))?\s*$")
+
+
+SMALLEST_RANGE = 1e-12
+"""Smallest range of a displacement and of a force: below it, a signal is constant. [m; rad; N]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,8 +127,12 @@ def _checked_loop(
         raise input_error(
             f"has {len(table)} samples; a loop needs at least {FEWEST}", where=str(path)
         )
+    size = float(np.max(np.abs(table * factors)))
+    if size > LARGEST_NUMBER:
+        message = f"has a number of size {size:g}; allowed are sizes up to {LARGEST_NUMBER:g} in SI"
+        raise input_error(message, where=str(path))
     for column in (1, 2):
-        if np.ptp(table[:, column]) == 0.0:
+        if np.ptp(table[:, column]) * factors[column] < SMALLEST_RANGE:
             message = f"is constant ({table[0, column]:g} on lines {lines[0]} to {lines[-1]})"
             raise input_error(message, where=f"{path}:{lines[0]}", key=head[columns[column]])
     time, displacement, force = (table * factors).T

@@ -53,14 +53,19 @@ def problems_of_option(option: str) -> Iterator[None]:
 
 def profile_of(parameters: "MachineParameters", path: Path | None) -> "SpinProfile":
     """Return the spin profile of the option `--profile`; that of the machine without it."""
+    if path is None:
+        return parameters.profile
+    return runnable_profile(existing_file(path, "--profile"), parameters.step)
+
+
+def runnable_profile(name_or_path: str | Path, step: float) -> "SpinProfile":
+    """Return a spin profile, after checking that a run with a step has a place in memory."""
     from wm_drake.engines.memory import check_size
     from wm_drake.parameters import load_profile
 
-    if path is None:
-        return parameters.profile
-    profile = load_profile(existing_file(path, "--profile"))
-    with problems_of_file(path):
-        check_size(profile, parameters.step)
+    profile = load_profile(name_or_path)
+    with problems_of_file(Path(name_or_path)):
+        check_size(profile, step)
     return profile
 
 

@@ -242,6 +242,10 @@ def test_a_key_is_one_line_of_the_terminal(identify):
             "'2 N/mm' is not a range; write for example '(1, 2) N/mm'",
         ),
         (
+            ("--unknown", "gasket.stiffness_x=(-5, 2) N/mm"),
+            "'(-5, 2) N/mm' is out of range; allowed is >= 0",
+        ),
+        (
             ("--unknown", "gasket.stiffness_x=(8, 2) N/mm"),
             "bounds 8 N/mm to 2 N/mm are not a range",
         ),

@@ -6,8 +6,7 @@ from typing import Any
 
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import load_profile
-from wm_drake.studies.inputs import channels_of
+from wm_drake.studies.inputs import channels_of, runnable_profile
 from wm_drake.studies.run import Executor
 from wm_drake.studies.spin_cycle.inputs import MeasuredFiles, cases_of_table
 from wm_drake.studies.spin_cycle.options import SpinCycleOptions
@@ -32,7 +31,7 @@ class SpinCycleTask(Task):
             hint = nearest_names(options.engine, ENGINES)
             raise input_error(f"unknown engine '{options.engine}'{hint}", where="--engine")
         self.machine, self.engine = machine, options.engine
-        self.profile = load_profile(options.profile)
+        self.profile = runnable_profile(options.profile, machine.parameters.step)
         self.cases = cases_of_table(options.cases, options.case)
         files = MeasuredFiles(
             options.measured, options.accelerations, channels_of(options.channels)

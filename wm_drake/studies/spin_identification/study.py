@@ -21,10 +21,10 @@ from wm_drake.parameters import (
     SpinProfile,
     Variation,
     apply,
-    load_profile,
     machine_yaml,
     with_values,
 )
+from wm_drake.parameters.allowed import allowed_range
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.parameters.variation import number_at, range_of
@@ -39,7 +39,7 @@ from wm_drake.studies.fitting import (
     least_squares,
     verdict_of,
 )
-from wm_drake.studies.inputs import channels_of
+from wm_drake.studies.inputs import channels_of, runnable_profile
 from wm_drake.studies.run import Executor
 from wm_drake.studies.spin_cycle.inputs import MeasuredFiles, cases_of_table
 from wm_drake.studies.spin_cycle.measured import rms_table
@@ -223,7 +223,7 @@ class SpinIdentifyTask(Task):
             InputError: one of them is wrong.
         """
         self.options, self.machine = options, machine
-        self.profile = load_profile(options.profile)
+        self.profile = runnable_profile(options.profile, machine.parameters.step)
         names = options.case or (() if options.cases else DEFAULT_CASES)
         self.cases = cases_of_table(options.cases, names)
         files = MeasuredFiles(
@@ -327,6 +327,11 @@ def sought_of(parameters: MachineParameters, keys: Sequence[str], bounds: str = 
         raise input_error(message, key=first.key)
     else:
         lower, upper = value / SPAN, value * SPAN
+    for number in numbers:  # the search may go to either end
+        allowed = allowed_range(parameters, number.key)
+        if not (allowed.holds(lower) and allowed.holds(upper)):
+            ends = " and ".join(f"{sign} {end:g}" for sign, end in allowed.limits())
+            raise input_error(f"'{bounds}' is out of range; allowed is {ends}", key=number.key)
     start = value if value is not None and lower <= value <= upper else None
     name = JOIN.join(keys)
     return Sought(
