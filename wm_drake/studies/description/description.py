@@ -74,8 +74,7 @@ def describe(machine: Machine) -> dict[str, Any]:
         >>> description["machine"], description["gravity_W"]
         ('reference', [0.0, 0.0, -9.81])
     """
-    setup = machine.set_up()
-    modes = natural_modes(machine)
+    setup, modes = machine.set_up(), natural_modes(machine)
     parameters, bodies = setup.parameters, _bodies(setup)
     described = {
         "machine": parameters.name,
@@ -114,6 +113,7 @@ def describe(machine: Machine) -> dict[str, Any]:
         },
         "natural_frequencies_hz": modes.frequency_hz.tolist(),
         "mode_damping_ratios": modes.damping_ratio.tolist(),
+        "natural_modes_pose": _pose(machine.set_up(dampers=False).rest_pose),
     }
     if setup.elements.others:
         described["elements"] = {name: _element(setup, name) for name in setup.elements.others}

@@ -31,13 +31,17 @@ def thresholds_table(result: DriveResult) -> pd.DataFrame:
 
 
 def map_table(result: DriveResult) -> pd.DataFrame:
-    """Return the map over torque limit and unbalance, a row for each run."""
+    """Return the map over torque limit and unbalance, a row for each run.
+
+    The unbalance is the sum of the sizes of mass times radius, so masses that balance each other
+    count.
+    """
     torque_map = result.map
     rows = [
         {
             "load": torque_map.load,
             "mass_factor": factor,
-            "unbalance_gm": 1e3 * torque_map.unbalance[u],
+            "sum_of_mass_times_radius_gm": 1e3 * torque_map.unbalance[u],
             "torque_limit_Nm": torque,
             "end_rpm": rpm(float(torque_map.end_speed[u, t])),
             "caught_rpm": rpm(float(torque_map.caught_speed[u, t])),
