@@ -4,9 +4,11 @@ import functools
 import json
 import math
 import random
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 import xarray as xr
@@ -99,6 +101,18 @@ WORDS = [
     "1_000 kg",
     "0x10 kg",
     "1 kg # comment",
+    "5 a" + " " * 200_000 + "b",
+    "5 kg" + " " * 200_000,
+    "1e300 kg",
+    "1e300 N/mm",
+    "1e-300 s",
+    "1e6 s",
+    "1e9 s",
+    "(0, 1e308) s",
+    "(0, 1e9) s",
+    "1510 N/mm",
+    "--out",
+    "-h",
 ]
 """Texts that a value may be replaced by."""
 
@@ -253,9 +267,11 @@ OPTIONS = [
     ("study gasket --trials 200", ["--seed", "--workers", "--design", "--model", "--tables", "--factor", "--load"]),
     ("study gasket", ["--trials"]),
     ("study spin-cycle", ["--workers", "--engine", "--profile", "--case"]),
-    ("study spin-identify", ["--seed", "--noise", "--workers", "--unknown", "--case"]),
+    ("study spin-identify --out out", ["--seed", "--noise", "--workers", "--unknown", "--case"]),
     ("study gasket-damping", ["--workers", "--load"]),
-    ("identify damper LOOP", ["--seed", "--knots", "--method", "--units", "--law", "--bounds", "--fix", "--name"]),
+    ("identify damper LOOP", ["--seed", "--knots", "--method", "--units", "--law", "--bounds", "--fix", "--name", "--cutoff"]),
+    ("identify table2", ["--units", "--friction-force"]),
+    ("studio --no-browser", ["--machine", "--port"]),
     ("rig damper", ["--frequency", "--amplitude", "--matrix", "--sponge-mass", "--name", "--component"]),
     ("rig gasket --axis x -f 1Hz", ["--amplitude", "--arm", "--axis"]),
     ("spin", ["--load", "--engine", "--machine", "--profile", "--set", "--out"]),
@@ -272,7 +288,12 @@ OPTIONS = [
 VALUED = {
     "--weight": ["middle=", "=", "middle:Xf=", "nowhere="],
     "--factor": ["C_L=", "gasket.stiffness_x=", "C_L=1 %..", "x="],
-    "--unknown": ["gasket.stiffness_x=", "", "gasket.stiffness_x+gravity="],
+    "--unknown": [
+        "gasket.stiffness_x=",
+        "gasket.stiffness_x=(-5, 2) N/mm",
+        "",
+        "gasket.stiffness_x+gravity=",
+    ],
     "--bounds": ["sponge_stiffness=", "x="],
     "--fix": ["slider_damping=", ""],
     "--leave-out": ["middle,middle", "middle", ",", "middle,nowhere", "middle,counter,front,back"],
@@ -283,6 +304,10 @@ UNITS = {
     "--amplitude": " mm",
     "--arm": " mm",
     "--sponge-mass": " g",
+    "--cutoff": " Hz",
+    "--from": " rpm",
+    "--to": " rpm",
+    "--rate": " rpm/s",
 }
 
 
@@ -433,7 +458,7 @@ def commands(file: str) -> dict[str, list[str]]:
 
 MEASURED = sorted(MACHINES_FOLDER.glob("*.csv"))
 YAML_DOORS = (*SHIPPED, *TEXTS)
-DOORS = (*YAML_DOORS, *CSV, "netcdf", "sdf", "mesh", "set", "options", "links")
+DOORS = (*YAML_DOORS, *CSV, "netcdf", "sdf", "mesh", "set", "options", "links", "http")
 """Every door; a case takes them in turn."""
 
 
@@ -605,6 +630,33 @@ MESHES = {
 }
 
 
+URIS = [
+    "bodies.sdf", "other.sdf", "missing.sdf", ".", "..", "", "/dev/zero", "/etc/passwd", "file:///etc/passwd",
+    "model://tub", "package://x/y.sdf", "http://localhost/x.sdf", "../work/bodies.sdf", "x" * 5000, "machine.yaml",
+]  # fmt: skip
+"""Names of included files."""
+
+
+def _with_include(random_: random.Random, text: str, folder: Path) -> str:
+    """Return an SDF that includes another file, which may include it again."""
+    again = random_.choice(["<include><uri>bodies.sdf</uri></include>", "", "<html/>", "<a>"])
+    other = f"<sdf version='1.9'><model name='other'>{again}</model></sdf>"
+    (folder / "other.sdf").write_text(other, encoding="utf-8")
+    added = f"<include><uri>{random_.choice(URIS)}</uri></include>"
+    opening = '<model name="oscillating_group">'
+    return text.replace(opening, opening + added)
+
+
+def _without_mass_properties(random_: random.Random, text: str) -> str:
+    """Return an SDF in which a link that moves lacks its mass or inertia, or states nonsense."""
+    part = random_.choice(["mass", "inertial", "inertia", "ixx", "iyy", "izz"])
+    found = list(re.finditer(f"<{part}>.*?</{part}>", text, re.DOTALL))
+    content = random_.choice(["", "", " ", "nan", "-1", "1e300", "x"])
+    chosen = random_.choice(found)
+    changed = random_.choice(["", f"<{part}>{content}</{part}>"])
+    return text[: chosen.start()] + changed + text[chosen.end() :]
+
+
 def _sdf_case(random_: random.Random, folder: Path, door: str) -> FuzzCase:
     text = (SDF_FOLDER / "oscillating_group.sdf").read_text(encoding="utf-8")
     (folder / "machine.yaml").write_text("extends: reference\nmodel: bodies.sdf\n", "utf-8")
@@ -616,8 +668,12 @@ def _sdf_case(random_: random.Random, folder: Path, door: str) -> FuzzCase:
         shape = f"<mesh>{random_.choice(['', '<drake:declare_convex/>'])}<uri>{name}</uri></mesh>"
     else:
         shape = random_.choice(SHAPES)
-    kind = random_.randrange(4) if door == "sdf" else 0
-    if kind <= 1:
+    kind = random_.randrange(6) if door == "sdf" else 0
+    if kind == 4:
+        data = _with_include(random_, text, folder).encode()
+    elif kind == 5:
+        data = _without_mass_properties(random_, text).encode()
+    elif kind <= 1:
         link, tag = (
             random_.choice(["housing", "tub", "drum"]),
             random_.choice(["collision", "visual"]),
@@ -726,7 +782,52 @@ def _links_case(  # noqa: C901 - one branch a kind of link
     return FuzzCase("links", ["machine", "check", file], [file[:20], ".yaml", "no such file"])
 
 
+REQUESTS = {
+    "run": {"page": "p", "state": {}, "keys": ["gasket.stiffness_x"]},
+    "ranking": {"page": "p", "state": {}, "keys": []},
+    "save": {"state": {}, "name": "mine", "overwrite": True},
+    "studies": {"state": {}, "study": "tolerance", "options": {"samples": "16", "load": "middle"}},
+}
+"""Requests of the studio by address; each has the state below."""
+STATE = {
+    "machine": "reference",
+    "values": {"gasket.stiffness_x": "4 N/mm", "bodies.tub.mass": "7 kg"},
+    "load": "middle",
+    "masses": [{"mass": "500 g", "radius": "235 mm", "y": "0 mm", "phase": "0 deg"}],
+    "gasket": True,
+}
+PATHS = [
+    "",
+    "machines",
+    "machine?id=reference",
+    "machine?id=../x",
+    "studies",
+    "place?page=p",
+    "nowhere",
+]
+
+
+def _request_case(random_: random.Random, _folder: Path) -> FuzzCase:
+    """Return a request to the studio: method, address and body."""
+    name = random_.choice(list(REQUESTS))
+    body = {**REQUESTS[name], "state": STATE} if name != "ranking" else {"page": "p"}
+    kind = random_.randrange(8)
+    if kind == 0:
+        method, path = random_.choice(["GET", "HEAD", "PUT", "DELETE"]), random_.choice(PATHS)
+        return FuzzCase("http", ["http", method, f"api/{path}", ""], [""])
+    if kind == 1:
+        act, study = random_.choice(["cancel", "resume", "x"]), random_.choice(WORDS)[:300]
+        path = f"api/studies/{quote(study, safe='')}/{act}"
+        return FuzzCase("http", ["http", "POST", path, "{}"], [""])
+    if kind == 2:
+        text = broken_text(random_, json.dumps(body)).decode(errors="replace")
+    else:
+        text, _ = mutated_tree(random_, json.loads(json.dumps(body)))
+    return FuzzCase("http", ["http", "POST", f"api/{name}", text], [""])
+
+
 OWN_CASES = {
+    "http": _request_case,
     "set": _set_case,
     "options": _options_case,
     "links": _links_case,

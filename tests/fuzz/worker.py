@@ -15,11 +15,15 @@ from unittest import mock
 
 import typer
 from fuzz.cases import case_of
+from fuzz.faults import faults
+from starlette.testclient import TestClient
 
 from wm_drake.cli import main
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.files import shipped_machines
+from wm_drake.studio.server import Studio, application
 
+TOKEN, PORT = "token", 8765
 MEMORY_LIMIT = 2 << 30
 COMPUTATIONS = (
     "wm_drake.studies.spin.study.run_spin",
@@ -68,8 +72,36 @@ def files(folder: Path) -> dict[str, tuple[int, int]]:
     }
 
 
+@functools.cache
+def studio() -> TestClient:
+    """Return a client of a studio whose studies do not start; it saves beside the cases."""
+    folder = Path(os.environ["FUZZ_STUDIO"])
+    mock.patch("wm_drake.studio.jobs.Jobs._launch").start()
+    app = application(Studio("reference", folder), TOKEN, PORT)
+    base = f"http://127.0.0.1:{PORT}/{TOKEN}/"
+    return TestClient(app, base_url=base, raise_server_exceptions=True)
+
+
+def answered(method: str, path: str, body: str) -> tuple[int, str, str]:
+    """Return the answer to a request: 2 for a refusal, with its messages as standard error."""
+    text = body.encode("utf-8", errors="surrogatepass")
+    headers = {"content-type": "application/json"}
+    try:
+        answer = studio().request(method, path, content=text, headers=headers)
+    except Exception:
+        return 1, "", traceback.format_exc()
+    if answer.status_code < 400:
+        return 0, "", ""
+    problems = answer.text
+    if answer.headers.get("content-type") == "application/json":
+        problems = "\n".join(problem["message"] for problem in answer.json()["problems"])
+    return (2 if answer.status_code < 500 else 1), "", problems
+
+
 def run(arguments: list[str]) -> tuple[int, str, str]:
     """Run a command in this process and return exit code, standard output and standard error."""
+    if arguments[0] == "http":
+        return answered(*arguments[1:])
     kept = os.dup(1), os.dup(2)
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         os.dup2(out.fileno(), 1)
@@ -115,7 +147,7 @@ def outcome(number: int, top: Path) -> dict:
         p for p in before.keys() | after.keys() if before.get(p) != after.get(p) and p != "work"
     )
     shutil.rmtree(around)
-    return {
+    result = {
         "number": number,
         "door": case.door,
         "arguments": case.arguments,
@@ -127,6 +159,7 @@ def outcome(number: int, top: Path) -> dict:
         "changed": changed,
         "seconds": seconds,
     }
+    return result | {"faults": faults(result)}
 
 
 def limit_memory() -> None:
@@ -141,9 +174,12 @@ def limit_memory() -> None:
 def serve() -> None:
     """Run each case whose number arrives, until the input ends."""
     os.environ["COLUMNS"] = "200"
+    # a server would not end by itself
+    mock.patch("uvicorn.Server.run", accepted).start()
     with tempfile.TemporaryDirectory() as name:
         top = Path(name)
         os.chdir(top)
+        os.environ["FUZZ_STUDIO"] = str(top / "studio")
         for name_of_machine in ("reference", "free_stroke"):  # imports and compiles
             run(["machine", "check", name_of_machine])
         for place in COMPUTATIONS:

@@ -11,8 +11,8 @@ EXTREMES = Measure(
             ("axis",),
             Unit("m", "mm"),
             "displacement",
-            "largest displacement, from the rest position of the run's own machine, of the tub point "
-            "nearest to the detergent box",
+            "largest displacement, from the rest position of the run's own machine, of the tub "
+            "point nearest to the detergent box",
             group="D",
             short="D{}",
             json="detergent_box_mm/D*",
