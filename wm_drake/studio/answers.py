@@ -16,10 +16,10 @@ from scipy.signal import find_peaks
 from wm_drake.batch.runs import Runner, RunResult
 from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
 from wm_drake.compiler.lanes import WIDTH
-from wm_drake.errors import InputError
+from wm_drake.errors import InputError, Problem
 from wm_drake.model.plausibility import unusual_springs
 from wm_drake.model.scene import Gap
-from wm_drake.parameters import SpinProfile
+from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
@@ -33,6 +33,7 @@ from wm_drake.simulation.displacements import (
 from wm_drake.simulation.measures import MEASURES, Variable
 from wm_drake.simulation.measures.labels import LABELS
 from wm_drake.simulation.records import Record
+from wm_drake.studies.inputs import friction_warnings
 from wm_drake.studies.spin.figures import ORBIT_REVOLUTIONS, axis_path_mm, orbit_window
 from wm_drake.studio.machines import OpenMachine, is_same
 from wm_drake.studio.state import State
@@ -89,7 +90,11 @@ def answer(
         turned = _turned(machine, case, keys[:LANES])
         batch_key, items = _batch(machine, [case, *(other for _, _, other in turned)])
         setup = items[0].numbers.setup
-        warnings = [*unusual_numbers(setup.parameters, state.values), *unusual_springs(setup)]
+        warnings = [
+            *unusual_numbers(setup.parameters, state.values),
+            *unusual_springs(setup),
+            *_friction_that_jumps(setup.parameters),
+        ]
     results = {run.number: run for run in runner.run(batch_key, items)}
     main = results[0]
     return {
@@ -105,6 +110,11 @@ def answer(
             "step_ms": MS_PER_S * batch_key.stepping.step,
         },
     }
+
+
+def _friction_that_jumps(parameters: MachineParameters) -> list[Problem]:
+    """Return the warning of friction that no fixed step resolves."""
+    return [Problem("", "damper_types", text) for text in friction_warnings(parameters)]
 
 
 def arrows(
