@@ -163,7 +163,8 @@ class Preparation:
         if key not in self._known_numbers:
             if len(self._known_numbers) >= KEPT_NUMBERS:
                 del self._known_numbers[next(iter(self._known_numbers))]
-            check_size(case.profile, self.step)
+            period = (case.parameters or self.machine.parameters).output_period
+            check_size(case.profile, self.step, period)
             empty = self._bodies(case.parameters or self.machine.parameters, None)
             setup = self._set_up(case)
             elements, layout = pack_elements(setup)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import input_error
-from wm_drake.model.machine import OUTPUT_PERIOD
 from wm_drake.parameters import SpinProfile
 
 NUMBERS_OF_SAMPLE = 150
@@ -20,7 +19,7 @@ SECONDS_OF_STEP = 2e-6
 _BYTES, _GB = 8, 1e9
 
 
-def check_size(profile: SpinProfile, step: float, period: float = OUTPUT_PERIOD) -> None:
+def check_size(profile: SpinProfile, step: float, period: float) -> None:
     """Check that a run has a place in the memory of this computer.
 
     Args:

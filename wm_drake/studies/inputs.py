@@ -55,17 +55,17 @@ def profile_of(parameters: "MachineParameters", path: Path | None) -> "SpinProfi
     """Return the spin profile of the option `--profile`; that of the machine without it."""
     if path is None:
         return parameters.profile
-    return runnable_profile(existing_file(path, "--profile"), parameters.step)
+    return runnable_profile(existing_file(path, "--profile"), parameters)
 
 
-def runnable_profile(name_or_path: str | Path, step: float) -> "SpinProfile":
-    """Return a spin profile, after checking that a run with a step has a place in memory."""
+def runnable_profile(name_or_path: str | Path, parameters: "MachineParameters") -> "SpinProfile":
+    """Return a spin profile, after checking that a run of a machine has a place in memory."""
     from wm_drake.engines.memory import check_size
     from wm_drake.parameters import load_profile
 
     profile = load_profile(name_or_path)
     with problems_of_file(Path(name_or_path)):
-        check_size(profile, step)
+        check_size(profile, parameters.step, parameters.output_period)
     return profile
 
 
@@ -217,7 +217,7 @@ def _built(file: str, parameters: "MachineParameters") -> "tuple[Machine, tuple[
         measured_amplitudes(parameters)
         published_results(parameters.published)
         step = checked_step(parameters, None)
-        check_size(parameters.profile, step)
+        check_size(parameters.profile, step, parameters.output_period)
         machine = build_machine(parameters)
         setup = machine.set_up()
         choose_stepping(setup, *pack(setup), parameters.profile, step, parameters.integrator)

@@ -51,9 +51,9 @@ def run_compiled(
     Raises:
         InputError: the machine has something that the compiled engine does not represent.
     """
+    period = period or setup.parameters.output_period
     check_size(profile, step, period)
     p, layout = pack(setup)
-    period = period or setup.parameters.output_period
     begin = initial_state(setup, profile)
     schedule = schedule_of(profile, step, period, layout.control_period)
     rows, size = len(schedule.time), len(begin) + layout.states.begins.rates

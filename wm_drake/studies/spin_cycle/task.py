@@ -31,7 +31,7 @@ class SpinCycleTask(Task):
             hint = nearest_names(options.engine, ENGINES)
             raise input_error(f"unknown engine '{options.engine}'{hint}", where="--engine")
         self.machine, self.engine = machine, options.engine
-        self.profile = runnable_profile(options.profile, machine.parameters.step)
+        self.profile = runnable_profile(options.profile, machine.parameters)
         self.cases = cases_of_table(options.cases, options.case)
         files = MeasuredFiles(
             options.measured, options.accelerations, channels_of(options.channels)

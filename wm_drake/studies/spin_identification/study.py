@@ -223,7 +223,7 @@ class SpinIdentifyTask(Task):
             InputError: one of them is wrong.
         """
         self.options, self.machine = options, machine
-        self.profile = runnable_profile(options.profile, machine.parameters.step)
+        self.profile = runnable_profile(options.profile, machine.parameters)
         names = options.case or (() if options.cases else DEFAULT_CASES)
         self.cases = cases_of_table(options.cases, names)
         files = MeasuredFiles(
