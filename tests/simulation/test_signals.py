@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 from scipy.signal import butter, find_peaks, sosfiltfilt
 
-from wm_drake.simulation.displacements import amplitudes, filtered
+from wm_drake.batch import simulate_many
+from wm_drake.parameters import SpinProfile
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.displacements import (
+    BAND_HZ,
+    amplitudes,
+    filtered,
+    filtered_displacement,
+    pass_band,
+)
+from wm_drake.simulation.runs import simulate
 
 PERIOD = 0.005
 
@@ -56,3 +66,33 @@ def test_signals_without_a_peak_have_their_largest_value():
     assert sizes == pytest.approx([6.0, 6.0, 0.0, np.nan], nan_ok=True)
     assert list(samples) == [8, 8, 0, 0]
     assert np.isnan(amplitudes(np.empty((0, 2)))[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("rpm", "edge"), [(400, 20.0), (-480, 20.0), (1200, 50.0), (1400, 175.0 / 3.0), (9000, 90.0)]
+)
+def test_band_is_that_of_b_or_reaches_to_the_second_order(rpm, edge):
+    profile = SpinProfile(time=(0.0, 9.0), speed=(0.0, np.pi / 30.0 * rpm))
+    assert pass_band(profile, PERIOD) == pytest.approx((0.5, edge))
+    if abs(rpm) < 500:
+        assert pass_band(profile, PERIOD) == BAND_HZ
+
+
+def test_displacement_at_1400_rpm_passes_alike_in_record_and_batch(machine):
+    speed = np.pi / 30.0 * 1400.0
+    profile = SpinProfile(time=(0.0, 4.0), speed=(speed, speed))
+    case = Case("middle", machine.parameters.loads["middle"], profile)
+    record = simulate(machine, case)
+    shown = filtered_displacement(record)
+
+    def at_drum_frequency(values):
+        part = slice(400, 700)  # 35 revolutions
+        turning = np.exp(-1j * speed * record.time.values[part]) * np.hanning(300)
+        return abs(turning @ values[part])
+
+    raw = at_drum_frequency(record.displacement.values)
+    assert at_drum_frequency(shown.values) == pytest.approx(raw, rel=0.01)
+    narrow = at_drum_frequency(filtered(record.displacement.values, PERIOD))
+    assert np.all(narrow < 0.3 * raw)
+    (of_batch,) = simulate_many(machine, [case], measures=("amplitudes",)).amplitude.values
+    assert of_batch == pytest.approx(amplitudes(shown.values)[0], rel=1e-9)

@@ -103,6 +103,7 @@ def test_interrupted_before_a_run_it_leaves_nothing(study, name, monkeypatch):
         (("--machine", "nosuch"), "no such file, and no shipped machine"),
         (("--set", "gravty=9.8 m/s^2"), "did you mean 'gravity'"),
         (("--out", ""), "--out: is empty; name a folder"),
+        (("--out", "free.yaml/out"), "free.yaml/out: cannot be written to: Not a directory"),
         (("--nonsense",), "--nonsense"),
     ],
 )

@@ -31,7 +31,7 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cabinet import floor_forces
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.displacements import amplitudes, filtered, filtered_lanes
+from wm_drake.simulation.displacements import amplitudes, filtered_lanes, pass_band
 from wm_drake.simulation.feet import cabinet_of
 from wm_drake.simulation.histories import measure_samples_lanes, poses_of_runs
 from wm_drake.simulation.measures import MEASURES, Run
@@ -140,7 +140,7 @@ class Runner:
             extremes,
             lengths,
         )
-        filtered = self._filtered(moved.reshape(rows, count, WIDTH), extremes[-WIDTH:], key.period)
+        filtered = self._filtered(moved.reshape(rows, count, WIDTH), extremes[-WIDTH:], key)
         arrays = (
             samples.reshape(rows, size, WIDTH),
             moved.reshape(rows, count, WIDTH),
@@ -170,13 +170,13 @@ class Runner:
         poses_of_runs(samples, rows, size, poses)
         return poses
 
-    def _filtered(self, moved: FloatArray, good: FloatArray, period: float) -> FloatArray:
+    def _filtered(self, moved: FloatArray, good: FloatArray, key: BatchKey) -> FloatArray:
         """Return the filtered displacements at the sensors of runs side by side, if needed.
 
         Args:
             moved: Displacements at the measured points. (rows, points, lanes) [m]
             good: Number of samples of each run before it diverged. (lanes,)
-            period: Time between samples. [s]
+            key: What the runs have in common.
 
         Returns:
             (rows, sensors, lanes); of no rows if no measure needs them or no run is complete. [m]
@@ -184,7 +184,8 @@ class Runner:
         rows, sensors = len(moved), moved.shape[1] - 3
         if "sensors" not in self.needs or not np.any(good == rows):
             return np.empty((0, 0, WIDTH))
-        flat = filtered_lanes(moved.reshape(rows, -1), sensors, period, self._array)
+        band = pass_band(key.profile, key.period)
+        flat = filtered_lanes(moved.reshape(rows, -1), sensors, key.period, self._array, band)
         return flat.reshape(rows, sensors, WIDTH)
 
     def _forces_of_mounts(
@@ -332,7 +333,7 @@ class LaneRun(Run):
     def filtered(self) -> FloatArray:
         if self.good == len(self.lane.of_batch):
             return self.lane.of_batch
-        return filtered(self.displacement, self.period)
+        return super().filtered
 
     @functools.cached_property
     def amplitudes(self) -> tuple[FloatArray, np.ndarray]:

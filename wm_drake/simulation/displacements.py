@@ -1,4 +1,4 @@
-"""Displacements of a record: filtered to the band of [B], envelopes, amplitudes, orbits."""
+"""Displacements of a record: filtered to a band, envelopes, amplitudes, orbits."""
 
 import functools
 from collections.abc import Callable
@@ -9,13 +9,23 @@ import xarray as xr
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.packing import aligned
 from wm_drake.model.scene import REPLAY_RATE
+from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.outputs import point_positions
-from wm_drake.simulation.records import Record, sample_period
+from wm_drake.simulation.records import Record, profile_of, sample_period
 from wm_drake.simulation.signals import filter_both_ways, largest_peaks
 
 BAND_HZ = (0.5, 20.0)
-"""Pass band of the displacements ([B] section 2.2)."""
+"""Pass band of the displacements in [B] section 2.2, where the drum turns at up to 400 rpm."""
+
+ORDERS_PASSED = 2.5
+"""Smallest ratio of the upper band edge to the highest drum frequency: two orders pass.
+
+An assumption; in [B] the ratio is 3.
+"""
+
+HIGHEST_PART = 0.45
+"""Largest ratio of an upper band edge above that of [B] to the sampling frequency."""
 
 FILTER_ORDER = 4
 """Order of the Butterworth filter ([B] section 2.2).
@@ -34,14 +44,39 @@ REPLAY_SPAN = 8.0
 """Length of a replay. [s]"""
 
 
-def filtered(displacement: FloatArray, period: float) -> FloatArray:
-    """Return displacements filtered to the band 0.5-20 Hz, without phase shift.
+def pass_band(profile: SpinProfile, period: float) -> tuple[float, float]:
+    """Return the pass band of the displacements of a run. [Hz]
+
+    It is that of [B] as long as the drum turns at up to 480 rpm. Of a faster drum the upper edge is
+    `ORDERS_PASSED` times its frequency, since 20 Hz would cut the motion at 1200 rpm in half.
+
+    Args:
+        profile: Spin profile of the run.
+        period: Time between samples. [s]
+    """
+    highest = max(map(abs, profile.speed)) / (2.0 * np.pi)
+    edge = min(ORDERS_PASSED * highest, HIGHEST_PART / period)
+    return BAND_HZ[0], max(BAND_HZ[1], edge)
+
+
+def band_of(record: Record) -> tuple[float, float]:
+    """Return the pass band of a record; that of [B] if it has no spin profile. [Hz]"""
+    if "profile" not in record.attrs:
+        return BAND_HZ
+    return pass_band(profile_of(record), sample_period(record))
+
+
+def filtered(
+    displacement: FloatArray, period: float, band: tuple[float, float] = BAND_HZ
+) -> FloatArray:
+    """Return displacements filtered to a band, without phase shift.
 
     The filter is a Butterworth filter of fourth order.
 
     Args:
         displacement: (n, k) one column per signal. [m]
         period: Time between samples. [s]
+        band: Pass band. [Hz]
 
     Returns:
         (n, k) filtered displacements. [m] NaN if there are fewer samples than the filter needs, for
@@ -52,7 +87,7 @@ def filtered(displacement: FloatArray, period: float) -> FloatArray:
     lanes = aligned(rows * groups * WIDTH)
     side_by_side = lanes.reshape(rows, groups * WIDTH)
     side_by_side[:, :columns] = displacement
-    return filtered_lanes(side_by_side, groups, period)[:, :columns].copy()
+    return filtered_lanes(side_by_side, groups, period, band=band)[:, :columns].copy()
 
 
 def filtered_lanes(
@@ -60,6 +95,7 @@ def filtered_lanes(
     groups: int,
     period: float,
     array: Callable[[str, int], FloatArray] = lambda name, size: aligned(size * WIDTH),
+    band: tuple[float, float] = BAND_HZ,
 ) -> FloatArray:
     """Return the first groups of `WIDTH` signals of an array, as from `filtered`.
 
@@ -70,6 +106,7 @@ def filtered_lanes(
         period: Time between samples. [s]
         array: Function that returns an array of lanes, given a name and a size. A caller that
             filters often can use the same memory again.
+        band: Pass band. [Hz]
     """
     rows, columns = signals.shape
     padding = min(round(PADDING / period), rows - 1)
@@ -77,21 +114,21 @@ def filtered_lanes(
         return np.full((rows, groups * WIDTH), np.nan)
     answer, work = array("filtered", rows * groups), array("filter", rows + 2 * padding)
     shape = (rows, groups, columns // WIDTH)
-    filter_both_ways(signals.ravel(), shape, *_band_pass(period), padding, work, answer)
+    filter_both_ways(signals.ravel(), shape, *_band_pass(period, band), padding, work, answer)
     return answer.reshape(rows, groups * WIDTH)
 
 
 @functools.cache
-def _band_pass(period: float) -> tuple[FloatArray, FloatArray]:
+def _band_pass(period: float, band: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
     """Return the sections of the filter, and their states at a constant signal, flat."""
     from scipy.signal import butter, sosfilt_zi  # slow to import: measures that filter
 
-    sections = butter(FILTER_ORDER, BAND_HZ, btype="bandpass", fs=1.0 / period, output="sos")
+    sections = butter(FILTER_ORDER, band, btype="bandpass", fs=1.0 / period, output="sos")
     return sections.ravel(), sosfilt_zi(sections).ravel()
 
 
 def filtered_displacement(record: Record) -> xr.DataArray:
-    """Return the displacements (time, sensor) of a record, filtered to 0.5-20 Hz. [m]
+    """Return the displacements (time, sensor) of a record, filtered to `band_of` it. [m]
 
     Example:
         >>> import wm_drake as wm
@@ -100,7 +137,7 @@ def filtered_displacement(record: Record) -> xr.DataArray:
         ('time', 'sensor')
     """
     raw = record.displacement
-    return raw.copy(data=filtered(raw.values, sample_period(record)))
+    return raw.copy(data=filtered(raw.values, sample_period(record), band_of(record)))
 
 
 def power_means(displacement: FloatArray) -> FloatArray:

@@ -111,13 +111,17 @@ def _what_it_holds(earlier: dict[str, Any], run: Run) -> str:
 
 
 def check_is_folder(out: Path) -> None:
-    """Raise an InputError if the path of a result folder is a file, or cannot exist."""
+    """Raise an InputError if a path is a file, or no folder can be made or written to there."""
     try:
         is_other = out.exists() and not out.is_dir()
     except (OSError, ValueError) as error:
         raise input_error(reason_of(error), where=str(out)) from None
     if is_other:
         raise input_error("this path is a file, but a folder is needed", where=str(out))
+    nearest = next(path for path in (out, *out.absolute().parents) if path.exists())
+    code = errno.EACCES if nearest.is_dir() else errno.ENOTDIR
+    if code == errno.ENOTDIR or not os.access(nearest, os.W_OK):
+        raise _unwritable(out, OSError(code, os.strerror(code)))
 
 
 def check_folders(out: Path, run: Run) -> None:

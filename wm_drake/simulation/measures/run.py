@@ -11,7 +11,7 @@ from wm_drake.model.scene import Gap, Scene
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.displacements import amplitudes, filtered
+from wm_drake.simulation.displacements import amplitudes, filtered, pass_band
 from wm_drake.simulation.feet import foot_measures
 
 Need: TypeAlias = Literal["sensors", "shapes", "tub", "mounts", "feet", "springs"]
@@ -92,8 +92,8 @@ class Run(ABC):
 
     @functools.cached_property
     def filtered(self) -> FloatArray:
-        """Return the displacements at the sensors, filtered to 0.5-20 Hz. (n, sensors) [m]"""
-        return filtered(self.displacement, self.period)
+        """Return the displacements at the sensors, filtered to `pass_band`. (n, sensors) [m]"""
+        return filtered(self.displacement, self.period, pass_band(self.profile, self.period))
 
     @functools.cached_property
     def amplitudes(self) -> tuple[FloatArray, np.ndarray]:

@@ -26,7 +26,7 @@ from wm_drake.studies.calibration.tables import (
 )
 from wm_drake.studies.description.modal import Modes, natural_modes
 from wm_drake.studies.spin import tables
-from wm_drake.studies.spin.cases import case_title
+from wm_drake.studies.spin.cases import band_text, case_title
 from wm_drake.studies.spin.figures import envelopes_figure
 from wm_drake.studies.spin.study import Comparison, SpinResult, run_spin
 from wm_drake.studies.study import Facts
@@ -397,8 +397,8 @@ def _modes_picture(modes: Sequence[tuple[str, Modes]]) -> Picture:
 def _envelopes_picture(best: SpinResult, table: pd.DataFrame, index: int) -> Picture:
     case = best.results[index]
     caption = (
-        f"Load {case_title(case)}: displacement in the band 0.5–20 Hz. The shaded area extends "
-        "from the lower to the upper envelope. Dashed lines: measured amplitude."
+        f"Load {case_title(case)}: displacement in the band {band_text(case)}. The shaded area "
+        "extends from the lower to the upper envelope. Dashed lines: measured amplitude."
     )
     return picture(
         envelopes_figure(case.record, tables.experiment_mm(table, case)),

@@ -23,7 +23,7 @@ from wm_drake.parameters import (
 )
 from wm_drake.parameters.rubber import RubberBranches
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.displacements import BAND_HZ, FILTER_ORDER, PADDING
+from wm_drake.simulation.displacements import FILTER_ORDER, PADDING, pass_band
 from wm_drake.simulation.vibration import HIGH_PASS_HZ
 from wm_drake.simulation.vibration import ORDER as RMS_ORDER
 from wm_drake.studies.description.modal import natural_modes
@@ -194,7 +194,7 @@ def _numerics(parameters: MachineParameters) -> dict[str, Any]:
         "output_period_s": parameters.output_period,
         "displacement_filter": f"Butterworth band-pass of order {FILTER_ORDER}, {both_ways}; ends "
         f"mirrored over {PADDING:g} s",
-        "displacement_band_hz": list(BAND_HZ),
+        "displacement_band_hz": list(pass_band(parameters.profile, parameters.output_period)),
         "rms_filter": f"Butterworth high-pass of order {RMS_ORDER}, {both_ways}",
         "rms_high_pass_hz": HIGH_PASS_HZ,
     }

@@ -269,7 +269,7 @@ def surface_figure(result: Damping) -> Figure:
 
 def _envelopes_picture(result: Damping, load: str) -> Picture:
     caption = (
-        f"Load {load}: envelopes of the displacement at each sensor in the band 0.5–20 Hz. Shaded "
+        f"Load {load}: envelopes of the filtered displacement at each sensor. Shaded "
         f"area: computed at the optimum. Dashed lines: {_source(result)}. The envelopes are "
         f"compared from {WINDOW[0]:g} to {WINDOW[1]:g} s."
     )

@@ -4,6 +4,7 @@ import numpy as np
 
 from wm_drake.parameters import Sensor
 from wm_drake.report.formatting import RPM_PER_RAD_S
+from wm_drake.simulation.displacements import band_of
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 
@@ -15,6 +16,12 @@ def has_gasket(result: CaseResult) -> bool:
 def case_title(result: CaseResult) -> str:
     """Return the title of a case: its load, with or without gasket."""
     return f"{result.case.name} ({'with' if has_gasket(result) else 'without'} gasket)"
+
+
+def band_text(*cases: CaseResult) -> str:
+    """Return the pass band of the displacements of cases as text; of different ones, all."""
+    bands = dict.fromkeys(band_of(case.record) for case in cases)
+    return ", ".join(f"{low:g}–{high:.3g} Hz" for low, high in bands)
 
 
 def speed_rpm(result: CaseResult, time: float) -> float:

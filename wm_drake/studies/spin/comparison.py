@@ -157,23 +157,6 @@ class ComparisonResult(Result):
         return [f"{v.name}: {text}" for v in self.variants for text in v.result.failures()]
 
 
-@dataclass(frozen=True)
-class MeasureOfCase:
-    """One measure of one case, in the unit in which it is shown.
-
-    Attributes:
-        group: What is measured, such as "amplitude".
-        name: Sensor, axis or mount; empty if there is only one.
-        unit: Unit of the value.
-        value: NaN if the case does not have this measure.
-    """
-
-    group: str
-    name: str
-    unit: str
-    value: float
-
-
 def compared_variables() -> dict[str, Variable]:
     """Return the variables of a table of differences by their name there, in its order."""
     known = {v.name: v for measure in MEASURES.values() for v in measure.variables}
@@ -182,18 +165,19 @@ def compared_variables() -> dict[str, Variable]:
     }
 
 
-def measures_of(case: CaseResult) -> list[MeasureOfCase]:
-    """Return every measure of a case; NaN for the forces of a gasket that is not there."""
-    has_gasket = case.record.attrs["gasket"] == "yes"
-    measured = []
+def measures_of(case: CaseResult) -> dict[tuple[str, str, str], float]:
+    """Return the measures of a case by group, name and unit; NaN for forces of an absent gasket.
+
+    A group is what is measured, such as "amplitude"; a name is a sensor, an axis or a mount, or
+    empty if there is only one.
+    """
+    has_gasket, measured = case.record.attrs["gasket"] == "yes", {}
     for title, variable in compared_variables().items():
+        is_known = has_gasket or not variable.name.startswith("gasket_")
         for labels, value in labelled_values(case.measures.table, variable):
-            if not has_gasket and labels == ("gasket",):
-                continue
-            number = np.nan if value is None else value
-            if variable.name.startswith("gasket_") and not has_gasket:
-                number = np.nan
-            measured.append(MeasureOfCase(title, " ".join(labels), variable.unit.shown, number))
+            if has_gasket or labels != ("gasket",):
+                key = title, " ".join(labels), variable.unit.shown
+                measured[key] = np.nan if value is None or not is_known else value
     return measured
 
 
@@ -212,10 +196,7 @@ def difference_table(variants: Sequence[Variant]) -> pd.DataFrame:
     """
     rows, order = [], list(compared_variables())
     for index, case in enumerate(variants[0].result.results):
-        of_variants = [
-            {(m.group, m.name, m.unit): m.value for m in measures_of(v.result.results[index])}
-            for v in variants
-        ]
+        of_variants = [measures_of(variant.result.results[index]) for variant in variants]
         keys = list(dict.fromkeys(key for values in of_variants for key in values))
         keys.sort(key=lambda key: order.index(key[0]))  # a stable sort
         for key in keys:

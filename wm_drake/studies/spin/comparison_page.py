@@ -14,7 +14,7 @@ from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Group, Row, Table, line, readable
 from wm_drake.simulation.displacements import envelopes
 from wm_drake.studies.spin import effect_page, tables
-from wm_drake.studies.spin.cases import speed_rpm
+from wm_drake.studies.spin.cases import band_text, speed_rpm
 from wm_drake.studies.spin.comparison import ComparisonResult, Variant, common_sensors, remarks
 from wm_drake.studies.spin.figures import experiment_rules
 from wm_drake.studies.spin.page import warnings_of
@@ -142,9 +142,10 @@ def amplitudes(variants: Sequence[Variant], table: pd.DataFrame) -> Table:
                 Row((heading, *(percent(of_variant[name]) for name in sensors)), "difference")
             )
         groups.append(Group(case.case.name, tuple(rows)))
+    cases = (case for variant in variants for case in variant.result.results)
     caption = (
         "Amplitude of the displacement at each sensor: the largest absolute value of its envelopes "
-        f"in the band 0.5–20 Hz. Differences are in percent of '{variants[0].name}'."
+        f"in the band {band_text(*cases)}. Differences are in percent of '{variants[0].name}'."
     )
     header = ("load", "machine or variant", *(f"{name}, mm" for name in sensors))
     return Table(caption, header, tuple(groups), text_columns=2)
@@ -186,8 +187,8 @@ def envelopes_picture(variants: Sequence[Variant], index: int) -> Picture | None
     measured = _measured_mm([variant for variant in variants if variant.name in cases], index)
     load = variants[0].result.results[index].case.name
     caption = (
-        "Displacement at each sensor over time, in the band 0.5–20 Hz. Each shaded area extends "
-        "from the lower to the upper envelope."
+        f"Displacement at each sensor over time, in the band {band_text(*cases.values())}. Each "
+        "shaded area extends from the lower to the upper envelope."
     )
     if len(cases) <= MOST_MARKED:
         caption += (

@@ -11,6 +11,7 @@ from wm_drake.report.formatting import MM_PER_M, number, percent
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.table import Column, Columns, Group, Row, Table, table_of
 from wm_drake.simulation.displacements import envelopes, filtered_displacement
+from wm_drake.studies.spin.cases import band_text
 from wm_drake.studies.spin.gasket_effect import LARGE_STEADY, SMALL_STEADY, steady_window
 from wm_drake.studies.spin.study import CaseResult
 
@@ -185,8 +186,8 @@ def records_picture(
     if not sensors:
         return None
     caption = (
-        "Displacement in the band 0.5–20 Hz, without and with gasket, at the sensors with the "
-        "largest difference ([B] Fig. 3). Left: envelopes and records. Right: the records "
+        f"Displacement in the band {band_text(without)}, without and with gasket, at the sensors "
+        "with the largest difference ([B] Fig. 3). Left: envelopes and records. Right: the records "
         "around the largest amplitude with gasket."
     )
     alternative = f"Overlaid records without and with gasket, load {load}: {sensors}."

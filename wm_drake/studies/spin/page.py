@@ -15,7 +15,7 @@ from wm_drake.report.springs import slack_warning
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.studies.modes.page import natural_modes_table
 from wm_drake.studies.spin import tables
-from wm_drake.studies.spin.cases import case_title, has_gasket, speed_rpm
+from wm_drake.studies.spin.cases import band_text, case_title, has_gasket, speed_rpm
 from wm_drake.studies.spin.drive import capture_warnings, drive_in_short, drive_section
 from wm_drake.studies.spin.figures import (
     envelopes_figure,
@@ -285,9 +285,9 @@ def _envelopes_picture(case: CaseResult, table: pd.DataFrame) -> Picture | None:
         for name in amplitude.sensor.values
     )
     caption = (
-        "Displacement at each sensor over time, in the band 0.5–20 Hz. The shaded area extends "
-        "from the lower to the upper envelope. The dot marks the largest absolute value; the top "
-        "of the panel gives this value and its drum speed. All panels have the same scale."
+        f"Displacement at each sensor over time, in the band {band_text(case)}. The shaded area "
+        "extends from the lower to the upper envelope. The dot marks the largest absolute value; "
+        "the top of the panel gives this value and its drum speed. All panels have the same scale."
     )
     if measured is not None:
         caption += " Dashed lines: measured amplitude, on both sides of zero."

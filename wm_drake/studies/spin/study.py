@@ -17,6 +17,7 @@ from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.cases import Case, is_as_measured
+from wm_drake.simulation.displacements import band_of
 from wm_drake.simulation.measures import Measures, measure
 from wm_drake.simulation.measures.as_json import as_json
 from wm_drake.simulation.mounts import POINT
@@ -188,6 +189,7 @@ def case_as_json(case: CaseResult) -> dict[str, Any]:
             "distance_mm": Unit("m", "mm").from_si(walk.distance),
             "turn_deg": Unit("rad", "deg").from_si(walk.turn),
         },
+        "displacement_band_hz": list(band_of(case.record)),
         "diverged": case.record.attrs["diverged"] or None,
         "wall_s": case.wall_s,
     }

@@ -34,7 +34,7 @@ from wm_drake.simulation.measures.registry import tabulated
 from wm_drake.simulation.mount_forces import MountForce, mount_forces, rms_table, speed_ranges
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.simulation.vibration import sensor_accelerations
-from wm_drake.studies.spin.cases import case_title, has_gasket, sensors_of, speed_rpm
+from wm_drake.studies.spin.cases import band_text, case_title, has_gasket, sensors_of, speed_rpm
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 OURS = "wm_drake"
@@ -128,8 +128,8 @@ def comparison(result: SpinResult, table: pd.DataFrame) -> Table:
         groups.append(Group(case_title(case), tuple(rows)))
     caption = (
         "Amplitude of the displacement at each sensor: the largest absolute value of its envelopes "
-        "in the band 0.5–20 Hz. The last rows of each load are differences: 100 % × (value − "
-        "experiment) / experiment, [B] Eq. (1)."
+        f"in the band {band_text(*result.results)}. The last rows of each load are differences: "
+        "100 % × (value − experiment) / experiment, [B] Eq. (1)."
     )
     header = ("load", "source", *(f"{name}, mm" for name in sensors), "mean absolute difference, %")
     return Table(caption, header, tuple(groups), text_columns=2)

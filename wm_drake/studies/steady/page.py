@@ -182,7 +182,7 @@ def _peaks_table(study: SteadyStudy) -> Table:
     sensors = [str(name) for name in study.cases[0].response.sensor.values]
     caption = (
         "Largest amplitude at each sensor and its speed: steady motion, and the run over the spin "
-        "profile of the machine, whose envelope is filtered from 0.5 to 20 Hz."
+        "profile of the machine, whose displacements are band-passed as by the command spin."
     )
     return Table(caption, ("load", "", *sensors), tuple(groups), text_columns=2)
 
