@@ -175,6 +175,13 @@ def _run(words: list[str]) -> None:
 
 
 def _write_inputs(folder: Path) -> None:
+    write_inputs_of_studies(folder)
+    for name, stiffness in (("r", 3.0), ("a", 5.0)):
+        _write_ramp(folder / f"{name}.csv", stiffness)
+
+
+def write_inputs_of_studies(folder: Path) -> None:
+    """Write the files that studies are given."""
     (folder / "free.yaml").write_text(FREE)
     (folder / "short.yaml").write_text(SHORT)
     (folder / "limits.yaml").write_text(
@@ -192,8 +199,6 @@ def _write_inputs(folder: Path) -> None:
     pd.DataFrame(rows, columns=["load", "gasket", "source", *sensors]).to_csv(
         folder / "measured.csv", index=False
     )
-    for name, stiffness in (("r", 3.0), ("a", 5.0)):
-        _write_ramp(folder / f"{name}.csv", stiffness)
 
 
 def _write_ramp(path: Path, stiffness: float) -> None:

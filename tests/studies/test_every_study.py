@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from every_page import KINDS, _write_inputs
+from every_page import KINDS, write_inputs_of_studies
 
 import wm_drake as wm
 from wm_drake.batch.ledger import Ledger
@@ -33,7 +33,7 @@ SLOWLY = [
 @pytest.fixture
 def study(wm_drake):
     """Return a function that runs a study with `--quick` and more arguments."""
-    _write_inputs(Path())
+    write_inputs_of_studies(Path())
 
     def command(name, *arguments, out="out"):
         words = [*STUDIES[name].command.split(), *REQUIRED.get(name, ()), "--quick"]
