@@ -153,7 +153,7 @@ def _motions(kind: str, bench: Bench, options: RigOptions) -> list[Harmonic]:
         rotates = isinstance(bench, BushingBench) and bench.axis.startswith("about")
         if kind == "gasket" and rotates:
             raise input_error("[A] does not rotate the gasket; give -f and -a", where="--matrix")
-        if rotates and bench.axis == "about_y":
+        if isinstance(bench, BushingBench) and bench.axis == "about_y":
             raise input_error(
                 "[A] does not twist the bushing about its axis; give -f and -a", where="--matrix"
             )
