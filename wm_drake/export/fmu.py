@@ -138,22 +138,22 @@ def _platforms(options: FmuOptions) -> list[Platform]:
         InputError: an option is not allowed.
     """
     if options.fmi not in VERSIONS:
-        raise input_error(f"there is no version {options.fmi}; allowed are 2 and 3", key="fmi")
+        raise input_error(f"there is no version {options.fmi}; allowed are 2 and 3", where="fmi")
     if options.input not in ("speed", "torque"):
-        raise input_error(f"no input '{options.input}'; allowed: speed, torque", key="input")
+        raise input_error(f"no input '{options.input}'; allowed: speed, torque", where="input")
     names = [name.strip() for name in options.platform.split(",") if name.strip()]
     for name in names:
         if name not in PLATFORMS:
             near = nearest_names(name, PLATFORMS)
-            raise input_error(f"no platform '{name}'{near}", key="platform")
+            raise input_error(f"no platform '{name}'{near}", where="platform")
     return [PLATFORMS[name] for name in dict.fromkeys(names or [host_platform()])]
 
 
 def _check_file(path: Path) -> None:
     if path.suffix != ".fmu":
-        raise input_error(f"'{path.name}' must end with .fmu", key="out")
+        raise input_error(f"'{path.name}' must end with .fmu", where="out")
     if not path.parent.is_dir():
-        raise input_error(f"there is no folder '{path.parent}'", key="out")
+        raise input_error(f"there is no folder '{path.parent}'", where="out")
 
 
 def _headers() -> Path:
@@ -163,7 +163,7 @@ def _headers() -> Path:
         raise input_error(
             "the headers of the standard come from the package FMPy, which is not installed; "
             "pip install 'wm-drake[fmu]'",
-            key="export fmu",
+            where="export fmu",
         )
     return Path(fmpy.origin).parent / "c-code"
 
@@ -179,7 +179,7 @@ def _compiler(platform: Platform) -> list[str]:
     raise input_error(
         f"no compiler for '{platform.name}'; pip install 'wm-drake[fmu]' installs ziglang, which "
         "compiles for all platforms",
-        key="platform",
+        where="platform",
     )
 
 
@@ -223,7 +223,7 @@ def _library(contents: Mapping[str, bytes], platform: Platform, compiler: list[s
         done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=place)
         if done.returncode or not library.is_file():
             reason = shortened(" ".join(done.stderr.split()), LONGEST_REASON)
-            raise input_error(f"the compiler failed: {reason}", key=f"platform {platform.name}")
+            raise input_error(f"the compiler failed: {reason}", where=f"platform {platform.name}")
         return library.read_bytes()
 
 

@@ -128,7 +128,7 @@ def exported_model(
     if not 0.0 < step <= parameters.step * 4.0:
         raise input_error(
             f"{step:g} s; it must be above 0 and at most {4.0 * parameters.step:g} s",
-            key="step",
+            where="step",
         )
     check_step(setup, step)
     tuned = tunables(machine, gasket)
