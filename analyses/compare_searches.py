@@ -21,7 +21,7 @@ from wm_drake.parameters.designs import load_design
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.pareto.problem import MachineDesigns, machine_designs
-from wm_drake.studies.pareto.search import SearchResult
+from wm_drake.studies.pareto.search import Problem, SearchResult, SearchSettings
 from wm_drake.studies.pareto.study import SEARCHES
 
 
@@ -39,10 +39,9 @@ def searched(
         return result
 
     begin = time.process_time()
-    search = SEARCHES[name]
     goals, limits = len(designs.objectives), len(designs.constraints)
-    settings = {"evaluations": evaluations, "population": min(64, evaluations), "seed": seed}
-    result = search(evaluate, designs.nominal(), goals, limits, **settings)
+    problem = Problem(evaluate, designs.nominal(), goals, limits)
+    result = SEARCHES[name](problem, SearchSettings(evaluations, min(64, evaluations), seed))
     return result, time.process_time() - begin - running
 
 

@@ -90,9 +90,9 @@ KINDS = {
         "--targets", "measured.csv", "--starts", "1", "--iterations", "3",
         "--leave-out", "back", "--fewer", "1",
     ),
-    "gasket": _one("gasket/page.html", "study", "gasket", "--trials", "150", "--check", "C_L=120 %"),
+    "gasket": _one("sections.html", "study", "gasket", "--trials", "150", "--check", "C_L=120 %"),
     "gasket_of_one_load": _one(
-        "gasket/page.html", "study", "gasket", "--design", "orthogonal", "--trials", "243",
+        "sections.html", "study", "gasket", "--design", "orthogonal", "--trials", "243",
         "--model", "main", "--load", "back", "--response", "mount_force_peak", "--response", "amplitude",
     ),
     "gasket_damping": Kind(
@@ -109,9 +109,9 @@ KINDS = {
         "sections.html", "study", "spin-identify", "--case", "2",
         "--unknown", "gasket.stiffness_y=(1, 4) N/mm", "--profile", "short_cycle.yaml",
     ),
-    "modes": _one("modes/page.html", "study", "modes"),
+    "modes": _one("sections.html", "study", "modes"),
     "response": _one(
-        "steady/page.html", "study", "response", "--load", "middle", "--points", "15",
+        "sections.html", "study", "response", "--load", "middle", "--points", "15",
         "--harmonics", "3", "--rate", "20 rpm/s", "--rate", "50 rpm/s",
     ),
     "orders": Kind(
@@ -123,7 +123,7 @@ KINDS = {
         "--sensitivity", "16", "--subset", "100", "--limits", "limits.yaml",
     ),
     "design": _one(
-        "pareto/page.html", "study", "design", "gasket", "--evaluations", "48", "--population", "16"
+        "sections.html", "study", "design", "gasket", "--evaluations", "48", "--population", "16"
     ),
     "drive": _one(
         "sections.html", "study", "drive", "--load", "middle", "--torques", "3",

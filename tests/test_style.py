@@ -22,7 +22,7 @@ elements/, engines/compiled/: compiled functions on flat arrays. An object would
 unpacked at each call from Python, and each of its types compiles another form.
 """
 
-FUNCTIONS_LEFT = 46
+FUNCTIONS_LEFT = 30
 
 
 def sources():

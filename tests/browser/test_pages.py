@@ -13,10 +13,10 @@ from wm_drake.report.figure import MARK, MEASURED, Axis, Figure, Line, Panel, Ru
 from wm_drake.report.page import picture, render
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe import make_design
+from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.screening import Meaning, Responses, run_screening
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.surface import surfaces
-from wm_drake.studies.gasket.task import GasketResult
 from wm_drake.studies.spin.page import spin_page as page_of_spin
 from wm_drake.studies.study import Facts
 

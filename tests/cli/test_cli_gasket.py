@@ -37,7 +37,7 @@ def study(wm_drake):
 @pytest.fixture
 def study_without_page(study, monkeypatch):
     """Return the small study without its figures, which take most of its time."""
-    monkeypatch.setattr("wm_drake.studies.gasket.page.gasket_page", lambda *_: "")
+    monkeypatch.setattr("wm_drake.studies.gasket.page.GasketResult.page", lambda *_: "")
     return study
 
 

@@ -73,3 +73,17 @@ def test_row_of_another_length_is_refused(table):
     short = Table("", table.columns, (line("middle", ["Xr", 1.0]),))
     with pytest.raises(ValueError, match="argument"):
         assert short.shown
+
+
+def test_neighbours_with_the_same_first_cell_become_one_group():
+    frame = pd.DataFrame({"load": ["a", "a", "b"], "Xr": [1.0, 2.0, 3.0]})
+    made = table_of(frame, columns={"Xr": Column("Xr", form="{:.0f} mm".format)}, grouped=True)
+    shown = [(g.heading, [row.cells for row in g.rows]) for g in made.shown]
+    assert shown == [("a", [("1 mm",), ("2 mm",)]), ("b", [("3 mm",)])]
+
+
+def test_column_can_be_left_out(table):
+    less = table.without("sensor")
+    assert less.header == ("load", "largest, mm", "share", "ends")
+    assert less.text_columns == 1
+    assert less.shown[0].rows[0].cells == ("−1.2", "0.1235", "yes")

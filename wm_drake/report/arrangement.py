@@ -56,26 +56,19 @@ MARGIN = 0.05
 
 
 @dataclass(frozen=True)
-class Place:
-    """Place of a panel, from the left and from the top. [px]
+class Texts:
+    """What stands around the axes of a panel.
 
     Attributes:
-        panel: The panel; the ranges of its axes are numbers.
-        left, right, top, bottom: Edges of its axes.
         titles: Lines of its title.
         subtitles: Lines of its subtitle.
-        above: Room between the axes and the title.
+        above: Room between the axes and the title. [px]
         x_ticks, y_ticks: Texts of the named ticks, broken into lines.
         is_upright: Whether the texts of the horizontal axis are turned.
         x_label, y_label: Lines of the labels of both axes.
         scale: Scale of the colour bar at its right.
     """
 
-    panel: Panel
-    left: float
-    right: float
-    top: float
-    bottom: float
     titles: tuple[str, ...]
     subtitles: tuple[str, ...]
     above: float
@@ -85,6 +78,24 @@ class Place:
     x_label: tuple[str, ...]
     y_label: tuple[str, ...]
     scale: Scale | None
+
+
+@dataclass(frozen=True)
+class Place:
+    """Place of a panel, from the left and from the top. [px]
+
+    Attributes:
+        panel: The panel; the ranges of its axes are numbers.
+        left, right, top, bottom: Edges of its axes.
+        texts: What stands around them.
+    """
+
+    panel: Panel
+    left: float
+    right: float
+    top: float
+    bottom: float
+    texts: Texts
 
 
 @dataclass(frozen=True)
@@ -171,15 +182,7 @@ def arrange(figure: Figure) -> Arrangement:
             *x_edges[panel.column],
             y_edges[panel.row][0],
             y_edges[panel.row + panel.rows - 1][1],
-            room.titles,
-            room.subtitles,
-            room.above,
-            room.x_ticks,
-            room.y_ticks,
-            room.is_upright,
-            room.x_label,
-            room.y_label,
-            room.scale,
+            room.texts,
         )
         for panel, room in zip(panels, rooms, strict=True)
     )
@@ -193,15 +196,7 @@ class _Room:
     right: float
     top: float
     bottom: float
-    titles: tuple[str, ...]
-    subtitles: tuple[str, ...]
-    above: float
-    x_ticks: tuple[str, ...]
-    y_ticks: tuple[str, ...]
-    is_upright: bool
-    x_label: tuple[str, ...]
-    y_label: tuple[str, ...]
-    scale: Scale | None
+    texts: Texts
 
 
 def _room(panel: Panel, width: float, height: float) -> _Room:
@@ -233,8 +228,8 @@ def _room(panel: Panel, width: float, height: float) -> _Room:
     subtitles = wrapped(panel.subtitle, TEXT, most) if panel.subtitle else ()
     top = above + LINE * (len(titles) * TITLE + len(subtitles) * TEXT)
     top += 4.0 if titles or subtitles else 0.0
-    texts = (titles, subtitles, above, x_ticks, y_ticks, is_upright, x_label, y_label, scale)
-    return _Room(left, right, top, below, *texts)
+    texts = Texts(titles, subtitles, above, x_ticks, y_ticks, is_upright, x_label, y_label, scale)
+    return _Room(left, right, top, below, texts)
 
 
 def _first_place(axis: Axis, width: float) -> float:

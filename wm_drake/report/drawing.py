@@ -48,7 +48,6 @@ from wm_drake.report.figure import (
     Scale,
     Span,
     Text,
-    round_numbers,
 )
 
 JOURNAL_WIDTH = 180.0 / 25.4
@@ -161,10 +160,7 @@ def _sample(marks: list[Mark]) -> Any:
             face = to_rgba(color, mark.opacity)
             samples[type(mark)] = Patch(facecolor=face, edgecolor=edge or (0, 0, 0, 0))
         elif isinstance(mark, (Line, Rule)):
-            style = _line_style(mark)
-            if isinstance(mark, Line) and mark.symbol:
-                style |= {"marker": MARKERS[mark.symbol], "markersize": POINT * mark.size}
-            samples[type(mark)] = Line2D([], [], **style)
+            samples[type(mark)] = Line2D([], [], **_line_style(mark))
         elif isinstance(mark, Points):
             samples[type(mark)] = Line2D([], [], **_point_style(mark))
     return tuple(samples.values())
@@ -183,20 +179,20 @@ def _draw_panel(drawing: Drawing, place: Place, height: float) -> None:
         _MARKS[type(mark)](second if mark.is_second and second is not None else axes, mark)
     if panel.is_square:
         axes.set_aspect("equal", adjustable="box")
-    _style_axis(axes, "x", panel.x, place.x_ticks, x_count(place.right - place.left))
-    _style_axis(axes, "y", panel.y, place.y_ticks, y_count(place.bottom - place.top))
-    axes.set_xlabel("\n".join(place.x_label))
-    axes.set_ylabel("\n".join(place.y_label))
+    _style_axis(axes, "x", panel.x, place.texts.x_ticks, x_count(place.right - place.left))
+    _style_axis(axes, "y", panel.y, place.texts.y_ticks, y_count(place.bottom - place.top))
+    axes.set_xlabel("\n".join(place.texts.x_label))
+    axes.set_ylabel("\n".join(place.texts.y_label))
     if panel.x.is_far:
         axes.xaxis.tick_top()
         axes.xaxis.set_label_position("top")
-    if place.is_upright:
+    if place.texts.is_upright:
         axes.tick_params(axis="x", rotation=90)
     if panel.top is not None:
         _draw_top(axes, panel.top)
     _draw_titles(axes, place)
-    if place.scale is not None:
-        _draw_color_bar(drawing, place, place.scale, height)
+    if place.texts.scale is not None:
+        _draw_color_bar(drawing, place, place.texts.scale, height)
 
 
 def _second_axes(axes: Axes, place: Place) -> Axes:
@@ -211,10 +207,10 @@ def _second_axes(axes: Axes, place: Place) -> Axes:
 
 
 def _draw_titles(axes: Axes, place: Place) -> None:
-    rise = place.above
+    rise = place.texts.above
     for lines, text_size, color, weight in (
-        (place.subtitles, TEXT, QUIET, "normal"),
-        (place.titles, TITLE, MARK, "bold"),
+        (place.texts.subtitles, TEXT, QUIET, "normal"),
+        (place.texts.titles, TITLE, MARK, "bold"),
     ):
         if lines:
             axes.annotate(
@@ -279,17 +275,15 @@ def _colormap(scale: Scale) -> Colormap:
     return LinearSegmentedColormap.from_list(scale.shades, scale.colors())
 
 
+def _norm(scale: Scale) -> Normalize:
+    return Normalize(*scale.ends())
+
+
 def _draw_color_bar(drawing: Drawing, place: Place, scale: Scale, height: float) -> None:
     box = ((place.right + 8.0) / WIDTH, 1.0 - place.bottom / height)
     axes = drawing.add_axes((*box, 12.0 / WIDTH, (place.bottom - place.top) / height))
-    low, high = map(float, scale.place([scale.low, scale.high]))
-    bar = drawing.colorbar(ScalarMappable(Normalize(low, high), _colormap(scale)), cax=axes)
-    ticks = scale.ticks
-    if ticks is None and scale.kind == "log":
-        powers = np.arange(np.ceil(low - 1e-9), np.floor(high + 1e-9) + 1.0)
-        ticks = tuple((float(10.0**p), f"{10.0**p:g}") for p in powers)
-    elif ticks is None:
-        ticks = tuple((v, f"{v:g}") for v in map(float, round_numbers(scale.low, scale.high, 6)))
+    bar = drawing.colorbar(ScalarMappable(_norm(scale), _colormap(scale)), cax=axes)
+    ticks = scale.bar_ticks()
     bar.set_ticks(list(scale.place([at for at, _ in ticks])), labels=[text for _, text in ticks])
     bar.ax.tick_params(labelsize=POINT * TEXT, labelcolor=QUIET, length=POINT * 4.9, **TICK)
     bar.set_label(scale.label, fontsize=POINT * LABEL)
@@ -297,11 +291,14 @@ def _draw_color_bar(drawing: Drawing, place: Place, scale: Scale, height: float)
 
 
 def _line_style(mark: Line | Rule) -> dict[str, Any]:
-    return {
+    style = {
         "color": to_rgba(mark.color, mark.opacity),
         "linewidth": POINT * mark.width * 1.15,
         "linestyle": DASHES[mark.dash],
     }
+    if isinstance(mark, Line) and mark.symbol:
+        style |= {"marker": MARKERS[mark.symbol], "markersize": POINT * mark.size}
+    return style
 
 
 def _point_style(mark: Points) -> dict[str, Any]:
@@ -318,22 +315,18 @@ def _point_style(mark: Points) -> dict[str, Any]:
 
 
 def _line(axes: Axes, mark: Line) -> None:
-    style = _line_style(mark)
-    if mark.symbol:
-        style |= {"marker": MARKERS[mark.symbol], "markersize": POINT * mark.size}
-    axes.plot(mark.x, mark.y, **style)
+    axes.plot(mark.x, mark.y, **_line_style(mark))
 
 
 def _points(axes: Axes, mark: Points) -> None:
     if mark.values is not None and mark.scale is not None:
-        low, high = map(float, mark.scale.place([mark.scale.low, mark.scale.high]))
         axes.scatter(
             mark.x,
             mark.y,
             s=(POINT * mark.size) ** 2,
             c=mark.scale.place(mark.values),
             cmap=_colormap(mark.scale),
-            norm=Normalize(low, high),
+            norm=_norm(mark.scale),
             zorder=3,
         )
     else:
@@ -369,7 +362,6 @@ def _bars(axes: Axes, mark: Bars) -> None:
 
 
 def _cells(axes: Axes, mark: Cells) -> None:
-    low, high = map(float, mark.scale.place([mark.scale.low, mark.scale.high]))
     edges = []
     for middles in (mark.x, mark.y):
         at = np.asarray(middles, dtype=float)
@@ -381,7 +373,7 @@ def _cells(axes: Axes, mark: Cells) -> None:
         origin="lower",
         aspect="auto",
         cmap=_colormap(mark.scale),
-        norm=Normalize(low, high),
+        norm=_norm(mark.scale),
         interpolation="none",
         alpha=mark.opacity,
     )

@@ -72,6 +72,21 @@ class Scale:
             return np.asarray(np.log10(cut))
         return np.asarray(np.sqrt(cut) if self.kind == "root" else cut)
 
+    def ends(self) -> tuple[float, float]:
+        """Return the numbers of `place` at both ends."""
+        low, high = self.place([self.low, self.high])
+        return float(low), float(high)
+
+    def bar_ticks(self) -> Ticks:
+        """Return values with names at the colour bar: given ones, powers of ten, round numbers."""
+        if self.ticks is not None:
+            return self.ticks
+        numbers = round_numbers(self.low, self.high, 6)
+        if self.kind == "log":
+            low, high = self.ends()
+            numbers = 10.0 ** np.arange(np.ceil(low - 1e-9), np.floor(high + 1e-9) + 1.0)
+        return tuple((value, f"{value:g}") for value in numbers.tolist())
+
 
 @dataclass(frozen=True, kw_only=True)
 class Mark:

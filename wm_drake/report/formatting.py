@@ -1,7 +1,7 @@
 """Text form of numbers and names on a page: rounded, in mm and rpm, with a true minus sign."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -43,6 +43,11 @@ def percent(value: float) -> str:
         return MISSING
     text = number(value, 0)
     return f"+{text} %" if round(value) > 0 else f"{text} %"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Return words as a list in a sentence: a, b and c."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def shape_name(name: str) -> str:

@@ -42,7 +42,6 @@ from wm_drake.report.figure import (
     Scale,
     Span,
     Text,
-    round_numbers,
 )
 
 Plain: TypeAlias = dict[str, Any]
@@ -89,8 +88,8 @@ def plotly_of(figure: Figure) -> Plain:
             _add_mark(mark, place.panel, (f"x{number}", y), data, layout)
         if place.panel.top is not None:
             data.append(_top_axis(place, index, layout))
-        if place.scale is not None:
-            data.append(_color_bar(place, place.scale, arrangement))
+        if place.texts.scale is not None:
+            data.append(_color_bar(place, place.texts.scale, arrangement))
     layout["meta"] = {
         "columns": [list(map(float, edges)) for edges in arrangement.columns],
         "keys": list(key_texts(figure)),
@@ -101,13 +100,24 @@ def plotly_of(figure: Figure) -> Plain:
 
 
 def _outer_labels(figure: Figure) -> list[Plain]:
-    font = {"size": LABEL, "color": MARK}
-    common = {"xref": "paper", "yref": "paper", "showarrow": False, "font": font, "borderpad": 0}
-    labels = []
-    if figure.x_label:
-        at = {"x": 0.5, "y": 0.0, "xanchor": "center", "yanchor": "bottom"}
-        labels.append({**common, **at, "text": escaped(figure.x_label)})
-    return labels
+    if not figure.x_label:
+        return []
+    place: Plain = {"xref": "paper", "yref": "paper", "x": 0.5, "y": 0.0, "xanchor": "center"}
+    return [_note(figure.x_label, LABEL, MARK, **place, yanchor="bottom")]
+
+
+def _note(text: str, size: float, color: str, *, is_bold: bool = False, **place: Any) -> Plain:
+    """Return a text in a picture.
+
+    Args:
+        text: The text.
+        size: Its size. [px]
+        color: Its colour.
+        is_bold: Whether it is bold.
+        place: Where it is, in the words of Plotly.
+    """
+    font = {"size": size, "color": color, "weight": 700 if is_bold else 400}
+    return {"text": escaped(text), "showarrow": False, "borderpad": 0, "font": font, **place}
 
 
 def escaped(text: str) -> str:
@@ -126,16 +136,19 @@ def _add_axes(
         "anchor": f"y{number}",
         "side": "top" if panel.x.is_far else "bottom",
         "nticks": x_count(place.right - place.left),
-        "tickangle": -90 if place.is_upright else 0,
+        "tickangle": -90 if place.texts.is_upright else 0,
     }
     y |= {
         "domain": [1.0 - place.bottom / height, 1.0 - place.top / height],
         "anchor": f"x{number}",
         "nticks": y_count(place.bottom - place.top),
     }
-    x["title"] = _label(panel.x, "\n".join(place.x_label), 4)
-    y["title"] = _label(panel.y, "\n".join(place.y_label), 5)
-    for plain, axis, texts in ((x, panel.x, place.x_ticks), (y, panel.y, place.y_ticks)):
+    x["title"] = _label(panel.x, "\n".join(place.texts.x_label), 4)
+    y["title"] = _label(panel.y, "\n".join(place.texts.y_label), 5)
+    for plain, axis, texts in (
+        (x, panel.x, place.texts.x_ticks),
+        (y, panel.y, place.texts.y_ticks),
+    ):
         if axis.ticks is not None:
             plain["tickvals"] = [at for at, _ in axis.ticks]
             plain["ticktext"] = list(map(escaped, texts))
@@ -188,29 +201,16 @@ def _axis(axis: Axis) -> Plain:
 
 
 def _add_titles(place: Place, number: str, layout: Plain) -> None:
-    lines = (place.titles, place.subtitles)
-    rise = place.above
-    for texts, size, color, weight in zip(
-        lines[::-1], (TEXT, TITLE), (QUIET, MARK), (400, 700), strict=True
-    ):
-        if texts:
-            layout["annotations"].append(
-                {
-                    "text": escaped("\n".join(texts)),
-                    "xref": f"x{number} domain",
-                    "yref": f"y{number} domain",
-                    "x": 0.0,
-                    "y": 1.0,
-                    "xanchor": "left",
-                    "yanchor": "bottom",
-                    "align": "left",
-                    "yshift": rise,
-                    "showarrow": False,
-                    "borderpad": 0,
-                    "font": {"size": size, "color": color, "weight": weight},
-                }
-            )
-            rise += len(texts) * size * LINE
+    texts = place.texts
+    at: Plain = {"x": 0.0, "y": 1.0, "xanchor": "left", "yanchor": "bottom"}
+    at |= {"xref": f"x{number} domain", "yref": f"y{number} domain", "align": "left"}
+    rise = texts.above
+    for lines, size, color in ((texts.subtitles, TEXT, QUIET), (texts.titles, TITLE, MARK)):
+        if lines:
+            is_title = lines is texts.titles
+            note = _note("\n".join(lines), size, color, is_bold=is_title, **at, yshift=rise)
+            layout["annotations"].append(note)
+            rise += len(lines) * size * LINE
 
 
 def _top_axis(place: Place, index: int, layout: Plain) -> Plain:
@@ -246,14 +246,7 @@ def _top_axis(place: Place, index: int, layout: Plain) -> Plain:
 
 def _color_bar(place: Place, scale: Scale, arrangement: Arrangement) -> Plain:
     """Return the empty curve that carries the colour bar at the right of a panel."""
-    low, high = (float(v) for v in scale.place([scale.low, scale.high]))
-    if scale.ticks is not None:
-        ticks = scale.ticks
-    elif scale.kind == "log":
-        powers = np.arange(np.ceil(low - 1e-9), np.floor(high + 1e-9) + 1.0)
-        ticks = tuple((float(10.0**p), f"{10.0**p:g}") for p in powers)
-    else:
-        ticks = tuple((v, f"{v:g}") for v in map(float, round_numbers(scale.low, scale.high, 6)))
+    (low, high), ticks = scale.ends(), scale.bar_ticks()
     right = (place.right + 8.0) / WIDTH
     middle = 1.0 - 0.5 * (place.top + place.bottom) / arrangement.height
     bar = {
@@ -390,8 +383,7 @@ def _span(mark: Span, axes: tuple[str, str]) -> Plain:
 def _text(mark: Text, axes: tuple[str, str], is_literal: bool) -> Plain:
     in_x, in_y = mark.in_data
     color = fixed(mark.color) if is_literal and in_x and in_y else mark.color
-    return {
-        "text": escaped(mark.text),
+    place: Plain = {
         "xref": axes[0] if in_x else f"{axes[0]} domain",
         "yref": axes[1] if in_y else f"{axes[1]} domain",
         "x": mark.x,
@@ -401,10 +393,8 @@ def _text(mark: Text, axes: tuple[str, str], is_literal: bool) -> Plain:
         "align": mark.across,
         "xshift": mark.shift[0],
         "yshift": mark.shift[1],
-        "showarrow": False,
-        "borderpad": 0,
-        "font": {"size": mark.size, "color": color, "weight": 700 if mark.is_bold else 400},
     }
+    return _note(mark.text, mark.size, color, is_bold=mark.is_bold, **place)
 
 
 def _line(mark: Line) -> Plain:
@@ -431,7 +421,7 @@ def _points(mark: Points) -> Plain:
     marker: Plain = {"symbol": symbol, "size": mark.size, "color": color}
     marker["line"] = {"color": color, "width": width}
     if mark.values is not None and mark.scale is not None:
-        low, high = (float(v) for v in mark.scale.place([mark.scale.low, mark.scale.high]))
+        low, high = mark.scale.ends()
         marker |= {"color": packed(mark.scale.place(mark.values)), "cmin": low, "cmax": high}
         marker |= {"colorscale": _colorscale(mark.scale), "line": {"width": 0}}
     return {
@@ -478,7 +468,7 @@ def _bars(mark: Bars) -> Plain:
 
 def _cells(mark: Cells) -> Plain:
     scale = mark.scale
-    low, high = (float(v) for v in scale.place([scale.low, scale.high]))
+    low, high = scale.ends()
     value = "z" if scale.kind == "linear" else "customdata"  # pictures.js adds the latter
     return {
         "type": "heatmap",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from wm_drake.report.figure import Figure
@@ -65,27 +65,32 @@ def render(template: str | Path, **values: Any) -> str:
         values: `title`, `about`, `warnings` (list of text), `summary`, and the other values that
             the template uses.
     """
+    return _template(template).render(
+        **values,
+        sections=sections,
+        scripts=Scripts(),
+        plotly=packed_plotly,
+        date=now(),
+        program=program(),
+    )
+
+
+def fragment(template: Path, **values: Any) -> Markup:
+    """Return a part of a page as HTML; the template gets `values`."""
+    return Markup(_template(template).render(**values))
+
+
+def _template(template: str | Path) -> Template:
     environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
+        loader=FileSystemLoader(FOLDER),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    folder = FOLDER
     if isinstance(template, Path):
-        folder = template.parent
-        chosen = environment.from_string(template.read_text(encoding="utf-8"))
-    else:
-        chosen = environment.get_template(template)
-    return chosen.render(
-        **values,
-        sections=sections,
-        scripts=Scripts(folder),
-        plotly=packed_plotly,
-        date=now(),
-        program=program(),
-    )
+        return environment.from_string(template.read_text(encoding="utf-8"))
+    return environment.get_template(template)
 
 
 def sections(body: str) -> list[tuple[str, Markup]]:

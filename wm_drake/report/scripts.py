@@ -25,21 +25,17 @@ POLICY = (
 class Scripts:
     """Scripts of one page."""
 
-    def __init__(self, folder: Path = FOLDER) -> None:
-        """Begin a page without scripts, whose template is in a folder."""
-        self._folder = folder
+    def __init__(self) -> None:
+        """Begin a page without scripts."""
         self._hashes: list[str] = []
 
-    def file(self, name: str) -> Markup:
+    def file(self, path: str | Path) -> Markup:
         """Return a script as an element, and allow it.
 
         Args:
-            name: Name of a file in the folder of the template, or in this folder.
+            path: Name of a file in this folder, or path of one elsewhere.
         """
-        nearest = self._folder / name
-        return self.inline(
-            (nearest if nearest.exists() else FOLDER / name).read_text(encoding="utf-8")
-        )
+        return self.inline((FOLDER / path).read_text(encoding="utf-8"))
 
     def inline(self, text: str) -> Markup:
         """Return a text of a template as a script element, and allow it.

@@ -6,7 +6,8 @@ terminal, `frame` for a CSV file and `records` for JSON, with the values themsel
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -41,11 +42,13 @@ class Column:
         name: Words.
         unit: Unit of its numbers; "" without one.
         decimals: Decimals of a number as text; None for significant digits.
+        form: Function that returns the text of a number, in place of `decimals`.
     """
 
     name: str
     unit: str = ""
     decimals: int | None = None
+    form: Callable[[float], str] | None = None
 
     @property
     def head(self) -> str:
@@ -60,6 +63,8 @@ class Column:
             return MISSING
         if isinstance(value, bool):
             return "yes" if value else "no"
+        if self.form is not None:
+            return self.form(value)
         return significant(value) if self.decimals is None else number(value, self.decimals)
 
 
@@ -134,6 +139,18 @@ class Table:
             for row in group.rows
         ]
 
+    def without(self, name: str) -> "Table":
+        """Return the table without a column, which is not the first one."""
+        names = [column.name for column in self._declared()]
+        at = names.index(name)
+
+        def kept(row: Row) -> Row:
+            return Row((*row.cells[: at - 1], *row.cells[at:]), row.kind)
+
+        groups = tuple(Group(group.heading, tuple(map(kept, group.rows))) for group in self.groups)
+        columns = (*self.columns[:at], *self.columns[at + 1 :])
+        return Table(self.caption, columns, groups, self.text_columns - (at < self.text_columns))
+
     def terminal(self, title: str) -> "rich.table.Table":
         """Return the table for the terminal: words at the left, numbers at the right."""
         from rich.table import Table as TerminalTable
@@ -157,6 +174,8 @@ def table_of(
     caption: str = "",
     columns: Mapping[str, Column] | None = None,
     kinds: Sequence[str] = (),
+    *,
+    grouped: bool = False,
 ) -> Table:
     """Return a table of a data frame.
 
@@ -165,14 +184,16 @@ def table_of(
         caption: Caption.
         columns: Declaration of columns by their names in the frame.
         kinds: Style of each row, as of `Row`.
+        grouped: Whether neighbours with the same first cell have it once.
     """
     known = columns or {}
     styles = itertools.chain(kinds, itertools.repeat(""))
+    rows = zip(frame.itertuples(index=False, name=None), styles, strict=False)
+    lines = [(first, Row(tuple(rest), style)) for (first, *rest), style in rows]
+    same = itertools.groupby(lines, operator.itemgetter(0)) if grouped else None
     groups = tuple(
-        Group(first, (Row(tuple(rest), style),))
-        for (first, *rest), style in zip(
-            frame.itertuples(index=False, name=None), styles, strict=False
-        )
+        Group(first, tuple(row for _, row in of_group))
+        for first, of_group in same or ((one[0], [one]) for one in lines)
     )
     kinds_of_columns = (column.dtype.kind for _, column in frame.items())
     words = len(list(itertools.takewhile(lambda kind: kind not in "fiu", kinds_of_columns)))
@@ -206,6 +227,6 @@ def readable(value: Any, unit: Unit) -> str:
     return f"{shown} {unit.shown.replace('*', ' ').replace('^2', '²')}"
 
 
-def line(heading: str, cells: Iterable[Value], kind: str = "") -> Group:
+def line(heading: Value, cells: Iterable[Value], kind: str = "") -> Group:
     """Return a group with one row."""
     return Group(heading, (Row(tuple(cells), kind),))

@@ -62,6 +62,15 @@ def is_as_measured(parameters: MachineParameters, case: Case) -> bool:
     )
 
 
+def load_of(case: Case, machine: MachineParameters, changed: MachineParameters) -> Load:
+    """Return the load of a case for a changed machine.
+
+    A change may be a mass of one of the machine's own loads.
+    """
+    is_of_machine = machine.loads.get(case.name) == case.load
+    return changed.loads[case.name] if is_of_machine else case.load
+
+
 def case_of(parameters: MachineParameters, load: str, *, gasket: bool = True) -> Case:
     """Return the case that runs one of a machine's loads over the machine's own profile.
 

@@ -332,9 +332,14 @@ def order_of(study: Study, given: Mapping[str, Any], command: str = "") -> Order
     try:
         return Order(study, study.options(**{**sizes, **others}), model(**running), command)
     except ValidationError as error:
-        raise InputError(
-            Problem("", ".".join(map(str, fault["loc"])), fault["msg"]) for fault in error.errors()
-        ) from None
+        raise input_error_of(error) from None
+
+
+def input_error_of(error: ValidationError) -> InputError:
+    """Return the problems of options with wrong values."""
+    return InputError(
+        Problem("", ".".join(map(str, fault["loc"])), fault["msg"]) for fault in error.errors()
+    )
 
 
 def options_of_driver(study: Study) -> type[RunOptions]:

@@ -23,6 +23,7 @@ from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
+from wm_drake.report.formatting import plain
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import (
     amplitudes,
@@ -216,7 +217,7 @@ def _measures(machine: OpenMachine, run: RunResult) -> dict[str, Any]:
 def _rows(machine: OpenMachine, run: RunResult, variable: Variable) -> list[dict[str, Any]]:
     """Return a row for each number of a variable of a run."""
     along = [LABELS[dim](machine.parameters, run.case.profile) for dim in variable.dims]
-    values = _plain(run.values[variable.name] * variable.unit.from_si(1.0))
+    values = plain(np.ravel(run.values[variable.name] * variable.unit.from_si(1.0)))
     rows = []
     for labels, value in zip(itertools.product(*along), values, strict=True):
         title, unit = variable.short_title_of(labels), variable.unit_text
@@ -388,8 +389,3 @@ def _gap_points(runner: Runner, run: RunResult) -> dict[str, Any] | None:
 def _whole(values: FloatArray) -> list[int]:
     """Return displacements in whole micrometres."""
     return np.rint(values * MICRO).astype(int).tolist()
-
-
-def _plain(values: FloatArray) -> list[float | None]:
-    """Return numbers for JSON: None for one that is not finite."""
-    return [float(value) if math.isfinite(value) else None for value in np.ravel(values)]

@@ -8,8 +8,8 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from wm_drake.errors import InputError, Problem, input_error
-from wm_drake.studies.run import options_of_driver
+from wm_drake.errors import input_error
+from wm_drake.studies.run import input_error_of, options_of_driver
 from wm_drake.studies.study import STUDIES, Study
 
 NOT_OFFERED = {"machine", "sets"}
@@ -55,9 +55,7 @@ def arguments(name: str, given: dict[str, str]) -> list[str]:
     try:
         STUDIES[name].options(**{k: value for k, value in values.items() if k != "quick"})
     except ValidationError as error:
-        raise InputError(
-            Problem("", ".".join(map(str, fault["loc"])), fault["msg"]) for fault in error.errors()
-        ) from None
+        raise input_error_of(error) from None
     return [word for k, value in values.items() for word in _words(k, options[k], value)]
 
 

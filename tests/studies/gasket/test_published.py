@@ -17,16 +17,16 @@ from wm_drake.parameters import (
     load_factors,
 )
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.measures.responses import chosen_responses
 from wm_drake.studies.doe import make_design
-from wm_drake.studies.gasket import page_tables as texts
+from wm_drake.studies.gasket import tables as texts
 from wm_drake.studies.gasket.compared import Compared
 from wm_drake.studies.gasket.findings import level_zero_text, summary
 from wm_drake.studies.gasket.level_zero import run_level_zero
+from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.published import NOT_PUBLISHED, published_for
 from wm_drake.studies.gasket.screening import Responses, run_screening
+from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.tables import as_plain_data
-from wm_drake.studies.gasket.task import GasketResult
 from wm_drake.studies.gasket.words import Words
 
 NAMES = ("C_L", "K_Lx", "K_Ly")
@@ -117,10 +117,10 @@ def test_tables_and_files_have_published_numbers_beside_ours(screening, publishe
     words = Words(levels(screening), {})
     found = texts.variance(screening, words, published)
     assert found.header[4:6] == ("published mean", "difference")
-    first, second = found.groups[0].rows
+    first, second = found.shown[0].rows
     assert (first.cells[2:5], first.kind) == (("20.0", "16.0", "+25 %"), "")
     assert (second.cells[2:5], second.kind) == (("10.0", "6.00", "+67 %"), "alarm")
-    assert found.groups[1].rows[0].cells[3:5] == ("–", "–")
+    assert found.shown[1].rows[0].cells[3:5] == ("–", "–")
     shown = texts.leading(screening, "middle", words, published)
     assert shown.header[2:4] == ("percent", "published percent")
     cells = [row.cells for row in shown.groups[0].rows]
@@ -182,8 +182,8 @@ def test_level_zero_is_the_machine_if_tables_are_scaled(reference, tables):
     known = {"K_Lx": load_factors(GASKET_FACTORS)["K_Lx"]}
     every = {name: levels_of(machine, known, name) for name in TABLES}
     loads = [Case("middle", machine.loads["middle"], machine.profile)]
-    chosen = chosen_responses(machine, machine.profile, ["D"])
-    zero = run_level_zero(machine, every, tables, loads, chosen, fake_run)
+    trials = GasketTrials(machine, every[tables], loads, ["D"])
+    zero = run_level_zero(machine, every, tables, trials, fake_run)
     label = ("middle", "Dx")
     assert zero.value(label, "machine") == pytest.approx(machine.gasket.stiffness_x.force[-1])
     assert zero.difference(label, "scaled") == 0.0
@@ -205,7 +205,7 @@ def test_level_zero_is_the_machine_if_tables_are_scaled(reference, tables):
 def test_level_zero_is_not_run_without_tables(reference, factor):
     known = {factor: load_factors(GASKET_FACTORS)[factor]}
     every = {name: levels_of(reference, known, name) for name in TABLES}
-    assert run_level_zero(reference, every, "scaled", [], [], None) is None
+    assert run_level_zero(reference, every, "scaled", None, None) is None
 
 
 def test_nothing_is_nothing():

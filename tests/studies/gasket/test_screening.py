@@ -26,10 +26,10 @@ from wm_drake.simulation.measures import measure
 from wm_drake.simulation.measures.responses import chosen_responses, measures_of
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.doe import Design, level_matrix, make_design, read_design
+from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.screening import Responses, leading_terms, mean_at, run_screening
 from wm_drake.studies.gasket.study import GasketTrials, as_responses
 from wm_drake.studies.gasket.tables import as_plain_data
-from wm_drake.studies.gasket.task import GasketResult
 
 NAMES = ("a", "b", "c")
 UNITS = {"y": "mm", "z": "N"}

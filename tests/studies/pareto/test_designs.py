@@ -18,6 +18,7 @@ from wm_drake.studies.pareto.envelopes import front_envelopes
 from wm_drake.studies.pareto.page import DesignResult
 from wm_drake.studies.pareto.problem import machine_designs
 from wm_drake.studies.pareto.robust import _is_kept, promises, summary_of
+from wm_drake.studies.pareto.search import SearchSettings
 from wm_drake.studies.pareto.study import run_designs
 from wm_drake.studies.pareto.tables import (
     front_table,
@@ -108,7 +109,7 @@ def test_front_under_a_constraint_is_found(machine, tmp_path):
     # Dx = 2 / k mm and Fx = 10 k N for k from 0.5 to 1.5; Dx at most 2.5 mm means k >= 0.8
     task = task_of(constraints=({"quantity": "Dx", "at_most": "2.5 mm"},))
     designs = designs_of(machine, task)
-    front = run_designs(designs, run_of(machine), evaluations=640, population=32, seed=0)
+    front = run_designs(designs, run_of(machine), SearchSettings(640, 32))
     dx, fx = front.objectives.T
     assert dx * fx == pytest.approx(20.0)  # 2/k mm times 10 k N
     assert (dx.min(), dx.max()) == pytest.approx((2.0 / 1.5, 2.5), rel=0.01)
@@ -155,9 +156,7 @@ def histories_of(machine):
 
 
 def test_envelopes_are_the_largest_over_the_loads(machine):
-    front = run_designs(
-        designs_of(machine, task_of()), run_of(machine), evaluations=32, population=16, seed=0
-    )
+    front = run_designs(designs_of(machine, task_of()), run_of(machine), SearchSettings(32, 16))
     shown = front_envelopes(front, histories_of(machine))
     assert shown.sensors == tuple(machine.sensors)
     # 2 mm / k of the counterweight's load; far from the ends, where the filter has settled
@@ -207,7 +206,7 @@ def test_robust_front_keeps_its_promise_on_fresh_samples(machine):
             base_samples(1, 256, seed)[0],
         )
 
-    front = run_designs(designs(0), run_of(machine), evaluations=96, population=32, seed=0)
+    front = run_designs(designs(0), run_of(machine), SearchSettings(96, 32))
     fresh, _ = designs(7).evaluate(front.search.designs, run_of(machine))
     # Fx = 10 k N with k within 5 %: its 95 % quantile is 1 + 1.645 * 0.05 times the nominal one
     k = front.designs.dimensions[0]
@@ -253,7 +252,7 @@ def test_failed_runs_are_not_on_the_front(machine):
         stiff = k > machine.spring_types["suspension"].stiffness
         return table.assign(diverged=("run", np.where(stiff, "at 3 s", "").astype(object)))
 
-    front = run_designs(designs_of(machine, task_of()), run, evaluations=96, population=32, seed=0)
+    front = run_designs(designs_of(machine, task_of()), run, SearchSettings(96, 32))
     assert len(front.objectives)
     assert (front.objectives[:, 1] <= 10.0 + 1e-9).all()
 

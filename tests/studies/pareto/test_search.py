@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("pymoo")
 
-from wm_drake.studies.pareto.search import hypervolume, search_front
+from wm_drake.studies.pareto.search import Problem, SearchSettings, hypervolume, search_front
 from wm_drake.studies.pareto.surrogate import search_with_surfaces
 
 
@@ -26,7 +26,7 @@ def zdt2(x):
     ids=["ZDT1", "ZDT2"],
 )
 def test_front_of_zdt(problem, front):
-    found = search_front(problem, np.full(6, 0.5), 2, 0, evaluations=6400, seed=1)
+    found = search_front(Problem(problem, np.full(6, 0.5), 2), SearchSettings(6400, seed=1))
     f = found.objectives
     above = f[:, 1] - front(f[:, 0])
     assert above.min() >= -1e-12
@@ -39,12 +39,13 @@ def test_front_of_zdt(problem, front):
     assert found.evaluations == 6400
 
 
-def test_constrained_front():
-    # minimize (x, y) on the unit square outside a circle about 0: the front is its arc
-    def circle(x):
-        return x, 0.64 - np.sum(x**2, axis=1, keepdims=True)
+def circle(x):
+    """Return (x, y) outside a circle about 0: the front is its arc."""
+    return x, 0.64 - np.sum(x**2, axis=1, keepdims=True)
 
-    found = search_front(circle, np.ones(2), 2, 1, evaluations=4000)
+
+def test_constrained_front():
+    found = search_front(Problem(circle, np.ones(2), 2, 1), SearchSettings(4000))
     radius = np.hypot(*found.objectives.T)
     assert radius.min() >= 0.8 - 1e-12
     assert np.quantile(radius, 0.9) == pytest.approx(0.8, abs=0.01)
@@ -60,7 +61,7 @@ def test_three_objectives_on_a_sphere():
         f = [np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)]
         return r[:, None] * np.column_stack(f), np.empty((len(x), 0))
 
-    found = search_front(dtlz2, np.full(5, 0.3), 3, 0, evaluations=4000, population=60)
+    found = search_front(Problem(dtlz2, np.full(5, 0.3), 3), SearchSettings(4000, population=60))
     assert np.linalg.norm(found.objectives, axis=1) == pytest.approx(1.0, abs=0.05)
 
 
@@ -77,7 +78,7 @@ def test_best_damper_of_two_masses():
         size = np.abs(inner / ((1.0 - ratio**2) * inner - mu * ratio**2 * (f**2 + s)))
         return size.max(axis=1, keepdims=True), np.empty((len(x), 0))
 
-    found = search_front(response, np.array([0.1, 0.9]), 1, 0, evaluations=4000)
+    found = search_front(Problem(response, np.array([0.1, 0.9]), 1), SearchSettings(4000))
     (x,) = found.designs[:1]
     assert 0.7 + 0.6 * x[0] == pytest.approx(1.0 / 1.1, rel=0.01)
     assert 0.02 + 0.4 * x[1] == pytest.approx(np.sqrt(3.0 * mu / (8.0 * 1.1)), rel=0.03)
@@ -86,19 +87,20 @@ def test_best_damper_of_two_masses():
 
 def test_same_seed_gives_the_same_front_and_another_not():
     fronts = [
-        search_front(zdt1, np.full(3, 0.5), 2, 0, evaluations=320, seed=s).objectives
-        for s in (0, 0, 1)
+        search_front(Problem(zdt1, np.full(3, 0.5), 2), SearchSettings(320, seed=seed)).objectives
+        for seed in (0, 0, 1)
     ]
     assert np.array_equal(fronts[0], fronts[1])
     assert not np.array_equal(fronts[0], fronts[2])
 
 
-def test_designs_that_cannot_run_are_not_on_the_front():
+@pytest.mark.parametrize("search", [search_front, search_with_surfaces])
+def test_designs_that_cannot_run_are_not_on_the_front(search):
     def half(x):
         f, g = zdt1(x)
         return np.where(x[:, :1] < 0.5, np.nan, f), g
 
-    found = search_front(half, np.full(3, 0.9), 2, 0, evaluations=640)
+    found = search(Problem(half, np.full(3, 0.9), 2), SearchSettings(64, population=32))
     assert len(found.designs)
     assert (found.designs[:, 0] >= 0.5).all()
 
@@ -110,19 +112,13 @@ def test_hypervolume_of_known_points():
     assert hypervolume(front, first) == pytest.approx(0.375 + 0.375 - 0.25)
 
 
-def circle(x):
-    """Return (x, y) outside a circle about 0: the front is its arc."""
-    return x, 0.64 - np.sum(x**2, axis=1, keepdims=True)
-
-
 @pytest.mark.parametrize(
     ("problem", "size", "constraints"), [(zdt1, 6, 0), (circle, 2, 1)], ids=["ZDT1", "circle"]
 )
 def test_surfaces_need_fewer_designs(problem, size, constraints):
-    arguments = (problem, np.full(size, 0.9), 2, constraints)
-    settings = {"population": 32, "seed": 1}
-    genetic = search_front(*arguments, evaluations=256, **settings)
-    found = search_with_surfaces(*arguments, evaluations=96, **settings)
+    whole = Problem(problem, np.full(size, 0.9), 2, constraints)
+    genetic = search_front(whole, SearchSettings(256, 32, seed=1))
+    found = search_with_surfaces(whole, SearchSettings(96, 32, seed=1))
     # both scale with the same first population, so that hypervolumes can be compared
     assert np.array_equal(found.first, genetic.first)
     assert found.hypervolume > genetic.hypervolume
@@ -134,19 +130,9 @@ def test_surfaces_need_fewer_designs(problem, size, constraints):
 
 
 def test_surfaces_find_the_front_of_zdt1_again_with_the_same_seed():
-    settings = {"evaluations": 112, "population": 32, "seed": 2}
-    found, again = (search_with_surfaces(zdt1, np.full(6, 0.9), 2, 0, **settings) for _ in range(2))
+    arguments = Problem(zdt1, np.full(6, 0.9), 2), SearchSettings(112, 32, seed=2)
+    found, again = (search_with_surfaces(*arguments) for _ in range(2))
     above = found.objectives[:, 1] - (1.0 - np.sqrt(found.objectives[:, 0]))
     assert above.min() >= -1e-12
     assert np.quantile(above, 0.9) < 0.02
     assert np.array_equal(found.designs, again.designs)
-
-
-def test_surfaces_leave_out_designs_that_cannot_run():
-    def half(x):
-        f, g = zdt1(x)
-        return np.where(x[:, :1] < 0.5, np.nan, f), g
-
-    found = search_with_surfaces(half, np.full(3, 0.9), 2, 0, evaluations=64, population=32)
-    assert len(found.designs)
-    assert (found.designs[:, 0] >= 0.5).all()

@@ -32,9 +32,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from scipy.special import fdtrc
-from threadpoolctl import threadpool_limits
 
 from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.threads import on_one_thread
 
 LARGEST_LEVERAGE = 1.0 - 1e-9
 """Leverage above which a trial cannot be left out: the others do not determine the model."""
@@ -235,6 +235,7 @@ def _sum_code(levels: int) -> FloatArray:
     return np.vstack([np.eye(levels - 1), -np.ones(levels - 1)])
 
 
+@on_one_thread
 def anova(
     levels: pd.DataFrame, responses: pd.DataFrame, interactions: bool = True
 ) -> dict[str, AnovaTable]:
@@ -249,11 +250,10 @@ def anova(
         Tables by name of the response. If a response is constant, all its contributions are NaN.
     """
     coding = SumCoding(levels, interactions)
-    with threadpool_limits(1, "blas"):  # the fits are small: several threads would be slower
-        return {
-            str(name): _analysed(coding, responses[name].to_numpy(dtype=float))
-            for name in responses.columns
-        }
+    return {
+        str(name): _analysed(coding, responses[name].to_numpy(dtype=float))
+        for name in responses.columns
+    }
 
 
 def _analysed(coding: SumCoding, response: FloatArray) -> AnovaTable:

@@ -1,10 +1,10 @@
 """D-optimal designs by the modified Fedorov exchange of trials, with rank-two updates."""
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.doe.coding import Levels, level_matrix, model_matrix
+from wm_drake.studies.threads import on_one_thread
 
 LARGEST_GRID = 3**9
 """Largest number of trials to choose from; for a larger grid, a random sample of this size."""
@@ -16,6 +16,7 @@ SMALLEST_GAIN = 2e-4
 """Relative gain of the D-efficiency in one pass below which the exchange ends."""
 
 
+@on_one_thread
 def d_optimal_levels(factors: int, trials: int, model: str, seed: int) -> Levels:
     """Search for distinct trials with the largest det X'X.
 
@@ -40,16 +41,15 @@ def d_optimal_levels(factors: int, trials: int, model: str, seed: int) -> Levels
     candidates = model_matrix(grid, model)
     columns = np.ascontiguousarray(candidates.T)
     log_determinant = -np.inf
-    with threadpool_limits(1, "blas"):  # the products are small: several threads would be slower
-        chosen = _independent_start(candidates, trials, rng)
-        for _ in range(MOST_PASSES):
-            _pass(columns, chosen)
-            last, log_determinant = (
-                log_determinant,
-                np.linalg.slogdet(candidates[chosen].T @ candidates[chosen])[1],
-            )
-            if log_determinant - last < SMALLEST_GAIN * candidates.shape[1]:
-                break
+    chosen = _independent_start(candidates, trials, rng)
+    for _ in range(MOST_PASSES):
+        _pass(columns, chosen)
+        last, log_determinant = (
+            log_determinant,
+            np.linalg.slogdet(candidates[chosen].T @ candidates[chosen])[1],
+        )
+        if log_determinant - last < SMALLEST_GAIN * candidates.shape[1]:
+            break
     levels = grid[chosen]
     return levels[np.lexsort(levels.T[::-1])]
 

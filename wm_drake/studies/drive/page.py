@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 from rich import table as terminal
 
 from wm_drake.report.figure import (
@@ -21,32 +22,46 @@ from wm_drake.report.figure import (
 from wm_drake.report.formatting import MISSING, RPM_PER_RAD_S, number
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
-from wm_drake.report.table import Group, Row, Table
+from wm_drake.report.table import Column, Table, line, table_of
 from wm_drake.studies.drive.study import PASSES, DriveResult, Threshold, motor_with_limit
 from wm_drake.studies.drive.tables import error_measures
 from wm_drake.studies.study import Facts
 
+ERRORS = {
+    "loads": Column("random loads", decimals=0),
+    "mean_planted_gm": Column("mean planted", "g\u00a0m", 1),
+    "bias_gm": Column("bias", "g\u00a0m", 1),
+    "rms_gm": Column("RMS", "g\u00a0m", 1),
+    "p95_gm": Column("95 % below", "g\u00a0m", 1),
+}
+"""Columns of the table of errors by their names in JSON."""
+
 
 def drive_page(result: DriveResult, facts: Facts) -> str:
     """Return the page as text of one self-contained HTML file."""
-    sections = [Section("map", "Torque limit and unbalance", (map_picture(result),))]
-    if result.estimation:
-        seen = (estimation_picture(result),)
-        sections.append(Section("estimation", "Unbalance seen by the drive", seen))
-    limits = (thresholds_table(result),)
-    sections.append(Section("thresholds", "Smallest torque limit", tables=limits))
-    if result.estimation:
-        errors = (errors_table(result),)
-        sections.append(Section("errors", "Errors of the estimation", tables=errors))
+    has_loads = result.estimation is not None
     made = [
         ("Machine", result.parameters.name),
         ("Runs", f"{result.runs} in {facts.wall_s:.0f} s"),
         ("Duration of a run", f"{result.profile.duration:g} s"),
         *facts.rows(),
     ]
-    title = f"Drive of machine {result.parameters.name}"
     return SectionedPage(
-        title, summary(result), sections, made, result.parameters, facts.warnings
+        f"Drive of machine {result.parameters.name}",
+        summary(result),
+        [
+            Section("map", "Torque limit and unbalance", (map_picture(result),)),
+            Section("estimation", "Unbalance seen by the drive", (estimation_picture(result),))
+            if has_loads
+            else None,
+            Section("thresholds", "Smallest torque limit", tables=(thresholds_table(result),)),
+            Section("errors", "Errors of the estimation", tables=(errors_table(result),))
+            if has_loads
+            else None,
+        ],
+        made,
+        result.parameters,
+        facts.warnings,
     ).html()
 
 
@@ -76,20 +91,13 @@ def summary(result: DriveResult) -> str:
 def threshold_cells(result: DriveResult, threshold: Threshold) -> tuple[str, str, str]:
     """Return limit at the motor and at the drum, and where the drum is caught just below."""
     ratio = motor_with_limit(result.parameters)[0].belt_ratio
-    if np.isfinite(threshold.passes_from):
-        limits = (
-            f"{'' if threshold.caught_below else '≤ '}{number(threshold.passes_from, 3)}",
-            f"{'' if threshold.caught_below else '≤ '}{number(ratio * threshold.passes_from, 2)}",
-        )
-    else:
-        limits = (
-            f"> {number(threshold.caught_below, 3)}",
-            (f"> {number(ratio * threshold.caught_below, 2)}"),
-        )
+    limit, sign = threshold.passes_from, "" if threshold.caught_below else "≤ "
+    if not np.isfinite(limit):
+        limit, sign = threshold.caught_below, "> "
     caught = MISSING
     if np.isfinite(threshold.caught_speed):
         caught = f"{number(RPM_PER_RAD_S * threshold.caught_speed, 0)} rpm"
-    return *limits, caught
+    return f"{sign}{number(limit, 3)}", f"{sign}{number(ratio * limit, 2)}", caught
 
 
 def terminal_table(result: DriveResult) -> terminal.Table:
@@ -100,7 +108,7 @@ def terminal_table(result: DriveResult) -> terminal.Table:
 
 def thresholds_table(result: DriveResult) -> Table:
     """Return the smallest torque limit of each load."""
-    groups = tuple(Group(t.load, (Row(threshold_cells(result, t)),)) for t in result.thresholds)
+    groups = tuple(line(t.load, threshold_cells(result, t)) for t in result.thresholds)
     caption = (
         "Smallest torque of the motor with which the drum passes every critical speed, by "
         "bisection to 2 %: it has at least "
@@ -147,21 +155,13 @@ def errors_table(result: DriveResult) -> Table:
     errors, estimation = error_measures(result), result.estimation
     assert errors is not None
     assert estimation is not None
-    cells = tuple(number(errors[key]) for key in ("mean_planted_gm", "bias_gm", "rms_gm", "p95_gm"))
     caption = (
         f"Error of the unbalance estimated at a constant {RPM_PER_RAD_S * estimation.speed:.0f} "
         "rpm, over loads of two masses at random places. Estimate: parts of motor torque and speed "
         "that go round with the drum, m r = |T - J dw/dt| / g, with the inertia of the empty drum. "
         "What remains: inertia of the load, and a tub that moves."
     )
-    header = (
-        "random loads",
-        "mean planted, g\u00a0m",
-        "bias, g\u00a0m",
-        "RMS, g\u00a0m",
-        "95 % below, g\u00a0m",
-    )
-    return Table(caption, header, (Group(f"{errors['loads']:.0f}", (Row(cells),)),))
+    return table_of(pd.DataFrame([errors])[list(ERRORS)], caption, ERRORS)
 
 
 def estimation_picture(result: DriveResult) -> Picture:

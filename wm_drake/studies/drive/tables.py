@@ -1,12 +1,12 @@
 """Tables of the drive study: CSV files and plain data for JSON."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from wm_drake.parameters.units import Unit
+from wm_drake.report.formatting import plain
 from wm_drake.studies.drive.study import DriveResult, motor_with_limit
 
 rpm = Unit("rad/s", "rpm").from_si
@@ -83,17 +83,13 @@ def error_measures(result: DriveResult) -> dict[str, float] | None:
 
 
 def as_plain_data(result: DriveResult) -> dict[str, Any]:
-    """Return the result for JSON, with None for NaN, which JSON does not have."""
+    """Return the result for JSON."""
     errors = error_measures(result)
-    return {
+    shown = {
         "machine": result.parameters.name,
         "runs": result.runs,
-        "thresholds": [_plain(row) for row in thresholds_table(result).to_dict("records")],
-        "map": [_plain(row) for row in map_table(result).to_dict("records")],
-        "estimation": None if errors is None else _plain(errors),
+        "thresholds": thresholds_table(result).to_dict("records"),
+        "map": map_table(result).to_dict("records"),
+        "estimation": errors,
     }
-
-
-def _plain(row: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return a row with None for NaN."""
-    return {str(name): value if value == value else None for name, value in row.items()}
+    return plain(shown)

@@ -20,8 +20,9 @@ const Explore = (() => {
   }
 
   // ---- the model -------------------------------------------------------------------------------
+  /* Row of the model at places; a place null means the mean over a factor, whose codes average to 0. */
   function row(places) {
-    const codes = places.map(x => [-x, 1 - 0.5 * x - 1.5 * x * x]);
+    const codes = places.map(x => x === null ? [0, 0] : [-x, 1 - 0.5 * x - 1.5 * x * x]);
     const found = [1, ...codes.flat()];
     if (data.interactions)
       for (let i = 0; i < codes.length; i++)
@@ -58,7 +59,7 @@ const Explore = (() => {
     return Math.min(1, Math.max(-1, place));
   }
   const short = Pictures.short;
-  const withUnit = factor => factor.unit ? `${short(valueAt(factor, state.places[factors.indexOf(factor)]))} ${factor.unit}` : short(valueAt(factor, state.places[factors.indexOf(factor)]));
+  const shownValue = (factor, k) => [short(valueAt(factor, state.places[k])), factor.unit].filter(Boolean).join(" ");
 
   // ---- elements --------------------------------------------------------------------------------
   function make(tag, attributes = {}, ...children) {
@@ -167,9 +168,10 @@ const Explore = (() => {
 
   /* Option that runs this setting. */
   function checkText() {
-    const parts = factors.map((factor, k) => [factor, state.places[k]]).filter(([, place]) => place !== 0)
-      .map(([factor, place]) => `${factor.name}=${Number(valueAt(factor, place).toPrecision(5))}${factor.unit ? ` ${factor.unit.replace(/ /g, "*")}` : ""}`);
-    return `--check '${(parts.length ? parts : [`${factors[0].name}=${Number(factors[0].numbers[1].toPrecision(5))}${factors[0].unit ? ` ${factors[0].unit.replace(/ /g, "*")}` : ""}`]).join(", ")}'`;
+    const text = (factor, value) => `${factor.name}=${Number(value.toPrecision(5))}${factor.unit ? ` ${factor.unit.replace(/ /g, "*")}` : ""}`;
+    const moved = factors.map((factor, k) => [factor, state.places[k]]).filter(([, place]) => place !== 0);
+    const parts = moved.length ? moved : [[factors[0], 0]];
+    return `--check '${parts.map(([factor, place]) => text(factor, valueAt(factor, place))).join(", ")}'`;
   }
 
   // ---- matrix of interactions --------------------------------------------------------------------
@@ -178,11 +180,11 @@ const Explore = (() => {
     if (!data.interactions || !grid) return;
     grid.style.setProperty("--factors", factors.length);
     grid.replaceChildren();
-    const model = data.models[state.load][state.response], coefficients = numbers(model.coefficients);
+    const model = data.models[state.load][state.response];
     const mean = (i, u, j, v) => {
       const places = factors.map(() => null);
       places[i] = u; places[j] = v;
-      return meanOver(coefficients, places);
+      return predict(state.load, state.response, places);
     };
     const all = [];
     for (let i = 0; i < factors.length; i++) for (let j = 0; j < factors.length; j++)
@@ -203,17 +205,6 @@ const Explore = (() => {
       cell.append(svg, make("small", {}, percent === null || percent === undefined ? "" : `${percent.toFixed(1)} %`));
       grid.append(cell);
     }
-  }
-
-  /* Mean of the model over all factors whose place is null: their sum-coded columns average to 0. */
-  function meanOver(coefficients, places) {
-    const codes = places.map(x => x === null ? [0, 0] : [-x, 1 - 0.5 * x - 1.5 * x * x]);
-    let sum = coefficients[0], at = 1;
-    for (const code of codes) for (const u of code) sum += u * coefficients[at++];
-    if (data.interactions)
-      for (let i = 0; i < codes.length; i++) for (let j = i + 1; j < codes.length; j++)
-        for (const u of codes[i]) for (const v of codes[j]) sum += u * v * coefficients[at++];
-    return sum;
   }
 
   // ---- contours ----------------------------------------------------------------------------------
@@ -357,7 +348,7 @@ const Explore = (() => {
     }
     said.textContent = found.value < 0
       ? "No setting in the range meets all limits; this one comes nearest. The sliders above show it."
-      : `Desirability ${found.value.toFixed(3)} of 1. The sliders above show the setting: ${factors.map(f => `${f.name} ${withUnit(f)}`).join(", ")}. Check it with a run: add the option below to the command and repeat it.`;
+      : `Desirability ${found.value.toFixed(3)} of 1. The sliders above show the setting: ${factors.map((f, k) => `${f.name} ${shownValue(f, k)}`).join(", ")}. Check it with a run: add the option below to the command and repeat it.`;
     return found;
   }
 

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wm_drake.report.formatting import number, percent
+from wm_drake.report.formatting import listed, number, percent
 from wm_drake.report.springs import CONSEQUENCE
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.doe.anova import Term
 from wm_drake.studies.gasket.check import Check
 from wm_drake.studies.gasket.compared import NOT_COMPARED, Compared
 from wm_drake.studies.gasket.level_zero import LevelZero
-from wm_drake.studies.gasket.page_tables import digits, r2_text
 from wm_drake.studies.gasket.published import FAR, Published
 from wm_drake.studies.gasket.screening import (
     LEADING_INTERACTION_PERCENT,
@@ -24,6 +23,7 @@ from wm_drake.studies.gasket.screening import (
     leading_terms,
     main_effects,
 )
+from wm_drake.studies.gasket.tables import digits, r2_text
 from wm_drake.studies.gasket.words import LEVELS, Words
 
 ADVICE_PERCENT = 5.0
@@ -49,7 +49,7 @@ def summary(screening: Screening, words: Words, compared: Compared = NOT_COMPARE
     sentences = [
         f"{runs} runs: {design.trials} trials of {len(design.factors)} factors ({design.kind}, "
         f"D-efficiency {number(design.efficiency(), 2)} %) with "
-        f"{_joined([f'load {load}' for load in screening.loads])}."
+        f"{listed([f'load {load}' for load in screening.loads])}."
     ]
     sentences += _contact(screening)
     sentences += _drivers(screening, words)
@@ -124,7 +124,7 @@ def _listed(named: list[str]) -> str:
     shown = named[:MOST_NAMED]
     more = len(named) - len(shown)
     shown += [f"{more} more"] if more else []
-    return f": {_joined(shown)}" if shown else ""
+    return f": {listed(shown)}" if shown else ""
 
 
 def level_zero_text(zero: LevelZero, words: Words) -> str:
@@ -172,7 +172,7 @@ def _slack(screening: Screening) -> list[str]:
     )
     if not counts:
         return []
-    springs = _joined([f"{spring} with load {load} ({n})" for (spring, load), n in counts.items()])
+    springs = listed([f"{spring} with load {load} ({n})" for (spring, load), n in counts.items()])
     runs = screening.design.trials * len(screening.loads)
     return [
         f"Springs go slack in {len(screening.responses.slack)} of {runs} runs: {springs}. "
@@ -190,7 +190,7 @@ def _drivers(screening: Screening, words: Words) -> list[str]:
     ranked = sorted(led.items(), key=lambda item: -sum(map(len, item[1].values())))[:3]
     return [
         f"{_capital(words.factor(factor))} is the most influential factor for "
-        f"{'; '.join(f'{_joined(names)} with load {load}' for load, names in by_load.items())}."
+        f"{'; '.join(f'{listed(names)} with load {load}' for load, names in by_load.items())}."
         for factor, by_load in ranked
     ]
 
@@ -257,7 +257,7 @@ def advice(screening: Screening, words: Words) -> list[str]:
             texts.append(f"{opening}: needs a compromise. {'; '.join(groups)}.")
     if idle:
         texts.append(
-            f"{_capital(_joined(idle))}: little influence, below {ADVICE_PERCENT:g} % of the "
+            f"{_capital(listed(idle))}: little influence, below {ADVICE_PERCENT:g} % of the "
             "variance of every response that has a goal. Choose by cost."
         )
     return texts
@@ -291,7 +291,7 @@ def _for_what(screening: Screening, words: Words, wishes: Sequence[_Wish], level
             load = f", load {wish.load}" if len(levels[wish.response]) > 1 else ""
             key = wish.response, load
             gains[key] = max(gains.get(key, 0.0), wish.gain)
-    return _joined(
+    return listed(
         [
             f"{words.response(name)}{load} [{digits(gain)} {screening.responses.units[name]}]"
             for (name, load), gain in gains.items()
@@ -337,7 +337,7 @@ def warnings(screening: Screening, words: Words) -> list[str]:
             texts.append(f"{len(poor) - 6} more")
         sentences.append(
             f"The model predicts these responses poorly, with R² below {LEAST_PREDICTED_R2:g}: "
-            f"{_joined(texts)}. Their contributions and effects are only indications."
+            f"{listed(texts)}. Their contributions and effects are only indications."
         )
     return sentences
 
@@ -363,7 +363,7 @@ def _driver_sentence(screening: Screening, label: Label, words: Words) -> str:
         if len(term.factors) > 1
     ]
     interactions = f"interaction{'s' if len(joint) > 1 else ''}"
-    together = f"depends on the {interactions} {_joined(joint)}" if joint else ""
+    together = f"depends on the {interactions} {listed(joint)}" if joint else ""
     return f"{opening} {'; '.join(filter(None, [*mains, together]))}."
 
 
@@ -427,7 +427,3 @@ def _capital(text: str) -> str:
     """Return a text with a capital first letter, unless it begins with a symbol or a key."""
     first = text.split()[0]
     return text[0].upper() + text[1:] if first.isalpha() and first.islower() else text
-
-
-def _joined(words: list[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

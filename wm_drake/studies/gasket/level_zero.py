@@ -14,10 +14,9 @@ import pandas as pd
 import xarray as xr
 
 from wm_drake.parameters import TABLES, FactorLevels, MachineParameters, at_levels
-from wm_drake.simulation.cases import Case
-from wm_drake.simulation.measures.responses import Response
+from wm_drake.simulation.cases import Case, load_of
 from wm_drake.studies.gasket.screening import Label, Responses
-from wm_drake.studies.gasket.study import as_responses
+from wm_drake.studies.gasket.study import GasketTrials, as_responses
 
 RunMachine: TypeAlias = Callable[[MachineParameters, Sequence[Case]], xr.Dataset]
 """Function that builds a machine, runs cases and returns their table, as `simulate_many` does."""
@@ -81,8 +80,7 @@ def run_level_zero(
     machine: MachineParameters,
     levels: Mapping[str, tuple[FactorLevels, ...]],
     tables: str,
-    loads: Sequence[Case],
-    chosen: Sequence[Response],
+    trials: GasketTrials,
     run: RunMachine,
 ) -> LevelZero | None:
     """Run the machine and level 0 of all factors with each treatment of tables.
@@ -91,8 +89,7 @@ def run_level_zero(
         machine: The machine itself.
         levels: Levels of the factors by treatment of tables, all of `TABLES`.
         tables: Treatment in the study.
-        loads: One case for each load.
-        chosen: The responses.
+        trials: Trials of the study, for its loads and responses.
         run: Function that runs cases of a machine.
 
     Returns:
@@ -106,15 +103,15 @@ def run_level_zero(
     runs = []
     for name, parameters in variants.items():
         cases = []
-        for case in loads:
-            # a factor may be a mass of one of the machine's own loads
-            is_of_machine = machine.loads.get(case.name) == case.load
-            load = parameters.loads[case.name] if is_of_machine else case.load
+        for case in trials.loads:
+            load = load_of(case, machine, parameters)
             cases.append(Case(f"{case.name}, {name}", load, case.profile, case.gasket))
         # a table and a number are different structures, so each variant is built
         runs.append(run(parameters, cases))
     table = xr.concat(runs, "run")
-    return LevelZero(tables, as_responses(table, [case.name for case in loads], chosen))
+    return LevelZero(
+        tables, as_responses(table, [case.name for case in trials.loads], trials.chosen)
+    )
 
 
 def has_tables(levels: Mapping[str, tuple[FactorLevels, ...]]) -> bool:

@@ -1,15 +1,20 @@
-"""Report of a gasket study: one self-contained HTML file."""
+"""What the gasket study shows: files, JSON, terminal and page."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
 
 from wm_drake.report.formatting import number
-from wm_drake.report.page import Picture, picture, render
-from wm_drake.report.table import Table, parameter_table
-from wm_drake.simulation.records import versions
-from wm_drake.studies.gasket import figures
-from wm_drake.studies.gasket import page_tables as tables
+from wm_drake.report.page import Picture, fragment, picture
+from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.table import Table
+from wm_drake.report.terminal import Console
+from wm_drake.studies.doe import write_design
+from wm_drake.studies.gasket import figures, tables
+from wm_drake.studies.gasket.compared import NOT_COMPARED, Compared
 from wm_drake.studies.gasket.explore import explorer_data
 from wm_drake.studies.gasket.findings import (
     about_check,
@@ -19,62 +24,178 @@ from wm_drake.studies.gasket.findings import (
     summary,
     warnings,
 )
-from wm_drake.studies.gasket.published import Published
 from wm_drake.studies.gasket.screening import Screening
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.surface import Surfaces, surfaces
 from wm_drake.studies.gasket.words import Words
-from wm_drake.studies.study import Facts
+from wm_drake.studies.study import Facts, Result
 
 if TYPE_CHECKING:
-    from wm_drake.studies.gasket.task import GasketResult
+    from rich import table as terminal
+
+WIDE = 100
+"""Width of a terminal from which on its table has the leading terms. [characters]"""
+
+ADVICE = (
+    "In brackets: by how much the mean response differs between the worst and the best value, with "
+    "the load for which this is most. The advice is about the range studied and treats factors one "
+    "by one. Check the chosen values with one run: wm-drake spin --set KEY=VALUE."
+)
+
+EFFECTS = (
+    "Effect of the most important factors on each response. Percentages are shares of the variance "
+    "of the response."
+)
+
+METHOD = (
+    "Axes: for a person who faces the door, x points to the right, y along the drum axis from "
+    "front to rear, and z up. Displacements, forces and moments are the largest absolute values "
+    "over the whole run, for each axis ([B] section 4)."
+)
 
 
 @dataclass(frozen=True)
-class LoadView:
-    """Section of the page about one load."""
+class GasketResult(Result):
+    """Result of the study.
 
-    anchor: str
-    title: str
-    findings: tuple[str, ...]
-    leading: Table
-    contributions: Table
-    pictures: tuple[Picture, ...]
+    Attributes:
+        screening: Effects of the factors.
+        trials: Trials that were run.
+        compared: What the effects are compared with.
+    """
 
+    screening: Screening
+    trials: GasketTrials
+    compared: Compared = NOT_COMPARED
 
-def gasket_page(result: "GasketResult", made: Facts) -> str:
-    """Return the page as text of one self-contained HTML file."""
-    screening, trials, compared = result.screening, result.trials, result.compared
-    parameters = trials.parameters
-    words = Words(trials.factors, screening.responses.meanings)
-    models = surfaces(screening)
-    return render(
-        Path(__file__).with_name("page.html"),
-        title=f"Gasket study of machine {parameters.name}",
-        about=parameters.about,
-        summary=" ".join(summary(screening, words, compared)),
-        advice=advice(screening, words),
-        warnings=[*made.warnings, *warnings(screening, words), *_warnings(screening, trials)],
-        heat_map=_heat_map(screening, words),
-        variance=tables.variance(screening, words, compared.published),
-        touching=tables.touching(screening, words) if screening.responses.touching else None,
-        about_residual=about_residual(screening),
-        spreads=_spreads(screening, words),
-        loads=[
-            _load_view(screening, index, load, words, compared.published, models)
-            for index, load in enumerate(screening.loads)
-        ],
-        level_zero=compared.level_zero and tables.level_zero(compared.level_zero, words),
-        models=explorer_data(screening, models, trials, words),
-        has_interactions=screening.design.model != "main",
-        check=compared.check and tables.check(compared.check, words),
-        about_check=compared.check and about_check(compared.check),
-        design=tables.design(screening),
-        factors=tables.factors(trials.factors, words),
-        responses=_about_responses(screening, words),
-        facts=_facts(trials, made),
-        numbers=parameter_table(parameters),
-    )
+    # more digits than the results are accurate to
+    float_format = "%.9g"
+
+    @cached_property
+    def words(self) -> Words:
+        """Words for factors and responses."""
+        return Words(self.trials.factors, self.screening.responses.meanings)
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return all tables but the design."""
+        return tables.all_tables(self.screening, self.trials.factors, self.compared)
+
+    def write(self, folder: Path) -> None:
+        """Write the tables and the design. One screening always results in the same bytes."""
+        values = tables.physical_values(self.screening.design, self.trials.factors)
+        write_design(self.screening.design, folder / "design.csv", values)
+        super().write(folder)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the result for JSON."""
+        return tables.as_plain_data(self.screening, self.compared)
+
+    def terminal(self) -> "list[terminal.Table | str]":
+        """Return percentages of the variance, the check and a summary."""
+        design, published = self.screening.design, self.compared.published
+        about = f"{design.kind}, {design.trials} trials, D-efficiency {design.efficiency():.2f} %"
+        is_wide = Console().width >= WIDE
+        variance = tables.variance(
+            self.screening, self.words, published, short=True, has_terms=is_wide
+        )
+        title = f"Percent of the variance explained ({about})"
+        shown: list[terminal.Table | str] = [variance.terminal(title)]
+        if published.has_terms:
+            shown.append(
+                "In parentheses: the published percentage of a leading term;"
+                f"{tables.SIGN_MARK} if its effect has another sign."
+            )
+        if self.compared.check is not None:
+            table = tables.check(self.compared.check, self.words, short=True)
+            shown.append(table.terminal("Fitted model and runs of --check"))
+        return [*shown, *summary(self.screening, self.words, self.compared)]
+
+    def warnings(self) -> list[str]:
+        """Return what limits the use of the result."""
+        return warnings(self.screening, self.words)
+
+    def failures(self) -> list[str]:
+        """Return a line for each run that diverged."""
+        failed = self.screening.responses.failed.items()
+        return [f"trial {trial + 1}, load {load}: {why}" for (trial, load), why in failed]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page: advice, effects, the model to explore, tables."""
+        screening, words, parameters = self.screening, self.words, self.trials.parameters
+        models = surfaces(screening)
+        advised = Section("", "What to do", text=ADVICE, remarks=advice(screening, words))
+        return SectionedPage(
+            f"Gasket study of machine {parameters.name}",
+            " ".join(summary(screening, words, self.compared)),
+            [
+                Section("contributions", "Contributions", (_heat_map(screening, words),)),
+                Section("explore", "Explore the fitted model", body=self._explorer(models)),
+                *self._load_sections(models),
+                Section("spread", "Spread of the responses", _spreads(screening, words)),
+                *self._tables(),
+            ],
+            [
+                ("Machine", parameters.name),
+                ("SDF model", Path(parameters.model).name),
+                ("Loads", ", ".join(case.name for case in self.trials.loads)),
+                ("Computing time", f"{number(facts.wall_s)} s, excluding this report"),
+                *_about_responses(screening, words),
+                *facts.rows(),
+            ],
+            parameters,
+            [*facts.warnings, *self.warnings(), *_warnings(screening, self.trials)],
+            method=METHOD,
+            advice=advised,
+            numbers_title="Parameters at level 0 of all factors",
+            script=Path(__file__).with_name("explore.js"),
+        ).html()
+
+    def _explorer(self, models: Surfaces) -> str:
+        """Return the part of the page that computes predictions of the fitted models."""
+        return fragment(
+            Path(__file__).with_name("explore.html"),
+            models=explorer_data(self.screening, models, self.trials, self.words),
+            has_interactions=self.screening.design.model != "main",
+        )
+
+    def _load_sections(self, models: Surfaces) -> list[Section]:
+        """Return a section of findings and pictures for each load."""
+        screening, words = self.screening, self.words
+        return [
+            Section(
+                f"load-{number}",
+                f"Load {load}",
+                _pictures(screening, load, words, models),
+                text=EFFECTS,
+                remarks=load_findings(screening, load, words),
+            )
+            for number, load in enumerate(screening.loads, start=1)
+        ]
+
+    def _tables(self) -> list[Section]:
+        """Return the sections of tables."""
+        screening, words, compared = self.screening, self.words, self.compared
+        published, zero, check = compared.published, compared.level_zero, compared.check
+        loads, sections = screening.loads, list[Section]()
+
+        def add(anchor: str, heading: str, *shown: Table, text: str = "") -> None:
+            sections.append(Section(anchor, heading, (), shown, text, has_long_words=True))
+
+        if screening.responses.touching:
+            add("contact", "Contact", tables.touching(screening, words))
+        if check:
+            add("check", "Check by runs", tables.check(check, words), text=about_check(check))
+        variance = tables.variance(screening, words, published)
+        add("variance", "Variance explained", variance, text=about_residual(screening))
+        leading = (tables.leading(screening, load, words, published) for load in loads)
+        add("leading", "Leading terms", *leading)
+        terms = (tables.all_contributions(screening, load, words) for load in loads)
+        add("all", "All terms", *terms)
+        levels = tables.factors(self.trials.factors, words)
+        add("design", "Design", tables.design(screening), levels)
+        if zero:
+            add("level-zero", "Level 0 and the machine", tables.level_zero(zero, words))
+        return sections
 
 
 def _warnings(screening: Screening, trials: GasketTrials) -> list[str]:
@@ -103,26 +224,11 @@ def _warnings(screening: Screening, trials: GasketTrials) -> list[str]:
     return sentences
 
 
-def _facts(trials: GasketTrials, made: Facts) -> list[tuple[str, str]]:
-    facts = [
-        ("Machine", trials.parameters.name),
-        ("About", trials.parameters.about),
-        ("SDF model", Path(trials.parameters.model).name),
-        ("Loads", ", ".join(case.name for case in trials.loads)),
-        ("Engine", f"compiled, step {1e3 * made.step:g} ms, integrator {made.integrator}"),
-        ("Versions", ", ".join(f"{name} {text}" for name, text in versions().items())),
-        ("Computing time", f"{number(made.wall_s)} s, excluding this report"),
-        ("Command", made.command),
-    ]
-    return [(word, text) for word, text in facts if text]
-
-
-def _about_responses(screening: Screening, words: Words) -> list[str]:
-    """Return a text for each kind of response: symbols, and what is measured."""
+def _about_responses(screening: Screening, words: Words) -> list[tuple[str, str]]:
+    """Return symbols and what is measured, for each kind of response."""
     return [
-        f"{', '.join(names)}: {words.meaning(names[0]).about}."
+        (", ".join(names), words.meaning(names[0]).about)
         for names in _by_kind(screening, words).values()
-        if words.meaning(names[0]).about
     ]
 
 
@@ -159,24 +265,6 @@ def _spreads(screening: Screening, words: Words) -> list[Picture]:
         alternative = f"Points and boxes of the {kind} over all trials, by load."
         shown.append(picture(figure, alternative, caption[0].upper() + caption[1:]))
     return shown
-
-
-def _load_view(
-    screening: Screening,
-    index: int,
-    load: str,
-    words: Words,
-    published: Published,
-    models: Surfaces,
-) -> LoadView:
-    return LoadView(
-        anchor=f"load-{index + 1}",
-        title=load,
-        findings=tuple(load_findings(screening, load, words)),
-        leading=tables.leading(screening, load, words, published),
-        contributions=tables.contributions(screening, load, words),
-        pictures=tuple(_pictures(screening, load, words, models)),
-    )
 
 
 def _pictures(screening: Screening, load: str, words: Words, models: Surfaces) -> list[Picture]:

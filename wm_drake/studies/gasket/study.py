@@ -14,7 +14,7 @@ import xarray as xr
 
 from wm_drake.parameters import FactorLevels, MachineParameters, at_levels
 from wm_drake.parameters.units import Unit
-from wm_drake.simulation.cases import Case
+from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures.responses import Response, chosen_responses, measures_of
 from wm_drake.studies.doe import Design
 from wm_drake.studies.gasket.screening import Meaning, Responses
@@ -67,9 +67,7 @@ class GasketTrials:
     def cases_of(self, changed: MachineParameters, name: str) -> Iterator[Case]:
         """Yield a case of each load for a changed machine."""
         for case in self.loads:
-            # a factor may be a mass of one of the machine's own loads
-            is_of_machine = self.parameters.loads.get(case.name) == case.load
-            load = changed.loads[case.name] if is_of_machine else case.load
+            load = load_of(case, self.parameters, changed)
             yield Case(f"{case.name}, {name}", load, case.profile, parameters=changed)
 
     def responses(self, design: Design, run: Run) -> Responses:

@@ -1,12 +1,11 @@
-"""The gasket study: its task, and its result as files, JSON and page."""
+"""The task of the gasket study: options and files checked, and runs."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import pandas as pd
 import xarray as xr
 
 from wm_drake.errors import InputError, input_error, nearest_names
@@ -25,93 +24,19 @@ from wm_drake.parameters import (
     published_results,
 )
 from wm_drake.simulation.cases import Case, is_as_measured
-from wm_drake.studies.doe import DESIGNS, MODELS, Design, make_design, read_design, write_design
-from wm_drake.studies.gasket import tables
+from wm_drake.studies.doe import DESIGNS, MODELS, Design, make_design, read_design
 from wm_drake.studies.gasket.check import Check, Setting, run_check
-from wm_drake.studies.gasket.compared import NOT_COMPARED, Compared
+from wm_drake.studies.gasket.compared import Compared
 from wm_drake.studies.gasket.level_zero import run_level_zero
 from wm_drake.studies.gasket.options import GasketOptions
+from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.published import Published, published_for
-from wm_drake.studies.gasket.screening import Screening, check_degrees_of_freedom, run_screening
+from wm_drake.studies.gasket.screening import check_degrees_of_freedom, run_screening
 from wm_drake.studies.gasket.study import LOADS, GasketTrials
 from wm_drake.studies.gasket.surface import surfaces
-from wm_drake.studies.gasket.words import Words
 from wm_drake.studies.inputs import existing_file, pairs_of, problems_of_option, selected_cases
 from wm_drake.studies.run import Executor, machine_text
-from wm_drake.studies.study import Facts, Result, Task
-
-if TYPE_CHECKING:
-    from rich.table import Table
-
-
-@dataclass(frozen=True)
-class GasketResult(Result):
-    """Result of the study.
-
-    Attributes:
-        screening: Effects of the factors.
-        trials: Trials that were run.
-        compared: What the effects are compared with.
-    """
-
-    screening: Screening
-    trials: GasketTrials
-    compared: Compared = NOT_COMPARED
-
-    # more digits than the results are accurate to
-    float_format = "%.9g"
-
-    @property
-    def words(self) -> Words:
-        """Words for factors and responses."""
-        return Words(self.trials.factors, self.screening.responses.meanings)
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return all tables but the design."""
-        return tables.all_tables(self.screening, self.trials.factors, self.compared)
-
-    def write(self, folder: Path) -> None:
-        """Write the tables and the design. One screening always results in the same bytes."""
-        values = tables.physical_values(self.screening.design, self.trials.factors)
-        write_design(self.screening.design, folder / "design.csv", values)
-        super().write(folder)
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the result for JSON."""
-        return tables.as_plain_data(self.screening, self.compared)
-
-    def terminal(self) -> "list[Table | str]":
-        """Return percentages of the variance, the check and a summary."""
-        from wm_drake.studies.gasket.findings import summary
-        from wm_drake.studies.gasket.terminal import SIGN_MARK, check_table, variance_table
-
-        published, check = self.compared.published, self.compared.check
-        shown: list[Table | str] = [variance_table(self.screening, self.words, published)]
-        if published.has_terms:
-            shown.append(
-                f"In parentheses: the published percentage of a leading term;{SIGN_MARK} if its "
-                "effect has another sign."
-            )
-        if check is not None:
-            shown.append(check_table(check))
-        return [*shown, *summary(self.screening, self.words, self.compared)]
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        from wm_drake.studies.gasket.page import gasket_page
-
-        return gasket_page(self, facts)
-
-    def warnings(self) -> list[str]:
-        """Return what limits the use of the result."""
-        from wm_drake.studies.gasket.findings import warnings
-
-        return warnings(self.screening, self.words)
-
-    def failures(self) -> list[str]:
-        """Return a line for each run that diverged."""
-        failed = self.screening.responses.failed.items()
-        return [f"trial {trial + 1}, load {load}: {why}" for (trial, load), why in failed]
+from wm_drake.studies.study import Task
 
 
 class GasketTask(Task):
@@ -182,9 +107,7 @@ class GasketTask(Task):
             name: _factors(self.parameters, options.model_copy(update={"tables": name}))
             for name in TABLES
         }
-        zero = run_level_zero(
-            self.parameters, every, options.tables, self.cases, trials.chosen, run_variant
-        )
+        zero = run_level_zero(self.parameters, every, options.tables, trials, run_variant)
         check: Check | None = None
         if self.settings:
             models = surfaces(screening)

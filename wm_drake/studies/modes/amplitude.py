@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
-from threadpoolctl import threadpool_limits
 
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
@@ -25,6 +24,7 @@ from wm_drake.studies.modes.linearisation import Spectrum
 from wm_drake.studies.modes.shapes import Mode
 from wm_drake.studies.steady.balance import HarmonicBalance
 from wm_drake.studies.steady.series import Series
+from wm_drake.studies.threads import on_one_thread
 
 SMALLEST_AMPLITUDE = 1e-5
 """Amplitude at which a mode is followed from its linearisation with stuck friction. [m]"""
@@ -71,6 +71,7 @@ class AmplitudeMode:
         )
 
 
+@on_one_thread
 def amplitude_modes(
     setup: Setup, stuck: Spectrum, modes: list[Mode], amplitudes: FloatArray
 ) -> list[AmplitudeMode]:
@@ -87,11 +88,10 @@ def amplitude_modes(
         A mode each; it ends where it cannot be followed any further.
     """
     balance = HarmonicBalance(setup, Series(ORDER, SAMPLES))
-    with threadpool_limits(1, "blas"):  # the matrices are small: several threads would be slower
-        return [
-            _follow(balance, stuck.values[index], stuck.right[:, index], mode.name, amplitudes)
-            for index, mode in enumerate(modes)
-        ]
+    return [
+        _follow(balance, stuck.values[index], stuck.right[:, index], mode.name, amplitudes)
+        for index, mode in enumerate(modes)
+    ]
 
 
 class _Free:

@@ -1,17 +1,19 @@
-"""Report of the modes of a machine: one self-contained HTML file, and tables for CSV files."""
+"""What the study of modes shows: files, JSON, terminal and page."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
-from rich import table as terminal
 
 from wm_drake.engines.trajectory import COORDINATES
 from wm_drake.model.scene import Scene
-from wm_drake.report.formatting import MISSING, MM_PER_M, RPM_PER_RAD_S, number
-from wm_drake.report.page import Picture, picture, render
-from wm_drake.report.table import Group, Row, Table, parameter_table
-from wm_drake.simulation.records import versions
+from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, plain
+from wm_drake.report.page import Picture, picture
+from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.table import Column, Group, Row, Table, line, table_of
 from wm_drake.studies.modes.figures import (
     TITLES,
     amplitude_figure,
@@ -20,31 +22,95 @@ from wm_drake.studies.modes.figures import (
     sensitivity_figure,
     shapes_figure,
 )
-from wm_drake.studies.modes.sensitivity import Sensitivity
-from wm_drake.studies.modes.study import SLIDING, STUCK, MachineModes, NaturalModes
-from wm_drake.studies.study import Facts
+from wm_drake.studies.modes.shapes import Mode
+from wm_drake.studies.modes.study import (
+    AMPLITUDE,
+    SLIDING,
+    STUCK,
+    AmplitudeValue,
+    MachineModes,
+    NaturalModes,
+)
+from wm_drake.studies.study import Facts, Result
+
+if TYPE_CHECKING:
+    from rich import table as terminal
+
+MODE = {
+    "mode": Column("mode"),
+    "name": Column("name"),
+    "frequency_Hz": Column("frequency", "Hz", 3),
+    "damping_ratio": Column("damping ratio", decimals=4),
+    "order": Column("order"),
+    "rpm": Column("speed", "rpm", 1),
+}
+"""Columns of tables of modes by their names in files."""
+
+AXES = (
+    "Axes: for a person who faces the door, x points to the right, y along the drum axis from "
+    "front to rear, and z up. Sway is along x, fore-aft along y, bounce along z; roll, pitch and "
+    "yaw turn about x, y and z."
+)
 
 
-def modes_page(result: MachineModes, facts: Facts, replays: Mapping[str, str]) -> str:
-    """Return the page as text of one self-contained HTML file.
+@dataclass(frozen=True)
+class ModesResult(Result):
+    """Modes, and the pages of their animations by name of the mode."""
 
-    Args:
-        result: Modes of a machine.
-        facts: How they were computed.
-        replays: Names of the files with a 3D animation, by name of the mode.
-    """
-    outlines = Scene(result.parameters).tub_outlines()
-    return render(
-        Path(__file__).with_name("page.html"),
-        title=f"Modes of machine {result.parameters.name}",
-        about=result.parameters.about,
-        summary=summary(result),
-        warnings=list(facts.warnings),
-        modes=natural_modes_table(result),
-        critical=_critical_table(result),
-        campbell=_campbell_picture(result),
-        amplitude=_amplitude_picture(result),
-        shapes=[
+    modes: MachineModes
+    replays: dict[str, str]
+
+    float_format = "%.8g"
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return modes, amplitudes, Campbell diagram and sensitivities."""
+        return {
+            "modes": modes_frame(self.modes),
+            "amplitudes": amplitudes_frame(self.modes),
+            "campbell": campbell_frame(self.modes),
+            "sensitivities": sensitivities_frame(self.modes),
+        }
+
+    def write(self, folder: Path) -> None:
+        """Write the tables, and the animations."""
+        super().write(folder)
+        for name, text in self.replays.items():
+            (folder / replay_file(name)).write_text(text, encoding="utf-8")
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the modes for JSON."""
+        result = self.modes
+        campbell = {name: _campbell_as_json(result, name) for name in (SLIDING, STUCK)}
+        shown = {
+            "machine": result.parameters.name,
+            "load": result.load,
+            "gasket": result.gasket,
+            "amplitude_mm": MM_PER_M * result.amplitude,
+            "modes": {
+                name: frame.drop(columns="friction").to_dict("records")
+                for name, frame in linearisations(result).groupby("friction", sort=False)
+            },
+            "critical_rpm": RPM_PER_RAD_S * result.critical_speeds,
+            "critical": {name: critical_rows(result, name) for name in result.critical},
+            "campbell": campbell[SLIDING],
+            "campbell_stuck": campbell[STUCK],
+        }
+        return plain(shown)
+
+    def terminal(self) -> "list[terminal.Table | str]":
+        """Return natural frequencies and damping ratios, and a summary."""
+        result = self.modes
+        frame = linearisations(result).replace({AMPLITUDE: f"{MM_PER_M * result.amplitude:g} mm"})
+        title = f"Modes of machine '{result.parameters.name}'"
+        columns = ["friction", "name", "frequency_Hz", "damping_ratio"]
+        shown = table_of(frame[columns], columns={**MODE, "name": Column("mode")})
+        return [shown.terminal(title), summary(result)]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page: frequencies, shapes, sensitivities, tables."""
+        result = self.modes
+        outlines = Scene(result.parameters).tub_outlines()
+        shapes = [
             picture(
                 shapes_figure(result.modes[name], outlines),
                 f"Outlines of the tub in each mode, {TITLES[name]}.",
@@ -52,76 +118,120 @@ def modes_page(result: MachineModes, facts: Facts, replays: Mapping[str, str]) -
                 "the motion, enlarged. Rows: seen from the front, from the right, from above.",
             )
             for name in (SLIDING, STUCK)
-        ],
-        participation=_participation_table(result),
-        energy=picture(
+        ]
+        energy = picture(
             energy_figure(result),
             "Bars with the shares of the elements in strain energy and dissipation of each mode.",
             "Share of each element in the strain energy and in the dissipated energy of each mode. "
             "Negative shares, which preload can cause, are not drawn; modes.csv has them.",
-        ),
-        sensitivity=[_sensitivity_picture(result, q) for q in ("frequency", "damping")],
-        replays=list(replays.items()),
-        facts=_facts(result, facts.command),
-        numbers=parameter_table(result.parameters),
+        )
+        over_speed = (_campbell_picture(result), _amplitude_picture(result))
+        causes = [_sensitivity_picture(result, name) for name in ("frequency", "damping")]
+        tables = (natural_modes_table(result), _critical_table(result), _participation(result))
+        return SectionedPage(
+            f"Modes of machine {result.parameters.name}",
+            summary(result),
+            [
+                Section("campbell", "Frequencies over speed and amplitude", over_speed),
+                Section("shapes", "Mode shapes", [*shapes, energy], links=self._links()),
+                Section("sensitivity", "Sensitivity: what moves a mode", causes),
+                Section("modes", "Modes", tables=tables[:1]),
+                Section("critical", "Critical speeds", tables=tables[1:2]),
+                Section("participation", "Participation", tables=tables[2:]),
+            ],
+            [
+                ("Load", result.load or "empty drum"),
+                ("Gasket", "yes" if result.gasket else "no"),
+                *facts.rows(),
+            ],
+            result.parameters,
+            facts.warnings,
+            method=AXES,
+        ).html()
+
+    def _links(self) -> list[tuple[str, str]]:
+        """Return the files of the animations, and their titles."""
+        return [(replay_file(name), f"Animation of {name} in 3D") for name in self.replays]
+
+
+def replay_file(name: str) -> str:
+    """Return the name of the file with the animation of a mode."""
+    return f"replay_{re.sub('[^a-z]', '_', name)}.html"
+
+
+def linearisations(result: NaturalModes) -> pd.DataFrame:
+    """Return name, natural frequency and damping ratio of the modes of each linearisation."""
+    modes: dict[str, Sequence[Mode | AmplitudeValue]] = {
+        STUCK: result.modes[STUCK],
+        SLIDING: result.modes[SLIDING],
+        AMPLITUDE: result.at_amplitude,
+    }
+    return pd.DataFrame(
+        {
+            "friction": friction,
+            "frequency_Hz": mode.frequency_hz,
+            "damping_ratio": mode.damping_ratio,
+            "name": mode.name,
+        }
+        for friction, of_friction in modes.items()
+        for mode in of_friction
     )
+
+
+def critical_rows(result: MachineModes, name: str) -> list[dict[str, Any]]:
+    """Return order, mode, speed and damping ratio of the critical speeds of a linearisation."""
+    return [
+        {
+            "order": critical.order,
+            "name": result.modes[name][critical.mode].name,
+            "rpm": RPM_PER_RAD_S * critical.speed,
+            "damping_ratio": critical.damping_ratio,
+        }
+        for critical in result.critical[name]
+    ]
+
+
+def _campbell_as_json(result: MachineModes, name: str) -> dict[str, Any]:
+    computed = result.diagrams[name]
+    return {
+        "rpm": RPM_PER_RAD_S * computed.speed,
+        "frequency_Hz": computed.frequency_hz.T,
+        "damping_ratio": computed.damping_ratio.T,
+        "name": [mode.name for mode in result.modes[name]],
+    }
 
 
 def summary(result: MachineModes) -> str:
     """Return one paragraph about the modes."""
-    sliding, stuck = result.modes[SLIDING], result.modes[STUCK]
+    sliding, stuck = (
+        [number(mode.frequency_hz, 2) for mode in result.modes[name]] for name in (SLIDING, STUCK)
+    )
     critical = ", ".join(number(RPM_PER_RAD_S * speed, 0) for speed in result.critical_speeds)
     load = f"with load {result.load}" if result.load else "with an empty drum"
-    sentences = [
-        f"{len(sliding)} modes of the machine {load}"
-        f"{'' if result.gasket else ' without gasket'}: "
-        f"{number(sliding[0].frequency_hz, 2)} to {number(sliding[-1].frequency_hz, 2)} Hz while "
-        f"friction slides, {number(stuck[0].frequency_hz, 2)} to "
-        f"{number(stuck[-1].frequency_hz, 2)} Hz while it sticks.",
-        f"With sliding friction the unbalance meets them at {critical} rpm."
-        if critical
-        else "With sliding friction the unbalance meets none of them.",
-    ]
-    return " ".join(sentences)
+    meets = f"them at {critical} rpm" if critical else "none of them"
+    return (
+        f"{len(sliding)} modes of the machine {load}{'' if result.gasket else ' without gasket'}: "
+        f"{sliding[0]} to {sliding[-1]} Hz while friction slides, {stuck[0]} to {stuck[-1]} Hz "
+        f"while it sticks. With sliding friction the unbalance meets {meets}."
+    )
 
 
-def terminal_table(result: MachineModes) -> terminal.Table:
-    """Return natural frequencies and damping ratios for the terminal."""
-    table = terminal.Table(title=f"Modes of machine '{result.parameters.name}'")
-    for head in ("friction", "mode", "frequency, Hz", "damping ratio"):
-        table.add_column(head, justify="left" if head in ("friction", "mode") else "right")
-    at_amplitude = f"{MM_PER_M * result.amplitude:g} mm"
-    for friction, modes in (
-        (STUCK, result.modes[STUCK]),
-        (at_amplitude, result.at_amplitude),
-        (SLIDING, result.modes[SLIDING]),
-    ):
-        for mode in modes:
-            values = ((mode.frequency_hz, 3), (mode.damping_ratio, 4))
-            cells = (MISSING if one is None else f"{one:.{digits}f}" for one, digits in values)
-            table.add_row(friction, mode.name, *cells)
-    return table
-
-
-def natural_modes_table(result: MachineModes | NaturalModes) -> Table:
+def natural_modes_table(result: NaturalModes) -> Table:
     """Return the table of natural frequencies and damping ratios of all linearisations."""
-    groups = []
-    at_amplitude = {value.name: value for value in result.at_amplitude}
-    for mode in result.modes[STUCK]:
-        sliding = next((m for m in result.modes[SLIDING] if m.name == mode.name), None)
-        value = at_amplitude[mode.name]
-        cells = [number(mode.frequency_hz, 3), number(mode.damping_ratio, 4)]
-        cells += [
-            MISSING if one is None else number(one, digits)
-            for one, digits in ((value.frequency_hz, 3), (value.damping_ratio, 4))
-        ]
-        cells += (
-            [number(sliding.frequency_hz, 3), number(sliding.damping_ratio, 4)]
-            if sliding
-            else [MISSING, MISSING]
-        )
-        groups.append(Group(mode.name, (Row(tuple(cells)),)))
     amplitude = number(MM_PER_M * result.amplitude, 1)
+    frame = linearisations(result).set_index(["friction", "name"])
+    both = frame.unstack("friction")  # NaN where a linearisation does not have the mode
+    groups = (
+        line(
+            mode.name,
+            [
+                both[what, friction][mode.name]
+                for friction in (STUCK, AMPLITUDE, SLIDING)
+                for what in ("frequency_Hz", "damping_ratio")
+            ],
+        )
+        for mode in result.modes[STUCK]
+    )
     caption = (
         "Natural frequency and damping ratio of each mode. Sticks: friction holds, so that the "
         f"sponges of dampers are springs. {amplitude} mm: harmonic balance of the free motion at "
@@ -129,27 +239,20 @@ def natural_modes_table(result: MachineModes | NaturalModes) -> Table:
         "only dashpots damp; its mode is the one of the same name. "
         "Roll, pitch and yaw turn about x, y and z."
     )
-    heads = [
-        f"{when}, {what}"
+    columns = tuple(
+        column
         for when in ("sticks", f"{amplitude} mm", "slides")
-        for what in ("Hz", "damping ratio")
-    ]
-    return Table(caption, ("mode", *heads), tuple(groups))
+        for column in (Column(when, "Hz", 3), Column(f"{when}, damping ratio", decimals=4))
+    )
+    return Table(caption, ("mode", *columns), tuple(groups))
 
 
 def _critical_table(result: MachineModes) -> Table:
     groups = []
     for name in (SLIDING, STUCK):
         rows = [
-            Row(
-                (
-                    result.modes[name][critical.mode].name,
-                    f"{critical.order:g}×",
-                    number(RPM_PER_RAD_S * critical.speed, 1),
-                    number(critical.damping_ratio, 4),
-                )
-            )
-            for critical in result.critical[name]
+            Row((row["name"], f"{row['order']:g}×", row["rpm"], row["damping_ratio"]))
+            for row in critical_rows(result, name)
         ]
         if rows:
             groups.append(Group(TITLES[name], tuple(rows)))
@@ -157,8 +260,8 @@ def _critical_table(result: MachineModes) -> Table:
         "Critical speeds: an order of the drum speed equals a natural frequency. The names are "
         "those of a drum that stands still."
     )
-    header = ("linearisation", "mode", "order", "speed, rpm", "damping ratio")
-    return Table(caption, header, tuple(groups), text_columns=3)
+    columns = tuple(MODE[key] for key in ("mode", "order", "rpm", "damping_ratio"))
+    return Table(caption, ("linearisation", *columns), tuple(groups), text_columns=3)
 
 
 def _campbell_picture(result: MachineModes) -> Picture:
@@ -184,19 +287,20 @@ def _amplitude_picture(result: MachineModes) -> Picture:
     return picture(amplitude_figure(result), "Frequency and damping over amplitude.", caption)
 
 
-def _participation_table(result: MachineModes) -> Table:
-    groups = []
-    for name in (SLIDING, STUCK):
-        rows = tuple(
-            Row((mode.name, *(number(100.0 * float(share), 0) for share in mode.participation)))
-            for mode in result.modes[name]
+def _participation(result: MachineModes) -> Table:
+    groups = tuple(
+        Group(
+            TITLES[name],
+            tuple(Row((m.name, *(100.0 * m.participation).tolist())) for m in result.modes[name]),
         )
-        groups.append(Group(TITLES[name], rows))
+        for name in (SLIDING, STUCK)
+    )
     caption = (
         "Participation of each coordinate of the tub, in percent. A mode has the name of a "
         "coordinate with a large part in it; no two have the same."
     )
-    return Table(caption, ("linearisation", "mode", *COORDINATES), tuple(groups), text_columns=2)
+    columns = tuple(Column(name, decimals=0) for name in COORDINATES)
+    return Table(caption, ("linearisation", "mode", *columns), groups, text_columns=2)
 
 
 def _sensitivity_picture(result: MachineModes, quantity: str) -> Picture:
@@ -209,21 +313,12 @@ def _sensitivity_picture(result: MachineModes, quantity: str) -> Picture:
     )
 
 
-def _facts(result: MachineModes, command: str) -> list[tuple[str, str]]:
-    return [
-        ("Command", command),
-        ("Load", result.load or "empty drum"),
-        ("Gasket", "yes" if result.gasket else "no"),
-        ("Software", ", ".join(f"{name} {text}" for name, text in versions().items())),
-    ]
-
-
-def modes_table(result: MachineModes) -> pd.DataFrame:
-    """Return the modes with shapes, participation and shares of the elements, for a CSV file."""
+def modes_frame(result: MachineModes) -> pd.DataFrame:
+    """Return the modes with shapes, participation and shares of the elements."""
     rows = []
     for name in (STUCK, SLIDING):
         for mode in result.modes[name]:
-            row = {
+            row: dict[str, Any] = {
                 "linearisation": name,
                 "mode": mode.name,
                 "frequency_Hz": mode.frequency_hz,
@@ -231,71 +326,62 @@ def modes_table(result: MachineModes) -> pd.DataFrame:
             }
             for coordinate, value in zip(COORDINATES, mode.shape, strict=True):
                 unit = "rad" if coordinate in COORDINATES[:3] else "m"
-                row[f"shape_{coordinate}_real_{unit}"] = float(value.real)
-                row[f"shape_{coordinate}_imag_{unit}"] = float(value.imag)
+                row[f"shape_{coordinate}_real_{unit}"] = value.real
+                row[f"shape_{coordinate}_imag_{unit}"] = value.imag
             for coordinate, share in zip(COORDINATES, mode.participation, strict=True):
-                row[f"participation_{coordinate}"] = float(share)
+                row[f"participation_{coordinate}"] = share
             for kind in ("strain_energy", "dissipation"):
                 for element, share in zip(result.elements, getattr(mode, kind), strict=True):
-                    row[f"{kind} {element}"] = float(share)
+                    row[f"{kind} {element}"] = share
             rows.append(row)
     return pd.DataFrame(rows)
 
 
-def amplitudes_table(result: MachineModes) -> pd.DataFrame:
-    """Return the modes over their amplitude, for a CSV file."""
-    return pd.DataFrame(
-        [
+def amplitudes_frame(result: MachineModes) -> pd.DataFrame:
+    """Return the modes over their amplitude."""
+    frames = (
+        pd.DataFrame(
             {
                 "mode": mode.name,
-                "amplitude_mm": MM_PER_M * amplitude,
-                "frequency_Hz": frequency,
-                "damping_ratio": ratio,
+                "amplitude_mm": MM_PER_M * mode.amplitude,
+                "frequency_Hz": mode.frequency_hz,
+                "damping_ratio": mode.damping_ratio,
             }
-            for mode in result.over_amplitude
-            for amplitude, frequency, ratio in zip(
-                mode.amplitude, mode.frequency_hz, mode.damping_ratio, strict=True
-            )
-        ],
-        columns=["mode", "amplitude_mm", "frequency_Hz", "damping_ratio"],
+        )
+        for mode in result.over_amplitude
+    )
+    return pd.concat(frames, ignore_index=True)
+
+
+def campbell_frame(result: MachineModes) -> pd.DataFrame:
+    """Return the Campbell diagrams."""
+    return pd.DataFrame(
+        {
+            "linearisation": name,
+            "rpm": RPM_PER_RAD_S * speed,
+            "mode": mode.name,
+            "frequency_Hz": diagram.frequency_hz[index, column],
+            "damping_ratio": diagram.damping_ratio[index, column],
+            "mac": diagram.mac[index, column],
+        }
+        for name, diagram in result.diagrams.items()
+        for index, speed in enumerate(diagram.speed)
+        for column, mode in enumerate(result.modes[name])
     )
 
 
-def campbell_table(result: MachineModes) -> pd.DataFrame:
-    """Return the Campbell diagrams, for a CSV file."""
-    rows = []
-    for name, diagram in result.diagrams.items():
-        for index, speed in enumerate(diagram.speed):
-            for mode, frequency in enumerate(diagram.frequency_hz[index]):
-                rows.append(
-                    {
-                        "linearisation": name,
-                        "rpm": RPM_PER_RAD_S * float(speed),
-                        "mode": result.modes[name][mode].name,
-                        "frequency_Hz": float(frequency),
-                        "damping_ratio": float(diagram.damping_ratio[index, mode]),
-                        "mac": float(diagram.mac[index, mode]),
-                    }
-                )
-    return pd.DataFrame(rows)
-
-
-def sensitivities_table(result: MachineModes) -> pd.DataFrame:
-    """Return the sensitivities of all modes to all numbers, for a CSV file."""
-    rows = []
-    for name, entries in result.sensitivities.items():
-        for entry in entries:
-            for index, mode in enumerate(result.modes[name]):
-                rows.append(_sensitivity_row(name, mode.name, entry, index))
-    return pd.DataFrame(rows)
-
-
-def _sensitivity_row(name: str, mode: str, entry: Sensitivity, index: int) -> dict[str, object]:
-    return {
-        "linearisation": name,
-        "mode": mode,
-        "key": entry.key,
-        "per": entry.unit.shown if entry.per_unit else "relative change",
-        "relative_change_of_frequency": float(entry.frequency[index]),
-        "change_of_damping_ratio": float(entry.damping[index]),
-    }
+def sensitivities_frame(result: MachineModes) -> pd.DataFrame:
+    """Return the sensitivities of all modes to all numbers."""
+    return pd.DataFrame(
+        {
+            "linearisation": name,
+            "mode": mode.name,
+            "key": entry.key,
+            "per": entry.unit.shown if entry.per_unit else "relative change",
+            "relative_change_of_frequency": entry.frequency[index],
+            "change_of_damping_ratio": entry.damping[index],
+        }
+        for name, entries in result.sensitivities.items()
+        for entry in entries
+        for index, mode in enumerate(result.modes[name])
+    )

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from threadpoolctl import threadpool_limits
 
 from wm_drake.batch import simulate_many
 from wm_drake.errors import input_error
@@ -19,6 +18,7 @@ from wm_drake.studies.modes.fixed_cabinet import check_fixed_cabinet
 from wm_drake.studies.modes.linearisation import MODES, Linearisation, Spectrum
 from wm_drake.studies.modes.sensitivity import Sensitivity, numbers_of, sensitivities
 from wm_drake.studies.modes.shapes import Mode, modes_of
+from wm_drake.studies.threads import on_one_thread
 
 STUCK, SLIDING, AMPLITUDE = "stuck", "sliding", "amplitude"
 """Linearisations.
@@ -70,17 +70,12 @@ class NaturalModes:
 
 
 @dataclass(frozen=True)
-class MachineModes:
-    """Modes of a machine.
+class MachineModes(NaturalModes):
+    """All modes of a machine.
 
     Attributes:
-        parameters: The machine.
-        load: Name of the load; "" for the empty drum.
         gasket: Whether the gasket is in place.
         elements: Names of the elements on the tub, in the order of the shares of a mode.
-        modes: Modes of the linearisations `STUCK` and `SLIDING` with a drum that stands still.
-        amplitude: Amplitude of the values in `at_amplitude`. [m]
-        at_amplitude: Modes at that amplitude.
         over_amplitude: Each mode over its amplitude.
         diagrams: Campbell diagram of `STUCK` and `SLIDING`.
         critical: Critical speeds of each.
@@ -89,13 +84,8 @@ class MachineModes:
             at the sensors, as `simulate_many` returns them. None if not computed.
     """
 
-    parameters: MachineParameters
-    load: str
     gasket: bool
     elements: list[str]
-    modes: dict[str, list[Mode]]
-    amplitude: float
-    at_amplitude: list[AmplitudeValue]
     over_amplitude: list[AmplitudeMode]
     diagrams: dict[str, Campbell]
     critical: dict[str, list[CriticalSpeed]]
@@ -108,6 +98,7 @@ class MachineModes:
         return np.array([c.speed for c in self.critical[SLIDING] if c.order == 1.0])
 
 
+@on_one_thread
 def modes(
     machine: Machine,
     load: Load | str | None = None,
@@ -144,65 +135,8 @@ def modes(
             f"{1e3 * amplitude:g} mm is no amplitude; allowed are more than 0 and up to 100 mm",
             key="amplitude",
         )
-    check_fixed_cabinet(machine.parameters)
-    with threadpool_limits(1, "blas"):  # the matrices are small: several threads would be slower
-        return _modes(machine, load, gasket, amplitude, run_up, progress)
-
-
-def three_linearisations(
-    machine: Machine,
-    load: Load | str,
-    *,
-    parameters: MachineParameters | None = None,
-    gasket: bool = True,
-    amplitude: float = DEFAULT_AMPLITUDE,
-) -> NaturalModes:
-    """Return the natural modes of a machine with a load, without anything that takes seconds.
-
-    Args:
-        machine: A built machine.
-        load: Point masses in the drum, or the name of one of the machine's loads.
-        parameters: Numbers to use; those it was built from if None.
-        gasket: False removes the gasket.
-        amplitude: Amplitude of the third linearisation, as for `modes`. [m]
-
-    Raises:
-        InputError: the cabinet moves, or the machine cannot be set up.
-    """
-    numbers = parameters or machine.parameters
-    check_fixed_cabinet(numbers)
-    with threadpool_limits(1, "blas"):  # the matrices are small: several threads would be slower
-        natural = {}
-        for name, friction in ((SLIDING, False), (STUCK, True)):
-            setup = machine.set_up(load, parameters=numbers, gasket=gasket, friction=friction)
-            linear = Linearisation(setup, loaded=True)
-            spectrum = linear.spectrum().first(MODES)
-            natural[name] = modes_of(spectrum, linear.wrench_slopes())
-        # the last setup is the one with friction
-        names = [mode.name for mode in natural[STUCK]]
-        if numbers.telescopic_dampers:
-            values = [AmplitudeValue(name, None, None) for name in names]
-        else:
-            over = amplitude_modes(setup, spectrum, natural[STUCK], np.array([amplitude]))
-            values = _values_at(over, amplitude)
-    return NaturalModes(
-        numbers, load if isinstance(load, str) else "given", natural, amplitude, values
-    )
-
-
-def _values_at(over: list[AmplitudeMode], amplitude: float) -> list[AmplitudeValue]:
-    return [AmplitudeValue(mode.name, *(mode.at(amplitude) or (None, None))) for mode in over]
-
-
-def _modes(
-    machine: Machine,
-    load: Load | str | None,
-    gasket: bool,
-    amplitude: float,
-    run_up: bool,
-    progress: Callable[[float], None],
-) -> MachineModes:
     parameters = machine.parameters
+    check_fixed_cabinet(parameters)
     linear = {
         STUCK: _linearisation(machine, load, gasket, friction=True),
         SLIDING: _linearisation(machine, load, gasket, friction=False),
@@ -230,17 +164,62 @@ def _modes(
     return MachineModes(
         parameters,
         load if isinstance(load, str) else "" if load is None else "given",
-        gasket,
-        linear[STUCK].names,
         natural,
         amplitude,
         _values_at(over, amplitude),
+        gasket,
+        linear[STUCK].names,
         over,
         diagrams,
         {name: critical_speeds(diagram, ORDERS) for name, diagram in diagrams.items()},
         bars,
         peaks,
     )
+
+
+@on_one_thread
+def three_linearisations(
+    machine: Machine,
+    load: Load | str,
+    *,
+    parameters: MachineParameters | None = None,
+    gasket: bool = True,
+    amplitude: float = DEFAULT_AMPLITUDE,
+) -> NaturalModes:
+    """Return the natural modes of a machine with a load, without anything that takes seconds.
+
+    Args:
+        machine: A built machine.
+        load: Point masses in the drum, or the name of one of the machine's loads.
+        parameters: Numbers to use; those it was built from if None.
+        gasket: False removes the gasket.
+        amplitude: Amplitude of the third linearisation, as for `modes`. [m]
+
+    Raises:
+        InputError: the cabinet moves, or the machine cannot be set up.
+    """
+    numbers = parameters or machine.parameters
+    check_fixed_cabinet(numbers)
+    natural = {}
+    for name, friction in ((SLIDING, False), (STUCK, True)):
+        setup = machine.set_up(load, parameters=numbers, gasket=gasket, friction=friction)
+        linear = Linearisation(setup, loaded=True)
+        spectrum = linear.spectrum().first(MODES)
+        natural[name] = modes_of(spectrum, linear.wrench_slopes())
+    # the last setup is the one with friction
+    names = [mode.name for mode in natural[STUCK]]
+    if numbers.telescopic_dampers:
+        values = [AmplitudeValue(name, None, None) for name in names]
+    else:
+        over = amplitude_modes(setup, spectrum, natural[STUCK], np.array([amplitude]))
+        values = _values_at(over, amplitude)
+    return NaturalModes(
+        numbers, load if isinstance(load, str) else "given", natural, amplitude, values
+    )
+
+
+def _values_at(over: list[AmplitudeMode], amplitude: float) -> list[AmplitudeValue]:
+    return [AmplitudeValue(mode.name, *(mode.at(amplitude) or (None, None))) for mode in over]
 
 
 def _linearisation(

@@ -8,8 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wm_drake.parameters import machine_yaml
-from wm_drake.report.formatting import MISSING, MM_PER_M, plain, significant, with_interval
-from wm_drake.report.page import Picture, as_json, picture, render
+from wm_drake.report.formatting import (
+    MISSING,
+    MM_PER_M,
+    listed,
+    plain,
+    significant,
+    with_interval,
+)
+from wm_drake.report.page import Picture, as_json, fragment, picture
+from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Table, Value, line
 from wm_drake.studies.pareto import tables
 from wm_drake.studies.pareto.envelopes import Envelopes
@@ -89,7 +97,7 @@ class DesignResult(Result):
 
     def page(self, facts: Facts) -> str:
         """Return the page: front with designs to pick, search, chosen designs."""
-        front, shown, search = self.front, self.envelopes, self.front.search
+        front, search = self.front, self.front.search
         designs, has_front = front.designs, bool(len(front.objectives))
         evaluated = f"{search.evaluations}, each {designs.scenarios} runs, {facts.wall_s:.0f} s"
         made = [
@@ -99,20 +107,36 @@ class DesignResult(Result):
             *facts.rows(),
         ]
         none = [] if has_front else ["No design meets all constraints."]
-        return render(
-            Path(__file__).with_name("page.html"),
-            title=f"Designs of machine {designs.parameters.name}",
-            about=self.about,
-            summary=summary(front, self.promises),
+        shown = self.envelopes if has_front else None
+        sections = [
+            Section("front", "Front", body=_picker(front, shown)) if shown else None,
+            Section("search", "Search", (_history(front),)),
+        ]
+        if has_front:
+            sections.append(Section("chosen", "Chosen designs", tables=(_chosen(front),)))
+        if self.promises:
+            promised = (_promises(self.promises),)
+            sections.append(Section("robust", "Robust designs on fresh samples", tables=promised))
+        return SectionedPage(
+            f"Designs of machine {designs.parameters.name}",
+            summary(front, self.promises),
+            sections,
+            made,
             warnings=[*facts.warnings, *none],
-            front=_front(front) if has_front and len(designs.objectives) > 1 else None,
-            picked=as_json(_picked(front, shown)) if has_front and shown else None,
-            envelopes=_envelopes(front, shown) if has_front and shown else None,
-            chosen=_chosen(front) if has_front else None,
-            promises=_promises(self.promises) if self.promises else None,
-            history=_history(front),
-            facts=[(word, text) for word, text in made if text],
-        )
+            about=self.about,
+            script=Path(__file__).with_name("pick.js") if shown else None,
+        ).html()
+
+
+def _picker(front: ParetoFront, shown: Envelopes) -> str:
+    """Return the part of the page on which designs are picked."""
+    has_plot = len(front.designs.objectives) > 1
+    return fragment(
+        Path(__file__).with_name("picked.html"),
+        front=_front(front) if has_plot else None,
+        picked=as_json(_picked(front, shown)),
+        envelopes=_envelopes(front, shown),
+    )
 
 
 def summary(front: ParetoFront, kept: Sequence[Promise] = ()) -> str:
@@ -140,11 +164,6 @@ def summary(front: ParetoFront, kept: Sequence[Promise] = ()) -> str:
     )
     name = "The compromise" if COMPROMISE in front.chosen else "The best design"
     return f"{text} {name} has {listed(parts)} of the machine itself.{robust}"
-
-
-def listed(words: list[str]) -> str:
-    """Return words as a list in a sentence: a, b and c."""
-    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
 
 
 def _text(value: float) -> str:

@@ -14,7 +14,7 @@ from wm_drake.parameters.tolerances import fraction
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.parameters.variation import value_at
-from wm_drake.simulation.cases import Case
+from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures.responses import Response, chosen_responses
 from wm_drake.studies.tolerance.variables import UncertainMachine
 
@@ -196,9 +196,7 @@ class MachineDesigns:
             return [replace(case, name=f"{name}, {case.name}") for case in cases]
         runs = []
         for case in self.cases:
-            # a variable may be a mass of one of the machine's own loads
-            is_of_machine = self.parameters.loads.get(case.name) == case.load
-            load = parameters.loads[case.name] if is_of_machine else case.load
+            load = load_of(case, self.parameters, parameters)
             changed = replace(case, name=f"{name}, {case.name}", load=load, parameters=parameters)
             runs.append(changed)
         return runs

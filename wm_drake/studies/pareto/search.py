@@ -2,7 +2,7 @@
 
 import importlib.util
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -65,55 +65,65 @@ def hypervolume(objectives: FloatArray, first: FloatArray) -> float:
     return float(HV(ref_point=np.ones(scaled.shape[1]))(scaled))
 
 
-def check_search(evaluations: int, population: int) -> None:
-    """Raise an InputError if there are fewer evaluations than designs of a generation.
+@dataclass(frozen=True)
+class Problem:
+    """What a search makes small.
 
-    Raises:
-        WmDrakeError: pymoo is missing.
+    Attributes:
+        evaluate: Objectives and constraints of designs.
+        start: A first design. (d,) in [0, 1]
+        objectives, constraints: Their numbers.
     """
-    if importlib.util.find_spec("pymoo") is None:
-        raise WmDrakeError("a design study needs pymoo: pip install 'wm-drake[design]'")
-    if evaluations < population:
-        raise input_error(
-            f"{evaluations} is less than the population, {population}", where="--evaluations"
-        )
+
+    evaluate: Evaluate
+    start: FloatArray
+    objectives: int
+    constraints: int = 0
 
 
-def search_front(
-    evaluate: Evaluate,
-    start: FloatArray,
-    objectives: int,
-    constraints: int,
-    *,
-    evaluations: int = 2000,
-    population: int = 64,
-    seed: int = 0,
-) -> SearchResult:
+@dataclass(frozen=True)
+class SearchSettings:
+    """Size of a search.
+
+    Attributes:
+        evaluations: Number of designs to evaluate, at least one population.
+        population: Designs of a generation.
+        seed: Of all random numbers.
+    """
+
+    evaluations: int = 2000
+    population: int = 64
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            InputError: there are fewer evaluations than designs of a generation.
+            WmDrakeError: pymoo is missing.
+        """
+        if importlib.util.find_spec("pymoo") is None:
+            raise WmDrakeError("a design study needs pymoo: pip install 'wm-drake[design]'")
+        if self.evaluations < self.population:
+            raise input_error(
+                f"{self.evaluations} is less than the population, {self.population}",
+                where="--evaluations",
+            )
+
+
+def search_front(problem: Problem, settings: SearchSettings) -> SearchResult:
     """Return the Pareto front of a problem.
 
     With up to two objectives the search is NSGA-II, with more NSGA-III. The first population is the
     start and points of a scrambled Sobol sequence.
-
-    Args:
-        evaluate: The problem.
-        start: A first design. (d,) in [0, 1]
-        objectives: Number of objectives.
-        constraints: Number of constraints.
-        evaluations: Number of designs to evaluate, at least one population.
-        population: Designs of a generation.
-        seed: Of all random numbers.
-
-    Raises:
-        InputError: there are fewer evaluations than designs of a generation.
-        WmDrakeError: pymoo is missing.
     """
-    check_search(evaluations, population)
-    size, done, first = len(start), 0, list[FloatArray]()
+    done, first = 0, list[FloatArray]()
+    objectives, constraints = problem.objectives, problem.constraints
     history: list[tuple[int, float]] = []
 
     def usable_only(x: FloatArray) -> tuple[FloatArray, FloatArray]:
         nonlocal done
-        f, g = evaluate(x)
+        f, g = problem.evaluate(x)
         usable = np.all(np.isfinite(np.hstack([f, g])), axis=1, keepdims=True)
         f, g = np.where(usable, f, UNUSABLE), np.where(usable, g, UNUSABLE)
         if not first:
@@ -126,12 +136,16 @@ def search_front(
         kept = optimum.get("F")[optimum.get("feas").ravel()] if len(optimum) else np.empty((0, 1))
         history.append((done, hypervolume(kept, first[0])))
 
-    points = first_population(start, population, seed)
-    until = ("n_eval", evaluations)
-    result = minimized(usable_only, points, objectives, constraints, until, population, seed, note)
+    result = minimized(
+        replace(problem, evaluate=usable_only),
+        first_population(problem.start, settings),
+        ("n_eval", settings.evaluations),
+        settings,
+        note,
+    )
     if result.F is None:
-        empty = np.empty((0, size)), np.empty((0, objectives)), np.empty((0, constraints))
-        return SearchResult(*empty, done, first[0], tuple(history))
+        x, f, g = (np.empty((0, n)) for n in (len(problem.start), objectives, constraints))
+        return SearchResult(x, f, g, done, first[0], tuple(history))
     x, f = np.atleast_2d(result.X), np.reshape(result.F, (-1, objectives))
     g = np.reshape(result.G, (len(f), -1)) if constraints else np.empty((len(f), 0))
     usable = np.all(f < UNUSABLE, axis=1)
@@ -140,54 +154,54 @@ def search_front(
     return SearchResult(x[order], f[order], g[order], done, first[0], tuple(history))
 
 
-def first_population(start: FloatArray, population: int, seed: int) -> FloatArray:
+def first_population(start: FloatArray, settings: SearchSettings) -> FloatArray:
     """Return a first design (d,) and points of a scrambled Sobol sequence. (population, d)"""
-    sobol = stats.qmc.Sobol(len(start), scramble=True, seed=np.random.default_rng(seed))
+    random, population = np.random.default_rng(settings.seed), settings.population
+    sobol = stats.qmc.Sobol(len(start), scramble=True, seed=random)
     points = sobol.random(1 << (population - 1).bit_length())[:population]
     points[0] = start
     return np.asarray(points)
 
 
 def minimized(
-    evaluate: Evaluate,
+    problem: Problem,
     points: FloatArray,
-    objectives: int,
-    constraints: int,
     until: tuple[str, int],
-    population: int,
-    seed: int,
+    settings: SearchSettings,
     note: Callable[[Any], None] | None = None,
 ) -> Any:
     """Return the result of pymoo's search.
 
     Args:
-        evaluate: The problem; its values are finite.
+        problem: The problem; its values are finite.
         points: First population. (population, d)
-        objectives, constraints: Numbers of objectives and constraints.
         until: When to stop, in the words of pymoo: ("n_eval", 2000) or ("n_gen", 40).
-        population: Designs of a generation.
-        seed: Of all random numbers.
+        settings: Designs of a generation, and seed.
         note: Called after each generation with pymoo's algorithm.
     """
-    from pymoo.core.problem import Problem
+    from pymoo.core.problem import Problem as PymooProblem
     from pymoo.optimize import minimize
 
-    class Bounded(Problem):
+    class Bounded(PymooProblem):
         """The problem in the form of pymoo."""
 
         def __init__(self) -> None:
             super().__init__(
-                n_var=points.shape[1], n_obj=objectives, n_ieq_constr=constraints, xl=0.0, xu=1.0
+                n_var=points.shape[1],
+                n_obj=problem.objectives,
+                n_ieq_constr=problem.constraints,
+                xl=0.0,
+                xu=1.0,
             )
 
         def _evaluate(self, x: FloatArray, out: Any, *_: Any, **__: Any) -> None:
-            out["F"], g = evaluate(np.asarray(x, dtype=float))
-            if constraints:
+            out["F"], g = problem.evaluate(np.asarray(x, dtype=float))
+            if problem.constraints:
                 out["G"] = g
 
-    algorithm = _algorithm(objectives, population, points)
+    algorithm = _algorithm(problem.objectives, settings.population, points)
     more = {} if note is None else {"callback": note}
-    return minimize(Bounded(), algorithm, until, seed=seed, **more)
+    return minimize(Bounded(), algorithm, until, seed=settings.seed, **more)
 
 
 def _algorithm(objectives: int, population: int, points: FloatArray) -> Any:

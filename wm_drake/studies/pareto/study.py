@@ -7,7 +7,7 @@ import numpy as np
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.pareto.problem import Goal, MachineDesigns, Run
-from wm_drake.studies.pareto.search import SearchResult, search_front
+from wm_drake.studies.pareto.search import Problem, SearchResult, SearchSettings, search_front
 from wm_drake.studies.pareto.surrogate import search_with_surfaces
 
 SEARCHES = {"genetic": search_front, "surfaces": search_with_surfaces}
@@ -44,31 +44,23 @@ class ParetoFront:
 
 
 def run_designs(
-    designs: MachineDesigns,
-    run: Run,
-    *,
-    evaluations: int,
-    population: int,
-    seed: int,
-    search: str = "genetic",
+    designs: MachineDesigns, run: Run, settings: SearchSettings, search: str = "genetic"
 ) -> ParetoFront:
     """Search the Pareto front of the designs of a machine.
 
     Args:
         designs: The designs.
         run: Function that runs cases.
-        evaluations, population, seed: As of `search_front`.
+        settings: Size of the search.
         search: Name in `SEARCHES`.
     """
-    result = SEARCHES[search](
+    problem = Problem(
         lambda x: designs.costs(x, run),
         designs.nominal(),
         len(designs.objectives),
         len(designs.constraints),
-        evaluations=evaluations,
-        population=population,
-        seed=seed,
     )
+    result = SEARCHES[search](problem, settings)
     nominal = designs.evaluate(designs.nominal()[None], run)
     return ParetoFront(
         designs,

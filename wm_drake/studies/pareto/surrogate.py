@@ -5,6 +5,7 @@ objectives and constraints of the designs that were evaluated. NSGA finds the fr
 surfaces, and the designs of it that lie farthest from known objectives are evaluated next.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,9 @@ from scipy.interpolate import RBFInterpolator
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.pareto.search import (
-    Evaluate,
+    Problem,
     SearchResult,
-    check_search,
+    SearchSettings,
     first_population,
     hypervolume,
     minimized,
@@ -33,33 +34,18 @@ SAME = 1e-3
 """Distance below which two designs count as the same. [length of the unit cube]"""
 
 
-def search_with_surfaces(
-    evaluate: Evaluate,
-    start: FloatArray,
-    objectives: int,
-    constraints: int,
-    *,
-    evaluations: int = 400,
-    population: int = 64,
-    seed: int = 0,
-) -> SearchResult:
-    """Return the Pareto front of a problem; arguments and result are those of `search_front`.
-
-    Raises:
-        InputError: there are fewer evaluations than designs of the first population.
-        WmDrakeError: pymoo is missing.
-    """
-    check_search(evaluations, population)
-    known = _Known(objectives, constraints)
-    known.add(first_population(start, population, seed), evaluate)
+def search_with_surfaces(problem: Problem, settings: SearchSettings) -> SearchResult:
+    """Return the Pareto front of a problem, as `search_front` does."""
+    known, evaluations = _Known(problem), settings.evaluations
+    known.add(first_population(problem.start, settings))
     history = [(len(known.x), known.volume())]
     while len(known.x) < evaluations:
         batch = min(BATCH, evaluations - len(known.x))
-        known.add(_next_designs(known, population, batch, seed + len(known.x)), evaluate)
+        known.add(_next_designs(known, batch, settings))
         history.append((len(known.x), known.volume()))
     best = np.flatnonzero(known.is_best())
     best = best[np.lexsort(known.f[best].T[::-1])]
-    first = known.f[:population]
+    first = known.f[: settings.population]
     return SearchResult(
         known.x[best], known.f[best], known.g[best], len(known.x), first, tuple(history)
     )
@@ -73,17 +59,18 @@ class _Known:
         first: Objectives of the first population.
     """
 
-    def __init__(self, objectives: int, constraints: int) -> None:
+    def __init__(self, problem: Problem) -> None:
         """Begin without designs."""
-        self.x: FloatArray = np.empty((0, 0))
-        self.f: FloatArray = np.empty((0, objectives))
-        self.g: FloatArray = np.empty((0, constraints))
+        self.problem = problem
+        self.x: FloatArray = np.empty((0, len(problem.start)))
+        self.f: FloatArray = np.empty((0, problem.objectives))
+        self.g: FloatArray = np.empty((0, problem.constraints))
         self.first: FloatArray = self.f
 
-    def add(self, designs: FloatArray, evaluate: Evaluate) -> None:
+    def add(self, designs: FloatArray) -> None:
         """Evaluate designs and keep them."""
-        f, g = evaluate(designs)
-        self.x = np.vstack([self.x, designs]) if len(self.x) else designs
+        f, g = self.problem.evaluate(designs)
+        self.x = np.vstack([self.x, designs])
         self.f, self.g = np.vstack([self.f, f]), np.vstack([self.g, g])
         if not len(self.first):
             self.first = np.where(self.is_usable()[:, None], f, np.inf)
@@ -118,41 +105,33 @@ class _Known:
         return rows[np.lexsort((rank, violation))]
 
 
-def _next_designs(known: _Known, population: int, count: int, seed: int) -> FloatArray:
+def _next_designs(known: _Known, count: int, settings: SearchSettings) -> FloatArray:
     """Return the designs to evaluate next. (count, d)"""
-    random = np.random.default_rng(seed)
+    settings = replace(settings, seed=settings.seed + len(known.x))
+    random, population = np.random.default_rng(settings.seed), settings.population
     rows, size = known.ranked()[:MOST_POINTS], known.x.shape[1]
     others = random.random((count, size))
     if len(rows) <= size + 1:  # too few for a linear trend
         return others
     surfaces = _Surfaces(known.x[rows], np.hstack([known.f[rows], known.g[rows]]))
-    objectives = known.f.shape[1]
+    objectives = known.problem.objectives
 
     def predicted(x: FloatArray) -> tuple[FloatArray, FloatArray]:
         values = surfaces(x)
         return values[:, :objectives], values[:, objectives:]
 
     begin = np.vstack([known.x[rows[:population]], random.random((population, size))])[:population]
-    result = minimized(
-        predicted,
-        begin,
-        objectives,
-        known.g.shape[1],
-        ("n_gen", GENERATIONS),
-        population,
-        seed,
-    )
+    problem = replace(known.problem, evaluate=predicted)
+    result = minimized(problem, begin, ("n_gen", GENERATIONS), settings)
     candidates: Any = np.atleast_2d(result.X) if result.X is not None else others
-    best = known.f[known.is_best()]
     values = predicted(np.asarray(candidates, dtype=float))[0]
-    return _spread(candidates, values, known.x, best, count, random)
+    return _spread(candidates, values, known, count, random)
 
 
 def _spread(
     candidates: FloatArray,
     values: FloatArray,
-    known: FloatArray,
-    best: FloatArray,
+    known: _Known,
     count: int,
     random: np.random.Generator,
 ) -> FloatArray:
@@ -163,10 +142,10 @@ def _spread(
     Args:
         candidates, values: Designs of a predicted front and their predicted objectives.
         known: Designs that were evaluated.
-        best: Objectives of the best of them.
         count: Number of designs to return.
         random: Source of random numbers.
     """
+    best, taken = known.f[known.is_best()], known.x
     together = np.vstack([best, values])
     low, length = together.min(axis=0), np.ptp(together, axis=0)
     scale = np.where(length > 0.0, length, 1.0)
@@ -175,7 +154,6 @@ def _spread(
     apart = np.full(len(values), np.inf)
     for point in near:
         apart = np.minimum(apart, np.linalg.norm(scaled - point, axis=1))
-    taken = known
     while len(chosen) < count and len(candidates):
         place = int(np.argmax(apart))
         if apart[place] < 0.0:

@@ -17,7 +17,7 @@ from wm_drake.studies.pareto.options import DesignOptions
 from wm_drake.studies.pareto.page import DesignResult
 from wm_drake.studies.pareto.problem import MachineDesigns, machine_designs
 from wm_drake.studies.pareto.robust import promises
-from wm_drake.studies.pareto.search import check_search
+from wm_drake.studies.pareto.search import SearchSettings
 from wm_drake.studies.pareto.study import SEARCHES, run_designs
 from wm_drake.studies.run import Executor, machine_text
 from wm_drake.studies.study import Task
@@ -37,7 +37,7 @@ class DesignTask(Task):
         if options.search not in SEARCHES:
             hint = nearest_names(options.search, SEARCHES)
             raise input_error(f"no search '{options.search}'{hint}", where="--search")
-        check_search(options.evaluations, options.population)
+        self.settings = SearchSettings(options.evaluations, options.population, options.seed)
         self.options, self.file = options, design_files.load_design(options.file)
         with problems_of_file(design_files.design_path(options.file)):
             self.machine, self.designs = self._designs(machine)
@@ -96,14 +96,7 @@ class DesignTask(Task):
         """Search the front, check a robust one on fresh samples, and run it with histories."""
         options, run = self.options, partial(executor.simulate, self.machine, self.measures)
         with executor.progress(options.evaluations * self.designs.scenarios):
-            front = run_designs(
-                self.designs,
-                run,
-                evaluations=options.evaluations,
-                population=options.population,
-                seed=options.seed,
-                search=options.search,
-            )
+            front = run_designs(self.designs, run, self.settings, options.search)
         checked = promises(front, partial(run, what="fresh samples"), options.seed)
         envelopes = None
         if len(front.objectives):

@@ -12,7 +12,6 @@ from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.springs import slack_warning
 from wm_drake.simulation.measures.as_json import as_json
-from wm_drake.simulation.records import versions
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.studies.spin_cycle import tables
 from wm_drake.studies.spin_cycle.drive import drive_frame, drive_table
@@ -120,7 +119,7 @@ class SpinCycleReport(Result):
             f"Spin cycle of machine {result.parameters.name}",
             summary(result, self.engine),
             sections,
-            _facts(result, self.engine, facts.command),
+            _facts(result, self.engine, facts),
             result.parameters,
             [*facts.warnings, *warnings_of(result)],
         ).html()
@@ -310,7 +309,7 @@ def _bars(result: SpinCycleResult, case: str, title: str) -> Picture:
     return picture(bars_figure(computed, integrated, measured), words, caption)
 
 
-def _facts(result: SpinCycleResult, engine: str, command: str) -> list[tuple[str, str]]:
+def _facts(result: SpinCycleResult, engine: str, facts: Facts) -> list[tuple[str, str]]:
     sensors = [
         f"{name} (frame {frame})"
         for name, frame in result.parameters.accelerometer_frames().items()
@@ -325,6 +324,5 @@ def _facts(result: SpinCycleResult, engine: str, command: str) -> list[tuple[str
             "from the rest position, with a high-pass filter of 0.5 Hz; RMS over all samples of a "
             "region, one every 5 ms",
         ),
-        ("Versions", ", ".join(f"{name} {text}" for name, text in versions().items())),
-        ("Command", command),
+        *facts.rows(),
     ]

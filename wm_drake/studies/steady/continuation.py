@@ -387,12 +387,7 @@ def _at_speed(balance: HarmonicBalance, guess: FloatArray, speed: float) -> Floa
         size = balance.extent(change)
         if not np.isfinite(size):
             return None
-        share, before = 1.0, float(np.linalg.norm(residual))
-        while share > SMALLEST_SHARE:
-            trial = coefficients + share * change
-            if np.linalg.norm(balance.residual(trial, speed)) < (1.0 - 0.1 * share) * before:
-                break
-            share *= 0.5
+        share = _share(balance, coefficients, speed, residual, change, 0.0)
         if share <= SMALLEST_SHARE and size < STUCK:
             return coefficients
         coefficients = coefficients + share * change

@@ -1,18 +1,21 @@
-"""Report of the steady unbalance response: one HTML file, and tables for CSV files."""
+"""What the study of the steady response shows: files, JSON, terminal and page."""
 
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from rich import table as terminal
+import xarray as xr
 
 from wm_drake.model.scene import Scene
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent
-from wm_drake.report.page import Picture, picture, render
-from wm_drake.report.table import Group, Row, Table, parameter_table
+from wm_drake.parameters.units import Unit
+from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent, plain
+from wm_drake.report.page import Picture, picture
+from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.table import Column, Group, Row, Table, table_of
 from wm_drake.simulation.mounts import KINDS
-from wm_drake.simulation.records import versions
 from wm_drake.studies.steady.figures import (
     deflection_figure,
     forces_figure,
@@ -21,20 +24,151 @@ from wm_drake.studies.steady.figures import (
     sweep_figure,
 )
 from wm_drake.studies.steady.study import SteadyCase, SteadyStudy
-from wm_drake.studies.study import Facts
+from wm_drake.studies.study import Facts, Result
+
+if TYPE_CHECKING:
+    from rich import table as terminal
+
+DEG_PER_RAD = Unit("rad/s", "deg/s").from_si(1.0)
+
+LEAST_SPIN = 0.05
+"""Least spin of a telescopic damper that a page tells. [deg per revolution]"""
+
+METHOD = (
+    "The steady motion has the period of a drum revolution. Its stability follows from its Floquet "
+    "multipliers; where it is unstable, the machine moves otherwise than drawn. Telescopic dampers "
+    "that spin about their axes make the motion vary slowly; then the values hold for dampers near "
+    "the angle at which they are built."
+)
 
 
-def response_page(study: SteadyStudy, facts: Facts) -> str:
-    """Return the page as text of one self-contained HTML file.
+class Quantity(NamedTuple):
+    """Variable of a response in files.
 
-    Args:
-        study: Results with at least one case.
-        facts: How they were computed.
+    Attributes:
+        name: Name of the variable, and of its columns in a CSV file.
+        dim: Its dimension beside the points of the branch.
+        in_json: Name in JSON, with the unit.
+        unit: Unit in names of columns.
+        factor: Its factor from SI units.
     """
-    loads = list(dict.fromkeys(case.load for case in study.cases))
+
+    name: str
+    dim: str
+    in_json: str
+    unit: str = "N"
+    factor: float = 1.0
+
+
+QUANTITIES = (
+    Quantity("amplitude", "sensor", "amplitudes_mm", "mm", MM_PER_M),
+    Quantity("detergent_displacement", "axis", "detergent_box_mm", "mm", MM_PER_M),
+    Quantity("gasket_force", "axis", "gasket_force_N"),
+    Quantity("gasket_moment", "axis", "gasket_moment_Nm", "Nm"),
+    Quantity("spring_tension", "spring", "spring_tension_N"),
+    Quantity("damper_tension", "damper", "damper_tension_N"),
+    Quantity("damper_spin", "spinning", "damper_spin_deg_s", "deg_s", DEG_PER_RAD),
+)
+MOUNT_FORCES = tuple(Quantity(f"mount_force_{kind}", "mount", kind) for kind in KINDS)
+"""Force of each mount on the cabinet: peak and RMS; in JSON below `mount_force_N`."""
+
+
+@dataclass(frozen=True)
+class ResponseResult(Result):
+    """Result of the study."""
+
+    study: SteadyStudy
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return the responses and, if computed, the sweeps."""
+        shown = {"response": response_frame(self.study)}
+        return shown if self.study.sweeps is None else shown | {"sweeps": sweeps_frame(self.study)}
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the responses for JSON."""
+        study = self.study
+        shown = {
+            "machine": study.parameters.name,
+            "harmonics": study.cases[0].response.attrs["harmonics"],
+            "cases": [_case_as_json(case) for case in study.cases],
+            "wall_s": study.wall_s,
+        }
+        return plain(shown)
+
+    def terminal(self) -> "list[terminal.Table | str]":
+        """Return the largest amplitude of each sensor, and a summary."""
+        title = f"Largest steady amplitudes of machine '{self.study.parameters.name}', in mm"
+        return [largest_table(self.study).terminal(title), summary(self.study)]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page: responses of each load, forces, sweeps, peaks."""
+        study = self.study
+        first = [case for case in study.cases if case.gasket == study.cases[0].gasket]
+        forces = picture(
+            forces_figure(first),
+            "Displacement of the box and gasket forces over the drum speed.",
+            f"Largest value of the axes, {_gasket(first[0])}.",
+        )
+        mounts = picture(
+            mounts_figure(first),
+            "Force of each mount on the cabinet over the drum speed.",
+            f"Size of the force of each mount on the cabinet in a revolution, {_gasket(first[0])}: "
+            "peak (line), and RMS without the mean (dashed). The peak has the weight that it "
+            "carries.",
+        )
+        sweep = _sweep_picture(study)
+        attributes = study.cases[0].response.attrs
+        return SectionedPage(
+            f"Steady response of machine {study.parameters.name}",
+            summary(study),
+            [
+                *_load_sections(study),
+                Section("forces", "Detergent box, gasket and mounts", (forces, mounts)),
+                Section("sweep", "Sweep rate", (sweep,)) if sweep else None,
+                Section("peaks", "Peaks", tables=(_peaks_table(study),)),
+            ],
+            [
+                ("Harmonics", f"{attributes['harmonics']}, {attributes['samples']} samples"),
+                ("Time", f"{number(study.wall_s, 1)} s"),
+                *facts.rows(),
+            ],
+            study.parameters,
+            [*facts.warnings, *_warnings(study)],
+            method=METHOD,
+        ).html()
+
+
+def _case_as_json(case: SteadyCase) -> dict[str, Any]:
+    mounts = _by_label(case, MOUNT_FORCES)
+    return {
+        "load": case.load,
+        "gasket": case.gasket,
+        "rpm": RPM_PER_RAD_S * case.response.speed.values,
+        **_by_label(case, QUANTITIES),
+        "mount_force_N": {
+            mount: {kind: mounts[kind][mount] for kind in KINDS} for mount in mounts[KINDS[0]]
+        },
+        "stable": case.response.stable.values,
+        "wall_s": case.wall_s,
+    }
+
+
+def _by_label(case: SteadyCase, quantities: Sequence[Quantity]) -> dict[str, dict[str, FloatArray]]:
+    """Return quantities along the branch, by name in JSON and label."""
+    return {
+        q.in_json: {
+            str(label): q.factor * case.response[q.name].sel({q.dim: label}).values
+            for label in case.response[q.dim].values
+        }
+        for q in quantities
+    }
+
+
+def _load_sections(study: SteadyStudy) -> list[Section]:
+    """Return a section for each load: responses, and deflection shapes at the peaks."""
     outlines = Scene(study.parameters).tub_outlines()
     sections = []
-    for load in loads:
+    for index, load in enumerate(dict.fromkeys(case.load for case in study.cases), start=1):
         cases = [case for case in study.cases if case.load == load]
         pictures = [_response_picture(load, cases)]
         shapes = deflection_figure(cases[0], outlines)
@@ -45,32 +179,8 @@ def response_page(study: SteadyStudy, facts: Facts) -> str:
                 "enlarged. Grey: at rest."
             )
             pictures.append(picture(shapes, "Outlines of the tub at the peaks.", caption))
-        sections.append((f"load-{loads.index(load) + 1}", load, pictures))
-    first = [case for case in study.cases if case.gasket == study.cases[0].gasket]
-    return render(
-        Path(__file__).with_name("page.html"),
-        title=f"Steady response of machine {study.parameters.name}",
-        about=study.parameters.about,
-        summary=summary(study),
-        warnings=[*facts.warnings, *_warnings(study)],
-        peaks=_peaks_table(study),
-        forces=picture(
-            forces_figure(first),
-            "Displacement of the box and gasket forces over the drum speed.",
-            f"Largest value of the axes, {_gasket(first[0])}.",
-        ),
-        mounts=picture(
-            mounts_figure(first),
-            "Force of each mount on the cabinet over the drum speed.",
-            f"Size of the force of each mount on the cabinet in a revolution, {_gasket(first[0])}: "
-            "peak (line), and RMS without the mean (dashed). The peak has the weight that it "
-            "carries.",
-        ),
-        loads=sections,
-        sweep=_sweep_picture(study),
-        facts=_facts(study, facts.command),
-        numbers=parameter_table(study.parameters),
-    )
+        sections.append(Section(f"load-{index}", f"Load {load}", pictures))
+    return sections
 
 
 def _gasket(case: SteadyCase) -> str:
@@ -103,26 +213,17 @@ def summary(study: SteadyStudy) -> str:
     )
 
 
-LEAST_SPIN = 0.05
-"""Least spin of a telescopic damper that a page tells. [deg per revolution]"""
-
-
-def terminal_table(study: SteadyStudy) -> terminal.Table:
-    """Return the largest amplitude of each sensor for the terminal."""
-    title = f"Largest steady amplitudes of machine '{study.parameters.name}', in mm"
-    table = terminal.Table(title=title)
-    for name in ("load", "gasket"):
-        table.add_column(name, overflow="fold")
-    for name in study.cases[0].response.sensor.values:
-        table.add_column(str(name), justify="right")
-    table.add_column("rpm", justify="right")
+def largest_table(study: SteadyStudy) -> Table:
+    """Return the largest amplitude of each sensor, and the speed of the largest of all."""
+    rows = []
     for case in study.cases:
         largest = MM_PER_M * case.response.amplitude.values
         place = int(largest.max(axis=1).argmax())
         speed = RPM_PER_RAD_S * float(case.response.speed.values[place])
-        cells = (f"{value:.1f}" for value in largest.max(axis=0))
-        table.add_row(case.load, "yes" if case.gasket else "no", *cells, f"{speed:.0f}")
-    return table
+        rows.append((case.load, "yes" if case.gasket else "no", *largest.max(axis=0), speed))
+    sensors = list(map(str, study.cases[0].response.sensor.values))
+    columns = {name: Column(name, decimals=1) for name in sensors} | {"rpm": Column("rpm", "", 0)}
+    return table_of(pd.DataFrame(rows, columns=["load", "gasket", *columns]), columns=columns)
 
 
 def _warnings(study: SteadyStudy) -> list[str]:
@@ -163,20 +264,18 @@ def _peaks_table(study: SteadyStudy) -> Table:
     for case in study.cases:
         steady = case.response.amplitude.max("point")
         at = case.response.amplitude.argmax("point")
-        speeds = RPM_PER_RAD_S * case.response.speed.values[at.values]
         rows = [
-            Row(("steady, mm", *(number(MM_PER_M * float(v)) for v in steady)), "ours"),
-            Row(("at, rpm", *(number(speed, 0) for speed in speeds))),
+            _row("steady, mm", MM_PER_M * steady, 1, "ours"),
+            _row("at, rpm", RPM_PER_RAD_S * case.response.speed[at.values], 0),
         ]
         if case.run_up is not None:
             size = np.maximum(np.abs(case.run_up.upper), np.abs(case.run_up.lower))
             run = size.max("time")
-            when = RPM_PER_RAD_S * case.run_up.speed.values[size.argmax("time").values]
-            change = 100.0 * (run.values / steady.values - 1.0)
+            changes = map(percent, 100.0 * (run.values / steady.values - 1.0))
             rows += [
-                Row(("run, mm", *(number(MM_PER_M * float(v)) for v in run))),
-                Row(("at, rpm", *(number(float(speed), 0) for speed in when))),
-                Row(("run less steady", *(percent(float(v)) for v in change)), "difference"),
+                _row("run, mm", MM_PER_M * run, 1),
+                _row("at, rpm", RPM_PER_RAD_S * case.run_up.speed[size.argmax("time").values], 0),
+                Row(("run less steady", *changes), "difference"),
             ]
         groups.append(Group(f"{case.load}, {_gasket(case)}", tuple(rows)))
     sensors = [str(name) for name in study.cases[0].response.sensor.values]
@@ -185,6 +284,10 @@ def _peaks_table(study: SteadyStudy) -> Table:
         "profile of the machine, whose displacements are band-passed as by the command spin."
     )
     return Table(caption, ("load", "", *sensors), tuple(groups), text_columns=2)
+
+
+def _row(words: str, values: xr.DataArray, decimals: int, kind: str = "") -> Row:
+    return Row((words, *(number(float(value), decimals) for value in values)), kind)
 
 
 def _response_picture(load: str, cases: list[SteadyCase]) -> Picture:
@@ -208,18 +311,8 @@ def _sweep_picture(study: SteadyStudy) -> Picture | None:
     return picture(sweep_figure(study), "Shift and height of peaks over the sweep rate.", caption)
 
 
-def _facts(study: SteadyStudy, command: str) -> list[tuple[str, str]]:
-    response = study.cases[0].response
-    return [
-        ("Command", command),
-        ("Harmonics", f"{response.attrs['harmonics']}, {response.attrs['samples']} samples"),
-        ("Time", f"{number(study.wall_s, 1)} s"),
-        ("Software", ", ".join(f"{name} {text}" for name, text in versions().items())),
-    ]
-
-
-def response_table(study: SteadyStudy) -> pd.DataFrame:
-    """Return all responses as a table, for a CSV file."""
+def response_frame(study: SteadyStudy) -> pd.DataFrame:
+    """Return all responses, a row for each point of a branch."""
     parts = []
     for case in study.cases:
         response = case.response
@@ -230,25 +323,16 @@ def response_table(study: SteadyStudy) -> pd.DataFrame:
             "stable": response.stable.values,
             "largest_multiplier": response.multiplier.values,
         }
-        for name, dim, factor, unit in (
-            ("amplitude", "sensor", MM_PER_M, "mm"),
-            ("detergent_displacement", "axis", MM_PER_M, "mm"),
-            ("gasket_force", "axis", 1.0, "N"),
-            ("gasket_moment", "axis", 1.0, "Nm"),
-            ("spring_tension", "spring", 1.0, "N"),
-            ("damper_tension", "damper", 1.0, "N"),
-            ("damper_spin", "spinning", 180.0 / np.pi, "deg_s"),
-            *((f"mount_force_{kind}", "mount", 1.0, "N") for kind in KINDS),
-        ):
-            for label in response[dim].values:
-                values = factor * response[name].sel({dim: label}).values
-                columns[f"{name}_{label}_{unit}"] = values
+        every = (*QUANTITIES, *MOUNT_FORCES)
+        for quantity, by_label in zip(every, _by_label(case, every).values(), strict=True):
+            for label, values in by_label.items():
+                columns[f"{quantity.name}_{label}_{quantity.unit}"] = values
         parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True)
 
 
-def sweeps_table(study: SteadyStudy) -> pd.DataFrame:
-    """Return the peaks of the sweeps as a table, for a CSV file."""
+def sweeps_frame(study: SteadyStudy) -> pd.DataFrame:
+    """Return the peaks of the sweeps."""
     assert study.sweeps is not None
     table = study.sweeps.to_dataframe().reset_index()
     return pd.DataFrame(

@@ -5,7 +5,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import xarray as xr
-from threadpoolctl import threadpool_limits
 
 from wm_drake.elements.state_map import CARRIER, ELEMENT, STRETCHES, TUB
 from wm_drake.engines.trajectory import COORDINATES, Trajectory
@@ -19,6 +18,7 @@ from wm_drake.studies.steady.balance import HARMONICS, SAMPLES, HarmonicBalance
 from wm_drake.studies.steady.continuation import Point, first_motion, follow
 from wm_drake.studies.steady.series import Series
 from wm_drake.studies.steady.settled import settled_coefficients
+from wm_drake.studies.threads import on_one_thread
 
 MOST_HARMONICS, MOST_SAMPLES = 40, 1024
 """Largest number of harmonics, and of samples of a period."""
@@ -76,6 +76,7 @@ def steady_response(
     return response_of(setup, speeds, harmonics, samples, progress)
 
 
+@on_one_thread
 def response_of(
     setup: Setup,
     speeds: Sequence[float] | FloatArray,
@@ -85,10 +86,9 @@ def response_of(
 ) -> xr.Dataset:
     """Return the steady response of a machine as it is set up; see `steady_response`."""
     grid = _checked(speeds, harmonics, samples)
-    with threadpool_limits(1, "blas"):  # the matrices are small: several threads would be slower
-        balance = HarmonicBalance(setup, Series(harmonics, samples))
-        points = branch_of(balance, setup, grid, progress)
-        return _measured(setup, balance, points)
+    balance = HarmonicBalance(setup, Series(harmonics, samples))
+    points = branch_of(balance, setup, grid, progress)
+    return _measured(setup, balance, points)
 
 
 def branch_of(

@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -73,55 +73,73 @@ class SteadyStudy:
     wall_s: float
 
 
+@dataclass(frozen=True)
+class Settings:
+    """What the study computes.
+
+    Attributes:
+        speeds: Rising speeds. [rad/s]
+        gaskets: True for a machine with its gasket, False for one without.
+        harmonics, samples: See `steady_response`.
+        rates_rpm_s: Sweep rates, up and down; none for no sweeps. [rpm/s]
+        workers: Number of threads; None for the number of cores. The results do not depend on it.
+    """
+
+    speeds: FloatArray
+    gaskets: Sequence[bool] = (True, False)
+    harmonics: int = HARMONICS
+    samples: int = SAMPLES
+    rates_rpm_s: Sequence[float] = RATES_RPM_S
+    workers: int | None = None
+
+    @property
+    def threads(self) -> int:
+        """Number of threads."""
+        return self.workers or os.cpu_count() or 1
+
+    @property
+    def run_threads(self) -> int:
+        """Number of threads of the runs; the responses use the other ones meanwhile."""
+        return max(1, self.threads // 2)
+
+
 def run_steady_study(
     machine: Machine,
-    loads: Sequence[tuple[str, Load]],
-    speeds: FloatArray,
-    *,
-    gaskets: Sequence[bool] = (True, False),
-    harmonics: int = HARMONICS,
-    samples: int = SAMPLES,
-    rates_rpm_s: Sequence[float] = RATES_RPM_S,
-    workers: int | None = None,
+    loads: Mapping[str, Load],
+    settings: Settings,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> SteadyStudy:
     """Compute the steady response to loads, runs over the spin profile, and sweeps.
 
     Args:
         machine: A built machine.
-        loads: Names and loads.
-        speeds: Rising speeds. [rad/s]
-        gaskets: True for a machine with its gasket, False for one without.
-        harmonics, samples: See `steady_response`.
-        rates_rpm_s: Sweep rates, up and down; none for no sweeps. [rpm/s]
-        workers: Number of threads; None for the number of cores. The results do not depend on it.
+        loads: Loads by name.
+        settings: What is computed.
         progress: Called with the fraction done.
 
     Raises:
         InputError: an argument is wrong, or no periodic motion is found for a load.
     """
     begin = time.perf_counter()
-    pairs = [(name, load, gasket) for gasket in gaskets for name, load in loads]
+    pairs = [(name, load, gasket) for gasket in settings.gaskets for name, load in loads.items()]
     setups = [machine.set_up(load, gasket=gasket) for _, load, gasket in pairs]
-    threads = workers or os.cpu_count() or 1
     done = _Progress(progress, [RESPONSE_SHARE] * len(pairs) + [RUN_SHARE])
 
     def run() -> tuple[list[Record | None], xr.Dataset | None]:
         cases = [Case(*pair[:2], machine.parameters.profile, pair[2]) for pair in pairs]
-        half = max(1, threads // 2)  # the responses use the other threads meanwhile
-        runs, sweeps = _records(machine, cases, half), None
-        if len(rates_rpm_s):
-            sweeps = _sweeps(machine, loads, gaskets, speeds, rates_rpm_s, half, done.of(-1))
+        runs, sweeps = _records(machine, cases, settings.run_threads), None
+        if len(settings.rates_rpm_s):
+            sweeps = _sweeps(machine, loads, settings, done.of(-1))
         done.of(-1)(1.0)
         return runs, sweeps
 
     def solve(index: int) -> tuple[xr.Dataset, float]:
         start, name = time.perf_counter(), pairs[index][0]
-        response = _response(setups[index], name, speeds, harmonics, samples, done.of(index))
+        response = _response(setups[index], name, settings, done.of(index))
         return response, time.perf_counter() - start
 
     # the matrices are small: several threads each would be slower
-    with threadpool_limits(1, "blas"), ThreadPoolExecutor(threads) as pool:
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(settings.threads) as pool:
         try:
             ran = pool.submit(run)
             responses = list(pool.map(solve, range(len(pairs))))
@@ -137,16 +155,11 @@ def run_steady_study(
 
 
 def _response(
-    setup: Setup,
-    load: str,
-    speeds: FloatArray,
-    harmonics: int,
-    samples: int,
-    progress: Callable[[float], None],
+    setup: Setup, load: str, settings: Settings, progress: Callable[[float], None]
 ) -> xr.Dataset:
     """Return the steady response of a setup; an error names its load."""
     try:
-        return response_of(setup, speeds, harmonics, samples, progress)
+        return response_of(setup, settings.speeds, settings.harmonics, settings.samples, progress)
     except InputError as error:
         raise InputError(
             Problem(f"load '{load}'", p.key, p.message) for p in error.problems
@@ -206,22 +219,20 @@ def sweep_profile(first: float, last: float, rate: float) -> SpinProfile:
 
 def _sweeps(
     machine: Machine,
-    loads: Sequence[tuple[str, Load]],
-    gaskets: Sequence[bool],
-    speeds: FloatArray,
-    rates_rpm_s: Sequence[float],
-    workers: int | None,
+    loads: Mapping[str, Load],
+    settings: Settings,
     progress: Callable[[float], None],
 ) -> xr.Dataset:
     """Return the largest amplitudes of sweeps and their speeds."""
-    low, high = float(min(speeds)), float(max(speeds))
+    low, high = float(min(settings.speeds)), float(max(settings.speeds))
+    gaskets, rates_rpm_s = settings.gaskets, settings.rates_rpm_s
     directions = {"up": (low, high), "down": (high, low)}
     cases, places = [], []
     for r, rate in enumerate(rates_rpm_s):
         for d, ends in enumerate(directions.values()):
             profile = sweep_profile(*ends, rate * RAD_S_PER_RPM)
             for g, gasket in enumerate(gaskets):
-                for k, (name, load) in enumerate(loads):
+                for k, (name, load) in enumerate(loads.items()):
                     cases.append(Case(name, load, profile, gasket))
                     places.append((k, g, r, d))
     shape = (len(loads), len(gaskets), len(rates_rpm_s), 2, len(machine.parameters.sensors))
@@ -230,7 +241,7 @@ def _sweeps(
         machine,
         cases,
         measures=["amplitudes in regions"],
-        workers=workers,
+        workers=settings.run_threads,
         progress=lambda done: progress(done / len(cases)),
     )
     complete = table.diverged.values == ""
@@ -245,7 +256,7 @@ def _sweeps(
             "speed": (dims, speed, {"units": "rad/s"}),
         },
         {
-            "load": [name for name, _ in loads],
+            "load": list(loads),
             "gasket": list(gaskets),
             "rate": ("rate", np.array(rates_rpm_s) * RAD_S_PER_RPM, {"units": "rad/s^2"}),
             "direction": list(directions),

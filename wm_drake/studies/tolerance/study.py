@@ -35,6 +35,15 @@ CONTACTS = "contacts"
 """Measure of `simulate_many` that tells which shapes touch."""
 
 
+CORRELATED = (
+    "Sobol indices divide the variance among independent quantities. Here quantities are "
+    "correlated, so the shares would overlap and are not computed. Shapley effects divide it in "
+    "this case, too: shapleysobol_knn of the R package 'sensitivity' estimates them from "
+    "samples.csv."
+)
+"""Why correlated quantities have no Sobol indices."""
+
+
 @dataclass(frozen=True)
 class Settings:
     """Numbers of samples.
@@ -212,11 +221,12 @@ def run_tolerances(
         settings: Numbers of samples.
         limits: From `limits_of`.
     """
+    trials = _Trials(machine, chosen, run, settings)
     a, b = base_samples(machine.joint.size, settings.samples, settings.seed)
     table = run(machine.cases(a), "samples")
-    values, failed = _measures(table, chosen), _failed(table)
-    indices, refused, more = _indices(machine, chosen, run, settings, (a, b), values)
-    contact = _contact(machine, run, settings, table)
+    values = _measures(table, chosen)
+    indices, refused, more = trials.indices(a, b, values)
+    contact = trials.contact(table)
     rare = contact.rare.evaluations if contact and contact.rare else 0
     return ToleranceResult(
         machine,
@@ -224,7 +234,7 @@ def run_tolerances(
         chosen,
         a,
         values,
-        failed,
+        _failed(table),
         contact,
         indices,
         refused,
@@ -260,79 +270,93 @@ def _measures(table: xr.Dataset, chosen: Sequence[Response]) -> pd.DataFrame:
     return frame
 
 
-def _indices(
-    machine: UncertainMachine,
-    chosen: tuple[Response, ...],
-    run: Run,
-    settings: Settings,
-    scores: tuple[FloatArray, FloatArray],
-    values: pd.DataFrame,
-) -> tuple[dict[str, list[Index]], str, int]:
-    """Return the Sobol indices by measure, why some are missing, and the number of runs."""
-    count = settings.sensitivity
-    if not count:
-        return {}, "Sobol indices were not requested (--sensitivity 0).", 0
-    if machine.joint.factor is not None:
-        reason = (
-            "Sobol indices divide the variance among independent quantities. Here quantities are "
-            "correlated, so the shares would overlap and are not computed. Shapley effects divide "
-            "it in this case, too: shapleysobol_knn of the R package 'sensitivity' estimates them "
-            "from samples.csv."
-        )
-        return {}, reason, 0
-    others = exchanged(scores[0][:count], scores[1][:count])
-    at_others = _measures(run(machine.cases(others, settings.samples + 1), "sensitivity"), chosen)
-    indices: dict[str, list[Index]] = {}
-    missing = []
-    for name in values:
-        estimated = sobol_indices(
-            values[name].to_numpy()[:count], at_others[name].to_numpy(), seed=settings.seed
-        )
-        if estimated is None:
-            missing.append(str(name))
+@dataclass(frozen=True)
+class _Trials:
+    """Runs of an uncertain machine.
+
+    Attributes:
+        machine, chosen, run, settings: As for `run_tolerances`.
+    """
+
+    machine: UncertainMachine
+    chosen: tuple[Response, ...]
+    run: Run
+    settings: Settings
+
+    def indices(
+        self, a: FloatArray, b: FloatArray, values: pd.DataFrame
+    ) -> tuple[dict[str, list[Index]], str, int]:
+        """Return the Sobol indices by measure, why some are missing, and the number of runs.
+
+        Args:
+            a, b: Independent samples. (n, variables)
+            values: Measures at `a`.
+        """
+        count = self.settings.sensitivity
+        if not count:
+            return {}, "Sobol indices were not requested (--sensitivity 0).", 0
+        if self.machine.joint.factor is not None:
+            return {}, CORRELATED, 0
+        cases = self.machine.cases(exchanged(a[:count], b[:count]), self.settings.samples + 1)
+        at_others = _measures(self.run(cases, "sensitivity"), self.chosen)
+        estimated = {
+            str(name): sobol_indices(
+                values[name].to_numpy()[:count], at_others[name].to_numpy(), seed=self.settings.seed
+            )
+            for name in values
+        }
+        missing = ", ".join(name for name, indices in estimated.items() if indices is None)
+        reason = f"No Sobol indices of {missing}: a run failed, or the measure does not vary."
+        known = {name: indices for name, indices in estimated.items() if indices is not None}
+        return known, reason if missing else "", len(cases)
+
+    def contact(self, table: xr.Dataset) -> Contact | None:
+        """Return how often the tub touches. A run that failed counts as contact."""
+        if "contact_gap" not in table or not table.sizes.get("pair", 0):
+            return None
+        has_failed = table.diverged.values != ""
+        touches = (table.smallest_gap.values <= 0.0) | has_failed
+        crude = share_of(touches)
+        names = [str(name) for name in table.pair.values]
+        nearest = pd.Series(table.nearest_pair.values).dropna().astype(int).value_counts()
+        rare = None
+        if crude.estimate < RARE and self.settings.subset:
+            rare = subset_simulation(
+                self._gaps,
+                self.machine.joint.size,
+                samples=self.settings.subset,
+                seed=self.settings.seed,
+            )
+        if rare and rare.probability:
+            ends, method = (rare.probability, rare.lower, rare.upper), SUBSET
         else:
-            indices[str(name)] = estimated
-    reason = (
-        f"No Sobol indices of {', '.join(missing)}: a run failed, or the measure does not vary."
-        if missing
-        else ""
-    )
-    return indices, reason, len(others)
-
-
-def _contact(
-    machine: UncertainMachine, run: Run, settings: Settings, table: xr.Dataset
-) -> Contact | None:
-    """Return how often the tub touches. A run that failed counts as contact."""
-    if CONTACTS not in _measured(table):
-        return None
-    has_failed = table.diverged.values != ""
-    touches = (table.smallest_gap.values <= 0.0) | has_failed
-    crude = share_of(touches)
-    names = [str(name) for name in table.pair.values]
-    nearest = pd.Series(table.nearest_pair.values).dropna().astype(int).value_counts()
-    rare = None
-    if crude.estimate < RARE and settings.subset:
-        rare = subset_simulation(
-            _limit_state(machine, run),
-            machine.joint.size,
-            samples=settings.subset,
-            seed=settings.seed,
+            upper = crude.upper if crude.count else bound_if_none(crude.samples)
+            ends, method = (crude.estimate, crude.lower, upper), CRUDE
+        return Contact(
+            *ends,
+            method,
+            crude,
+            touching_pairs(table),
+            {names[int(str(i))]: int(count) for i, count in nearest.items()},
+            rare,
+            self._rare_pairs(rare),
         )
-    if rare and rare.probability:
-        ends, method = (rare.probability, rare.lower, rare.upper), SUBSET
-    else:
-        upper = crude.upper if crude.count else bound_if_none(crude.samples)
-        ends, method = (crude.estimate, crude.lower, upper), CRUDE
-    return Contact(
-        *ends,
-        method,
-        crude,
-        touching_pairs(table),
-        {names[int(str(i))]: int(count) for i, count in nearest.items()},
-        rare,
-        _rare_pairs(machine, run, rare),
-    )
+
+    def _rare_pairs(self, rare: RareEvent | None) -> dict[str, float]:
+        """Return the share of the contacts of the subset simulation by pair; its runs are repeated.
+
+        A ledger has these runs, so that they cost nothing.
+        """
+        if rare is None or not len(rare.failures):
+            return {}
+        table = self.run(self.machine.cases(rare.failures), "places of contact")
+        return {name: share.estimate for name, share in touching_pairs(table).items()}
+
+    def _gaps(self, scores: FloatArray) -> FloatArray:
+        """Return the smallest gap at scores; NaN where a run failed. [m]"""
+        table = self.run(self.machine.cases(scores), "rare contact")
+        gap = np.asarray(table.smallest_gap.values)
+        return np.where(table.diverged.values != "", np.nan, gap)
 
 
 def touching_pairs(table: xr.Dataset) -> dict[str, Share]:
@@ -346,29 +370,3 @@ def touching_pairs(table: xr.Dataset) -> dict[str, Share]:
     }
     often = sorted((n for n in shares if shares[n].count), key=lambda n: -shares[n].count)
     return {name: shares[name] for name in often}
-
-
-def _rare_pairs(machine: UncertainMachine, run: Run, rare: RareEvent | None) -> dict[str, float]:
-    """Return the share of the contacts of the subset simulation by pair; its runs are repeated.
-
-    A ledger has these runs, so that they cost nothing.
-    """
-    if rare is None or not len(rare.failures):
-        return {}
-    table = run(machine.cases(rare.failures), "places of contact")
-    return {name: share.estimate for name, share in touching_pairs(table).items()}
-
-
-def _measured(table: xr.Dataset) -> set[str]:
-    return {CONTACTS} if "contact_gap" in table and table.sizes.get("pair", 0) else set()
-
-
-def _limit_state(machine: UncertainMachine, run: Run) -> Callable[[FloatArray], FloatArray]:
-    """Return the smallest gap as a function of scores; NaN where a run failed. [m]"""
-
-    def gaps(scores: FloatArray) -> FloatArray:
-        table = run(machine.cases(scores), "rare contact")
-        gap = np.asarray(table.smallest_gap.values)
-        return np.where(table.diverged.values != "", np.nan, gap)
-
-    return gaps
