@@ -76,11 +76,14 @@ class SpringStrutParameters:
     @property
     def free_length(self) -> float | None:
         """Length without tension; None if it is not between 0 and twice the drawn length. [m]"""
-        from scipy.optimize import brentq  # slow to import, and seldom needed
-
         ends = 0.0, 2.0 * self.rest_length
         if not self._tension(ends[0], -math.inf) < 0.0 <= self._tension(ends[1], -math.inf):
             return None
+        if self.structure == [0]:  # a straight line
+            slope = float(stiffness_force(1.0, self.packed_stiffness, 0))
+            return self.rest_length - self.preload / slope
+        from scipy.optimize import brentq  # slow to import: springs with a table
+
         return float(brentq(self._tension, *ends, args=(-math.inf,), xtol=1e-12))
 
     @property

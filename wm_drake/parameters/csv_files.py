@@ -3,22 +3,24 @@
 import io
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from wm_drake.errors import input_error
 from wm_drake.parameters.text_files import read_text
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import LARGEST_NUMBER, comma_hint
 
+if TYPE_CHECKING:  # slow to import: CSV files
+    import pandas as pd
+
 _SIGNS = "; columns are separated by commas, and the decimal sign is a point"
 
 
 def read_csv(
     path: str | Path, columns: list[str], key: str = "", optional: str = ""
-) -> pd.DataFrame:
+) -> "pd.DataFrame":
     """Read a CSV file with given columns.
 
     Args:
@@ -31,6 +33,8 @@ def read_csv(
         InputError: the file cannot be read as CSV, has other columns, or has a row with more values
             than columns.
     """
+    import pandas as pd  # slow to import: CSV files
+
     text = read_text(Path(path), key=key)
     try:
         named = list(_table(text, nrows=0).columns)
@@ -55,7 +59,7 @@ def read_csv(
         raise input_error(f"cannot be read as CSV ({reason})", where=str(path), key=key) from None
 
 
-def finite_numbers(table: pd.DataFrame, path: str | Path, key: str = "") -> FloatArray:
+def finite_numbers(table: "pd.DataFrame", path: str | Path, key: str = "") -> FloatArray:
     """Return a table as numbers. (row, column)
 
     Args:
@@ -66,6 +70,8 @@ def finite_numbers(table: pd.DataFrame, path: str | Path, key: str = "") -> Floa
     Raises:
         InputError: a value is not a finite number, or is out of range.
     """
+    import pandas as pd  # slow to import: CSV files
+
     numbers = table.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
     wrong = np.argwhere(~(np.abs(numbers) <= LARGEST_NUMBER))  # nan is wrong too
     if len(wrong):
@@ -101,7 +107,9 @@ MOST_COLUMNS = 1000
 """Largest number of columns of a table."""
 
 
-def _table(text: str, **options: Any) -> pd.DataFrame:
+def _table(text: str, **options: Any) -> "pd.DataFrame":
+    import pandas as pd  # slow to import: CSV files
+
     head = next((line for line in text.splitlines() if line.partition("#")[0].strip()), "")
     if head.count(",") >= MOST_COLUMNS:
         raise ValueError(f"{head.count(',') + 1} columns; allowed are up to {MOST_COLUMNS}")

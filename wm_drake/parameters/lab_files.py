@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from wm_drake.errors import InputError, input_error, shortened
 from wm_drake.parameters.csv_files import read_csv, read_header
@@ -92,6 +91,8 @@ def csv_channels(path: Path) -> list[Channel]:
     Raises:
         InputError: The file cannot be read.
     """
+    import pandas as pd  # slow to import: CSV files
+
     table = read_csv(path, read_header(path))
     channels = []
     for text in table.columns:

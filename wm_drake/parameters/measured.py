@@ -6,13 +6,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from wm_drake.errors import input_error
 from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.published import COLUMNS, CONSTANT, OF_RESPONSE, published_results
+
+if TYPE_CHECKING:  # slow to import: CSV files
+    import pandas as pd
 
 _KEYS = ["load", "gasket", "source"]
 
@@ -57,7 +59,7 @@ class NamedValue:
     mean: float = math.nan
 
 
-def measured_amplitudes(parameters: MachineParameters) -> pd.DataFrame:
+def measured_amplitudes(parameters: MachineParameters) -> "pd.DataFrame":
     """Read the measured amplitudes of a machine.
 
     Returns:
@@ -67,6 +69,8 @@ def measured_amplitudes(parameters: MachineParameters) -> pd.DataFrame:
     Raises:
         InputError: a file is missing, has other columns, or contains a value that is not a number.
     """
+    import pandas as pd  # slow to import: CSV files
+
     sensors = list(parameters.sensors)
     tables = [_read(path, sensors) for path in parameters.measured if not _has_responses(path)]
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=_KEYS + sensors)
@@ -152,7 +156,7 @@ def _responses(path: str) -> list[NamedValue]:
     ]
 
 
-def _check_entries(table: pd.DataFrame, column: str, allowed: tuple[str, str], path: str) -> None:
+def _check_entries(table: "pd.DataFrame", column: str, allowed: tuple[str, str], path: str) -> None:
     if not set(table[column]) <= set(allowed):
         raise input_error(
             f"a value in the column {column} is neither {allowed[0]} nor {allowed[1]}",
@@ -161,7 +165,7 @@ def _check_entries(table: pd.DataFrame, column: str, allowed: tuple[str, str], p
         )
 
 
-def _read(path: str, sensors: list[str]) -> pd.DataFrame:
+def _read(path: str, sensors: list[str]) -> "pd.DataFrame":
     table = read_csv(path, _KEYS + sensors, key="measured")
     _check_entries(table, "gasket", ("yes", "no"), path)
     values = finite_numbers(table[sensors], path, key="measured")

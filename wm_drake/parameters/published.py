@@ -5,8 +5,6 @@ from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-import pandas as pd
-
 from wm_drake.errors import InputError, input_error
 from wm_drake.parameters.csv_files import read_csv
 from wm_drake.parameters.units import comma_hint, plain_number
@@ -104,6 +102,8 @@ class _Row:
 
     def text(self, column: str) -> str:
         """Return the text of a cell, which may be empty."""
+        import pandas as pd  # slow to import: CSV files
+
         return "" if pd.isna(self.cells[column]) else str(self.cells[column]).strip()
 
     def word(self, column: str) -> str:

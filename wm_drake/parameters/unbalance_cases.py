@@ -4,7 +4,6 @@ from collections.abc import Hashable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-import pandas as pd
 from pydantic import Field, ValidationError
 
 from wm_drake.errors import InputError, Problem, input_error
@@ -108,6 +107,8 @@ def load_unbalance_cases(path: Path = TABLE_9) -> list[UnbalanceCase]:
 
 
 def _case(path: Path, row: Mapping[Hashable, Any]) -> UnbalanceCase:
+    import pandas as pd  # slow to import: CSV files
+
     units = {"front_g": "g", "rear_g": "g", "phase_deg": "deg"}
     fields: dict[str, object] = {
         name: f"{row[column]} {units[column]}" for column, name in _COLUMNS.items()
