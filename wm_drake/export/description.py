@@ -33,8 +33,8 @@ def model_description(model: ExportedModel, token: str, version: int, program: s
         generationTool=program,
         generationDateAndTime=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
         variableNamingConvention="structured",
-        **{"guid" if version == 2 else "instantiationToken": token},
     )
+    root.set("guid" if version == 2 else "instantiationToken", token)
     able = "canGetAndSetFMUstate" if version == 2 else "canGetAndSetFMUState"
     serialize = "canSerializeFMUstate" if version == 2 else "canSerializeFMUState"
     common = {"modelIdentifier": IDENTIFIER, able: "true", serialize: "true"}

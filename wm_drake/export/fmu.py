@@ -287,7 +287,9 @@ def _c(value: float | None, none: str = "0.0") -> str:
 def _reference(model: ExportedModel) -> bytes:
     """Return the displacements of a run of the engine through the spin profile, as CSV."""
     profile = model.setup.parameters.profile
-    setup = model.setup.machine.set_up(model.load, gasket=model.plan.gasket >= 0)
+    setup = model.setup.machine.set_up(
+        model.load, context=model.setup.context, gasket=model.plan.gasket >= 0
+    )
     trajectory = run_compiled(setup, profile, model.step, lambda _: None, integrator="runge_kutta")
     values = variables_of(setup, trajectory)["displacement"][1]
     text = io.StringIO()
