@@ -46,9 +46,8 @@ def test_a_plain_simulator_follows_the_profile(machine, scheme, step):
     [("runge_kutta3", None), ("runge_kutta3", 2e-3), ("runge_kutta2", 2e-3)],
 )
 def test_a_plain_simulator_follows_a_run_up_to_its_end(machine, scheme, fixed_step):
-    """Run up to full speed and hold it, five times as fast as the profile of the machine."""
-    profile = machine.parameters.profile
-    profile = SpinProfile(time=tuple(t / 5.0 for t in profile.time), speed=profile.speed)
+    """Run up by 7 rpm/s as the machine does, to a corner between two steps, and hold the speed."""
+    profile = SpinProfile(time=(0.0, 71.0 / 7.0, 12.0), speed=(0.0, 71.0 * RPM, 71.0 * RPM))
     simulator = Simulator(machine.diagram, machine.set_up("middle", profile=profile).context)
     if fixed_step:
         ResetIntegratorFromFlags(simulator, scheme, fixed_step).set_fixed_step_mode(True)
