@@ -330,8 +330,8 @@ def sought_of(parameters: MachineParameters, keys: Sequence[str], bounds: str = 
     for number in numbers:  # the search may go to either end
         allowed = allowed_range(parameters, number.key)
         if not (allowed.holds(lower) and allowed.holds(upper)):
-            ends = " and ".join(f"{sign} {end:g}" for sign, end in allowed.limits())
-            raise input_error(f"'{bounds}' is out of range; allowed is {ends}", key=number.key)
+            limits = " and ".join(f"{sign} {end:g}" for sign, end in allowed.limits())
+            raise input_error(f"'{bounds}' is out of range; allowed is {limits}", key=number.key)
     start = value if value is not None and lower <= value <= upper else None
     name = JOIN.join(keys)
     return Sought(
