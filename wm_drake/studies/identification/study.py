@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pandas as pd
 from rich.table import Table
@@ -92,8 +92,15 @@ class FittedComponent:
         ]
 
 
+class SampledResult(Result):
+    """Result whose CSV files have all digits, but for the samples of loops."""
+
+    float_format: ClassVar[str | None] = None
+    float_formats: ClassVar[Mapping[str, str]] = {"loops": "%.7g"}
+
+
 @dataclass(frozen=True)
-class FitResult(Result):
+class FitResult(SampledResult):
     """Fit of one law.
 
     Attributes:
@@ -128,7 +135,7 @@ class FitResult(Result):
 
     def write(self, folder: Path) -> None:
         """Write tables, identified numbers, and the fit as JSON."""
-        _write_tables(self.tables(), folder)
+        super().write(folder)
         path = folder / "identified.yaml"
         self.component.write(path, self.fit, self.model, self.judgement.sentences)
         text = json.dumps(self._fit_as_dict(), indent=1)
@@ -163,7 +170,7 @@ class FitResult(Result):
 
 
 @dataclass(frozen=True)
-class ComparisonResult(Result):
+class ComparisonResult(SampledResult):
     """Several laws that were fitted to the same tests.
 
     Attributes:
@@ -185,7 +192,7 @@ class ComparisonResult(Result):
 
     def write(self, folder: Path) -> None:
         """Write tables, the identified numbers of each law, and the comparison as JSON."""
-        _write_tables(self.tables(), folder)
+        super().write(folder)
         for law in self.comparison.results:
             path = folder / f"identified_{law.law}.yaml"
             self.component.write(path, law.fit, law.model, law.judgement.sentences)
@@ -216,13 +223,6 @@ class ComparisonResult(Result):
     def page(self, facts: Facts) -> str:
         """Return the page."""
         return comparison_page(self, facts)
-
-
-def _write_tables(tables: Mapping[str, pd.DataFrame], folder: Path) -> None:
-    """Write tables as CSV: samples with seven digits, others with all."""
-    for name, table in tables.items():
-        digits = "%.7g" if name == "loops" else None
-        table.to_csv(folder / f"{name}.csv", index=False, float_format=digits)
 
 
 class FitTask(Task):

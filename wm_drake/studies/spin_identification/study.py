@@ -3,11 +3,11 @@
 [A] section 4.2 identifies the parameters of its Table 8 in this way.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -130,6 +130,7 @@ class SpinIdentification(Result):
     before: xr.DataArray
     after: xr.DataArray
     planted: FloatArray | None = None
+    float_formats: ClassVar[Mapping[str, str]] = {"parameters": "%.7g"}
 
     @property
     def uncertainty(self) -> FloatArray:
@@ -177,9 +178,7 @@ class SpinIdentification(Result):
         """Write the identified machine and the tables."""
         text = machine_yaml(identified_machine(self))
         (folder / "identified.yaml").write_text(text, encoding="utf-8")
-        for name, table in self.tables().items():
-            digits = "%.7g" if name == "parameters" else self.float_format
-            table.to_csv(folder / f"{name}.csv", index=False, float_format=digits)
+        super().write(folder)
 
     def as_json(self) -> dict[str, Any]:
         """Return the result for JSON."""
