@@ -6,12 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-LONGEST_MESSAGE = 500
-"""Largest number of characters of the text of an `InputError`."""
+LONGEST_LINE = 500
+"""Largest number of characters of a problem; a longer one is shortened."""
 
-LONGEST_LINE = 470
-"""Largest number of characters of a problem; a longer one is shortened. What is left of the text
-counts the problems that have no place in it."""
+MOST_PROBLEMS = 8
+"""Largest number of problems, each in a line, that the text of an `InputError` lists."""
 
 MOST_NAMES = 8
 """Largest number of allowed names that a message lists."""
@@ -54,21 +53,15 @@ class InputNotice(UserWarning):
 class InputError(WmDrakeError):
     """An input that cannot be used.
 
-    The message has one line per problem, as many as `LONGEST_MESSAGE` allows, at least one.
+    The message has one line per problem, at most `MOST_PROBLEMS`, and the number of the others.
     """
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         """Store the problems, of which there must be at least one."""
         self.problems = tuple(problems)
-        lines, length = list[str](), 0
-        for problem in self.problems:
-            line = str(problem)
-            length += len(line) + 1
-            if lines and length > LONGEST_LINE:
-                left_out = len(self.problems) - len(lines)
-                lines.append(f"and {left_out} more problem{'s' * (left_out > 1)}")
-                break
-            lines.append(line)
+        lines = [str(problem) for problem in self.problems[:MOST_PROBLEMS]]
+        if left_out := len(self.problems) - len(lines):
+            lines.append(f"and {left_out} more problem{'s' * (left_out > 1)}")
         super().__init__("\n".join(lines))
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from wm_drake import load_record
-from wm_drake.parameters import load_machine
+from wm_drake.parameters import load_machine, shipped_machines
 from wm_drake.studies.result_folder import Run, result_folder
 
 SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
@@ -542,7 +542,7 @@ def test_faulty_input_in_a_process_of_its_own(tmp_path):
     assert (ended.returncode, ended.stdout) == (2, "")
     assert (
         ended.stderr
-        == "nosuch.yaml: no such file, and no shipped machine of that name (known: free_stroke, heavy_cabinet, light_cabinet, motor, reference)\n"
+        == f"nosuch.yaml: no such file, and no shipped machine of that name (known: {', '.join(shipped_machines())})\n"
     )
 
 

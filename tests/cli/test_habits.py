@@ -10,7 +10,7 @@ import pytest
 from ordinary_machine import ORDINARY
 
 import wm_drake as wm
-from wm_drake.parameters import load_machine
+from wm_drake.parameters import load_machine, shipped_machines
 from wm_drake.report.progress import progress_bar
 
 RIG = ("rig", "damper", "-f", "1 Hz", "-a", "5 mm", "--out", "out")
@@ -97,7 +97,8 @@ def test_brackets_in_a_name_are_printed_as_they_are(wm_drake):
 
 
 def test_list_of_machines(wm_drake):
-    names = ["free_stroke", "heavy_cabinet", "light_cabinet", "motor", "reference"]
+    names = list(shipped_machines())
+    assert {"reference", "free_stroke"} <= set(names)
     lines = wm_drake("machine", "list").out.splitlines()
     assert [line.split()[0] for line in lines] == names
     assert sorted(json.loads(wm_drake("machine", "list", "--json").out)) == names

@@ -16,7 +16,7 @@ from moving_cabinet import with_moving_cabinet
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
 
 import wm_drake as wm
-from wm_drake.elements.kind import Ends, placed_element
+from wm_drake.elements.kind import Ends
 from wm_drake.engines.compiled.derivative import StateDerivative
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
@@ -182,7 +182,7 @@ def test_derivatives_of_the_system_are_those_of_differences(kind, numbers):
     """Compare AutoDiffXd with central differences, by the state of the plant and own states."""
     point, ground = np.array([-0.1, 0.02, -0.2]), np.array([-0.25, 0.03, -0.5])
     ends = Ends(point, np.eye(3), ground, np.eye(3))
-    placed = placed_element(kind, kind.parameters.model_validate(numbers), ends)
+    placed = kind.place(ends, kind.parameters.model_validate(numbers))
     system = ElementSystem(kind, placed.packed(), placed.state_size)
     rng = np.random.default_rng(1)
     state = rng.uniform(-0.2, 0.2, 14 + placed.state_size)

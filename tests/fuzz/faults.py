@@ -4,8 +4,8 @@ import re
 
 SECONDS_LIMIT = 10.0
 LONGEST_LINE = 500
-LONGEST_MESSAGE = 510
 MOST_LINES = 25
+MOST_PROBLEMS = 9
 PYTHON = re.compile(
     r"Traceback|\[Errno|np\.\w+\(|<class |object at 0x|Error\(|Exception|InertiaMatrix|pydantic|ruamel|pandas|numpy|NoneType"
 )
@@ -38,8 +38,9 @@ def faults_of_refusal(outcome):
     found, err = [], outcome["err"]
     if outcome["out"]:
         found.append("standard output")
-    if len(err) > LONGEST_MESSAGE and not any(word in err for word in ("Usage:", "notice:")):
-        found.append(f"message of {len(err)} characters")
+    framed = any(word in err for word in ("Usage:", "Error ──", "notice:"))
+    if len(err.splitlines()) > MOST_PROBLEMS and not framed:
+        found.append(f"message of {len(err.splitlines())} lines")
     if not any(name in err for name in outcome["names"]):
         found.append("names neither file nor option")
     if outcome["keys"] and not any(key in err for key in outcome["keys"]):

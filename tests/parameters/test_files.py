@@ -297,8 +297,6 @@ def test_everything_missing_is_several_lines(write):
         f"{key}: is missing"
         for key in (
             "gravity",
-            "spring_types",
-            "springs",
             "sensors",
             "clearance",
             "loads",
@@ -316,7 +314,8 @@ def test_machine_that_extends_itself_is_refused(write):
 
 def test_missing_machine_is_refused_with_the_nearest(tmp_path):
     assert refused("refrence") == [
-        "refrence: no such file, and no shipped machine of that name (did you mean 'reference'? known: free_stroke, heavy_cabinet, light_cabinet, motor, reference)"
+        "refrence: no such file, and no shipped machine of that name (did you mean 'reference'? "
+        f"known: {', '.join(shipped_machines())})"
     ]
     assert refused(tmp_path)[0].startswith(f"{tmp_path}: is a folder")
 

@@ -1,6 +1,7 @@
 """Files that are too large, too deep, endless or no files, and texts that would keep a parser busy."""
 
 import os
+import re
 import time
 
 import pytest
@@ -143,7 +144,7 @@ def test_field_of_a_loop_beyond_the_limit_of_the_reader(tmp_path):
 )  # fmt: skip
 def test_unit_that_would_keep_the_parser_busy_is_refused(reference, unit):
     (line,) = refused(with_value, reference, "gravity", f"1 {unit}")
-    assert line.startswith("gravity: unit '")
+    assert re.match(r"gravity: (unit '|has \d+ characters; allowed are up to)", line)
 
 
 @pytest.mark.parametrize(

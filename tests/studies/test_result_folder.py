@@ -230,9 +230,9 @@ def test_spin_whose_files_cannot_grow_ends_with_a_message(tmp_path, size):
         ("--workers=0", "--workers"),
         ("--workers=-1", "--workers"),
         ("--seed=-1", "--seed"),
-        ("--starts=0", "starts: 0 starts"),
+        ("--starts=0", "--starts"),
         ("--iterations=-1", "--iterations"),
-        ("--resolution=inf", "resolution: inf is not allowed"),
+        ("--resolution=inf", "resolution: Input should be a finite number"),
         (
             "--deviation=nan",
             "--deviation: amplitudes: 'nan' is not allowed; must be > 0 and finite",

@@ -5,11 +5,14 @@ strikes the floor, a spring that goes slack or a motion that is chaotic shows in
 A run that is converged changes little with half the step.
 """
 
+import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from wm_drake.batch.ledger import Ledger, Result
+from wm_drake.batch.remembered import run_keys
 from wm_drake.batch.runs import Runner
 from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
 from wm_drake.compiler.lanes import WIDTH
@@ -86,6 +89,15 @@ class Sample:
             self.cases = self.cases[::2]
             self._stride *= 2
 
+    def key(self) -> str:
+        """Return the key of the error of its steps in a ledger."""
+        keys = (
+            key
+            for machine, case in self.cases
+            for key in run_keys(machine.parameters, [case], measures=("amplitudes",))
+        )
+        return hashlib.sha256(f"half step {' '.join(keys)}".encode()).hexdigest()
+
     def step_error(self, step: float | None = None) -> StepError | None:
         """Return the error of the steps of the sample; None without runs.
 
@@ -101,6 +113,20 @@ class Sample:
             return None
         worst = max(errors, key=lambda error: error.difference)
         return StepError(worst.difference, worst.case, worst.step, len(self.cases))
+
+
+def remembered_step_error(sample: Sample, ledger: Ledger) -> StepError | None:
+    """Return the error of the steps of a sample, which is run once for a ledger."""
+    key = sample.key()
+    if key in ledger:
+        known = ledger.get(key)
+        difference, step, runs = known.values["step_error"].tolist()
+        return StepError(difference, known.note, step, int(runs))
+    error = sample.step_error()
+    if error is not None:
+        numbers = np.array([error.difference, error.step, error.runs])
+        ledger.put_all({key: Result({"step_error": numbers}, error.case)})
+    return error
 
 
 def step_error(machine: Machine, cases: Sequence[Case], step: float | None = None) -> StepError:

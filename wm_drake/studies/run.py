@@ -247,7 +247,13 @@ class Executor:
 
     def step_error(self) -> "StepError | None":
         """Return the error of the steps of a sample of the cases; None without cases."""
-        return None if self._sample is None else self._sample.step_error()
+        from wm_drake.batch.verification import remembered_step_error
+
+        if self._sample is None:
+            return None
+        if self.ledger is None:
+            return self._sample.step_error()
+        return remembered_step_error(self._sample, self.ledger)
 
 
 @dataclass(frozen=True)
