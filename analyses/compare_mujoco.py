@@ -38,8 +38,9 @@ from wm_drake.elements.friction_damper import (
 from wm_drake.elements.motion import TubMotion
 from wm_drake.elements.spring import spring_strut_wrench
 from wm_drake.engines.compiled.packing import drum_joint, pack
-from wm_drake.model.machine import OUTPUT_PERIOD, Setup
+from wm_drake.model.machine import Setup
 from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.machine import OUTPUT_PERIOD
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
 

@@ -538,8 +538,8 @@ def _executor(order: Order, run: Run) -> Iterator[Executor]:
 def _ledger(chosen: LedgerOptions, run: Run) -> "Iterator[Ledger]":
     """Open the ledger of a study in its folder, or in a temporary one if nothing is written.
 
-    If the input is refused, or no run finished and no result was written, this function removes
-    what it created: the ledger, and the folder if it was not there.
+    If no run finished and no result was written, this function removes what it created: the ledger,
+    and the folder if it was not there.
     """
     from wm_drake.batch.ledger import open_ledger
 
@@ -559,12 +559,8 @@ def _ledger(chosen: LedgerOptions, run: Run) -> "Iterator[Ledger]":
         with open_ledger(out / LEDGER, run.identity, **options) as ledger:
             try:
                 yield ledger
+            finally:
                 kept = len(ledger)
-            except InputError:
-                raise
-            except BaseException:
-                kept = len(ledger)
-                raise
     finally:
         if not kept and not (out / RUN_FILE).exists():
             for path in set(out.glob(f"{LEDGER}*")) - earlier:
