@@ -88,7 +88,7 @@ MEASURED: Any = option(
     "Repeatable. Default: those of the machine file, for its own numbers, loads and profile.",
     "CSV",
 )
-SEED: Any = option(0, "Seed of all random numbers.", "N", ge=0)
+SEED: Any = option(0, "Seed of all random numbers.", "N", ge=0, le=2**32 - 1)
 
 
 PAGE = "report.html"
