@@ -28,7 +28,7 @@ class CalibrateOptions(Options):
     iterations: int = option(
         0, "Largest number of iterations per search; 0: default of the method.", ge=0
     )
-    seed: int = option(0, "Seed of the random starting points.", "N", ge=0)
+    seed: int = option(0, "Seed of the random starting points.", "N", ge=0, le=2**32 - 1)
     deviation: tuple[str, ...] = option(
         (),
         "Standard deviation of a measured amplitude, in percent (default: 5), or that of other "

@@ -32,7 +32,7 @@ class GasketOptions(Options):
         "main+2fi",
         "Effects to estimate: main (main effects) or main+2fi (with two-factor interactions).",
     )
-    seed: int = option(0, "Seed of the D-optimal design.", ge=0)
+    seed: int = option(0, "Seed of the D-optimal design.", ge=0, le=2**32 - 1)
     factor: tuple[str, ...] = option(
         (),
         "Factor to study instead of the eight factors of the gasket: one of C_L, K_Lx, ..., or any "

@@ -23,7 +23,7 @@ class GasketDampingOptions(Options):
     planted_torsional: str = option(
         "87 N mm s/deg", "Torsional damping C_T of the virtual experiment.", "VALUE"
     )
-    seed: int = option(0, "Seed of the noise of the virtual experiment.", "N", ge=0)
+    seed: int = option(0, "Seed of the noise of the virtual experiment.", "N", ge=0, le=2**32 - 1)
     mesh: float = option(
         0.1,
         "Spacing at which the grid search ends, in percent of the region (0 to 0.05 N s/mm, 0 to "

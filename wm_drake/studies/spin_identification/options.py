@@ -27,7 +27,11 @@ class SpinIdentifyOptions(CycleOptions):
         0.005, "Relative standard deviation of the noise in a virtual experiment.", ge=0.0
     )
     seed: int = option(
-        0, "Seed of the planted values of a virtual experiment, and of the search.", "N", ge=0
+        0,
+        "Seed of the planted values of a virtual experiment, and of the search.",
+        "N",
+        ge=0,
+        le=2**32 - 1,
     )
 
 
