@@ -385,10 +385,10 @@ def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
         _executor(order, run) as executor,
     ):
         result = task.run(executor)
+        error = executor.step_error()
         if executor.ledger is not None:
             executor.ledger.mark_finished()
         step, integrator = _stepping(machine)
-        error = executor.step_error()
         not_converged = (error.warning,) if error is not None and error.is_large else ()
         for text in not_converged:
             say(f"warning: {text}", err=True)
