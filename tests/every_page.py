@@ -47,26 +47,13 @@ def _fit(template: str, bench: tuple[str, ...], *words: str) -> Kind:
 
 KINDS = {
     "spin": _one("sections.html", "spin"),
-    "spin_of_motor": _one(
-        "sections.html", "spin", "--machine", "motor", "--load", "middle", "--detail"
-    ),
-    "spin_of_cabinet": _one(
-        "sections.html", "spin", "--machine", "light_cabinet", "--load", "middle"
-    ),
-    "comparison": _one(
-        "sections.html", "spin", "--compare-gasket", "--load", "middle", "--load", "front",
-    ),
-    "rig_damper": _one(
-        "sections.html", "rig", "damper", *DAMPER, "-f", "1,10 Hz", "-a", "0.3,1 mm"
-    ),
+    "spin_of_motor": _one("sections.html", "spin", "--machine", "motor", "--load", "middle", "--detail"),
+    "spin_of_cabinet": _one("sections.html", "spin", "--machine", "light_cabinet", "--load", "middle"),
+    "comparison": _one("sections.html", "spin", "--compare-gasket", "--load", "middle", "--load", "front"),
+    "rig_damper": _one("sections.html", "rig", "damper", *DAMPER, "-f", "1,10 Hz", "-a", "0.3,1 mm"),
     "rig_gasket": _one("sections.html", "rig", "gasket", "--axis", "axial", "--matrix", "A"),
-    "rig_bushing": _one(
-        "sections.html", "rig", "bushing", "--machine", "free_stroke", "--axis", "radial",
-        "-f", "1,5 Hz", "-a", "1 mm",
-    ),
-    "identify_damper": _fit(
-        "sections.html", ("damper", *DAMPER, "-f", "1,10 Hz", "-a", "0.3,1 mm"), "damper", "*"
-    ),
+    "rig_bushing": _one("sections.html", "rig", "bushing", "--machine", "free_stroke", "--axis", "radial", "-f", "1,5 Hz", "-a", "1 mm"),
+    "identify_damper": _fit("sections.html", ("damper", *DAMPER, "-f", "1,10 Hz", "-a", "0.3,1 mm"), "damper", "*"),
     "identify_gasket": _fit(
         "sections.html",
         ("gasket", "--machine", "free_stroke", "--axis", "radial", "-f", "1,5 Hz", "-a", "1,10 mm"),
@@ -81,9 +68,7 @@ KINDS = {
         ("damper", *DAMPER, "-f", "1,5,10 Hz", "-a", "0.3,1 mm"),
         "damper", "*", "--law", "mstv,stv,coulomb",
     ),
-    "identify_static": _one(
-        "sections.html", "identify", "gasket", "--static", "radial=r.csv", "axial=a.csv"
-    ),
+    "identify_static": _one("sections.html", "identify", "gasket", "--static", "radial=r.csv", "axial=a.csv"),
     "identify_table2": _one("sections.html", "identify", "table2"),
     "calibration": _one(
         "sections.html", "calibrate", "--machine", "short.yaml", "--free", "free.yaml",
@@ -102,9 +87,7 @@ KINDS = {
             (*["study", "gasket-damping", "--mesh", "20", "--record"], "middle=bench/record_middle.nc"),
         ),
     ),
-    "spin_cycle": _one(
-        "sections.html", "study", "spin-cycle", "--case", "2", "--case", "29"
-    ),
+    "spin_cycle": _one("sections.html", "study", "spin-cycle", "--case", "2", "--case", "29"),
     "spin_identify": _one(
         "sections.html", "study", "spin-identify", "--case", "2",
         "--unknown", "gasket.stiffness_y=(1, 4) N/mm", "--profile", "short_cycle.yaml",
@@ -114,21 +97,13 @@ KINDS = {
         "sections.html", "study", "response", "--load", "middle", "--points", "15",
         "--harmonics", "3", "--rate", "20 rpm/s", "--rate", "50 rpm/s",
     ),
-    "orders": Kind(
-        "sections.html",
-        (("spin", "--load", "middle", "--out", "bench"), ("record", "orders", "record")),
-    ),
+    "orders": Kind("sections.html", (("spin", "--load", "middle", "--out", "bench"), ("record", "orders", "record"))),
     "tolerance": _one(
         "sections.html", "study", "tolerance", "laundry", "--samples", "64",
         "--sensitivity", "16", "--subset", "100", "--limits", "limits.yaml",
     ),
-    "design": _one(
-        "sections.html", "study", "design", "gasket", "--evaluations", "48", "--population", "16"
-    ),
-    "drive": _one(
-        "sections.html", "study", "drive", "--load", "middle", "--torques", "3",
-        "--unbalances", "2", "--loads", "4",
-    ),
+    "design": _one("sections.html", "study", "design", "gasket", "--evaluations", "48", "--population", "16"),
+    "drive": _one("sections.html", "study", "drive", "--load", "middle", "--torques", "3", "--unbalances", "2", "--loads", "4"),
 }  # fmt: skip
 
 

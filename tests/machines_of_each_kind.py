@@ -23,13 +23,7 @@ DAMPERS = {
     "coulomb": {"friction_force": 60.0, "damping": 20.0},
     "stv": {"friction_force": 60.0, "transition_velocity": 0.2, "damping": 20.0},
     "havsin": {"friction_force": 60.0, "full_friction_velocity": 0.2, "damping": 20.0},
-    "mstv": {
-        "friction_force": 60.0,
-        "friction_damping": 30.0,
-        "sponge_stiffness": 176e3,
-        "sponge_damping": 90.0,
-        "slider_damping": 400.0,
-    },
+    "mstv": {"friction_force": 60.0, "friction_damping": 30.0, "sponge_stiffness": 176e3, "sponge_damping": 90.0, "slider_damping": 400.0},
     "stv_sponge": {
         "friction_force": 60.0,
         "transition_velocity": 0.1,
@@ -44,7 +38,7 @@ DAMPERS = {
         "basic_full_friction_velocity": 0.09,
         "sponge": SPONGE,
     },
-}
+}  # fmt: skip
 FRICTION = {f"friction_torque_{axis}": 0.5 for axis in "xyz"} | {
     f"full_friction_rate_{axis}": 1.5 for axis in "xyz"
 }

@@ -15,11 +15,8 @@ CHECKOUT = Path(__file__).parents[1]
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(
-        shutil.which("git") is None or not (CHECKOUT / ".git").exists(),
-        reason="needs a git checkout",
-    ),
-]
+    pytest.mark.skipif(shutil.which("git") is None or not (CHECKOUT / ".git").exists(), reason="needs a git checkout"),
+]  # fmt: skip
 
 
 def run(*command, cwd):

@@ -147,13 +147,10 @@ def test_no_room_imports_by_a_name_made_at_run_time():
         ("wm_drake.cli", "def f():\n    import matplotlib"),
         ("wm_drake.cli", "from tests.conftest import wm_drake"),
         ("wm_drake.studies.spin.study", "import analyses.run"),
-        (
-            "wm_drake.studies.spin.study",
-            "try:\n    import wm_drake.cli\nexcept ImportError:\n    pass",
-        ),
+        ("wm_drake.studies.spin.study", "try:\n    import wm_drake.cli\nexcept ImportError:\n    pass"),
         ("wm_drake.cellar", "import numpy"),
     ],
-)
+)  # fmt: skip
 def test_planted_fault_is_found(name, source):
     assert len(faults(name, source)) == 1
 
@@ -161,23 +158,11 @@ def test_planted_fault_is_found(name, source):
 @pytest.mark.parametrize(
     ("name", "source"),
     [
-        (
-            "wm_drake.systems.element",
-            "from wm_drake.parameters import units\nfrom wm_drake.laws import table\nimport pydrake",
-        ),
-        (
-            "wm_drake.parameters.units",
-            "from .elements import Frozen\nfrom ..errors import InputError\nimport pint",
-        ),
-        (
-            "wm_drake.report.figure",
-            "import matplotlib\nfrom wm_drake.simulation.measures import measure",
-        ),
-        (
-            "wm_drake.laws.friction",
-            "import numba, numpy, functools\nfrom wm_drake.compiler.compilation import law",
-        ),
+        ("wm_drake.systems.element", "from wm_drake.parameters import units\nfrom wm_drake.laws import table\nimport pydrake"),
+        ("wm_drake.parameters.units", "from .elements import Frozen\nfrom ..errors import InputError\nimport pint"),
+        ("wm_drake.report.figure", "import matplotlib\nfrom wm_drake.simulation.measures import measure"),
+        ("wm_drake.laws.friction", "import numba, numpy, functools\nfrom wm_drake.compiler.compilation import law"),
     ],
-)
+)  # fmt: skip
 def test_good_imports_pass(name, source):
     assert faults(name, source) == []

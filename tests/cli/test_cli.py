@@ -27,10 +27,7 @@ def in_machine(text):
 
 FAULTY_MACHINES = {
     "missing file": ({}, "no such file, and no shipped machine of that name"),
-    "unknown key": (
-        in_machine("gasket: {stifness_x: 3 N/mm}"),
-        "unknown key 'stifness_x' (did you mean 'stiffness_x'?",
-    ),
+    "unknown key": (in_machine("gasket: {stifness_x: 3 N/mm}"), "unknown key 'stifness_x' (did you mean 'stiffness_x'?"),
     "inertia not positive definite": (
         in_machine(
             "bodies: {tub: {inertia: {xx: 1 kg m^2, yy: 1 kg m^2, zz: 1 kg m^2, xy: 2 kg m^2}}}"
@@ -42,26 +39,11 @@ FAULTY_MACHINES = {
         "bodies.tub",
     ),
     "mass beyond measure": (in_machine("bodies: {tub: {mass: 1e300 kg}}"), "machine.yaml"),
-    "spring of no length": (
-        in_machine("springs: {extra: {type: suspension, tub_frame: tub, housing_frame: housing}}"),
-        "springs.extra",
-    ),
-    "damper of no length": (
-        in_machine("dampers: {extra: {type: friction, tub_frame: tub, housing_frame: housing}}"),
-        "dampers.extra",
-    ),
-    "unknown frame": (
-        in_machine("springs: {left: {tub_frame: spring_lft_tub}}"),
-        "no frame 'spring_lft_tub' in the SDF",
-    ),
-    "unknown link": (
-        in_machine("bodies: {tubb: {mass: 1 kg}}"),
-        "no moving link 'tubb' in the SDF (did you mean 'tub'?",
-    ),
-    "unknown joint": (
-        in_machine("drive: {joint: drum_axes}"),
-        "no moving joint 'drum_axes' in the SDF (did you mean 'drum_axis'?",
-    ),
+    "spring of no length": (in_machine("springs: {extra: {type: suspension, tub_frame: tub, housing_frame: housing}}"), "springs.extra"),
+    "damper of no length": (in_machine("dampers: {extra: {type: friction, tub_frame: tub, housing_frame: housing}}"), "dampers.extra"),
+    "unknown frame": (in_machine("springs: {left: {tub_frame: spring_lft_tub}}"), "no frame 'spring_lft_tub' in the SDF"),
+    "unknown link": (in_machine("bodies: {tubb: {mass: 1 kg}}"), "no moving link 'tubb' in the SDF (did you mean 'tub'?"),
+    "unknown joint": (in_machine("drive: {joint: drum_axes}"), "no moving joint 'drum_axes' in the SDF (did you mean 'drum_axis'?"),
     "unknown model": (in_machine("model: nosuch.sdf"), "no SDF file 'nosuch.sdf'"),
     "model that is no SDF": (in_machine("model: machine.yaml"), "cannot be read"),
     "missing measured table": (
@@ -76,49 +58,25 @@ FAULTY_MACHINES = {
         in_machine("frames: {spring_left_housing: {position: '(-250, 0, -600) mm'}}"),
         "springs.left: would be slack at rest",
     ),
-}
+}  # fmt: skip
 
 FAULTY_SPINS = {
-    "unknown load": (
-        {},
-        ["--load", "midle"],
-        "neither a load of machine 'reference' nor a file (did you mean 'middle'?",
-    ),
+    "unknown load": ({}, ["--load", "midle"], "neither a load of machine 'reference' nor a file (did you mean 'middle'?"),
     "unknown engine": ({}, ["--engine", "drak"], "unknown engine 'drak' (did you mean 'drake'?"),
-    "set without =": (
-        {},
-        ["--set", "gasket.stiffness_x"],
-        "'gasket.stiffness_x' does not have the form KEY=VALUE",
-    ),
-    "set without unit": (
-        {},
-        ["--set", "gasket.stiffness_x=3"],
-        "gasket.stiffness_x: '3' has no unit",
-    ),
-    "set unknown link": (
-        {},
-        ["--set", "bodies.tubb.mass=1 kg"],
-        "no moving link 'tubb' in the SDF",
-    ),
+    "set without =": ({}, ["--set", "gasket.stiffness_x"], "'gasket.stiffness_x' does not have the form KEY=VALUE"),
+    "set without unit": ({}, ["--set", "gasket.stiffness_x=3"], "gasket.stiffness_x: '3' has no unit"),
+    "set unknown link": ({}, ["--set", "bodies.tubb.mass=1 kg"], "no moving link 'tubb' in the SDF"),
     "same load twice": ({}, ["--load", "middle", "--load", "middle"], "'middle' is given twice"),
     "load file named as a load": (
         {"middle.yaml": "unbalances: []\n"},
         ["--load", "middle", "--load", "middle.yaml"],
         "'middle' is given twice",
     ),
-    "bad load file": (
-        {"l.yaml": "unbalances: [{mass: -1 kg, radius: 1 mm, y: 0 mm}]\n"},
-        ["--load", "l.yaml"],
-        "l.yaml:1: unbal",
-    ),
+    "bad load file": ({"l.yaml": "unbalances: [{mass: -1 kg, radius: 1 mm, y: 0 mm}]\n"}, ["--load", "l.yaml"], "l.yaml:1: unbal"),
     "missing profile": ({}, ["--profile", "nosuch.csv"], "no such file 'nosuch.csv'"),
-    "out is a file": (
-        {"file": ""},
-        ["--out", "file"],
-        "file: this path is a file, but a folder is needed",
-    ),
+    "out is a file": ({"file": ""}, ["--out", "file"], "file: this path is a file, but a folder is needed"),
     "out is below a file": ({"file": ""}, ["--out", "file/out"], "file/out: cannot be written to"),
-}
+}  # fmt: skip
 
 
 def listing():

@@ -104,17 +104,14 @@ FAULTS = {
     "no free file": (["--free", "none.yaml"], "--free: no such file 'none.yaml'"),
     "no targets file": (["--targets", "none.csv"], "--targets: no such file 'none.csv'"),
     "unknown method": (["--method", "luck"], "no method 'luck'"),
-    "unknown load left out": (
-        ["--leave-out", "bck"],
-        "no measured load 'bck' (did you mean 'back'?",
-    ),
+    "unknown load left out": (["--leave-out", "bck"], "no measured load 'bck' (did you mean 'back'?"),
     "all loads left out": (["--leave-out", "back,middle"], "leaves no load"),
     "as many as are free": (["--fewer", "2"], "--fewer: 2: needs falling numbers"),
     "fewer that is no number": (["--fewer", "one"], "--fewer: 'one' is not a whole number"),
     "limit of nothing": (["--limit", "Q=2"], "--limit: 'Q' is no load, sensor"),
     "limit of zero": (["--limit", "0"], "--limit: '0' is not allowed"),
     "weight of nothing": (["--weight", "Q=2"], "'Q' is no load, sensor"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("fault", FAULTS)

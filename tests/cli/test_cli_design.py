@@ -52,13 +52,10 @@ def test_study_writes_front_and_machines_and_continues(study, wm_drake, monkeypa
         (("Dx", "Dq"), "no response 'Dq'"),
         (("stiffness]", "stifness]"), "stiffness"),
         (("low: 90 %", "low: 9 kg"), "forms"),
-        (
-            ("loads: [middle]", "loads: [midle]"),
-            "d.yaml: loads.0: 'midle' is not a load of machine",
-        ),
+        (("loads: [middle]", "loads: [midle]"), "d.yaml: loads.0: 'midle' is not a load of machine"),
         (("loads: [middle]", "loads: [back, back]"), "d.yaml: loads.1: 'back' is named twice"),
     ],
-)
+)  # fmt: skip
 def test_wrong_file_is_refused_before_any_run(study, change, message):
     Path("d.yaml").write_text(TASK.replace(*change, 1))
     ended = study()

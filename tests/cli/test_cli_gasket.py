@@ -109,28 +109,16 @@ def test_factor_file_and_one_worker_give_the_same(study_without_page, wm_drake):
 
 
 FAULTS = {
-    "kind of design": (
-        ("--design", "d-optmal"),
-        "--design: 'd-optmal' is neither a kind of design nor a file (did you mean",
-    ),
-    "trials": (
-        ("--design", "d-optimal", "--trials", "10"),
-        "10 trials cannot determine the 19 coefficients",
-    ),
+    "kind of design": (("--design", "d-optmal"), "--design: 'd-optmal' is neither a kind of design nor a file (did you mean"),
+    "trials": (("--design", "d-optimal", "--trials", "10"), "10 trials cannot determine the 19 coefficients"),
     "model": (("--model", "mian"), "unknown model 'mian' (did you mean 'main'?"),
-    "factor": (
-        ("--factor", "gasket.stifness_x"),
-        "gasket.stifness_x: unknown key 'stifness_x' (did you mean 'stiffness_x'?",
-    ),
+    "factor": (("--factor", "gasket.stifness_x"), "gasket.stifness_x: unknown key 'stifness_x' (did you mean 'stiffness_x'?"),
     "factor twice": (("--factor", "K_Lx"), "a factor is given twice"),
-    "saturated": (
-        ("--design", "d-optimal", "--trials", "19"),
-        "19 trials for 19 coefficients of main+2fi leave no degree of freedom",
-    ),
+    "saturated": (("--design", "d-optimal", "--trials", "19"), "19 trials for 19 coefficients of main+2fi leave no degree of freedom"),
     "response": (("--response", "gpa"), "--response: no response 'gpa' (did you mean 'gap'"),
     "tables": (("--tables", "curved"), "unknown treatment 'curved'"),
     "factor file": (("--factors", "nosuch.yaml"), "no such file 'nosuch.yaml'"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("fault", FAULTS)

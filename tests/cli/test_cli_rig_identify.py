@@ -261,28 +261,16 @@ BAD_FILE = "time_s,displacement_mm,force_N\n" + "\n".join(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (
-            "rig damper",
-            "rig damper: needs -f and -a (for example -f '3 Hz' -a '5 mm'), or --matrix",
-        ),
-        (
-            "rig damper -f 3 -a '5 mm'",
-            "--frequency: '3': '3' has no unit; write for example '1 Hz'",
-        ),
+        ("rig damper", "rig damper: needs -f and -a (for example -f '3 Hz' -a '5 mm'), or --matrix"),
+        ("rig damper -f 3 -a '5 mm'", "--frequency: '3': '3' has no unit; write for example '1 Hz'"),
         ("rig damper -f '3 Hz' -a 'five mm'", "--amplitude: 'five mm' is not a number with a unit"),
         ("rig damper -f '3 Hz' -a '5 deg'", "--amplitude: '5 deg': unit 'deg' does not fit"),
         ("rig damper -f '-3 Hz' -a '5 mm'", "frequency: is -3; allowed is > 0"),
         ("rig damper --matrix B", "--matrix: no matrix 'B' for a damper (known: A, C)"),
         ("rig damper --matrix C -f '3 Hz'", "--matrix: has its own frequencies"),
         ("rig damper --name left --matrix C", "--name: no 'left' in damper_types of 'reference'"),
-        (
-            "rig damper --component rubber.yaml --matrix C",
-            "--component: 'rubber.yaml' is a bushing, needs a damper",
-        ),
-        (
-            "rig bushing --axis radial --matrix A",
-            "--machine: 'reference' has no bushing_types; name another machine",
-        ),
+        ("rig damper --component rubber.yaml --matrix C", "--component: 'rubber.yaml' is a bushing, needs a damper"),
+        ("rig bushing --axis radial --matrix A", "--machine: 'reference' has no bushing_types; name another machine"),
         ("rig gasket --axis round --matrix A", "--axis: no axis 'round'"),
         ("rig gasket --axis x --name old --matrix A", "--name: a machine has one gasket"),
         ("rig gasket --axis x --arm '100 mm' -f 1Hz -a 1mm", "arm: an arm drives a rotation"),
@@ -292,24 +280,12 @@ BAD_FILE = "time_s,displacement_mm,force_N\n" + "\n".join(
         ("identify damper good.csv --method newton", "--method: no method 'newton'"),
         ("identify damper good.csv --law glue", "--law: no law 'glue' of a damper"),
         ("identify damper good.csv --bounds 'friction=1 N'", "--bounds: unknown number 'friction'"),
-        (
-            "identify damper good.csv --bounds 'friction_force=1 N'",
-            "--bounds: friction_force: '1 N' is not a range",
-        ),
-        (
-            "identify damper good.csv --fix friction_force",
-            "--fix: 'friction_force' does not have the form KEY=VALUE",
-        ),
-        (
-            "identify gasket good.csv --axis x --fix 'damping_x=-1 N s/mm'",
-            "--fix: damping_x: '-1000.0' is out of range; allowed is >= 0",
-        ),
-        (
-            "identify gasket good.csv --axis tilt",
-            "good.csv: holds displacements and forces, needs angles and moments",
-        ),
+        ("identify damper good.csv --bounds 'friction_force=1 N'", "--bounds: friction_force: '1 N' is not a range"),
+        ("identify damper good.csv --fix friction_force", "--fix: 'friction_force' does not have the form KEY=VALUE"),
+        ("identify gasket good.csv --axis x --fix 'damping_x=-1 N s/mm'", "--fix: damping_x: '-1000.0' is out of range; allowed is >= 0"),
+        ("identify gasket good.csv --axis tilt", "good.csv: holds displacements and forces, needs angles and moments"),
     ],
-)
+)  # fmt: skip
 def test_bad_input_gets_one_message_and_leaves_nothing(wm_drake, arguments, message):
     Path("bad.csv").write_text(BAD_FILE)
     Path("rubber.yaml").write_text(

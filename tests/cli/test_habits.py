@@ -185,20 +185,11 @@ def test_unusual_values_are_warned_of_and_strict_refuses_them(wm_drake):
         ({"p.csv": "time_s,speed_rpm\n0,0\n1,5,30\n"}, ("spin", "--profile", "p.csv")),
         ({"p.csv": "time_s;speed_rpm\n0;0\n1,5;30\n"}, ("spin", "--profile", "p.csv")),
         ({"p.csv": 'time_s,speed_rpm\n0,0\n"1,5",30\n'}, ("spin", "--profile", "p.csv")),
-        (
-            {"l.csv": "time [s];displacement [mm];force [N]\n0;0;0\n0,1;1,5;30\n"},
-            ("identify", "damper", "l.csv"),
-        ),
-        (
-            {"l.csv": "time [s],displacement [mm],force [N]\n0,0,0\n0,1,1,5,30\n"},
-            ("identify", "damper", "l.csv"),
-        ),
-        (
-            {"m.csv": 'load,gasket,source,Xr,Yr,Zr,Xf,Yf,Zf\nmiddle,yes,exp,"1,5",1,1,1,1,1\n'},
-            ("spin", "--measured", "m.csv"),
-        ),
+        ({"l.csv": "time [s];displacement [mm];force [N]\n0;0;0\n0,1;1,5;30\n"}, ("identify", "damper", "l.csv")),
+        ({"l.csv": "time [s],displacement [mm],force [N]\n0,0,0\n0,1,1,5,30\n"}, ("identify", "damper", "l.csv")),
+        ({"m.csv": 'load,gasket,source,Xr,Yr,Zr,Xf,Yf,Zf\nmiddle,yes,exp,"1,5",1,1,1,1,1\n'}, ("spin", "--measured", "m.csv")),
     ],
-)
+)  # fmt: skip
 def test_decimal_comma_is_named(wm_drake, files, arguments):
     for name, text in files.items():
         Path(name).write_text(text)

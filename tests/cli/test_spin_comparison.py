@@ -43,30 +43,21 @@ FAULTS = {
         [*of_machines("reference", "soft.yaml"), "--load", "back"],
         "--load: 'back' is neither a load of machine 'soft' nor a file",
     ),
-    "no common load": (
-        of_machines("reference", "odd.yaml"),
-        "the machines have no load of the same name: 'reference' has middle",
-    ),
+    "no common load": (of_machines("reference", "odd.yaml"), "the machines have no load of the same name: 'reference' has middle"),
     "no common sensor": (of_machines("reference", "blind.yaml"), "no sensor of the same name"),
     "number that one machine lacks": (
         [*of_machines("reference", "bare.yaml"), "--set", "gasket.damping_x=1 N s/mm"],
         "--set in machine 'bare.yaml': gasket.damping_x",
     ),
-    "no gasket to compare": (
-        [*of_machines("bare.yaml"), "--compare-gasket"],
-        "--compare-gasket: machine 'bare' has no gasket",
-    ),
+    "no gasket to compare": ([*of_machines("bare.yaml"), "--compare-gasket"], "--compare-gasket: machine 'bare' has no gasket"),
     "gasket both ways": (["--compare-gasket", "--no-gasket"], "--compare-gasket: excludes"),
     "too many": (
         [*of_machines("reference", "soft.yaml", "odd.yaml", "blind.yaml"), "--compare-gasket"],
         "8 machines or variants are too many for one page; at most 6",
     ),
     "faulty machine": (of_machines("reference", "faulty.yaml"), "faulty.yaml:3: gravity"),
-    "machine that cannot be built": (
-        of_machines("reference", "unbuildable.yaml"),
-        "unbuildable.yaml:3: ",
-    ),
-}
+    "machine that cannot be built": (of_machines("reference", "unbuildable.yaml"), "unbuildable.yaml:3: "),
+}  # fmt: skip
 
 
 @pytest.fixture

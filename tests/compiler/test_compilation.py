@@ -62,24 +62,12 @@ LAWS = {
     "stv": (1, friction.stv_friction, lambda f, x: f(x[0], 0.6, 60.0)),
     "havsin": (1, friction.havsin_friction, lambda f, x: f(x[0], 0.6, 10.5)),
     "mstv": (2, friction.mstv_friction, lambda f, x: f(x[0], x[1], 35.0, 60.0, 1e-6)),
-    "slider_rate": (
-        2,
-        damper.slider_rate,
-        lambda f, x: f(100.0 * x[0], x[1], 490.0, 60.0, 0.0, 1e-6),
-    ),
+    "slider_rate": (2, damper.slider_rate, lambda f, x: f(100.0 * x[0], x[1], 490.0, 60.0, 0.0, 1e-6)),
     "root_as_quotient": (1, damper.root_as_quotient, lambda f, x: f(2.0, x[0], 3.0)),
     "mstv_damper": (2, damper.mstv_damper, lambda f, x: f(0.3 * x[0], 1e-3 * x[1], *MSTV)),
-    "free_stroke_damper": (
-        2,
-        damper.free_stroke_damper,
-        lambda f, x: f(0.2 * x[0], 0.015 * x[1], *FREE_STROKE, (CURVE, 0)),
-    ),
+    "free_stroke_damper": (2, damper.free_stroke_damper, lambda f, x: f(0.2 * x[0], 0.015 * x[1], *FREE_STROKE, (CURVE, 0))),
     "damper_response": (2, damper_law.damper_response, lambda f, x: f(x[0], 0.01 * x[1], STV, 0)),
-    "spring_tension": (
-        1,
-        spring.spring_tension,
-        lambda f, x: f(0.2 + 0.02 * x[0], 0.2, 110.0, 40.0, (CURVE, 0)),
-    ),
+    "spring_tension": (1, spring.spring_tension, lambda f, x: f(0.2 + 0.02 * x[0], 0.2, 110.0, 40.0, (CURVE, 0))),
     "stiffness_force": (1, table.stiffness_force, lambda f, x: f(0.015 * x[0], CURVE, 0)),
     "bushing_force": (
         12,
@@ -92,34 +80,12 @@ LAWS = {
             _same_way(f, read_bushing_law)(BUSHING, 0),
         ),
     ),
-    "strut_line": (
-        12,
-        strut_line,
-        lambda f, x: f(
-            TubMotion((), three(x, 3), three(x, 6), three(x, 9)), three(x, 0), (0.3, -0.2, 3.0)
-        ),
-    ),
-    "bending_moment": (
-        9,
-        strut.bending_moment,
-        lambda f, x: f(unit(three(x, 0)), three(x, 3), unit(three(x, 6)), 12.0, 0.3, 0.9, 0.5),
-    ),
-    "transverse_couple": (
-        7,
-        strut.transverse_couple,
-        lambda f, x: f(three(x, 0), three(x, 3), 2.0 + x[6]),
-    ),
-    "wrench_at_origin": (
-        9,
-        wrench_at_origin,
-        lambda f, x: f(three(x, 0), three(x, 3), three(x, 6)),
-    ),
+    "strut_line": (12, strut_line, lambda f, x: f(TubMotion((), three(x, 3), three(x, 6), three(x, 9)), three(x, 0), (0.3, -0.2, 3.0))),
+    "bending_moment": (9, strut.bending_moment, lambda f, x: f(unit(three(x, 0)), three(x, 3), unit(three(x, 6)), 12.0, 0.3, 0.9, 0.5)),
+    "transverse_couple": (7, strut.transverse_couple, lambda f, x: f(three(x, 0), three(x, 3), 2.0 + x[6])),
+    "wrench_at_origin": (9, wrench_at_origin, lambda f, x: f(three(x, 0), three(x, 3), three(x, 6))),
     "rotation_from_rpy": (3, vectors.rotation_from_rpy, lambda f, x: f(x[0], x[1], x[2])),
-    "rotation_vector": (
-        3,
-        vectors.rotation_vector,
-        lambda f, x: f(_same_way(f, vectors.rotation_from_rpy)(x[0], x[1], x[2])),
-    ),
+    "rotation_vector": (3, vectors.rotation_vector, lambda f, x: f(_same_way(f, vectors.rotation_from_rpy)(x[0], x[1], x[2]))),
     "rotation_vector_near_zero": (
         3,
         vectors.rotation_vector,
@@ -127,17 +93,9 @@ LAWS = {
             _same_way(f, vectors.rotation_from_rpy)(4e-3 * x[0], 4e-3 * x[1], 4e-3 * x[2])
         ),
     ),
-    "rotation_vector_rate": (
-        6,
-        vectors.rotation_vector_rate,
-        lambda f, x: f(three(x, 0), three(x, 3), 0.08),
-    ),
-    "moment_from_rotation_vector": (
-        6,
-        vectors.moment_from_rotation_vector,
-        lambda f, x: f(three(x, 0), three(x, 3), 0.08),
-    ),
-}
+    "rotation_vector_rate": (6, vectors.rotation_vector_rate, lambda f, x: f(three(x, 0), three(x, 3), 0.08)),
+    "moment_from_rotation_vector": (6, vectors.moment_from_rotation_vector, lambda f, x: f(three(x, 0), three(x, 3), 0.08)),
+}  # fmt: skip
 
 
 def _same_way(f, other):
@@ -193,16 +151,8 @@ def test_autodiff_agrees_with_finite_differences(name):
 AT_REST = {  # what linearisation about the rest pose meets: name -> (count, law, call)
     "havsin": (1, friction.havsin_friction, lambda f, x: f(x[0], 0.6, 10.5)),
     "mstv_damper": (2, damper.mstv_damper, lambda f, x: f(x[0], x[1], *MSTV)),
-    "free_stroke_damper": (
-        2,
-        damper.free_stroke_damper,
-        lambda f, x: f(x[0], x[1], *FREE_STROKE, (CURVE, 0)),
-    ),
-    "rotation_vector": (
-        3,
-        vectors.rotation_vector,
-        lambda f, x: f(_same_way(f, vectors.rotation_from_rpy)(x[0], x[1], x[2])),
-    ),
+    "free_stroke_damper": (2, damper.free_stroke_damper, lambda f, x: f(x[0], x[1], *FREE_STROKE, (CURVE, 0))),
+    "rotation_vector": (3, vectors.rotation_vector, lambda f, x: f(_same_way(f, vectors.rotation_from_rpy)(x[0], x[1], x[2]))),
     "bushing_force": LAWS["bushing_force"],
     "bending_moment": (
         6,
@@ -211,7 +161,7 @@ AT_REST = {  # what linearisation about the rest pose meets: name -> (count, law
             unit((x[0], x[1], 1.0 + x[2])), three(x, 3), (0.0, 0.0, 1.0), 12.0, 0.3, 0.9, 3.0
         ),
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", AT_REST)

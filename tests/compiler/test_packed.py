@@ -150,16 +150,10 @@ def test_only_a_layout_without_variable_parts_has_a_fixed_size():
     ("values", "message"),
     [
         ({"mass": 1.0, "points": packed_list()}, "InnerNumbers: values and fields differ in name"),
-        (
-            {"mass": 1.0, "points": packed_list(), "name_behind": 0.0, "weight": 1.0},
-            "InnerNumbers: values and fields differ in weight",
-        ),
-        (
-            {"mass": (1.0, 2.0), "points": packed_list(), "name_behind": 0.0},
-            "InnerNumbers: mass has 2 numbers; allowed are 1",
-        ),
+        ({"mass": 1.0, "points": packed_list(), "name_behind": 0.0, "weight": 1.0}, "InnerNumbers: values and fields differ in weight"),
+        ({"mass": (1.0, 2.0), "points": packed_list(), "name_behind": 0.0}, "InnerNumbers: mass has 2 numbers; allowed are 1"),
     ],
-)
+)  # fmt: skip
 def test_wrong_values_are_refused(values, message):
     with pytest.raises(ValueError, match=message):
         INNER.pack(**values)

@@ -25,10 +25,8 @@ def rubber(parameters):
 MACHINES = {
     "rubber and bearing": lambda: with_bearing(rubber(load_machine("reference"))),
     "tubes and bearing": lambda: with_bearing(telescopic()),
-    "cabinet, motor and rubber": lambda: rubber(
-        load_machine("heavy_cabinet").model_copy(update={"drive": load_machine("motor").drive})
-    ),
-}
+    "cabinet, motor and rubber": lambda: rubber(load_machine("heavy_cabinet").model_copy(update={"drive": load_machine("motor").drive})),
+}  # fmt: skip
 
 
 def evaluated(setup):

@@ -271,9 +271,7 @@ CHOICES = {
     "1400 rpm at 1 ms": (MSTV, 146.6, 1e-3, "multistep", 1e-3),
     "2000 rpm": (MSTV, 209.4, 2.5e-3, "runge_kutta", 2.5e-3),
     "longer step": (MSTV, 42.0, 5e-3, "multistep", 2.5e-3),
-    "Coulomb friction": (
-        variant("coulomb", friction_force=25.0), 42.0, 2.5e-3, "runge_kutta", 2.5e-3
-    ),
+    "Coulomb friction": (variant("coulomb", friction_force=25.0), 42.0, 2.5e-3, "runge_kutta", 2.5e-3),
     "smooth friction": (havsin(0.1), 42.0, 2.5e-3, "multistep", 2.5e-3),
     "sharp friction": (havsin(0.006), 42.0, 2.5e-3, "runge_kutta", 2.5e-3),
 }  # fmt: skip

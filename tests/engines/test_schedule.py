@@ -10,14 +10,10 @@ PERIOD = 5e-3  # s
 PROFILES = {
     "one ramp": SpinProfile(time=(0.0, 2.0), speed=(0.0, 15.0)),
     "corners on samples": SpinProfile(time=(0.0, 0.5, 0.505, 2.0), speed=(3.0, 15.0, 14.0, -2.0)),
-    "corners off samples": SpinProfile(
-        time=(0.0, 0.33331, 0.3334, 1.00017, 1.5021), speed=(0.0, 12.0, 12.0, -5.0, -5.0)
-    ),
+    "corners off samples": SpinProfile(time=(0.0, 0.33331, 0.3334, 1.00017, 1.5021), speed=(0.0, 12.0, 12.0, -5.0, -5.0)),
     "shorter than a sample": SpinProfile(time=(0.0, 0.003), speed=(1.0, 2.0)),
-    "corner a rounding away from a sample": SpinProfile(
-        time=(0.0, 0.1 + 0.2, 1.0), speed=(0.0, 9.0, 9.0)
-    ),
-}
+    "corner a rounding away from a sample": SpinProfile(time=(0.0, 0.1 + 0.2, 1.0), speed=(0.0, 9.0, 9.0)),
+}  # fmt: skip
 
 
 def angle_at(profile, time):

@@ -147,20 +147,11 @@ def test_other_joints_are_refused(tmp_path, change, message):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (
-            {"joint": "damper_lft_telescope"},
-            r"joint: no joint 'damper_lft_telescope' in the SDF \(did you mean 'damper_left_telescope'",
-        ),
-        (
-            {"outer_frame": "damper_left_tub"},
-            "outer_frame: frame 'damper_left_tub' is not fixed to the damper_left_outer",
-        ),
-        (
-            {"tub_bushing": "conecting"},
-            r"left.tub_bushing: 'conecting' is not in bushing_types \(did you mean 'connecting'",
-        ),
+        ({"joint": "damper_lft_telescope"}, r"joint: no joint 'damper_lft_telescope' in the SDF \(did you mean 'damper_left_telescope'"),
+        ({"outer_frame": "damper_left_tub"}, "outer_frame: frame 'damper_left_tub' is not fixed to the damper_left_outer"),
+        ({"tub_bushing": "conecting"}, r"left.tub_bushing: 'conecting' is not in bushing_types \(did you mean 'connecting'"),
     ],
-)
+)  # fmt: skip
 def test_wrong_names_are_refused(change, message):
     parameters = telescopic()
     dampers = parameters.model_dump()["telescopic_dampers"]

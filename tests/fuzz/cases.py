@@ -172,12 +172,8 @@ DOCUMENTS = [
     "\n".join(" " * n + "a:" for n in range(600)) + "\n",
     "a: " + "- " * 3000 + "b\n",
     "a0: &a0 [x, x]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}]\n" for n in range(1, 26)),
-    "a0: &a0 [x, x, x, x, x, x, x, x, x]\n"
-    + "".join(f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]\n" for n in range(1, 10)),
-    "a0: &a0 {k0: x}\n"
-    + "".join(
-        f"a{n}: &a{n} {{<<: [{', '.join([f'*a{n - 1}'] * 9)}], k{n}: x}}\n" for n in range(1, 10)
-    ),
+    "a0: &a0 [x, x, x, x, x, x, x, x, x]\n" + "".join(f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]\n" for n in range(1, 10)),
+    "a0: &a0 {k0: x}\n" + "".join(f"a{n}: &a{n} {{<<: [{', '.join([f'*a{n - 1}'] * 9)}], k{n}: x}}\n" for n in range(1, 10)),
     "name: " + "x" * 3_000_000 + "\n",
     "".join(f"key{n}: value\n" for n in range(60_000)),
     "a: b\n" * 2,
@@ -216,7 +212,7 @@ DOCUMENTS = [
     "extends: reference\nbodies: {tub: {inertia: {xx: 1e-320 kg*m^2, yy: 1e-320 kg*m^2, zz: 1e-320 kg*m^2}}}\n",
     "extends: reference\ngravity: 1e300 m/s^2\n",
     "extends: reference\nsprings: {left: {tub_frame: 'a\\nb'}}\n",
-]
+]  # fmt: skip
 """Whole documents: syntax, tags, bombs, links."""
 
 TABLES = [
@@ -288,17 +284,12 @@ OPTIONS = [
 VALUED = {
     "--weight": ["middle=", "=", "middle:Xf=", "nowhere="],
     "--factor": ["C_L=", "gasket.stiffness_x=", "C_L=1 %..", "x="],
-    "--unknown": [
-        "gasket.stiffness_x=",
-        "gasket.stiffness_x=(-5, 2) N/mm",
-        "",
-        "gasket.stiffness_x+gravity=",
-    ],
+    "--unknown": ["gasket.stiffness_x=", "gasket.stiffness_x=(-5, 2) N/mm", "", "gasket.stiffness_x+gravity="],
     "--bounds": ["sponge_stiffness=", "x="],
     "--fix": ["slider_damping=", ""],
     "--leave-out": ["middle,middle", "middle", ",", "middle,nowhere", "middle,counter,front,back"],
     "--set": ["gravity=", "gasket.stiffness_x=", "x.y=", "bodies.tub.mass=", "profile="],
-}
+}  # fmt: skip
 UNITS = {
     "--frequency": " Hz",
     "--amplitude": " mm",
@@ -418,12 +409,8 @@ CSV = {
     "loop": loop_text(),
     "design": "C_L\n-1\n0\n1\n",
     "published": (MACHINES_FOLDER / "sanchez_tabuenca_2020_tables45.csv").read_text("utf-8"),
-    "signals": "time_s,speed_rpm,Xr,Zf\n" + "".join(
-        f"{0.01 * n:g},{0.3 * n:g},{n % 7},{n % 5}\n" for n in range(3000)
-    ),
-    "record": "time_s,Xr,Yr,Zr,Xf,Yf,Zf\n" + "".join(
-        f"{0.01 * n:g},{n % 7},0,1,2,3,{n % 5}\n" for n in range(60)
-    ),
+    "signals": "time_s,speed_rpm,Xr,Zf\n" + "".join(f"{0.01 * n:g},{0.3 * n:g},{n % 7},{n % 5}\n" for n in range(3000)),
+    "record": "time_s,Xr,Yr,Zr,Xf,Yf,Zf\n" + "".join(f"{0.01 * n:g},{n % 7},0,1,2,3,{n % 5}\n" for n in range(60)),
 }  # fmt: skip
 
 

@@ -33,32 +33,14 @@ GASKET = "frames.gasket_{}.position"
 PLANTED = {
     "stiff springs": ({"spring_types.suspension.stiffness": "9 N/mm"}, "spring_types"),
     "soft springs": ({"spring_types.suspension.stiffness": "1.2 N/mm"}, "spring_types"),
-    "end bushing": (
-        {"damper_types.friction.end_bushing.stiffness": "6600 N*mm/rad"},
-        "damper_types.friction.end_bushing.stiffness",
-    ),
-    "torsion": (
-        {"gasket.rotational_stiffness_y": "600000 N*mm/rad"},
-        "gasket.rotational_stiffness_y",
-    ),
-    "gasket in the wall": (
-        {GASKET.format(end): "(0, -311, 0) mm" for end in ("tub", "housing")},
-        "gasket.housing_frame",
-    ),
-    "gasket in the tub": (
-        {GASKET.format(end): "(0, -100, 0) mm" for end in ("tub", "housing")},
-        "gasket.housing_frame",
-    ),
-    "unbalance": (
-        {"loads.middle.unbalances.0.radius": "245 mm"},
-        "loads.middle.unbalances.0.radius",
-    ),
+    "end bushing": ({"damper_types.friction.end_bushing.stiffness": "6600 N*mm/rad"}, "damper_types.friction.end_bushing.stiffness"),
+    "torsion": ({"gasket.rotational_stiffness_y": "600000 N*mm/rad"}, "gasket.rotational_stiffness_y"),
+    "gasket in the wall": ({GASKET.format(end): "(0, -311, 0) mm" for end in ("tub", "housing")}, "gasket.housing_frame"),
+    "gasket in the tub": ({GASKET.format(end): "(0, -100, 0) mm" for end in ("tub", "housing")}, "gasket.housing_frame"),
+    "unbalance": ({"loads.middle.unbalances.0.radius": "245 mm"}, "loads.middle.unbalances.0.radius"),
     "concrete": ({"bodies.upper_counterweight.mass": "15 kg"}, "bodies.upper_counterweight.mass"),
-    "steel": (
-        {"bodies.motor.mass": "60 kg", "spring_types.suspension.action": "tension-compression"},
-        "bodies.motor.mass",
-    ),
-}
+    "steel": ({"bodies.motor.mass": "60 kg", "spring_types.suspension.action": "tension-compression"}, "bodies.motor.mass"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", PLANTED)

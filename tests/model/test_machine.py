@@ -240,16 +240,10 @@ def test_a_compliant_bearing_needs_a_joint_between_tub_and_drum(tmp_path):
     ("key", "message"),
     [
         ("damper_types.free_stroke.sponge", r"telescopic_dampers.left: sponge has 4 points, .* 12"),
-        (
-            "bushing_types.connecting.stiffness_y",
-            r"telescopic_dampers.left.tub_bushing: stiffness_y has 4 points, .* 6; rebuild",
-        ),
-        (
-            "bushing_types.connecting.stiffness_x",
-            r"tub_bushing: stiffness_x has 4 points, that of the built machine none",
-        ),
+        ("bushing_types.connecting.stiffness_y", r"telescopic_dampers.left.tub_bushing: stiffness_y has 4 points, .* 6; rebuild"),
+        ("bushing_types.connecting.stiffness_x", r"tub_bushing: stiffness_x has 4 points, that of the built machine none"),
     ],
-)
+)  # fmt: skip
 def test_a_table_with_other_points_is_refused_by_its_name(key, message, shipped):
     machine = shipped("free_stroke")
     table = {"displacement": "(-20, -5, 5, 20) mm", "force": "(-100, 0, 0, 100) N"}

@@ -74,10 +74,8 @@ def test_a_written_sdf_has_the_new_frames(four, tmp_path):
 @pytest.mark.parametrize(
     ("frames", "message"),
     [
-        ("a: {attached_to: tubb, position: '(0, 0, 0) mm'}",
-         r"frames.a.attached_to: no link 'tubb' in the SDF .did you mean 'tub'"),
-        ("spring_left_tub: {attached_to: tub, position: '(0, 0, 0) mm'}",
-         "frames.spring_left_tub: is a frame of the SDF"),
+        ("a: {attached_to: tubb, position: '(0, 0, 0) mm'}", r"frames.a.attached_to: no link 'tubb' in the SDF .did you mean 'tub'"),
+        ("spring_left_tub: {attached_to: tub, position: '(0, 0, 0) mm'}", "frames.spring_left_tub: is a frame of the SDF"),
         ("a: {position: '(0, 0, 0) mm'}", r"no frame 'a' in the SDF.*attached_to: LINK"),
         ("a: {position: '(0, 0, 0) mm', angles: '(0, 0, 9) deg'}", "only a new frame has them"),
         ("a: {attached_to: tub, position: '(0, 0, 0) mm', angles: '(0, 9) deg'}", "has 2 values"),

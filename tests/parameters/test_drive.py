@@ -52,14 +52,8 @@ def test_a_motor_with_a_compliant_bearing_is_refused():
             "  torque_limit: {speed: '(0, 500, 400) rpm', torque: '(2, 1, 1) N*m'}",
             r"drive\.torque_limit: speed must rise from point to point",
         ),
-        (
-            "  torque_limit: {speed: '(10, 500) rpm', torque: '(2, 1) N*m'}",
-            r"drive\.torque_limit: the first speed must be 0 rpm",
-        ),
-        (
-            "  torque_limit: {speed: '(0, 500) rpm', torque: '(2, -1) N*m'}",
-            r"drive\.torque_limit: torque must not be negative",
-        ),
+        ("  torque_limit: {speed: '(10, 500) rpm', torque: '(2, 1) N*m'}", r"drive\.torque_limit: the first speed must be 0 rpm"),
+        ("  torque_limit: {speed: '(0, 500) rpm', torque: '(2, -1) N*m'}", r"drive\.torque_limit: torque must not be negative"),
         ("  controller: {sample_time: 0 s}", r"drive\.controller\.sample_time: .* >= 0\.0001"),
         ("  controller: {proportional_gain: 0 N*m*s/rad}", r"proportional_gain: .* allowed is > 0"),
         (
@@ -68,7 +62,7 @@ def test_a_motor_with_a_compliant_bearing_is_refused():
         ),
         ("  belt_ratios: 3", r"drive\.belt_ratios: unknown key 'belt_ratios'"),
     ],
-)
+)  # fmt: skip
 def test_mistakes_get_one_message(tmp_path, change, message):
     with pytest.raises(InputError, match=message) as found:
         read(tmp_path, DRIVE + change + "\n")

@@ -42,18 +42,14 @@ def in_file(kind, text):
 @pytest.mark.parametrize(
     ("x", "y", "message"),
     [
-        (
-            (0.0, 1.0, 2.0),
-            (0.0, 1.0),
-            "as many values of displacement as of force, at least two; has 3 and 2",
-        ),
+        ((0.0, 1.0, 2.0), (0.0, 1.0), "as many values of displacement as of force, at least two; has 3 and 2"),
         ((0.0,), (0.0,), "at least two; has 1 and 1"),
         ((0.0, 1.0, 1.0), (0.0, 1.0, 2.0), "displacement must rise"),
         ((0.0, 2.0, 1.0), (0.0, 1.0, 2.0), "displacement must rise"),
         ((0.0, 1.0, 2.0), (0.0, 1.0, 0.5), "force must not fall"),
         ((0.0, 1.0), (0.0, float("nan")), "not a finite number"),
     ],
-)
+)  # fmt: skip
 def test_bad_table_is_refused(x, y, message):
     with pytest.raises(ValidationError, match=message):
         ForceTable(displacement=x, force=y)

@@ -83,21 +83,13 @@ def test_levels_are_set_and_nothing_else(plain):
 @pytest.mark.parametrize(
     ("text", "key", "expected"),
     [
-        (
-            "damper_types.friction.friction_force=20 N..30 N",
-            "damper_types.friction.friction_force",
-            [20.0, 25.0, 30.0],
-        ),
-        (
-            "loads.middle.unbalances.0.mass=90 %..120 %",
-            "loads.middle.unbalances.0.mass",
-            [0.9, 1.05, 1.2],
-        ),
+        ("damper_types.friction.friction_force=20 N..30 N", "damper_types.friction.friction_force", [20.0, 25.0, 30.0]),
+        ("loads.middle.unbalances.0.mass=90 %..120 %", "loads.middle.unbalances.0.mass", [0.9, 1.05, 1.2]),
         ("K_Lx=2 N/mm..4000 N/m", "gasket.stiffness_x", [2000.0, 3000.0, 4000.0]),
         ("bodies.tub.mass=9 kg..11 kg", "bodies.tub.mass", [9.0, 10.0, 11.0]),
         ("gravity", "gravity", [4.905, 9.81, 14.715]),
     ],
-)
+)  # fmt: skip
 def test_any_number_can_be_a_factor(reference, text, key, expected):
     (factor,) = one(reference, text)
     assert [setting[key] for setting in factor.settings] == pytest.approx(expected)

@@ -164,21 +164,13 @@ def test_model_path_is_relative_to_the_file(write, tmp_path):
     ("text", "line", "message"),
     [
         ("name: x\nname: y\n", 2, 'is not YAML: found duplicate key "name"'),
-        (
-            "name: x\ngasket:\n  tub_frame: a\n  tub_frame: b\n",
-            4,
-            'is not YAML: found duplicate key "tub_frame"',
-        ),
-        (
-            "name: x\n\tgravity: 1\n",
-            2,
-            "is not YAML: found character '\\t' that cannot start any token",
-        ),
+        ("name: x\ngasket:\n  tub_frame: a\n  tub_frame: b\n", 4, 'is not YAML: found duplicate key "tub_frame"'),
+        ("name: x\n\tgravity: 1\n", 2, "is not YAML: found character '\\t' that cannot start any token"),
         ("name: x\nloads: [1,\n  }\n", 3, "is not YAML: "),
         ("name: x\n---\nname: y\n", 2, "is not YAML: but found another document"),
         ("name: *nobody\n", 1, "is not YAML: found undefined alias"),
     ],
-)
+)  # fmt: skip
 def test_bad_yaml_is_refused_with_its_line(write, text, line, message):
     path = write(text)
     (problem,) = refused(path)
@@ -217,10 +209,7 @@ def test_strange_scalar_is_refused_with_its_line(write, value):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (
-            "gasket:\n  stifness_x: 3 N/mm\n",
-            ":3: gasket.stifness_x: unknown key 'stifness_x' (did you mean 'stiffness_x'?",
-        ),
+        ("gasket:\n  stifness_x: 3 N/mm\n", ":3: gasket.stifness_x: unknown key 'stifness_x' (did you mean 'stiffness_x'?"),
         ("gravty: 9 m/s^2\n", ":2: gravty: unknown key 'gravty' (did you mean 'gravity'?"),
         (
             "damper_types:\n  friction:\n    sponge_stifness: 3 N/mm\n",
@@ -238,31 +227,16 @@ def test_strange_scalar_is_refused_with_its_line(write, value):
             "loads:\n  middle:\n    unbalances:\n    - {mass: 1 kg, radius: 1 mm, y: 1 mm, fase: 1 deg}\n",
             ":5: loads.middle.unbalances.0.fase: unknown key 'fase' (did you mean 'phase'?",
         ),
-        (
-            "damper_types: {friction: {law: glue}}\n",
-            ":2: damper_types.friction: law 'glue' is not known; allowed are 'coulomb', ",
-        ),
-        (
-            "springs:\n  left: {type: nosuch}\n",
-            "springs: left.type: 'nosuch' is not in spring_types (known: suspension)",
-        ),
+        ("damper_types: {friction: {law: glue}}\n", ":2: damper_types.friction: law 'glue' is not known; allowed are 'coulomb', "),
+        ("springs:\n  left: {type: nosuch}\n", "springs: left.type: 'nosuch' is not in spring_types (known: suspension)"),
         ("gravity: -1 m/s^2\n", ":2: gravity: '-1 m/s^2' is out of range; allowed is >= 0"),
         ("gravity: 9.81\n", ":2: gravity: '9.81' has no unit; write for example '1 m/s^2'"),
-        (
-            "gasket:\n  rotational_stiffness_x: 5 N mm\n",
-            ":3: gasket.rotational_stiffness_x: unit 'N mm' does not fit; allowed",
-        ),
-        (
-            "frames: {sensor_Xr: {position: '(1, 2, 3) N'}}\n",
-            "position: unit 'N' does not fit; allowed is a unit such as mm",
-        ),
+        ("gasket:\n  rotational_stiffness_x: 5 N mm\n", ":3: gasket.rotational_stiffness_x: unit 'N mm' does not fit; allowed"),
+        ("frames: {sensor_Xr: {position: '(1, 2, 3) N'}}\n", "position: unit 'N' does not fit; allowed is a unit such as mm"),
         ("loads: null\n", ":2: loads: is missing"),
-        (
-            "sensors: {Xr: null, Yr: null, Zr: null, Xf: null, Yf: null, Zf: null}\n",
-            ":2: sensors: needs at least one entry",
-        ),
+        ("sensors: {Xr: null, Yr: null, Zr: null, Xf: null, Yf: null, Zf: null}\n", ":2: sensors: needs at least one entry"),
     ],
-)
+)  # fmt: skip
 def test_bad_entry_is_refused_with_its_line_and_key(write, text, message):
     path = write(f"extends: reference\n{text}")
     (problem,) = refused(path)

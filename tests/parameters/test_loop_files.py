@@ -73,31 +73,11 @@ def test_angle_and_moment_are_a_rotation(tmp_path):
     ("head", "lines", "message"),
     [
         ("time [s], force [N]", None, ":2: no column displacement among 'time [s], force [N]'"),
-        (
-            "time [s], displacement [mm], d [mm]",
-            None,
-            ":2: 'd [mm]' is a second column of displacement",
-        ),
-        (
-            "time [s], displacement [mm], moment [N m]",
-            None,
-            ":2: mixes a rotation with a translation",
-        ),
-        (
-            "time [s], displacement [mm], force",
-            None,
-            ":2: force: has no unit; write 'force [N]' in the header or use --units",
-        ),
-        (
-            "time [s], displacement [N], force [N]",
-            None,
-            ":2: displacement [N]: unit 'N' does not fit; allowed is a unit such as mm",
-        ),
-        (
-            "time [s], displacement [furl], force [N]",
-            None,
-            ":2: displacement [furl]: unit 'furl' is not known",
-        ),
+        ("time [s], displacement [mm], d [mm]", None, ":2: 'd [mm]' is a second column of displacement"),
+        ("time [s], displacement [mm], moment [N m]", None, ":2: mixes a rotation with a translation"),
+        ("time [s], displacement [mm], force", None, ":2: force: has no unit; write 'force [N]' in the header or use --units"),
+        ("time [s], displacement [N], force [N]", None, ":2: displacement [N]: unit 'N' does not fit; allowed is a unit such as mm"),
+        ("time [s], displacement [furl], force [N]", None, ":2: displacement [furl]: unit 'furl' is not known"),
         (HEAD, changed(3, "0.1,nan,2.0"), ":6: displacement [mm]: 'nan' is not a finite number"),
         (HEAD, changed(3, "0.1,1.0,inf"), ":6: force [N]: 'inf' is not a finite number"),
         (HEAD, changed(3, "0.1,1.0,-"), ":6: force [N]: '-' is not a number"),
@@ -108,7 +88,7 @@ def test_angle_and_moment_are_a_rotation(tmp_path):
         (HEAD, rows(displacement=np.zeros(40)), ":3: displacement [mm]: is constant"),
         (HEAD, rows()[:19], ": has 19 samples; a loop needs at least 20"),
     ],
-)
+)  # fmt: skip
 def test_a_bad_file_gets_one_message_with_file_and_line(tmp_path, head, lines, message):
     path = written(tmp_path, head, lines)
     with pytest.raises(InputError) as told:

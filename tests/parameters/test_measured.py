@@ -39,10 +39,7 @@ def test_no_tables_give_the_columns_alone(machine):
     ("text", "message"),
     [
         ("", "cannot be read as CSV"),
-        (
-            HEADER.replace(",Zf", "") + ROW,
-            "needs the columns load,gasket,source,Xr,Yr,Zr,Xf,Yf,Zf, has load",
-        ),
+        (HEADER.replace(",Zf", "") + ROW, "needs the columns load,gasket,source,Xr,Yr,Zr,Xf,Yf,Zf, has load"),
         (HEADER.replace("Zf", "Zg") + ROW, "needs the columns"),
         (HEADER.replace("\n", ",extra\n") + ROW.replace("\n", ",1\n"), "needs the columns"),
         (HEADER + ROW.replace("\n", ",1\n"), "a row has more values than columns"),
@@ -51,7 +48,7 @@ def test_no_tables_give_the_columns_alone(machine):
         (HEADER + ROW.replace("3.5", ""), "not a finite number"),
         (HEADER + ROW.replace("3.5", "inf"), "not a finite number"),
     ],
-)
+)  # fmt: skip
 def test_bad_table_is_refused(machine, tmp_path, text, message):
     with pytest.raises(InputError, match=message) as refused:
         measured_amplitudes(machine(text))

@@ -90,12 +90,9 @@ def test_effects_at_two_levels_are_completed_to_a_sum_of_zero(write):
         ("middle,Dx,C_L,40,1 inf 2\n", "effects: 'inf' is not a finite number"),
         ("middle,Dx,C_L,40,1_0 2 3\n", "'1_0' is not a finite number"),
         ("middle,,C_L,40,\n", "row 1 of the data: the column response is empty"),
-        (
-            "middle,Dx,C_L,40,\nmiddle,Dx,C_L,41,\n",
-            "row 2 of the data: middle, Dx, C_L is given twice",
-        ),
+        ("middle,Dx,C_L,40,\nmiddle,Dx,C_L,41,\n", "row 2 of the data: middle, Dx, C_L is given twice"),
     ],
-)
+)  # fmt: skip
 def test_faulty_files_are_refused(write, text, message):
     path = write(text)
     with pytest.raises(InputError) as refused:

@@ -168,22 +168,13 @@ def test_load_file(tmp_path):
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
-        (
-            "{mass: -1 kg, radius: 1 mm, y: 0 mm}",
-            ":2: unbalances.0.mass: '-1 kg' is out of range; allowed is >= 0",
-        ),
-        (
-            "{mass: 1 kg, radius: -1 mm, y: 0 mm}",
-            ":2: unbalances.0.radius: '-1 mm' is out of range",
-        ),
+        ("{mass: -1 kg, radius: 1 mm, y: 0 mm}", ":2: unbalances.0.mass: '-1 kg' is out of range; allowed is >= 0"),
+        ("{mass: 1 kg, radius: -1 mm, y: 0 mm}", ":2: unbalances.0.radius: '-1 mm' is out of range"),
         ("{mass: 1 kg, radius: 1 mm}", ":2: unbalances.0.y: is missing"),
         ("{mass: 1, radius: 1 mm, y: 0 mm}", ":2: unbalances.0.mass: '1' has no unit"),
-        (
-            "{mas: 1 kg, mass: 1 kg, radius: 1 mm, y: 0 mm}",
-            "unknown key 'mas' .did you mean 'mass'",
-        ),
+        ("{mas: 1 kg, mass: 1 kg, radius: 1 mm, y: 0 mm}", "unknown key 'mas' .did you mean 'mass'"),
     ],
-)
+)  # fmt: skip
 def test_bad_load_file_is_refused(tmp_path, entry, message):
     path = tmp_path / "towels.yaml"
     path.write_text(f"unbalances:\n  - {entry}\n")

@@ -217,12 +217,9 @@ def test_walk_is_the_nearest_rigid_motion():
         ({"foot_type": {"vertical_stiffness": -1.0}}, "vertical_stiffness"),
         ({"foot_type": {"horizontal_damping": 0.0}}, "horizontal_damping"),
         ({"inertia": None}, "needs inertia"),
-        (
-            {"feet": {n: {"x": 0.1 * i, "y": 0.0} for i, n in enumerate("abcd")}},
-            "in a line with two others",
-        ),
+        ({"feet": {n: {"x": 0.1 * i, "y": 0.0} for i, n in enumerate("abcd")}}, "in a line with two others"),
     ],
-)
+)  # fmt: skip
 def test_a_cabinet_that_cannot_stand_is_refused(changes, message):
     with pytest.raises(ValueError, match=message):
         with_moving_cabinet(**changes)

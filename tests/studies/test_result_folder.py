@@ -233,16 +233,13 @@ def test_spin_whose_files_cannot_grow_ends_with_a_message(tmp_path, size):
         ("--starts=0", "--starts"),
         ("--iterations=-1", "--iterations"),
         ("--resolution=inf", "resolution: Input should be a finite number"),
-        (
-            "--deviation=nan",
-            "--deviation: amplitudes: 'nan' is not allowed; must be > 0 and finite",
-        ),
+        ("--deviation=nan", "--deviation: amplitudes: 'nan' is not allowed; must be > 0 and finite"),
         ("--weight=middle=inf", "--weight: middle: 'inf' is not allowed"),
         ("--weight=middle=٣", "--weight: middle: '٣' is not a number"),
         ("--weight=middle", "--weight: 'middle' does not have the form KEY=VALUE"),
         ("--leave-out=middle,middle", "--leave-out: 'middle' is given twice"),
     ],
-)
+)  # fmt: skip
 def test_option_that_makes_no_sense_is_refused(wm_drake, tmp_path, option, message):
     (tmp_path / "free.yaml").write_text(
         "quantities:\n  spring: {bounds: '(1, 20) N/mm', prior: '(7, 2) N/mm', "

@@ -144,11 +144,9 @@ class Element:
 ELEMENTS = {
     "spring": Element(SPRING_STRUT, spring_parameters().packed()),
     "spring with a table": Element(SPRING_STRUT, spring_parameters(SPRING_CURVE).packed()),
-    "spring that is nearly slack": Element(
-        SPRING_STRUT, SPRING.replaced(spring_parameters().packed(), taut_from=2000.0)
-    ),
+    "spring that is nearly slack": Element(SPRING_STRUT, SPRING.replaced(spring_parameters().packed(), taut_from=2000.0)),
     "bushing": Element(SIX_COMPONENT_BUSHING, bushing_parameters().packed()),
-}
+}  # fmt: skip
 SPONGE_STATES = {"mstv": (2.3e-4,), "free_stroke": (0.012,)}  # m
 for _name, _damper in DAMPERS.items():
     _packed = damper_parameters(_damper).packed()

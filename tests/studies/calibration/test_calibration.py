@@ -125,35 +125,17 @@ def test_machine_with_explicit_values_is_that_of_the_sdf(short, tmp_path):
 
 
 FAULTS = {
-    "no bounds": (
-        FREE.replace("    bounds: (10, 60) N\n", ""),
-        "quantities.friction.bounds: is missing",
-    ),
+    "no bounds": (FREE.replace("    bounds: (10, 60) N\n", ""), "quantities.friction.bounds: is missing"),
     "one bound": (FREE.replace("(10, 60) N", "10 N"), "is not two numbers with a unit"),
-    "falling bounds": (
-        FREE.replace("(10, 60) N", "(60, 10) N"),
-        "lower bound must be below the upper",
-    ),
-    "prior outside": (
-        FREE.replace("(30, 10) N", "(70, 10) N"),
-        "the expected value is outside the bounds",
-    ),
-    "prior of no width": (
-        FREE.replace("(30, 10) N", "(30, 0) N"),
-        "standard deviation must be above 0",
-    ),
-    "prior in another dimension": (
-        FREE.replace("(30, 10) N", "(30, 10) kg"),
-        "the prior is in kg, the bounds in N",
-    ),
+    "falling bounds": (FREE.replace("(10, 60) N", "(60, 10) N"), "lower bound must be below the upper"),
+    "prior outside": (FREE.replace("(30, 10) N", "(70, 10) N"), "the expected value is outside the bounds"),
+    "prior of no width": (FREE.replace("(30, 10) N", "(30, 0) N"), "standard deviation must be above 0"),
+    "prior in another dimension": (FREE.replace("(30, 10) N", "(30, 10) kg"), "the prior is in kg, the bounds in N"),
     "unknown unit": (FREE.replace("(10, 60) N", "(10, 60) Nn"), "unit 'Nn' is not known"),
     "unknown word": (FREE + "    colour: red\n", "unknown key 'colour'"),
     "nothing free": ("quantities: {}\n", "quantities"),
-    "preload that is no force": (
-        PRELOAD.replace(") N", ") kg") + FREE,
-        "the numbers are in kg; a preload needs a unit such as N",
-    ),
-}
+    "preload that is no force": (PRELOAD.replace(") N", ") kg") + FREE, "the numbers are in kg; a preload needs a unit such as N"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -165,28 +147,16 @@ def test_faulty_free_file_is_refused_with_its_line(fault, tmp_path):
 
 
 MISFITS = {
-    "unknown key": (
-        FREE.replace("friction_force", "fricton_force"),
-        "is not a number of the machine (did you mean",
-    ),
-    "unknown frame": (
-        FREE.replace("damper_left_housing", "damper_lft_housing"),
-        "no frame 'damper_lft_housing'",
-    ),
+    "unknown key": (FREE.replace("friction_force", "fricton_force"), "is not a number of the machine (did you mean"),
+    "unknown frame": (FREE.replace("damper_left_housing", "damper_lft_housing"), "no frame 'damper_lft_housing'"),
     "unknown body": (FREE.replace("bodies.motor.mass", "bodies.motr.mass"), "no link 'motr'"),
     "wrong dimension": (
         FREE.replace("(10, 60) N", "(10, 60) kg").replace("(30, 10) N", "(30, 10) kg"),
         "needs a unit such as N, but kg is not of this kind",
     ),
-    "factor for a table": (
-        FREE + TABLE.replace('"(-30, 0, 30) mm"', '"(-30, 30) mm"'),
-        "needs a list of 3 factors, not 2",
-    ),
-    "factor of the wrong dimension": (
-        FREE.replace("0.0024 m^2", "0.0024 m"),
-        "but kg times m is not of this kind",
-    ),
-}
+    "factor for a table": (FREE + TABLE.replace('"(-30, 0, 30) mm"', '"(-30, 30) mm"'), "needs a list of 3 factors, not 2"),
+    "factor of the wrong dimension": (FREE.replace("0.0024 m^2", "0.0024 m"), "but kg times m is not of this kind"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("misfit", MISFITS)
@@ -216,15 +186,12 @@ def test_targets_are_the_rows_of_the_experiment(reference):
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
-        (
-            [["midle", "no", "experiment", *range(1, 7)]],
-            "no load 'midle' in the machine (did you mean 'middle'?",
-        ),
+        ([["midle", "no", "experiment", *range(1, 7)]], "no load 'midle' in the machine (did you mean 'middle'?"),
         ([["back", "no", "experiment", *range(1, 7)]] * 2, "'back' occurs twice"),
         ([["back", "no", "experiment", *range(6)]], "not above 0"),
         ([["back", "no", "a model", *range(1, 7)]], "has no row of source 'experiment'"),
     ],
-)
+)  # fmt: skip
 def test_targets_that_cannot_be_used_are_refused(rows, message, reference):
     with pytest.raises(InputError) as refused:
         targets_of(reference, measured(rows), "t.csv")

@@ -72,12 +72,9 @@ def test_files_of_responses_are_no_files_of_amplitudes(short, tmp_path):
         (HEAD + ROWS.replace("50", "0"), "it must be above 0"),
         (HEAD + ROWS.replace("counter", "middle"), "occurs twice"),
         (HEAD + ROWS.replace("50", "x"), "'x' is not a finite number"),
-        (
-            HEAD + ROWS.replace("machine", "design").replace("yes", "no"),
-            "a mean over the gasket's design needs the gasket",
-        ),
+        (HEAD + ROWS.replace("machine", "design").replace("yes", "no"), "a mean over the gasket's design needs the gasket"),
     ],
-)
+)  # fmt: skip
 def test_a_wrong_file_is_refused(short, tmp_path, text, message):
     with pytest.raises(InputError) as refused:
         response_targets_of(short.parameters, named(short, tmp_path, text))

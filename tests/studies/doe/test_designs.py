@@ -186,17 +186,11 @@ def test_few_trials_and_large_grids():
 FAULTS = {
     "kind": ({"kind": "d-optmal"}, "no design 'd-optmal' (did you mean 'd-optimal'?"),
     "model": ({"kind": "full", "model": "quadratic"}, "no model 'quadratic'"),
-    "too few": (
-        {"kind": "d-optimal", "trials": 100},
-        "100 trials cannot determine the 129 coefficients",
-    ),
+    "too few": ({"kind": "d-optimal", "trials": 100}, "100 trials cannot determine the 129 coefficients"),
     "too many": ({"kind": "d-optimal", "trials": 6562}, "6561 different trials"),
     "full of another size": ({"kind": "full", "trials": 1000}, "has 6561 trials, not 1000"),
-    "no such array": (
-        {"kind": "orthogonal", "trials": 1000},
-        "orthogonal designs have 27, 243 or 729",
-    ),
-}
+    "no such array": ({"kind": "orthogonal", "trials": 1000}, "orthogonal designs have 27, 243 or 729"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("fault", FAULTS)

@@ -312,33 +312,15 @@ def test_a_quadratic_is_its_own_surface(p):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (
-            lambda: Unknown("k", 2e3, 1e3, Unit("N/m", "N/mm")),
-            "k: bounds 2 N/mm to 1 N/mm are not a range",
-        ),
+        (lambda: Unknown("k", 2e3, 1e3, Unit("N/m", "N/mm")), "k: bounds 2 N/mm to 1 N/mm are not a range"),
         (lambda: Unknown("k", 0.0, np.inf, Unit("N", "N")), "k: bounds 0 N to inf are not a range"),
-        (
-            lambda: Unknown("k", 0.0, 1.0, logarithmic=True),
-            "k: a logarithmic search needs a lower bound > 0",
-        ),
-        (
-            lambda: Unknown("k", 0.0, 1.0, Unit("N", "N"), start=2.0),
-            "k: start 2 N is outside the bounds",
-        ),
-        (
-            lambda: FitProblem((), (), decay_and_swing),
-            "an identification needs at least one measurement",
-        ),
-        (
-            lambda: FitProblem((UNKNOWNS[0],) * 2, planted().measurements, decay_and_swing),
-            "a: is unknown twice",
-        ),
-        (
-            lambda: identify(planted(), "leastsquares"),
-            "--method: no method 'leastsquares' (did you mean 'least-squares'?",
-        ),
+        (lambda: Unknown("k", 0.0, 1.0, logarithmic=True), "k: a logarithmic search needs a lower bound > 0"),
+        (lambda: Unknown("k", 0.0, 1.0, Unit("N", "N"), start=2.0), "k: start 2 N is outside the bounds"),
+        (lambda: FitProblem((), (), decay_and_swing), "an identification needs at least one measurement"),
+        (lambda: FitProblem((UNKNOWNS[0],) * 2, planted().measurements, decay_and_swing), "a: is unknown twice"),
+        (lambda: identify(planted(), "leastsquares"), "--method: no method 'leastsquares' (did you mean 'least-squares'?"),
     ],
-)
+)  # fmt: skip
 def test_bad_input_is_told(make, message):
     with pytest.raises(InputError) as told:
         make()

@@ -308,30 +308,18 @@ def test_twelve_noisy_loops_are_fitted():
     ("make", "message"),
     [
         (lambda m: damper_model("glue", m), "--law: no law 'glue' of a damper"),
-        (
-            lambda m: damper_model("mstv", m, Given({"stiffness": (1.0, 2.0)})),
-            "--bounds: unknown number 'stiffness'",
-        ),
-        (
-            lambda m: damper_model("mstv", m, Given(fixed={"glue": 1.0})),
-            "--fix: unknown number 'glue'",
-        ),
+        (lambda m: damper_model("mstv", m, Given({"stiffness": (1.0, 2.0)})), "--bounds: unknown number 'stiffness'"),
+        (lambda m: damper_model("mstv", m, Given(fixed={"glue": 1.0})), "--fix: unknown number 'glue'"),
         (
             lambda m: damper_model(
                 "mstv", m, Given({"slider_damping": (1.0, 2.0)}, {"slider_damping": 1.0})
             ),
             "--fix: 'slider_damping' has bounds and is fixed",
         ),
-        (
-            lambda m: bushing_model("voigt_havsin", m, TestedAxis(GASKET, "x")),
-            "--law: voigt_havsin is a law about an axis",
-        ),
-        (
-            lambda m: bushing_model("putty", m, TestedAxis(GASKET, "x")),
-            "--law: no law 'putty' of a bushing",
-        ),
+        (lambda m: bushing_model("voigt_havsin", m, TestedAxis(GASKET, "x")), "--law: voigt_havsin is a law about an axis"),
+        (lambda m: bushing_model("putty", m, TestedAxis(GASKET, "x")), "--law: no law 'putty' of a bushing"),
     ],
-)
+)  # fmt: skip
 def test_bad_questions_are_told(make, message):
     with pytest.raises(InputError) as told:
         make(measured(damper_bench(MSTV), motions_mm((3.0, 1.0))))

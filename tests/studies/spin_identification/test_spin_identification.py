@@ -156,12 +156,9 @@ def test_numbers_that_are_one_unknown_change_together(reference):
     [
         (("gasket.stifness_x",), "unknown key 'stifness_x' .did you mean 'stiffness_x'"),
         (("gasket.stiffness_x", "gasket.damping_x"), "have different units"),
-        (
-            ("damper_types.friction.friction_damping",),
-            "is not positive, so its range must be given",
-        ),
+        (("damper_types.friction.friction_damping",), "is not positive, so its range must be given"),
     ],
-)
+)  # fmt: skip
 def test_bad_unknowns_are_refused(reference, keys, message):
     with pytest.raises(InputError, match=message):
         sought_of(reference, keys)
@@ -228,29 +225,14 @@ def test_a_key_is_one_line_of_the_terminal(identify):
     ("arguments", "message"),
     [
         ((), "machine 'reference' does not have the numbers of [A] Table 8; give keys"),
-        (
-            ("--unknown", "gasket.stiffness"),
-            "--unknown: gasket.stiffness: unknown key 'stiffness'",
-        ),
+        (("--unknown", "gasket.stiffness"), "--unknown: gasket.stiffness: unknown key 'stiffness'"),
         (("--unknown", "gasket.stiffness_x=(2, 8) N"), "unit 'N' does not fit"),
-        (
-            ("--unknown", "gasket.stiffness_x=2..8"),
-            "'2' has no unit; write for example '1 N/mm'",
-        ),
-        (
-            ("--unknown", "gasket.stiffness_x=2 N/mm"),
-            "'2 N/mm' is not a range; write for example '(1, 2) N/mm'",
-        ),
-        (
-            ("--unknown", "gasket.stiffness_x=(-5, 2) N/mm"),
-            "'(-5, 2) N/mm' is out of range; allowed is >= 0",
-        ),
-        (
-            ("--unknown", "gasket.stiffness_x=(8, 2) N/mm"),
-            "bounds 8 N/mm to 2 N/mm are not a range",
-        ),
+        (("--unknown", "gasket.stiffness_x=2..8"), "'2' has no unit; write for example '1 N/mm'"),
+        (("--unknown", "gasket.stiffness_x=2 N/mm"), "'2 N/mm' is not a range; write for example '(1, 2) N/mm'"),
+        (("--unknown", "gasket.stiffness_x=(-5, 2) N/mm"), "'(-5, 2) N/mm' is out of range; allowed is >= 0"),
+        (("--unknown", "gasket.stiffness_x=(8, 2) N/mm"), "bounds 8 N/mm to 2 N/mm are not a range"),
     ],
-)
+)  # fmt: skip
 def test_bad_input_is_refused_in_one_line(identify, arguments, message):
     ended = identify(*arguments)
     assert (ended.code, len(ended.messages)) == (2, 1)
