@@ -26,16 +26,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from every_page import KINDS, _with_files, _write_inputs
 
 VARIABLE = {
-    "wall_s",
-    "date",
-    "revision",
-    "version",
-    "sources",
-    "seconds",
-    "program",
-    "command",
-    "written",
-}
+    "wall_s", "date", "revision", "version", "sources", "seconds", "program", "command", "written",
+}  # fmt: skip
 """Names of values that differ from run to run."""
 
 PRINTED = {

@@ -10,13 +10,9 @@ DAMPING = 55.0  # N s/m
 MASS = 6 * 7.0  # kg, six bodies
 
 BODIES = (
-    "tub",
-    "drum",
-    "motor",
-    "upper_counterweight",
-    "front_counterweight_left",
+    "tub", "drum", "motor", "upper_counterweight", "front_counterweight_left",
     "front_counterweight_right",
-)
+)  # fmt: skip
 STEPS = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])  # displacements of a gasket table, in its half range
 HARDENING = np.array([-3.0, -1.0, 0.0, 1.0, 3.0])  # forces there, in force of the half range
 

@@ -48,21 +48,13 @@ NOT_RUN = {  # beginning of a command, and why this test does not run it
     "wm-drake calibrate --free free.yaml --resume": "continues what was interrupted: test_cli_calibrate",
 }
 HOURS = (  # commands of more than ten seconds of processor time; the marker `hours` runs them
-    "wm-drake study tolerance",
-    "wm-drake study spin-cycle",
-    "wm-drake study spin-identify",
-    "wm-drake study gasket",
-    "wm-drake study drive",
-    "wm-drake study design",
-    "wm-drake study modes",
-    "wm-drake study response",
-    "wm-drake calibrate",
-    "wm-drake spin --engine drake",
-    "wm-drake identify gasket rubber/*.csv --axis radial --method",
-    "wm-drake identify damper bench/*.csv --law coulomb",
-    "wm-drake identify damper fit/*.csv",
+    "wm-drake study tolerance", "wm-drake study spin-cycle", "wm-drake study spin-identify",
+    "wm-drake study gasket", "wm-drake study drive", "wm-drake study design",
+    "wm-drake study modes", "wm-drake study response", "wm-drake calibrate",
+    "wm-drake spin --engine drake", "wm-drake identify gasket rubber/*.csv --axis radial --method",
+    "wm-drake identify damper bench/*.csv --law coulomb", "wm-drake identify damper fit/*.csv",
     "wm-drake identify table2",
-)
+)  # fmt: skip
 OVERVIEWS = ("README.md", "docs/how-to/commands.md")
 """Pages whose commands another page may run."""
 COMMANDS = {}

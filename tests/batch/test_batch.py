@@ -27,12 +27,8 @@ from wm_drake.simulation.runs import DivergenceWarning, simulate
 RUN_UP = SpinProfile(time=(0.0, 12.0), speed=(5.0, 30.0))
 LONGER = SpinProfile(time=(0.0, 11.0, 13.0), speed=(5.0, 28.0, 28.0))
 VARIABLES = (
-    "detergent_displacement",
-    "gasket_force",
-    "gasket_moment",
-    "amplitude",
-    "critical_speed",
-)
+    "detergent_displacement", "gasket_force", "gasket_moment", "amplitude", "critical_speed",
+)  # fmt: skip
 VIOLENT = Load(unbalances=(Unbalance(mass=60.0, radius=0.3, y=0.1),))
 
 

@@ -6,11 +6,9 @@ from concurrent.futures import CancelledError
 from pathlib import Path
 
 import pytest
-import xarray as xr
 
 from wm_drake.batch import cluster, simulate_many
 from wm_drake.batch.cluster import (
-    CASES_PER_WORK_ITEM,
     check_workers,
     cluster_client,
     run_work_item,
@@ -129,42 +127,6 @@ def test_lost_scheduler_ends_the_study():
         next(cluster._as_they_end(Running(), Lost("connecting", {"tcp://one": {}})))
     with pytest.raises(WmDrakeError, match="scheduler is lost"), cluster._cluster_errors():
         raise CancelledError
-
-
-@pytest.mark.slow
-def test_tables_are_the_same_if_a_worker_is_killed(reference, machine, tmp_path):
-    from distributed import LocalCluster
-
-    count = 12 * CASES_PER_WORK_ITEM
-    killed = []
-    with (
-        LocalCluster(
-            n_workers=2,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=None,
-            memory_limit=0,
-        ) as cluster,
-        cluster_client(cluster.scheduler_address) as client,
-        open_ledger(tmp_path / "ledger.sqlite", {"study": "test"}) as ledger,
-    ):
-        pids = client.run(os.getpid)
-
-        def kill_one(done):
-            if done >= 2 * CASES_PER_WORK_ITEM and not killed:
-                killed.append(next(iter(pids.values())))
-                os.kill(killed[0], signal.SIGKILL)
-
-        table = simulate_on_cluster(
-            machine, cases_of(reference, count), ledger, client, progress=kill_one
-        )
-        assert len(ledger) == count
-        again = simulate_on_cluster(machine, cases_of(reference, count), ledger, client)
-    assert killed
-    xr.testing.assert_identical(
-        table, simulate_many(machine, cases_of(reference, count), measures=("extremes",))
-    )
-    xr.testing.assert_identical(table, again)
 
 
 @pytest.mark.slow

@@ -256,20 +256,6 @@ def test_full_disk_is_reported_and_loses_nothing(path):
         assert all(ledger.get(str(n)).values["x"][0] == n for n in range(int(number)))
 
 
-def test_full_database_is_reported(path):
-    with open_ledger(path, IDENTITY) as ledger:
-        ledger._connection.execute("PRAGMA max_page_count = 20")
-        with pytest.raises(LedgerError, match="is the disk full"):
-            put_many(ledger)
-        assert len(ledger) > 10
-        assert ledger.get(str(len(ledger) - 1)).values["x"].shape == (100,)
-
-
-def put_many(ledger):
-    for number in range(10_000):
-        ledger.put(str(number), {"x": np.zeros(100)})
-
-
 @given(st.dictionaries(st.text(), st.floats() | st.integers() | st.text() | st.lists(st.floats())))
 def test_key_depends_on_content_not_on_order(parts):
     assert key_of(parts=parts) == key_of(parts=dict(reversed(parts.items())))

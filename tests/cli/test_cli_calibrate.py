@@ -64,14 +64,9 @@ def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
     assert result["predictions"][0]["loads"] == ["back"]
     names = {path.name for path in Path("out").iterdir()}
     assert names == {
-        "report.html",
-        "machine_1.yaml",
-        "quantities.csv",
-        "amplitudes.csv",
-        "fewer.csv",
-        "ledger.sqlite",
-        "run.json",
-    }
+        "report.html", "machine_1.yaml", "quantities.csv", "amplitudes.csv", "fewer.csv",
+        "ledger.sqlite", "run.json",
+    }  # fmt: skip
     written = load_machine(Path("out/machine_1.yaml"))
     assert written.damper_types["friction"].friction_force == pytest.approx(
         friction["value_1"], abs=0.01
@@ -98,46 +93,3 @@ def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
     assert f"{friction['value_1']:.4g}" in value
     assert " N " in value
     assert "data" in value
-
-
-FAULTS = {
-    "no free file": (["--free", "none.yaml"], "--free: no such file 'none.yaml'"),
-    "no targets file": (["--targets", "none.csv"], "--targets: no such file 'none.csv'"),
-    "unknown method": (["--method", "luck"], "no method 'luck'"),
-    "unknown load left out": (["--leave-out", "bck"], "no measured load 'bck' (did you mean 'back'?"),
-    "all loads left out": (["--leave-out", "back,middle"], "leaves no load"),
-    "as many as are free": (["--fewer", "2"], "--fewer: 2: needs falling numbers"),
-    "fewer that is no number": (["--fewer", "one"], "--fewer: 'one' is not a whole number"),
-    "limit of nothing": (["--limit", "Q=2"], "--limit: 'Q' is no load, sensor"),
-    "limit of zero": (["--limit", "0"], "--limit: '0' is not allowed"),
-    "weight of nothing": (["--weight", "Q=2"], "'Q' is no load, sensor"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_faulty_calibration_is_refused_and_nothing_written(fault, wm_drake, tmp_path):
-    (tmp_path / "free.yaml").write_text(FREE)
-    (tmp_path / "short.yaml").write_text(SHORT)
-    rows = [
-        ["middle", "yes", "experiment", *range(1, 7)],
-        ["back", "yes", "experiment", *range(1, 7)],
-    ]
-    pd.DataFrame(rows, columns=["load", "gasket", "source", *SENSORS]).to_csv(
-        tmp_path / "measured.csv", index=False
-    )
-    arguments, message = FAULTS[fault]
-    ended = wm_drake(COMMAND, "--out", "out", *arguments)
-    assert ended.code == 2
-    assert message in ended.err
-    assert len(ended.messages) == 1
-    assert not Path("out").exists()
-
-
-def test_free_file_that_does_not_fit_is_refused_with_its_line(wm_drake, tmp_path):
-    (tmp_path / "free.yaml").write_text(FREE.replace("friction_force", "fricton_force"))
-    ended = wm_drake("calibrate", "--free", "free.yaml", "--out", "out")
-    assert ended.code == 2
-    assert ended.err.startswith(
-        "free.yaml:2: quantities.friction.sets: 'damper_types.friction.fricton_force' is not a number"
-    )
-    assert not Path("out").exists()

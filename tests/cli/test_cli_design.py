@@ -44,26 +44,3 @@ def test_study_writes_front_and_machines_and_continues(study, wm_drake, monkeypa
     monkeypatch.setattr("wm_drake.batch.ledger.Ledger.put_all", None)
     again = json.loads(study("--evaluations", "16", "--json").out)
     assert again["front"] == printed["front"]
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (("Dx", "Dq"), "no response 'Dq'"),
-        (("stiffness]", "stifness]"), "stiffness"),
-        (("low: 90 %", "low: 9 kg"), "forms"),
-        (("loads: [middle]", "loads: [midle]"), "d.yaml: loads.0: 'midle' is not a load of machine"),
-        (("loads: [middle]", "loads: [back, back]"), "d.yaml: loads.1: 'back' is named twice"),
-    ],
-)  # fmt: skip
-def test_wrong_file_is_refused_before_any_run(study, change, message):
-    Path("d.yaml").write_text(TASK.replace(*change, 1))
-    ended = study()
-    assert ended.code == 2
-    assert message in ended.err
-    assert not Path("out").exists()
-
-
-def test_fewer_evaluations_than_a_population_are_refused(study):
-    ended = study("--evaluations", "4")
-    assert (ended.code, "--evaluations: 4 is less than the population" in ended.err) == (2, True)

@@ -108,29 +108,6 @@ def test_factor_file_and_one_worker_give_the_same(study_without_page, wm_drake):
     assert tables("other") == tables()
 
 
-FAULTS = {
-    "kind of design": (("--design", "d-optmal"), "--design: 'd-optmal' is neither a kind of design nor a file (did you mean"),
-    "trials": (("--design", "d-optimal", "--trials", "10"), "10 trials cannot determine the 19 coefficients"),
-    "model": (("--model", "mian"), "unknown model 'mian' (did you mean 'main'?"),
-    "factor": (("--factor", "gasket.stifness_x"), "gasket.stifness_x: unknown key 'stifness_x' (did you mean 'stiffness_x'?"),
-    "factor twice": (("--factor", "K_Lx"), "a factor is given twice"),
-    "saturated": (("--design", "d-optimal", "--trials", "19"), "19 trials for 19 coefficients of main+2fi leave no degree of freedom"),
-    "response": (("--response", "gpa"), "--response: no response 'gpa' (did you mean 'gap'"),
-    "tables": (("--tables", "curved"), "unknown treatment 'curved'"),
-    "factor file": (("--factors", "nosuch.yaml"), "no such file 'nosuch.yaml'"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_faults_are_refused_in_one_line_and_leave_nothing(study, fault):
-    arguments, message = FAULTS[fault]
-    ended = study(*arguments)
-    assert (ended.code, ended.out) == (2, "")
-    assert len(ended.messages) == 1
-    assert message in ended.messages[0]
-    assert [path.name for path in Path().iterdir()] == ["p.yaml"]
-
-
 def test_disk_that_is_full_at_the_end_costs_no_run(study_without_page, monkeypatch, no_runs):
     def full(*_):
         raise OSError(28, "No space left on device")
@@ -290,14 +267,3 @@ def test_level_zero_of_a_machine_with_tables_is_beside_the_machine(study_without
     assert printed["level_zero"]["tables"] == "scaled"
     (row,) = printed["level_zero"]["responses"]
     assert row["unit"] == "mm"
-
-
-def test_faulty_published_results_are_refused(study):
-    Path("known.csv").write_text("load,response,term,percent,effects\nmiddle,Dx,C_L,50,much\n")
-    ended = study("--published", "known.csv")
-    assert (ended.code, len(ended.messages)) == (2, 1)
-    assert "known.csv" in ended.err
-    assert "'much' is not a finite number" in ended.err
-    ended = study("--published", "nosuch.csv")
-    assert (ended.code, "no such file 'nosuch.csv'" in ended.err) == (2, True)
-    assert not Path("out").exists()

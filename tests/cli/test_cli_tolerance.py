@@ -50,28 +50,3 @@ def test_doubling_keeps_the_finished_runs(study, no_runs):
     no_runs()
     assert study("--samples", "16", *settings, "--workers", "1").code == 0
     pd.testing.assert_frame_equal(few, pd.read_csv("out/samples.csv"))
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (("high: 12 kg", "high: 0.5 kg"), "low must be below high"),
-        (("low: 1 kg", "low: -1 kg"), "lower end is not allowed"),
-        (("unbalances.0.mass", "unbalances.0.mas"), "mass"),
-        (("load: middle", "load: midle"), "did you mean 'middle'"),
-        (("distribution: uniform, low: 1 kg", "distribution: unifrom, low: 1 kg"), "uniform"),
-    ],
-)
-def test_wrong_file_is_refused_before_any_run(study, change, message):
-    Path("t.yaml").write_text(TOLERANCES.replace(*change, 1))
-    ended = study("--samples", "16")
-    assert ended.code == 2
-    assert "t.yaml" in ended.err
-    assert message in ended.err
-    assert not Path("out").exists()
-
-
-@pytest.mark.parametrize("option", ["--samples", "--sensitivity"])
-def test_numbers_that_are_no_powers_of_two_are_refused(study, option):
-    ended = study(option, "100")
-    assert (ended.code, f"{option}: 100 is not a power of two" in ended.err) == (2, True)

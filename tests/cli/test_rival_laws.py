@@ -96,29 +96,6 @@ def test_a_law_with_numbers_that_one_loop_does_not_show_reports_its_error(wm_dra
     assert json.loads(Path("two/fit.json").read_text())["supported"] == "coulomb"
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--law", "mstv,glue"), "--law: no law 'glue' of a damper"),
-        (("--law", "mstv,mstv"), "--law: 'mstv' is there twice"),
-        (("--law", "mstv,stv", "--fix", "sponge=1 N"), "--fix: unknown number 'sponge'"),
-        (("--law", "coulomb,stv", "--fix", "sponge_stiffness=1 N/mm"), "--fix: none of these laws has a number 'sponge_stiffness'"),
-        (("--validate", "copy.csv"), "copy.csv: has the same content as loop.csv, which is fitted"),
-        (("--validate", "none.csv"), "none.csv: no such file"),
-        (("--cutoff", "0 Hz"), "--cutoff: is 0 Hz; allowed is > 0"),
-    ],
-)  # fmt: skip
-def test_bad_comparisons_get_one_message(wm_drake, arguments, message):
-    lines = ["time_s,displacement_mm,force_N"]
-    lines += [f"{0.01 * k},{(k % 20 - 10) ** 2},{k % 20}" for k in range(100)]
-    Path("loop.csv").write_text("\n".join(lines))
-    Path("copy.csv").write_text("\n".join(lines))
-    ended = wm_drake("identify", "damper", "loop.csv", *arguments, "--out", "out")
-    assert ended.code == 2
-    assert ended.err.strip().splitlines()[0].startswith(message)
-    assert not Path("out").exists()
-
-
 def test_all_names_after_validate_are_held_out(wm_drake, bench):
     """Expand held/*.csv to several names, as a shell does: none of them may reach the fit."""
     files, held = bench

@@ -25,22 +25,11 @@ CURVE = packed_stiffness(
 BUSHING = np.concatenate(
     [
         [
-            50.0,
-            10.0,
-            50.0,
-            3.0,
-            5.0,
-            7.0,
-            3.7,
-            2.0,
-            1.0,
-            1.5,
-            1.0,
-            0.5,
+            50.0, 10.0, 50.0, 3.0, 5.0, 7.0, 3.7, 2.0, 1.0, 1.5, 1.0, 0.5,
         ],  # N s/m, N m s/rad, N m, rad/s
         *map(packed_stiffness, (8e3, 3e3, 8e3, 73.0, 890.0, 250.0)),  # N/m, N m/rad
     ]
-)
+)  # fmt: skip
 STV = np.array([1.0, 60.0, 0.4, 25.0])  # number of the law, f_max, v_st, damping
 MSTV = (60.0, 30.0, 1e-6, 176e3, 90.0, 400.0)  # f_max, c_m, epsilon, k1, c1, c2
 FREE_STROKE = (35.0, 60.0, 1e-6, 10.5, 0.09)  # f_max, c_m, epsilon, p_b, v_b

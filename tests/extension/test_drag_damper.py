@@ -286,14 +286,7 @@ def test_an_entry_point_makes_a_kind_known_to_every_command(tmp_path):
     shown = json.loads(run("machine", "show", "mine.yaml", "--json", *set_))
     assert shown["elements"]["slow"]["coefficient"] == 800.0
     words = (
-        "spin",
-        "--machine",
-        "mine.yaml",
-        "--load",
-        "middle",
-        "--profile",
-        "short.csv",
-        "--json",
-    )
+        "spin", "--machine", "mine.yaml", "--load", "middle", "--profile", "short.csv", "--json",
+    )  # fmt: skip
     result = run(*words)
     assert "elements.slow" in result

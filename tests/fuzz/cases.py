@@ -784,14 +784,9 @@ STATE = {
     "gasket": True,
 }
 PATHS = [
-    "",
-    "machines",
-    "machine?id=reference",
-    "machine?id=../x",
-    "studies",
-    "place?page=p",
+    "", "machines", "machine?id=reference", "machine?id=../x", "studies", "place?page=p",
     "nowhere",
-]
+]  # fmt: skip
 
 
 def _request_case(random_: random.Random, _folder: Path) -> FuzzCase:

@@ -1,5 +1,6 @@
 """The machine in the hands of a Drake user: ports, Simulator, logs, Meshcat, linearization, AutoDiff."""
 
+import gc
 import struct
 
 import numpy as np
@@ -260,8 +261,16 @@ def test_derivatives_by_element_parameters_are_those_of_finite_differences(machi
         np.testing.assert_allclose(exact[:, column], difference, atol=tolerance)
 
 
-def test_meshcat_shows_the_moving_machine_and_cannot_touch_the_dynamics(machine, reference):
-    meshcat = Meshcat(MeshcatParams(host="localhost"))
+@pytest.fixture
+def meshcat():
+    """Return a Meshcat; it must end in the thread that made it, or the process aborts."""
+    yield Meshcat(MeshcatParams(host="localhost"))
+    gc.collect()
+
+
+def test_meshcat_shows_the_moving_machine_and_cannot_touch_the_dynamics(
+    machine, reference, meshcat
+):
     shown = build_machine(reference, meshcat=meshcat)
     ends, rates = [], []
     for built in (machine, shown):
@@ -278,9 +287,8 @@ def test_meshcat_shows_the_moving_machine_and_cannot_touch_the_dynamics(machine,
     assert meshcat.HasPath("/drake/visualizer/oscillating_group/tub")
 
 
-def test_meshcat_moves_a_cabinet_that_moves():
+def test_meshcat_moves_a_cabinet_that_moves(meshcat):
     """Compare the picture with the plant: the cabinet is where it is there, and its floor stays."""
-    meshcat = Meshcat(MeshcatParams(host="localhost"))
     shown = build_machine(with_moving_cabinet(friction=0.1), meshcat=meshcat)
     context = shown.set_up("middle").context
     simulator = Simulator(shown.diagram, context)

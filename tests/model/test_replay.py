@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -185,3 +187,22 @@ def test_replay_is_served_to_this_computer_only(monkeypatch, reference):
     with pytest.raises(KeyboardInterrupt):
         replay_page(reference, Motion(np.zeros(1), np.zeros((1, 7)), np.zeros(1)))
     assert hosts == ["localhost"]
+
+
+COLLECTED = """
+import gc, threading
+import numpy as np
+from wm_drake.model.replay import Motion, replay_page
+from wm_drake.parameters import load_machine
+gc.disable()
+replay_page(load_machine("reference"), Motion(np.zeros(1), np.zeros((1, 7)), np.zeros(1)))
+thread = threading.Thread(target=gc.collect)
+thread.start()
+thread.join()
+"""
+
+
+def test_garbage_of_a_replay_may_be_collected_in_any_thread():
+    """A Meshcat that another thread collects ends the process, as in a study after a replay."""
+    ended = subprocess.run([sys.executable, "-c", COLLECTED], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr

@@ -31,14 +31,9 @@ def test_shapes_of_tub_weights_and_housing_are_measured(scene):
     fixed = {scene._name(pair[1]) for pair in scene._pairs}
     assert {"tub_shell", "motor_block", "upper_counterweight_block"} <= moving
     assert {
-        "wall_left",
-        "wall_right",
-        "wall_top",
-        "wall_bottom",
-        "wall_rear",
-        "wall_front",
+        "wall_left", "wall_right", "wall_top", "wall_bottom", "wall_rear", "wall_front",
         "detergent_box",
-    } == fixed
+    } == fixed  # fmt: skip
 
 
 def test_tub_shell_to_side_wall_is_the_support_function_of_a_cylinder(scene):

@@ -41,15 +41,8 @@ def one(parameters, text, tables="linear"):
 def test_gasket_factors_move_every_stiffness_and_damping_once(plain):
     levels = levels_of(plain, KNOWN)
     assert [factor.name for factor in levels] == [
-        "C_L",
-        "C_T",
-        "K_Lx",
-        "K_Ly",
-        "K_Lz",
-        "K_Tx",
-        "K_Ty",
-        "K_Tz",
-    ]
+        "C_L", "C_T", "K_Lx", "K_Ly", "K_Lz", "K_Tx", "K_Ty", "K_Tz",
+    ]  # fmt: skip
     moved = [key for factor in levels for key in factor.settings[0]]
     expected = [
         key

@@ -78,15 +78,9 @@ def test_a_planted_fault_does_not_fit_the_schema(fault, validator):
 
 
 GROUPS_OF_MACHINES = (
-    "gasket",
-    "loads.middle.unbalances.0",
-    "spring_types.suspension",
-    "springs.left",
-    "profile",
-    "sensors.Xr",
-    "clearance",
-    "drive",
-)
+    "gasket", "loads.middle.unbalances.0", "spring_types.suspension", "springs.left", "profile",
+    "sensors.Xr", "clearance", "drive",
+)  # fmt: skip
 FAULTS = {
     "no unit": lambda text: text.partition(" ")[0] if text[0] != "(" else f"{text.split(')')[0]})",
     "number of YAML": lambda text: 1.5,

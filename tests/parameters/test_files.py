@@ -250,19 +250,11 @@ def test_several_problems_are_several_lines(write):
     )
     problems = refused(path)
     assert sorted(problem.removeprefix(f"{path}:").split(" ")[1] for problem in problems) == [
-        "extra:",
-        "gasket.damping_x:",
-        "gasket.stiffness_x:",
-        "gravity:",
-        "profile:",
-    ]
+        "extra:", "gasket.damping_x:", "gasket.stiffness_x:", "gravity:", "profile:",
+    ]  # fmt: skip
     assert sorted(int(problem.removeprefix(f"{path}:").split(":")[0]) for problem in problems) == [
-        2,
-        4,
-        5,
-        6,
-        7,
-    ]
+        2, 4, 5, 6, 7,
+    ]  # fmt: skip
 
 
 def test_everything_missing_is_several_lines(write):
@@ -270,13 +262,9 @@ def test_everything_missing_is_several_lines(write):
     assert [problem.split(": ", 1)[1] for problem in problems] == [
         f"{key}: is missing"
         for key in (
-            "gravity",
-            "sensors",
-            "clearance",
-            "loads",
-            "profile",
+            "gravity", "sensors", "clearance", "loads", "profile",
         )
-    ]
+    ]  # fmt: skip
 
 
 def test_machine_that_extends_itself_is_refused(write):

@@ -196,23 +196,6 @@ def test_factor_table_has_every_level_and_its_unit(trials, words):
             )
 
 
-def test_page_is_whole(screening, trials):
-    page = GasketResult(screening, trials).page(Facts("wm-drake study gasket", 12.0))
-    assert "load towel &amp; co" in page
-    assert page.count("<figure data-picture>") == 1 + 3 + 2 * 5
-    assert "<img" not in page
-    for text in (
-        "0.0095 N s/mm",
-        "gasket.damping_z",
-        "What to do",
-        "D-efficiency for main+2fi",
-        "wm-drake study gasket",
-        "linear stiffness along x K_Lx × linear stiffness along y K_Ly",
-    ):
-        assert text in page
-    assert not re.search(r"[>( ](nan|NaN)[<) ]", without_scripts(page))
-
-
 @pytest.mark.parametrize("model", ["main", "main+2fi"])
 def test_page_of_few_factors_and_failed_runs(trials, model):
     def evaluate(design):

@@ -84,13 +84,10 @@ def test_accelerations_of_points_are_the_second_differences_of_their_positions(m
     angle = record.drum_angle.values[:, None]
     motion = np.hstack(
         [
-            record.tub_angle,
-            record.tub_position,
-            angle,
-            record.tub_angular_velocity,
+            record.tub_angle, record.tub_position, angle, record.tub_angular_velocity,
             record.tub_velocity,
         ]
-    )
+    )  # fmt: skip
     acceleration = np.hstack([record.tub_angular_acceleration, record.tub_acceleration])
     points = np.array([[0.1, -0.2, 0.25]])
     computed = point_accelerations(motion, acceleration, points)[:, 0]

@@ -3,6 +3,7 @@
 The page is Drake's Meshcat with a recorded animation. A caption shows title, time and drum speed.
 """
 
+import gc
 import html
 import json
 from collections.abc import Iterator
@@ -85,6 +86,17 @@ def replay_page(
         load: Point masses in the drum; they turn with it.
         gasket: Whether the gasket is shown.
     """
+    try:
+        return _drawn_page(parameters, motion, title, load, gasket)
+    finally:
+        # The diagram and its Meshcat refer to each other, and a Meshcat that the garbage collector
+        # finds in another thread ends the process.
+        gc.collect()
+
+
+def _drawn_page(
+    parameters: MachineParameters, motion: Motion, title: str, load: Load | None, gasket: bool
+) -> str:
     meshcat = Meshcat(MeshcatParams(host="localhost"))  # reachable from this computer only
     for hidden in ("/Grid", "/Axes"):
         meshcat.SetProperty(hidden, "visible", False)

@@ -1,6 +1,5 @@
 """Tests of the calibration page: its text agrees with the numbers."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -87,27 +86,9 @@ def test_certainty_sorts_the_quantities(calibration):
     assert found["Determined by the prior only"] == "none"
 
 
-def test_page_needs_nothing_else_and_escapes_the_command(page):
-    assert not re.search(r'(src|href)="(?!data:|#|https://doi.org/)', page)
-    assert "a&lt;b" in page
-
-
-def test_page_shows_every_search_prediction_and_quantity(page):
-    for text in ("2000.0", "31.0", "4.001", "determined by", "bound", "123", "back"):
-        assert text in page
-    for load in ("middle (without gasket)", "middle (with gasket)", "back (with gasket)"):
-        assert f"Load {load}: displacement" in page
-
-
 def test_page_shows_the_intervals_of_held_out_loads(page):
     section = page[page.index('id="prediction"') : page.index('id="quantities"')]
     assert "The intervals contain 50 % of the measured ones" in section
     assert "5.0 to 11.0" in section
     assert "5.0 to 9.0" in section
     assert "a scatter of 7 % of an amplitude" in section
-
-
-def test_page_compares_the_gasket_s_effect(page):
-    section = page[page.index('id="gasket"') : page.index('id="prediction"')]
-    assert "−25 %" in section  # Yf: computed falls, measured does not change
-    assert "0 %" in section

@@ -222,16 +222,6 @@ def test_response_that_does_not_vary_has_no_contributions():
     assert np.isnan(table.residual_percent)
 
 
-def test_saturated_fit_has_no_tests():
-    levels = d_optimal_levels(4, 33, "main+2fi", 0)
-    table = anova(design_of(levels), pd.DataFrame({"y": np.random.default_rng(0).normal(size=33)}))[
-        "y"
-    ]
-    assert table.residual_df == 0
-    assert all(np.isnan(term.p) for term in table.terms)
-    assert sum(term.percent for term in table.terms) == pytest.approx(100.0)
-
-
 def test_predicted_r2_is_that_of_fits_without_each_trial():
     rng = np.random.default_rng(3)
     levels = d_optimal_levels(4, 60, "main+2fi", 0)

@@ -100,19 +100,6 @@ def test_effects_with_another_sign_are_marked(screening):
     assert "another sign than the published ones: 1 of 1: C_L on Dx, load middle." in text
 
 
-def test_summary_says_what_is_far(screening, published):
-    words = Words((), {})
-    text = " ".join(summary(screening, words, Compared(published)))
-    assert (
-        "Means beside the published ones: 1 of 2 differ by more than 30 %: Dy, load middle (+67 %)."
-    ) in text
-    assert (
-        "Contributions beside the published ones: 1 differ by more than 30 points of percent: C_L "
-        "on Dx, load middle (40 points)."
-    ) in text
-    assert "published" not in " ".join(summary(screening, words))
-
-
 def test_tables_and_files_have_published_numbers_beside_ours(screening, published, tmp_path):
     words = Words(levels(screening), {})
     found = texts.variance(screening, words, published)

@@ -78,13 +78,9 @@ def test_tables_are_the_same_bytes_each_time(screening, tmp_path):
     files = {path.name: path.read_bytes() for path in (tmp_path / "first").iterdir()}
     assert files == {path.name: path.read_bytes() for path in (tmp_path / "second").iterdir()}
     assert set(files) == {
-        "design.csv",
-        "runs.csv",
-        "variance.csv",
-        "contributions.csv",
-        "effects.csv",
+        "design.csv", "runs.csv", "variance.csv", "contributions.csv", "effects.csv",
         "leading_terms.csv",
-    }
+    }  # fmt: skip
     variance = pd.read_csv(tmp_path / "first" / "variance.csv").set_index(["load", "response"])
     assert variance.loc[
         ("two", "y"), ["constant", "smallest", "largest"]

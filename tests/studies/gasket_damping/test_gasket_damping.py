@@ -253,17 +253,3 @@ def run_of(machine, parameters, load):
     ended = []
     simulate_many(machine, cases, histories=True, finished=ended.append)
     return ended[0].record
-
-
-def test_faults_of_the_command_are_refused(wm_drake):
-    Path("r.csv").write_text("time_s,Xr\n0,1\n")
-    for arguments, message in (
-        (("--record", "r.csv"), "does not have the form LOAD=FILE with a load of the machine"),
-        (("--record", "middle=nosuch.csv"), "no such file 'nosuch.csv'"),
-        (("--record", "middle=r.csv"), "r.csv: needs the columns time_s,Xr,Yr"),
-        (("--planted-linear", "3 N"), "unit 'N' does not fit"),
-    ):
-        ended = wm_drake("study", "gasket-damping", "--out", "out", *arguments)
-        assert (ended.code, len(ended.messages)) == (2, 1)
-        assert message in ended.err
-        assert not Path("out").exists()

@@ -112,20 +112,3 @@ def test_command_gives_all_axes_in_one_plot_and_a_machine(wm_drake):
     page = Path("fit/report.html").read_text()
     assert page.count("<figure data-picture>") == 1
     assert set(pd.read_csv("fit/static.csv").axis) == {"x", "y", "about_x", "about_y"}
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--static", "r.csv"), "FILES: 'r.csv' names no axis"),
-        (("--static", "radial=r.csv", "z=r.csv"), "FILES: axis z is tested under two names"),
-        (("--static", "tilt=r.csv"), "r.csv: axis about_x needs angles and moments"),
-        (("r.csv",), "--axis: is needed"),
-    ],
-)
-def test_bad_static_commands_get_one_message(wm_drake, arguments, message):
-    write("r.csv", ramps((0.0, 20e-3, 0.0)), ("time_s", "displacement_mm", "force_N"))
-    ended = wm_drake("identify", "gasket", *arguments, "--out", "out")
-    assert ended.code == 2
-    assert ended.err.strip().splitlines()[0].startswith(message)
-    assert not Path("out").exists()

@@ -2,7 +2,7 @@ import base64
 import hashlib
 import html
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from html.parser import HTMLParser
 
@@ -13,12 +13,9 @@ from hand_made_records import case_result, spin_result
 from pages import without_scripts
 
 from wm_drake.parameters import (
-    Load,
     MachineParameters,
     SpinProfile,
     load_machine,
-    quantities,
-    with_value,
 )
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import number, percent
@@ -26,7 +23,7 @@ from wm_drake.report.scripts import packed_plotly
 from wm_drake.report.table import readable
 from wm_drake.studies.spin.page import amplitude_table, spin_page, warnings_of
 from wm_drake.studies.spin.panels import revolution_starts, simplified_indices
-from wm_drake.studies.spin.study import CaseResult, Comparison, Files, SpinResult
+from wm_drake.studies.spin.study import CaseResult, Files, SpinResult
 from wm_drake.studies.spin.tables import (
     accelerations,
     differences,
@@ -157,30 +154,6 @@ def words_from(words: list[str], start: int, count: int) -> list[str]:
     return [word for word in words[start : start + 2 * count] if word][:count]
 
 
-def test_page_names_what_was_run(page: str, machine: MachineParameters) -> None:
-    for text in (
-        "drake 9.9.9",
-        "2.5 ms",
-        "wm-drake spin --set &#39;a=&lt;b&gt;&#39;",
-        "oscillating_group.sdf",
-    ):
-        assert text in page
-    assert f"{machine.spring_types['suspension'].stiffness / 1e3:g} N/mm" in page
-    assert all(f">{html.escape(key)}</th>" in page for key, _, _ in quantities(machine))
-    assert "C_L, the same on every axis" in page
-    assert all(f"<dt>[{letter}]</dt>" in page for letter in "ABC")
-
-
-def test_summary_is_made_from_the_numbers(result: SpinResult, page: str) -> None:
-    size = 1e3 * float(result.results[0].measures.amplitude.max())
-    summary = re.search(r'<p class="summary">(.*?)</p>', page, re.DOTALL)
-    assert summary is not None
-    assert f"load middle (with gasket): {size:.1f} mm at sensor" in summary[1]
-    assert "at 240 rpm" in summary[1]
-    assert "12.0 mm between tub shell and wall right" in summary[1]
-    assert "12 amplitudes can be compared" in summary[1]
-
-
 def test_mount_forces_and_accelerations_of_planted_motion(
     result: SpinResult, machine: MachineParameters
 ) -> None:
@@ -255,45 +228,6 @@ def test_all_cases_diverged_still_give_a_page(machine: MachineParameters) -> Non
 def test_overlap_is_warned_of(machine: MachineParameters) -> None:
     page = spin_page(spin_result(machine, [case_result(machine, gap=-0.003)]))
     assert "tub shell and wall right overlap by 3.0 mm" in page
-
-
-def slower(case: CaseResult) -> CaseResult:
-    slow = SpinProfile(time=(0.0, 2.0), speed=(0.0, 10.0))
-    return replace(case, case=replace(case.case, profile=slow))
-
-
-def heavier(case: CaseResult) -> CaseResult:
-    load = Load(
-        unbalances=tuple(u.model_copy(update={"mass": 0.5}) for u in case.case.load.unbalances)
-    )
-    return replace(case, case=replace(case.case, load=load))
-
-
-def of_own_parameters(case: CaseResult) -> CaseResult:
-    other = with_value(load_machine("reference"), "gasket.damping_x", 10.0)
-    return replace(case, case=replace(case.case, parameters=other))
-
-
-@pytest.mark.usefixtures("without_drawing")
-@pytest.mark.parametrize("change", [slower, heavier, of_own_parameters])
-def test_only_what_was_measured_is_compared(
-    machine: MachineParameters, change: Callable[[CaseResult], CaseResult]
-) -> None:
-    result = spin_result(machine, [change(case_result(machine))])
-    assert amplitude_table(result)["source"].tolist() == ["wm_drake"]
-    page = spin_page(result)
-    assert "they belong to other loads or to another spin profile" in page
-    assert "can be compared with the experiment" not in page
-    named = replace(result, comparison=Comparison.ALL)
-    assert "experiment" in amplitude_table(named)["source"].tolist()
-    assert "can be compared with the experiment" in spin_page(named)
-
-
-@pytest.mark.usefixtures("without_drawing")
-def test_machine_with_changed_numbers_is_not_compared(machine: MachineParameters) -> None:
-    result = replace(spin_result(machine, [case_result(machine)]), comparison=Comparison.NONE)
-    assert amplitude_table(result)["source"].tolist() == ["wm_drake"]
-    assert "because its numbers were changed" in spin_page(result)
 
 
 def test_names_cannot_inject_markup(machine: MachineParameters) -> None:
@@ -375,16 +309,6 @@ def test_percent_difference_row_by_hand(machine: MachineParameters) -> None:
     assert cells == ["+20 %", "0 %", "−50 %", "0 %", "−50 %", "−90 %", "35 %"]  # 210 / 6
     assert "The mean absolute difference is 35 %" in page
     assert "The largest difference is −90 %, at sensor Zf" in page
-
-
-@pytest.mark.usefixtures("without_drawing")
-def test_case_without_gasket_has_no_gasket_figure(machine: MachineParameters) -> None:
-    page = spin_page(spin_result(machine, [case_result(machine, gasket=False)]))
-    plots = [a for a in Tags(page).all("div") if a.get("class") == "plot"]
-    alternatives = [plot["aria-label"] or "" for plot in plots]
-    assert len(alternatives) == 5  # floor, envelopes, orbits, mount forces, accelerations
-    assert not any("Gasket" in text for text in alternatives)
-    assert "middle (without gasket)" in page
 
 
 def test_same_result_gives_the_same_page(result: SpinResult, page: str) -> None:

@@ -219,22 +219,3 @@ def test_a_key_is_one_line_of_the_terminal(identify):
     lines = [line.strip() for line in identify(*unknowns).out.splitlines()]
     assert {"gasket.stiffness_x", "= gasket.stiffness_z", "gasket.damping_x"} <= set(lines)
     assert "report.html, identified.yaml, measured.csv" in lines[-1]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((), "machine 'reference' does not have the numbers of [A] Table 8; give keys"),
-        (("--unknown", "gasket.stiffness"), "--unknown: gasket.stiffness: unknown key 'stiffness'"),
-        (("--unknown", "gasket.stiffness_x=(2, 8) N"), "unit 'N' does not fit"),
-        (("--unknown", "gasket.stiffness_x=2..8"), "'2' has no unit; write for example '1 N/mm'"),
-        (("--unknown", "gasket.stiffness_x=2 N/mm"), "'2 N/mm' is not a range; write for example '(1, 2) N/mm'"),
-        (("--unknown", "gasket.stiffness_x=(-5, 2) N/mm"), "'(-5, 2) N/mm' is out of range; allowed is >= 0"),
-        (("--unknown", "gasket.stiffness_x=(8, 2) N/mm"), "bounds 8 N/mm to 2 N/mm are not a range"),
-    ],
-)  # fmt: skip
-def test_bad_input_is_refused_in_one_line(identify, arguments, message):
-    ended = identify(*arguments)
-    assert (ended.code, len(ended.messages)) == (2, 1)
-    assert message in ended.err
-    assert not Path("out").exists()
