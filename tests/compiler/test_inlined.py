@@ -6,7 +6,6 @@ import sys
 from collections import namedtuple
 from pathlib import Path
 
-
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.lanes import WIDTH, lane_array
 
