@@ -28,6 +28,7 @@ SLOWLY = [
     pytest.param(name, marks=[pytest.mark.slow] if name in {*REQUIRED, *SHORTER} else [])
     for name in STUDIES
 ]
+SHORTER["tolerance"] = KINDS["tolerance"].commands
 
 
 @pytest.fixture

@@ -211,11 +211,3 @@ def test_command_names_its_experiment_virtual_and_recovers_the_true_numbers(iden
     assert (
         "virtual" not in Path("out/report.html").read_text(encoding="utf-8").split("references")[0]
     )
-
-
-def test_a_key_is_one_line_of_the_terminal(identify):
-    keys = ("gasket.stiffness_x+gasket.stiffness_z", "gasket.damping_x")
-    unknowns = (word for key in keys for word in ("--unknown", key))
-    lines = [line.strip() for line in identify(*unknowns).out.splitlines()]
-    assert {"gasket.stiffness_x", "= gasket.stiffness_z", "gasket.damping_x"} <= set(lines)
-    assert "report.html, identified.yaml, measured.csv" in lines[-1]
