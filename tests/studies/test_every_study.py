@@ -22,6 +22,7 @@ REQUIRED = {"calibrate": KINDS["calibration"].commands[0][1:]}
 SHORTER = {
     "gasket-damping": KINDS["gasket_damping"].commands,
     "spin-identify": KINDS["spin_identify"].commands,
+    "verdict": KINDS["verdict"].commands,
 }
 """Commands of studies that take minutes even with `--quick`: those of their pages."""
 SLOWLY = [

@@ -19,6 +19,7 @@ from wm_drake.cli.quiet import give_quiet
 from wm_drake.errors import Problem, WmDrakeError, reason_of
 from wm_drake.studies.calibration.options import CALIBRATE
 from wm_drake.studies.spin.options import SPIN
+from wm_drake.studies.verdict.options import VERDICT
 
 app = typer.Typer(
     help="Dynamics of front-loading washing machines.",
@@ -32,7 +33,7 @@ app.add_typer(machine.app, name="machine")
 app.add_typer(record.app, name="record")
 app.add_typer(rig.app, name="rig")
 app.add_typer(study.app, name="study")
-for declared in (SPIN, CALIBRATE):
+for declared in (VERDICT, SPIN, CALIBRATE):
     app.command(declared.name)(command_of(declared))
 app.command()(studio.studio)
 give_quiet(app)

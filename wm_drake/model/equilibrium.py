@@ -282,9 +282,8 @@ def spring_force(elements: PlacedElements, pose: FloatArray) -> FloatArray:
     """Return the sum of the forces of the springs on the tub at a pose, in W. (3,) [N]"""
     tensions = tensions_at(elements, pose)
     lines = _spring_lines(elements, pose)
-    return np.asarray(
-        sum(-tensions[name] * line / np.linalg.norm(line) for name, line in lines.items())
-    )
+    forces = (-tensions[name] * line / np.linalg.norm(line) for name, line in lines.items())
+    return sum(forces, start=np.zeros(3))
 
 
 def _spring_lines(elements: PlacedElements, pose: FloatArray) -> dict[str, FloatArray]:

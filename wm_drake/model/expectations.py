@@ -70,7 +70,7 @@ def bounce_frequency(setup: Setup) -> float:
 
 def _bounce(setup: Setup) -> Iterator[Problem]:
     frequency, (low, high) = bounce_frequency(setup), BOUNCE_HZ
-    if not low <= frequency <= high:
+    if setup.elements.springs and not low <= frequency <= high:
         yield Problem(
             "",
             "spring_types",

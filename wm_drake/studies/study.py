@@ -252,6 +252,7 @@ def _load() -> None:
     from wm_drake.studies.spin_identification.options import SPIN_IDENTIFY
     from wm_drake.studies.steady.options import RESPONSE
     from wm_drake.studies.tolerance.options import TOLERANCE
+    from wm_drake.studies.verdict.options import VERDICT
 
     studies = (
         CALIBRATE,
@@ -265,6 +266,7 @@ def _load() -> None:
         SPIN_CYCLE,
         SPIN_IDENTIFY,
         TOLERANCE,
+        VERDICT,
     )
     for study in studies:
         STUDIES.register(study)

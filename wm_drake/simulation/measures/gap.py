@@ -21,10 +21,12 @@ def _contacts(run: Run) -> Sequence[FloatArray]:
     gap, pairs = run.find_gap(), run.scene.pair_names()
     touching: FloatArray = np.full(len(pairs), np.nan)
     if gap is None:
-        return np.array(np.nan), touching
+        return np.array(np.nan), np.array(np.nan), touching
     if gap.distance <= 0.0:
         touching = run.scene.contacts(run.time, run.poses, run.rest_pose)
-    return np.array(float(pairs.index(f"{gap.moving}|{gap.fixed}"))), touching
+    nearest = np.array(float(pairs.index(f"{gap.moving}|{gap.fixed}")))
+    speed = np.array(np.interp(gap.time, run.time, run.drum_speed))
+    return nearest, speed, touching
 
 
 GAP = Measure(
@@ -55,6 +57,17 @@ CONTACTS = Measure(
             Unit("", ""),
             "nearest pair",
             "number, along pair, of the two shapes with the smallest gap",
+            better="",
+            is_response=False,
+            json=None,
+            studio=None,
+        ),
+        Variable(
+            "gap_speed",
+            (),
+            Unit("rad/s", "rpm"),
+            "speed at the smallest gap",
+            "speed of the drum at the time of the smallest gap",
             better="",
             is_response=False,
             json=None,

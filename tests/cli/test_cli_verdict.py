@@ -1,0 +1,76 @@
+"""Tests of `wm-drake verdict`: answer, advice that holds when it is run, exit codes."""
+
+import json
+import shlex
+from pathlib import Path
+
+import pytest
+
+import wm_drake as wm
+from wm_drake.parameters import with_values
+
+PROFILE = "time: (0, 2) s\nspeed: (0, 300) rpm\n"
+
+
+@pytest.fixture
+def verdict(wm_drake):
+    """Return a function that gives a verdict on a short run."""
+    Path("p.yaml").write_text(PROFILE)
+    return lambda *words: wm_drake("verdict", *words, "--samples", "16", "--profile", "p.yaml")
+
+
+def smallest_gaps(parameters):
+    """Return the smallest gap of each load by single runs, with its drum speed. [m, rad/s]"""
+    profile, machine = wm.load_profile("p.yaml"), wm.build_machine(parameters)
+    scene = wm.Scene(parameters)
+    gaps = {}
+    for name, load in parameters.loads.items():
+        record = wm.simulate(machine, wm.Case(name, load, profile))
+        gap = wm.measure(record, scene).smallest_gap
+        speed = float(record.drum_speed.interp(time=gap.time))
+        gaps[name] = gap.distance, speed, f"{gap.moving} and {gap.fixed}".replace("_", " ")
+    return gaps
+
+
+def test_the_answer_and_the_advice_are_those_of_single_runs(verdict):
+    ended = verdict("reference", "--json", "--out", "out")
+    assert ended.code == 0, ended.err
+    shown = json.loads(ended.out)
+    reference = wm.load_machine("reference")
+    assert [row["load"] for row in shown["loads"]] == list(reference.loads)
+    for row, (gap, speed, parts) in zip(
+        shown["loads"], smallest_gaps(reference).values(), strict=True
+    ):
+        assert row["smallest_gap_mm"] == pytest.approx(1e3 * gap, rel=1e-9)
+        assert row["speed_rpm"] == pytest.approx(30.0 / 3.14159265 * speed, rel=1e-4)
+        assert row["between"] == parts
+    assert shown["verdict"] == "clear"
+    assert shown["laundry"]["upper"] == pytest.approx(1.0 - 0.05 ** (1 / 16))  # rule of three
+    single, both = shown["best_single_change"], shown["best_combination"]
+    assert shown["smallest_gap_mm"] < single["smallest_gap_mm"] < both["smallest_gap_mm"]
+    changed = with_values(reference, both["set"])
+    gaps = [gap for gap, _, _ in smallest_gaps(changed).values()]
+    assert both["smallest_gap_mm"] == pytest.approx(1e3 * min(gaps), rel=1e-9)
+    words = shlex.split(shown["line_to_copy"])
+    assert words[:3] == ["wm-drake", "verdict", "reference"]
+    assert [w for w in words if "=" in w] == [f"{key}={text}" for key, text in both["set"].items()]
+    page = Path("out/report.html").read_text(encoding="utf-8")
+    assert page.index("The tub does not touch the housing") < page.index("Best combination")
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (("--clearance", "200 mm"), 1, "verdict: too near"),
+        (("--set", "loads.back.unbalances.0.mass=12 kg"), 1, "verdict: touches"),
+        (("--clearance", "10 N"), 2, "--clearance"),
+        (("--clearance", "-1 mm"), 2, "allowed are 0 mm"),
+        (("nothing.yaml",), 2, "nothing.yaml"),
+        (("rodrigues_2010",), 0, ""),  # no springs, so no frequency of bouncing either
+    ],
+)
+def test_exit_codes(verdict, words, code, message):
+    ended = verdict(*words, "--out", "out")
+    assert ended.code == code
+    assert message in ended.err
+    assert Path("out/report.html").exists() == (code != 2)

@@ -1,0 +1,48 @@
+"""Options of the verdict, and its declaration."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wm_drake.studies.study import PROFILE, SEED, Options, Study, Task, option
+
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    from wm_drake.model.machine import Machine
+
+
+class VerdictOptions(Options):
+    """Options of the verdict."""
+
+    machine: str = option(
+        "reference", "Name of a shipped machine, or machine file.", "MACHINE", "argument"
+    )
+    clearance: str = option(
+        "0 mm", "Gap between tub and housing that must remain in every run.", "LENGTH"
+    )
+    laundry: str = option(
+        "laundry",
+        "What scatters beside the loads of the machine: shipped tolerance file (laundry, "
+        "heavy_laundry, laundry_and_parts), or a YAML file.",
+        "NAME|FILE",
+    )
+    samples: int = option(512, "Samples of the laundry, a power of two.", "N", ge=16)
+    change: float = option(
+        20.0, "Change of a part that is tried, more and less. [%]", "PERCENT", ge=1.0, le=80.0
+    )
+    profile: Path | None = PROFILE
+    seed: int = SEED
+
+
+def _begin(options: VerdictOptions, machine: "Machine") -> Task:
+    from wm_drake.studies.verdict.study import VerdictTask
+
+    return VerdictTask(options, machine)
+
+
+VERDICT = Study(
+    "verdict",
+    "Say whether the tub touches the housing, how likely that is, and what to change.",
+    VerdictOptions,
+    _begin,
+    quick={"samples": 16},
+    group="",
+)

@@ -1,0 +1,424 @@
+"""Judge a machine by all its loads and random laundry, and try changes of its parts in real runs.
+
+Nothing is interpolated: each gap that the result names is that of a run. Changes are tried one at a
+time, more and less; the best ones are then combined one after the other, as long as that helps.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from wm_drake.engines.compiled.step_check import check_step
+from wm_drake.errors import InputError, input_error
+from wm_drake.model.bodies import with_sdf_values
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
+from wm_drake.model.sdf_names import sdf_names
+from wm_drake.parameters import MachineParameters, with_values
+from wm_drake.parameters.keys import quantities
+from wm_drake.parameters.units import Unit
+from wm_drake.parameters.variation import value_at
+from wm_drake.simulation.cases import Case, load_of
+from wm_drake.simulation.measures import MEASURES
+from wm_drake.simulation.measures.responses import (
+    GAP,
+    Response,
+    has_gap,
+    known_responses,
+    measures_of,
+)
+from wm_drake.simulation.runs import checked_step
+from wm_drake.studies.inputs import problems_of_option, profile_of, selected_cases
+from wm_drake.studies.study import Task
+from wm_drake.studies.tolerance.options import ToleranceOptions
+from wm_drake.studies.tolerance.shares import bound_if_none, share_of
+from wm_drake.studies.tolerance.study import CONTACTS
+from wm_drake.studies.tolerance.task import ToleranceTask
+from wm_drake.studies.verdict.options import VerdictOptions
+
+if TYPE_CHECKING:
+    from wm_drake.parameters.types import FloatArray
+    from wm_drake.studies.run import Executor
+    from wm_drake.studies.verdict.page import VerdictResult
+
+MM = Unit("m", "mm")
+
+NO_SHAPES = "the SDF has no shapes on both tub and housing, so no verdict can be given"
+
+PARTS = ("spring_types", "damper_types", "bushing_types", "gasket")
+"""Tables of the parts that a designer can exchange."""
+
+PHYSICAL = ("N/m", "N*s/m", "N", "N*m/rad", "N*m*s/rad", "N*m")
+"""SI units of stiffness, damping and friction; other numbers, such as the velocity at which
+friction is full, belong to a law and not to a part."""
+
+COUNTERWEIGHT = "counterweight"
+"""Part of the name of a body whose mass a designer can choose."""
+
+SHOWN_GROUPS = ("amplitude", "F", "mount_force_peak")
+"""Responses that tell what a change costs: displacement, force of the gasket, forces of mounts."""
+
+MOST_COMBINED = 3
+"""Largest number of changes in a combination: more are hard to make."""
+
+MOST_TRIED = 8
+"""Number of single changes, the best ones, that a combination may contain."""
+
+LEAST_GAIN = 1e-4
+"""Gain of the gap below which a change is not added. [m] Assumption: less cannot be measured."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the runs of all loads with one machine gave.
+
+    Attributes:
+        changes: Values as text by key path; empty for the machine as it is.
+        table: Runs of the loads, in the order of the loads.
+    """
+
+    changes: Mapping[str, str]
+    table: xr.Dataset
+
+    @property
+    def gaps(self) -> "FloatArray":
+        """Return the smallest gap of each load; minus infinity for a run that failed. [m]"""
+        failed = self.table.diverged.values != ""
+        return np.where(failed, -np.inf, self.table.smallest_gap.values)
+
+    @property
+    def gap(self) -> float:
+        """Return the smallest gap of all loads. [m]"""
+        return float(self.gaps.min())
+
+    def place(self, index: int) -> tuple[str, float]:
+        """Return the pair of shapes of the smallest gap of a load, and the speed there. [rad/s]"""
+        pair = float(self.table.nearest_pair.values[index])
+        name = str(self.table.pair.values[int(pair)]) if np.isfinite(pair) else ""
+        return name, float(self.table.gap_speed.values[index])
+
+
+@dataclass(frozen=True)
+class Influence:
+    """What one number of a part does to the smallest gap of all loads.
+
+    Attributes:
+        key: Key path.
+        less, more: Runs with less and with more of it.
+    """
+
+    key: str
+    less: Outcome
+    more: Outcome
+
+    @property
+    def span(self) -> float:
+        """Return by how much the gap differs between more and less. [m]"""
+        return abs(self.more.gap - self.less.gap) if np.isfinite(self._ends).all() else np.inf
+
+    @property
+    def best(self) -> Outcome:
+        """Return the better of the two."""
+        return max(self.less, self.more, key=lambda outcome: outcome.gap)
+
+    @property
+    def _ends(self) -> tuple[float, float]:
+        return self.more.gap, self.less.gap
+
+
+@dataclass(frozen=True)
+class Laundry:
+    """Smallest gaps of samples of the laundry.
+
+    Attributes:
+        gaps: (n,) [m], minus infinity for a run that failed.
+        clearance: Gap that must remain. [m]
+    """
+
+    gaps: "FloatArray"
+    clearance: float
+
+    @property
+    def probability(self) -> tuple[float, float, float]:
+        """Return the share of samples with too small a gap, and the ends of its 95 % interval."""
+        share = share_of(self.gaps <= self.clearance)
+        upper = share.upper if share.count else bound_if_none(share.samples)
+        return share.estimate, share.lower, upper
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Findings of a verdict.
+
+    Attributes:
+        machine: The machine.
+        loads: Names of its loads.
+        clearance: Gap that must remain. [m]
+        change: Change of a part that was tried. [%]
+        base: Runs of the machine as it is.
+        influences: Of each part, the strongest first.
+        single: Best single change; None if none helps.
+        combination: Best combination of at least two changes; None if none is better.
+        laundry: Random laundry in the machine as it is.
+        laundry_changed: The same laundry with the best change; None without one.
+        about: Description of the laundry.
+        responses: Responses of the tables, with words and unit.
+        command: Command that gives a verdict on the machine again.
+        runs: Number of all runs.
+    """
+
+    machine: MachineParameters
+    loads: tuple[str, ...]
+    clearance: float
+    change: float
+    base: Outcome
+    influences: tuple[Influence, ...]
+    single: Outcome | None
+    combination: Outcome | None
+    laundry: Laundry
+    laundry_changed: Laundry | None
+    about: str
+    responses: tuple[Response, ...]
+    command: str
+    runs: int
+
+    @property
+    def best(self) -> Outcome | None:
+        """Return the best change; None if none helps."""
+        return self.combination or self.single
+
+    @property
+    def is_clear(self) -> bool:
+        """Return whether all loads and all samples of the laundry keep the clearance."""
+        return self.smallest > self.clearance
+
+    @property
+    def smallest(self) -> float:
+        """Return the smallest gap of all loads and all samples of the laundry. [m]"""
+        return min(self.base.gap, float(self.laundry.gaps.min()))
+
+    @property
+    def word(self) -> str:
+        """Return the verdict in one or two words."""
+        if self.is_clear:
+            return "clear"
+        return "touches" if self.smallest <= 0.0 else "too near"
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Runs of all loads with changed machines.
+
+    Attributes:
+        machine: The built machine.
+        cases: Its loads.
+        measures: Names of measures.
+        executor: Runs cases.
+    """
+
+    machine: Machine
+    cases: Sequence[Case]
+    measures: tuple[str, ...]
+    executor: "Executor"
+
+    def outcomes(self, changes: Iterable[Mapping[str, str]], what: str) -> list[Outcome]:
+        """Return the outcome of each set of changes that the machine and its step allow."""
+        usable = [(c, p) for c in changes if (p := self._changed(c)) is not None]
+        cases = [
+            Case(
+                f"machine {number}, {case.name}",
+                load_of(case, self.machine.parameters, parameters),
+                case.profile,
+                parameters=parameters,
+            )
+            for number, (_, parameters) in enumerate(usable)
+            for case in self.cases
+        ]
+        if not cases:
+            return []
+        table, size = (
+            self.executor.simulate(self.machine, self.measures, cases, what),
+            len(self.cases),
+        )
+        return [
+            Outcome(c, table.isel(run=slice(n * size, (n + 1) * size)))
+            for n, (c, _) in enumerate(usable)
+        ]
+
+    def influences(self, keys: Iterable[str], change: float) -> list[Influence]:
+        """Return the influence of each number, the strongest first."""
+        pairs = [
+            [{key: _text(self.machine.parameters, key, factor)} for factor in _ends(change)]
+            for key in keys
+        ]
+        outcomes = self.outcomes([c for pair in pairs for c in pair], "single changes")
+        by_change = {_key(outcome.changes): outcome for outcome in outcomes}
+        complete = [pair for pair in pairs if all(_key(c) in by_change for c in pair)]
+        influences = [
+            Influence(next(iter(less)), by_change[_key(less)], by_change[_key(more)])
+            for less, more in complete
+        ]
+        return sorted(influences, key=lambda influence: -influence.span)
+
+    def combined(self, base: Outcome, influences: Iterable[Influence]) -> list[Outcome]:
+        """Return the best single change, the best addition to it, and so on.
+
+        The list ends where an addition gains less than `LEAST_GAIN`.
+        """
+        useful = sorted((i.best for i in influences), key=lambda outcome: -outcome.gap)[:MOST_TRIED]
+        candidates, chosen, last = useful, list[Outcome](), base
+        while candidates and len(chosen) < MOST_COMBINED:
+            best = max(candidates, key=lambda outcome: outcome.gap)
+            if best.gap < last.gap + LEAST_GAIN or not np.isfinite(best.gap):
+                break
+            chosen.append(best)
+            last = best
+            more = [
+                {**best.changes, **other.changes}
+                for other in useful
+                if not set(other.changes) <= set(best.changes)
+            ]
+            if len(chosen) < MOST_COMBINED:
+                candidates = self.outcomes(more, "combinations")
+        return chosen
+
+    def _changed(self, changes: Mapping[str, str]) -> MachineParameters | None:
+        """Return the changed machine; None if it is not allowed."""
+        try:
+            changed = with_values(self.machine.parameters, changes)
+            check_step(self.machine.set_up(parameters=changed), self.step)
+        except InputError:
+            return None
+        return changed
+
+    @property
+    def step(self) -> float:
+        """Return the step of the machine. [s]"""
+        return checked_step(self.machine.parameters, None)
+
+
+def _key(changes: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+    return tuple(changes.items())
+
+
+def _ends(change: float) -> tuple[float, float]:
+    return 1.0 - 0.01 * change, 1.0 + 0.01 * change
+
+
+def _text(parameters: MachineParameters, key: str, factor: float) -> str:
+    """Return a multiple of a number as the text that `--set` takes, so that it is what is run."""
+    unit = next(unit for name, _, unit in quantities(parameters) if name == key)
+    return f"{unit.from_si(factor * value_at(parameters, key)):.4g} {unit.shown}"
+
+
+def changeable(parameters: MachineParameters) -> Iterator[str]:
+    """Yield the key paths of what a designer can change: numbers of parts, counterweights.
+
+    Numbers that are 0 and tables of forces are left out.
+    """
+    for key, value, unit in quantities(parameters):
+        table = key.partition(".")[0]
+        is_part = table in PARTS and unit.si in PHYSICAL
+        is_weight = table == "bodies" and COUNTERWEIGHT in key and key.endswith(".mass")
+        if (is_part or is_weight) and isinstance(value, float) and value != 0.0:
+            yield key
+
+
+class VerdictTask(Task):
+    """The verdict with checked options."""
+
+    def __init__(self, options: VerdictOptions, machine: Machine) -> None:
+        """Check the options and the laundry.
+
+        Raises:
+            InputError: an option is wrong, or the SDF has no shapes whose gap could be measured.
+        """
+        if not has_gap(machine.parameters):
+            raise input_error(NO_SHAPES)
+        self.options, self.clearance = options, _length(options.clearance)
+        weights = [name for name in sdf_names(machine.plant).links if COUNTERWEIGHT in name]
+        keys = [f"bodies.{name}.mass" for name in weights]
+        full = with_sdf_values(machine.plant, machine.parameters, keys)
+        self.machine = build_machine(full)
+        self.laundry = self._laundry(self.machine)
+        self.cases = selected_cases(full, None, True, options.profile)
+        known = known_responses(full, profile_of(full, options.profile))
+        self.responses = tuple(r for r in known if r.group in SHOWN_GROUPS or r.name == GAP)
+        measures = {*measures_of(full, self.responses), CONTACTS}
+        self.measures = tuple(name for name in MEASURES if name in measures)
+
+    @property
+    def _command(self) -> str:
+        """Return the command of this verdict, without sizes."""
+        options = self.options
+        words = ["wm-drake verdict", options.machine, *(f'--set "{text}"' for text in options.sets)]
+        words += [f"--clearance '{options.clearance}'"] if self.clearance else []
+        words += [f"--profile {options.profile}"] if options.profile else []
+        return " ".join(words)
+
+    def _laundry(self, machine: Machine) -> ToleranceTask:
+        """Return the tolerance study of a machine, without what a verdict does not show."""
+        o = self.options
+        with_gap = ToleranceOptions(
+            file=o.laundry, samples=o.samples, sensitivity=0, subset=0, response=(GAP,),
+            profile=o.profile, seed=o.seed,
+        )  # fmt: skip
+        return ToleranceTask(with_gap, machine)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the runs."""
+        return {**self.laundry.identity, "change": f"{self.options.change:g} %"}
+
+    def run(self, executor: "Executor") -> "VerdictResult":
+        """Run the loads, the changes, and the laundry before and after the best change."""
+        from wm_drake.studies.verdict.page import VerdictResult
+
+        parameters = self.machine.parameters
+        trials = Trials(self.machine, self.cases, self.measures, executor)
+        (base,) = trials.outcomes([{}], "loads")
+        laundry = self._samples(self.laundry, executor)
+        influences = trials.influences(changeable(parameters), self.options.change)
+        steps = trials.combined(base, influences)
+        changed = None
+        if steps:
+            better = build_machine(with_values(parameters, steps[-1].changes))
+            changed = self._samples(self._laundry(better), executor)
+        return VerdictResult(
+            Findings(
+                parameters,
+                tuple(case.name for case in self.cases),
+                self.clearance,
+                self.options.change,
+                base,
+                tuple(influences),
+                steps[0] if steps else None,
+                steps[-1] if len(steps) > 1 else None,
+                laundry,
+                changed,
+                self.laundry.tolerances.about,
+                self.responses,
+                self._command,
+                executor.runs,
+            )
+        )
+
+    def _samples(self, task: ToleranceTask, executor: "Executor") -> Laundry:
+        """Return the gaps of the samples of a tolerance study."""
+        (gaps,) = (column for _, column in task.run(executor).result.values.items())
+        return Laundry(np.nan_to_num(1e-3 * gaps.to_numpy(), nan=-np.inf), self.clearance)
+
+
+def _length(text: str) -> float:
+    """Return a clearance. [m]"""
+    with problems_of_option("--clearance"):
+        try:
+            clearance = MM.number(text)
+        except ValueError as error:
+            raise input_error(str(error)) from None
+        if not 0.0 <= clearance < 1.0:
+            raise input_error(f"'{text}' is not allowed; allowed are 0 mm to below 1 m")
+    return clearance
