@@ -125,6 +125,7 @@ STUDY = "--out out --quiet"
 TASKS = {
     "`wm-drake --help`": Task("--help"),
     "16 runs, D, F, M": Task(make=lambda: batch(16)),
+    "`wm-drake machine show reference`": Task("machine show reference"),
     "first run and batch after installation": Task(make=first_call, is_warm=False, limit="15"),
     "one run of `reference`, 70 s, with its record": Task(
         make=lambda: one_run("reference", "middle", "compiled")

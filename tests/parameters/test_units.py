@@ -1,8 +1,11 @@
 """Units: text is converted to SI and back without loss."""
 
 import math
+import subprocess
+import sys
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -48,6 +51,24 @@ ALL_UNITS = sorted(
 )
 def test_text_becomes_si(text, si, value):
     assert to_si(text, IN_FILE, Unit(si, si)) == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize(("unit", "other"), sorted(units.FACTORS))
+def test_known_factors_are_those_of_pint(unit, other):
+    random = np.random.default_rng(0)
+    numbers = random.normal(size=200) * 10.0 ** random.uniform(-6.0, 6.0, size=200)
+    for spelt in (unit, unit.replace("*", " ")):
+        quantities = [units.registry().Quantity(float(n), spelt).to(other) for n in numbers]
+        assert [q.magnitude for q in quantities] == [
+            n * units.FACTORS[unit, other] for n in numbers
+        ]
+
+
+def test_shipped_machine_is_read_without_pint():
+    code = (
+        "import sys, wm_drake as wm; wm.load_machine('reference'); assert 'pint' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_vector_becomes_si():

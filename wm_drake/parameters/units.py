@@ -4,14 +4,16 @@ import functools
 import math
 import re
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import pint
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema
 from pydantic_core.core_schema import with_info_before_validator_function
 
 from wm_drake.errors import shortened
+
+if TYPE_CHECKING:  # importing pint and making its registry take 0.7 s: units not in FACTORS
+    import pint
 
 # Possessive (++) and greedy: the time to match any text is proportional to its length.
 _NUMBER = r"[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]++)?"
@@ -38,12 +40,54 @@ _UNIT = re.compile(rf"(?:1\s*/)?(?:[^\W\d]\w*|[°%]|[\s*/().·-]|{_POWER})*")
 """A unit: words, products and quotients; a power is one whole number of at most two digits."""
 
 
+FACTORS = {
+    ("N*m", "N*mm"): 1000.0,
+    ("N*mm", "N*m"): 0.001,
+    ("N*m*s/rad", "N*mm*s/deg"): 17.453292519943297,
+    ("N*mm*s/deg", "N*m*s/rad"): 0.057295779513082325,
+    ("N*m*s/rad", "N*mm*s/rad"): 1000.0,
+    ("N*mm*s/rad", "N*m*s/rad"): 0.001,
+    ("N*m/rad", "N*mm/rad"): 1000.0,
+    ("N*mm/rad", "N*m/rad"): 0.001,
+    ("N*s/m", "N*s/mm"): 0.001,
+    ("N*s/mm", "N*s/m"): 1000.0,
+    ("N/m", "N/mm"): 0.001,
+    ("N/mm", "N/m"): 1000.0,
+    ("kg", "g"): 1000.0,
+    ("g", "kg"): 0.001,
+    ("kg*m", "g*mm"): 1000000.0,
+    ("g*mm", "kg*m"): 1e-06,
+    ("kg*m^2", "g*mm^2"): 1000000000.0,
+    ("g*mm^2", "kg*m^2"): 1e-09,
+    ("m", "mm"): 1000.0,
+    ("mm", "m"): 0.001,
+    ("m/s", "mm/s"): 1000.0,
+    ("mm/s", "m/s"): 0.001,
+    ("rad", "deg"): 57.29577951308232,
+    ("deg", "rad"): 0.017453292519943295,
+    ("rad/s", "deg/s"): 57.29577951308232,
+    ("deg/s", "rad/s"): 0.017453292519943295,
+    ("rad/s", "rpm"): 9.549296585513721,
+    ("rpm", "rad/s"): 0.10471975511965977,
+    ("rad/s^2", "rpm/s"): 9.549296585513721,
+    ("rpm/s", "rad/s^2"): 0.10471975511965977,
+    ("s", "ms"): 1000.0,
+    ("ms", "s"): 0.001,
+}
+"""Factors from a unit to another one, of the units of machine files and pages.
+
+They are those of pint, to the last bit, which the tests check; all other units are left to pint.
+"""
+
+
 @functools.cache
-def registry() -> pint.UnitRegistry[float]:
+def registry() -> "pint.UnitRegistry[float]":
     """Return pint's registry of units, in which the angle is a dimension.
 
     With this, N m and N m/rad cannot be confused.
     """
+    import pint
+
     units: pint.UnitRegistry[float] = pint.UnitRegistry(on_redefinition="ignore")
     units.define("radian = [angle] = rad")
     # pint has cached rpm and deg as dimensionless; there is no public way to clear its cache
@@ -77,8 +121,17 @@ def plain_number(text: str) -> float:
     return float(text)
 
 
+def _known_factor(unit: str, other: str) -> float | None:
+    """Return the factor of two units that needs no pint; blanks are products. None if unknown."""
+    plain = unit.replace(" ", "*")
+    return 1.0 if plain == other else FACTORS.get((plain, other))
+
+
 @functools.lru_cache(maxsize=8192)  # pint takes 50 µs, and a page shows the same numbers again
 def _in_unit(value: float, unit: str, shown: str) -> float:
+    factor = _known_factor(unit, shown)
+    if factor is not None:
+        return float(value * factor)
     return float(registry().Quantity(value, unit).to(shown).magnitude)
 
 
@@ -208,6 +261,11 @@ def convert(magnitude: float, unit_text: str | None, unit: Unit) -> float:
     """
     if unit_text is None:
         raise ValueError(f"'{magnitude:g}' has no unit; write for example '1 {unit.shown}'")
+    factor = _known_factor(unit_text, unit.si)
+    if factor is not None:
+        return bounded(magnitude * factor, f"{magnitude:g} {unit_text}")
+    import pint
+
     try:
         value = float(quantity(magnitude, unit_text).to(unit.si).magnitude)
     except pint.DimensionalityError:

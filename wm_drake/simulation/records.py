@@ -108,9 +108,11 @@ MOST_REASON = 150
 
 
 def save_record(record: Record, path: Path) -> None:
-    """Write a record to a compressed netCDF file.
+    """Write a record to a netCDF file.
 
-    The file is made in memory first: if HDF5 itself meets a full disk, the process crashes.
+    It is not compressed: the numbers fill all digits, so that gzip saves 6 % of the size and
+    doubles the time. The file is made in memory first: if HDF5 itself meets a full disk, the
+    process crashes.
 
     Raises:
         OSError: the file cannot be written.
@@ -125,12 +127,7 @@ def save_record(record: Record, path: Path) -> None:
         >>> path.exists()
         True
     """
-    compression = {
-        name: {"compression": "gzip", "compression_opts": 1}
-        for name in record.data_vars
-        if record[name].size
-    }
-    path.write_bytes(record.to_netcdf(engine="h5netcdf", encoding=compression))
+    path.write_bytes(record.to_netcdf(engine="h5netcdf"))
 
 
 def load_record(path: Path) -> Record:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import wm_drake as wm
 from wm_drake.parameters import SpinProfile, load_machine
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.spin.page import spin_page
@@ -43,3 +44,12 @@ def test_single_case_runs_in_this_process_and_is_measured():
     text = spin_page(run)
     assert "<h2>Natural modes</h2>" in text
     assert f"{run.modes.modes['sliding'][0].frequency_hz:.3f}" in text
+
+
+def test_records_can_be_left_out(tmp_path):
+    wm.run_study("spin", load=("middle",), no_records=True, out=tmp_path / "out")
+    assert sorted(file.name for file in (tmp_path / "out").iterdir()) == [
+        "amplitudes.csv",
+        "report.html",
+        "run.json",
+    ]

@@ -47,6 +47,7 @@ class SpinOptions(Options):
         "Draw mount forces, accelerations and spectra of every load, not only of the load with the "
         "largest amplitude.",
     )
+    no_records: bool = option(False, "Leave out the netCDF records, one for each load.")
     measured: tuple[Path, ...] = MEASURED
     drive: str | None = option(
         None,

@@ -79,11 +79,13 @@ class Files:
         replay: A 3D replay for each case.
         detail: Pictures of vibration for every case, not only for the one with the largest
             amplitude.
+        records: The record of each case.
         part: Part of the names of files that tells machines apart; "" for a single machine.
     """
 
     replay: bool = False
     detail: bool = False
+    records: bool = True
     part: str = ""
 
 
@@ -149,12 +151,13 @@ class SpinResult(Result):
         self.write_cases(folder)
 
     def write_cases(self, folder: Path) -> None:
-        """Write the record of each case, and its 3D replay where wanted."""
-        from wm_drake.studies.spin.replay import case_replay
-
+        """Write the record of each case and its 3D replay where wanted."""
         for case in self.results:
-            save_record(case.record, folder / f"record_{self._name_of(case)}.nc")
+            if self.files.records:
+                save_record(case.record, folder / f"record_{self._name_of(case)}.nc")
             if file := self.replay_of(case):
+                from wm_drake.studies.spin.replay import case_replay
+
                 (folder / file).write_text(case_replay(self.parameters, case), encoding="utf-8")
 
     def warnings(self) -> list[str]:

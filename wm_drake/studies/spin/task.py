@@ -127,7 +127,7 @@ class SpinTask(Task):
                 )
                 if self.engine == DEFAULT_ENGINE:  # the other one controls its error
                     executor.verify(planned.machine, planned.cases)
-                files = Files(options.replay, options.detail, part)
+                files = Files(options.replay, options.detail, not options.no_records, part)
                 variants.append(Variant(planned.name, replace(result, files=files)))
                 finished += len(planned.cases)
         if is_one:
