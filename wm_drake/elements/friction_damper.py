@@ -36,13 +36,16 @@ FRICTION_DAMPER = PackedLayout(
     law=LAW,
 )
 """Tub end (T) and housing end (W) [m], unit vector from the housing end to the tub end at the rest
-pose, 1 or 0 for a damper that is taken out, end bushings, law."""
+pose, 1 or 0 for a damper whose law is taken out, end bushings, law."""
 read_end_bushing, read_friction_damper = END_BUSHING.read, FRICTION_DAMPER.read
 
 
 @dataclass(frozen=True)
 class FrictionDamperParameters:
-    """A damper in its place: ends at the rest pose, end bushings, law. `engaged` 0 takes it out."""
+    """A damper in its place: ends at the rest pose, end bushings, law.
+
+    `engaged` 0 takes the law out, not the end bushings.
+    """
 
     p_ToA_T: FloatArray
     p_WH: FloatArray
@@ -72,9 +75,15 @@ class FrictionDamperParameters:
 
     def without_friction(self) -> "FrictionDamperParameters":
         """Return the damper without friction, as a small motion on top of steady sliding has it."""
-        bushing = self.end_bushing.model_copy(update={"friction_torque": 0.0})
         law = frictionless_law(self.packed_law)
-        return replace(self, end_bushing=bushing, packed_law=law)
+        return replace(self, end_bushing=self._end_bushing_without_friction(), packed_law=law)
+
+    def without_law(self) -> "FrictionDamperParameters":
+        """Return the end bushings alone, without friction."""
+        return replace(self, end_bushing=self._end_bushing_without_friction(), engaged=0.0)
+
+    def _end_bushing_without_friction(self) -> EndBushing:
+        return self.end_bushing.model_copy(update={"friction_torque": 0.0})
 
     @packed_once
     def packed(self) -> FloatArray:
@@ -113,14 +122,14 @@ def friction_damper_tension(elongation_rate, deformation, p, at):
         p, at: Array that holds the numbers of `FRICTION_DAMPER`, and where they begin.
 
     Returns:
-        Tension [N], also of a damper that is taken out, and deformation rate [m/s].
+        Tension [N], also of a law that is taken out, and deformation rate [m/s].
     """
     return damper_response(elongation_rate, deformation, *read_friction_damper(p, at).law)
 
 
 @law
 def friction_damper_force(motion, deformation, p, at):
-    """Return the own force of a damper, which is its tension, 0 of a damper that is taken out. [N]
+    """Return the own force of a damper, which is its tension; 0 if its law is taken out. [N]
 
     Args:
         motion: `TubMotion`.
@@ -152,8 +161,8 @@ def friction_damper_wrench(motion, arm, line, tension, p, at):
     )
     on_strut_by_housing = end_moment(direction, w_strut, damper.axis, bushing)
     couple = transverse_couple(add(on_strut_by_tub, on_strut_by_housing), direction, inverse_length)
-    force = scale(damper.engaged, add(scale(-tension, direction), couple))
-    return wrench_at_origin(arm, force, scale(-damper.engaged, on_strut_by_tub))
+    force = add(scale(-damper.engaged * tension, direction), couple)
+    return wrench_at_origin(arm, force, scale(-1.0, on_strut_by_tub))
 
 
 @law

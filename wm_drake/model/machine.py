@@ -225,7 +225,8 @@ class MachineSystems:
             parameters: Numbers to use; those it was built from if None. They must have the same
                 elements, the same laws and tables of the same length.
             profile: Spin profile to follow; that of the parameters if None.
-            gasket, dampers: False disengages them.
+            gasket: False disengages it.
+            dampers: False takes their laws and their friction out; their bushings stay.
             friction: False takes the dry friction out of all elements, as for a small motion on top
                 of steady sliding.
             systems: False for the compiled engine, which reads the `Setup`: it may leave the

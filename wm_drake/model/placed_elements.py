@@ -79,8 +79,8 @@ class PlacedElements:
         return replace(self, bushings=self.bushings | {"gasket": gasket})
 
     def without_dampers(self) -> "PlacedElements":
-        """Return the elements with all damper laws and the friction of tube bushings disengaged."""
-        dampers = {name: replace(damper, engaged=0.0) for name, damper in self.dampers.items()}
+        """Return the elements without damper laws and without friction of end and tube bushings."""
+        dampers = {name: damper.without_law() for name, damper in self.dampers.items()}
         telescopes = {name: tubes.without_friction() for name, tubes in self.telescopes.items()}
         return replace(self, dampers=dampers, telescopes=telescopes)
 

@@ -113,7 +113,6 @@ def describe(machine: Machine) -> dict[str, Any]:
         },
         "natural_frequencies_hz": modes.frequency_hz.tolist(),
         "mode_damping_ratios": modes.damping_ratio.tolist(),
-        "natural_modes_pose": _pose(machine.set_up(dampers=False).rest_pose),
     }
     if setup.elements.others:
         described["elements"] = {name: _element(setup, name) for name in setup.elements.others}

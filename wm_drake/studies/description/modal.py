@@ -31,10 +31,11 @@ class Modes:
 def natural_modes(
     machine: Machine, parameters: MachineParameters | None = None, *, gasket: bool = True
 ) -> Modes:
-    """Compute the natural modes of the empty machine about its rest pose without dampers.
+    """Compute the natural modes of the empty machine about its rest pose, without friction.
 
-    The drum stands still. Dampers are removed, because friction at rest is neither a spring nor a
-    dashpot; `wm_drake.studies.modes.study.modes` treats it. Overdamped motions are not included. Of
+    The drum stands still. Dampers lose their law and their friction, because friction at rest is
+    neither a spring nor a dashpot; `wm_drake.studies.modes.study.modes` treats it. Their bushings
+    and tubes stay. Overdamped motions are not included. Of
     the others, only the six slowest are included; damper tubes on their bushings and a drum in a
     compliant bearing have faster ones.
 

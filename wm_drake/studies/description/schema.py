@@ -277,10 +277,6 @@ class Description(Frozen):
     equilibrium_residual: Residual
     natural_frequencies_hz: list[float]
     mode_damping_ratios: list[float]
-    natural_modes_pose: Pose = Field(
-        description="Rest pose without dampers, about which the natural modes are computed. "
-        "Without their moments the tub rests elsewhere than at `rest_pose`, by some micrometres."
-    )
     elements: dict[str, OtherElement] | None = Field(
         None, description="Elements of kinds of other packages; absent without any."
     )
