@@ -23,3 +23,13 @@ def doubled(item, report):
 def answer(connection):
     """Send whether this process may start others."""
     connection.send(can_start_processes())
+
+
+def answer_of_runs(connection):
+    """Send the number of results of two short runs of pydrake, for which two workers are asked."""
+    import wm_drake as wm
+
+    parameters = wm.load_machine("reference")
+    profile = parameters.profile.model_copy(update={"time": (0.0, 0.02), "speed": (0.0, 60.0)})
+    cases = [wm.Case(name, parameters.loads["middle"], profile) for name in "ab"]
+    connection.send(len(wm.run_spin(parameters, cases, "drake", workers=2).results))

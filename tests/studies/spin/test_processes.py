@@ -1,11 +1,13 @@
 """Worker processes: order, progress, errors and ends, and no other child process is touched."""
 
 import multiprocessing
+import threading
 import time
 
 import pytest
-from process_jobs import answer, doubled
+from process_jobs import answer, answer_of_runs, doubled
 
+import wm_drake as wm
 from wm_drake.errors import InputError
 from wm_drake.studies.spin.processes import (
     WorkerProcessError,
@@ -57,3 +59,24 @@ def test_daemon_process_cannot_start_others():
     assert receiver.recv() is False
     daemon.join()
     assert can_start_processes()
+
+
+@pytest.mark.parametrize("daemon", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_runs_in_the_fork_of_a_process_with_threads(daemon):
+    """A daemon computes the runs itself; another child starts workers, each a cold start."""
+    assert wm.run_spin  # imported before the fork
+    ended = threading.Event()
+    thread = threading.Thread(target=ended.wait)
+    thread.start()
+    context = multiprocessing.get_context("fork")
+    receiver, sender = context.Pipe()
+    child = context.Process(target=answer_of_runs, args=(sender,), daemon=daemon)
+    child.start()
+    sender.close()
+    try:
+        assert receiver.poll(300.0), "no answer"
+        assert receiver.recv() == 2
+    finally:
+        ended.set()
+        child.kill()
+        child.join()
