@@ -1,5 +1,8 @@
 """Runs that have no place in memory are refused before they begin."""
 
+import subprocess
+import sys
+
 import pytest
 
 import wm_drake as wm
@@ -41,3 +44,33 @@ def test_file_is_named(wm_drake, tmp_path):
             wm.build_machine(wm.load_machine("reference")),
             [wm.Case("long", wm.load_machine("reference").loads["middle"], wm.load_profile(path))],
         )
+
+
+PEAK = r"""
+import gc, re
+from pathlib import Path
+import wm_drake as wm
+from wm_drake.engines.memory import needed_memory
+
+def size(name):
+    return 1024 * int(re.search(name + r":\s+(\d+)", Path("/proc/self/status").read_text())[1])
+
+def profile(duration):
+    return given.profile.model_copy(update={"time": (0.0, duration), "speed": (0.0, 60.0)})
+
+given = wm.load_machine("reference")
+machine = wm.build_machine(given)
+wm.simulate(machine, wm.Case("short", given.loads["middle"], profile(2.0)))
+gc.collect()
+Path("/proc/self/clear_refs").write_text("5")  # resets the peak
+before = size("VmRSS")
+wm.simulate(machine, wm.Case("long", given.loads["middle"], profile(300.0)))
+print((size("VmHWM") - before) / needed_memory(profile(300.0), given.step, given.output_period))
+"""
+
+
+@pytest.mark.slow  # a new process, whose memory no other test has used
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_estimate_is_that_of_a_run():
+    printed = subprocess.check_output([sys.executable, "-c", PEAK], text=True)
+    assert 0.5 < float(printed) < 1.0

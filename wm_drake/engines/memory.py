@@ -7,14 +7,18 @@ from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import input_error
 from wm_drake.parameters import SpinProfile
 
-NUMBERS_OF_SAMPLE = 150
-"""Numbers that a run keeps for each sample, in all its lanes: state, displacements, forces."""
+NUMBERS_OF_SAMPLE = 40
+"""Numbers that a run keeps for each sample in each lane: state, displacements, forces.
 
-NUMBERS_OF_STEP = 40
-"""Numbers of the schedule for each step, and of its construction."""
+Measured as the growth of the peak of memory with the length of the run, 20,000 and 80,000 samples,
+`reference`: 26 to 35 by measures, which include the transient copies; 40 is on the safe side.
+"""
 
-SECONDS_OF_STEP = 2e-6
-"""Time of a step on one core, measured for a machine with gasket and three dampers. [s]"""
+NUMBERS_OF_STEP = 28
+"""Numbers of the schedule for each step, and of its construction, at the peak (measured)."""
+
+SECONDS_OF_STEP = 3e-6
+"""Time of a step on one core: 2.5 to 4 us with gasket and three dampers, by measures. [s]"""
 
 _BYTES, _GB = 8, 1e9
 
@@ -30,8 +34,7 @@ def check_size(profile: SpinProfile, step: float, period: float) -> None:
     Raises:
         InputError: it needs more memory than is available.
     """
-    samples, steps = profile.duration / period, profile.duration / step
-    needed = _BYTES * (NUMBERS_OF_SAMPLE * WIDTH * samples + NUMBERS_OF_STEP * steps)
+    steps, needed = profile.duration / step, needed_memory(profile, step, period)
     available = available_memory()
     if needed <= available:
         return
@@ -41,6 +44,12 @@ def check_size(profile: SpinProfile, step: float, period: float) -> None:
         f"{available / _GB:.3g} GB are available: shorten the profile or lengthen the step",
         key="profile",
     )
+
+
+def needed_memory(profile: SpinProfile, step: float, period: float) -> float:
+    """Return the memory that a run needs, arguments as for `check_size`. [byte]"""
+    samples, steps = profile.duration / period, profile.duration / step
+    return _BYTES * (NUMBERS_OF_SAMPLE * WIDTH * samples + NUMBERS_OF_STEP * steps)
 
 
 def available_memory() -> float:
