@@ -40,7 +40,7 @@ def test_a_motor_with_a_compliant_bearing_is_refused():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ("  kind: steam", r"drive: kind must be 'prescribed' or 'motor'"),
+        ("  kind: steam", r"drive: kind must be 'prescribed' or 'motor', is 'steam'"),
         ("  belt_ratio: -3", r"drive\.belt_ratio: '-3' is out of range; allowed is >= 1"),
         ("  rotor_inertia: -1 kg*m^2", r"drive\.rotor_inertia: .* allowed is >= 0"),
         ("  torque_limit: {torque: 0 N*m}", r"drive\.torque_limit\.torque: .* allowed is > 0"),
