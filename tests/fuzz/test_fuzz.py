@@ -47,7 +47,7 @@ class Worker:
         self.process.stdin.write(f"{number}\n")
         self.process.stdin.flush()
         try:
-            return json.loads(self.lines.get(timeout=SECONDS_LIMIT + 10.0))
+            return json.loads(self.lines.get(timeout=12.0 * SECONDS_LIMIT))
         except queue.Empty:
             self.end()
             return None
