@@ -112,8 +112,7 @@ def _message(detail: Any, root: type[BaseModel]) -> str:
         return f"needs {_EXPECTED[kind]}, is {shortened(repr(given), 60)}"
     if kind == "literal_error":
         return f"'{shown}' is not allowed; allowed are {context['expected']}"
-    if isinstance(given, dict):  # of a group it is the kind that is wrong
-        given = given.get("kind", given)
+    given = given.get("kind", given) if kind == "drive_kind" else given
     return f"{detail['msg'][0].lower()}{detail['msg'][1:]}, is {shortened(repr(given), 60)}"
 
 
