@@ -5,7 +5,7 @@ import signal
 import time
 
 from wm_drake.errors import input_error
-from wm_drake.studies.spin.processes import can_start_processes
+from wm_drake.studies.spin.processes import can_start_processes, map_in_processes
 
 
 def doubled(item, report):
@@ -23,6 +23,11 @@ def doubled(item, report):
 def answer(connection):
     """Send whether this process may start others."""
     connection.send(can_start_processes())
+
+
+def answer_of_workers(connection):
+    """Send what two worker processes of this process compute."""
+    connection.send(map_in_processes(doubled, [0.0, 0.1], 2, lambda *report: None))
 
 
 def answer_of_runs(connection):

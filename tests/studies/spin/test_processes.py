@@ -5,7 +5,7 @@ import threading
 import time
 
 import pytest
-from process_jobs import answer, answer_of_runs, doubled
+from process_jobs import answer, answer_of_runs, answer_of_workers, doubled
 
 import wm_drake as wm
 from wm_drake.errors import InputError
@@ -61,21 +61,24 @@ def test_daemon_process_cannot_start_others():
     assert can_start_processes()
 
 
-@pytest.mark.parametrize("daemon", [True, pytest.param(False, marks=pytest.mark.slow)])
-def test_runs_in_the_fork_of_a_process_with_threads(daemon):
-    """A daemon computes the runs itself; another child starts workers, each a cold start."""
+@pytest.mark.parametrize(
+    ("work", "daemon", "expected"),
+    [(answer_of_runs, True, 2), (answer_of_workers, False, [0.0, 0.2])],
+)
+def test_fork_of_a_process_with_threads_gets_its_answer(work, daemon, expected):
+    """A daemon computes the runs itself; another child starts workers."""
     assert wm.run_spin  # imported before the fork
     ended = threading.Event()
     thread = threading.Thread(target=ended.wait)
     thread.start()
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe()
-    child = context.Process(target=answer_of_runs, args=(sender,), daemon=daemon)
+    child = context.Process(target=work, args=(sender,), daemon=daemon)
     child.start()
     sender.close()
     try:
         assert receiver.poll(300.0), "no answer"
-        assert receiver.recv() == 2
+        assert receiver.recv() == expected
     finally:
         ended.set()
         child.kill()
