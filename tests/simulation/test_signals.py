@@ -8,15 +8,15 @@ from wm_drake.batch import simulate_many
 from wm_drake.parameters import SpinProfile
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import (
-    BAND_HZ,
     amplitudes,
+    band_warnings,
     filtered,
     filtered_displacement,
     pass_band,
 )
 from wm_drake.simulation.runs import simulate
 
-PERIOD = 0.005
+PERIOD, BAND = 0.005, (0.5, 20.0)
 
 
 @pytest.fixture(scope="module")
@@ -31,13 +31,13 @@ def test_filter_is_that_of_scipy(walks):
     for walk in walks:
         padding = min(1000, len(walk) - 1)
         theirs = sosfiltfilt(sections, walk, axis=0, padtype="even", padlen=padding)
-        assert filtered(walk, PERIOD) == pytest.approx(theirs, abs=1e-9 * np.abs(walk).max())
+        assert filtered(walk, PERIOD, BAND) == pytest.approx(theirs, abs=1e-9 * np.abs(walk).max())
 
 
 def test_filter_of_one_signal_does_not_depend_on_the_others(walks):
-    together = filtered(walks[1], PERIOD)
+    together = filtered(walks[1], PERIOD, BAND)
     for k in (0, 3, 7):
-        assert np.array_equal(filtered(walks[1][:, [k]], PERIOD)[:, 0], together[:, k])
+        assert np.array_equal(filtered(walks[1][:, [k]], PERIOD, BAND)[:, 0], together[:, k])
 
 
 def peaks_of_scipy(signal):
@@ -71,11 +71,19 @@ def test_signals_without_a_peak_have_their_largest_value():
 @pytest.mark.parametrize(
     ("rpm", "edge"), [(400, 20.0), (-480, 20.0), (1200, 50.0), (1400, 175.0 / 3.0), (9000, 90.0)]
 )
-def test_band_is_that_of_b_or_reaches_to_the_second_order(rpm, edge):
+def test_band_reaches_to_the_second_order_and_is_that_of_the_profile(rpm, edge):
     profile = SpinProfile(time=(0.0, 9.0), speed=(0.0, np.pi / 30.0 * rpm))
     assert pass_band(profile, PERIOD) == pytest.approx((0.5, edge))
-    if abs(rpm) < 500:
-        assert pass_band(profile, PERIOD) == BAND_HZ
+    narrow = profile.model_copy(update={"band": (1.0, 12.0)})
+    assert pass_band(narrow, PERIOD) == (1.0, 12.0)
+    assert bool(band_warnings(profile, PERIOD)) == (rpm == 9000)
+    assert bool(band_warnings(narrow, PERIOD)) == (abs(rpm) > 720)
+
+
+@pytest.mark.parametrize("band", [(0.0, 20.0), (20.0, 0.5), (20.0,)])
+def test_band_that_is_no_range_is_refused(band):
+    with pytest.raises(ValueError, match="band"):
+        SpinProfile(time=(0.0, 9.0), speed=(0.0, 1.0), band=band)
 
 
 def test_displacement_at_1400_rpm_passes_alike_in_record_and_batch(machine):
@@ -92,7 +100,7 @@ def test_displacement_at_1400_rpm_passes_alike_in_record_and_batch(machine):
 
     raw = at_drum_frequency(record.displacement.values)
     assert at_drum_frequency(shown.values) == pytest.approx(raw, rel=0.01)
-    narrow = at_drum_frequency(filtered(record.displacement.values, PERIOD))
+    narrow = at_drum_frequency(filtered(record.displacement.values, PERIOD, BAND))
     assert np.all(narrow < 0.3 * raw)
     (of_batch,) = simulate_many(machine, [case], measures=("amplitudes",)).amplitude.values
     assert of_batch == pytest.approx(amplitudes(shown.values)[0], rel=1e-9)

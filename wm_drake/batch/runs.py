@@ -185,7 +185,7 @@ class Runner:
         if "sensors" not in self.needs or not np.any(good == rows):
             return np.empty((0, 0, WIDTH))
         band = pass_band(key.profile, key.period)
-        flat = filtered_lanes(moved.reshape(rows, -1), sensors, key.period, self._array, band)
+        flat = filtered_lanes(moved.reshape(rows, -1), sensors, key.period, band, self._array)
         return flat.reshape(rows, sensors, WIDTH)
 
     def _forces_of_mounts(

@@ -192,11 +192,14 @@ class SpinProfile(Frozen):
             is measured at each of them.
         speed: Drum speed at each of them.
         regions: Time intervals for RMS values.
+        band: Pass band of displacements, `(0.5, 20) Hz`, such as that of a measurement to compare
+            with. Without it, the second order of the highest speed passes.
     """
 
     time: u.Times
     speed: u.Speeds
     regions: tuple[Region, ...] = ()
+    band: u.Frequencies | None = None
 
     @classmethod
     def __get_pydantic_json_schema__(
@@ -215,11 +218,11 @@ class SpinProfile(Frozen):
     def _from_steps(cls, data: Any, info: ValidationInfo) -> Any:
         if not isinstance(data, dict) or ("steps" not in data and {"time", "speed"} & set(data)):
             return data
-        steps, others = data.get("steps"), set(data) - {"steps", "regions"}
+        steps, others = data.get("steps"), set(data) - {"steps", "regions", "band"}
         if others or not isinstance(steps, list):
             raise ValueError(
                 "a profile is either {steps: [...]} or {time: (...) s, speed: (...) rpm}; regions "
-                "are optional"
+                "and band are optional"
             )
         points, stairs = [(0.0, 0.0)], list[dict[str, str]]()
         for index, entry in enumerate(steps):
@@ -245,7 +248,8 @@ class SpinProfile(Frozen):
             name: f"({', '.join(map(repr, values))}) {unit[name].si}"
             for name, values in points_of.items()
         }
-        return {**texts, "regions": [*stairs, *data.get("regions", ())]}
+        rest = {key: data[key] for key in ("band",) if key in data}
+        return {**texts, **rest, "regions": [*stairs, *data.get("regions", ())]}
 
     @model_validator(mode="after")
     def _usable(self) -> "SpinProfile":
@@ -275,6 +279,14 @@ class SpinProfile(Frozen):
                     f"of the profile ({self.time[-1]:g} s) or before"
                 )
             before = region.end
+        return self
+
+    @model_validator(mode="after")
+    def _band_is_a_range(self) -> "SpinProfile":
+        if self.band is not None and not (
+            len(self.band) == 2 and 0.0 < self.band[0] < self.band[1]
+        ):
+            raise ValueError("band: needs a lower and a higher frequency, for example (0.5, 20) Hz")
         return self
 
     @property

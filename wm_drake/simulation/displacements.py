@@ -15,8 +15,19 @@ from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record, profile_of, sample_period
 from wm_drake.simulation.signals import filter_both_ways, largest_peaks
 
-BAND_HZ = (0.5, 20.0)
-"""Pass band of the displacements in [B] section 2.2, where the drum turns at up to 400 rpm."""
+LOWER_EDGE = 0.5
+"""Lower edge of the pass band without one in the profile. [Hz]
+
+Slower motion, such as the shift of the mean at a change of speed, does not count as vibration. It
+is also the lower edge in [B] section 2.2.
+"""
+
+LEAST_UPPER_EDGE = 20.0
+"""Smallest upper edge of the pass band without one in the profile. [Hz]
+
+An assumption: slow machines keep the orders that their friction causes. It is also the upper edge
+in [B] section 2.2, where the drum turns at up to 400 rpm.
+"""
 
 ORDERS_PASSED = 2.5
 """Smallest ratio of the upper band edge to the highest drum frequency: two orders pass.
@@ -25,7 +36,7 @@ An assumption; in [B] the ratio is 3.
 """
 
 HIGHEST_PART = 0.45
-"""Largest ratio of an upper band edge above that of [B] to the sampling frequency."""
+"""Largest ratio of an upper band edge to the sampling frequency."""
 
 FILTER_ORDER = 4
 """Order of the Butterworth filter ([B] section 2.2).
@@ -33,11 +44,11 @@ FILTER_ORDER = 4
 The filter runs forwards and backwards, so that it shifts no phase.
 """
 
-PADDING = 5.0
-"""Length by which displacements are mirrored at both ends before filtering. [s]
+PADDING_PERIODS = 2.5
+"""Length by which displacements are mirrored at both ends, in periods of the lower band edge.
 
-It is two and a half periods of the lower band edge. With the padding that scipy chooses, a record
-that ends at a resonance would show peaks that are a third too large near its end.
+With the padding that scipy chooses, a record that ends at a resonance would show peaks that are a
+third too large near its end.
 """
 
 REPLAY_SPAN = 8.0
@@ -47,28 +58,50 @@ REPLAY_SPAN = 8.0
 def pass_band(profile: SpinProfile, period: float) -> tuple[float, float]:
     """Return the pass band of the displacements of a run. [Hz]
 
-    It is that of [B] as long as the drum turns at up to 480 rpm. Of a faster drum the upper edge is
-    `ORDERS_PASSED` times its frequency, since 20 Hz would cut the motion at 1200 rpm in half.
+    It is that of the profile. A profile without one has a band up to `ORDERS_PASSED` times the
+    highest drum frequency, since 20 Hz would cut the motion at 1200 rpm in half.
 
     Args:
         profile: Spin profile of the run.
         period: Time between samples. [s]
     """
-    highest = max(map(abs, profile.speed)) / (2.0 * np.pi)
-    edge = min(ORDERS_PASSED * highest, HIGHEST_PART / period)
-    return BAND_HZ[0], max(BAND_HZ[1], edge)
+    low, high = profile.band or (
+        LOWER_EDGE,
+        max(LEAST_UPPER_EDGE, ORDERS_PASSED * _highest_frequency(profile)),
+    )
+    return low, max(min(high, HIGHEST_PART / period), 1.001 * low)
+
+
+def _highest_frequency(profile: SpinProfile) -> float:
+    """Return the highest frequency of drum revolutions. [Hz]"""
+    return max(map(abs, profile.speed)) / (2.0 * np.pi)
+
+
+def band_warnings(profile: SpinProfile, period: float) -> list[str]:
+    """Return a warning if the pass band of displacements cuts the highest speed of a profile."""
+    low, high = pass_band(profile, period)
+    highest = _highest_frequency(profile)
+    if low <= highest <= high or highest == 0.0:
+        return []
+    remedy = (
+        "remove profile.band or widen it"
+        if profile.band and not low <= highest <= profile.band[1]
+        else "choose a shorter output_period"
+    )
+    return [
+        f"the pass band of displacements, {low:g} to {high:.3g} Hz, cuts the highest drum speed, "
+        f"{60.0 * highest:.4g} rpm or {highest:.3g} Hz, so amplitudes are too small; {remedy}"
+    ]
 
 
 def band_of(record: Record) -> tuple[float, float]:
-    """Return the pass band of a record; that of [B] if it has no spin profile. [Hz]"""
+    """Return the pass band of a record; for 400 rpm if it has no spin profile. [Hz]"""
     if "profile" not in record.attrs:
-        return BAND_HZ
+        return LOWER_EDGE, LEAST_UPPER_EDGE
     return pass_band(profile_of(record), sample_period(record))
 
 
-def filtered(
-    displacement: FloatArray, period: float, band: tuple[float, float] = BAND_HZ
-) -> FloatArray:
+def filtered(displacement: FloatArray, period: float, band: tuple[float, float]) -> FloatArray:
     """Return displacements filtered to a band, without phase shift.
 
     The filter is a Butterworth filter of fourth order.
@@ -87,15 +120,15 @@ def filtered(
     lanes = aligned(rows * groups * WIDTH)
     side_by_side = lanes.reshape(rows, groups * WIDTH)
     side_by_side[:, :columns] = displacement
-    return filtered_lanes(side_by_side, groups, period, band=band)[:, :columns].copy()
+    return filtered_lanes(side_by_side, groups, period, band)[:, :columns].copy()
 
 
 def filtered_lanes(
     signals: FloatArray,
     groups: int,
     period: float,
+    band: tuple[float, float],
     array: Callable[[str, int], FloatArray] = lambda name, size: aligned(size * WIDTH),
-    band: tuple[float, float] = BAND_HZ,
 ) -> FloatArray:
     """Return the first groups of `WIDTH` signals of an array, as from `filtered`.
 
@@ -104,12 +137,12 @@ def filtered_lanes(
             [m]
         groups: Number of groups to filter.
         period: Time between samples. [s]
+        band: Pass band. [Hz]
         array: Function that returns an array of lanes, given a name and a size. A caller that
             filters often can use the same memory again.
-        band: Pass band. [Hz]
     """
     rows, columns = signals.shape
-    padding = min(round(PADDING / period), rows - 1)
+    padding = min(round(PADDING_PERIODS / band[0] / period), rows - 1)
     if padding <= 6 * FILTER_ORDER + 3:  # the padding that sosfiltfilt chooses by default
         return np.full((rows, groups * WIDTH), np.nan)
     answer, work = array("filtered", rows * groups), array("filter", rows + 2 * padding)
@@ -232,7 +265,8 @@ def smooth_envelope(record: Record) -> xr.DataArray:
 
     displacement = filtered_displacement(record)
     values = displacement.values
-    padding = min(round(PADDING / sample_period(record)), len(values) - 1)
+    length = PADDING_PERIODS / band_of(record)[0]
+    padding = min(round(length / sample_period(record)), len(values) - 1)
     if padding < 1:
         return displacement.copy(data=np.abs(values))
     mirrored = np.pad(values, ((padding, padding), (0, 0)), mode="reflect")

@@ -122,11 +122,19 @@ def pairs_of(entries: Sequence[str] | None, option: str) -> list[tuple[str, str]
     return pairs
 
 
-def machine_warnings(parameters: "MachineParameters") -> list[str]:
-    """Return warnings of what a machine has and runs of its loads do not use."""
-    from wm_drake.simulation.cases import UNUSED_PHASE_ERROR
+def machine_warnings(parameters: "MachineParameters", profile: Path | None = None) -> list[str]:
+    """Return warnings of what a machine has and runs do not use, and of a band that cuts them.
 
-    return [UNUSED_PHASE_ERROR] if parameters.imperfections.phase_error else []
+    Args:
+        parameters: The machine.
+        profile: File of the option `--profile`.
+    """
+    from wm_drake.simulation.cases import UNUSED_PHASE_ERROR
+    from wm_drake.simulation.displacements import band_warnings
+
+    unused = [UNUSED_PHASE_ERROR] if parameters.imperfections.phase_error else []
+    chosen = profile_of(parameters, profile)
+    return [*unused, *band_warnings(chosen, parameters.output_period)]
 
 
 def friction_warnings(parameters: "MachineParameters") -> list[str]:

@@ -368,7 +368,9 @@ def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
     begin, study, options = time.perf_counter(), order.study, order.options
     machines = tuple(_machine_of(order, name) for name in order.machines)
     machine = machines[0] if len(machines) == 1 else None
-    about_machines = _warnings(machines, machine_warnings)
+    given = getattr(options, "profile", None)
+    profile = given if isinstance(given, Path) else None
+    about_machines = _warnings(machines, partial(machine_warnings, profile=profile))
     for text in about_machines:
         say(f"warning: {text}", err=True)
     task = study.begin(options, *machines)

@@ -122,6 +122,7 @@ def test_front_under_a_constraint_is_found(machine, tmp_path):
     DesignResult(front, [], None, "").write(tmp_path)
     for name, number in front.chosen.items():
         loaded = load_machine(tmp_path / f"machine_{name.replace(' ', '_')}.yaml")
+        assert loaded.name == f"reference, {name}"
         wanted = front.machine(number).spring_types["suspension"].stiffness
         assert loaded.spring_types["suspension"].stiffness == pytest.approx(wanted, rel=1e-12)
     shown = front_envelopes(front, histories_of(machine))

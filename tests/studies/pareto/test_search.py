@@ -39,6 +39,18 @@ def test_front_of_zdt(problem, front):
     assert found.evaluations == 6400
 
 
+def test_search_evaluates_exactly_as_many_designs_as_wanted():
+    asked = []
+
+    def counted(x):
+        asked.append(len(x))
+        return zdt1(x)
+
+    found = search_front(Problem(counted, np.full(6, 0.5), 2), SearchSettings(100, 64))
+    assert (asked, found.evaluations) == ([64, 36], 100)
+    assert found.history[-1][0] == 100
+
+
 def circle(x):
     """Return (x, y) outside a circle about 0: the front is its arc."""
     return x, 0.64 - np.sum(x**2, axis=1, keepdims=True)

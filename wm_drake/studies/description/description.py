@@ -23,7 +23,7 @@ from wm_drake.parameters import (
 )
 from wm_drake.parameters.rubber import RubberBranches
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.displacements import FILTER_ORDER, PADDING, pass_band
+from wm_drake.simulation.displacements import FILTER_ORDER, PADDING_PERIODS, pass_band
 from wm_drake.simulation.vibration import HIGH_PASS_HZ
 from wm_drake.simulation.vibration import ORDER as RMS_ORDER
 from wm_drake.studies.description.modal import natural_modes
@@ -186,14 +186,15 @@ INTEGRATORS = {
 
 
 def _numerics(parameters: MachineParameters) -> dict[str, Any]:
+    band = pass_band(parameters.profile, parameters.output_period)
     both_ways = "forwards and backwards, so that no phase is shifted"
     return {
         "integrator": INTEGRATORS[parameters.integrator],
         "step_s": parameters.step,
         "output_period_s": parameters.output_period,
         "displacement_filter": f"Butterworth band-pass of order {FILTER_ORDER}, {both_ways}; ends "
-        f"mirrored over {PADDING:g} s",
-        "displacement_band_hz": list(pass_band(parameters.profile, parameters.output_period)),
+        f"mirrored over {PADDING_PERIODS / band[0]:g} s",
+        "displacement_band_hz": list(band),
         "rms_filter": f"Butterworth high-pass of order {RMS_ORDER}, {both_ways}",
         "rms_high_pass_hz": HIGH_PASS_HZ,
     }

@@ -71,7 +71,8 @@ class DesignResult(Result):
         for name, number in self.front.chosen.items():
             machine = self.front.machine(number)
             about = f"Design '{name}' of a design study of machine {machine.name}"
-            copy = machine.model_copy(update={"about": about, "measured": ()})
+            own = {"name": f"{machine.name}, {name}", "about": about, "measured": ()}
+            copy = machine.model_copy(update=own)
             path = folder / tables.machine_file_name(name)
             path.write_text(machine_yaml(copy), encoding="utf-8")
 
@@ -93,7 +94,7 @@ class DesignResult(Result):
         """Yield the chosen designs, if there are any, and a summary."""
         if self.front.chosen:
             yield _chosen(self.front).terminal("Chosen designs of the front")
-        yield summary(self.front, self.promises)
+        yield summary(self.front, self.promises, self.envelopes)
 
     def page(self, facts: Facts) -> str:
         """Return the page: front with designs to pick, search, chosen designs."""
@@ -119,7 +120,7 @@ class DesignResult(Result):
             sections.append(Section("robust", "Robust designs on fresh samples", tables=promised))
         return SectionedPage(
             f"Designs of machine {designs.parameters.name}",
-            summary(front, self.promises),
+            summary(front, self.promises, self.envelopes),
             sections,
             made,
             warnings=[*facts.warnings, *none],
@@ -139,7 +140,9 @@ def _picker(front: ParetoFront, shown: Envelopes) -> str:
     )
 
 
-def summary(front: ParetoFront, kept: Sequence[Promise] = ()) -> str:
+def summary(
+    front: ParetoFront, kept: Sequence[Promise] = (), shown: Envelopes | None = None
+) -> str:
     """Return the findings as one paragraph."""
     designs, count = front.designs, len(front.objectives)
     if not count:
@@ -163,7 +166,21 @@ def summary(front: ParetoFront, kept: Sequence[Promise] = ()) -> str:
         else ""
     )
     name = "The compromise" if COMPROMISE in front.chosen else "The best design"
-    return f"{text} {name} has {listed(parts)} of the machine itself.{robust}"
+    grown = "" if shown is None else _growth(shown, number)
+    return f"{text} {name} has {listed(parts)} of the machine itself.{grown}{robust}"
+
+
+def _growth(shown: Envelopes, number: int) -> str:
+    """Return a sentence about the amplitudes that are larger in a design than in the machine."""
+    before, after = (
+        MM_PER_M * np.nanmax(values, axis=-1) for values in (shown.nominal, shown.designs[number])
+    )
+    grown = [
+        f"{sensor} from {_text(old)} to {_text(new)} mm"
+        for sensor, old, new in zip(shown.sensors, before, after, strict=True)
+        if new > old and _text(old) != _text(new)
+    ]
+    return f" It increases amplitudes: {listed(grown)}." if grown else ""
 
 
 def _text(value: float) -> str:

@@ -122,13 +122,17 @@ def search_front(problem: Problem, settings: SearchSettings) -> SearchResult:
     history: list[tuple[int, float]] = []
 
     def usable_only(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Evaluate designs; those of the last generation beyond the allowed number count as bad."""
         nonlocal done
-        f, g = problem.evaluate(x)
-        usable = np.all(np.isfinite(np.hstack([f, g])), axis=1, keepdims=True)
-        f, g = np.where(usable, f, UNUSABLE), np.where(usable, g, UNUSABLE)
+        f, g = (np.full((len(x), size), UNUSABLE) for size in (objectives, constraints))
+        allowed = min(len(x), settings.evaluations - done)
+        if allowed > 0:
+            values = problem.evaluate(x[:allowed])
+            usable = np.all(np.isfinite(np.hstack(values)), axis=1, keepdims=True)
+            f[:allowed], g[:allowed] = (np.where(usable, v, UNUSABLE) for v in values)
         if not first:
             first.append(f)
-        done += len(x)
+        done += allowed
         return f, g
 
     def note(algorithm: Any) -> None:

@@ -95,7 +95,8 @@ class DesignTask(Task):
     def run(self, executor: Executor) -> DesignResult:
         """Search the front, check a robust one on fresh samples, and run it with histories."""
         options, run = self.options, partial(executor.simulate, self.machine, self.measures)
-        with executor.progress(options.evaluations * self.designs.scenarios):
+        total = (options.evaluations + 1) * self.designs.scenarios  # and the machine itself
+        with executor.progress(total):
             front = run_designs(self.designs, run, self.settings, options.search)
         checked = promises(front, partial(run, what="fresh samples"), options.seed)
         envelopes = None
