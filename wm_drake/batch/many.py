@@ -12,11 +12,11 @@ import xarray as xr
 from wm_drake.batch.runs import Runner, RunResult
 from wm_drake.batch.work_items import Preparation
 from wm_drake.errors import input_error
-from wm_drake.model.machine import Machine
+from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.cases import Case, notice_jumping_friction
+from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
 from wm_drake.simulation.feet import cabinet_of
 from wm_drake.simulation.measures import MEASURES, Variable
 from wm_drake.simulation.measures.labels import LABELS
@@ -39,8 +39,8 @@ class SimulationInterrupted(KeyboardInterrupt):
 
 
 def simulate_many(
-    machine: Machine,
-    cases: Iterable[Case],
+    machine: AnyMachine,
+    cases: Iterable[Case | str],
     *,
     measures: Iterable[str] = ("extremes", "amplitudes"),
     step: float | None = None,
@@ -56,9 +56,9 @@ def simulate_many(
     the number of workers or on the other cases.
 
     Args:
-        machine: A built machine.
-        cases: Cases to run. They are taken one by one as needed, so memory stays constant if this
-            is a generator.
+        machine: A built machine, its parameters, or its name or file.
+        cases: Cases to run, or names of loads of the machine. They are taken one by one as needed,
+            so memory stays constant if this is a generator.
         measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`, such as
             "extremes" (D, F and M of [B]), "amplitudes" (and critical speeds), "gap", "mounts".
         step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
@@ -81,12 +81,11 @@ def simulate_many(
 
     Example:
         >>> import wm_drake as wm
-        >>> machine = wm.build_machine(wm.load_machine("reference"))
-        >>> cases = [wm.case_of(machine.parameters, load) for load in ("middle", "counter")]
-        >>> table = wm.simulate_many(machine, cases)
+        >>> table = wm.simulate_many("reference", ["middle", "counter"])
         >>> dict(table.amplitude.sizes)
         {'run': 2, 'sensor': 6}
     """
+    machine = machine_of(machine)
     chosen = tuple(dict.fromkeys(measures))
     if any("feet" in MEASURES.find(name, key="measures").needs for name in chosen):
         cabinet_of(machine.parameters)
@@ -94,6 +93,8 @@ def simulate_many(
     scheme = checked_integrator(machine.parameters, integrator)
     notice_jumping_friction(machine.parameters)
     results: dict[int, tuple[str, str, list[FloatArray]]] = {}
+    parameters = machine.parameters
+    listed = (case_of(parameters, case) if isinstance(case, str) else case for case in cases)
 
     def collect(runs: list[RunResult]) -> None:
         for run in runs:  # fill the table first: the callbacks may raise
@@ -105,7 +106,7 @@ def simulate_many(
     try:
         runner = Runner(machine.parameters, chosen, histories, machine.cache.scenes)
         preparation = Preparation(machine, step, scheme)
-        _run_all(preparation, runner, cases, workers or os.cpu_count() or 1, collect)
+        _run_all(preparation, runner, listed, workers or os.cpu_count() or 1, collect)
     except KeyboardInterrupt:
         raise SimulationInterrupted(as_table(machine.parameters, chosen, results)) from None
     pairs = runner.scenes[0].pair_names() if runner.scenes else None

@@ -1,6 +1,7 @@
 """Add a machine to a diagram, or build a diagram of it alone."""
 
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 from pydrake.geometry import Meshcat
@@ -17,7 +18,7 @@ from wm_drake.model.state_layout import state_layout_of
 from wm_drake.model.tub_points import measured_points, tub_points
 from wm_drake.model.visualization import add_visualizer
 from wm_drake.model.wiring import Link, Wiring
-from wm_drake.parameters import MachineParameters, MotorDrive
+from wm_drake.parameters import MachineParameters, MotorDrive, load_machine
 from wm_drake.parameters.drive import motor_of
 from wm_drake.systems.cabinet import Cabinet
 from wm_drake.systems.element_system import ElementSystem
@@ -26,6 +27,9 @@ from wm_drake.systems.sensors import Sensors
 from wm_drake.systems.speed_source import MotorTorque, SpeedSource
 from wm_drake.systems.spin_profile_source import SpinProfileSource
 from wm_drake.systems.tub_force import TubForce
+
+AnyMachine: TypeAlias = Machine | MachineParameters | str | Path
+"""A built machine, parameters, the name of a shipped machine, or a machine file."""
 
 
 def add_washing_machine(
@@ -117,13 +121,15 @@ def add_washing_machine(
     )
 
 
-def build_machine(parameters: MachineParameters, *, meshcat: Meshcat | None = None) -> Machine:
+def build_machine(
+    parameters: MachineParameters | str | Path, *, meshcat: Meshcat | None = None
+) -> Machine:
     """Build the diagram of a machine alone, with its named ports exported.
 
     Build once and reuse: every number can be changed afterwards in a Context (`Machine.set_up`).
 
     Args:
-        parameters: The machine.
+        parameters: The machine, the name of a shipped one, or a machine file.
         meshcat: Shows the moving machine if given; the shapes cannot touch the dynamics.
 
     Raises:
@@ -131,10 +137,12 @@ def build_machine(parameters: MachineParameters, *, meshcat: Meshcat | None = No
 
     Example:
         >>> import wm_drake as wm
-        >>> machine = wm.build_machine(wm.load_machine("reference"))
+        >>> machine = wm.build_machine("reference")
         >>> sorted(machine.springs)
         ['left', 'rear', 'right']
     """
+    if not isinstance(parameters, MachineParameters):
+        parameters = load_machine(parameters)
     builder = DiagramBuilder()
     systems = add_washing_machine(builder, parameters)
     if meshcat is not None:
@@ -148,6 +156,15 @@ def build_machine(parameters: MachineParameters, *, meshcat: Meshcat | None = No
     diagram = builder.Build()
     diagram.set_name(parameters.name)
     return Machine(**vars(systems), diagram=diagram)
+
+
+def machine_of(machine: AnyMachine) -> Machine:
+    """Return a machine that may be given by its parameters, name or file, built.
+
+    Raises:
+        InputError: there is no such machine, or it has an error.
+    """
+    return machine if isinstance(machine, Machine) else build_machine(machine)
 
 
 def _by_kind(placed: PlacedElements, by_label: dict[str, ElementSystem]) -> dict[str, Any]:

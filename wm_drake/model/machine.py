@@ -34,7 +34,7 @@ from wm_drake.systems.speed_source import SpeedSource
 from wm_drake.systems.spin_profile_source import SpinProfileSource
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Setup:
     """A machine set up in a Context: numbers chosen, preloads solved, at rest at its rest pose.
 
@@ -66,6 +66,11 @@ class Setup:
     carrier_rest: FloatArray
     cabinet: CabinetOnFeet | None
     measured_points: FloatArray
+
+    def __repr__(self) -> str:
+        """Return the machine and its rest position in one line."""
+        x, y, z = (f"{1e3 * value:.3g}" for value in self.rest_pose[3:6])
+        return f"<Setup of {self.parameters!r}; rest position of the tub ({x}, {y}, {z}) mm>"
 
     @property
     def plant_context(self) -> Context:
@@ -153,7 +158,7 @@ class MotorSystems:
         self.controller.reset(self.controller.GetMyContextFromRoot(context))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MachineSystems:
     """The systems of a machine in a diagram, and the ports that other systems may connect to.
 
@@ -199,6 +204,11 @@ class MachineSystems:
     inputs: dict[str, InputPort]
     outputs: dict[str, OutputPort]
     cache: SetUpCache = field(default_factory=SetUpCache, repr=False, compare=False, kw_only=True)
+
+    def __repr__(self) -> str:
+        """Return the machine and the number of its ports in one line."""
+        ports = f"{len(self.inputs)} inputs, {len(self.outputs)} outputs"
+        return f"<{type(self).__name__} of {self.parameters!r}; {ports}>"
 
     def set_up(
         self,
@@ -397,7 +407,7 @@ class MachineSystems:
             part.SetContinuousState(np.zeros(self.feet.state_size))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Machine(MachineSystems):
     """A machine as a diagram of its own. The named ports are exported: inputs and outputs.
 

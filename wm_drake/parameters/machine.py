@@ -1,5 +1,6 @@
 """Parameters of a machine: one frozen tree of numbers in SI units."""
 
+import math
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints, ValidationInfo, field_validator, model_validator
@@ -293,6 +294,18 @@ class MachineParameters(Frozen):
         if self.cabinet and self.cabinet.moves and not self.gravity > 0.0:
             raise ValueError("cabinet.moves: needs gravity above 0, which presses the feet down")
         return self
+
+    def __repr__(self) -> str:
+        """Return name, elements, loads and speed in one line; `model_dump()` has all numbers."""
+        kinds = ("springs", "dampers", "telescopic_dampers", "bushings", "elements")
+        counts = {kind.replace("_", " "): len(getattr(self, kind)) for kind in kinds}
+        parts = [f"{count} {kind}" for kind, count in counts.items() if count]
+        parts += [f"{'a' if self.gasket else 'no'} gasket", f"loads {', '.join(self.loads)}"]
+        rpm = max(map(abs, self.profile.speed)) * 30.0 / math.pi
+        speed = f"up to {rpm:.4g} rpm in {self.profile.duration:.4g} s"
+        return f"<{type(self).__name__} '{self.name}': {', '.join(parts)}; {speed}>"
+
+    __str__ = __repr__
 
     @property
     def cabinet_moves(self) -> bool:

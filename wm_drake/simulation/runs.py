@@ -11,7 +11,7 @@ from wm_drake.engines.compiled.stepping import choose_stepping
 from wm_drake.engines.drake import run_drake
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.errors import input_error, nearest_names
-from wm_drake.model.machine import Machine
+from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.machine import Integrator
 from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
@@ -29,7 +29,7 @@ class DivergenceWarning(UserWarning):
 
 
 def simulate(
-    machine: Machine,
+    machine: AnyMachine,
     case: Case | str,
     engine: str = DEFAULT_ENGINE,
     *,
@@ -40,7 +40,7 @@ def simulate(
     """Simulate one case of a machine and return its record.
 
     Args:
-        machine: A built machine.
+        machine: A built machine, its parameters, or its name or file.
         case: The case to run, or the name of one of the machine's loads.
         engine: Name of an engine in `ENGINES`.
         step: Step size; the output period of the machine must be an integer multiple of it. If
@@ -60,11 +60,11 @@ def simulate(
 
     Example:
         >>> import wm_drake as wm
-        >>> machine = wm.build_machine(wm.load_machine("reference"))
-        >>> record = wm.simulate(machine, "middle")
+        >>> record = wm.simulate("reference", "middle")
         >>> record.displacement.dims, float(record.time[-1])
         (('time', 'sensor'), 70.0)
     """
+    machine = machine_of(machine)
     if engine not in ENGINES:
         raise input_error(f"no engine '{engine}'{nearest_names(engine, ENGINES)}", key="engine")
     step = checked_step(machine.parameters, step)

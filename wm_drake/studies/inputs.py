@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 
@@ -98,10 +98,11 @@ def with_sets(
     """
     from wm_drake.parameters import with_values
 
-    changes: dict[str, str | None] = {}
-    for key, text in pairs_of(sets, "--set"):
-        changes.pop(key, None)
-        changes[key] = None if text in ("null", "~") else text
+    changes: dict[str, Any] = {}
+    for name, text in pairs_of(sets, "--set"):
+        for key, value in _set(parameters, name, text).items():
+            changes.pop(key, None)
+            changes[key] = value
     if not changes:
         return parameters, dict(sources)
     try:
@@ -109,6 +110,25 @@ def with_sets(
     except InputError as error:
         raise InputError(Problem("--set", p.key, p.message) for p in error.problems) from None
     return changed, {**sources, **dict.fromkeys(changes, "set on the command line")}
+
+
+def _set(parameters: "Tree", name: str, text: str) -> dict[str, Any]:
+    """Return the values by key that an option `--set NAME=TEXT` sets.
+
+    The name is a key path, or a symbol of [B] such as C_L, whose numbers change together; a symbol
+    also takes percents of the numbers of the machine.
+    """
+    from wm_drake.parameters import GASKET_FACTORS, MachineParameters, load_factors
+    from wm_drake.parameters.variation import variation_of
+
+    factor = None if "." in name else load_factors(GASKET_FACTORS).get(name)
+    if factor is None or not isinstance(parameters, MachineParameters):
+        return {name: None if text in ("null", "~") else text}
+    try:
+        variation, values = variation_of(parameters, name, factor.keys, {name: text})
+    except InputError as error:
+        raise InputError(Problem("--set", name, p.message) for p in error.problems) from None
+    return variation.changes(values[name])
 
 
 def pairs_of(entries: Sequence[str] | None, option: str) -> list[tuple[str, str]]:

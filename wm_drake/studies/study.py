@@ -70,7 +70,8 @@ class Options(OptionModel):
     sets: tuple[str, ...] = option(
         (),
         "Change a number of the machine file: gasket.stiffness_x='5 N/mm'; null removes an "
-        "element: dampers.left=null. Repeatable.",
+        "element: dampers.left=null. A symbol of the pages sets its numbers together: C_L='80 %'. "
+        "Repeatable.",
         "KEY=VALUE",
         "--set",
     )

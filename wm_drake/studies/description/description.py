@@ -10,8 +10,9 @@ from wm_drake.elements.spin_profile import drum_motion
 from wm_drake.elements.state_map import BEARING_WORDS
 from wm_drake.engines.compiled.step_check import fastest_motions
 from wm_drake.model.bodies import oscillating_bodies
+from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.model.equilibrium import tensions_at
-from wm_drake.model.machine import Machine, Setup
+from wm_drake.model.machine import Setup
 from wm_drake.model.sdf_names import tubes_of
 from wm_drake.model.state_layout import CARRIER
 from wm_drake.parameters import (
@@ -61,7 +62,7 @@ CONVENTIONS = {
 PRODUCTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
-def describe(machine: Machine) -> dict[str, Any]:
+def describe(machine: AnyMachine) -> dict[str, Any]:
     """Return the description of a machine at rest, in SI units (m, kg, s, rad, N).
 
     The frames are W (housing), T (tub) and D (drum); in the SDF all three coincide. The suffix of a
@@ -74,6 +75,7 @@ def describe(machine: Machine) -> dict[str, Any]:
         >>> description["machine"], description["gravity_W"]
         ('reference', [0.0, 0.0, -9.81])
     """
+    machine = machine_of(machine)
     setup, modes = machine.set_up(), natural_modes(machine)
     parameters, bodies = setup.parameters, _bodies(setup)
     described = {

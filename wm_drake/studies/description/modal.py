@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wm_drake.model.machine import Machine
+from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.modes.linearisation import MODES, Linearisation
@@ -29,7 +29,7 @@ class Modes:
 
 
 def natural_modes(
-    machine: Machine, parameters: MachineParameters | None = None, *, gasket: bool = True
+    machine: AnyMachine, parameters: MachineParameters | None = None, *, gasket: bool = True
 ) -> Modes:
     """Compute the natural modes of the empty machine about its rest pose, without friction.
 
@@ -40,7 +40,7 @@ def natural_modes(
     compliant bearing have faster ones.
 
     Args:
-        machine: A built machine.
+        machine: A built machine, its parameters, or its name or file.
         parameters: Parameters to use; those of the built machine if None.
         gasket: False removes the gasket.
 
@@ -50,6 +50,7 @@ def natural_modes(
         >>> len(modes.frequency_hz)
         6
     """
+    machine = machine_of(machine)
     setup = machine.set_up(parameters=parameters, gasket=gasket, dampers=False)
     spectrum = Linearisation(setup).spectrum().first(MODES)
     shapes = [shape_of(vector).real for vector in spectrum.right.T]

@@ -8,6 +8,7 @@ import xarray as xr
 
 from wm_drake.batch import simulate_many
 from wm_drake.errors import input_error
+from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import Load, MachineParameters
 from wm_drake.parameters.types import FloatArray
@@ -100,7 +101,7 @@ class MachineModes(NaturalModes):
 
 @on_one_thread
 def modes(
-    machine: Machine,
+    machine: AnyMachine,
     load: Load | str | None = None,
     *,
     gasket: bool = True,
@@ -111,7 +112,7 @@ def modes(
     """Return the modes of a machine.
 
     Args:
-        machine: A built machine.
+        machine: A built machine, its parameters, or its name or file.
         load: Point masses in the drum, or the name of one of the machine's loads; None for the
             empty drum. With a load, the equilibrium and the matrix are means over a revolution.
         gasket: False removes the gasket.
@@ -130,6 +131,7 @@ def modes(
         >>> len(result.modes["sliding"])
         6
     """
+    machine = machine_of(machine)
     if not 0.0 < amplitude <= 0.1:
         raise input_error(
             f"{1e3 * amplitude:g} mm is no amplitude; allowed are more than 0 and up to 100 mm",

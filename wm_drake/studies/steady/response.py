@@ -9,7 +9,8 @@ import xarray as xr
 from wm_drake.elements.state_map import CARRIER, ELEMENT, STRETCHES, TUB
 from wm_drake.engines.trajectory import COORDINATES, Trajectory
 from wm_drake.errors import input_error
-from wm_drake.model.machine import Machine, Setup
+from wm_drake.model.build import AnyMachine, machine_of
+from wm_drake.model.machine import Setup
 from wm_drake.parameters import Load
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.mounts import KINDS, force_measures, mount_names
@@ -25,7 +26,7 @@ MOST_HARMONICS, MOST_SAMPLES = 40, 1024
 
 
 def steady_response(
-    machine: Machine,
+    machine: AnyMachine,
     load: Load | str,
     speeds: Sequence[float] | FloatArray,
     *,
@@ -39,7 +40,7 @@ def steady_response(
     The periodic motion is found by harmonic balance and followed around folds.
 
     Args:
-        machine: A built machine.
+        machine: A built machine, its parameters, or its name or file.
         load: Point masses in the drum, or the name of one of the machine's loads.
         speeds: Rising or falling speeds, at least two. [rad/s]
         gasket: False removes the gasket.
@@ -72,6 +73,7 @@ def steady_response(
         >>> bool(response.stable.all())
         True
     """
+    machine = machine_of(machine)
     setup = machine.set_up(load, gasket=gasket)
     return response_of(setup, speeds, harmonics, samples, progress)
 
