@@ -1,7 +1,8 @@
 """Dynamics of front-loading washing machines on Drake.
 
     import wm_drake as wm
-    record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
+    wm.run_study("spin", "reference", load=["middle"]).plot()
+    record = wm.simulate("reference", "middle")
     wm.envelopes(record).upper.sel(sensor="Xr").plot()
 
 The rooms, in the order of the data flow: `parameters`, `laws`, `elements`, `systems`, `model`,

@@ -23,11 +23,13 @@ plain functions, and tests can pass any other function of the same form.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from wm_drake.errors import input_error, nearest_names
 from wm_drake.registry import Registry
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -35,6 +37,7 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from rich.table import Table
 
     from wm_drake.parameters import MachineParameters
+    from wm_drake.report.figure import Figure
     from wm_drake.studies.run import Executor
 
 
@@ -131,6 +134,17 @@ class Facts:
         ]
 
 
+MOST_ROWS = 12
+"""Largest number of rows of a table in a notebook; `to_dataframe` has all."""
+
+
+def _chosen(name: str, known: Sequence[str], kind: str) -> str:
+    """Return the name of a table or figure of a result; the first one if the name is empty."""
+    if not known or (name and name not in known):
+        raise input_error(f"no {kind} '{name}'{nearest_names(name, known)}", key=kind)
+    return name or known[0]
+
+
 class Result(ABC):
     """Result of a study."""
 
@@ -159,6 +173,54 @@ class Result(ABC):
     def pages(self, facts: Facts) -> Mapping[str, str]:
         """Return the pages by the names of their files; a study with several pages extends this."""
         return {PAGE: self.page(facts)}
+
+    def to_dataframe(self, name: str = "") -> "pd.DataFrame":
+        """Return a table of the result.
+
+        Args:
+            name: Name of the table, as in `tables()`; the first one if empty.
+
+        Raises:
+            InputError: there is no such table.
+
+        Example:
+            >>> import wm_drake as wm
+            >>> result = wm.run_study("drive", load=["middle"], quick=True, quiet=True)
+            >>> result.to_dataframe("map").equals(result.tables()["map"])
+            True
+        """
+        tables = self.tables()
+        return tables[_chosen(name, list(tables), "table")]
+
+    def pictures(self) -> "dict[str, Figure]":
+        """Return the figures of the page by the texts that describe them."""
+        from wm_drake.report.publication import collected
+
+        with collected() as drawn:
+            self.pages(Facts())
+        return {title: figure for figure, title in drawn}
+
+    def plot(self, title: str = "") -> Any:
+        """Return a figure of the page, drawn with matplotlib; a notebook shows it.
+
+        Args:
+            title: First words of its text, as in `pictures()`; the first figure if empty.
+
+        Raises:
+            InputError: there is no such figure.
+        """
+        from wm_drake.report.drawing import matplotlib_of
+
+        figures = self.pictures()
+        full = next((text for text in figures if title and text.startswith(title)), title)
+        return matplotlib_of(figures[_chosen(full, list(figures), "figure")])
+
+    def _repr_html_(self) -> str:
+        """Return the tables for a notebook, long ones shortened in the middle."""
+        return "".join(
+            f"<h4>{escape(name)}</h4>{table.to_html(max_rows=MOST_ROWS, index=False)}"
+            for name, table in self.tables().items()
+        )
 
     def write(self, folder: Path) -> None:
         """Write the tables as CSV; a study that writes other files too extends this."""

@@ -71,8 +71,8 @@ class DesignResult(Result):
         for name, number in self.front.chosen.items():
             machine = self.front.machine(number)
             about = f"Design '{name}' of a design study of machine {machine.name}"
-            own = {"name": f"{machine.name}, {name}", "about": about, "measured": ()}
-            copy = machine.model_copy(update=own)
+            changes = {"name": f"{machine.name}, {name}", "about": about, "measured": ()}
+            copy = machine.model_copy(update=changes)
             path = folder / tables.machine_file_name(name)
             path.write_text(machine_yaml(copy), encoding="utf-8")
 
