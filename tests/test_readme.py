@@ -103,6 +103,10 @@ def test_the_python_snippets_run(path):
         assert all(mode.damping_ratio > 0.0 for mode in names["result"].modes["sliding"])
         assert names["response"].amplitude.sel(sensor="Zf").size >= names["speeds"].size
         return
+    if path == README:
+        assert names["result"].to_dataframe()["source"].tolist() == ["wm_drake"]
+        assert names["result"].plot().get_axes()
+        return
     assert names["record"].sizes["time"] == round(SHORT.duration / 5e-3) + 1
     if path == page("batch"):
         table = names["table"]
@@ -114,7 +118,7 @@ def test_the_python_snippets_run(path):
 
 def test_the_snippet_of_the_readme_is_short():
     (code,) = blocks(README, "python")
-    assert len([line for line in code.splitlines() if line.strip()]) == 3
+    assert len([line for line in code.splitlines() if line.strip()]) <= 5
 
 
 MACHINES = [  # page, index of the block, a number in it by key path, whether nothing in it is unusual
