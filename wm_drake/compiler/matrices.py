@@ -70,3 +70,9 @@ def about_centre(i, m, q):
 def plus(a, b):
     """Return the sum of two wrenches."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
+
+
+@law
+def scaled(s, a):
+    """Return a wrench times a number."""
+    return (s * a[0], s * a[1], s * a[2], s * a[3], s * a[4], s * a[5])

@@ -17,7 +17,7 @@ states, equilibrium, forces on the cabinet, records and pictures.
 import functools
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -25,8 +25,8 @@ import numpy as np
 from wm_drake.compiler.chosen import ChosenLaw
 from wm_drake.compiler.elementary import numbers
 from wm_drake.compiler.packed import PackedLayout, generated
-from wm_drake.elements.motion import tub_motion, write_generalized_force
-from wm_drake.parameters.element_kinds import ELEMENT_KINDS, Element
+from wm_drake.elements.motion import drum_motion, tub_motion, write_generalized_force
+from wm_drake.parameters.element_kinds import ELEMENT_KINDS, DrumElement, OfKind
 from wm_drake.parameters.types import FloatArray
 
 
@@ -44,6 +44,21 @@ class Ends(NamedTuple):
     housing_rotation: FloatArray
 
 
+class DrumPlace(NamedTuple):
+    """The place of an element on the drum, as drawn.
+
+    Attributes:
+        tub_point: Point of the drum axis, in T. (3,) [m]
+        tub_rotation: Rotation of a frame there whose y axis is the drum axis and whose z axis
+            points to the top of the drum at angle 0, in T. (3, 3)
+        gravity: Acceleration of free fall in W. (3,) [m/s^2]
+    """
+
+    tub_point: FloatArray
+    tub_rotation: FloatArray
+    gravity: FloatArray
+
+
 @dataclass(frozen=True)
 class Output:
     """A named output of an element.
@@ -52,7 +67,8 @@ class Output:
         name: Name of the port, and of the variable in a record behind the name of the kind.
         unit: SI unit.
         words: What it is, for records and pages.
-        size: 1, or 3 for a vector.
+        size: 1, 3 for a vector, or any number with a dimension of its own.
+        dim: Dimension of the numbers in a record.
 
     Example:
         >>> import wm_drake as wm
@@ -64,6 +80,7 @@ class Output:
     unit: str
     words: str = ""
     size: int = 1
+    dim: str = "axis"
 
 
 @dataclass(frozen=True)
@@ -93,17 +110,18 @@ class ElementKind:
     Attributes:
         name: Name in machine files.
         parameters: Type of its parameters in a machine file, with units; for a kind of another
-            package a subclass of `Element`.
+            package a subclass of `Element`, or of `DrumElement` if it acts on the drum.
         layout: Packed numbers.
         outputs: Named outputs of an element, one after the other.
-        numbers: Function (parameters, `Ends`) that returns the values of the layout's fields by
-            name.
+        numbers: Function (parameters, `Ends` or `DrumPlace`) that returns the values of the
+            layout's fields by name.
         evaluate: Law (motion, state, p, at). motion: `TubMotion` of the tub, in the frame of the
-            housing; state: named tuple of the states; p, at: array that holds the packed numbers,
-            and index where they begin, as `layout.read` takes them. It returns the moment about To
-            and the force on the tub (six numbers, W), a tuple with the outputs, and a tuple with
-            the time derivatives of the states. It has no branches: `where` chooses. None for a kind
-            with `on_plant`.
+            housing, or `DrumMotion` in W for an element on the drum; state: named tuple of the
+            states; p, at: array that holds the packed numbers, and index where they begin, as
+            `layout.read` takes them. It returns the moment about To and the force on the tub (six
+            numbers, W), a tuple with the outputs, and a tuple with the time derivatives of the
+            states. An element on the drum returns its torque on the drum about the drum axis as a
+            seventh number. It has no branches: `where` chooses. None for a kind with `on_plant`.
         states: Continuous states.
         acts_at_rest: Whether its force counts in the static equilibrium; False for a damper.
         frictionless: Values of fields of the layout that take the dry friction out, for modes.
@@ -126,7 +144,7 @@ class ElementKind:
     parameters: type[Any]
     layout: PackedLayout
     outputs: tuple[Output, ...] = ()
-    numbers: Callable[[Any, Ends], Mapping[str, Any]] | None = None
+    numbers: Callable[[Any, Any], Mapping[str, Any]] | None = None
     evaluate: Any = None
     states: tuple[State, ...] = ()
     acts_at_rest: bool = True
@@ -146,13 +164,18 @@ class ElementKind:
         if self.on_plant is None:
             if self.evaluate is None or self.numbers is None:
                 raise ValueError(f"element kind '{self.name}' needs numbers and evaluate")
-            if not issubclass(self.parameters, Element):
+            if not issubclass(self.parameters, OfKind):
                 raise ValueError(f"element kind '{self.name}': parameters must extend Element")
             if not self.name.isidentifier():
                 raise ValueError(f"element kind '{self.name}': the name must be an identifier")
             object.__setattr__(self, "on_plant", _on_plant(self))
         if self.place is None and self.numbers is not None:
             object.__setattr__(self, "place", functools.partial(_placed, self))
+
+    @property
+    def on_drum(self) -> bool:
+        """Return whether its elements act on the drum, and not between tub and housing."""
+        return issubclass(self.parameters, DrumElement)
 
     @property
     def output_parts(self) -> dict[str, slice]:
@@ -218,11 +241,14 @@ class PlacedElement:
         kind: Its kind.
         ends: Its frames.
         packed_numbers: Numbers of `ElementKind.layout`.
+        start: States at the start of a run with a drum at rest, and what a unit of the rate of the
+            drum adds to them; those of the kind if None.
     """
 
     kind: ElementKind
-    ends: Ends
+    ends: Ends | DrumPlace
     packed_numbers: FloatArray
+    start: tuple[FloatArray, FloatArray] | None = None
 
     @property
     def structure(self) -> list[int]:
@@ -234,35 +260,40 @@ class PlacedElement:
         """Return the number of its states."""
         return len(self.kind.states)
 
-    @property
-    def initial(self) -> FloatArray:
-        """Return the values of its states at rest."""
-        return np.array([state.initial for state in self.kind.states])
+    def initial(self, drum_rate: float = 0.0) -> FloatArray:
+        """Return the values of its states at the start, at a rate of the drum. [rad/s]"""
+        if self.start is None:
+            return np.array([state.initial for state in self.kind.states])
+        return self.start[0] + drum_rate * self.start[1]
 
     def without_friction(self) -> "PlacedElement":
         """Return the element without dry friction."""
         changed = self.kind.layout.replaced(self.packed_numbers, **self.kind.frictionless)
-        return PlacedElement(self.kind, self.ends, changed)
+        return replace(self, packed_numbers=changed)
 
     def packed(self) -> FloatArray:
         """Return its packed numbers."""
         return self.packed_numbers.copy()
 
 
-def _placed(kind: ElementKind, ends: Ends, parameters: Element) -> PlacedElement:
+def _placed(kind: ElementKind, ends: Ends | DrumPlace, parameters: OfKind) -> PlacedElement:
     """Return an element of another package in its place."""
     assert kind.numbers is not None  # the declaration has been checked
     return PlacedElement(kind, ends, kind.layout.pack(**kind.numbers(parameters, ends)))
 
 
-RegisteredLaws = namedtuple("RegisteredLaws", ("wrench", "outputs", "at", "states"))
+RegisteredLaws = namedtuple(
+    "RegisteredLaws", ("wrench", "outputs", "at", "states", "on_cabinet", "torque")
+)
 """Elements of other packages in a machine, for compiled functions.
 
 wrench: `ChosenLaw` (i, x, dx, motion, p, at, first) that returns moment about To and force of
 element i on the tub, and writes the time derivatives of its states unless dx is None; outputs:
 `ChosenLaw` (i, x, motion, p, at, first, answer, column) that writes its outputs and returns the
-index behind them; at, states: index of each element in the packed numbers, and of its first state.
-A machine without such elements has None in place of this.
+index behind them; at, states: index of each element in the packed numbers, and of its first state;
+on_cabinet: 1 for an element whose reaction acts on the cabinet, 0 for one on the drum; torque:
+`ChosenLaw` (i, x, motion, p, at, first) that returns the torque on the drum, None without elements
+on the drum. A machine without such elements has None in place of this.
 """
 
 
@@ -278,28 +309,39 @@ def registered_laws(
     if not kinds:
         return None
     indices = (np.array(values, dtype=np.int64) for values in (at, states))
-    return RegisteredLaws(*_laws_of(tuple(kinds)), *indices)
+    on_cabinet = np.array([0.0 if kind.on_drum else 1.0 for kind in kinds])
+    wrench, outputs, torque = _laws_of(tuple(kinds))
+    return RegisteredLaws(wrench, outputs, *indices, on_cabinet, torque)
 
 
 @functools.lru_cache(maxsize=64)
-def _laws_of(kinds: tuple[ElementKind, ...]) -> tuple[ChosenLaw, ChosenLaw]:
-    """Return the laws `wrench` and `outputs` of `RegisteredLaws`."""
-    laws = []
-    for word, arguments, law_of in (
-        ("wrench", "x, dx, motion, p, at, first", _wrench_law),
-        ("outputs", "x, motion, p, at, first, answer, column", _outputs_law),
-    ):
-        lines = [f"def element_{word}(i, {arguments}):"]
-        names = {}
-        for i, kind in enumerate(kinds):
-            names[f"law_{i}"] = law_of(kind)
-            last = i == len(kinds) - 1
-            lines += [] if last else [f"    if i == {i}:"]
-            lines.append(f"    {'' if last else '    '}return law_{i}({arguments})")
-        compiled = generated(f"element_{word}", "\n".join(lines) + "\n", names)
-        title = "+".join(f"{kind.name}({kind.layout.name})" for kind in kinds)
-        laws.append(ChosenLaw(compiled, f"{word} of {title}"))
-    return laws[0], laws[1]
+def _laws_of(kinds: tuple[ElementKind, ...]) -> tuple[ChosenLaw, ChosenLaw, ChosenLaw | None]:
+    """Return the laws `wrench`, `outputs` and `torque` of `RegisteredLaws`."""
+    torque = None
+    if any(kind.on_drum for kind in kinds):
+        torque = _law_of_all(kinds, "torque", "x, motion, p, at, first", _torque_law)
+    return (
+        _law_of_all(kinds, "wrench", "x, dx, motion, p, at, first", _wrench_law),
+        _law_of_all(kinds, "outputs", "x, motion, p, at, first, answer, column", _outputs_law),
+        torque,
+    )
+
+
+def _law_of_all(
+    kinds: tuple[ElementKind, ...], word: str, arguments: str, law_of: Callable[[ElementKind], Any]
+) -> ChosenLaw:
+    """Return a law (i, arguments) that calls that of the kind of element i."""
+    lines, names = [f"def element_{word}(i, {arguments}):"], {}
+    each = list(dict.fromkeys(kinds))
+    for number, kind in enumerate(each):
+        names[f"law_{number}"] = law_of(kind)
+        last = number == len(each) - 1
+        of_kind = " or ".join(f"i == {i}" for i, other in enumerate(kinds) if other is kind)
+        lines += [] if last else [f"    if {of_kind}:"]
+        lines.append(f"    {'' if last else '    '}return law_{number}({arguments})")
+    compiled = generated(f"element_{word}", "\n".join(lines) + "\n", names)
+    title = "+".join(f"{kind.name}{len(kind.states)}({kind.layout.name})" for kind in kinds)
+    return ChosenLaw(compiled, f"{word} of {title}")
 
 
 @functools.cache
@@ -314,8 +356,8 @@ def _wrench_law(kind: ElementKind) -> Any:
         write = "    put(dx, first, rates)\n"
     source = (
         f"def {kind.name}_wrench(x, dx, motion, p, at, first):\n"
-        f"    wrench, outputs, rates = evaluate(motion, {_states(kind, 'x', 'first')}, p, at)\n"
-        f"{write}    return wrench\n"
+        f"    wrench, outputs, rates = {_evaluated(kind)}\n"
+        f"{write}    return {_six('wrench')}\n"
     )
     return generated(f"{kind.name}_wrench", source, names)
 
@@ -327,10 +369,32 @@ def _outputs_law(kind: ElementKind) -> Any:
     lines = [f"    answer[column + {k}] = outputs[{k}]" for k in range(size)]
     source = (
         f"def {kind.name}_outputs(x, motion, p, at, first, answer, column):\n"
-        f"    wrench, outputs, rates = evaluate(motion, {_states(kind, 'x', 'first')}, p, at)\n"
+        f"    wrench, outputs, rates = {_evaluated(kind)}\n"
     )
     source += "\n".join([*lines, f"    return column + {size}"]) + "\n"
     return generated(f"{kind.name}_outputs", source, _names(kind))
+
+
+@functools.cache
+def _torque_law(kind: ElementKind) -> Any:
+    """Return the law (x, motion, p, at, first) of the torque of an element on the drum."""
+    lines = [f"def {kind.name}_torque(x, motion, p, at, first):"]
+    if kind.on_drum:
+        lines += [f"    wrench, outputs, rates = {_evaluated(kind)}", "    return wrench[6]"]
+    else:
+        lines.append("    return 0.0 * motion.velocity[0]")
+    return generated(f"{kind.name}_torque", "\n".join(lines) + "\n", _names(kind))
+
+
+def _evaluated(kind: ElementKind) -> str:
+    """Return the source that evaluates an element in a law of `RegisteredLaws`."""
+    motion = "drum_motion(motion, x)" if kind.on_drum else "motion"
+    return f"evaluate({motion}, {_states(kind, 'x', 'first')}, p, at)"
+
+
+def _six(wrench: str) -> str:
+    """Return the source of moment and force of a wrench."""
+    return f"({', '.join(f'{wrench}[{k}]' for k in range(6))})"
 
 
 def _on_plant(kind: ElementKind) -> Any:
@@ -338,8 +402,10 @@ def _on_plant(kind: ElementKind) -> Any:
     lines = [
         f"def {kind.name}_on_plant(x, state, p, generalized_force, written, rate):",
         "    motion = tub_motion(numbers(x))",
+        "    motion = drum_motion(motion, x)" if kind.on_drum else "",
         f"    wrench, outputs, rates = evaluate(motion, {_states(kind, 'state')}, numbers(p), 0)",
-        "    write_generalized_force(generalized_force, 0, wrench, 0.0 * wrench[0])",
+        f"    torque = {'wrench[6]' if kind.on_drum else '0.0 * wrench[0]'}",
+        "    write_generalized_force(generalized_force, 0, wrench, torque)",
         *(f"    written[{k}] = outputs[{k}]" for k in range(kind.output_size)),
         *(f"    rate[{k}] = rates[{k}]" for k in range(len(kind.states))),
     ]
@@ -353,7 +419,7 @@ def _on_plant(kind: ElementKind) -> Any:
 
 def _names(kind: ElementKind) -> dict[str, Any]:
     """Return the global names of the generated laws of a kind."""
-    names: dict[str, Any] = {"evaluate": kind.evaluate}
+    names: dict[str, Any] = {"evaluate": kind.evaluate, "drum_motion": drum_motion}
     if kind.states:
         names["States"] = namedtuple(f"{kind.name}_states", [state.name for state in kind.states])
     return names

@@ -42,6 +42,23 @@ TubMotion = namedtuple("TubMotion", ("rotation", "position", "angular_velocity",
 """R_WT by rows, p_WTo [m], w_WT [rad/s], v_WTo [m/s] of the tub or of another body: tuples of
 scalars, in W."""
 
+DrumMotion = namedtuple("DrumMotion", (*TubMotion._fields, "drum_angle", "drum_rate"))
+"""A `TubMotion`, and angle and rate of the drum against the tub. [rad, rad/s]"""
+
+
+@law
+def drum_motion(motion, x):
+    """Return the motion of tub and drum from that of the tub and the state (`TREE_STATE`)."""
+    state = read_tree_state(x, 0)
+    return DrumMotion(
+        motion.rotation,
+        motion.position,
+        motion.angular_velocity,
+        motion.velocity,
+        state.joint_position,
+        state.joint_rate,
+    )
+
 
 @law
 def tub_motion(x):

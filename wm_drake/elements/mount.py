@@ -13,7 +13,7 @@ from wm_drake.compiler.chosen import call
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes
 from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
-from wm_drake.compiler.matrices import plus
+from wm_drake.compiler.matrices import plus, scaled
 from wm_drake.compiler.vectors import add, cross, scale
 from wm_drake.elements.bushing import six_component_bushing_wrench
 from wm_drake.elements.friction_damper import (
@@ -197,7 +197,31 @@ def _write_others(x, p, motion, others, wrenches, column):
     if others is not None:
         for i in range(len(others.at)):
             wrench = call(others.wrench, i, x, None, motion, p, others.at[i], others.states[i])
-            column = write_wrench(wrenches, column, reaction_on_cabinet(motion.position, wrench))
+            reaction = scaled(others.on_cabinet[i], reaction_on_cabinet(motion.position, wrench))
+            column = write_wrench(wrenches, column, reaction)
+
+
+@law
+def torque_on_drum(x, motion, p, others):
+    """Return the torque on the drum of all elements on it; arguments as for `add_others`. [N m]"""
+    if others is None:
+        return 0.0
+    return _torque_of(x, motion, p, others.torque, others)
+
+
+@law
+def _torque_of(x, motion, p, torque, others):
+    """Return the torque on the drum; `torque` is None without elements on the drum.
+
+    It is an argument of its own, so that the function is compiled without the branch that is not
+    taken.
+    """
+    if torque is None:
+        return 0.0
+    total = 0.0 * motion.velocity[0]
+    for i in range(len(others.at)):
+        total = total + call(torque, i, x, motion, p, others.at[i], others.states[i])
+    return total
 
 
 @law

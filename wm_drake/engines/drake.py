@@ -84,7 +84,7 @@ def run_drake(
     Returns:
         The motion sampled at the output period, up to the last good sample if it diverged.
     """
-    setup.machine.set_profile(setup.context, profile)
+    setup.machine.set_profile(setup.context, profile, setup.elements)
     simulator = _simulator(setup, step, scheme, accuracy)
     period = setup.parameters.output_period
     check_size(profile, step, period)

@@ -25,7 +25,7 @@ from wm_drake.compiler.vectors import add, cross, dot, rotate, rotate_back
 from wm_drake.elements.cabinet import FEET_COUNT, foot_of
 from wm_drake.elements.motion import BODY_STATE, TREE_STATE, motion_at, tub_motion
 from wm_drake.elements.motor import motor_response, read_motor_state
-from wm_drake.elements.mount import WRENCH_SIZE, write_mount_wrenches
+from wm_drake.elements.mount import WRENCH_SIZE, torque_on_drum, write_mount_wrenches
 from wm_drake.elements.rubber import bushing_wrench
 from wm_drake.elements.sensor import POINT_SIZE, displacement_at, read_measured_point
 from wm_drake.engines.compiled.bearing import carrier_motion
@@ -339,7 +339,8 @@ def kernel(plan: Any) -> dict[str, Any]:  # noqa: C901 - the functions of one ma
         masses = mass_properties(p, cosine, sine)
         motion, rates = turning_body(x, rate, bearing)
         turning = rates.angular_acceleration, rates.acceleration
-        return motor_torque(motion, *turning, masses, x[DRUM_RATE], rate[DRUM_RATE], p)
+        needed = motor_torque(motion, *turning, masses, x[DRUM_RATE], rate[DRUM_RATE], p)
+        return needed - torque_on_drum(x, motion, p, elements.mounts.others)
 
     @njit(**OPTIONS)
     def turning_body(x, rate, bearing):

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 
-from wm_drake.model.bodies import set_bodies
+from wm_drake.model.bodies import DRUM, set_bodies
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 
@@ -26,7 +26,7 @@ class FramePoses:
         Raises:
             InputError: names unknown to the SDF.
         """
-        self.frames, self._plant = parameters.frames, plant
+        self.frames, self._plant, self._drive = parameters.frames, plant, parameters.drive.joint
         self._context = plant.CreateDefaultContext()
         set_bodies(plant, self._context, parameters)
         self._known: dict[tuple[str, str], tuple[FloatArray, FloatArray]] = {}
@@ -44,6 +44,32 @@ class FramePoses:
                 np.array(pose.rotation().matrix()),
             )
         return self._known[body, frame]
+
+    @property
+    def gravity(self) -> FloatArray:
+        """Return the acceleration of free fall in W. (3,) [m/s^2]"""
+        return np.array(self._plant.gravity_field().gravity_vector())
+
+    def on_drum(self, y: float) -> tuple[FloatArray, FloatArray]:
+        """Return position and rotation, in T, of a frame at a place of the drum axis.
+
+        Its y axis is that axis, its z axis points to the top of the drum, z of D at angle 0.
+
+        Args:
+            y: Position along the axis from the origin of D. [m]
+        """
+        position, rotation = self("tub", self._plant.GetBodyByName(DRUM).body_frame().name())
+        joint = self._plant.GetJointByName(self._drive)
+        frame = joint.frame_on_parent()
+        X_TF = self._plant.CalcRelativeTransform(
+            self._context, self._plant.GetBodyByName("tub").body_frame(), frame
+        )
+        axis = X_TF.rotation() @ joint.revolute_axis()
+        origin = X_TF.translation()
+        centre = origin + (axis @ (position - origin) + y) * axis
+        top = rotation[:, 2] - (axis @ rotation[:, 2]) * axis
+        top /= np.linalg.norm(top)
+        return centre, np.column_stack([np.cross(axis, top), axis, top])
 
     def placed(self, key: str, parts: tuple[Any, ...], place: Callable[[], Placed]) -> Placed:
         """Return an element placed at these frames; that of the last call, if its parts were these.

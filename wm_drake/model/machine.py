@@ -283,7 +283,7 @@ class MachineSystems:
             self._set_systems(context, elements, measured)
             self._set_drive(context, parameters)
             self._set_feet(context, cabinet)
-            self.set_profile(context, profile or parameters.profile)
+            self.set_profile(context, profile or parameters.profile, elements)
         rest = q[layout.tub], residual, q[layout.tubes], q[layout.carrier]
         return Setup(self, parameters, context, elements, points, *rest, cabinet, measured)
 
@@ -301,13 +301,17 @@ class MachineSystems:
         self._add_load(plant_context, parameters, load)
         return context
 
-    def set_profile(self, context: Context, profile: SpinProfile) -> None:
-        """Set the spin profile in a root Context, and the drum speed to its first speed."""
+    def set_profile(self, context: Context, profile: SpinProfile, elements: PlacedElements) -> None:
+        """Set the spin profile in a root Context, and drum and elements to its first speed."""
         self.spin_profile.set_profile(self.spin_profile.GetMyContextFromRoot(context), profile)
         plant_context = self.plant.GetMyContextFromRoot(context)
         velocities = self.plant.GetVelocities(plant_context)
         velocities[self.state_layout.drum] = profile.speed[0]
         self.plant.SetVelocities(plant_context, velocities)
+        for name, system in self.others.items():
+            if system.state_size:
+                initial = elements.others[name].initial(profile.speed[0])
+                system.GetMyContextFromRoot(context).SetContinuousState(initial)
 
     def set_drum_acceleration(self, context: Context, acceleration: float) -> None:
         """Fix the drum's acceleration in a root Context, in place of the spin profile. [rad/s^2]
@@ -389,8 +393,7 @@ class MachineSystems:
                 part = system.GetMyContextFromRoot(context)
                 system.set_parameters(part, placed[name].packed())
                 if system.state_size:
-                    initial = getattr(placed[name], "initial", np.zeros(system.state_size))
-                    part.SetContinuousState(initial)
+                    part.SetContinuousState(np.zeros(system.state_size))
         self.sensors.set_points(self.sensors.GetMyContextFromRoot(context), points)
 
     def _set_drive(self, context: Context, parameters: MachineParameters) -> None:

@@ -13,7 +13,7 @@ from wm_drake.elements.bearing import DRUM_BEARING
 from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bushing_law
 from wm_drake.elements.damper_law import packed_damper_law
 from wm_drake.elements.friction_damper import FRICTION_DAMPER_STRUT, FrictionDamperParameters
-from wm_drake.elements.kind import ElementKind, Ends, PlacedElement, element_kind
+from wm_drake.elements.kind import DrumPlace, ElementKind, Ends, PlacedElement, element_kind
 from wm_drake.elements.mount import Mounts, mounts_at
 from wm_drake.elements.rubber import (
     MOST_STATES,
@@ -134,9 +134,13 @@ class PlacedElements:
         pairs = zip(indices["bushings"], self.bushings.values(), strict=True)
         return tuple(at for at, bush in pairs if isinstance(bush, RubberBushingParameters))
 
-    def initial_of_others(self) -> FloatArray:
-        """Return the states of all elements of other packages at rest, one after the other."""
-        return np.concatenate([[], *(element.initial for element in self.others.values())])
+    def initial_of_others(self, drum_rate: float = 0.0) -> FloatArray:
+        """Return the states of all elements of registered kinds at the start, one after the other.
+
+        Args:
+            drum_rate: Rate of the drum. [rad/s]
+        """
+        return np.concatenate([[], *(e.initial(drum_rate) for e in self.others.values())])
 
     def states(self, *, drive: bool = False, cabinet: bool = False) -> StateMap:
         """Return the states of tub, drum and all elements.
@@ -232,7 +236,7 @@ class AppliedForce:
                 self._states.append(_as_slice(np.concatenate([states[t] for t in acted_on])))
             part, of_force = parts[tree]
             force = np.empty(len(of_force))
-            state = element.initial if isinstance(element, PlacedElement) else _RELAXED
+            state = element.initial() if isinstance(element, PlacedElement) else _RELAXED
             work = state, np.empty(kind.output_size), np.empty(len(state))
             self._calls.append(
                 (kind.on_plant, part, _as_slice(of_force), element.packed(), force, work)
@@ -317,6 +321,9 @@ def _placed(poses: FramePoses, key: str, kind: ElementKind | None, parts: Sequen
         InputError: the ends of a strut coincide.
     """
     element, kind = parts[0], kind or element_kind(parts[0].kind)
+    assert kind.place is not None  # the declaration has been checked
+    if kind.on_drum:
+        return kind.place(DrumPlace(*poses.on_drum(element.y), poses.gravity), *parts)
     ends = Ends(*poses("tub", element.tub_frame), *poses("world", element.housing_frame))
     is_strut = kind.picture == "strut"
     if is_strut and not math.dist(ends.tub_point, ends.housing_point) > SHORTEST_STRUT:
@@ -325,7 +332,6 @@ def _placed(poses: FramePoses, key: str, kind: ElementKind | None, parts: Sequen
             f"they must be more than {1e3 * SHORTEST_STRUT:g} mm apart",
             key=key,
         )
-    assert kind.place is not None  # the declaration has been checked
     return kind.place(ends, *parts)
 
 

@@ -13,7 +13,13 @@ from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.elements import ForceTable, TorqueTable
 from wm_drake.parameters.sections import SECTIONS, Section
 
-BUILT_IN = {"kind": "kind", "law": "law", "joint": "joint", "branches_in_use": "branches of rubber"}
+BUILT_IN = {
+    "kind": "kind",
+    "law": "law",
+    "joint": "joint",
+    "branches_in_use": "branches of rubber",
+    "balls": "number of balls",
+}
 """What a built machine keeps of an element or its type, beside the size of tables, in words."""
 
 

@@ -99,7 +99,8 @@ def _attachments(
                 tubes = (body.name() for body in tubes_of(plant, joint))
                 bodies |= dict(zip(("outer", "inner"), tubes, strict=True))
             for end, body in bodies.items():
-                yield f"{section.key(name)}.{end}_frame", body, getattr(element, f"{end}_frame")
+                if hasattr(element, f"{end}_frame"):  # an element on the drum has none
+                    yield f"{section.key(name)}.{end}_frame", body, getattr(element, f"{end}_frame")
     for table in ("sensors", "accelerometers"):
         for name, sensor in getattr(parameters, table).items():
             yield f"{table}.{name}.frame", "tub", sensor.frame

@@ -1,21 +1,42 @@
 """Elements of other packages in a machine file: `elements: {NAME: {kind: KIND, ...}}`."""
 
+import importlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypeAlias
 
 from pydantic import SerializeAsAny, ValidationError, ValidationInfo, WrapValidator
 
 from wm_drake.errors import Problem, nearest_names, shortened
+from wm_drake.parameters import units as u
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.problems import ProblemsInsideError, problems_of
 from wm_drake.registry import Registry
 
 
-class Element(Frozen):
+class OfKind(Frozen):
+    """An element of a registered kind.
+
+    Attributes:
+        kind: Name of an element kind.
+    """
+
+    kind: str
+
+
+class DrumElement(OfKind):
+    """An element on the drum; the parameters of a kind that acts on the drum extend this type.
+
+    Attributes:
+        y: Position along the drum axis, to the rear, from mid-depth of the drum.
+    """
+
+    y: u.Length = 0.0
+
+
+class Element(OfKind):
     """An element in its place; the parameters of an element kind extend this type.
 
     Attributes:
-        kind: Name of an element kind that a package registered.
         tub_frame, housing_frame: Frames of the two ends, on the tub and on the housing.
 
     Example:
@@ -29,7 +50,6 @@ class Element(Frozen):
         400.0
     """
 
-    kind: str
     tub_frame: str
     housing_frame: str
 
@@ -42,12 +62,17 @@ class HasParameters(Protocol):
         """Name of the kind in a machine file."""
 
     @property
-    def parameters(self) -> type[Element]:
+    def parameters(self) -> type[OfKind]:
         """Type of its parameters."""
 
 
-ELEMENT_KINDS: Registry[HasParameters] = Registry("element kind", "wm_drake.elements")
-"""Element kinds of other packages, `wm_drake.elements.kind.ElementKind`, by name."""
+def _load() -> None:
+    """Import the registered kinds of this package, which are in a room after this one."""
+    importlib.import_module("wm_drake.elements.ball_ring")
+
+
+ELEMENT_KINDS: Registry[HasParameters] = Registry("element kind", "wm_drake.elements", _load)
+"""Registered element kinds, `wm_drake.elements.kind.ElementKind`, by name."""
 
 
 def _validated(value: Any, handler: Any, info: ValidationInfo) -> Any:
@@ -56,12 +81,12 @@ def _validated(value: Any, handler: Any, info: ValidationInfo) -> Any:
     Raises:
         ProblemsInsideError: the kind is unknown, or a value is wrong.
     """
-    if isinstance(value, Element) or not isinstance(value, Mapping):
+    if isinstance(value, OfKind) or not isinstance(value, Mapping):
         return handler(value)
     name = value.get("kind")
     if not isinstance(name, str) or name not in ELEMENT_KINDS:
         text = "is missing" if name is None else f"'{shortened(str(name), 60)}' is not known"
-        hint = nearest_names(str(name), ELEMENT_KINDS) if ELEMENT_KINDS else "; none is registered"
+        hint = nearest_names(str(name), ELEMENT_KINDS)
         raise ProblemsInsideError([Problem("", "kind", text + hint)])
     parameters = ELEMENT_KINDS[name].parameters
     try:
@@ -71,7 +96,7 @@ def _validated(value: Any, handler: Any, info: ValidationInfo) -> Any:
 
 
 if TYPE_CHECKING:
-    AnyElement: TypeAlias = Element
+    AnyElement: TypeAlias = OfKind
 else:
-    AnyElement = Annotated[SerializeAsAny[Element], WrapValidator(_validated)]
+    AnyElement = Annotated[SerializeAsAny[OfKind], WrapValidator(_validated)]
 """An element of any registered kind."""

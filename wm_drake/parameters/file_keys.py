@@ -17,7 +17,7 @@ from pydantic_core import core_schema
 
 from wm_drake.parameters.allowed import declared_range
 from wm_drake.parameters.damper_laws import DamperNumbers
-from wm_drake.parameters.element_kinds import ELEMENT_KINDS, Element
+from wm_drake.parameters.element_kinds import ELEMENT_KINDS, OfKind
 from wm_drake.parameters.keys import models_in, unit_of
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.units import PureNumber, Unit
@@ -217,7 +217,7 @@ class _FileSchema(DocumentedSchema):
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         """Return the schema of a group; of an element that of all registered kinds."""
-        if schema["cls"] is Element and ELEMENT_KINDS:
+        if schema["cls"] is OfKind and ELEMENT_KINDS:
             kinds = [kind.parameters for kind in ELEMENT_KINDS.values()]
             return {"anyOf": [self.generate_inner(k.__pydantic_core_schema__) for k in kinds]}
         group = super().model_schema(schema)

@@ -11,7 +11,7 @@ from wm_drake.parameters.bearing import Bearing
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.damper_laws import DamperType
 from wm_drake.parameters.drive import AnyDrive, Drive, MotorDrive
-from wm_drake.parameters.element_kinds import AnyElement
+from wm_drake.parameters.element_kinds import AnyElement, DrumElement
 from wm_drake.parameters.elements import (
     Bushing,
     BushingType,
@@ -281,6 +281,16 @@ class MachineParameters(Frozen):
             raise ValueError(
                 "drive.kind: 'motor' needs a rigid bearing of the drum; remove "
                 "imperfections.bearing, or use 'prescribed'"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _drum_turns_in_a_tub_in_a_fixed_cabinet(self) -> "MachineParameters":
+        on_drum = [name for name, e in self.elements.items() if isinstance(e, DrumElement)]
+        if on_drum and (self.imperfections.bearing or self.cabinet_moves):
+            raise ValueError(
+                f"elements.{on_drum[0]}: acts on the drum, which needs a rigid bearing and a fixed "
+                "cabinet; remove imperfections.bearing, and leave cabinet.moves out"
             )
         return self
 

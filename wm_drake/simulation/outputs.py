@@ -4,7 +4,6 @@ import numpy as np
 
 from wm_drake.elements.bearing import FORCE_SIZE as BEARING_FORCE_SIZE
 from wm_drake.elements.bearing import drum_bearing_history
-from wm_drake.elements.kind import ElementKind
 from wm_drake.elements.telescopic_damper import FORCE_SIZE, telescopic_damper_history
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.machine import Setup
@@ -229,11 +228,11 @@ def _forces(
     }
 
 
-def others_by_kind(setup: Setup) -> dict[ElementKind, list[str]]:
-    """Return the names of the elements of other packages, by kind."""
-    names: dict[ElementKind, list[str]] = {}
+def others_by_kind(setup: Setup) -> dict[str, list[str]]:
+    """Return the names of the elements of registered kinds, by the name of their kind."""
+    names: dict[str, list[str]] = {}
     for name, element in setup.elements.others.items():
-        names.setdefault(element.kind, []).append(name)
+        names.setdefault(element.kind.name, []).append(name)
     return names
 
 
@@ -244,21 +243,25 @@ def _outputs_of_others(setup: Setup, outputs: FloatArray) -> Variables:
         setup: Machine as it was set up for the run.
         outputs: Of all elements, one after the other. (n, k)
     """
-    columns: dict[str, int] = {}
+    others, columns = setup.elements.others, dict[str, int]()
     end = 0
-    for name, element in setup.elements.others.items():
+    for name, element in others.items():
         columns[name], end = end, end + element.kind.output_size
     variables: Variables = {}
-    for kind, names in others_by_kind(setup).items():
-        begins = np.array([columns[name] for name in names])
-        for output in kind.outputs:
-            part = kind.output_parts[output.name]
-            values = outputs[:, begins[:, None] + np.arange(part.start, part.stop)]
-            dims: tuple[str, ...] = ("time", kind.name, "axis")
-            if output.size == 1:
+    for kind_name, names in others_by_kind(setup).items():
+        kinds = [others[name].kind for name in names]
+        for number, output in enumerate(kinds[0].outputs):
+            size = max(kind.outputs[number].size for kind in kinds)
+            values = np.full((len(outputs), len(names), size), np.nan)
+            for k, (name, kind) in enumerate(zip(names, kinds, strict=True)):
+                part = kind.output_parts[output.name]
+                own = outputs[:, columns[name] + part.start : columns[name] + part.stop]
+                values[:, k, : own.shape[1]] = own
+            dims: tuple[str, ...] = ("time", kind_name, output.dim)
+            if size == 1 and output.dim == "axis":
                 dims, values = dims[:2], values[:, :, 0]
             words = output.words or output.name
-            variables[f"{kind.name}_{output.name}"] = (dims, values, output.unit, words)
+            variables[f"{kind_name}_{output.name}"] = (dims, values, output.unit, words)
     return variables
 
 

@@ -59,7 +59,7 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
         "mount": mount_names(setup.parameters),
         **({"tube": setup.telescopes} if setup.telescopes else {}),
         **({"branch": branches} if (branches := branch_names(setup)) else {}),
-        **{kind.name: names for kind, names in others_by_kind(setup).items()},
+        **others_by_kind(setup),
         **({"foot": setup.cabinet.cabinet.corners} if setup.cabinet else {}),
     }
     label_coordinates = _label_coordinates(**{name: tuple(of) for name, of in labels.items()})

@@ -42,7 +42,7 @@ from wm_drake.elements.motion import (
     write_tree_state,
 )
 from wm_drake.elements.motor import read_motor
-from wm_drake.elements.mount import add_others
+from wm_drake.elements.mount import add_others, torque_on_drum
 from wm_drake.elements.rubber import bushing_wrench
 from wm_drake.elements.spring import spring_strut_wrench
 from wm_drake.elements.state_map import RATES_SIZE
@@ -272,7 +272,7 @@ def state_derivative(x, dx, inputs, masses, rate, acceleration, p, elements):
     w_rate, v_rate = tub_and_carrier_accelerations(x, dx, *bodies, elements.bearing, begins.carrier)
     w_rate, v_rate, acceleration = turned_by_motor(
         x, dx, in_world, masses, (w_rate, v_rate, acceleration), reference, p, motor,
-        begins.motor
+        begins.motor, mounts.others
     )  # fmt: skip
     write_tree_state(
         dx,
@@ -332,7 +332,7 @@ def drum_now(x, masses, rate, p, motor):
 
 
 @law
-def turned_by_motor(x, dx, motion, masses, rates, reference, p, motor, first):
+def turned_by_motor(x, dx, motion, masses, rates, reference, p, motor, first, others):
     """Return the accelerations of tub and drum, and write the rates of the drive's state.
 
     Args:
@@ -343,12 +343,14 @@ def turned_by_motor(x, dx, motion, masses, rates, reference, p, motor, first):
         reference: Speed of the drum that is wanted. [rad/s]
         p, motor, first: Packed numbers, and indices in them and in the state where the drive
             begins; None if the rotation of the drum is prescribed.
+        others: `RegisteredLaws`, some of them on the drum; None without.
     """
     w_rate, v_rate, acceleration = rates
     if motor is None:
         return w_rate, v_rate, acceleration
     bodies, reflected = read_bodies(p, 0), read_motor(p, motor).reflected_inertia
     torque = motor_torque_and_rates(x, dx, reference, p, motor, first)
+    torque = torque + torque_on_drum(x, motion, p, others)
     missing = torque - motor_torque(motion, w_rate, v_rate, masses, x[DRUM_RATE], acceleration, p)
     return with_free_drum(motion, masses, bodies, w_rate, v_rate, acceleration, missing, reflected)
 

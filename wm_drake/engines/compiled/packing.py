@@ -200,7 +200,7 @@ def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:
     if setup.bearing:
         x[states.indices(*PLACES, kinds=[CARRIER_STATES])] = setup.carrier_rest
     if setup.elements.others:
-        x[states.span(ELEMENT)] = setup.elements.initial_of_others()
+        x[states.span(ELEMENT)] = setup.elements.initial_of_others(profile.speed[0])
     return x
 
 

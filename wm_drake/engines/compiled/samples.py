@@ -7,6 +7,7 @@ from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_la
 from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.elements.cabinet import motion_with, rates_with
 from wm_drake.elements.motion import BODY_STATE_SIZE, POSE, tub_motion
+from wm_drake.elements.mount import torque_on_drum
 from wm_drake.elements.state_map import CARRIER, ELEMENT, RATES_SIZE, STRETCHES, TUB
 from wm_drake.engines.cabinet_frame import seen_from_cabinet
 from wm_drake.engines.compiled.bearing import carrier_motion
@@ -55,6 +56,8 @@ def trajectory_of(
     else:
         drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
         torque_history(turning, of_carrier, drum_acceleration, p, moving, torque)
+        if any(kind.on_drum for kind in layout.kinds):
+            subtract_torque_of_elements(states, p, layout.mounts.others, torque)
     trajectory = Trajectory(
         schedule.time,
         motion,
@@ -105,6 +108,30 @@ def _motion_of_drum_and_carrier(motion: FloatArray, carrier: FloatArray) -> Floa
         return motion
     pose, velocity = np.split(carrier, [POSE.fixed_size], axis=1)
     return np.column_stack([pose, motion[:, DRUM_ANGLE], velocity, motion[:, DRUM_RATE]])
+
+
+@long_running
+def subtract_torque_of_elements(states, p, others, torque):
+    """Subtract the torque of elements on the drum, which the motor then need not give.
+
+    Args:
+        states: (n, size)
+        p, others: Packed numbers, and the `RegisteredLaws` in them.
+        torque: (n, 1), changed. [N m]
+    """
+    align_stack()
+    x_numbers, numbers, p_numbers = (
+        np.empty(states.shape[1] * WIDTH),
+        np.empty(WIDTH),
+        in_each_lane(p),
+    )
+    x, answer, q = lane_array(x_numbers), lane_array(numbers), lane_array(p_numbers)
+    for begin in range(0, len(torque), WIDTH):
+        rows_to_lanes(states, begin, x_numbers)
+        answer[0] = torque_on_drum(x, tub_motion(x), q, others)
+        for lane in range(min(WIDTH, len(torque) - begin)):
+            torque[begin + lane, 0] -= numbers[lane]
+    keep(p_numbers)
 
 
 @long_running

@@ -126,10 +126,10 @@ def _element(setup: Setup, name: str) -> dict[str, Any]:
     placed, element = setup.elements.others[name], setup.parameters.elements[name]
     return element.model_dump(exclude={"tub_frame", "housing_frame"}) | {
         "law": placed.kind.words,
-        "tub_point_T": placed.ends.tub_point.tolist(),
-        "tub_rotation_T": placed.ends.tub_rotation.tolist(),
-        "housing_point_W": placed.ends.housing_point.tolist(),
-        "housing_rotation_W": placed.ends.housing_rotation.tolist(),
+        **{
+            f"{name}_{'T' if name.startswith('tub') else 'W'}": value.tolist()
+            for name, value in placed.ends._asdict().items()
+        },
     }
 
 

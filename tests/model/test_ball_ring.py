@@ -1,0 +1,289 @@
+"""Ball balancer: equations in both engines, energy, and motion against closed forms."""
+
+import numpy as np
+import pytest
+from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
+from scipy.spatial.transform import Rotation
+
+import wm_drake as wm
+from wm_drake.elements.ball_ring import BALL_RING, DAMPING_RATIO, FULL_CONTACT, BallRing
+from wm_drake.elements.kind import DrumPlace
+from wm_drake.elements.state_map import ELEMENT
+from wm_drake.engines.compiled.derivative import StateDerivative
+from wm_drake.errors import InputError
+from wm_drake.parameters import Load, MachineParameters, SpinProfile, load_machine
+from wm_drake.systems.element_system import ElementSystem
+
+RING = {
+    "kind": "ball_ring",
+    "y": -0.15,
+    "balls": 3,
+    "ball_mass": 0.05,
+    "ball_diameter": 0.022,
+    "race_radius": 0.25,
+    "damping": 1e-3,
+    "rolling_resistance": 2e-3,
+}
+RIG_RING = {
+    "kind": "ball_ring",
+    "y": -0.02,
+    "balls": 2,
+    "ball_mass": 0.44e-3,
+    "ball_diameter": 4.76e-3,
+    "race_radius": 42.8e-3,
+    "damping": 1.41e-5,
+    "race_frequency": 3000.0 * np.pi,
+    "start_angles": (0.0, 1.0),
+}
+PLACE = DrumPlace(
+    np.array([0.01, -0.15, 0.02]),
+    Rotation.from_euler("xyz", [0.1, 0.2, 0.3]).as_matrix(),
+    np.array([0.0, 0.0, -9.81]),
+)
+
+
+def with_rings(parameters=None, **rings):
+    """Return a machine with rings."""
+    tree = (parameters or load_machine("reference")).model_dump(exclude_unset=True)
+    return MachineParameters.model_validate(tree | {"elements": rings})
+
+
+def moved(balls, rng, ring=RING, place=PLACE):
+    """Return states of a ring (6 n,) that is deflected, turns and has two balls in contact."""
+    angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, balls))
+    if balls > 1:
+        angles[1] = angles[0] + 0.95 * ring["ball_diameter"] / ring["race_radius"]
+    side, axis, top = place.tub_rotation.T
+    places = ring["race_radius"] * (np.outer(np.sin(angles), side) + np.outer(np.cos(angles), top))
+    velocities = rng.uniform(20.0, 40.0) * np.cross(axis, places)
+    moves = rng.uniform(-1e-4, 1e-4, (balls, 3)), rng.uniform(-0.3, 0.3, (balls, 3))
+    return np.hstack([places + moves[0], velocities + moves[1]]).ravel()
+
+
+@pytest.mark.parametrize("name", ["reference", "motor"])
+def test_both_engines_agree_at_random_states(name):
+    """Compare the accelerations of tub and drum, prescribed or turned by a motor, and all balls."""
+    rings = {"front": RING, "rear": {**RING, "y": 0.15, "balls": 2}}
+    machine = wm.build_machine(with_rings(load_machine(name), **rings))
+    setup = machine.set_up("middle")
+    derivative, context = StateDerivative(setup), setup.context
+    rng, sizes = np.random.default_rng(3), [0.2] * 3 + [0.05] * 3 + [30.0] + [1.0] * 6 + [30.0]
+    upright = DrumPlace(np.zeros(3), np.eye(3), np.zeros(3))
+    ball_states, state = (
+        derivative.layout.states.span(ELEMENT),
+        np.zeros(derivative.layout.states.size),
+    )
+    parts = [system.GetMyContextFromRoot(context) for system in machine.others.values()]
+    for _ in range(20):
+        state[:14] = np.array(sizes) * rng.uniform(-1.0, 1.0, 14)
+        balls = [moved(n, rng, place=upright) for n in (3, 2)]
+        state[ball_states] = np.concatenate(balls)
+        machine.plant.SetPositionsAndVelocities(setup.plant_context, state[:14])
+        for part, values in zip(parts, balls, strict=True):
+            part.SetContinuousState(values)
+        if name == "reference":
+            machine.set_drum_acceleration(context, 3.0)
+        plant = machine.plant.get_generalized_acceleration_output_port().Eval(setup.plant_context)
+        pairs = zip(machine.others.values(), parts, strict=True)
+        drake = np.concatenate([s.EvalTimeDerivatives(c).CopyToVector() for s, c in pairs])
+        reference = setup.parameters.profile.speed[0]
+        ours = derivative(state, plant[6], reference=reference)
+        for part in (slice(0, 3), slice(3, 6), slice(6, 7)):
+            scale = np.abs(plant[part]).max()
+            np.testing.assert_allclose(ours[7:14][part], plant[part], rtol=0, atol=1e-9 * scale)
+        np.testing.assert_allclose(
+            ours[ball_states], drake, rtol=0, atol=1e-10 * np.abs(drake).max()
+        )
+
+
+def law_at(state, motion, ring):
+    """Return generalized force and rates of a ring alone from the state of tub and drum (14)."""
+    placed = BALL_RING.place(PLACE, BallRing.model_validate(ring))
+    system = ElementSystem(placed.kind, placed.packed(), placed.state_size)
+    context = system.CreateDefaultContext()
+    system.GetInputPort("plant_state").FixValue(context, motion)
+    context.SetContinuousState(state)
+    force = system.GetOutputPort("generalized_force").Eval(context)
+    return force, system.EvalTimeDerivatives(context).CopyToVector().reshape(-1, 6)
+
+
+@pytest.mark.parametrize("balls", [1, 2, 5])
+def test_power_and_momentum_balance(balls):
+    """Balance what drum and tub give the balls, with damping, friction and contact."""
+    rng = np.random.default_rng(balls)
+    ring = {**RING, "balls": balls}
+    mass, k = ring["ball_mass"], ring["ball_mass"] * (1000.0 * np.pi) ** 2
+    for _ in range(20):
+        motion = rng.uniform(-1.0, 1.0, 14) * ([0.3] * 3 + [0.05] * 3 + [9.0] + [2.0] * 6 + [60.0])
+        states = moved(balls, rng, ring).reshape(-1, 6)
+        force, rates = law_at(states.ravel(), motion, ring)
+        v, acceleration, u = states[:, 3:], rates[:, 3:], rates[:, :3]
+        given = mass * (acceleration - PLACE.gravity)
+        np.testing.assert_allclose(force[3:6], -given.sum(axis=0), atol=1e-9 * k * 1e-3)
+        R = Rotation.from_euler("xyz", motion[:3]).as_matrix()
+        arms = (PLACE.tub_point + states[:, :3]) @ R.T
+        np.testing.assert_allclose(force[:3], -np.cross(arms, given).sum(axis=0), atol=1e-6)
+        supplied = force @ motion[7:14] + np.sum(given * v)
+        _, axis, _ = PLACE.tub_rotation.T
+        q = states[:, :3]
+        y, y_rate = q @ axis, u @ axis
+        across = q - np.outer(y, axis)
+        r = np.linalg.norm(across, axis=1)
+        out = across / r[:, None]
+        r_rate, s = (
+            np.sum(u * out, axis=1),
+            np.sum(u * np.cross(axis, out), axis=1) - r * motion[13],
+        )
+        elastic = k * np.sum((r - ring["race_radius"]) * r_rate + y * y_rate)
+        push = k * (r - ring["race_radius"]) + 2.0 * DAMPING_RATIO * np.sqrt(k * mass) * r_rate
+        lost = 2.0 * DAMPING_RATIO * np.sqrt(k * mass) * np.sum(r_rate**2 + y_rate**2)
+        lost += np.sum(ring["damping"] / ring["race_radius"] ** 2 * s**2)
+        lost += np.sum(ring["rolling_resistance"] * np.abs(push) * s**2 / np.hypot(s, 0.01))
+        in_contact = 0.0
+        for i in range(balls if balls > 2 else balls - 1):
+            apart = q[i] - q[(i + 1) % balls]
+            closing = -(u[i] - u[(i + 1) % balls]) @ apart / np.linalg.norm(apart)
+            o = max(ring["ball_diameter"] - np.linalg.norm(apart), 0.0)
+            tau = 2.0 * DAMPING_RATIO * np.sqrt(mass / k)
+            stiffness = k / (FULL_CONTACT * ring["ball_diameter"])
+            in_contact += closing * max(stiffness * o * (o + tau * closing), 0.0)
+        assert (in_contact != 0.0) == (balls > 1)
+        total = elastic + lost + in_contact
+        # power of the drum and tub on the balls, less what they get, is stored or lost
+        assert supplied == pytest.approx(-total, rel=1e-7, abs=1e-7)
+
+
+def test_derivatives_of_the_system_are_those_of_differences():
+    placed = BALL_RING.place(PLACE, BallRing.model_validate({**RING, "balls": 2}))
+    system, rng = ElementSystem(placed.kind, placed.packed(), 12), np.random.default_rng(1)
+    sizes = np.array([0.2] * 3 + [0.05] * 3 + [2.0] + [0.5] * 6 + [20.0])
+    state = np.concatenate([sizes * rng.uniform(-1.0, 1.0, 14), moved(2, rng)])
+
+    def outputs(system, values):
+        context = system.CreateDefaultContext()
+        system.GetInputPort("plant_state").FixValue(context, values[:14])
+        context.SetContinuousState(values[14:])
+        ports = ("generalized_force", "moment", "angle")
+        rates = system.EvalTimeDerivatives(context).CopyToVector()
+        return np.concatenate([*(system.GetOutputPort(p).Eval(context) for p in ports), rates])
+
+    slopes = ExtractGradient(outputs(system.ToScalarType[AutoDiffXd](), InitializeAutoDiff(state)))
+    steps = 1e-7 * np.eye(len(state))
+    differences = [(outputs(system, state + h) - outputs(system, state - h)) / 2e-7 for h in steps]
+    scale = np.maximum(np.abs(slopes).max(axis=1, keepdims=True), 1e-9)
+    np.testing.assert_allclose(slopes / scale, np.transpose(differences) / scale, atol=1e-5)
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return wm.build_machine(with_rings(load_machine("rodrigues_2010"), abb=RIG_RING))
+
+
+def at_constant_speed(rig, rpm, moment, duration=8.0, step=1e-4):
+    """Return the record of a rig with an unbalance [kg m] in the plane of the ring, at 115 deg."""
+    speed, unbalance = rpm * np.pi / 30.0, {"moment": moment, "y": -0.02, "phase": 2.0}
+    profile = SpinProfile(time=(0.0, duration), speed=(speed, speed))
+    load = Load.model_validate({"static": unbalance})
+    return wm.simulate(rig, wm.Case("", load, profile), step=step)
+
+
+@pytest.mark.parametrize("part", [0.3, 0.6, 0.9])
+def test_two_balls_balance_an_unbalance_above_the_critical_speeds(rig, part):
+    """Compare with the closed form: balls at phase + pi -+ acos(U / 2 m R)."""
+    capacity = 2.0 * RIG_RING["ball_mass"] * RIG_RING["race_radius"]
+    record = at_constant_speed(rig, 4500.0, part * capacity)
+    turns = np.exp(1j * record.ball_ring_angle.values[-1, 0])
+    half = np.arccos(part)
+    expected = np.exp(1j * (2.0 + np.pi + np.array([-half, half])))
+    either = [np.abs(np.angle(turns / order)).max() for order in (expected, expected[::-1])]
+    # gravity moves a ball to and fro by g/(R w^2) = 0.06 deg; the race gives way by 0.3 %
+    assert min(either) < np.deg2rad(0.5)
+    residual = record.ball_ring_moment.values[-1, 0] + np.array(
+        Load.model_validate({"static": {"moment": part * capacity, "phase": 2.0}}).static.vector()
+    )
+    assert np.hypot(*residual[[0, 2]]) < 5e-3 * capacity
+
+
+def test_balls_add_to_the_unbalance_below_the_critical_speeds():
+    """They touch beside the unbalance, and the radius grows by the sum of first moments."""
+    moment, ring = 20e-6, {**RIG_RING, "start_angles": (1.4, 2.6)}
+    balanced = wm.build_machine(with_rings(load_machine("rodrigues_2010"), abb=ring))
+    record = at_constant_speed(balanced, 1100.0, moment, 6.0)
+    angles = record.ball_ring_angle.values[-400:, 0]
+    touching = 2.0 * np.arcsin(0.5 * ring["ball_diameter"] / ring["race_radius"])
+    assert np.ptp(angles, axis=1) == pytest.approx(touching, rel=0.02)
+    assert angles.mean() == pytest.approx(2.0, abs=np.deg2rad(3.0))
+    plain = wm.build_machine(load_machine("rodrigues_2010"))
+    alone = at_constant_speed(plain, 1100.0, moment, 4.0)
+
+    def radius(record):
+        part = record.displacement.values[-1000:, :2]
+        return np.hypot(*(part - part.mean(axis=0)).T).max()
+
+    balls = 2.0 * ring["ball_mass"] * ring["race_radius"] * np.cos(0.5 * touching)
+    assert radius(record) / radius(alone) == pytest.approx(1.0 + balls / moment, rel=0.02)
+
+
+def test_balls_cannot_pass_each_other():
+    """Start six balls in a heap, without damping: their order around the race stays."""
+    crowd = {**RIG_RING, "balls": 6, "damping": 0.0, "start_angles": None}
+    parameters = with_rings(load_machine("rodrigues_2010"), abb=crowd)
+    record = at_constant_speed(wm.build_machine(parameters), 1700.0, 30e-6, 1.0)
+    gaps = np.diff(record.ball_ring_angle.values[:, 0], axis=1, append=np.nan)
+    gaps[:, -1] = record.ball_ring_angle.values[:, 0, 0] - record.ball_ring_angle.values[:, 0, -1]
+    assert np.allclose(np.mod(gaps, 2.0 * np.pi).sum(axis=1), 2.0 * np.pi)
+
+
+def test_a_stiffer_race_changes_nothing(rig):
+    """The race of 3000 pi rad/s stands for a rigid one: twice as stiff, the balls move alike."""
+    stiff = {**RIG_RING, "race_frequency": 6000.0 * np.pi}
+    other = wm.build_machine(with_rings(load_machine("rodrigues_2010"), abb=stiff))
+    angles = [
+        np.unwrap(at_constant_speed(each, 4500.0, 20e-6, 1.0, step).ball_ring_angle.values[:, 0, 0])
+        for each, step in ((rig, 1e-4), (other, 5e-5))
+    ]
+    assert np.abs(angles[0] - angles[1]).max() < 0.05
+    assert np.ptp(angles[0]) > 0.5
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"balls": 0}, "balls"),
+        ({"ball_diameter": 0.6}, "3 balls do not fit in the race"),
+        ({"start_angles": (0.0, 1.0)}, "needs 3 angles; has 2"),
+        ({"start_angles": (0.0, 0.05, 1.0)}, "balls must not overlap"),
+    ],
+)
+def test_rings_that_cannot_be(changes, message):
+    with pytest.raises(ValueError, match=message):
+        with_rings(front={**RING, **changes})
+
+
+def test_a_built_machine_keeps_its_number_of_balls(rig):
+    other = with_rings(
+        load_machine("rodrigues_2010"), abb={**RIG_RING, "balls": 1, "start_angles": None}
+    )
+    with pytest.raises(InputError, match="number of balls"):
+        rig.set_up(parameters=other)
+
+
+def test_a_compliant_bearing_is_refused():
+    tree = load_machine("reference").model_dump(exclude_unset=True)
+    bearing = dict.fromkeys(("radial_stiffness", "axial_stiffness", "tilting_stiffness"), 1e7)
+    bearing |= dict.fromkeys(("radial_damping", "axial_damping", "tilting_damping", "y"), 0.1)
+    with pytest.raises(ValueError, match=r"elements\.front: acts on the drum"):
+        MachineParameters.model_validate(
+            tree | {"elements": {"front": RING}, "imperfections": {"bearing": bearing}}
+        )
+
+
+def test_rings_of_different_size_share_the_variables_of_a_record():
+    parameters = with_rings(front=RING, rear={**RING, "y": 0.15, "balls": 2})
+    profile = SpinProfile(time=(0.0, 0.05), speed=(30.0, 30.0))
+    machine = wm.build_machine(parameters)
+    record = wm.simulate(machine, wm.Case("", parameters.loads["middle"], profile), step=2.5e-4)
+    assert list(record.ball_ring.values) == ["front", "rear"]
+    assert record.ball_ring_angle.shape[1:] == (2, 3)
+    assert np.isnan(record.ball_ring_angle.values[:, 1, 2]).all()
+    assert not record.mount_force.sel(mount="elements.front").values.any()
