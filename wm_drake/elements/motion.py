@@ -42,7 +42,10 @@ TubMotion = namedtuple("TubMotion", ("rotation", "position", "angular_velocity",
 """R_WT by rows, p_WTo [m], w_WT [rad/s], v_WTo [m/s] of the tub or of another body: tuples of
 scalars, in W."""
 
-DrumMotion = namedtuple("DrumMotion", (*TubMotion._fields, "drum_angle", "drum_rate"))
+DrumMotion = namedtuple(
+    "DrumMotion",
+    ("rotation", "position", "angular_velocity", "velocity", "drum_angle", "drum_rate"),
+)
 """A `TubMotion`, and angle and rate of the drum against the tub. [rad, rad/s]"""
 
 
