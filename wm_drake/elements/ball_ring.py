@@ -31,7 +31,6 @@ from wm_drake.elements.kind import (
     Output,
     PlacedElement,
     State,
-    register_element,
 )
 from wm_drake.parameters import units as u
 from wm_drake.parameters.element_kinds import DrumElement
@@ -310,5 +309,5 @@ def ring_of(balls: int) -> ElementKind:
     )
 
 
-BALL_RING = register_element(ring_of(2))
+BALL_RING = ring_of(2)
 """The kind in machine files; `placed_ring` takes the number of balls of each ring."""

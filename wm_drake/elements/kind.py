@@ -308,10 +308,10 @@ def registered_laws(
     """
     if not kinds:
         return None
-    indices = (np.array(values, dtype=np.int64) for values in (at, states))
+    begins, firsts = (np.array(values, dtype=np.int64) for values in (at, states))
     on_cabinet = np.array([0.0 if kind.on_drum else 1.0 for kind in kinds])
     wrench, outputs, torque = _laws_of(tuple(kinds))
-    return RegisteredLaws(wrench, outputs, *indices, on_cabinet, torque)
+    return RegisteredLaws(wrench, outputs, begins, firsts, on_cabinet, torque)
 
 
 @functools.lru_cache(maxsize=64)

@@ -13,6 +13,7 @@ import numpy as np
 from pydrake.geometry import Box, Cylinder, Meshcat, MeshcatParams, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
+from wm_drake.elements.kind import Ends
 from wm_drake.model.cabinet import with_fixed_cabinet
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.placed_elements import placed_elements
@@ -271,7 +272,7 @@ def _parts(
             length = float(np.linalg.norm(element.p_ToA_T - element.p_WH))
             yield of_kind(f"/elements/{kind}/{name}", element.p_ToA_T, element.p_WH, length)
     for name, other in elements.others.items():
-        if other.kind.picture == "strut":
+        if other.kind.picture == "strut" and isinstance(other.ends, Ends):
             ends = other.ends.tub_point, other.ends.housing_point
             length = float(np.linalg.norm(ends[0] - ends[1]))
             yield _Damper(f"/elements/others/{name}", *ends, length)

@@ -1,6 +1,5 @@
 """Elements of other packages in a machine file: `elements: {NAME: {kind: KIND, ...}}`."""
 
-import importlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypeAlias
 
@@ -66,12 +65,9 @@ class HasParameters(Protocol):
         """Type of its parameters."""
 
 
-def _load() -> None:
-    """Import the registered kinds of this package, which are in a room after this one."""
-    importlib.import_module("wm_drake.elements.ball_ring")
-
-
-ELEMENT_KINDS: Registry[HasParameters] = Registry("element kind", "wm_drake.elements", _load)
+ELEMENT_KINDS: Registry[HasParameters] = Registry(
+    "element kind", "wm_drake.elements", shipped=("wm_drake.elements.ball_ring:BALL_RING",)
+)
 """Registered element kinds, `wm_drake.elements.kind.ElementKind`, by name."""
 
 

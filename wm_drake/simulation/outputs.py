@@ -255,8 +255,10 @@ def _outputs_of_others(setup: Setup, outputs: FloatArray) -> Variables:
             values = np.full((len(outputs), len(names), size), np.nan)
             for k, (name, kind) in enumerate(zip(names, kinds, strict=True)):
                 part = kind.output_parts[output.name]
-                own = outputs[:, columns[name] + part.start : columns[name] + part.stop]
-                values[:, k, : own.shape[1]] = own
+                begin = columns[name] + part.start
+                values[:, k, : part.stop - part.start] = outputs[
+                    :, begin : columns[name] + part.stop
+                ]
             dims: tuple[str, ...] = ("time", kind_name, output.dim)
             if size == 1 and output.dim == "axis":
                 dims, values = dims[:2], values[:, :, 0]
