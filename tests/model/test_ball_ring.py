@@ -211,7 +211,9 @@ def test_balls_add_to_the_unbalance_below_the_critical_speeds():
     record = at_constant_speed(balanced, 1100.0, moment, 6.0)
     angles = record.ball_ring_angle.values[-400:, 0]
     touching = 2.0 * np.arcsin(0.5 * ring["ball_diameter"] / ring["race_radius"])
-    assert np.ptp(angles, axis=1) == pytest.approx(touching, rel=0.02)
+    swing = 9.81 / (ring["race_radius"] * (1100.0 * np.pi / 30.0) ** 2)  # of a ball, by gravity
+    gaps = np.ptp(angles, axis=1)
+    assert 0.98 * touching < gaps.min() <= gaps.max() < touching + 2.0 * swing
     assert angles.mean() == pytest.approx(2.0, abs=np.deg2rad(3.0))
     plain = wm.build_machine(load_machine("rodrigues_2010"))
     alone = at_constant_speed(plain, 1100.0, moment, 4.0)
@@ -235,15 +237,15 @@ def test_balls_cannot_pass_each_other():
 
 
 def test_a_stiffer_race_changes_nothing(rig):
-    """The race of 3000 pi rad/s stands for a rigid one: twice as stiff, the balls move alike."""
+    """With a race twice as stiff as 3000 pi rad/s, the balls take the same way within 5 %."""
     stiff = {**RIG_RING, "race_frequency": 6000.0 * np.pi}
     other = wm.build_machine(with_rings(load_machine("rodrigues_2010"), abb=stiff))
     angles = [
         np.unwrap(at_constant_speed(each, 4500.0, 20e-6, 1.0, step).ball_ring_angle.values[:, 0, 0])
         for each, step in ((rig, 1e-4), (other, 5e-5))
     ]
-    assert np.abs(angles[0] - angles[1]).max() < 0.05
     assert np.ptp(angles[0]) > 0.5
+    assert np.abs(angles[0] - angles[1]).max() < 0.05 * np.ptp(angles[0])
 
 
 @pytest.mark.parametrize(
