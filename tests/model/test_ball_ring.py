@@ -214,7 +214,13 @@ def test_balls_add_to_the_unbalance_below_the_critical_speeds():
     swing = 9.81 / (ring["race_radius"] * (1100.0 * np.pi / 30.0) ** 2)  # of a ball, by gravity
     gaps = np.ptp(angles, axis=1)
     assert 0.98 * touching < gaps.min() <= gaps.max() < touching + 2.0 * swing
-    assert angles.mean() == pytest.approx(2.0, abs=np.deg2rad(3.0))
+    balls = 2.0 * ring["ball_mass"] * ring["race_radius"] * np.cos(0.5 * touching)
+    # the motion lags behind the heavy side by a mean over both axes, and the balls follow it
+    stiffness, w = np.array([43000.0, 31600.0]), 1100.0 * np.pi / 30.0
+    compliance = 1.0 / (stiffness - 1.28 * w**2)
+    lag = (2.5e-4 * w * stiffness * compliance) @ compliance / compliance.sum()
+    expected = 2.0 - (1.0 + balls / moment) * lag
+    assert angles.mean() == pytest.approx(expected, abs=np.deg2rad(3.0))
     plain = wm.build_machine(load_machine("rodrigues_2010"))
     alone = at_constant_speed(plain, 1100.0, moment, 4.0)
 
@@ -222,7 +228,6 @@ def test_balls_add_to_the_unbalance_below_the_critical_speeds():
         part = record.displacement.values[-1000:, :2]
         return np.hypot(*(part - part.mean(axis=0)).T).max()
 
-    balls = 2.0 * ring["ball_mass"] * ring["race_radius"] * np.cos(0.5 * touching)
     assert radius(record) / radius(alone) == pytest.approx(1.0 + balls / moment, rel=0.02)
 
 
