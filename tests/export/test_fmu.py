@@ -1,5 +1,6 @@
 """The FMU of a machine: what validators say, and that it computes what the engine computes."""
 
+import pathlib
 import shutil
 import subprocess
 import sys
@@ -237,6 +238,23 @@ def test_run_that_diverges_is_an_error(fmu):
     instance.set([references["unbalance[1].mass"], references["drum_speed"]], [20.0, 200.0])
     with pytest.raises(FMICallException, match="DoStep"):
         run_to(instance, 10.0)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_sources_give_the_same_run(tmp_path, machine, fmi):
+    path = tmp_path / "machine.fmu"
+    wm.export_fmu(machine.parameters, "middle", path, FmuOptions(fmi=fmi, sources=True))
+    expected = simulated(path, ["displacement.Xr"])["displacement.Xr"]
+    folder = tmp_path / "fmu"
+    files = fmpy.read_model_description(path).buildConfigurations[0].sourceFileSets[0].sourceFiles
+    fmpy.extract(path, folder)
+    (library,) = folder.glob("binaries/*/*")
+    library.unlink()
+    headers = pathlib.Path(fmpy.__file__).parent / "c-code"
+    command = ["cc", "-shared", "-fPIC", "-O2", f"-I{headers}", *files, "-o", library, "-lm"]
+    subprocess.run(command, check=True, cwd=folder / "sources")
+    assert np.array_equal(simulated(folder, ["displacement.Xr"])["displacement.Xr"], expected)
+    assert np.abs(expected).max() > 1e-3
 
 
 @pytest.mark.parametrize(

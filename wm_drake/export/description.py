@@ -2,6 +2,7 @@
 
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
@@ -15,46 +16,71 @@ IDENTIFIER = "wm_drake_machine"
 TOOL = "wm-drake"
 
 
-def model_description(model: ExportedModel, token: str, version: int, program: str) -> bytes:
-    """Return the description of a model as XML.
+@dataclass(frozen=True)
+class Identity:
+    """What an FMU is, beside the model in it.
 
-    Args:
-        model: The model.
+    Attributes:
         token: GUID of an FMU of version 2, instantiation token of version 3.
         version: 2 or 3, version of the standard.
         program: Name and version of this program.
+        sources: Names of the source files that an importer can compile; none without sources.
     """
-    parameters = model.setup.parameters
-    root = ET.Element(
-        "fmiModelDescription",
-        fmiVersion="2.0" if version == 2 else "3.0",
-        modelName=parameters.name,
-        description=f"{parameters.about or parameters.name} Load: {model.load}.",
-        generationTool=program,
-        generationDateAndTime=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
-        variableNamingConvention="structured",
-    )
-    root.set("guid" if version == 2 else "instantiationToken", token)
-    able = "canGetAndSetFMUstate" if version == 2 else "canGetAndSetFMUState"
-    serialize = "canSerializeFMUstate" if version == 2 else "canSerializeFMUState"
-    common = {"modelIdentifier": IDENTIFIER, able: "true", serialize: "true"}
-    exchange = {"numberOfEventIndicators": "0"} if version == 2 else {}
-    root.attrib |= exchange
-    ET.SubElement(root, "ModelExchange", common)
-    ET.SubElement(root, "CoSimulation", common | {"canHandleVariableCommunicationStepSize": "true"})
+
+    token: str
+    version: int
+    program: str
+    sources: tuple[str, ...] = ()
+
+
+def model_description(model: ExportedModel, identity: Identity) -> bytes:
+    """Return the description of a model as XML."""
+    root = _root(model, identity)
+    _add_kinds(root, identity)
     _add_units(root, model.variables)
     categories = ET.SubElement(root, "LogCategories")
     ET.SubElement(categories, "Category", name="logStatusError", description="errors")
-    profile = parameters.profile
-    ET.SubElement(
-        root, "DefaultExperiment", startTime="0", stopTime=_number(profile.duration),
-        stepSize=_number(0.005),
-    )  # fmt: skip
+    end = _number(model.setup.parameters.profile.duration)
+    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime=end, stepSize="0.005")
     variables = ET.SubElement(root, "ModelVariables")
-    write = _write_2 if version == 2 else _write_3
+    write = _write_2 if identity.version == 2 else _write_3
     write(root, variables, model)
     ET.indent(root)
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
+
+
+def _root(model: ExportedModel, identity: Identity) -> ET.Element:
+    parameters = model.setup.parameters
+    root = ET.Element(
+        "fmiModelDescription",
+        fmiVersion="2.0" if identity.version == 2 else "3.0",
+        modelName=parameters.name,
+        description=f"{parameters.about or parameters.name} Load: {model.load}.",
+        generationTool=identity.program,
+        generationDateAndTime=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        variableNamingConvention="structured",
+    )
+    root.set("guid" if identity.version == 2 else "instantiationToken", identity.token)
+    if identity.version == 2:
+        root.set("numberOfEventIndicators", "0")
+    return root
+
+
+def _add_kinds(root: ET.Element, identity: Identity) -> None:
+    """Add what model exchange and co-simulation can do."""
+    state = "state" if identity.version == 2 else "State"
+    common = {
+        "modelIdentifier": IDENTIFIER,
+        f"canGetAndSetFMU{state}": "true",
+        f"canSerializeFMU{state}": "true",
+    }
+    steps = {"canHandleVariableCommunicationStepSize": "true"}
+    for kind, more in (("ModelExchange", {}), ("CoSimulation", steps)):
+        element = ET.SubElement(root, kind, common | more)
+        if identity.version == 2 and identity.sources:
+            files = ET.SubElement(element, "SourceFiles")
+            for name in identity.sources:
+                ET.SubElement(files, "File", name=name)
 
 
 def _add_units(root: ET.Element, variables: Sequence[Variable]) -> None:

@@ -18,7 +18,7 @@ import sys
 import tempfile
 import uuid
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,11 +28,12 @@ from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.engines.trajectory import LARGEST_ANGLE, LARGEST_DISPLACEMENT, LARGEST_TILT
 from wm_drake.errors import input_error, nearest_names, shortened
-from wm_drake.export.description import IDENTIFIER, model_description
+from wm_drake.export.description import IDENTIFIER, Identity, model_description
 from wm_drake.export.kernel import kernel_code
 from wm_drake.export.model import ExportedModel, Variable, exported_model
 from wm_drake.export.object_code import PLATFORMS, Platform, object_files
 from wm_drake.export.options import FmuOptions
+from wm_drake.export.sources import build_description, sources_in_c
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.outputs import variables_of
 
@@ -95,10 +96,10 @@ def export_fmu(
         wm_drake.errors.InputError: fmi: there is no version 1; allowed are 2 and 3
     """
     options = options or FmuOptions()
-    path, fmi, platforms = Path(out), options.fmi, _platforms(options)
+    path, platforms = Path(out), _platforms(options)
     _check_file(path)
     headers = _headers()
-    compilers = {platform.name: _compiler(platform) for platform in platforms}
+    compilers = {p.name: [*_compiler(p), f"-I{headers}"] for p in platforms}
     model = exported_model(
         parameters,
         load,
@@ -106,29 +107,60 @@ def export_fmu(
         step=options.step,
         gasket=not options.no_gasket,
     )
-    code = kernel_code(model.plan)
-    token = _token(model, code, fmi)
-    files = {
-        "modelDescription.xml": model_description(model, token, fmi, _program()),
-        "documentation/index.html": _documentation(model, fmi),
-    }
-    if model.plan.follows_speed:
-        files["documentation/reference.csv"] = _reference(model)
-    for platform in platforms:
-        name = f"{IDENTIFIER}{platform.suffix}"
-        contents = object_files(code, platform) | {
-            "machine.h": _machine_header(model, token, platform).encode()
-        }
-        command = [*compilers[platform.name], f"-DFMI_VERSION={fmi}", f"-I{headers}"]
-        files[f"binaries/{platform.folder(fmi)}/{name}"] = _library(contents, platform, command)
-    if options.sources:
-        folder = "extra/wm_drake/sources"
-        files[f"{folder}/fmu.c"] = WRAPPER.read_bytes()
-        files[f"{folder}/machine.h"] = _machine_header(model, token, PLATFORMS["win64"]).encode()
-        files |= {f"{folder}/{name}.ll": text.encode() for name, text in code.items()}
-    _write(path, files)
+    contents = _Contents(model, kernel_code(model.plan), options.fmi, platforms)
+    sources = contents.sources() if options.sources else {}
+    files = contents.about(sources) | contents.libraries(compilers)
+    _write(path, files | {f"sources/{name}": content for name, content in sources.items()})
     names = tuple(platform.name for platform in platforms)
     return ExportedFmu(path, model, names, path.stat().st_size)
+
+
+class _Contents:
+    """Files of an FMU, by their path in it."""
+
+    def __init__(
+        self, model: ExportedModel, code: Mapping[str, str], fmi: int, platforms: list[Platform]
+    ) -> None:
+        self.model, self.code, self.fmi, self.platforms = model, code, fmi, platforms
+        self.token = _token(model, code, fmi)
+        self.header = _machine_header(model, self.token, fmi).encode()
+
+    def about(self, sources: Iterable[str]) -> dict[str, bytes]:
+        """Return the description, the documentation and the reference results.
+
+        Args:
+            sources: Names of the files in `sources`.
+        """
+        compiled = tuple(name for name in sources if name.endswith(".c"))
+        identity = Identity(self.token, self.fmi, _program(), compiled)
+        files = {
+            "modelDescription.xml": model_description(self.model, identity),
+            "documentation/index.html": _documentation(self.model, self.fmi),
+        }
+        if self.model.plan.follows_speed:
+            files["documentation/reference.csv"] = _reference(self.model)
+        return files
+
+    def libraries(self, compilers: Mapping[str, list[str]]) -> dict[str, bytes]:
+        """Return the library of each platform.
+
+        Args:
+            compilers: Command that compiles and links, by platform.
+        """
+        files = {}
+        for platform in self.platforms:
+            place = f"binaries/{platform.folder(self.fmi)}/{IDENTIFIER}{platform.suffix}"
+            objects = object_files(self.code, platform) | {"machine.h": self.header}
+            files[place] = _library(objects, platform, compilers[platform.name])
+        return files
+
+    def sources(self) -> dict[str, bytes]:
+        """Return the sources by file name; for FMI 3 with the description of how to build them."""
+        files = {"fmu.c": WRAPPER.read_bytes()}
+        for platform in self.platforms:
+            files |= sources_in_c(self.code, platform)
+        more = {"buildDescription.xml": build_description(files)} if self.fmi == 3 else {}
+        return files | {"machine.h": self.header} | more
 
 
 def _platforms(options: FmuOptions) -> list[Platform]:
@@ -215,9 +247,8 @@ def _library(contents: Mapping[str, bytes], platform: Platform, compiler: list[s
         for name, content in contents.items():
             (place / name).write_bytes(content)
         library = place / f"{IDENTIFIER}{platform.suffix}"
-        position = [] if platform.suffix == ".dll" else ["-fPIC"]
         objects = sorted(str(file) for file in place.glob("*.o"))
-        kind = ["-shared", "-O2", "-std=c11", "-fvisibility=hidden", *position]
+        kind = ["-shared", "-O2", "-std=c11", "-fvisibility=hidden", *platform.linking]
         files = [f"-I{place}", str(WRAPPER), *objects, "-o", str(library), "-lm"]
         command = [*compiler, *kind, *files]
         done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=place)
@@ -227,7 +258,7 @@ def _library(contents: Mapping[str, bytes], platform: Platform, compiler: list[s
         return library.read_bytes()
 
 
-def _machine_header(model: ExportedModel, token: str, platform: Platform) -> str:
+def _machine_header(model: ExportedModel, token: str, fmi: int) -> str:
     """Return the C header with the numbers of a machine."""
     at, begins = model.plan.at, model.plan.elements.begins
     limits = [v for v in model.variables if v.minimum is not None or v.maximum is not None]
@@ -238,9 +269,9 @@ def _machine_header(model: ExportedModel, token: str, platform: Platform) -> str
     by_index = {v.index: v.nominal or 1.0 for v in model.variables}
     nominals = [by_index[k] for k in model.states]
     defines = {
+        "FMI_VERSION": fmi,
         "WM_TOKEN": f'"{token}"',
         "WM_SIZE": at.size,
-        "WM_FAST": int(bool(platform.fast)),
         "WM_FOLLOWS_SPEED": int(model.plan.follows_speed),
         "WM_SPEED": at.speed,
         "WM_ACCELERATION": at.acceleration,
@@ -257,6 +288,8 @@ def _machine_header(model: ExportedModel, token: str, platform: Platform) -> str
         "WM_LIMITS": len(limits),
     }
     lines = [f"#define {name} {value}" for name, value in defines.items()]
+    fast = " || ".join(f"({p.condition})" for p in PLATFORMS.values() if p.fast)
+    lines += [f"#if {fast}", "#define WM_FAST 1", "#else", "#define WM_FAST 0", "#endif"]
     lines += [
         f"static const double wm_start[] = {{{', '.join(map(_c, model.numbers))}}};",
         f"static const double wm_constants[] = {{{', '.join(map(_c, model.constants))}}};",

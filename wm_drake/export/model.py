@@ -25,7 +25,7 @@ from wm_drake.export.tunable import Tunable, tunables
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Setup
 from wm_drake.model.scene import Scene
-from wm_drake.parameters import Drive, Load, MachineParameters, MotorDrive, SpinProfile
+from wm_drake.parameters import Drive, MachineParameters, MotorDrive, SpinProfile
 from wm_drake.parameters.drive import SpeedController, TorqueLimit, motor_of
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import notice_jumping_friction
@@ -123,7 +123,10 @@ def exported_model(
     parameters = parameters.model_copy(update={"drive": _drive(parameters, input_kind)})
     machine = build_machine(parameters)
     machine.set_up(load, gasket=gasket)  # an unknown load is an error
-    setup = machine.set_up(Load(unbalances=()), gasket=gasket)
+    # point masses are inputs; unbalance without mass stays in the packed numbers
+    setup = machine.set_up(
+        parameters.loads[load].model_copy(update={"unbalances": ()}), gasket=gasket
+    )
     step = parameters.step if step is None else step
     if not 0.0 < step <= parameters.step * 4.0:
         raise input_error(
@@ -169,7 +172,7 @@ class _Contents:
         unbalances = list(setup.parameters.loads[load].unbalances)
         self.unbalances = [(u.mass, u.phase, u.y, u.radius) for u in unbalances]
         while len(self.unbalances) < FEWEST_UNBALANCES:
-            self.unbalances.append((0.0, 0.0, 0.0, self.unbalances[0][3]))
+            self.unbalances.append((0.0, 0.0, 0.0, _usual_radius(setup.parameters, load)))
         self.mounts = mount_names(setup.parameters)
         self.pairs = _shape_pairs(setup)
         self.count = Counts(
@@ -466,6 +469,12 @@ class _Contents:
                 )
             )
         return variables
+
+
+def _usual_radius(parameters: MachineParameters, load: str) -> float:
+    """Return the radius of the first point mass of a load, else of any load, else zero. [m]"""
+    loads = [parameters.loads[load], *parameters.loads.values()]
+    return next((u.radius for one in loads for u in one.unbalances), 0.0)
 
 
 def structured(key: str) -> str:

@@ -19,6 +19,8 @@ class Platform:
         fmi2, fmi3: Its folder in an FMU of each version.
         suffix: How names of its libraries end.
         fast: Features of newer processors for which a second code is added; "" for none.
+        condition: Condition of the C preprocessor that holds there.
+        linking: Options with which its library is linked.
     """
 
     name: str
@@ -27,7 +29,9 @@ class Platform:
     fmi2: str
     fmi3: str
     suffix: str
+    condition: str
     fast: str = ""
+    linking: tuple[str, ...] = ("-fPIC", "-Wl,-s")
 
     def folder(self, version: int) -> str:
         """Return its folder below `binaries` in an FMU of a version of the standard."""
@@ -44,6 +48,7 @@ PLATFORMS = {
             "linux64",
             "x86_64-linux",
             ".so",
+            "defined __x86_64__ && defined __linux__",
             "+avx2,+fma",
         ),
         Platform(
@@ -53,6 +58,8 @@ PLATFORMS = {
             "win64",
             "x86_64-windows",
             ".dll",
+            "defined __x86_64__ && defined _WIN32",
+            linking=("-Wl,-s",),
         ),
         Platform(
             "darwin64",
@@ -61,6 +68,8 @@ PLATFORMS = {
             "darwin64",
             "x86_64-darwin",
             ".dylib",
+            "defined __x86_64__ && defined __APPLE__",
+            linking=("-fPIC", "-Wl,-install_name,@rpath/wm_drake_machine.dylib"),
         ),
         Platform(
             "aarch64",
@@ -69,6 +78,7 @@ PLATFORMS = {
             "aarch64-linux",
             "aarch64-linux",
             ".so",
+            "defined __aarch64__ && defined __linux__",
         ),
     )
 }
@@ -79,55 +89,111 @@ BASELINE = {"x86_64": "x86-64", "aarch64": "generic"}
 """Processor for which code is generated, by architecture."""
 
 
-def object_files(code: Mapping[str, str], platform: Platform) -> dict[str, bytes]:
-    """Return the object files of functions for a platform, by file name.
+def symbols(code: Mapping[str, str], platform: Platform) -> list[tuple[str, str, str]]:
+    """Return function, symbol and features of the processor of each code of a platform.
 
     Args:
         code: LLVM's text of each function as numba gives it, by the name that its symbol gets.
         platform: The platform.
     """
-    llvm.initialize_all_targets()
-    llvm.initialize_all_asmprinters()
-    files = {}
-    for name, text in code.items():
-        files[f"{name}.o"] = _object(name, name, text, platform, "")
-        if platform.fast:
-            files[f"{name}_fast.o"] = _object(name, f"{name}_fast", text, platform, platform.fast)
-    return files
+    usual = [(name, name, "") for name in code]
+    fast = [(name, f"{name}_fast", platform.fast) for name in code if platform.fast]
+    return usual + fast
 
 
-@functools.lru_cache(maxsize=8)  # both versions of the standard have the same code
-def _object(name: str, symbol: str, text: str, platform: Platform, features: str) -> bytes:
-    """Return the object file of one function."""
-    processor = BASELINE[platform.triple.split("-")[0]]
-    machine = llvm.Target.from_triple(platform.triple).create_target_machine(
-        cpu=processor, features=features, opt=3, reloc="pic", codemodel="default"
-    )
-    text = re.sub(r"target triple = .*", f'target triple = "{platform.triple}"', text)
+def object_files(code: Mapping[str, str], platform: Platform) -> dict[str, bytes]:
+    """Return the object files of functions for a platform, by file name.
+
+    Args:
+        code: As for `symbols`.
+        platform: The platform.
+    """
+    return {
+        f"{symbol}.o": _emitted(name, symbol, code[name], _Target(platform, features, "object"))
+        for name, symbol, features in symbols(code, platform)
+    }
+
+
+def assembly(code: Mapping[str, str], platform: Platform) -> dict[str, str]:
+    """Return the text for an assembler of functions for a platform, by symbol.
+
+    Args:
+        code: As for `symbols`.
+        platform: The platform.
+    """
+    return {
+        symbol: _emitted(name, symbol, code[name], _Target(platform, features, "text")).decode()
+        for name, symbol, features in symbols(code, platform)
+    }
+
+
+@dataclass(frozen=True)
+class _Target:
+    """What is emitted: for a platform, with features of its processor, as "object" or "text"."""
+
+    platform: Platform
+    features: str
+    form: str
+
+    def machine(self) -> llvm.TargetMachine:
+        """Return LLVM's machine."""
+        llvm.initialize_all_targets()
+        llvm.initialize_all_asmprinters()
+        triple = self.platform.triple
+        return llvm.Target.from_triple(triple).create_target_machine(
+            cpu=BASELINE[triple.split("-")[0]],
+            features=self.features,
+            opt=3,
+            reloc="pic",
+            codemodel="default",
+        )
+
+
+@functools.lru_cache(maxsize=16)  # both versions of the standard have the same code
+def _emitted(name: str, symbol: str, text: str, target: _Target) -> bytes:
+    """Return the machine code of one function."""
+    machine = target.machine()
+    text = re.sub(r"target triple = .*", f'target triple = "{target.platform.triple}"', text)
     text = re.sub(r"target datalayout = .*", f'target datalayout = "{machine.target_data}"', text)
     text = re.sub(r'"target-(cpu|features)"="[^"]*"', "", text)
     module = llvm.parse_assembly(text)
-    entry = _entry(module, name)
+    _expose(module, _entry(module, name), symbol)
+    _remove_unused(module, machine)
+    if unwanted := _unwanted(module):
+        raise AssertionError(f"{symbol} needs {', '.join(unwanted)}")
+    if target.form == "object":
+        return bytes(machine.emit_object(module))
+    return str(machine.emit_assembly(module)).encode()
+
+
+def _expose(module: llvm.ModuleRef, entry: str, symbol: str) -> None:
+    """Make a function the only one that other files see, under the name of a symbol."""
     for item in [*module.functions, *module.global_variables]:
         if not item.is_declaration and item.name != entry:
             item.linkage = "internal"
-    module.get_function(entry).name = symbol
-    # the text is optimised; what only the entry from Python used is now without a caller
+    function = module.get_function(entry)
+    function.name, function.linkage = symbol, "external"
+    function.visibility = "hidden"  # libraries of other FMUs have the same names
+
+
+def _remove_unused(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
+    """Remove what only the entry from Python used; the text is optimised already."""
     passes = llvm.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()
     passes.add_strip_dead_prototype_pass()
     options = llvm.create_pipeline_tuning_options(speed_level=0)
     passes.run(module, llvm.create_pass_builder(machine, options))
-    unwanted = [
+
+
+def _unwanted(module: llvm.ModuleRef) -> list[str]:
+    """Return the functions outside of a module that are none of libm's."""
+    return [
         function.name
         for function in module.functions
         if function.is_declaration
         and not function.name.startswith("llvm.")
         and function.name not in OF_LIBM
     ]
-    if unwanted:
-        raise AssertionError(f"{symbol} needs {', '.join(unwanted)}")
-    return bytes(machine.emit_object(module))
 
 
 def _entry(module: llvm.ModuleRef, name: str) -> str:

@@ -12,7 +12,7 @@ class FmuOptions(BaseModel):
         platform: Names of platforms, separated by commas; that of this computer if empty.
         step: Largest step of the integrator; that of the machine if None. [s]
         no_gasket: Whether the gasket is taken out.
-        sources: Whether the FMU also has the C source and LLVM's text of the machine.
+        sources: Whether the FMU also has its sources, which GCC and Clang compile.
 
     Example:
         >>> import wm_drake as wm
@@ -36,4 +36,4 @@ class FmuOptions(BaseModel):
         json_schema_extra={"metavar": "SECONDS"},
     )
     no_gasket: bool = Field(False, description="Take the gasket out.")
-    sources: bool = Field(False, description="Add the C source and LLVM's text of the machine.")
+    sources: bool = Field(False, description="Add sources that GCC and Clang compile.")
