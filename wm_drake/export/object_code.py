@@ -59,7 +59,7 @@ PLATFORMS = {
             "x86_64-windows",
             ".dll",
             "defined __x86_64__ && defined _WIN32",
-            linking=("-Wl,-s",),
+            linking=(),
         ),
         Platform(
             "darwin64",
