@@ -31,6 +31,16 @@ def test_script_runs_quickly_and_writes_its_output(script, tmp_path):
     assert done.returncode == 0, done.stderr
     assert out.read_text().strip() in done.stdout
     assert script in (ANALYSES / "README.md").read_text()
+    if script == "write_paper_c.py":
+        rows = verdicts(out.read_text())
+        assert len(rows) > 15
+        assert rows <= verdicts((ANALYSES.parent / "docs" / "paper-c.md").read_text())
+
+
+def verdicts(page):
+    """Return statement and verdict of each row: statement, paper, ours, verdict, command."""
+    rows = (line.split(" | ") for line in page.splitlines() if line.startswith("| "))
+    return {(cells[0], cells[3]) for cells in rows if len(cells) == 5}
 
 
 def test_renewing_the_table_of_times_changes_the_measured_rows_only():
