@@ -104,7 +104,7 @@ class Runs:
         packed = np.tile(bench.packed, (len(omega), 1))
         states = steady_deformations(bench, packed, np.full(len(omega), amplitude * MM), omega)
         step = 2.0 * np.pi / (states.shape[1] - 1)
-        return np.asarray(np.diff(states, axis=1) / step * omega[:, None])
+        return np.asarray(np.gradient(states, step, axis=1) * omega[:, None])
 
 
 def verdict(is_so: object) -> str:
@@ -129,7 +129,7 @@ def test_lines(runs: Runs) -> list[list[str]]:
     peaks = [measures_of(x).peak_force for x in runs.over_frequency(1.0)]
     of_sponge = runs.sponge_rates(1.0)
     rates = np.max(np.abs(of_sponge), axis=1)
-    slider = np.abs(shown.velocity - of_sponge[-1])
+    slider = np.abs(shown.velocity - of_sponge[-1, :-1])
     at_c = float(slider[360] / slider.max())
     held = slider_friction_curves(damper_bench(runs.damper), (MM, 5 * MM, 25 * MM), np.array([MM]))
     assert held is not None
@@ -247,10 +247,10 @@ def case_lines(runs: Runs) -> tuple[list[list[str]], list[list[str]]]:
             SCRIPT,
         ],
         [
-            "4.3, Figs. 15 to 18: STV has an error of more than 10 % in all four",
+            "4.3, Figs. 15 to 18: STV has a larger error than MSTV (STV beside MSTV)",
             "larger than MSTV",
             listed([of_stv[f, 0.3] for f in (1.0, 3.0, 6.67, 10.0)], ""),
-            verdict(min(of_stv[f, 0.3] for f in (1.0, 3.0, 6.67, 10.0)) > 0.1),
+            OPEN,
             SCRIPT,
         ],
         [
