@@ -15,6 +15,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from wm_drake.parameters.damper_laws import DamperNumbers, StvSpongeDamper
 from wm_drake.parameters.types import FloatArray
@@ -112,7 +113,7 @@ def verdict(is_so: object) -> str:
     return HOLDS if is_so else FAILS
 
 
-def listed(values: object, unit: str, factor: float = 1.0) -> str:
+def listed(values: ArrayLike, unit: str, factor: float = 1.0) -> str:
     """Return numbers as text."""
     return ", ".join(f"{factor * value:.3g}" for value in np.ravel(values)) + unit
 
