@@ -228,6 +228,16 @@ def test_all_cases_diverged_still_give_a_page(machine: MachineParameters) -> Non
 def test_overlap_is_warned_of(machine: MachineParameters) -> None:
     page = spin_page(spin_result(machine, [case_result(machine, gap=-0.003)]))
     assert "tub shell and wall right overlap by 3.0 mm" in page
+    answer = "The tub touches the housing: overlap of 3.0 mm, between tub shell and wall right"
+    assert page.index(answer) < page.index("1 case was run")  # the answer comes first
+
+
+@pytest.mark.usefixtures("without_drawing")
+def test_the_page_says_first_that_the_tub_does_not_touch(machine: MachineParameters) -> None:
+    cases = [case_result(machine, "middle", gap=0.0108), case_result(machine, "back", gap=0.0081)]
+    page = spin_page(spin_result(machine, cases))
+    assert "The tub does not touch the housing: smallest gap 8.1 mm" in page
+    assert re.search(r"per load: middle[^,]* 10.8 mm, back[^,]* 8.1 mm\.", page)
 
 
 def test_names_cannot_inject_markup(machine: MachineParameters) -> None:

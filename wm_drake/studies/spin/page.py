@@ -46,6 +46,12 @@ MODES = (
     "has the steady response."
 )
 
+VERDICT = (
+    "'wm-drake verdict' adds random laundry to these loads, and finds what decides the gap and "
+    "what to change."
+)
+"""How the verdict differs from this page."""
+
 
 def spin_page(result: SpinResult, facts: Facts | None = None) -> str:
     """Return the page of spin runs as text of one self-contained HTML file.
@@ -58,10 +64,11 @@ def spin_page(result: SpinResult, facts: Facts | None = None) -> str:
         InputError: A file of measured amplitudes cannot be used.
     """
     table, made = amplitude_table(result), facts or Facts()
+    gaps = _gaps_pictures(result)
     drive, floor, modes = drive_section(result), floor_section(result), result.modes
     sections = [
         *_case_sections(result, table),
-        Section("gap", "Smallest gaps", _gaps_pictures(result)),
+        Section("gap", "Smallest gaps", gaps, text=VERDICT * bool(gaps)),
         Section("floor", "Feet over time", floor.pictures),
         Section(
             "drive", "Speed and torque", drive.pictures, text=drive.text * bool(drive.pictures)
@@ -131,9 +138,9 @@ def summary(result: SpinResult, table: pd.DataFrame) -> str:
         filter(
             None,
             [
+                _contact_sentence(ended),
                 opening,
                 _largest_amplitude_sentence(ended),
-                _smallest_gap_sentence(ended),
                 _agreement_sentence(result, ended, table),
             ],
         )
@@ -164,15 +171,21 @@ def _peak(case: CaseResult) -> tuple[float, str, float]:
     )
 
 
-def _smallest_gap_sentence(cases: list[CaseResult]) -> str:
-    gaps = [(case.measures.smallest_gap, case) for case in cases if case.measures.smallest_gap]
+def _contact_sentence(cases: list[CaseResult]) -> str:
+    """Return whether the tub touches, the smallest gap and where it is, and that of each load."""
+    gaps = [(gap, case) for case in cases if (gap := case.measures.smallest_gap)]
     if not gaps:
-        return ""
+        return "The SDF has no shapes on both tub and housing, so contact cannot be judged."
     gap, case = min(gaps, key=lambda pair: pair[0].distance)
-    return (
-        f"The smallest gap to the housing occurs with load {case_title(case)}: "
-        f"{_gap_text(case, gap)}."
-    )
+    parts = f"between {shape_name(gap.moving)} and {shape_name(gap.fixed)}"
+    place = f"{parts}, with load {case_title(case)} at {number(speed_rpm(case, gap.time), 0)} rpm"
+    size = f"smallest gap {number(MM_PER_M * gap.distance)} mm"
+    does = "does not touch"
+    if gap.distance <= 0.0:
+        size, does = f"overlap of {number(-MM_PER_M * gap.distance)} mm", "touches"
+    loads = [f"{case_title(c)} {number(MM_PER_M * g.distance)} mm" for g, c in gaps]
+    per_load = f" Smallest gap per load: {', '.join(loads)}." if len(gaps) > 1 else ""
+    return f"The tub {does} the housing: {size}, {place}.{per_load}"
 
 
 def _gap_text(case: CaseResult, gap: Gap) -> str:
