@@ -1,0 +1,106 @@
+"""FMUs of all shipped machines, and of kinds that none of them has, compute what the engine does."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+import wm_drake as wm
+from wm_drake.engines.compiled.run import run_compiled
+from wm_drake.parameters import SpinProfile, shipped_machines
+from wm_drake.simulation.outputs import variables_of
+
+fmpy = pytest.importorskip("fmpy", reason="headers and importer are FMPy's: install wm-drake[fmu]")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler on this computer"),
+]
+
+PROFILE = SpinProfile(time=(0.0, 0.5), speed=(0.0, 10.0))
+KINDS = {
+    "rubber": """
+name: rubber
+extends: reference
+gasket:
+  dahl_displacement_y: 0.5 mm
+  dahl_force_y: 4 N
+  maxwell_stiffness_y: 0.8 N/mm
+  maxwell_damping_y: 0.04 N s/mm
+  cross_stiffness_y_z: 0.3 N/mm
+""",
+    "whirling": """
+name: whirling
+extends: reference
+step: 0.5 ms
+imperfections:
+  bearing:
+    radial_stiffness: 10 kN/mm
+    axial_stiffness: 8 kN/mm
+    tilting_stiffness: 100 kN m/rad
+    radial_damping: 1 N s/mm
+    axial_damping: 1 N s/mm
+    tilting_damping: 10 N m s/rad
+    y: 170 mm
+""",
+}
+"""Machines with elements that no shipped machine has: docs/how-to/rubber.md, compliant-bearing.md."""
+OUTPUTS = {
+    "displacement": "displacement",
+    "mount_force": "mount_force",
+    "cabinet_force": "cabinet_force",
+    "cabinet_moment": "cabinet_moment",
+    "drum_angle": "drum_angle",
+    "drum_speed": "drum_rate",
+}
+"""Outputs of an FMU by the variable of a record; the detergent box is another variable there."""
+
+
+def machine_named(name, folder):
+    """Return a shipped machine, or one of `KINDS`."""
+    if name not in KINDS:
+        return wm.load_machine(name)
+    path = folder / f"{name}.yaml"
+    path.write_text(KINDS[name], encoding="utf-8")
+    return wm.load_machine(path)
+
+
+@pytest.mark.parametrize("name", [*shipped_machines(), *KINDS])
+def test_fmu_equals_engine(name, tmp_path):
+    parameters = machine_named(name, tmp_path)
+    load = list(parameters.loads)[-1]
+    written = wm.export_fmu(parameters, load, tmp_path / "machine.fmu")
+    setup = written.model.setup.machine.set_up(load)
+    step = written.model.step
+    trajectory = run_compiled(setup, PROFILE, step, lambda _: None, integrator="runge_kutta")
+    expected = variables_of(setup, trajectory)
+    names = [v.name for v in written.model.variables if v.causality == "output"]
+    columns = {
+        variable: [n for n in names if n.split(".")[0] == output and "detergent" not in n]
+        for variable, output in OUTPUTS.items()
+        if variable in expected
+    }
+    rates = np.full((2, 1), PROFILE.speed[1] / PROFILE.duration)
+    rows = np.column_stack([PROFILE.time, PROFILE.speed, rates])
+    signals = np.array(
+        [tuple(row) for row in rows],
+        dtype=[(n, float) for n in ("time", "drum_speed", "drum_acceleration")],
+    )
+    interval = trajectory.time[1] - trajectory.time[0]
+    result = fmpy.simulate_fmu(
+        written.path,
+        stop_time=PROFILE.duration,
+        output_interval=interval,
+        input=signals,
+        output=[output for outputs in columns.values() for output in outputs],
+        fmi_type="CoSimulation",
+    )
+    at = np.searchsorted(result["time"], trajectory.time + 1e-9) - 1
+    assert {"displacement", "drum_speed"} <= set(columns)
+    for variable, outputs in columns.items():
+        values = expected[variable][1].reshape(len(at), -1)
+        size = np.abs(values).max()
+        for column, output in enumerate(outputs):
+            deviation = np.abs(result[output][at] - values[:, column]).max()
+            assert deviation <= 1e-9 * size, output
+        assert outputs
+        assert size > 0.0
