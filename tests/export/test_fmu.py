@@ -5,9 +5,11 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from typer.testing import CliRunner
 
 import wm_drake as wm
@@ -190,6 +192,12 @@ def advanced(instance, references, begin, count):
     return values
 
 
+def configure(simulator):
+    """Choose fixed steps of 0.5 ms of Drake's scheme of third order."""
+    integrator = ResetIntegratorFromFlags(simulator, "runge_kutta3", 5e-4)
+    integrator.set_fixed_step_mode(True)
+
+
 @pytest.mark.parametrize("through_bytes", [False, True])
 def test_saved_state_continues_bit_for_bit(fmu, through_bytes):
     instance, references = slave(fmu)
@@ -215,6 +223,42 @@ def test_instances_do_not_share_anything(fmu):
     ]
     assert [one for one, _ in both] == expected
     assert both[-1][1] != expected[-1]
+
+
+def test_threads_compute_what_one_computes(fmu):
+    alone, references = slave(fmu)
+    expected = advanced(alone, references, 0, 200)
+    instances = [slave(fmu)[0] for _ in range(4)]
+    with ThreadPoolExecutor(4) as pool:
+        runs = list(pool.map(lambda instance: advanced(instance, references, 0, 200), instances))
+    assert runs == [expected] * 4
+    assert len(set(expected)) == 200
+
+
+def test_unbalance_that_changes_in_a_run_is_that_of_drake(fmu, machine):
+    """Both have 1.5 times the mass of the load from 1 s on; in Drake the bodies change."""
+    instance, references = slave(fmu)
+    advanced(instance, references, 0, 200)
+    instance.set([references["unbalance[1].mass"]], [1.5])
+    actual = np.array(advanced(instance, references, 200, 200))
+
+    setup = machine.set_up("middle", profile=SpinProfile(time=(0.0, 2.0), speed=(0.0, 10.0)))
+    simulator = Simulator(machine.diagram, setup.context)
+    configure(simulator)
+    simulator.AdvanceTo(1.0)
+    plant, context = machine.plant, setup.plant_context
+    state = plant.GetPositionsAndVelocities(context)
+    heavy = wm.with_value(machine.parameters, "loads.middle.unbalances.0.mass", 1.5)
+    machine.set_up_bodies(heavy.loads["middle"], heavy, setup.context)
+    plant.SetPositionsAndVelocities(context, state)
+    expected = []
+    for k in range(200):
+        simulator.AdvanceTo(1.0 + 5e-3 * (k + 1))
+        port = machine.outputs["displacement"]
+        expected.append(port.Eval(port.get_system().GetMyContextFromRoot(setup.context))[0])
+    assert np.abs(actual - expected).max() < 1e-3 * np.abs(expected).max()
+    same = np.array(advanced(slave(fmu)[0], references, 0, 400)[200:])
+    assert np.abs(actual - same).max() > 0.1 * np.abs(same).max()
 
 
 def test_run_is_faster_than_real_time(fmu):
