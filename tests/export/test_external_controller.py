@@ -1,10 +1,11 @@
 """A PI controller outside of an FMU drives the drum as the sampled controller of Drake's diagram."""
 
+import runpy
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
-from external_controller import spin_up
 
 import wm_drake as wm
 from wm_drake.engines.drake import run_drake
@@ -12,6 +13,7 @@ from wm_drake.export.options import FmuOptions
 from wm_drake.parameters import SpinProfile
 
 pytest.importorskip("fmpy", reason="headers and importer are FMPy's: install wm-drake[fmu]")
+SCRIPT = Path(__file__).parents[2] / "analyses" / "spin_up_fmu.py"
 SAMPLE_TIME, SAMPLES = 1e-3, 1000
 PROFILE = SpinProfile(time=(0.0, 1.0), speed=(0.0, 5.0))
 
@@ -32,6 +34,7 @@ def test_external_controller_equals_the_drake_diagram(tmp_path):
     )
     samples = SAMPLE_TIME * np.arange(SAMPLES)
     reference = drive.belt_ratio * PROFILE.speed_at(samples)
+    spin_up = runpy.run_path(str(SCRIPT))["spin_up"]
     history = np.array(spin_up(path, reference, gains, SAMPLE_TIME))
 
     setup = wm.build_machine(parameters).set_up("middle", profile=PROFILE)
