@@ -102,7 +102,7 @@ KINDS = {
         "sections.html", "study", "tolerance", "laundry", "--samples", "64",
         "--sensitivity", "16", "--subset", "100", "--limits", "limits.yaml",
     ),
-    "verdict": _one("sections.html", "verdict", "reference", "--samples", "16", "--profile", "short.yaml"),
+    "verdict": _one("sections.html", "verdict", "short.yaml", "--samples", "16", "--profile", "short_cycle.yaml"),
     "design": _one("sections.html", "study", "design", "gasket", "--evaluations", "48", "--population", "16"),
     "drive": _one("sections.html", "study", "drive", "--load", "middle", "--torques", "3", "--unbalances", "2", "--loads", "4"),
 }  # fmt: skip

@@ -67,6 +67,7 @@ FILES = {  # what a block with a file is called in the commands of its page
     "docs/how-to/own-machine.md": ["mine.yaml", "four_springs.yaml", "imperfect.yaml"],
     "docs/how-to/rubber.md": ["rubber.yaml"],
     "docs/how-to/tolerances.md": ["mine.yaml", "limits.yaml"],
+    "docs/theory/ball-ring.md": ["balls.yaml"],
 }
 """Names of the YAML and CSV blocks of each page."""
 

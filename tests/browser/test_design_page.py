@@ -23,13 +23,13 @@ def test_picked_design_shows_its_numbers_and_envelopes(browser, tmp_path):
     browser.wait("return document.documentElement.dataset.pictures === 'ready'", timeout=90.0)
     browser.run("Pictures.all()")
     first = given["picked"]
-    assert browser.run(PICKED) == pytest.approx(given["objectives"][first])
+    assert browser.run(PICKED) == pytest.approx(given["objectives"][first][:2])
     browser.run("document.getElementById('plot').focus()")
     wanted = first - 1 if first else 1
     key = Keys.ARROW_LEFT if first else Keys.ARROW_RIGHT
     ActionChains(browser.driver).send_keys(key).perform()
     assert browser.run("return Picked.number()") == wanted
-    assert browser.run(PICKED) == pytest.approx(given["objectives"][wanted])
+    assert browser.run(PICKED) == pytest.approx(given["objectives"][wanted][:2])
     drawn = np.array(browser.run(ENVELOPE), dtype=float)
     assert drawn == pytest.approx(np.array(given["envelopes"][wanted][0], dtype=float))
     shown = browser.find("#picked").text
@@ -40,7 +40,7 @@ def test_picked_design_shows_its_numbers_and_envelopes(browser, tmp_path):
     place = """const plot = document.querySelector('#plot .plot'), f = plot._fullLayout;
         plot.scrollIntoView({block: 'center'}); const c = plot.getBoundingClientRect();
         return [c.left + f.xaxis._offset + f.xaxis.d2p(arguments[0]), c.top + f.yaxis._offset + f.yaxis.d2p(arguments[1])]"""
-    at = browser.run(place, *given["objectives"][far])
+    at = browser.run(place, *given["objectives"][far][:2])
     mouse = ActionChains(browser.driver)
     mouse.w3c_actions.pointer_action.move_to_location(*map(int, np.round(at)))
     mouse.w3c_actions.pointer_action.click()

@@ -140,7 +140,7 @@ def test_error_controlled_integration_agrees(machine, reference, run_up):
     integrator = simulator.get_mutable_integrator()  # Drake's default: RK3 with error control
     integrator.set_target_accuracy(1e-6)
     integrator.set_maximum_step_size(5e-3)
-    machine.set_profile(setup.context, case.profile)
+    machine.set_profile(setup.context, case.profile, setup.elements)
     advance_to(simulator, case.profile.duration, case.profile)
     assert not integrator.get_fixed_step_mode()
     final = machine.plant.GetPositions(setup.plant_context)
