@@ -132,8 +132,9 @@ class VerdictResult(Result):
             f"Verdict on machine {f.machine.name}",
             answer(f),
             [
-                Section("loads", "Smallest gaps", (gaps_picture(f),), (loads_table(f),)),
+                Section("gaps", "Smallest gaps", (gaps_picture(f),)),
                 Section("influences", "What decides the gap", (influences_picture(f),)),
+                Section("loads", "Each load", tables=(loads_table(f),)),
                 Section("cost", "What the changes cost", tables=(cost_table(f),)),
                 Section("others", "Other commands with a smallest gap", text=HOW_OTHERS_DIFFER),
             ],
