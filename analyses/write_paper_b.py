@@ -169,11 +169,7 @@ def main() -> None:
     said = [[words, *cells] for words, cells in claims(screenings)]
     text += page.table_text("Section 4 in words", ["", *MACHINES], said)
     print(text)
-    if arguments.out:
-        arguments.out.write_text(text, encoding="utf-8")
-    if arguments.page:
-        before = arguments.page.read_text(encoding="utf-8")
-        arguments.page.write_text(page.renewed(before, text), encoding="utf-8")
+    page.write(text, arguments.out, arguments.page)
 
 
 if __name__ == "__main__":

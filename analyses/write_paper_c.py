@@ -315,11 +315,7 @@ def main() -> None:
     text += page.table_text("Models in words: sections 3.3 to 4.3", heads, sentences)
     text += page.table_text("Table 2: Coulomb fits", heads, fit_lines(runs.damper, arguments.quick))
     print(text)
-    if arguments.out:
-        arguments.out.write_text(text, encoding="utf-8")
-    if arguments.page:
-        before = arguments.page.read_text(encoding="utf-8")
-        arguments.page.write_text(page.renewed(before, text), encoding="utf-8")
+    page.write(text, arguments.out, arguments.page)
 
 
 if __name__ == "__main__":

@@ -200,11 +200,7 @@ def main() -> None:
     text += page.compared(table, rows.FITTED, reasons, fewer)
     text += page.compared(table, rows.PREDICTED, reasons)
     print(text)
-    if arguments.out:
-        arguments.out.write_text(text, encoding="utf-8")
-    if arguments.page:
-        before = arguments.page.read_text(encoding="utf-8")
-        arguments.page.write_text(page.renewed(before, text), encoding="utf-8")
+    page.write(text, arguments.out, arguments.page)
 
 
 if __name__ == "__main__":

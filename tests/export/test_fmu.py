@@ -38,7 +38,7 @@ def machine():
 
 @pytest.fixture(scope="module")
 def record(machine):
-    """What the engine computes: time and variables."""
+    """Return what the engine computes: trajectory and variables."""
     setup = machine.set_up("middle")
     trajectory = run_compiled(setup, PROFILE, STEP, lambda _: None, integrator="runge_kutta")
     return trajectory, variables_of(setup, trajectory)

@@ -443,7 +443,9 @@ def test_a_disengaged_element_exerts_nothing_at_all(damper):
             (),
         )
     else:
-        placed = damper_parameters(damper, EndBushing(), engaged=0.0)  # no bushings: they stay
+        placed = damper_parameters(
+            damper, EndBushing(), engaged=0.0
+        )  # its end bushings would act on
         state = [2e-3] if placed.has_sponge else []  # m
         system = ElementSystem(FRICTION_DAMPER_STRUT, placed.packed(), int(placed.has_sponge))
     context = context_of(system, random_plant_states(1, seed=32)[0], state)

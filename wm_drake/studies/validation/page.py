@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby
+from pathlib import Path
 from textwrap import fill
 from typing import Any
 
@@ -46,6 +47,14 @@ def renewed(page: str, text: str) -> str:
     """Return a page with a new text between its marks."""
     before, rest = page.split(BEGIN)
     return f"{before}{BEGIN}{text}{END}{rest.split(END)[1]}"
+
+
+def write(text: str, out: Path | None, page: Path | None) -> None:
+    """Write a text to a file, and between the marks of a page; None leaves either out."""
+    if out:
+        out.write_text(text, encoding="utf-8")
+    if page:
+        page.write_text(renewed(page.read_text(encoding="utf-8"), text), encoding="utf-8")
 
 
 def origin(command: str, notes: Sequence[str]) -> str:
