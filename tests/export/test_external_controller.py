@@ -12,7 +12,7 @@ from wm_drake.engines.drake import run_drake
 from wm_drake.export.options import FmuOptions
 from wm_drake.parameters import SpinProfile
 
-pytest.importorskip("fmpy", reason="headers and importer are FMPy's: install wm-drake[fmu]")
+fmpy = pytest.importorskip("fmpy", reason="headers and importer are FMPy's: install wm-drake[fmu]")
 SCRIPT = Path(__file__).parents[2] / "analyses" / "spin_up_fmu.py"
 SAMPLE_TIME, SAMPLES = 1e-3, 1000
 PROFILE = SpinProfile(time=(0.0, 1.0), speed=(0.0, 5.0))
@@ -43,3 +43,31 @@ def test_external_controller_equals_the_drake_diagram(tmp_path):
     speed = trajectory.state[1:, 13]
     assert np.abs(history[after, 0] - speed).max() < 1e-3 * np.abs(speed).max()
     assert np.abs(speed).max() > 2.0
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler on this computer")
+def test_current_is_torque_at_the_shaft_over_torque_constant(tmp_path):
+    parameters = wm.with_value(wm.load_machine("motor"), "drive.torque_constant", 0.2)
+    path = tmp_path / "machine.fmu"
+    wm.export_fmu(parameters, "middle", path, FmuOptions(input="torque"))
+    assert fmpy.read_model_description(path).unitDefinitions
+    demand = np.array(
+        [(0.0, 1.5), (0.5, 1.5)], dtype=[("time", float), ("motor_torque_demand", float)]
+    )
+    result = fmpy.simulate_fmu(
+        path, stop_time=0.5, input=demand, output=["drive_current", "drum_torque"]
+    )
+    assert result["drive_current"][-1] == pytest.approx(1.5 / 0.2, rel=1e-12)
+    assert result["drum_torque"][-1] == pytest.approx(12 * 1.5, rel=1e-12)
+
+
+def test_record_has_the_current_of_a_motor_with_a_torque_constant():
+    plain = wm.load_machine("motor").model_copy(update={"profile": PROFILE})
+    parameters = wm.with_value(plain, "drive.torque_constant", 0.2)
+    record = wm.simulate(parameters, "middle")
+    assert record.motor_current.attrs["units"] == "A"
+    shaft_torque = record.motor_torque.values / parameters.drive.belt_ratio
+    np.testing.assert_allclose(0.2 * record.motor_current.values, shaft_torque, rtol=1e-12)
+    assert np.abs(record.motor_current.values).max() > 1.0
+    assert "motor_current" not in wm.simulate(plain, "middle")

@@ -18,6 +18,7 @@ from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.errors import InputError
 from wm_drake.export.options import FmuOptions
 from wm_drake.export.speed import real_time_factor
+from wm_drake.model.scene import Scene
 from wm_drake.parameters import SpinProfile
 from wm_drake.simulation.outputs import variables_of
 
@@ -116,6 +117,36 @@ def test_run_equals_engine(fmu, record, variable, names, size):
         actual = at(result, name, trajectory.time)
         assert np.abs(actual - expected[:, column]).max() < 1e-9 * size
     assert np.abs(expected).max() > size
+
+
+@pytest.mark.parametrize("sensor", ["Xr", "Yf", "Zr"])
+def test_acceleration_is_the_second_derivative_of_displacement(fmu, sensor):
+    names = [f"{kind}.{sensor}" for kind in ("displacement", "acceleration")]
+    interval = 1e-3
+    result = simulated(fmu, names, interval=interval)
+    time = interval * np.arange(100, 2900)  # the rate of the speed jumps at 0 and 3 s
+    displacement, acceleration = (at(result, name, time) for name in names)
+    expected = np.diff(displacement, 2) / interval**2
+    # dampers reverse their friction within some samples, where differences are coarse
+    assert np.abs(expected - acceleration[1:-1]).max() < 3e-3 * np.abs(expected).max()
+
+
+def test_gap_is_a_lower_bound_of_the_smallest_distance(fmu, record, machine):
+    trajectory, _ = record
+    setup = machine.set_up("middle")
+    scene, poses = Scene(machine.parameters), trajectory.state[:, :6]
+    bound = at(simulated(fmu, ["gap"]), "gap", trajectory.time)
+    rows = range(0, len(poses), 40)
+    distance = np.array(
+        [
+            scene.smallest_gap(trajectory.time[[k]], poses[[k]], setup.rest_pose).distance
+            for k in rows
+        ]
+    )
+    assert bound[0] == pytest.approx(distance[0], abs=2e-6)  # the accuracy of Drake's distance
+    assert np.all(bound[rows] < distance + 2e-6)
+    assert np.all(bound[rows] > distance - 1e-3)
+    assert np.ptp(distance) > 2e-3
 
 
 @pytest.mark.parametrize("interval", [1e-4, 1e-3, 1e-2])

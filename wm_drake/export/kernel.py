@@ -72,6 +72,7 @@ Places = namedtuple(
         "displacements",
         "accelerations",
         "drum",
+        "current",
         "gasket",
         "mounts",
         "cabinet",
@@ -96,24 +97,37 @@ Places = namedtuple(
 speed, acceleration: inputs of a prescribed drum [rad/s, rad/s^2]; torque: input of a free drum
 [N m]; time_constant: with which model exchange follows the speed [s]; unbalances: `UNBALANCE_SIZE`
 each; parameters: numbers of the machine file; displacements, accelerations: of the sensors [m,
-m/s^2]; drum: angle, speed, acceleration and torque [rad, rad/s, rad/s^2, N m]; gasket: force and
+m/s^2]; drum: angle, speed, acceleration and torque [rad, rad/s, rad/s^2, N m]; current: of the
+motor [A]; gasket: force and
 moment on the housing [N, N m]; mounts: force of each on the cabinet; cabinet: force and moment of
 all; feet: force of the floor on each [N]; gap: smallest distance [m]; state, rate: state of the
 engine and its derivative; in_force: acceleration of a prescribed drum [rad/s^2]; turned: angle
 taken off the drum's [rad]; the others are packed numbers and arrays to work in; size: of the array.
 """
 Constants = namedtuple(
-    "Constants", ("packed", "start", "entries", "harmonics", "drum", "points", "pairs", "size")
+    "Constants",
+    ("packed", "start", "entries", "harmonics", "drum", "points", "pairs", "current", "size"),
 )
 """Indices in the array of constants.
 
 packed: packed numbers without unbalance; start: values of the parameters that belong to them;
 entries: (row, parameter, slope) of each packed number that depends on a parameter;
 harmonics: matrix of the drum's harmonics; drum: rotation of D in T by rows, then O from Do in T
-[m]; points: measured points; pairs: shapes for the gap.
+[m]; points: measured points; pairs: shapes for the gap; current: per torque on the drum [A/(N m)].
 """
 Counts = namedtuple(
-    "Counts", ("packed", "parameters", "entries", "unbalances", "points", "mounts", "feet", "pairs")
+    "Counts",
+    (
+        "packed",
+        "parameters",
+        "entries",
+        "unbalances",
+        "points",
+        "mounts",
+        "feet",
+        "pairs",
+        "currents",
+    ),
 )
 """How many of each there are."""
 Plan = namedtuple("Plan", ("at", "of", "count", "elements", "gasket", "follows_speed"))
@@ -310,6 +324,8 @@ def kernel(plan: Any) -> dict[str, Any]:  # noqa: C901 - the functions of one ma
                 numbers[at.cabinet + 3 + k] = numbers[at.cabinet + 3 + k] + moment
         write_floor(numbers, x, p, cabinet)
         write_drum(numbers, x, rate, p)
+        if count.currents:
+            numbers[at.current] = constants[of.current] * numbers[at.drum + 3]
         if count.pairs:
             numbers[at.gap] = smallest_gap(motion, constants)
 

@@ -175,6 +175,7 @@ class _Contents:
             self.unbalances.append((0.0, 0.0, 0.0, _usual_radius(setup.parameters, load)))
         self.mounts = mount_names(setup.parameters)
         self.pairs = _shape_pairs(setup)
+        self.currents = _currents(setup)
         self.count = Counts(
             packed=len(self.packed),
             parameters=len(tuned),
@@ -184,6 +185,7 @@ class _Contents:
             mounts=len(self.mounts),
             feet=FEET_COUNT if setup.cabinet else 0,
             pairs=len(self.pairs),
+            currents=len(self.currents),
         )
 
     def model(self, step: float) -> ExportedModel:
@@ -234,6 +236,7 @@ class _Contents:
             np.concatenate([rotation.ravel(), origin]),
             self.setup.measured_points.ravel(),
             np.array(self.pairs, dtype=float).ravel(),
+            np.array(self.currents),
         ]
 
     def _places(self) -> Any:
@@ -249,6 +252,7 @@ class _Contents:
             "displacements": count.points,
             "accelerations": count.points,
             "drum": 4,
+            "current": count.currents,
             "gasket": 6,
             "mounts": 3 * count.mounts,
             "cabinet": 6,
@@ -421,6 +425,13 @@ class _Contents:
         add(["drum_rate"], at.drum + 1, "rad/s", "speed of the drum against the tub")
         add(["drum_rate_of_change"], at.drum + 2, "rad/s^2", "acceleration of the drum")
         add(["drum_torque"], at.drum + 3, "N*m", "torque of the motor on the drum")
+        if self.count.currents:
+            add(
+                ["drive_current"],
+                at.current,
+                "A",
+                "current of the motor, with the sign of its torque",
+            )
         if self.layout.gasket >= 0:
             words = "of the gasket on the housing"
             add([f"gasket_force.{a}" for a in AXES], at.gasket, "N", f"force {words}")
@@ -469,6 +480,12 @@ class _Contents:
                 )
             )
         return variables
+
+
+def _currents(setup: Setup) -> list[float]:
+    """Return the current per torque on the drum, one number; none if it is not known. [A/(N m)]"""
+    factor = setup.motor.current_per_drum_torque if setup.motor else None
+    return [] if factor is None else [factor]
 
 
 def _usual_radius(parameters: MachineParameters, load: str) -> float:

@@ -126,6 +126,8 @@ class MotorDrive(Frozen):
         torque_limit: Largest torque of the motor, at the motor's shaft.
         controller: Speed controller, at the motor's shaft.
         bearing_friction: Friction of the drum, at the drum.
+        torque_constant: Torque of the motor's shaft per current; None if it is not known, so that
+            there is no current in records and exports. [N m/A]
     """
 
     kind: Literal["motor"]
@@ -139,6 +141,7 @@ class MotorDrive(Frozen):
     ]
     controller: SpeedController
     bearing_friction: BearingFriction = BearingFriction()
+    torque_constant: Annotated[u.TorqueConstant, Field(gt=0.0)] | None = None
 
     @property
     def reflected_inertia(self) -> float:
@@ -147,6 +150,19 @@ class MotorDrive(Frozen):
         See `wm_drake.model.rotor`.
         """
         return (self.belt_ratio - 1.0) * self.belt_ratio * self.rotor_inertia
+
+    @property
+    def current_per_drum_torque(self) -> float | None:
+        """Return the current per torque on the drum; None without torque constant. [A/(N m)]
+
+            i = T / (n k_t)    T: torque on the drum, n: belt ratio, k_t: torque constant
+
+        It has the sign of the torque. Losses of the motor and its magnetising current are not in
+        it.
+        """
+        if self.torque_constant is None:
+            return None
+        return 1.0 / (self.belt_ratio * self.torque_constant)
 
 
 def _kind(value: Any) -> str:

@@ -28,6 +28,7 @@ def variables_of(setup: Setup, trajectory: Trajectory) -> Variables:
         | _whirl(setup, trajectory)
         | _motion(setup, trajectory, displacements)
         | _forces(trajectory, *forces)
+        | _current(setup, trajectory)
         | _outputs_of_others(setup, outputs)
         | _on_cabinet(mount_wrenches(setup, trajectory))
     )
@@ -190,6 +191,15 @@ def _whirl(setup: Setup, trajectory: Trajectory) -> Variables:
             f"moment of the drum on the tub in the bearing, {where}",
         ),
     }
+
+
+def _current(setup: Setup, trajectory: Trajectory) -> Variables:
+    """Return the current of the motor; none without its torque constant."""
+    factor = setup.motor.current_per_drum_torque if setup.motor else None
+    if factor is None:
+        return {}
+    current = factor * trajectory.motor_torque
+    return {"motor_current": (("time",), current, "A", "current of the motor")}
 
 
 def _forces(

@@ -302,6 +302,7 @@ def _motor(setup: Setup) -> dict[str, Any] | None:
         "torque_limit": drive.torque_limit.model_dump(),
         "controller": drive.controller.model_dump(),
         "bearing_friction": drive.bearing_friction.model_dump(),
+        "torque_constant_NmA": drive.torque_constant,
     }
 
 

@@ -77,6 +77,9 @@ class Motor(Frozen):
     torque_limit: TorqueLimit | TorqueLimitTable
     controller: SpeedController
     bearing_friction: BearingFriction
+    torque_constant_NmA: u.TorqueConstant | None = Field(
+        description="Torque at the motor's shaft per current; null if it is not known."
+    )
 
 
 class Imperfections(Frozen):
