@@ -32,7 +32,7 @@ def test_description_follows_its_schema(described):
     _, plain = described
     Description.model_validate(plain)
     schema = description_schema()
-    assert schema["required"] == list(plain)
+    assert schema["required"] == [key for key in plain if key != "elements"]  # few machines have it
     jsonschema.Draft202012Validator.check_schema(schema)
     validator = jsonschema.Draft202012Validator(schema)
     validator.validate(plain)

@@ -196,6 +196,19 @@ class OtherElement(Frozen):
     housing_rotation_W: Rotation
 
 
+class ElementOnDrum(Frozen):
+    """An element on the drum, such as a ring of balls; the other keys are its parameters, in SI."""
+
+    model_config = ConfigDict(extra="allow")
+    kind: str = Field(description="Name of the kind in machine files.")
+    law: str = Field(description="What it is, in words.")
+    tub_point_T: u.Position = Field(description="Point of the drum axis.")
+    tub_rotation_T: Rotation = Field(
+        description="Its y axis is the drum axis, its z axis points to the top of the drum."
+    )
+    gravity_W: Vector = Field(description="[m/s^2]")
+
+
 class Sensor(Frozen):
     """A sensor of the displacement of a point of the tub from its rest position, along one axis."""
 
@@ -280,7 +293,7 @@ class Description(Frozen):
     equilibrium_residual: Residual
     natural_frequencies_hz: list[float]
     mode_damping_ratios: list[float]
-    elements: dict[str, OtherElement] | None = Field(
+    elements: dict[str, OtherElement | ElementOnDrum] | None = Field(
         None, description="Elements of kinds of other packages; absent without any."
     )
 
