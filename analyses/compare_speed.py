@@ -140,8 +140,10 @@ TASKS = {
         make=lambda: slider_moves(100), returns_times=True, limit="0.1"
     ),
     "`spin`": Task(f"spin {STUDY}"),
-    "`study gasket`, 2000 runs": Task(f"study gasket {STUDY}"),
-    "`study gasket --design full`, 13 122 runs": Task(f"study gasket --design full {STUDY}"),
+    "`study gasket`, 2000 runs": Task(f"study gasket --load middle --load counter {STUDY}"),
+    "`study gasket --design full`, 13 122 runs": Task(
+        f"study gasket --design full --load middle --load counter {STUDY}"
+    ),
     "`study spin-cycle --machine free_stroke`, 33 runs of 130 s": Task(
         f"study spin-cycle --machine free_stroke {STUDY}"
     ),

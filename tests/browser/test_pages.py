@@ -94,6 +94,18 @@ def opened(browser, path, width=1400, *, dark=False):
     browser.run("Pictures.all()")
 
 
+def test_folded_sections_open_by_a_link_and_on_paper(browser, pages):
+    opened(browser, pages(gasket_page))
+    closed = "return document.querySelectorAll('details:not([open])').length"
+    count = browser.run(closed)
+    browser.run("location.hash = '#load-1'")
+    browser.wait(f"return document.querySelectorAll('details:not([open])').length === {count - 1}")
+    drawn = "return !!document.querySelector('#load-1 figure[data-drawn] .main-svg')"
+    browser.wait(drawn)
+    browser.run("dispatchEvent(new Event('beforeprint'))")
+    assert (count > 3, browser.run(closed)) == (True, 0)
+
+
 def test_print_draws_every_picture_on_a4_in_light_colours(browser, pages):
     browser.size(1400)
     browser.media(dark=True)

@@ -29,7 +29,7 @@ SMALL = ("--design", "full", *FACTORS, "--profile", "p.yaml")
 
 @pytest.fixture
 def study(wm_drake):
-    """Return a function that runs a small study (27 trials, two loads) with extra arguments."""
+    """Return a function that runs a small study (27 trials, four loads) with extra arguments."""
     Path("p.yaml").write_text(PROFILE)
     return lambda *arguments: wm_drake("study", "gasket", *SMALL, "--out", "out", *arguments)
 
@@ -51,8 +51,8 @@ def test_study_writes_tables_and_prints_them(study):
     assert "Percent of the variance explained (full, 27 trials, D-efficiency 100.00 %)" in ended.out
     assert set(TABLES) < {path.name for path in Path("out").iterdir()}
     runs = pd.read_csv("out/runs.csv")
-    assert len(runs) == 54
-    assert set(runs["load"]) == {"middle", "counter"}
+    assert len(runs) == 108
+    assert set(runs["load"]) == {"middle", "counter", "back", "front"}
     assert (runs[["Dx [mm]", "Fy [N]", "Mz [N m]"]] > 0.0).all(axis=None)
     percents = pd.read_csv("out/contributions.csv").groupby(["load", "response"])["percent"].sum()
     rest = pd.read_csv("out/variance.csv").set_index(["load", "response"])["residual_percent"]
@@ -61,6 +61,9 @@ def test_study_writes_tables_and_prints_them(study):
     assert (runs["gap [mm]"] > 0.0).all()
     assert runs["touches"].isna().all()
     stiffness = 1e-3 * load_machine("reference").gasket.stiffness_x  # N/mm
+    proposal = pd.read_csv("out/proposal.csv")
+    assert set(proposal["load"]) == set(runs["load"])
+    assert "Line to copy: wm-drake spin --set" in ended.out
     levels = sorted(pd.read_csv("out/design.csv")["K_Lx [N/mm]"].unique())
     assert levels == pytest.approx(stiffness * np.array([0.5, 1.0, 1.5]))
 

@@ -13,9 +13,10 @@ from wm_drake.report.arrangement import arrange
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket import figures
+from wm_drake.studies.gasket.advice import advice
+from wm_drake.studies.gasket.compared import NOT_COMPARED
 from wm_drake.studies.gasket.findings import (
     about_residual,
-    advice,
     load_findings,
     summary,
     warnings,
@@ -87,14 +88,19 @@ def test_words_come_from_the_numbers(screening, words, place, parts):
     assert all(part in text for part in parts)
 
 
-def test_advice_names_the_best_value_or_the_compromise(screening, words):
-    damping, torsional, *_ = advice(screening, words)
-    assert "compromise. 0.0095 N s/mm is best for moment x (Mx) [3.00 N m]" in damping
-    assert "0.0285 N s/mm is best for displacement x (Dx) [6.00 mm]" in damping
-    assert "choose 60 N mm s/deg. It is best for displacement y (Dy) [1.50 mm]" in torsional
+def test_advice_names_direction_gain_and_conflict(screening, words, trials):
+    damping, torsional, *_ = advice(trials.factors, screening, words, NOT_COMPARED).frame().values
+    assert damping[0] == "linear damping C_L"
+    assert damping[1].startswith("gasket.damping_x, gasket.damping_y")
+    assert damping[2:5].tolist() == [
+        "less: 0.0095 N s/mm",
+        "Mx [3.00 N m]",
+        "more: 0.0285 N s/mm for Dx [6.00 mm]",
+    ]
+    assert torsional[2:5].tolist() == ["middle: 60 N mm s/deg", "Dy [1.50 mm]", ""]
 
 
-def test_advice_names_the_load_where_loads_differ(words):
+def test_advice_names_the_load_where_loads_differ(words, trials):
     def evaluate(design):
         a = design.levels[:, 0].astype(float)
         frames = {
@@ -102,9 +108,10 @@ def test_advice_names_the_load_where_loads_differ(words):
         }
         return Responses(frames, {"Dx": "mm"}, {}, MEANINGS)
 
-    damping = advice(run_screening(make_design("full", NAMES), evaluate), words)[0]
-    assert "(Dx), load p [2.00 mm]; 0.0285 N s/mm" in damping
-    assert damping.endswith("(Dx), load q [2.00 mm].")
+    found = run_screening(make_design("full", NAMES), evaluate)
+    damping = advice(trials.factors, found, words, NOT_COMPARED).frame().values[0]
+    assert damping[3] == "Dx, load p [2.00 mm]"
+    assert damping[4] == "more: 0.0285 N s/mm for Dx, load q [2.00 mm]"
 
 
 def part_of_grid(kind, trials, cube):

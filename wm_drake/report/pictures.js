@@ -275,17 +275,24 @@ const Pictures = (() => {
     plotly = window.Plotly;
   }
 
+  /* Opens what is folded: all of it for paper, a section that a link leads to. */
+  const unfold = part => part.querySelectorAll("details").forEach(fold => { fold.open = true; });
+  const atLink = () => { const part = document.getElementById(location.hash.slice(1)); if (part) unfold(part); };
+
   async function begin() {
+    addEventListener("hashchange", atLink);
+    atLink();
     if (!document.getElementById("plotly")) return;
     await library();
     const watcher = new IntersectionObserver(seen => {
       for (const { target, isIntersecting } of seen) if (isIntersecting) show(target);
     }, { rootMargin: "400px" });
     figures().forEach(figure => watcher.observe(figure));
+    document.querySelectorAll("details").forEach(fold => fold.addEventListener("toggle", () => { if (fold.open) fold.querySelectorAll("figure[data-picture]").forEach(figure => { watcher.unobserve(figure); watcher.observe(figure); }); }));
     let waiting = 0;
     addEventListener("resize", () => { clearTimeout(waiting); waiting = setTimeout(again, 120); });
     dark.addEventListener("change", again);
-    addEventListener("beforeprint", () => { isPrinting = true; figures().forEach(show); });
+    addEventListener("beforeprint", () => { isPrinting = true; unfold(document); figures().forEach(show); });
     addEventListener("afterprint", () => {
       isPrinting = false;
       drawn.forEach(picture => { picture.total = null; });

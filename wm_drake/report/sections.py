@@ -24,6 +24,7 @@ class Section:
         remarks: Sentences of a list.
         body: Other parts as HTML, from `report.page.fragment`.
         has_long_words: Whether the words of the tables are broken into lines.
+        is_folded: Whether a reader must open the section to see more than its heading.
     """
 
     anchor: str
@@ -36,6 +37,7 @@ class Section:
     remarks: Sequence[str] = ()
     body: str = ""
     has_long_words: bool = False
+    is_folded: bool = False
 
     @property
     def has_content(self) -> bool:

@@ -1,8 +1,6 @@
 """Findings of a screening study as sentences, made from its numbers."""
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,9 +23,6 @@ from wm_drake.studies.gasket.screening import (
 )
 from wm_drake.studies.gasket.tables import digits, r2_text
 from wm_drake.studies.gasket.words import LEVELS, Words
-
-ADVICE_PERCENT = 5.0
-"""Smallest contribution to a response with which a factor counts in the advice."""
 
 MOST_NAMED = 6
 """Largest number of results that a sentence names."""
@@ -220,87 +215,6 @@ def _quality(screening: Screening, words: Words) -> str:
         f"{model} predicts trials that were left out of its fit with R² of at least "
         f"{r2_text(known[worst])} ({words.response(name)}, load {load})."
     )
-
-
-@dataclass(frozen=True)
-class _Wish:
-    """A level of a factor that is best for a response.
-
-    Attributes:
-        level: The level.
-        load, response: Names of load and response.
-        gain: Difference of the mean response between worst and best level. [unit of the response]
-    """
-
-    level: int
-    load: str
-    response: str
-    gain: float
-
-
-def advice(screening: Screening, words: Words) -> list[str]:
-    """Return what to do: for each factor, its best level, or the compromise it needs."""
-    texts, idle = [], []
-    for factor in screening.design.factors:
-        wishes = _wishes(screening, words, factor)
-        if not wishes:
-            idle.append(words.factor(factor))
-            continue
-        best = sorted({wish.level for wish in wishes})
-        purposes = {level: _for_what(screening, words, wishes, level) for level in best}
-        opening = _capital(words.factor(factor))
-        if len(best) == 1:
-            value = f"{words.value(factor, best[0])}{_place(best[0])}"
-            texts.append(f"{opening}: choose {value}. It is best for {purposes[best[0]]}.")
-        else:
-            groups = [f"{words.value(factor, x)} is best for {purposes[x]}" for x in best]
-            texts.append(f"{opening}: needs a compromise. {'; '.join(groups)}.")
-    if idle:
-        texts.append(
-            f"{_capital(listed(idle))}: little influence, below {ADVICE_PERCENT:g} % of the "
-            "variance of every response that has a goal. Choose by cost."
-        )
-    return texts
-
-
-def _wishes(screening: Screening, words: Words, factor: str) -> list[_Wish]:
-    """Return the levels of a factor that are best for the responses that it influences."""
-    wishes = []
-    for (load, name), table in screening.tables.items():
-        goal = words.meaning(name).goal
-        term = next(term for term in table.terms if term.factors == (factor,))
-        if not goal or not term.percent >= ADVICE_PERCENT:
-            continue
-        effects = [term.effects[(level,)] for level in LEVELS]
-        at = int(np.argmin(effects) if goal == "smaller" else np.argmax(effects))
-        wishes.append(_Wish(LEVELS[at], load, name, max(effects) - min(effects)))
-    return wishes
-
-
-def _for_what(screening: Screening, words: Words, wishes: Sequence[_Wish], level: int) -> str:
-    """Return the responses for which a level is best, each with its largest gain.
-
-    The load is named where another level is best for the same response with another load.
-    """
-    levels: dict[str, set[int]] = {}
-    for wish in wishes:
-        levels.setdefault(wish.response, set()).add(wish.level)
-    gains: dict[tuple[str, str], float] = {}
-    for wish in wishes:
-        if wish.level == level:
-            load = f", load {wish.load}" if len(levels[wish.response]) > 1 else ""
-            key = wish.response, load
-            gains[key] = max(gains.get(key, 0.0), wish.gain)
-    return listed(
-        [
-            f"{words.response(name)}{load} [{digits(gain)} {screening.responses.units[name]}]"
-            for (name, load), gain in gains.items()
-        ]
-    )
-
-
-def _place(level: int) -> str:
-    return {-1: ", the lowest value studied", 0: "", 1: ", the highest value studied"}[level]
 
 
 def warnings(screening: Screening, words: Words) -> list[str]:

@@ -14,7 +14,8 @@ class GasketOptions(Options):
 
     load: tuple[str, ...] = option(
         (),
-        "Load of the machine, or load file. Repeatable. Default: middle and counter.",
+        "Load of the machine, or load file. Repeatable. Default: all loads. [B] has middle and "
+        "counter.",
         "NAME|FILE",
     )
     design: str = option(

@@ -14,12 +14,13 @@ from wm_drake.report.table import Table
 from wm_drake.report.terminal import Console
 from wm_drake.studies.doe import write_design
 from wm_drake.studies.gasket import figures, tables
+from wm_drake.studies.gasket.advice import advice
+from wm_drake.studies.gasket.answer import OTHER_GOALS, answer, before_and_after, in_short
 from wm_drake.studies.gasket.compared import NOT_COMPARED, Compared
 from wm_drake.studies.gasket.explore import explorer_data
 from wm_drake.studies.gasket.findings import (
     about_check,
     about_residual,
-    advice,
     load_findings,
     summary,
     warnings,
@@ -36,21 +37,9 @@ if TYPE_CHECKING:
 WIDE = 100
 """Width of a terminal from which on its table has the leading terms. [characters]"""
 
-ADVICE = (
-    "In brackets: by how much the mean response differs between the worst and the best value, with "
-    "the load for which this is most. The advice is about the range studied and treats factors one "
-    "by one. Check the chosen values with one run: wm-drake spin --set KEY=VALUE."
-)
-
 EFFECTS = (
     "Effect of the most important factors on each response. Percentages are shares of the variance "
     "of the response."
-)
-
-METHOD = (
-    "Axes: for a person who faces the door, x points to the right, y along the drum axis from "
-    "front to rear, and z up. Displacements, forces and moments are the largest absolute values "
-    "over the whole run, for each axis ([B] section 4)."
 )
 
 
@@ -91,7 +80,7 @@ class GasketResult(Result):
         return tables.as_plain_data(self.screening, self.compared)
 
     def terminal(self) -> "list[terminal.Table | str]":
-        """Return percentages of the variance, the check and a summary."""
+        """Return percentages of the variance, the check, a summary and the proposed setting."""
         design, published = self.screening.design, self.compared.published
         about = f"{design.kind}, {design.trials} trials, D-efficiency {design.efficiency():.2f} %"
         is_wide = Console().width >= WIDE
@@ -108,7 +97,12 @@ class GasketResult(Result):
         if self.compared.check is not None:
             table = tables.check(self.compared.check, self.words, short=True)
             shown.append(table.terminal("Fitted model and runs of --check"))
-        return [*shown, *summary(self.screening, self.words, self.compared)]
+        shown += summary(self.screening, self.words, self.compared)
+        proposal = self.compared.proposal
+        if proposal is not None:
+            shown.append(answer(proposal, self.words))
+            shown += [f"{w}: {t}" for w, t in in_short(proposal, self.screening, self.words)]
+        return shown
 
     def warnings(self) -> list[str]:
         """Return what limits the use of the result."""
@@ -120,18 +114,23 @@ class GasketResult(Result):
         return [f"trial {trial + 1}, load {load}: {why}" for (trial, load), why in failed]
 
     def page(self, facts: Facts) -> str:
-        """Return the page: advice, effects, the model to explore, tables."""
+        """Return the page: the proposed setting, what to do, effects, the model, tables."""
         screening, words, parameters = self.screening, self.words, self.trials.parameters
         models = surfaces(screening)
-        advised = Section("", "What to do", text=ADVICE, remarks=advice(screening, words))
+        findings = summary(screening, words, self.compared)
+        proposal = self.compared.proposal
         return SectionedPage(
             f"Gasket study of machine {parameters.name}",
-            " ".join(summary(screening, words, self.compared)),
+            answer(proposal, words) if proposal else " ".join(findings),
             [
+                self._what_to_do(),
+                Section("findings", "Findings of the study", remarks=findings, is_folded=True),
                 Section("contributions", "Contributions", (_heat_map(screening, words),)),
                 Section("explore", "Explore the fitted model", body=self._explorer(models)),
                 *self._load_sections(models),
-                Section("spread", "Spread of the responses", _spreads(screening, words)),
+                Section(
+                    "spread", "Spread of the responses", _spreads(screening, words), is_folded=True
+                ),
                 *self._tables(),
             ],
             [
@@ -144,11 +143,26 @@ class GasketResult(Result):
             ],
             parameters,
             [*facts.warnings, *self.warnings(), *_warnings(screening, self.trials)],
-            method=METHOD,
-            advice=advised,
+            advice=self._proposed(),
             numbers_title="Parameters at level 0 of all factors",
             script=Path(__file__).with_name("explore.js"),
         ).html()
+
+    def _proposed(self) -> Section | None:
+        """Return the answer in short: the proposed setting with its runs."""
+        proposal, screening, words = self.compared.proposal, self.screening, self.words
+        if proposal is None:
+            return None
+        facts = in_short(proposal, screening, words)
+        table = before_and_after(proposal, screening, words)
+        return Section("", "In short", tables=(table,), facts=facts)
+
+    def _what_to_do(self) -> Section:
+        """Return the advice on each factor."""
+        table = advice(self.trials.factors, self.screening, self.words, self.compared)
+        return Section(
+            "what-to-do", "What to do", tables=(table,), text=OTHER_GOALS, has_long_words=True
+        )
 
     def _explorer(self, models: Surfaces) -> str:
         """Return the part of the page that computes predictions of the fitted models."""
@@ -168,6 +182,7 @@ class GasketResult(Result):
                 _pictures(screening, load, words, models),
                 text=EFFECTS,
                 remarks=load_findings(screening, load, words),
+                is_folded=True,
             )
             for number, load in enumerate(screening.loads, start=1)
         ]
@@ -179,7 +194,8 @@ class GasketResult(Result):
         loads, sections = screening.loads, list[Section]()
 
         def add(anchor: str, heading: str, *shown: Table, text: str = "") -> None:
-            sections.append(Section(anchor, heading, (), shown, text, has_long_words=True))
+            section = Section(anchor, heading, (), shown, text, has_long_words=True, is_folded=True)
+            sections.append(section)
 
         if screening.responses.touching:
             add("contact", "Contact", tables.touching(screening, words))

@@ -45,14 +45,27 @@ def codes(places: FloatArray) -> FloatArray:
     return np.stack([low - high, middle - high], axis=-1)
 
 
+def model_rows(places: FloatArray, *, interactions: bool) -> FloatArray:
+    """Return the rows of the model: constant, mains, interactions. (n, p)
+
+    Args:
+        places: Places of all factors. (n, factors)
+        interactions: Whether the model has two-factor interactions.
+    """
+    of_factors = codes(places)
+    count = len(places)
+    blocks = [np.ones((count, 1)), of_factors.reshape(count, -1)]
+    if interactions:
+        for i, j in itertools.combinations(range(places.shape[1]), 2):
+            product = of_factors[:, i, :, None] * of_factors[:, j, None, :]
+            blocks.append(product.reshape(count, -1))
+    return np.concatenate(blocks, axis=1)
+
+
 def model_row(places: Sequence[float], *, interactions: bool) -> FloatArray:
     """Return the row of the model at places of all factors: constant, mains, interactions. (p,)"""
-    of_factors = codes(np.asarray(places, dtype=float))
-    blocks = [np.ones(1), of_factors.ravel()]
-    if interactions:
-        pairs = itertools.combinations(of_factors, 2)
-        blocks += [np.outer(first, second).ravel() for first, second in pairs]
-    return np.concatenate(blocks)
+    row: FloatArray = model_rows(np.array([places], dtype=float), interactions=interactions)[0]
+    return row
 
 
 @dataclass(frozen=True)

@@ -129,6 +129,8 @@ def all_tables(
         tables["level_zero"] = compared.level_zero.frame()
     if compared.check is not None:
         tables["check"] = compared.check.frame()
+    if compared.proposal is not None:
+        tables["proposal"] = compared.proposal.frame()
     return tables
 
 
@@ -348,6 +350,8 @@ def as_plain_data(screening: Screening, compared: Compared = NOT_COMPARED) -> di
         shown["published"] = published.source
     if check is not None:
         shown["check"] = check.frame().to_dict("records")
+    if compared.proposal is not None:
+        shown["proposal"] = compared.proposal.as_json()
     if zero is not None:
         rows = zero.frame().to_dict("records")
         shown["level_zero"] = {"tables": zero.tables, "responses": rows}

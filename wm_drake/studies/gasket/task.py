@@ -30,9 +30,18 @@ from wm_drake.studies.gasket.compared import Compared
 from wm_drake.studies.gasket.level_zero import run_level_zero
 from wm_drake.studies.gasket.options import GasketOptions
 from wm_drake.studies.gasket.page import GasketResult
+from wm_drake.studies.gasket.proposal import (
+    Aim,
+    Change,
+    Proposal,
+    best_places,
+    change_of,
+    is_level_zero,
+    settings_of,
+)
 from wm_drake.studies.gasket.published import Published, published_for
 from wm_drake.studies.gasket.screening import check_degrees_of_freedom, run_screening
-from wm_drake.studies.gasket.study import LOADS, GasketTrials
+from wm_drake.studies.gasket.study import GasketTrials, Run
 from wm_drake.studies.gasket.surface import surfaces
 from wm_drake.studies.inputs import existing_file, pairs_of, problems_of_option, selected_cases
 from wm_drake.studies.run import Executor, machine_text
@@ -53,13 +62,18 @@ class GasketTask(Task):
         self.settings = [_setting(parameters, levels, text) for text in options.check]
         self.design = _design(options, tuple(factor.name for factor in levels))
         check_degrees_of_freedom(self.design)
-        default = [name for name in LOADS if name in parameters.loads]
-        loads = options.load or default
-        self.cases = selected_cases(parameters, loads, True, options.profile)
+        self.cases = selected_cases(parameters, options.load, True, options.profile)
         middle = at_levels(parameters, levels, [0] * len(levels))
         with problems_of_option("--response"):
             self.trials = GasketTrials(middle, levels, self.cases, options.response)
+            self.verified = replace(self.trials, loads=self._every_load())
         self.published = self._published()
+
+    def _every_load(self) -> list[Case]:
+        """Return the loads of the study, then the other ones of the machine."""
+        every = selected_cases(self.parameters, None, True, self.options.profile)
+        names = [case.name for case in self.cases]
+        return [*self.cases, *(case for case in every if case.name not in names)]
 
     def _published(self) -> Published:
         """Return the published results that are compared, of some loads."""
@@ -109,10 +123,38 @@ class GasketTask(Task):
         }
         zero = run_level_zero(self.parameters, every, options.tables, trials, run_variant)
         check: Check | None = None
+        models = surfaces(screening)
         if self.settings:
-            models = surfaces(screening)
             check = run_check(trials, self.settings, models, partial(run, what="check"))
-        return GasketResult(screening, trials, Compared(self.published, zero, check))
+        proposal = self._proposal(Aim(screening, models), partial(run, what="proposal"))
+        return GasketResult(screening, trials, Compared(self.published, zero, check, proposal))
+
+    def _proposal(self, aim: Aim, run: Run) -> Proposal:
+        """Choose a setting on the fitted models, and run it and level 0 with all loads."""
+        factors, parameters = self.verified.factors, self.parameters
+        places = best_places(aim) or (0.0,) * len(factors)
+        every = [change_of(parameters, f, x) for f, x in zip(factors, places, strict=True) if x]
+        changes = tuple(change for change in every if change.place)
+        check = run_check(self.verified, settings_of(changes, factors), aim.surfaces, run)
+        return Proposal(
+            changes,
+            check,
+            tuple(case.name for case in self.cases),
+            is_level_zero(parameters, factors),
+            self._command(changes),
+        )
+
+    def _command(self, changes: Sequence[Change]) -> str:
+        """Return the command that runs changes; "" if there is none."""
+        options = self.options
+        sets = [f"{name}={text}" for c in changes for name, text in c.sets.items()]
+        if not changes or not all(change.sets for change in changes):
+            return ""
+        words = ["wm-drake spin"]
+        words += [f"--machine {options.machine}"] if options.machine != "reference" else []
+        words += [f'--set "{text}"' for text in (*options.sets, *sets)]
+        words += [f"--profile {options.profile}"] if options.profile else []
+        return " ".join(words)
 
 
 def _factors(parameters: MachineParameters, options: GasketOptions) -> tuple[FactorLevels, ...]:

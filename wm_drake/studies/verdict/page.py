@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from markupsafe import Markup
 
 from wm_drake.report.figure import (
     MARK,
@@ -58,8 +57,7 @@ HOW_OTHERS_DIFFER = (
     "'wm-drake spin' runs the loads of the machine only and shows the motion over time. 'wm-drake "
     "study tolerance' draws many more samples of laundry and parts, so that rare contact can be "
     "counted, and leaves the loads of the machine out. 'wm-drake study gasket' varies the gasket "
-    "alone, by default with the loads middle and counter. Their smallest gaps differ for this "
-    "reason."
+    "alone. Their smallest gaps differ for this reason."
 )
 """How the commands that also show a smallest gap differ."""
 
@@ -118,10 +116,6 @@ class VerdictResult(Result):
     def page(self, facts: Facts) -> str:
         """Return the page."""
         f = self.findings
-        shown = [
-            (word, Markup("<code>{}</code>").format(text) if word == LINE else text)
-            for word, text in facts_of(f)
-        ]
         made = [
             ("Machine", f.machine.name),
             ("Runs", f"{f.runs} in {facts.wall_s:.0f} s"),
@@ -141,7 +135,7 @@ class VerdictResult(Result):
             made,
             f.machine,
             facts.warnings,
-            advice=Section("answer", "In short", facts=shown),
+            advice=Section("answer", "In short", facts=list(facts_of(f))),
         ).html()
 
     def failures(self) -> list[str]:
