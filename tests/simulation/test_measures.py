@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.signal import find_peaks
 
 from wm_drake.parameters import SpinProfile
 from wm_drake.simulation.displacements import (
     envelopes,
     filtered_displacement,
     largest_motion,
+    local_maxima,
     moment_of_largest_amplitude,
     peak_line,
     percent_difference,
@@ -87,6 +89,13 @@ def test_a_record_shorter_than_the_filter_has_no_amplitude():
     assert np.isnan(filtered_displacement(record_of(np.zeros(20)))).all()
     assert np.isnan(measure(record_of(np.zeros(20))).amplitude).all()
     assert np.isnan(measure(record_of(np.zeros(20))).critical_speed).all()
+
+
+@pytest.mark.parametrize("levels", [2, 4, 1000])
+def test_local_maxima_are_those_of_scipy(levels):
+    signal = np.random.default_rng(1).integers(0, levels, 5000).astype(float)
+    for part in (signal, -signal, signal[:2], signal[:1], signal[:0], np.zeros(9)):
+        assert local_maxima(part).tolist() == find_peaks(part)[0].tolist()
 
 
 def test_peak_line_goes_from_peak_to_peak():

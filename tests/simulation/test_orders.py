@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from scipy.signal import ShortTimeFFT
+from scipy.signal.windows import hann
 
 from wm_drake.simulation.orders import frequency_map, order_map
 
@@ -119,6 +121,27 @@ def test_windows_of_a_frequency_map_are_within_the_record(samples):
     found = frequency_map(np.cos(2.0 * np.pi * 5.0 * time), time)
     np.testing.assert_allclose(found.sel(frequency=5.0), 1.0, rtol=0.01)
     assert found.sizes["time"] == 1 + (samples - 800) // 50
+
+
+@pytest.mark.parametrize("window", [4.0, 4.005])
+def test_frequency_map_is_that_of_scipy(window):
+    random = np.random.default_rng(3).normal(size=(1777, 2))
+    time = TIME[:1777]
+    found = frequency_map(random, time, window=window)
+    length = round(window / (time[1] - time[0]))
+    scipys = ShortTimeFFT(
+        hann(length, sym=False),
+        50,
+        1.0 / (time[1] - time[0]),
+        mfft=2 * length,
+        fft_mode="onesided2X",
+        scale_to="magnitude",
+    )
+    first, end = scipys.lower_border_end[1], scipys.upper_border_begin(len(random))[1]
+    lines = scipys.stft_detrend(random, "constant", p0=first, p1=end, axis=0)
+    np.testing.assert_allclose(found, np.abs(np.moveaxis(lines, -1, 0)), atol=1e-13)
+    np.testing.assert_allclose(found.time, scipys.t(len(random), first, end), atol=1e-12)
+    np.testing.assert_allclose(found.frequency, scipys.f, atol=1e-12)
 
 
 def test_columns_of_a_frequency_map():

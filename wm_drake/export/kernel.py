@@ -6,20 +6,17 @@ state, then arrays to work in (`Places`). What no importer changes is in a secon
 and the Runge-Kutta step are those of the compiled engine, compiled for single floats.
 """
 
-import contextlib
-import hashlib
 import json
-import os
 from collections import namedtuple
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numba import carray, cfunc, njit, types
 from numba.extending import intrinsic
 
-from wm_drake.compiler.compilation import CACHE_FOLDER, law
+from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import sine_cosine
+from wm_drake.compiler.kept import kept
 from wm_drake.compiler.lanes import NUMBER_ARRAY
 from wm_drake.compiler.vectors import add, cross, dot, rotate, rotate_back
 from wm_drake.elements.cabinet import FEET_COUNT, foot_of
@@ -196,18 +193,12 @@ def acceleration_of_point(motion, rates, points, at):
 
 def kernel_code(plan: Any) -> dict[str, str]:
     """Return LLVM's text of the functions of `kernel`, from the files of compiled code if kept."""
-    name = f"fmu-{hashlib.sha256(repr(plan).encode()).hexdigest()[:32]}.json"
-    kept = Path(CACHE_FOLDER) / name if CACHE_FOLDER else None
-    if kept and kept.is_file():
-        with contextlib.suppress(OSError, ValueError):
-            return dict(json.loads(kept.read_text(encoding="utf-8")))
-    code = {symbol: function.inspect_llvm() for symbol, function in kernel(plan).items()}
-    if kept:
-        part = kept.with_suffix(f".{os.getpid()}")
-        with contextlib.suppress(OSError):
-            part.write_text(json.dumps(code), encoding="utf-8")
-            part.replace(kept)
-    return code
+
+    def compiled() -> bytes:
+        code = {symbol: function.inspect_llvm() for symbol, function in kernel(plan).items()}
+        return json.dumps(code).encode()
+
+    return dict(json.loads(kept(f"fmu {plan!r}", compiled)))
 
 
 def kernel(plan: Any) -> dict[str, Any]:  # noqa: C901 - the functions of one machine

@@ -8,10 +8,13 @@ import base64
 import functools
 import gzip
 import hashlib
+import importlib.metadata
 import importlib.util
 from pathlib import Path
 
 from markupsafe import Markup
+
+from wm_drake.compiler.kept import kept
 
 FOLDER = Path(__file__).parent
 
@@ -59,4 +62,7 @@ def packed_plotly() -> str:
     assert spec is not None
     assert spec.origin is not None
     script = Path(spec.origin).parent / "package_data" / "plotly.min.js"
-    return base64.b64encode(gzip.compress(script.read_bytes(), 6, mtime=0)).decode()
+    key = f"plotly {importlib.metadata.version('plotly')}"
+    return kept(
+        key, lambda: base64.b64encode(gzip.compress(script.read_bytes(), 6, mtime=0))
+    ).decode()

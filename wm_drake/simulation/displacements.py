@@ -1,11 +1,13 @@
 """Displacements of a record: filtered to a band, envelopes, amplitudes, orbits."""
 
 import functools
+import json
 from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
 
+from wm_drake.compiler.kept import kept
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.packing import aligned
 from wm_drake.model.scene import REPLAY_RATE
@@ -154,10 +156,18 @@ def filtered_lanes(
 @functools.cache
 def _band_pass(period: float, band: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
     """Return the sections of the filter, and their states at a constant signal, flat."""
-    from scipy.signal import butter, sosfilt_zi  # slow to import: measures that filter
 
-    sections = butter(FILTER_ORDER, band, btype="bandpass", fs=1.0 / period, output="sos")
-    return sections.ravel(), sosfilt_zi(sections).ravel()
+    def designed() -> bytes:
+        from scipy.signal import butter, sosfilt_zi  # half a second to import
+
+        sections = butter(FILTER_ORDER, band, btype="bandpass", fs=1.0 / period, output="sos")
+        return json.dumps(
+            [sections.ravel().tolist(), sosfilt_zi(sections).ravel().tolist()]
+        ).encode()
+
+    key = f"band-pass of order {FILTER_ORDER}: {period!r} s, {band!r} Hz"
+    sections, states = json.loads(kept(key, designed))
+    return np.array(sections), np.array(states)
 
 
 def filtered_displacement(record: Record) -> xr.DataArray:
@@ -241,15 +251,24 @@ def envelopes(record: Record) -> xr.Dataset:
     )
 
 
+def local_maxima(signal: FloatArray) -> np.ndarray:
+    """Return the samples of the local maxima of a signal (n,); of a plateau, the middle one.
+
+    They are those of `scipy.signal.find_peaks`.
+    """
+    steps = np.sign(np.diff(signal))
+    changes = np.flatnonzero(steps)
+    rises = (steps[changes[:-1]] > 0.0) & (steps[changes[1:]] < 0.0)
+    return (changes[:-1][rises] + 1 + changes[1:][rises]) // 2
+
+
 def peak_line(time: FloatArray, signal: FloatArray) -> FloatArray:
     """Return the line through the local maxima of a signal.
 
     The line is constant before the first maximum and after the last one. A signal without a local
     maximum is returned unchanged.
     """
-    from scipy.signal import find_peaks  # slow to import: envelopes
-
-    peaks = find_peaks(signal)[0]
+    peaks = local_maxima(signal)
     return np.interp(time, time[peaks], signal[peaks]) if len(peaks) else signal
 
 

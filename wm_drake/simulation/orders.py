@@ -139,32 +139,31 @@ def frequency_map(
         (time, frequency) or (time, frequency, signal) in the unit of the signal, up to half the
         sampling rate. [Hz] Only windows within the record are used; without one it has no times.
     """
-    from scipy.signal import ShortTimeFFT  # slow to import: orders
-    from scipy.signal.windows import hann
-
     columns = np.atleast_2d(np.asarray(signal, dtype=float).T).T
     spacing = float(time[1] - time[0]) if len(time) > 1 else 1.0
     length, hop = max(2, round(window / spacing)), max(1, round(period / spacing))
-    transform = ShortTimeFFT(
-        hann(length, sym=False),
-        hop,
-        1.0 / spacing,
-        mfft=2 * length,
-        fft_mode="onesided2X",
-        scale_to="magnitude",
-    )
-    if len(columns) < length:
-        values, centres = np.empty((0, transform.f_pts, columns.shape[1])), np.empty(0)
-    else:
-        first, end = transform.lower_border_end[1], transform.upper_border_begin(len(columns))[1]
-        lines = transform.stft_detrend(columns, "constant", p0=first, p1=end, axis=0)
-        values = np.abs(np.moveaxis(lines, -1, 0))
-        centres = time[0] + transform.t(len(columns), first, end)
+    lines = 2 * length
+    values, centres = np.empty((0, length + 1, columns.shape[1])), np.empty(0)
+    if len(columns) >= length:
+        # windows around each hop-th sample, as many as there are within the record
+        first = -(-(length // 2) // hop)
+        begin = first * hop - length // 2
+        parts = np.lib.stride_tricks.sliding_window_view(columns, length, axis=0)[begin::hop]
+        centres = time[0] + spacing * hop * (first + np.arange(len(parts)))
+        share = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)  # Hann window
+        free_of_mean = parts - parts.mean(axis=-1, keepdims=True)
+        spectra = np.fft.rfft(free_of_mean * (share / share.sum()), lines, axis=-1)
+        spectra[..., 1:-1] *= 2.0  # each line stands for its negative frequency too
+        values = np.moveaxis(np.abs(spectra), -1, 1)
     result = xr.DataArray(
         values,
         {
             "time": ("time", centres, {"units": "s"}),
-            "frequency": ("frequency", transform.f, {"units": "Hz"}),
+            "frequency": (
+                "frequency",
+                np.fft.rfftfreq(lines, spacing),
+                {"units": "Hz"},
+            ),
         },
         ["time", "frequency", "signal"],
     )

@@ -11,7 +11,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from wm_drake.batch.runs import Runner, RunResult
 from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
@@ -29,6 +28,7 @@ from wm_drake.simulation.displacements import (
     amplitudes,
     filtered_displacement,
     largest_motion,
+    local_maxima,
     moment_of_largest_amplitude,
 )
 from wm_drake.simulation.measures import MEASURES, Variable
@@ -320,7 +320,7 @@ def _envelopes(record: Record, displacement: FloatArray) -> list[dict[str, Any]]
             corners.append({"upper": [[], []], "lower": [[], []]})
             continue
         for name, sign in (("upper", 1.0), ("lower", -1.0)):
-            at = find_peaks(sign * column)[0]
+            at = local_maxima(sign * column)
             at = at if len(at) else np.arange(len(column))
             sides[name] = [time[at].tolist(), _whole(column[at])]
         corners.append(sides)
