@@ -37,7 +37,10 @@ def test_study_writes_tables_and_page_and_prints_json(study):
     samples = pd.read_csv("out/samples.csv")
     touching = (samples["smallest_gap_mm"] <= 0.0).mean()
     assert printed["contact_probability"]["estimate"] == pytest.approx(touching)
-    assert "in a million" in Path("out/report.html").read_text()
+    page = Path("out/report.html").read_text()
+    assert "in a million" not in page
+    assert page.index('id="gap"') < page.index('id="distributions"')
+    assert set(printed["smallest_gap_of_loads_mm"]) == {"middle", "counter", "back", "front"}
 
 
 def test_doubling_keeps_the_finished_runs(study, no_runs):

@@ -1,5 +1,6 @@
 """Figures of the tolerance study."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,18 +16,24 @@ from wm_drake.report.figure import (
     Line,
     Mark,
     Panel,
+    Points,
     Rule,
+    Text,
     band,
     in_grid,
     named,
     segments,
 )
+from wm_drake.report.formatting import MM_PER_M
 from wm_drake.studies.tolerance.sensitivity import Index
 from wm_drake.studies.tolerance.shares import band_of
 from wm_drake.studies.tolerance.study import ToleranceResult
 
 MOST_POINTS = 400
 """Largest number of points of a curve."""
+
+MOST_STEPS = 5
+"""Number of heights at which the loads are drawn, so that their names do not overlap."""
 
 
 def distributions_figure(result: ToleranceResult, names: dict[str, str]) -> Figure:
@@ -36,24 +43,49 @@ def distributions_figure(result: ToleranceResult, names: dict[str, str]) -> Figu
         result: Result of the study.
         names: Titles of the measures by their keys.
     """
-    panels = []
-    for name, title in names.items():
-        values = np.sort(result.values[name].dropna().to_numpy())
-        kept = np.unique(np.linspace(0, len(values) - 1, MOST_POINTS).astype(int))
-        share = (kept + 0.5) / len(values)
-        half = band_of(len(values))
-        low, high = np.clip(share - half, 0.0, 1.0), np.clip(share + half, 0.0, 1.0)
-        x = values[kept]
-        marks: list[Mark] = [
-            band(x, 100.0 * low, 100.0 * high, opacity=0.25),
-            Line(x, 100.0 * share, width=2.0),
-        ]
-        limits = [verdict.number for verdict in result.verdicts if verdict.key == name]
-        marks += [Rule(limit, "y", color=MEASURED, width=1.8, dash="dashed") for limit in limits]
-        if name.startswith("smallest_gap") and values[0] < 0.0:
-            marks.append(Rule(0.0, "y", color=MARK))
-        panels.append(Panel(title=title, marks=tuple(marks), y=Axis(label="runs below, %")))
+    panels = [
+        Panel(title=title, marks=tuple(_distribution(result, name)), y=Axis(label="runs below, %"))
+        for name, title in names.items()
+    ]
     return Figure(panels=in_grid(panels, 3, share="y"), height=150.0)
+
+
+def _distribution(result: ToleranceResult, name: str) -> list[Mark]:
+    """Return the distribution function of a measure with its 95 % band and its limits."""
+    values = np.sort(result.values[name].dropna().to_numpy())
+    kept = np.unique(np.linspace(0, len(values) - 1, MOST_POINTS).astype(int))
+    share = (kept + 0.5) / len(values)
+    half = band_of(len(values))
+    low, high = np.clip(share - half, 0.0, 1.0), np.clip(share + half, 0.0, 1.0)
+    marks: list[Mark] = [
+        band(values[kept], 100.0 * low, 100.0 * high, opacity=0.25),
+        Line(values[kept], 100.0 * share, width=2.0),
+    ]
+    limits = [verdict.number for verdict in result.verdicts if verdict.key == name]
+    return marks + [Rule(x, "y", color=MEASURED, width=1.8, dash="dashed") for x in limits]
+
+
+def gap_figure(result: ToleranceResult, name: str, loads: Mapping[str, float]) -> Figure:
+    """Return the distribution of the smallest gap beside the gaps of the loads of the machine.
+
+    Args:
+        result: Result of the study.
+        name: Key of the smallest gap among the measures.
+        loads: Smallest gap by load. [m]
+    """
+    marks = [*_distribution(result, name), Rule(0.0, "y", color=MARK)]
+    ranked = sorted(loads.items(), key=lambda item: item[1])
+    if ranked:
+        gaps = np.array([MM_PER_M * gap for _, gap in ranked])
+        heights = 15.0 + 18.0 * (np.arange(len(gaps)) % MOST_STEPS)
+        marks.append(Points(gaps, heights, color=MEASURED, size=9.0, key="load of the machine"))
+        marks += [
+            Text(float(gap), float(height), load, across="left", shift=(9.0, 0.0))
+            for (load, _), gap, height in zip(ranked, gaps, heights, strict=True)
+        ]
+    x = Axis(label="smallest gap, mm (0: contact)")
+    y = Axis(label="runs below, %", range=(0.0, 100.0))
+    return Figure(panels=(Panel(marks=tuple(marks), x=x, y=y),), height=260.0)
 
 
 def sobol_figure(indices: list[tuple[str, Index]]) -> Figure:

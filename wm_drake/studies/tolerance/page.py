@@ -1,7 +1,7 @@
 """What the tolerance study shows: files, JSON, terminal and page."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from wm_drake.report.formatting import plain
@@ -9,9 +9,11 @@ from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.studies.study import Facts, Result
 from wm_drake.studies.tolerance import tables
-from wm_drake.studies.tolerance.figures import distributions_figure, sobol_figure
+from wm_drake.studies.tolerance.figures import distributions_figure, gap_figure, sobol_figure
 from wm_drake.studies.tolerance.study import ToleranceResult
 from wm_drake.studies.tolerance.words import (
+    about_loads,
+    in_short,
     leading,
     measure_titles,
     quantity_words,
@@ -30,10 +32,17 @@ MOST_PANELS = 9
 
 @dataclass(frozen=True)
 class ToleranceReport(Result):
-    """Result of the study, and the description in the tolerance file."""
+    """Result of the study.
+
+    Attributes:
+        result: Samples and what follows from them.
+        about: Description in the tolerance file.
+        gaps_of_loads: Smallest gap of each load of the machine. [m]
+    """
 
     result: ToleranceResult
     about: str
+    gaps_of_loads: Mapping[str, float] = field(default_factory=dict)
 
     float_format = None
 
@@ -75,6 +84,7 @@ class ToleranceReport(Result):
                 measure: dict(zip(names, map(vars, indices), strict=True))
                 for measure, indices in result.indices.items()
             },
+            "smallest_gap_of_loads_mm": {n: 1e3 * g for n, g in self.gaps_of_loads.items()},
             "sobol_refused": result.refused,
             "limits": tables.limits_frame(result).to_dict("records"),
         }
@@ -88,12 +98,15 @@ class ToleranceReport(Result):
         if self.result.verdicts:
             yield tables.limits_table(self.result).terminal("Limits")
         yield from summary(self.result)
+        for word, text in facts_of(self.result, self.gaps_of_loads):
+            yield f"{word}: {text}"
 
     def page(self, facts: Facts) -> str:
         """Return the page: distributions, causes, limits, contact, tables."""
         result, settings = self.result, self.result.settings
         machine = result.machine.parameters
         sections = [
+            Section("gap", "Smallest gap", _gap_picture(result, self.gaps_of_loads)),
             Section("distributions", "Distributions", _distributions(result)),
             Section(
                 "sensitivity", "What causes the scatter", _sobol_picture(result),
@@ -128,6 +141,7 @@ class ToleranceReport(Result):
             made,
             warnings=[*facts.warnings, *warnings(result)],
             about=self.about,
+            advice=Section("", "In short", facts=facts_of(result, self.gaps_of_loads)),
         ).html()
 
     def warnings(self) -> list[str]:
@@ -140,9 +154,34 @@ class ToleranceReport(Result):
         return [f"{count} of {self.result.settings.samples} runs failed"] if count else []
 
 
+def facts_of(result: ToleranceResult, gaps: Mapping[str, float]) -> list[tuple[str, str]]:
+    """Return the facts below the answer.
+
+    Args:
+        result: Result of the study.
+        gaps: Smallest gap of each load of the machine. [m]
+    """
+    facts = [*in_short(result), ("Loads of the machine", about_loads(gaps))]
+    return [(word, text) for word, text in facts if text]
+
+
+def _gap_picture(result: ToleranceResult, gaps: Mapping[str, float]) -> tuple[Picture, ...]:
+    """Return the distribution of the smallest gap beside the loads; nothing without a gap."""
+    name = next((str(n) for n in result.values if str(n).startswith("smallest_gap")), "")
+    if not name or result.values[name].notna().sum() < 2:
+        return ()
+    caption = (
+        "Share of the runs whose smallest gap between tub and housing is below a value; 0 and "
+        "below: contact. Shaded: 95 % band for the whole curve. Points: loads of the machine file, "
+        "at any height."
+    )
+    figure = gap_figure(result, name, gaps)
+    return (picture(figure, f"Distribution of the smallest gap. {caption}", caption),)
+
+
 def _distributions(result: ToleranceResult) -> tuple[Picture, ...]:
     titles = {name: ", ".join(text) for name, text in measure_titles(result).items()}
-    names = [str(name) for name in result.values]
+    names = [str(name) for name in result.values if not str(name).startswith("smallest_gap")]
     caption = (
         "Distribution functions of the measures: share of the runs below a value. Shaded: 95 % "
         "band for the whole curve (Dvoretzky, Kiefer, Wolfowitz). Dashed: limits."

@@ -9,7 +9,7 @@ from wm_drake.report.formatting import MISSING, shape_name, significant, with_in
 from wm_drake.report.table import Column, Table, line, table_of
 from wm_drake.studies.tolerance.shares import PERCENTILES, percentile_of
 from wm_drake.studies.tolerance.study import ToleranceResult
-from wm_drake.studies.tolerance.words import in_a_million, measure_titles, quantity_words
+from wm_drake.studies.tolerance.words import in_percent, measure_titles, quantity_words
 
 KINDS = {"pass": "ours", "fail": "alarm", "undecided": ""}
 """Style of the row of a limit by its verdict."""
@@ -106,16 +106,16 @@ def contact_table(result: ToleranceResult) -> Table:
     """Return how often each pair of shapes touches and is nearest."""
     rows = []
     for moving, fixed, share, low, high, count in contact_frame(result).to_numpy().tolist():
-        ends = f"{in_a_million(low)} to {in_a_million(high)}" if share else MISSING
+        ends = f"{in_percent(low)} to {in_percent(high)}" if share else MISSING
         nearest = 100.0 * count / result.settings.samples
-        cells = (shape_name(fixed), in_a_million(share), ends, nearest)
+        cells = (shape_name(fixed), in_percent(share), ends, nearest)
         rows.append(line(shape_name(moving), cells))
     caption = (
         "Contact by pair of shapes among the samples. A run may touch at several places. Last "
         "column: share of the runs in which the pair has the smallest gap. Intervals: 95 %, "
         "Clopper and Pearson."
     )
-    header = ("moves with the tub", "housing", "touch, in a million", "interval")
+    header = ("moves with the tub", "housing", "touch", "interval")
     return Table(caption, (*header, Column("nearest", "%", 1)), tuple(rows), text_columns=2)
 
 

@@ -35,6 +35,7 @@ from wm_drake.studies.tolerance.study import (
     CONTACTS,
     DEFAULT,
     Settings,
+    ToleranceResult,
     limits_of,
     run_tolerances,
 )
@@ -99,10 +100,26 @@ class ToleranceTask(Task):
         }
 
     def run(self, executor: Executor) -> ToleranceReport:
+        """Run samples, Sobol indices and rare contact, and the loads of the machine."""
+        result = self.sampled(executor)
+        return ToleranceReport(result, self.tolerances.about, self._gaps_of_loads(executor))
+
+    def sampled(self, executor: Executor) -> ToleranceResult:
         """Run samples, Sobol indices and rare contact."""
         run = partial(executor.simulate, self.machine, self.measures)
-        result = run_tolerances(self.uncertain, self.responses, run, self.settings, self.limits)
-        return ToleranceReport(result, self.tolerances.about)
+        return run_tolerances(self.uncertain, self.responses, run, self.settings, self.limits)
+
+    def _gaps_of_loads(self, executor: Executor) -> dict[str, float]:
+        """Return the smallest gap of each load of the machine; empty without shapes. [m]"""
+        if CONTACTS not in self.measures:
+            return {}
+        profile = self.uncertain.case.profile
+        loads = self.uncertain.parameters.loads
+        cases = [Case(name, load, profile) for name, load in loads.items()]
+        table = executor.simulate(self.machine, self.measures, cases, "loads")
+        good = table.diverged.values == ""
+        gaps = table.smallest_gap.values
+        return {n: float(g) for n, g, kept in zip(loads, gaps, good, strict=True) if kept}
 
 
 def _measures(

@@ -1,7 +1,11 @@
 """Findings of a tolerance study in words."""
 
+from collections.abc import Mapping
+
+import numpy as np
+
 from wm_drake.parameters.tolerances import LAUNDRY
-from wm_drake.report.formatting import number, shape_name
+from wm_drake.report.formatting import number, shape_name, significant
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.tolerance.sensitivity import Index
 from wm_drake.studies.tolerance.study import (
@@ -46,32 +50,23 @@ def contact_sentences(contact: Contact) -> list[str]:
     """Return sentences about how often the tub touches, and where."""
     if contact.estimate == 0.0:
         sentences = [
-            f"None of {contact.crude.samples} runs touches, so with 95 % confidence at most "
-            f"{in_a_million(contact.upper)} in a million do (rule of three).",
-            *_unreached(contact),
+            f"The tub touches the housing in none of {contact.crude.samples} runs, so in at most "
+            f"{in_percent(contact.upper)} of all such runs (with 95 % confidence)."
         ]
     else:
-        ends = f"{in_a_million(contact.lower)} to {in_a_million(contact.upper)}"
-        how = contact.method
-        if how == CRUDE:
-            how = f"{contact.crude.count} of {contact.crude.samples} runs"
-        sentences = [
-            f"{in_a_million(contact.estimate)} in a million runs touch (95 % interval {ends}; "
-            f"{how})."
-        ]
+        sentences = [f"The tub touches the housing in {probability(contact)}."]
     return sentences + _where(contact)
 
 
-def _unreached(contact: Contact) -> list[str]:
-    """Return what a subset simulation that ended without contact reached."""
-    rare = contact.rare
-    if rare is None:
-        return []
-    return [
-        f"Subset simulation followed the smallest gap down to {1e3 * rare.smallest:.1f} mm in "
-        f"{len(rare.thresholds) + 1} levels and {rare.evaluations} runs, and ended without "
-        "contact; it gives no probability."
-    ]
+def probability(contact: Contact) -> str:
+    """Return the probability of contact in percent, with its interval and how it is known."""
+    if contact.estimate == 0.0:
+        return f"0 to {in_percent(contact.upper)} of the runs (95 % confidence; none was seen)"
+    how = "estimated by a search for rare contact"
+    if contact.method == CRUDE:
+        how = f"{contact.crude.count} of {contact.crude.samples} runs"
+    ends = f"{in_percent(contact.lower)} to {in_percent(contact.upper)}"
+    return f"{in_percent(contact.estimate)} of the runs (95 % interval {ends}; {how})"
 
 
 def rare_sentences(contact: Contact) -> str:
@@ -87,7 +82,11 @@ def rare_sentences(contact: Contact) -> str:
         "mm"
     )
     if not rare.probability:
-        return f"{text}. The smallest gap of the last level is {1000.0 * rare.smallest:.1f} mm."
+        return (
+            f"{text}. The smallest gap of the last level is {1000.0 * rare.smallest:.1f} mm; "
+            "without contact the simulation gives no probability, and the bound is that of the "
+            "samples alone (rule of three)."
+        )
     places = ", ".join(
         f"{pair_words(name)} {100.0 * share:.0f} %" for name, share in contact.rare_pairs.items()
     )
@@ -112,14 +111,9 @@ def _where(contact: Contact) -> list[str]:
     return []
 
 
-def in_a_million(share: float) -> str:
-    """Return a share as number in a million, with two or three digits and thin spaces."""
-    parts = 1e6 * share
-    if parts < 1.0:
-        return f"{parts:.2g}"
-    digits = len(str(int(parts)))
-    rounded = round(parts, 3 - digits) if digits > 3 else round(parts)
-    return f"{int(rounded):,}".replace(",", "\u202f")
+def in_percent(share: float) -> str:
+    """Return a share in percent with two significant digits, three from 10 % on."""
+    return f"{significant(100.0 * share, 3 if share >= 0.1 else 2)} %"
 
 
 def pair_words(pair: str) -> str:
@@ -159,6 +153,45 @@ def leading(result: ToleranceResult) -> tuple[str, list[tuple[Variable, Index]]]
         name = next(iter(result.indices), "")
     pairs = zip(result.machine.variables, result.indices.get(name, ()), strict=False)
     return name, sorted(pairs, key=lambda pair: -pair[1].total)
+
+
+def in_short(result: ToleranceResult) -> list[tuple[str, str]]:
+    """Return the facts below the answer: probability, gap, what decides it, limits."""
+    facts = []
+    if result.contact:
+        facts.append(("Probability of contact", probability(result.contact)))
+    gaps = next((v for n, v in result.values.items() if str(n).startswith("smallest_gap")), None)
+    if gaps is not None and gaps.notna().any():
+        low, median = float(np.quantile(gaps.dropna(), 0.05)), float(np.median(gaps.dropna()))
+        facts.append(
+            (
+                "Smallest gap",
+                f"{number(float(gaps.min()))} mm in {len(gaps)} runs; 1 run in 20 is below "
+                f"{number(low)} mm, half of them are below {number(median)} mm",
+            )
+        )
+    key, indices = leading(result)
+    named = [(v.name, i) for v, i in indices if i.total >= LEAST_TOTAL][:MOST_NAMED]
+    if named:
+        title, _ = measure_titles(result)[key]
+        facts.append((f"What decides the {title}", _listed(named)))
+    return facts
+
+
+def about_loads(gaps: Mapping[str, float]) -> str:
+    """Return why the test loads of a machine give other gaps than the samples.
+
+    Args:
+        gaps: Smallest gap by load. [m]
+    """
+    if not gaps:
+        return ""
+    listed = ", ".join(f"{load} {number(1e3 * gap)} mm" for load, gap in gaps.items())
+    return (
+        f"The loads of the machine file are tests, not laundry: {listed}. They are often heavier "
+        "or placed worse than laundry in use, so a smaller gap with them is no contradiction. The "
+        "file of this study says what scatters and why; 'wm-drake verdict' judges both together."
+    )
 
 
 def _sensitivity_sentences(result: ToleranceResult) -> list[str]:

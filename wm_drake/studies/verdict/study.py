@@ -408,7 +408,7 @@ class VerdictTask(Task):
 
     def _samples(self, task: ToleranceTask, executor: "Executor") -> Laundry:
         """Return the gaps of the samples of a tolerance study."""
-        (gaps,) = (column for _, column in task.run(executor).result.values.items())
+        (gaps,) = (column for _, column in task.sampled(executor).values.items())
         return Laundry(np.nan_to_num(1e-3 * gaps.to_numpy(), nan=-np.inf), self.clearance)
 
 
