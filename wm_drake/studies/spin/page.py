@@ -15,6 +15,7 @@ from wm_drake.report.springs import slack_warning
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.studies.modes.page import natural_modes_table
 from wm_drake.studies.spin import tables
+from wm_drake.studies.spin.balance import balance_section
 from wm_drake.studies.spin.cases import band_text, case_title, has_gasket, speed_rpm
 from wm_drake.studies.spin.drive import capture_warnings, drive_in_short, drive_section
 from wm_drake.studies.spin.figures import (
@@ -66,9 +67,11 @@ def spin_page(result: SpinResult, facts: Facts | None = None) -> str:
     table, made = amplitude_table(result), facts or Facts()
     gaps = _gaps_pictures(result)
     drive, floor, modes = drive_section(result), floor_section(result), result.modes
+    balance = balance_section(result)
     sections = [
         *_case_sections(result, table),
         Section("gap", "Smallest gaps", gaps, text=VERDICT * bool(gaps)),
+        replace(balance, tables=()),
         Section("floor", "Feet over time", floor.pictures),
         Section(
             "drive", "Speed and torque", drive.pictures, text=drive.text * bool(drive.pictures)
@@ -82,6 +85,7 @@ def spin_page(result: SpinResult, facts: Facts | None = None) -> str:
             "Mounts and accelerations",
             tables=(*tables.mount_force_tables(result), tables.accelerations(result)),
         ),
+        Section("remaining", "Remaining unbalance", tables=balance.tables),
         replace(floor, pictures=()),
         replace(drive, pictures=(), text=drive.text * (not drive.pictures)),
         Section("springs", "Springs", tables=(tables.smallest_tensions(result),)),

@@ -16,6 +16,7 @@ from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.units import Unit
+from wm_drake.simulation.balance import balance_of, rings_of
 from wm_drake.simulation.cases import Case, is_as_measured
 from wm_drake.simulation.displacements import band_of
 from wm_drake.simulation.measures import Measures, measure
@@ -121,14 +122,24 @@ class SpinResult(Result):
         return "_".join(filter(None, [self.files.part, case.case.name]))
 
     def tables(self) -> "dict[str, pd.DataFrame]":
-        """Return the amplitudes."""
+        """Return the amplitudes, and of a machine with rings of balls what they do."""
+        from wm_drake.studies.spin.balance import balance_frame, ball_table
         from wm_drake.studies.spin.tables import amplitude_table
 
-        return {"amplitudes": amplitude_table(self)}
+        tables = {"amplitudes": amplitude_table(self)}
+        if rings_of(self.parameters) and any(c.record.sizes["time"] for c in self.results):
+            tables |= {"balance": balance_frame(self), "balls": ball_table(self)}
+        return tables
 
     def as_json(self) -> dict[str, Any]:
         """Return the measures of each case."""
-        cases = [case_as_json(case) for case in self.results]
+        from wm_drake.studies.spin.balance import balance_as_json
+
+        cases = [
+            case_as_json(case)
+            | {"balance": balance_as_json(balance_of(case.case, self.parameters, case.record))}
+            for case in self.results
+        ]
         return {"machine": self.parameters.name, "engine": self.engine, "cases": cases}
 
     def terminal(self) -> "list[Table | str]":

@@ -244,7 +244,11 @@ def mount_force_tables(result: SpinResult) -> list[Table]:
     for case in result.results:
         forces, ranges = mount_forces(case.record), speed_ranges(case.record, case.case.profile)
         rms = rms_table(forces, ranges)
-        rows = tuple(_mount_row(case, force, rms[i]) for i, force in enumerate(forces))
+        rows = tuple(
+            _mount_row(case, force, rms[i])
+            for i, force in enumerate(forces)
+            if force.peak > 0.0  # rings of balls act on the drum
+        )
         if rows:
             names = tuple(part.name for part in ranges)
             by_ranges.setdefault(names, []).append(Group(case_title(case), rows))

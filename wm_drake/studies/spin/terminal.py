@@ -8,9 +8,11 @@ import pandas as pd
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.units import Unit
 from wm_drake.report.table import Column, table_of
+from wm_drake.simulation.balance import balance_of
 from wm_drake.simulation.measures import Measures
 from wm_drake.simulation.measures.as_json import as_json, labelled_values
 from wm_drake.simulation.measures.registry import tabulated
+from wm_drake.studies.spin.balance import balance_line
 from wm_drake.studies.spin.study import CaseResult
 
 if TYPE_CHECKING:
@@ -38,6 +40,8 @@ def case_lines(parameters: MachineParameters, case: CaseResult) -> list[str]:
             for labels, value in labelled_values(measures.table, variable)
         ]
         lines.append(f"{variable.kind} {', '.join(numbers)} {variable.unit_text}")
+    if (balance := balance_of(case.case, parameters, case.record)) is not None:
+        lines.append(balance_line(balance))
     if (walk := measures.walk) is not None:
         turn = math.degrees(walk.turn)
         lines.append(f"the cabinet walks {1e3 * walk.distance:.1f} mm and turns by {turn:.1f} deg")

@@ -58,7 +58,8 @@ def vibration_pictures(result: SpinResult, case: CaseResult) -> list[Picture | N
 
 
 def _mounts_picture(case: CaseResult) -> Picture | None:
-    forces = [force for force in mount_forces(case.record) if force.name != "gasket"]
+    # rings of balls act on the drum, not on the cabinet
+    forces = [f for f in mount_forces(case.record) if f.name != "gasket" and f.peak > 0.0]
     if not forces:
         return None
     caption = (
