@@ -189,6 +189,14 @@ def test_upper_bounds_of_the_compiler_allow_what_is_installed():
         assert installed < (int(bound[1]), int(bound[2]))
 
 
+def test_the_page_of_keys_has_those_of_the_program(monkeypatch):
+    monkeypatch.syspath_prepend(CHECKOUT / "docs" / "extensions")
+    import machine_keys
+
+    text = machine_keys.PAGE.read_text(encoding="utf-8")
+    assert text == machine_keys.filled(text), "run: python docs/extensions/machine_keys.py"
+
+
 def test_the_picture_of_the_architecture_has_all_rooms_and_their_imports(monkeypatch):
     monkeypatch.syspath_prepend(CHECKOUT / "docs" / "extensions")
     import architecture

@@ -22,19 +22,20 @@ from pathlib import Path
 from typing import Any
 
 import architecture
+import machine_keys
 import typer
 from equations import mathml_of, with_indices
 from jupyter_cache import get_cache
 from jupyter_cache.cache.db import create_db
+from machine_keys import escaped
 from pictures import svg_of
 from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
 
 import wm_drake
-from wm_drake.parameters.file_keys import FileKey, KeyGroup, key_groups
 from wm_drake.simulation.measures import MEASURES
 
-KEYS, NAMES = "<!-- machine file keys -->", "<!-- public names -->"
+NAMES = "<!-- public names -->"
 COMMANDS, MEASURED = "<!-- command options -->", "<!-- measures -->"
 BELOW, ROOMS = "<!-- pages of decisions -->", "<!-- architecture -->"
 TREE_BELOW = "```{toctree}\n:hidden:\n:glob:\n\n0*\n```"
@@ -93,8 +94,8 @@ def _spread(_app: Sphinx, _env: Any, names: list[str]) -> None:
 def _complete(app: Sphinx, docname: str, source: list[str]) -> None:
     """Fill the marks of a page, and lead its links to pages of the manual."""
     text = source[0]
-    if KEYS in text:
-        text = text.replace(KEYS, "\n".join(_keys()))
+    if machine_keys.BEGIN in text:
+        text = machine_keys.BLOCK.sub(lambda _: "\n".join(_keys()), text)
     if COMMANDS in text:
         text = text.replace(COMMANDS, "\n".join(_commands()))
     if MEASURED in text:
@@ -233,11 +234,14 @@ def _commands() -> Iterator[str]:
             continue
         with contextlib.redirect_stdout(io.StringIO()):
             command.get_help(context)  # completes the help of its options
-        yield f"## {context.command_path.removeprefix('wm-drake ')}\n\n{_escaped(command.help)}\n"
+        yield f"## {context.command_path.removeprefix('wm-drake ')}\n\n{escaped(command.help)}\n"
         yield "| option | meaning |\n|---|---|"
         for option in command.params:
             names, meaning = option.get_help_record(context)
-            cells = (f"`{names}`", _escaped(meaning).replace("<", "&lt;").replace("*", "\\*"))
+            cells = (
+                f"`{names}`",
+                escaped(meaning).replace("<", "&lt;").replace("*", "\\*"),
+            )
             yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
         yield ""
 
@@ -251,36 +255,10 @@ def _measures() -> Iterator[str]:
             places = ", ".join(variable.dims)
             cells = (f"`{measure.name}`", f"`{variable.name}`", places, variable.units)
             response = f"`{variable.group_name}`" if variable.is_response else ""
-            yield f"| {' | '.join(cells)} | {_escaped(variable.about)} | {response} |"
+            yield f"| {' | '.join(cells)} | {escaped(variable.about)} | {response} |"
 
 
 def _keys() -> Iterator[str]:
-    for group in key_groups():
-        yield from _section(group)
-
-
-def _section(group: KeyGroup) -> Iterator[str]:
-    yield f"## {group.title}\n"
-    yield f"{_escaped(group.about)}\n"
-    if group.title in PICTURES_OF_KEYS:
-        yield f"{_drawn(PICTURES_OF_KEYS[group.title])}\n"
-    if group.places:
-        yield f"In the file: {', '.join(f'`{place}`' for place in group.places)}.\n"
-    if group.also:
-        anchor = group.also.lower().replace(" ", "-")
-        yield f"It has the keys of [{group.also}](#{anchor}) and these:\n"
-    yield "| key | meaning | value | allowed | default |"
-    yield "|---|---|---|---|---|"
-    yield from map(_row, group.keys)
-    yield ""
-
-
-def _row(key: FileKey) -> str:
-    needed = "" if not key.is_required else "required"
-    cells = (f"`{key.name}`", _escaped(key.meaning), key.form, key.allowed, key.default or needed)
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
-
-
-def _escaped(text: str) -> str:
-    """Return text whose brackets are no links; braces in backticks stay."""
-    return text.replace("[", "\\[").replace("]", "\\]")
+    return machine_keys.keys(
+        lambda title: _drawn(PICTURES_OF_KEYS[title]) if title in PICTURES_OF_KEYS else ""
+    )

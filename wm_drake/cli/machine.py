@@ -1,14 +1,12 @@
 """Command `wm-drake machine`: list, start, check and show machine files."""
 
 import json
-import os
-import re
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from wm_drake.cli.common import JsonOption, SetOption
+from wm_drake.cli.new_machine import machine_new_with_options
 from wm_drake.errors import InputError, input_error, shortened
 from wm_drake.report.terminal import say
 from wm_drake.studies.inputs import (
@@ -100,66 +98,4 @@ def machine_list(as_json: JsonOption = False) -> None:
         typer.echo(f"{name:{width}}  {text}")
 
 
-@app.command("new")
-def machine_new(
-    name: Annotated[
-        str, typer.Argument(help="Name of the new machine, or path of its file.", metavar="NAME")
-    ],
-    base: Annotated[
-        str,
-        typer.Option("--extends", help="Machine that the new one changes.", metavar="NAME|FILE"),
-    ] = "reference",
-) -> None:
-    """Write a machine file that extends another machine, with all its numbers as comments."""
-    path = Path(name) if name.endswith((".yaml", ".yml")) else Path(f"{name}.yaml")
-    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_-]*", path.stem):
-        raise input_error(
-            f"'{path.stem}' is no name of a machine; letters, digits, '_' and '-' are allowed, and "
-            "a letter first",
-            where="machine new",
-        )
-    text = _template(path, base)
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        raise input_error("exists already; choose another name", where=str(path)) from None
-    except OSError as error:
-        raise input_error(f"cannot be written to: {error.strerror}", where=str(path)) from None
-    say(f"{path} extends '{base}'. Edit it, then: wm-drake machine check {path}")
-
-
-def _template(path: Path, base: str) -> str:
-    """Return the text of a machine file that extends a machine and changes nothing yet."""
-    from wm_drake.parameters import load_machine
-    from wm_drake.parameters.files import machine_path, machine_yaml, shipped_machines
-
-    parameters = load_machine(base)
-    extends = base
-    if base not in shipped_machines():
-        extends = os.path.relpath(machine_path(base).resolve(), path.parent.resolve())
-    header_keys = {"name", "about", "model", "measured", "published"}
-    lines = machine_yaml(parameters.model_copy(update={"sources": {}})).splitlines()
-    comments, skipped = [], False
-    for line in lines:
-        if not line.startswith((" ", "-")):  # a key at the top
-            skipped = line.split(":")[0] in header_keys
-        if not skipped:
-            comments.append(f"# {line}")
-    return "\n".join(
-        [
-            f"# A machine of your own. It has every number of '{base}' that this file does not "
-            "change.",
-            "# To change a number, remove '# ' from its line and from the lines of the keys above",
-            "# it that are less indented; write the new value with its unit. A list, a table and a",
-            "# profile are replaced as a whole. 'null' in place of an element removes it.",
-            f"# Check it: wm-drake machine check {path}",
-            f"# Run it:   wm-drake spin --machine {path}",
-            f"extends: {json.dumps(extends)}",
-            f"name: {path.stem}",
-            f"about: {json.dumps(f'changes to {base}')}",
-            "",
-            *comments,
-            "",
-        ]
-    )
+app.command("new")(machine_new_with_options())

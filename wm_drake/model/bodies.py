@@ -292,9 +292,24 @@ def _check_degrees_of_freedom(plant: MultibodyPlant, parameters: MachineParamete
         size = plant.num_velocities()
         raise input_error(
             f"SDF '{parameters.model}' has {size} degrees of freedom; allowed are 6 for the tub, "
-            f"1 for the drum{more}; attach all other links by fixed joints",
+            f"1 for the drum{more}; {_loose(plant, parameters)}attach all other links by fixed "
+            "joints",
             key="model",
         )
+
+
+def _loose(plant: MultibodyPlant, parameters: MachineParameters) -> str:
+    """Return which links are attached to nothing, as part of a message; "" if none is."""
+    allowed = {"tub", CARRIER, CABINET}
+    allowed |= {outer_tube(plant, parameters, n).name() for n in parameters.telescopic_dampers}
+    loose = [plant.get_body(i).name() for i in sorted(plant.GetFloatingBaseBodies())]
+    loose = [name for name in loose if name not in allowed]
+    if "housing" in loose:
+        return (
+            "link 'housing' is not fixed to world: add <joint name=\"housing_to_floor\" "
+            'type="fixed"><parent>world</parent><child>housing</child></joint>; '
+        )
+    return f"nothing holds {', '.join(repr(name) for name in loose)}; " if loose else ""
 
 
 def oscillating_bodies(plant: MultibodyPlant) -> list[RigidBody]:

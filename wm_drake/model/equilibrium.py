@@ -143,8 +143,41 @@ def rest_pose(elements: PlacedElements, weight: Weight) -> tuple[FloatArray, Flo
     if not _is_at_rest(elements, pose, remaining, EQUILIBRIUM_TOLERANCE):
         pose, remaining = _search(statics, elements)
         as_drawn = statics.wrench(np.zeros(6))
-        _check_rest(elements, pose, remaining, EQUILIBRIUM_TOLERANCE, as_drawn)
+        try:
+            _check_rest(elements, pose, remaining, EQUILIBRIUM_TOLERANCE, as_drawn)
+        except InputError as error:
+            raise _with_way_out(error, elements, weight) from None
     return pose, remaining
+
+
+def _with_way_out(error: InputError, elements: PlacedElements, weight: Weight) -> InputError:
+    """Return the error of a machine that cannot rest as drawn, with preloads with which it sags.
+
+    Springs without a preload get the one that balances the weight as well as they can; with all
+    of them given, the tub may move to its own rest pose, up to the limits of a sag. The preloads
+    are named only if that works.
+    """
+    if _sags(elements) or not elements.springs:
+        return error
+    given = {
+        name: replace(spring, preload=float(f"{spring.preload:.4g}"), is_given=True)
+        for name, spring in elements.springs.items()
+    }
+    sagging = replace(elements, springs=given)
+    try:
+        pose, _ = rest_pose(sagging, weight)
+    except InputError:
+        return error
+    texts = ", ".join(f"springs.{name}.preload: {s.preload:.4g} N" for name, s in given.items())
+    move, turn = 1e3 * np.abs(pose[3:]).max(), np.rad2deg(np.abs(pose[:3]).max())
+    return InputError(
+        replace(
+            problem,
+            message=f"{problem.message}; or let it find its own rest pose: with {texts} (or a "
+            f"free_length of their type) it moves by {move:.0f} mm and turns by {turn:.1f} deg",
+        )
+        for problem in error.problems
+    )
 
 
 def _search(statics: TubStatics, elements: PlacedElements) -> tuple[FloatArray, FloatArray]:

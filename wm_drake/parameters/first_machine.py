@@ -1,0 +1,397 @@
+"""Write the first files of a machine from a few numbers: a commented machine file and its SDF.
+
+Attachment points follow from the numbers, so that the machine balances: the hooks of the springs
+are placed around the centre of mass of all that hangs in them, and above it. All of them are
+assumptions, which the files say; they are meant to be replaced.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from string import Template
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from wm_drake.errors import input_error
+from wm_drake.parameters import units as u
+from wm_drake.parameters.csv_files import finite_numbers, read_csv
+from wm_drake.parameters.elements import Frozen
+from wm_drake.parameters.types import FloatArray
+
+TEMPLATES = Path(__file__).parents[1] / "data" / "first_machine"
+"""Folder of the templates of the two files."""
+
+COLUMNS = [
+    "part", "body", "mass_kg", "x_mm", "y_mm", "z_mm",
+    "ixx_kgm2", "iyy_kgm2", "izz_kgm2", "ixy_kgm2", "ixz_kgm2", "iyz_kgm2",
+]  # fmt: skip
+"""Columns of a table of parts: name, `tub` or `drum`, mass, centre of mass in T, and inertia about
+the centre of mass. Products are elements of the matrix: ixy = -sum(m x y)."""
+
+VERTICAL_HZ = 2.5
+"""Vertical natural frequency on the springs where no rate is given. [Hz] Assumption: usual are 2 to
+3 Hz."""
+
+FRICTION_N = 80.0
+"""Friction of all dampers together where none is given. [N] Assumption: usual are 60 to 120 N."""
+
+SPRING_M, LEAN_M = 0.2, 0.015
+"""Length of the springs as drawn, and how far their upper ends lean outwards. [m] Assumptions."""
+
+
+class FirstNumbers(Frozen):
+    """Numbers that a person has of a machine; each has a default that the files call an assumption.
+
+    Attributes:
+        tub_mass, drum_mass: All that hangs in the springs without turning, and all that turns.
+        tub_centre: Centre of mass of the tub with all that is fixed to it, in T.
+        springs, dampers: Numbers of them, 2 to 4.
+        spring_rate: Rate of one spring; None for the vertical natural frequency `VERTICAL_HZ`.
+        friction: Friction force of one damper; None for `FRICTION_N` in all of them.
+        gasket_stiffness: Stiffness of the door gasket along every axis.
+        drum_radius, drum_depth: Size of the drum.
+        gap: Distance between tub and cabinet at the sides.
+        unbalance: Mass of the unbalance in the drum.
+        speed: Highest drum speed.
+    """
+
+    tub_mass: Annotated[u.Mass, Field(gt=0.0)] = 35.0
+    drum_mass: Annotated[u.Mass, Field(gt=0.0)] = 9.0
+    tub_centre: u.Position = (0.0, 0.0, 0.0)
+    springs: Annotated[int, Field(ge=2, le=4)] = 2
+    dampers: Annotated[int, Field(ge=2, le=4)] = 2
+    spring_rate: Annotated[u.LinearStiffness, Field(gt=0.0)] | None = None
+    friction: Annotated[u.Force, Field(ge=0.0)] | None = None
+    gasket_stiffness: Annotated[u.LinearStiffness, Field(ge=0.0)] = 2000.0
+    drum_radius: Annotated[u.Length, Field(gt=0.05, lt=1.0)] = 0.24
+    drum_depth: Annotated[u.Length, Field(gt=0.05, lt=2.0)] = 0.34
+    gap: Annotated[u.Length, Field(gt=0.0, lt=1.0)] = 0.038
+    unbalance: Annotated[u.Mass, Field(gt=0.0)] = 0.5
+    speed: Annotated[u.Speed, Field(gt=0.0)] = 1200.0 * np.pi / 30.0
+
+
+@dataclass(frozen=True)
+class Mass:
+    """Mass properties of a body.
+
+    Attributes:
+        mass: [kg]
+        centre: Centre of mass, in T. (3,) [m]
+        inertia: About the centre of mass, in the axes of T. (3, 3) [kg m^2]
+        about: Where the numbers come from.
+    """
+
+    mass: float
+    centre: FloatArray
+    inertia: FloatArray
+    about: str
+
+
+def combined(masses: list[Mass], about: str) -> Mass:
+    """Return the mass properties of parts that are fixed to each other.
+
+        m = sum m_i,  c = sum m_i c_i / m,
+        I = sum (I_i + m_i (d_i.d_i 1 - d_i d_i^T)),  d_i = c_i - c      (Huygens, Steiner)
+
+    Args:
+        masses: Parts, at least one.
+        about: Description of the body.
+    """
+    mass = sum(part.mass for part in masses)
+    centre = sum(part.mass * part.centre for part in masses) / mass
+    inertia = np.zeros((3, 3))
+    for part in masses:
+        d = part.centre - centre
+        inertia += part.inertia + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
+    return Mass(mass, np.asarray(centre), inertia, about)
+
+
+def shell(mass: float, radius: float, length: float) -> FloatArray:
+    """Return the inertia of a thin cylindrical shell about y. (3, 3) [kg m^2]
+
+    Iyy = m r^2, Ixx = Izz = m (r^2 / 2 + l^2 / 12). [kg, m]
+    """
+    across = mass * (0.5 * radius**2 + length**2 / 12.0)
+    return np.diag([across, mass * radius**2, across])
+
+
+def read_parts(path: Path) -> dict[str, Mass]:
+    """Return tub and drum, combined from a table of parts (`COLUMNS`).
+
+    Raises:
+        InputError: the file cannot be read, a body is neither tub nor drum, or one has no part.
+    """
+    table = read_csv(path, COLUMNS)
+    numbers = finite_numbers(table[COLUMNS[2:]], path)
+    parts: dict[str, list[Mass]] = {"tub": [], "drum": []}
+    for place, (body, row) in enumerate(zip(table["body"], numbers, strict=True), start=2):
+        if body not in parts:
+            message = f"body '{body}' is not allowed; allowed are tub, drum"
+            raise input_error(message, where=f"{path}:{place}")
+        if row[0] <= 0.0:
+            raise input_error("mass_kg must be above 0", where=f"{path}:{place}")
+        parts[body].append(_part(row))
+    empty = [body for body, of in parts.items() if not of]
+    if empty:
+        raise input_error(f"has no part of the {empty[0]}", where=str(path))
+    return {
+        body: combined(of, f"{len(of)} parts of {path.name}, combined")
+        for body, of in parts.items()
+    }
+
+
+def _part(row: FloatArray) -> Mass:
+    xx, yy, zz, xy, xz, yz = row[4:]
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return Mass(float(row[0]), 1e-3 * row[1:4], inertia, "")
+
+
+@dataclass(frozen=True)
+class FirstMachine:
+    """A machine from a few numbers.
+
+    Attributes:
+        name: Name of the machine.
+        numbers: What is known of it.
+        parts: Tub and drum of a table of parts; empty for shells of the masses of `numbers`.
+    """
+
+    name: str
+    numbers: FirstNumbers
+    parts: dict[str, Mass]
+
+    @property
+    def tub_radius(self) -> float:
+        """Outer radius of the tub: 22 mm around the drum. [m] Assumption."""
+        return self.numbers.drum_radius + 0.022
+
+    @property
+    def tub_depth(self) -> float:
+        """Length of the tub: 90 mm more than the drum. [m] Assumption."""
+        return self.numbers.drum_depth + 0.09
+
+    @cached_property
+    def bodies(self) -> dict[str, Mass]:
+        """Tub and drum."""
+        if self.parts:
+            return self.parts
+        n = self.numbers
+        tub = shell(n.tub_mass, self.tub_radius, self.tub_depth)
+        drum = shell(n.drum_mass, n.drum_radius, n.drum_depth)
+        about = "inertia of a thin shell of this mass (assumption)"
+        return {
+            "tub": Mass(n.tub_mass, np.array(n.tub_centre), tub, about),
+            "drum": Mass(n.drum_mass, np.zeros(3), drum, about),
+        }
+
+    @cached_property
+    def whole(self) -> Mass:
+        """All that hangs in the springs."""
+        return combined(list(self.bodies.values()), "")
+
+    @property
+    def spring_rate(self) -> float:
+        """Rate of one spring. [N/m]"""
+        n, rate = self.numbers, self.whole.mass * (2.0 * np.pi * VERTICAL_HZ) ** 2
+        return n.spring_rate or float(rate / n.springs)
+
+    @property
+    def friction(self) -> float:
+        """Friction force of one damper. [N]"""
+        n = self.numbers
+        return FRICTION_N / n.dampers if n.friction is None else n.friction
+
+    def hooks(self) -> dict[str, tuple[FloatArray, FloatArray]]:
+        """Return the ends of the springs on tub and housing by name. [m]
+
+        They lie around the vertical line through the centre of mass, so that the springs hold it.
+        """
+        x, y, _ = self.whole.centre
+        height, across = 0.7 * self.tub_radius, 0.7 * self.tub_radius
+        ends = {}
+        for name, (side, along) in SPRING_PLACES[self.numbers.springs].items():
+            on_tub = np.array([x + side * across, y + along * self.tub_depth, height])
+            ends[name] = on_tub, on_tub + np.array([LEAN_M * np.sign(side), 0.0, SPRING_M])
+        return ends
+
+    def struts(self) -> dict[str, tuple[FloatArray, FloatArray]]:
+        """Return the ends of the dampers on tub and housing by name. [m]"""
+        y = self.whole.centre[1]
+        r = self.tub_radius
+        ends = {}
+        for name, (side, along) in DAMPER_PLACES[self.numbers.dampers].items():
+            on_tub = np.array([0.5 * side * r, y + along * self.tub_depth, -0.8 * r])
+            ends[name] = on_tub, on_tub + np.array([0.3 * side * r, 0.0, -0.17])
+        return ends
+
+    def frames(self) -> list[tuple[str, str, FloatArray]]:
+        """Return name, link and position of all frames. [m]"""
+        listed = []
+        for kind, ends in (("spring", self.hooks()), ("damper", self.struts())):
+            for name, (tub, housing) in ends.items():
+                listed.append((f"{kind}_{name}_tub", "tub", tub))
+                listed.append((f"{kind}_{name}_housing", "housing", housing))
+        front, rear = -0.5 * self.tub_depth, 0.5 * self.tub_depth
+        ring = np.array([0.0, front - 0.03, 0.0])
+        listed += [(f"gasket_{link}", link, ring) for link in ("tub", "housing")]
+        listed.append(("sensor_r", "tub", np.array([0.0, rear, self.tub_radius])))
+        listed.append(("sensor_f", "tub", np.array([0.0, front, self.tub_radius])))
+        corner = self.tub_radius * np.sqrt(0.5)
+        listed.append(("corner", "tub", np.array([corner, front, corner])))
+        return listed
+
+    def walls(self) -> list[tuple[str, FloatArray, FloatArray]]:
+        """Return name, centre and size of the walls of the cabinet; they are 10 mm thick. [m]"""
+        wide, deep = self.tub_radius + self.numbers.gap, 0.5 * self.tub_depth + 0.06
+        top = max(end[2] for _, end in self.hooks().values()) + 0.02
+        low = min(end[2] for _, end in self.struts().values()) - 0.02
+        middle, height = 0.5 * (top + low), top - low
+        walls = []
+        for name, axis, at in (
+            ("left", 0, -wide), ("right", 0, wide), ("front", 1, -deep), ("rear", 1, deep),
+            ("bottom", 2, low), ("top", 2, top),
+        ):  # fmt: skip
+            centre, size = np.array([0.0, 0.0, middle]), np.array([2 * wide, 2 * deep, height])
+            centre[axis], size[axis] = at + 0.005 * np.sign(at), 0.01
+            walls.append((f"wall_{name}", centre, size))
+        return walls
+
+    def sdf(self) -> str:
+        """Return the text of the SDF file."""
+        n, tub, drum = self.numbers, self.bodies["tub"], self.bodies["drum"]
+        walls = (
+            _shape(name, f"{_row(c)} 0 0 0", f"<box><size>{_row(size)}</size></box>", GLASS)
+            for name, c, size in self.walls()
+        )
+        frames = (
+            f'    <frame name="{name}" attached_to="{link}">'
+            f"<pose>{_row(place)} 0 0 0</pose></frame>"
+            for name, link, place in self.frames()
+        )
+        return _filled(
+            "bodies.sdf",
+            name=self.name,
+            gap_mm=_text(1e3 * n.gap),
+            walls="\n".join(walls),
+            frames="\n".join(frames),
+            about_tub=tub.about,
+            about_drum=drum.about,
+            tub=_inertial(tub),
+            drum=_inertial(drum),
+            tub_shell=_cylinder("tub_shell", self.tub_radius, self.tub_depth),
+            drum_shell=_cylinder("drum_shell", n.drum_radius, n.drum_depth),
+        )
+
+    def yaml(self, file: str, model: str) -> str:
+        """Return the text of the machine file.
+
+        Args:
+            file: Its path, for the commands in its comments.
+            model: Path of the SDF from its folder.
+        """
+        n, whole = self.numbers, self.whole
+        given = n.model_fields_set
+
+        def source(name: str, otherwise: str) -> str:
+            return "given" if name in given else f"assumption: {otherwise}"
+
+        return _filled(
+            "machine.yaml",
+            name=self.name,
+            file=file,
+            model=model,
+            n_springs=n.springs,
+            n_dampers=n.dampers,
+            tub_kg=_text(self.bodies["tub"].mass),
+            drum_kg=_text(self.bodies["drum"].mass),
+            springs=_elements("spring", "suspension", SPRING_PLACES[n.springs]),
+            dampers=_elements("damper", "friction", DAMPER_PLACES[n.dampers]),
+            spring_rate=f"{_text(1e-3 * self.spring_rate)} N/mm",
+            spring_source=source(
+                "spring_rate", f"{VERTICAL_HZ:g} Hz vertically with {_text(whole.mass)} kg"
+            ),
+            friction=f"{_text(self.friction)} N",
+            friction_source=source("friction", f"{FRICTION_N:g} N in all dampers"),
+            gasket=f"{_text(1e-3 * n.gasket_stiffness)} N/mm",
+            gasket_source=source("gasket_stiffness", "usual are 1 to 4 N/mm"),
+            unbalance=f"{_text(n.unbalance)} kg",
+            unbalance_source=source("unbalance", "usual limit before a spin"),
+            radius_mm=_text(1e3 * n.drum_radius - 5.0),
+            front_mm=_text(-350.0 * n.drum_depth),
+            rear_mm=_text(350.0 * n.drum_depth),
+            speed=f"{_text(n.speed * 30.0 / np.pi)} rpm",
+        )
+
+
+GLASS, METAL = "0.8 0.8 0.85 0.15", "0.75 0.85 0.9 0.35"
+"""Colours of shapes: red, green, blue, opacity."""
+
+SPRING_PLACES = {
+    2: {"left": (-1.0, 0.0), "right": (1.0, 0.0)},
+    3: {"left": (-1.0, -0.15), "right": (1.0, -0.15), "rear": (0.0, 0.3)},
+    4: {
+        "left_front": (-1.0, -0.2), "right_front": (1.0, -0.2),
+        "left_rear": (-1.0, 0.2), "right_rear": (1.0, 0.2),
+    },
+}  # fmt: skip
+"""Places of the hooks by number of springs: side, and part of the depth of the tub along y."""
+
+DAMPER_PLACES = {
+    2: {"left": (-1.0, 0.0), "right": (1.0, 0.0)},
+    3: {"left": (-1.0, 0.0), "right_front": (1.0, -0.2), "right_rear": (1.0, 0.2)},
+    4: SPRING_PLACES[4],
+}
+"""Places of the dampers by their number, in the same way."""
+
+
+def _text(value: float) -> str:
+    """Return a number with four significant digits."""
+    return np.format_float_positional(value, precision=4, fractional=False, trim="-")
+
+
+def _row(vector: FloatArray) -> str:
+    return " ".join(f"{value + 0.0:.6g}" for value in vector)
+
+
+def _shape(name: str, pose: str, geometry: str, colour: str) -> str:
+    """Return a visual and a collision shape with the same name."""
+    inside = f"<pose>{pose}</pose>\n        <geometry>{geometry}</geometry>"
+    material = f"<material><diffuse>{colour}</diffuse></material>"
+    return (
+        f'      <visual name="{name}">\n        {inside}\n        {material}\n      </visual>\n'
+        f'      <collision name="{name}">\n        {inside}\n      </collision>'
+    )
+
+
+def _inertial(body: Mass) -> str:
+    i = body.inertia
+    names = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
+    numbers = "".join(f"<i{name}>{i[a, b]:.6g}</i{name}>" for name, a, b in names)
+    return (
+        f"      <inertial>\n        <pose>{_row(body.centre)} 0 0 0</pose>\n"
+        f"        <mass>{body.mass:.6g}</mass>\n        <inertia>{numbers}</inertia>\n"
+        "      </inertial>"
+    )
+
+
+def _cylinder(name: str, radius: float, length: float) -> str:
+    """Return the shapes of a cylinder about y."""
+    size = f"<radius>{radius:.6g}</radius><length>{length:.6g}</length>"
+    return _shape(name, "0 0 0 1.5707963267948966 0 0", f"<cylinder>{size}</cylinder>", METAL)
+
+
+def _elements(kind: str, of: str, names: Iterable[str]) -> str:
+    """Return the lines of the springs or dampers of a type."""
+    return "\n".join(
+        f"  {name}: {{type: {of}, tub_frame: {kind}_{name}_tub, "
+        f"housing_frame: {kind}_{name}_housing}}"
+        for name in names
+    )
+
+
+def _filled(template: str, **values: object) -> str:
+    text = (TEMPLATES / f"{template}.template").read_text(encoding="utf-8")
+    return Template(text).substitute(values)
