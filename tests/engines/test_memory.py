@@ -28,6 +28,17 @@ def test_memory_is_that_of_this_computer(reference, monkeypatch):
         check_size(reference.profile, reference.step, 5e-3)
 
 
+def test_batches_are_counted_by_threads_and_records(machine, monkeypatch):
+    parameters = machine.parameters
+    one = memory.needed_memory(parameters.profile, parameters.step, parameters.output_period)
+    monkeypatch.setattr(memory, "available_memory", lambda: 3.0 * one)
+    for options in ({"workers": 2}, {"workers": 1, "histories": True}):
+        wm.simulate_many(machine, ["middle"], **options)
+    for options in ({"workers": 4}, {"workers": 2, "histories": True}):
+        with pytest.raises(InputError, match="GB are available"):
+            wm.simulate_many(machine, ["middle"], **options)
+
+
 def test_file_is_named(wm_drake, tmp_path):
     path = tmp_path / "long.yaml"
     path.write_text("time: (0, 1e9) s\nspeed: (0, 100) rpm\n", encoding="utf-8")

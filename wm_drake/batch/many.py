@@ -11,6 +11,7 @@ import xarray as xr
 
 from wm_drake.batch.runs import Runner, RunResult
 from wm_drake.batch.work_items import Preparation
+from wm_drake.engines.memory import RECORDS_OF_BATCH
 from wm_drake.errors import input_error
 from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.model.scene import Scene
@@ -105,8 +106,10 @@ def simulate_many(
 
     try:
         runner = Runner(machine.parameters, chosen, histories, machine.cache.scenes)
-        preparation = Preparation(machine, step, scheme)
-        _run_all(preparation, runner, listed, workers or os.cpu_count() or 1, collect)
+        threads = workers or os.cpu_count() or 1
+        at_once = threads * (RECORDS_OF_BATCH if histories else 1.0)
+        preparation = Preparation(machine, step, scheme, at_once)
+        _run_all(preparation, runner, listed, threads, collect)
     except KeyboardInterrupt:
         raise SimulationInterrupted(as_table(machine.parameters, chosen, results)) from None
     pairs = runner.scenes[0].pair_names() if runner.scenes else None

@@ -100,9 +100,19 @@ class Preparation:
     To set a machine up takes a good part of the time of a run, so its results are cached.
     """
 
-    def __init__(self, machine: Machine, step: float, integrator: Integrator) -> None:
-        """Prepare for a built machine, a largest step [s] and an integrator."""
+    def __init__(
+        self, machine: Machine, step: float, integrator: Integrator, at_once: float = 1.0
+    ) -> None:
+        """Prepare for a built machine.
+
+        Args:
+            machine: The machine.
+            step: Largest step. [s]
+            integrator: Integrator.
+            at_once: How many times the memory of a batch is needed at once.
+        """
         self.machine, self.step, self.integrator = machine, step, integrator
+        self.at_once = at_once
         self.sensors = list(machine.parameters.sensors)
         self._context: Context | None = None
         self._drawn: list[tuple[object, DrawnBodies]] = []
@@ -164,7 +174,7 @@ class Preparation:
             if len(self._known_numbers) >= KEPT_NUMBERS:
                 del self._known_numbers[next(iter(self._known_numbers))]
             period = (case.parameters or self.machine.parameters).output_period
-            check_size(case.profile, self.step, period)
+            check_size(case.profile, self.step, period, self.at_once)
             empty = self._bodies(case.parameters or self.machine.parameters, None)
             setup = self._set_up(case)
             elements, layout = pack_elements(setup)

@@ -17,24 +17,28 @@ Measured as the growth of the peak of memory with the length of the run, 20,000 
 NUMBERS_OF_STEP = 28
 """Numbers of the schedule for each step, and of its construction, at the peak (measured)."""
 
+RECORDS_OF_BATCH = 2.5
+"""Memory of a batch that makes records, by that of one without (measured)."""
+
 SECONDS_OF_STEP = 3e-6
 """Time of a step on one core: 2.5 to 4 us with gasket and three dampers, by measures. [s]"""
 
 _BYTES, _GB = 8, 1e9
 
 
-def check_size(profile: SpinProfile, step: float, period: float) -> None:
+def check_size(profile: SpinProfile, step: float, period: float, at_once: float = 1.0) -> None:
     """Check that a run has a place in the memory of this computer.
 
     Args:
         profile: Spin profile of the run.
         step: Step size. [s]
         period: Time between samples. [s]
+        at_once: How many times its memory is needed at once.
 
     Raises:
         InputError: it needs more memory than is available.
     """
-    steps, needed = profile.duration / step, needed_memory(profile, step, period)
+    steps, needed = profile.duration / step, at_once * needed_memory(profile, step, period)
     available = available_memory()
     if needed <= available:
         return
