@@ -10,6 +10,7 @@ their own it takes about half an hour; it needs a checkout.
 """
 
 import argparse
+import contextlib
 import json
 import os
 import queue
@@ -211,7 +212,6 @@ def kills(count: int, top: Path) -> list[str]:
     """Kill studies at random moments, resume them, and return a table of what came out."""
     rows = ["| study | kills | finished | tables differ | files left |", "|---|---|---|---|---|"]
     random_ = random.Random(0)
-    os.chdir(top)
     Path("free.yaml").write_text(FREE, encoding="utf-8")
     warm_up()
     for number, command in enumerate(STUDIES):
@@ -245,8 +245,9 @@ def main() -> None:
     cases, count = (30, 0) if options.quick else (options.cases, options.kills)
     killed = []
     if count:
-        with tempfile.TemporaryDirectory() as folder:
-            killed = ["", *kills(count, Path(folder))]  # first: this process has no threads yet
+        # `calibrate` names a file in the folder; kills first: this process has no threads yet
+        with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+            killed = ["", *kills(count, Path(folder))]
     text = ""
     for tally in campaign(range(options.first, options.first + cases), doors_of_tests()):
         text = "\n".join([*tally.rows(), "", *tally.faults, *killed]) + "\n"
