@@ -81,6 +81,7 @@ KINDS = {
         "sections.html", "study", "gasket", "--design", "orthogonal", "--trials", "243",
         "--model", "main", "--load", "back", "--response", "mount_force_peak", "--response", "amplitude",
     ),
+    "gasket_curves": _one("sections.html", "gasket", "curves", "folded", "--quick", "--axial", "8 mm"),
     "gasket_damping": Kind(
         "sections.html",
         (

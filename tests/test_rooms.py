@@ -18,6 +18,7 @@ ORDER = (
     {"compiler"},
     {"laws"},
     {"parameters"},
+    {"solid"},
     {"elements"},
     {"systems"},
     {"model"},
@@ -36,7 +37,7 @@ LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}
 DRAWING = {"page", "figures", "tables", "words"}
 """Modules of a study that may import a plotting library."""
 # laws do without much more
-WITHOUT_DRAKE = {"registry", "errors", "compiler", "parameters", "elements", "rigs", "cli"}
+WITHOUT_DRAKE = {"registry", "errors", "compiler", "parameters", "solid", "elements", "rigs", "cli"}
 
 
 def imported(name, source, is_package=False):

@@ -5,8 +5,8 @@
     record = wm.simulate("reference", "middle")
     wm.envelopes(record).upper.sel(sensor="Xr").plot()
 
-The rooms, in the order of the data flow: `parameters`, `laws`, `elements`, `systems`, `model`,
-`engines`, `simulation`, `export`, `batch`, `rigs`, `report`, `studies`, `studio`, `cli`.
+The rooms, in the order of the data flow: `parameters`, `solid`, `laws`, `elements`, `systems`,
+`model`, `engines`, `simulation`, `export`, `batch`, `rigs`, `report`, `studies`, `studio`, `cli`.
 """
 
 import importlib

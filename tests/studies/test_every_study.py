@@ -76,7 +76,7 @@ def test_interrupted_at_the_end_it_keeps_its_runs_and_writes_what_it_promises(
     assert ended.code == 0, ended.err
     assert json.loads(ended.out, parse_constant=pytest.fail)["wall_s"] > 0.0
     made = json.loads(Path("out/run.json").read_text())
-    assert made["command"] == STUDIES[name].command
+    assert made["command"] == STUDIES[name].folder_owner
     assert {"report.html", *made["files"], "run.json"} == files() - {LEDGER}
     assert any(file.endswith(".csv") for file in made["files"])
     options = STUDIES[name].options(**made["options"])

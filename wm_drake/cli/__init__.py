@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from wm_drake.cli import export, identify, machine, record, rig, studio, study
+from wm_drake.cli import export, gasket, identify, machine, record, rig, studio, study
 from wm_drake.cli.common import HELP_OPTIONS
 from wm_drake.cli.options import command_of
 from wm_drake.cli.quiet import give_quiet
@@ -28,6 +28,7 @@ app = typer.Typer(
     context_settings=HELP_OPTIONS,
 )
 app.add_typer(export.app, name="export")
+app.add_typer(gasket.app, name="gasket")
 app.add_typer(identify.app, name="identify")
 app.add_typer(machine.app, name="machine")
 app.add_typer(record.app, name="record")

@@ -307,6 +307,7 @@ def _load() -> None:
     from wm_drake.studies.calibration.options import CALIBRATE
     from wm_drake.studies.drive.options import DRIVE
     from wm_drake.studies.gasket.options import GASKET
+    from wm_drake.studies.gasket_curves.options import GASKET_CURVES
     from wm_drake.studies.gasket_damping.options import GASKET_DAMPING
     from wm_drake.studies.modes.options import MODES
     from wm_drake.studies.pareto.options import DESIGN
@@ -322,6 +323,7 @@ def _load() -> None:
         DESIGN,
         DRIVE,
         GASKET,
+        GASKET_CURVES,
         GASKET_DAMPING,
         MODES,
         RESPONSE,

@@ -1,0 +1,143 @@
+"""`wm-drake gasket curves`: from a drawing to a machine that spins with it; wrong drawings."""
+
+import json
+import math
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import wm_drake as wm
+from wm_drake.parameters import load_machine
+from wm_drake.solid import curves as solid_curves
+
+SMALL = ("--quick", "--points", "2", "--twist", "2 deg", "--tilt", "1 deg")
+
+
+def drawing(**changes):
+    """Return the text of a straight tube of rubber with changed numbers."""
+    numbers = {"thickness": "2.5 mm", "rubber": "{shore_a: 40, loss_factor: 0.15}"} | changes
+    points = numbers.get(
+        "points", "- {radius: 160 mm, y: 0 mm, T}\n- {radius: 170 mm, y: 50 mm, T}\n"
+    )
+    meridian = points.replace("T}", f"thickness: {numbers['thickness']}}}")
+    return f"about: test\nmeridian:\n{meridian}rubber: {numbers['rubber']}\n"
+
+
+def test_curves_of_a_drawing_give_a_machine_that_spins(wm_drake):
+    ended = wm_drake("gasket", "curves", "folded", *SMALL, "--out", "out")
+    assert ended.code == 0, ended.err
+    assert {path.name for path in Path("out").iterdir()} == {
+        "checks.csv", "curves.csv", "gasket.yaml", "machine.yaml", "report.html", "run.json",
+        "values.csv",
+    }  # fmt: skip
+    machine, values = load_machine("out/machine.yaml"), pd.read_csv("out/values.csv", index_col=0)
+    gasket = machine.gasket
+    damping = 0.15 / (2.0 * math.pi * 2.5)
+    for axis in "xyz":
+        along, about = values.loc[axis], values.loc[f"about_{axis}"]
+        for kind, row in (("", along), ("rotational_", about)):
+            table = getattr(gasket, f"{kind}stiffness_{axis}")
+            assert table.nominal_stiffness == pytest.approx(
+                row.stiffness_first_20_percent, rel=1e-5
+            )
+            assert getattr(gasket, f"{kind}damping_{axis}") == pytest.approx(
+                damping * table.nominal_stiffness, rel=1e-9
+            )
+    assert values.loc["y"].stiffness_at_rest < 0.3 * values.loc["x"].stiffness_at_rest
+    assert values.loc["about_y"].stiffness_at_rest > values.loc["about_x"].stiffness_at_rest
+    assert gasket.cross_stiffness_x_about_z == -gasket.cross_stiffness_z_about_x > 0.0
+    assert gasket.tub_frame == load_machine("reference").gasket.tub_frame
+    # the section in a machine file of the user's
+    section = Path("out/gasket.yaml").read_text()
+    Path("mine.yaml").write_text(f"extends: reference\nname: mine\n{section}")
+    for axis in "xyz":
+        name = f"stiffness_{axis}"
+        assert getattr(load_machine("mine.yaml").gasket, name) == getattr(gasket, name)
+    Path("short.csv").write_text("time_s,speed_rpm\n0,30\n6,120\n")
+    spin = wm_drake("spin --machine mine.yaml --load middle --profile short.csv --out spin")
+    assert spin.code in (0, 1), spin.err
+
+
+def test_python_and_json_give_the_same(wm_drake):
+    result = wm.run_study("curves", file="bellows", quick=True, points=2, tilt="1 deg", quiet=True)
+    printed = json.loads(
+        wm_drake("gasket curves bellows --quick --points 2 --tilt '1 deg' --json --out o").out
+    )
+    for ours, theirs in zip(result.as_json()["values"], printed["values"], strict=True):
+        assert ours["axis"] == theirs["axis"]
+        assert ours["stiffness_at_rest"] == pytest.approx(theirs["stiffness_at_rest"], rel=1e-9)
+    assert max(row["work_error"] for row in printed["checks"]) < 0.01
+    by_axis = {row["axis"]: row["stiffness_at_rest"] for row in printed["values"]}
+    assert by_axis["x"] == by_axis["z"]
+
+
+CROSSING = (
+    "- {radius: 160 mm, y: 0 mm, T}\n- {radius: 160 mm, y: 40 mm, T, fillet: 4 mm}\n"
+    "- {radius: 180 mm, y: 40 mm, T, fillet: 4 mm}\n- {radius: 180 mm, y: 20 mm, T, fillet: 4 mm}\n"
+    "- {radius: 140 mm, y: 20 mm, T}\n"
+).replace("T, fillet: 4 mm}", "fillet: 4 mm, T}")
+THIN = (
+    "- {radius: 160 mm, y: 0 mm, thickness: 0 mm}\n- {radius: 170 mm, y: 50 mm, thickness: 2 mm}\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"points": CROSSING}, "meridian: the wall crosses itself, at radius and y"),
+        ({"points": THIN}, "meridian.0.thickness: '0 mm' is out of range; allowed is > 0"),
+        ({"rubber": "{c1: -0.3 MPa}"}, "rubber.c1: '-0.3 MPa' is out of range; allowed is > 0"),
+        ({"rubber": "{c1: 0.3 MPa, c2: -0.1 MPa}"}, "the rubber is unstable: its force falls"),
+        ({"rubber": "{shore_a: 40, c1: 0.3 MPa}"}, "needs either shore_a or c1"),
+        ({"rubber": "{shore_a: 40 mm}"}, "shore_a"),
+        (
+            {"points": "- {radius: 1 mm, y: 0 mm, T}\n- {radius: 1 mm, y: 9 mm, T}\n"},
+            "reaches the axis",
+        ),
+    ],
+)
+def test_a_wrong_drawing_is_one_message(wm_drake, changes, message):
+    Path("mine.yaml").write_text(drawing(**changes))
+    ended = wm_drake("gasket curves mine.yaml --out out")
+    assert (ended.code, ended.out, len(ended.messages)) == (2, "", 1)
+    assert "mine.yaml" in ended.err
+    assert message in ended.err
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("nosuch", "nosuch: no such file, and no shipped gasket drawing"),
+        ("folded --axial '0 mm'", "--axial: '0 mm': allowed is one number above 0"),
+        ("folded --twist '3 mm'", "--twist"),
+        ("folded --frequency '-1 Hz'", "--frequency: '-1 Hz': allowed is one number above 0"),
+        ("folded --set gasket=null", "the machine has no gasket"),
+    ],
+)
+def test_wrong_options_are_refused(wm_drake, words, message):
+    ended = wm_drake(f"gasket curves {words} --out out")
+    assert (ended.code, ended.out) == (2, "")
+    assert message in ended.err
+    assert not Path("out").exists()
+
+
+def test_a_load_step_without_equilibrium_keeps_what_was_computed(wm_drake, monkeypatch):
+    solve = solid_curves.Solver.solve
+
+    def at_most_a_millimetre(self, rim, start):
+        if abs(rim[:, 0]).max() > 3e-3:
+            raise solid_curves.NoEquilibriumError
+        return solve(self, rim, start)
+
+    Path("tube.yaml").write_text(drawing())
+    monkeypatch.setattr(solid_curves.Solver, "solve", at_most_a_millimetre)
+    words = "gasket curves tube.yaml --quick --axial '1 mm' --twist '.5 deg' --tilt '.5 deg'"
+    ended = wm_drake(f"{words} --out out")
+    assert ended.code == 1
+    assert "radial: no equilibrium was found beyond 2.99 mm; the curve ends there" in ended.err
+    curves = pd.read_csv("out/curves.csv").groupby("curve").value.max()
+    assert curves["radial"] == 2.0
+    assert curves["axial"] == 1.0
+    assert load_machine("out/machine.yaml").gasket.stiffness_x.displacement[-1] == 2e-3

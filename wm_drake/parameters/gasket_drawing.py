@@ -1,0 +1,236 @@
+"""Drawing of a rubber gasket: meridian, wall thickness, rubber."""
+
+import itertools
+import math
+from collections.abc import Iterable
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from wm_drake.parameters import units as u
+from wm_drake.parameters.elements import Frozen
+from wm_drake.parameters.files import read_model
+from wm_drake.parameters.text_files import DATA, ShippedFiles
+from wm_drake.parameters.types import FloatArray
+
+_FILES = ShippedFiles("gasket drawing", DATA / "gaskets")
+
+STIFFEST_STRETCH = 3.0
+"""Stretch up to which a rubber must stiffen in tension and compression: beyond folded gaskets."""
+
+NEARLY_INCOMPRESSIBLE = 500.0
+"""Bulk modulus in shear moduli if none is given (assumption): Poisson's ratio 0.4990. Rubber has
+1000 and more, which changes no curve of a thin wall: its sides are free."""
+
+_Positive = Annotated[u.Length, Field(gt=0.0)]
+_Pressure = Annotated[float, u.Unit("Pa", "MPa")]
+
+
+class Rubber(Frozen):
+    """Rubber: a hardness, or constants of Yeoh.
+
+    Attributes:
+        shore_a: Hardness Shore A, 20 to 80. Young's modulus follows from Gent, Rubber Chemistry and
+            Technology 31 (1958) 896: E = 0.0981 (56 + 7.62336 s) / (0.137505 (254 - 2.54 s)) MPa.
+        c1, c2, c3: Constants of Yeoh; Neo-Hookean with c1 alone, whose shear modulus is 2 c1.
+        bulk_modulus: Bulk modulus; 500 times the shear modulus if not given.
+        loss_factor: Ratio of loss to storage modulus at the frequency of the resonances.
+    """
+
+    shore_a: Annotated[float, u.PureNumber(), Field(ge=20.0, le=80.0)] | None = None
+    c1: Annotated[_Pressure, Field(gt=0.0)] | None = None
+    c2: _Pressure = 0.0
+    c3: _Pressure = 0.0
+    bulk_modulus: Annotated[_Pressure, Field(gt=0.0)] | None = None
+    loss_factor: Annotated[float, u.PureNumber(), Field(ge=0.0, le=2.0)] = 0.0
+
+    @model_validator(mode="after")
+    def _is_one_rubber(self) -> "Rubber":
+        if (self.shore_a is None) == (self.c1 is None):
+            raise ValueError("needs either shore_a or c1")
+        if self.shore_a is not None and (self.c2 or self.c3):
+            raise ValueError("c2 and c3 belong to c1, not to shore_a")
+        return self
+
+    @model_validator(mode="after")
+    def _is_stable(self) -> "Rubber":
+        c1, c2, c3 = self.constants
+        stretch = np.linspace(1.0 / STIFFEST_STRETCH, STIFFEST_STRETCH, 201)
+        x = stretch**2 + 2.0 / stretch - 3.0
+        force = (stretch - stretch**-2.0) * (c1 + 2.0 * c2 * x + 3.0 * c3 * x**2)
+        if not np.all(np.diff(force) > 0.0):
+            at = stretch[int(np.argmin(np.diff(force)))]
+            raise ValueError(
+                f"the rubber is unstable: its force falls at stretch {at:.2g}; allowed are "
+                f"constants with which it rises from {1.0 / STIFFEST_STRETCH:.2g} to "
+                f"{STIFFEST_STRETCH:g}"
+            )
+        return self
+
+    @property
+    def constants(self) -> tuple[float, float, float]:
+        """Constants of Yeoh. [Pa]"""
+        if self.c1 is not None:
+            return self.c1, self.c2, self.c3
+        assert self.shore_a is not None
+        s = self.shore_a
+        young = 1e6 * 0.0981 * (56.0 + 7.62336 * s) / (0.137505 * (254.0 - 2.54 * s))
+        return young / 6.0, 0.0, 0.0
+
+    @property
+    def bulk(self) -> float:
+        """Bulk modulus. [Pa]"""
+        return self.bulk_modulus or NEARLY_INCOMPRESSIBLE * 2.0 * self.constants[0]
+
+
+class MeridianPoint(Frozen):
+    """Corner of the middle line of the wall, in a plane through the axis.
+
+    Attributes:
+        radius: Distance from the axis.
+        y: Position along the axis, in the direction of y of the tub.
+        thickness: Wall thickness; between corners it changes evenly.
+        fillet: Radius of the arc that rounds the corner; 0 at both rims.
+    """
+
+    radius: _Positive
+    y: u.Length
+    thickness: _Positive
+    fillet: Annotated[u.Length, Field(ge=0.0)] = 0.0
+
+
+class GasketDrawing(Frozen):
+    """A gasket: a wall turned about the axis, from the rim at the housing to the rim at the tub.
+
+    Attributes:
+        about: Description.
+        meridian: Corners of the middle line; the first is clamped to the housing, the last is moved
+            by the tub.
+        rubber: The rubber.
+    """
+
+    about: str = ""
+    meridian: tuple[MeridianPoint, ...] = Field(max_length=60)
+    rubber: Rubber
+
+    @model_validator(mode="after")
+    def _can_be_built(self) -> "GasketDrawing":
+        if len(self.meridian) < 2:
+            raise ValueError("meridian: needs at least two points")
+        ends = self.meridian[0], self.meridian[-1]
+        if any(point.fillet for point in ends):
+            raise ValueError("meridian: a rim has no fillet")
+        line = self.stations(200)
+        self._check_thickness(line)
+        self._check_distance(line)
+        return self
+
+    def _check_thickness(self, line: FloatArray) -> None:
+        if np.any(line[:, 0] <= 0.5 * line[:, 2] * np.abs(line[:, 3])):
+            raise ValueError("meridian: the wall reaches the axis; allowed is a larger radius")
+        for number, point in enumerate(self.meridian[1:-1], start=1):
+            if point.fillet <= 0.5 * point.thickness and self._turn(number) > math.radians(20.0):
+                raise ValueError(
+                    f"meridian.{number}: fillet {1e3 * point.fillet:g} mm is too sharp for the "
+                    f"wall; allowed is more than half the thickness, {500.0 * point.thickness:g} mm"
+                )
+
+    def _check_distance(self, line: FloatArray) -> None:
+        """Check that no two parts of the wall overlap."""
+        step = float(np.linalg.norm(np.diff(line[:, :2], axis=0), axis=1).max())
+        apart = line[:, None, :2] - line[None, :, :2]
+        thickness = 0.5 * (line[:, None, 2] + line[None, :, 2])
+        along = step * np.abs(np.subtract.outer(np.arange(len(line)), np.arange(len(line))))
+        overlaps = (np.hypot(apart[..., 0], apart[..., 1]) < thickness) & (along > 2.0 * thickness)
+        if np.any(overlaps):
+            first, second = (line[index] for index in np.argwhere(overlaps)[0])
+            places = " and ".join(
+                f"({1e3 * p[0]:.1f}, {1e3 * p[1]:.1f}) mm" for p in (first, second)
+            )
+            raise ValueError(f"meridian: the wall crosses itself, at radius and y {places}")
+
+    def _turn(self, number: int) -> float:
+        """Return the angle by which the line turns at a corner. [rad]"""
+        before, at, after = (self._places[number + shift] for shift in (-1, 0, 1))
+        first, second = at - before, after - at
+        size = float(np.linalg.norm(first) * np.linalg.norm(second))
+        return math.acos(min(1.0, max(-1.0, float(first @ second) / size)))
+
+    @cached_property
+    def _places(self) -> FloatArray:
+        places = np.array([(point.radius, point.y) for point in self.meridian])
+        if np.any(np.linalg.norm(np.diff(places, axis=0), axis=1) < 1e-6):
+            raise ValueError("meridian: two neighbouring points are at the same place")
+        return places
+
+    def stations(self, count: int) -> FloatArray:
+        """Return points of the middle line at equal distances along it, with the thickness.
+
+        Returns:
+            Radius, y, thickness, radius and y of the normal. (count, 5) [m]
+
+        Raises:
+            ValueError: a fillet does not fit between its neighbours.
+        """
+        path = np.array(list(self._path()))
+        along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1)))
+        places = np.linspace(0.0, along[-1], count)
+        line = np.column_stack([np.interp(places, along, path[:, k]) for k in range(3)])
+        tangent = np.gradient(line[:, :2], axis=0, edge_order=2 if count > 2 else 1)
+        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+        return np.column_stack([line, -tangent[:, 1], tangent[:, 0]])
+
+    def _path(self) -> Iterable[tuple[float, float, float]]:
+        """Yield points of the middle line with rounded corners, and the thickness. [m]"""
+        places, count = self._places, len(self._places)
+        cut = [0.0] * count
+        for number in range(1, count - 1):
+            cut[number] = self.meridian[number].fillet * math.tan(0.5 * self._turn(number))
+        for number, (left, right) in enumerate(itertools.pairwise(cut)):
+            length = float(np.linalg.norm(places[number + 1] - places[number]))
+            if left + right > length * (1.0 + 1e-9):
+                raise ValueError(
+                    f"meridian.{number}: the fillets need {1e3 * (left + right):.1f} mm of the "
+                    f"{1e3 * length:.1f} mm to the next point"
+                )
+        for number, point in enumerate(self.meridian):
+            if cut[number] == 0.0:
+                yield (*places[number], point.thickness)
+                continue
+            yield from ((*place, point.thickness) for place in self._arc(number, cut[number]))
+
+    def _arc(self, number: int, cut: float) -> FloatArray:
+        """Return points of the arc at a corner. (n, 2) [m]"""
+        corner = self._places[number]
+        before, after = (
+            (self._places[number + shift] - corner)
+            / np.linalg.norm(self._places[number + shift] - corner)
+            for shift in (-1, 1)
+        )
+        begin, turn = corner + cut * before, self._turn(number)
+        side = np.sign(-before[0] * after[1] + before[1] * after[0])
+        normal = side * np.array([before[1], -before[0]])
+        centre = begin + normal * self.meridian[number].fillet
+        angles = np.linspace(0.0, turn, 2 + round(turn / 0.05)) * side
+        c, s, arm = np.cos(angles), np.sin(angles), begin - centre
+        return centre + np.column_stack([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])
+
+
+def shipped_gaskets() -> dict[str, Path]:
+    """Return the drawings that the package contains, by name."""
+    return _FILES.listed()
+
+
+def load_gasket_drawing(name_or_path: str | Path) -> GasketDrawing:
+    """Read a drawing of a gasket.
+
+    Args:
+        name_or_path: Name of a shipped drawing, or path of a YAML file.
+
+    Raises:
+        InputError: the file is missing or wrong, with one problem for each error.
+    """
+    return read_model(GasketDrawing, _FILES.path(name_or_path))

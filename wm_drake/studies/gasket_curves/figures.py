@@ -1,0 +1,137 @@
+"""Figures of a gasket: its curves, cuts through the deformed wall, the ring from the side."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from wm_drake.parameters.types import FloatArray
+from wm_drake.report.figure import (
+    MEASURED,
+    OURS,
+    QUIET,
+    Axis,
+    Figure,
+    Line,
+    Mark,
+    Panel,
+    Rule,
+    in_grid,
+)
+from wm_drake.report.formatting import MM_PER_M
+from wm_drake.solid.curves import Curve, Point
+from wm_drake.solid.mesh import Ring, axes_at
+from wm_drake.studies.rig.units import units_of
+
+TITLES = {
+    "axial": "axial, along y",
+    "radial": "radial, along x and z",
+    "twist": "twist, about y",
+    "tilt": "tilt, about x and z",
+}
+"""Titles of the curves by the names of the motions."""
+
+AROUND = 25
+"""Columns of nodes of the half ring that stands for a wedge in the view."""
+
+YAW, ELEVATION = math.radians(35.0), math.radians(30.0)
+"""Direction of the view: turned from the front to the side, and from above."""
+
+
+def curves_figure(curves: dict[str, Curve]) -> Figure:
+    """Draw force over displacement and moment over angle, with the slope of the first 20 %."""
+    panels = []
+    for name, curve in curves.items():
+        unit, table = units_of(curve.motion.rotates), curve.table
+        finer = np.linspace(curve.values[0], curve.values[-1], 121)
+        slope = Line(
+            unit.factor * finer,
+            table.nominal_stiffness * finer,
+            color=QUIET,
+            dash="dashed",
+            key="slope of the first 20 %",
+        )
+        between = Line(unit.factor * finer, table.values(finer), key="table of the machine file")
+        points = Line(
+            unit.factor * curve.values,
+            curve.wrench(),
+            width=0.0,
+            symbol="circle",
+            key="equilibria",
+        )
+        marks: tuple[Mark, ...] = (Rule(0.0, color=QUIET), slope, between, points)
+        x, y = Axis(label=unit.label("displacement")), Axis(label=unit.force_label)
+        panels.append(Panel(title=TITLES[name], marks=marks, x=x, y=y))
+    return Figure(panels=in_grid(panels, 2), height=230.0)
+
+
+def sections_figure(curves: dict[str, Curve]) -> Figure:
+    """Draw cuts through the wall at rest and at both ends, one panel for each side of the axis."""
+    panels = []
+    for name, curve in curves.items():
+        columns = dict.fromkeys((0, curve.ring.grid.shape[1] - 1))
+        for column, side in zip(columns, ("x > 0", "x < 0"), strict=False):
+            panel = Panel(
+                title=TITLES[name],
+                subtitle=side if len(columns) > 1 else "all around",
+                marks=tuple(_cuts(curve, column)),
+                x=Axis(label="across, mm"),
+                y=Axis(label="y, mm"),
+                is_square=True,
+            )
+            panels.append(panel)
+    return Figure(panels=in_grid(panels, 3), height=300.0)
+
+
+def _cuts(curve: Curve, column: int) -> Iterator[Mark]:
+    """Yield the outlines of the wall in a cut: as drawn, and at both ends."""
+    rest = curve.points[len(curve.points) // 2]
+    for point, color, key in (
+        (rest, QUIET, "as drawn"),
+        (curve.points[0], MEASURED, "at the negative end"),
+        (curve.points[-1], OURS, "at the positive end"),
+    ):
+        outline = MM_PER_M * _outline(curve.ring, point, column)
+        yield Line(*outline.T, color=color, key=key, width=1.2)
+
+
+def rings_figure(curves: dict[str, Curve]) -> Figure:
+    """Draw half of the ring from the side at both ends of each curve, by lines of its mesh."""
+    panels = []
+    for name, curve in curves.items():
+        unit = units_of(curve.motion.rotates)
+        for point in (curve.points[0], curve.points[-1]):
+            lines = np.concatenate(list(_mesh_lines(_surface(curve.ring, point.u))))
+            mark = Line(*(MM_PER_M * lines).T, color=OURS, width=0.7)
+            blank = Axis(ticks=(), has_grid=False, has_line=False)
+            title = f"{name}, {unit.text(point.value)}"
+            panels.append(Panel(title=title, marks=(mark,), x=blank, y=blank, is_square=True))
+    return Figure(panels=in_grid(panels, 2), height=210.0)
+
+
+def _outline(ring: Ring, point: Point, column: int) -> FloatArray:
+    """Return the closed outline of the wall in a cut: x and y of its nodes. (n, 2) [m]"""
+    places = (ring.positions + point.u)[ring.grid[:, column]][..., :2]
+    return np.concatenate([places[:, 0], places[-1], places[::-1, 2], places[0][::-1]])
+
+
+def _surface(ring: Ring, u: FloatArray) -> FloatArray:
+    """Return the places of the outer nodes of half a ring. (along, around, 3) [m]"""
+    places = (ring.positions + u)[ring.grid[:, :, 0]]
+    if ring.grid.shape[1] > 1:
+        return np.asarray(places)
+    turns = [axes_at(angle) for angle in np.linspace(0.0, math.pi, AROUND)]
+    return np.stack([places[:, 0] @ turn.T for turn in turns], axis=1)
+
+
+def _mesh_lines(places: FloatArray) -> Iterator[FloatArray]:
+    """Yield the lines of a mesh in the plane of the view, each with a gap behind it. (n, 2) [m]"""
+    x, y, z = np.moveaxis(places, -1, 0)
+    right = x * math.cos(YAW) + y * math.sin(YAW)
+    away = -x * math.sin(YAW) + y * math.cos(YAW)
+    seen = np.stack([right, z * math.cos(ELEVATION) + away * math.sin(ELEVATION)], axis=-1)
+    gap = np.full((1, 2), np.nan)
+    along = range(0, seen.shape[0], max(1, seen.shape[0] // 20))
+    for line in (*(seen[i] for i in along), *(seen[:, j] for j in range(seen.shape[1]))):
+        yield line
+        yield gap

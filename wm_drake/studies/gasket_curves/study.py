@@ -1,0 +1,290 @@
+"""Curves of a gasket: ranges of the options, the computation, and what a machine file gets."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from wm_drake.errors import WmDrakeError, input_error
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import MachineParameters, machine_yaml
+from wm_drake.parameters.elements import Bushing
+from wm_drake.parameters.files import machine_tree, yaml_text
+from wm_drake.parameters.gasket_drawing import GasketDrawing, load_gasket_drawing
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
+from wm_drake.solid.curves import AXIAL, MOTIONS, RADIAL, TILT, TWIST, Curve, Gasket, Mesh
+from wm_drake.solid.deformed import Deformed, deformed, folds_touch, wrinkles
+from wm_drake.studies.gasket_curves.options import CurvesOptions
+from wm_drake.studies.inputs import quantities_of
+from wm_drake.studies.run import Executor
+from wm_drake.studies.study import Facts, Result, Task
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+WRINKLED = 0.03
+"""Amplitude of wrinkles that is reported, in parts of the largest displacement."""
+
+NEAR_REST = 0.02
+"""First point of a curve, in parts of the last one: the slope at rest is measured there."""
+
+LARGEST_WORK_ERROR = 0.01
+"""Difference of work and strain energy above which a curve has too few points."""
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A curve with what its deformed states show.
+
+    Attributes:
+        curve: The curve.
+        begin, end: Stretch and stress at its ends.
+        touches_at: First value on each side where folds overlap, and NaN without. (2,) [m or rad]
+        wrinkles_at: First value on each side where the wall has wrinkles, and NaN without. (2,)
+    """
+
+    curve: Curve
+    begin: Deformed
+    end: Deformed
+    touches_at: FloatArray
+    wrinkles_at: FloatArray
+
+
+@dataclass(frozen=True)
+class CurvesResult(Result):
+    """Curves of a gasket.
+
+    Attributes:
+        name: Name or file of the drawing.
+        drawing: The gasket.
+        mesh: Sizes of the meshes.
+        curves: Its curves by the names of the motions.
+        frequency: Frequency of the loss factor. [Hz]
+        machine: The machine with this gasket.
+    """
+
+    name: str
+    drawing: GasketDrawing
+    mesh: Mesh
+    curves: dict[str, Checked]
+    frequency: float
+    machine: MachineParameters
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return the curves, what follows from them, and their checks."""
+        from wm_drake.studies.gasket_curves.tables import checks_table, curves_table, values_table
+
+        return {
+            "curves": curves_table(self),
+            "values": values_table(self),
+            "checks": checks_table(self),
+        }
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the tables and the coupling for JSON."""
+        from wm_drake.studies.gasket_curves.tables import as_plain_data
+
+        return as_plain_data(self)
+
+    def terminal(self) -> "Iterable[Table | str]":
+        """Return stiffness and damping."""
+        from wm_drake.studies.gasket_curves.page import summary, values_shown
+
+        return [values_shown(self).terminal(f"Gasket {self.name}"), summary(self)]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        from wm_drake.studies.gasket_curves.page import curves_page
+
+        return curves_page(self, facts)
+
+    def write(self, folder: Path) -> None:
+        """Write the tables, the section `gasket` of a machine file, and the machine with it."""
+        super().write(folder)
+        section = yaml_text({"gasket": machine_tree(self.machine)["gasket"]})
+        (folder / "gasket.yaml").write_text(section, encoding="utf-8")
+        (folder / "machine.yaml").write_text(machine_yaml(self.machine), encoding="utf-8")
+
+    def warnings(self) -> Sequence[str]:
+        """Return where the curves are less than what a real gasket does."""
+        return [text for checked in self.curves.values() for text in _warnings_of(checked)]
+
+    def failures(self) -> Sequence[str]:
+        """Return where a curve ends early; what was computed is kept."""
+        stopped = (checked.curve.stopped for checked in self.curves.values())
+        return [f"{text}; the curve ends there, and its other points are kept" for text in stopped
+                if text]  # fmt: skip
+
+
+def _warnings_of(checked: Checked) -> Iterable[str]:
+    name, rotates = checked.curve.motion.name, checked.curve.motion.rotates
+    unit = Unit("rad", "deg") if rotates else Unit("m", "mm")
+
+    def listed(values: FloatArray) -> str:
+        shown = [f"{unit.from_si(value):.3g}" for value in values if np.isfinite(value)]
+        return f"{' and '.join(shown)} {unit.shown}"
+
+    if np.isfinite(checked.touches_at).any():
+        yield (
+            f"{name}: folds overlap from {listed(checked.touches_at)} on; the model has no contact "
+            "between folds, so the real gasket is stiffer there"
+        )
+    if np.isfinite(checked.wrinkles_at).any():
+        yield (
+            f"{name}: the wall wrinkles from {listed(checked.wrinkles_at)} on; wrinkles need "
+            "a fine mesh around (--around)"
+        )
+    if checked.curve.falls:
+        yield f"{name}: the force falls; the table of the machine file stays level there"
+    if checked.curve.work_error() > LARGEST_WORK_ERROR:
+        yield (
+            f"{name}: the work of the rim differs from the strain energy by "
+            f"{100.0 * checked.curve.work_error():.2g} %; use more --points"
+        )
+
+
+class CurvesTask(Task):
+    """The curves with checked options."""
+
+    def __init__(self, options: CurvesOptions, machine: Machine) -> None:
+        """Read the drawing and the ranges, and mesh the gasket.
+
+        Raises:
+            InputError: an option or the drawing is wrong, or the machine has no gasket.
+        """
+        self.options, self.machine = options, machine.parameters
+        if self.machine.gasket is None:
+            raise input_error(
+                "the machine has no gasket, whose frames the new one takes", key="machine"
+            )
+        self.drawing = load_gasket_drawing(options.file)
+        self.values = {
+            motion.name: _values(getattr(options, motion.name), motion.rotates, options.points,
+                                 f"--{motion.name}")
+            for motion in MOTIONS
+        }  # fmt: skip
+        self.frequency = _positive(options.frequency, Unit("Hz", "Hz"), "--frequency")
+        self.mesh = Mesh(options.elements, options.around)
+        self.gasket = Gasket(self.drawing, self.mesh)
+
+    def run(self, executor: Executor) -> CurvesResult:
+        """Compute all curves."""
+        curves = {}
+        with executor.fractions([motion.name for motion in MOTIONS]) as progress:
+            for number, motion in enumerate(MOTIONS):
+                values, report = self.values[motion.name], partial(progress, number)
+                curves[motion.name] = self._checked(self.gasket.curve(motion, values, report))
+        name, options = self.options.file, self.options
+        machine = with_gasket(
+            self.machine,
+            {motion: checked.curve for motion, checked in curves.items()},
+            damping_per_stiffness(self.drawing, self.frequency),
+            f"wm-drake gasket curves {name}, {options.elements} by {options.around} elements",
+        )
+        return CurvesResult(name, self.drawing, self.mesh, curves, self.frequency, machine)
+
+    def _checked(self, curve: Curve) -> Checked:
+        """Return a curve with stretch, stress, touching folds and wrinkles.
+
+        Raises:
+            WmDrakeError: the curve has no point beside the one at rest.
+        """
+        points = curve.points
+        if points[0].value == 0.0 or points[-1].value == 0.0:
+            raise WmDrakeError(f"{curve.stopped}: there is no curve; nothing was written")
+        rubber = self.drawing.rubber
+        touch = [folds_touch(curve.ring, point.u) for point in points]
+        return Checked(
+            curve,
+            deformed(curve.ring, rubber, points[0].u),
+            deformed(curve.ring, rubber, points[-1].u),
+            _first(curve.values, touch),
+            _first(curve.values, [wrinkles(curve.ring, point.u) > WRINKLED for point in points]),
+        )
+
+
+def _first(values: FloatArray, holds: Sequence[bool]) -> FloatArray:
+    """Return the value nearest to 0 on each side where something holds; NaN without one. (2,)"""
+    chosen = values[np.array(holds)]
+    sides = chosen[chosen < 0.0][-1:], chosen[chosen > 0.0][:1]
+    return np.array([side[0] if len(side) else math.nan for side in sides])
+
+
+def _values(text: str, rotates: bool, points: int, option: str) -> list[float]:
+    """Return the values of a curve above 0. [m or rad]"""
+    unit = Unit("rad", "deg") if rotates else Unit("m", "mm")
+    largest = _positive(text, unit, option)
+    parts = np.append(NEAR_REST, np.arange(1, points + 1) / points)
+    return (largest * parts).tolist()
+
+
+def _positive(text: str, unit: Unit, option: str) -> float:
+    """Return a number above 0 in SI."""
+    numbers = quantities_of(text, unit, option)
+    if len(numbers) != 1 or not 0.0 < numbers[0] < math.inf:
+        raise input_error(f"'{text}': allowed is one number above 0", where=option)
+    return numbers[0]
+
+
+def damping_per_stiffness(drawing: GasketDrawing, frequency: float) -> float:
+    """Return the damping of an axis by its stiffness.
+
+        c / k = tan(delta) / (2 pi f)
+
+    A dashpot with this coefficient dissipates what the rubber does at the frequency f. [s]
+    """
+    return drawing.rubber.loss_factor / (2.0 * math.pi * frequency)
+
+
+def coupling(curves: dict[str, Curve]) -> float:
+    """Return the moment about z per displacement along x, and force per angle: their mean. [N]
+
+    Both are equal because the forces have a potential. The moment is about the moved rim's centre.
+    """
+    moment = curves[RADIAL.name].slope_at_rest(TILT.component)
+    force = curves[TILT.name].slope_at_rest(RADIAL.component)
+    return 0.5 * (moment + force)
+
+
+def with_gasket(
+    machine: MachineParameters, curves: dict[str, Curve], damping: float, source: str
+) -> MachineParameters:
+    """Return a machine whose gasket has the curves of a drawing.
+
+    A turn about the axis maps x to -z and z to x, so the coupling of z with the angle about x has
+    the other sign than that of x with the angle about z.
+
+    Args:
+        machine: Machine with a gasket, whose two frames stay.
+        curves: Curves by the names of the motions.
+        damping: Damping of an axis by its stiffness. [s]
+        source: Source of the numbers.
+    """
+    assert machine.gasket is not None
+    axes = {"x": (RADIAL, TILT), "y": (AXIAL, TWIST), "z": (RADIAL, TILT)}
+    values: dict[str, Any] = {}
+    for axis, motions in axes.items():
+        for kind, motion in zip(("", "rotational_"), motions, strict=True):
+            table = curves[motion.name].table
+            values[f"{kind}stiffness_{axis}"] = table
+            values[f"{kind}damping_{axis}"] = damping * table.nominal_stiffness
+    both = coupling(curves)
+    values |= {"cross_stiffness_x_about_z": both, "cross_stiffness_z_about_x": -both}
+    frames = {name: getattr(machine.gasket, name) for name in ("tub_frame", "housing_frame")}
+    sources = {key: text for key, text in machine.sources.items() if not key.startswith("gasket.")}
+    sources |= {f"gasket.{key}": source for key in values}
+    return machine.model_copy(
+        update={
+            "name": f"{machine.name}_with_drawn_gasket",
+            "gasket": Bushing(**frames, **values),
+            "sources": sources,
+            "measured": (),
+            "published": (),
+        }
+    )
