@@ -1,7 +1,7 @@
 """Page and tables of a bench test."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -43,7 +43,7 @@ def rig_page(result: "RigResult", facts: Facts) -> str:
         f"{_summary(run)} {result.effect}".strip(),
         [
             Section("loops", "Loops", tuple(_pictures(run))),
-            Section("measures", "Derived quantities", tables=(measures_shown(run),)),
+            Section("measures", "Derived quantities", tables=(measures_shown(run, result.printed),)),
             Section("parameters", "Parameters", tables=(_numbers(run),)),
         ],
         [("Component", run.title), ("Loops", str(len(run.loops))), *facts.rows()],
@@ -102,14 +102,18 @@ def loop_table(loop: ForceLoop) -> pd.DataFrame:
     return pd.DataFrame({head: values[::SAMPLES_KEPT] for head, values in columns.items()})
 
 
-def measures_table(run: RigRun) -> pd.DataFrame:
+Printed: TypeAlias = tuple[Sequence[float], str] | None
+"""Errors that [A] prints of the tests, and a sentence on them; None without."""
+
+
+def measures_table(run: RigRun, printed: Printed = None) -> pd.DataFrame:
     """Return the quantities derived from each loop, with units in the column names.
 
-    All values are in SI except frequency, amplitude and loss angle.
+    All values are in SI except frequency, amplitude, loss angle and the printed errors of [A].
     """
     rotates = run.bench.rotates
     units, per = units_of(rotates), "Nm{}_per_rad" if rotates else "N{}_per_m"
-    return pd.DataFrame(
+    frame = pd.DataFrame(
         [
             {
                 "frequency_hz": loop.motion.frequency,
@@ -123,9 +127,10 @@ def measures_table(run: RigRun) -> pd.DataFrame:
             for loop, m in zip(run.loops, run.measures, strict=True)
         ]
     )
+    return frame.assign(printed_rmse=printed[0]) if printed else frame
 
 
-def measures_shown(run: RigRun) -> Table:
+def measures_shown(run: RigRun, printed: Printed = None) -> Table:
     """Return the quantities derived from each loop, in units for reading."""
     caption = (
         "Quantities derived from each loop. Energy: area of the loop. Equivalent damping: "
@@ -135,7 +140,7 @@ def measures_shown(run: RigRun) -> Table:
     )
     rotates = run.bench.rotates
     units, length = units_of(rotates), "rad" if rotates else "mm"
-    heads = (
+    heads: list[Column] = [
         Column("frequency", "Hz"),
         Column("amplitude", units.unit),
         Column(f"peak {units.force}", units.force_unit, 2),
@@ -143,10 +148,15 @@ def measures_shown(run: RigRun) -> Table:
         Column("equivalent damping", f"{units.force_unit} s/{length}", 3),
         Column("dynamic stiffness", f"{units.force_unit}/{length}", 2),
         Column("loss angle", "deg", 1),
-    )
+    ]
     per = 1.0 if rotates else 1.0 / MM_PER_M
-    frame = measures_table(run)
-    frame *= [1.0, 1.0, 1.0, 1e3, per, per, 1.0]
+    factors = [1.0, 1.0, 1.0, 1e3, per, per, 1.0]
+    if printed:
+        caption += f" {printed[1]}"
+        heads.append(Column("RMSE in [A]", "", 4))
+        factors.append(1.0)
+    frame = measures_table(run, printed)
+    frame *= factors
     return table_of(frame, caption, dict(zip(frame.columns, heads, strict=True)))
 
 

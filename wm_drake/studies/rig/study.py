@@ -36,6 +36,7 @@ from wm_drake.studies.rig.page import (
     measures_table,
     rig_page,
 )
+from wm_drake.studies.rig.printed import printed_errors, printed_verdict
 from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Facts, Result, Task
 
@@ -48,31 +49,33 @@ class RigResult(Result):
         run: Loops of the component.
         massless: Its loops without masses; None if it has none.
         beyond: Sentences on tables that the motions leave.
+        printed: Errors that [A] prints of these tests, and a sentence on them; None without.
     """
 
     run: RigRun
     massless: RigRun | None = None
     beyond: Sequence[str] = ()
+    printed: tuple[Sequence[float], str] | None = None
     float_format: ClassVar[str] = "%.9g"
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return each loop, what is derived from the loops, and the effect of masses."""
         loops = {loop_file(loop).removesuffix(".csv"): loop_table(loop) for loop in self.run.loops}
-        shown = {"measures": measures_table(self.run), **loops}
+        shown = {"measures": measures_table(self.run, self.printed), **loops}
         if self.massless is not None:
             shown["masses"] = masses_table(self.run, self.massless)
         return shown
 
     def as_json(self) -> dict[str, Any]:
         """Return what is derived from the loops for JSON: of one loop, or a list of several."""
-        text = measures_table(self.run).to_json(orient="records", double_precision=15)
+        text = measures_table(self.run, self.printed).to_json(orient="records", double_precision=15)
         rows = json.loads(text)
         shown = rows[0] if len(rows) == 1 else {"loops": rows}
         return {"component": self.run.title, **shown}
 
     def terminal(self) -> list[Table | str]:
         """Return what is derived from the loops, and the effect of masses."""
-        table = measures_shown(self.run).terminal(self.run.title)
+        table = measures_shown(self.run, self.printed).terminal(self.run.title)
         return [table, *([self.effect] if self.effect else [])]
 
     @property
@@ -106,6 +109,11 @@ class RigTask(Task):
             assert isinstance(options, AxisRigOptions)
             self._set_axis(kind, options)
         self.motions = _motions(kind, self.bench, options)
+        self.printed = (
+            (printed_errors(kind, self.bench, self.motions), printed_verdict(kind, self.bench))
+            if options.matrix == "A"
+            else None
+        )
 
     def _set_damper(self, options: DamperRigOptions) -> None:
         sponge = mass_of(options.sponge_mass, "--sponge-mass")
@@ -139,7 +147,7 @@ class RigTask(Task):
         massless = None
         if self.massless is not None:
             massless = run_rig(self.title, self.massless, self.motions)
-        return RigResult(run, massless, beyond_tables(self.bench, self.motions))
+        return RigResult(run, massless, beyond_tables(self.bench, self.motions), self.printed)
 
 
 def _motions(kind: str, bench: Bench, options: RigOptions) -> list[Harmonic]:
