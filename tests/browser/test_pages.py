@@ -12,6 +12,7 @@ from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors, load_ma
 from wm_drake.report.figure import MARK, MEASURED, Axis, Figure, Line, Panel, Rule, Span, in_grid
 from wm_drake.report.page import picture, render
 from wm_drake.simulation.cases import Case
+from wm_drake.studies.description.page import machine_page
 from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.screening import Meaning, Responses, run_screening
@@ -104,6 +105,19 @@ def test_folded_sections_open_by_a_link_and_on_paper(browser, pages):
     browser.wait(drawn)
     browser.run("dispatchEvent(new Event('beforeprint'))")
     assert (count > 3, browser.run(closed)) == (True, 0)
+
+
+def test_machine_page_turns_and_names_parts(browser, machine, tmp_path):
+    page = tmp_path / "machine.html"
+    page.write_text(machine_page(machine, []), encoding="utf-8")
+    browser.open(page)
+    spring = "document.querySelector('g[data-name=left] path.spring')"
+    before = browser.run(f"return {spring}.getAttribute('d')")
+    browser.run("document.querySelectorAll('.views button')[1].click()")
+    assert before != browser.run(f"return {spring}.getAttribute('d')")
+    browser.run(f"{spring}.parentNode.dispatchEvent(new PointerEvent('pointerenter'))")
+    assert browser.run("return document.querySelector('.pointed').textContent").startswith("spring")
+    assert browser.errors() == []
 
 
 def test_print_draws_every_picture_on_a4_in_light_colours(browser, pages):

@@ -1,7 +1,9 @@
 """Command `wm-drake machine`: list, start, check and show machine files."""
 
 import json
-from typing import Annotated
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,10 +12,14 @@ from wm_drake.cli.new_machine import machine_new_with_options
 from wm_drake.errors import InputError, input_error, shortened
 from wm_drake.report.terminal import say
 from wm_drake.studies.inputs import (
-    check_buildable,
+    built_with_problems,
     load_parameters,
     located_in,
 )
+
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    from wm_drake.errors import Problem
+    from wm_drake.model.machine import Machine
 
 app = typer.Typer(help="List, start, check and show machine files.", no_args_is_help=True)
 
@@ -24,18 +30,48 @@ def machine_check(
     strict: Annotated[
         bool, typer.Option("--strict", help="Treat unusual values as errors.")
     ] = False,
+    page: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write a page that draws the machine: parts, springs, dampers, gasket and sensors "
+            "at rest, natural frequencies, warnings.",
+            metavar="FILE.html",
+        ),
+    ] = None,
 ) -> None:
     """Check a machine file. The exit code is 0, or 2 with one line per problem.
 
     Values outside the usual range are warned of.
     """
     parameters = load_parameters(file, None)
-    unusual = check_buildable(file, parameters)
+    machine, unusual = built_with_problems(file, parameters)
+    if page is not None:
+        _write_page(page, machine_page_of(machine, unusual))
     if unusual and strict:
         raise InputError(unusual)
     for problem in unusual:
         typer.echo(f"warning: {problem}", err=True)
     say(f"{file}: machine '{parameters.name}' is valid")
+
+
+def machine_page_of(machine: "Machine", unusual: "Sequence[Problem]") -> str:
+    """Return the page of a machine with its unusual values."""
+    from wm_drake.studies.description.page import machine_page
+
+    return machine_page(machine, [str(problem) for problem in unusual])
+
+
+def _write_page(path: Path, text: str) -> None:
+    """Write a page.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise input_error(f"cannot be written to: {error.strerror}", where=str(path)) from None
+    say(f"{path}: open it in a browser")
 
 
 @app.command("show")

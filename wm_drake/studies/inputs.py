@@ -220,15 +220,18 @@ def check_buildable(file: str, parameters: "MachineParameters") -> "tuple[Proble
     Returns:
         Values of the machine that are legal but unusual, with file and line.
     """
-    return _built(file, parameters)[1]
+    return built_with_problems(file, parameters)[1]
 
 
 def build_checked(file: str, parameters: "MachineParameters") -> "Machine":
     """Return the built machine, after the checks of `check_buildable`."""
-    return _built(file, parameters)[0]
+    return built_with_problems(file, parameters)[0]
 
 
-def _built(file: str, parameters: "MachineParameters") -> "tuple[Machine, tuple[Problem, ...]]":
+def built_with_problems(
+    file: str, parameters: "MachineParameters"
+) -> "tuple[Machine, tuple[Problem, ...]]":
+    """Return the built machine and its unusual values, after the checks of `check_buildable`."""
     from wm_drake.engines.compiled.packing import pack
     from wm_drake.engines.compiled.stepping import choose_stepping
     from wm_drake.engines.memory import check_size
