@@ -98,6 +98,7 @@ def test_the_python_snippets_run(path):
     if path == page("drake-users"):
         assert names["displacement"].shape == (6, 51)
         assert names["linear"].C().shape[0] == 6
+        assert abs(names["rpm"][0] - 60.0) < 1.0  # held by a PidController
         return
     if path == page("modes-and-response"):
         assert all(mode.damping_ratio > 0.0 for mode in names["result"].modes["sliding"])

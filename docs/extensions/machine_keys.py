@@ -1,11 +1,14 @@
 """The keys of a machine file as Markdown, for the site and for readers of the repository.
 
-    python docs/extensions/machine_keys.py        write them into docs/reference/machine-file.md
+    python docs/extensions/machine_keys.py            write them into docs/reference/machine-file.md
+    python docs/extensions/machine_keys.py --check    end with 1 if they are not those of the file
 
 A test holds the file to the types that check a machine file.
 """
 
 import re
+import sys
+import textwrap
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -64,8 +67,6 @@ def filled(text: str) -> str:
 
 def wrapped(line: str) -> str:
     """Return a line of prose in lines of at most 100 characters; a table stays as it is."""
-    import textwrap
-
     if line.startswith("|") or len(line) <= 100:
         return line
     end = "\n" if line.endswith("\n") else ""
@@ -73,4 +74,7 @@ def wrapped(line: str) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    written = PAGE.read_text(encoding="utf-8")
+    if "--check" in sys.argv:
+        sys.exit(written != filled(written))
+    PAGE.write_text(filled(written), encoding="utf-8")

@@ -14,6 +14,7 @@ from pydrake.systems.primitives import ConstantVectorSource, Linearize, LogVecto
 
 from wm_drake import add_washing_machine, advance_to, build_machine
 from wm_drake.elements.spin_profile import drum_motion
+from wm_drake.errors import InputError
 from wm_drake.parameters import SpinProfile
 
 RPM = 2.0 * np.pi / 60.0
@@ -332,3 +333,23 @@ def test_motor_torque_of_a_run_is_that_of_the_port(machine):
     drum = machine.plant.GetBodyByName("drum")
     about_axis = drum.CalcSpatialInertiaInBodyFrame(setup.plant_context).CalcRotationalInertia()
     assert torque == pytest.approx(2.0 * about_axis.CopyToFullMatrix3()[1, 1], rel=0.2)
+
+
+def test_a_torque_of_ones_own_turns_the_drum_of_a_motor():
+    motor = build_machine("motor")
+    plain = motor.set_up("middle")
+    motor.diagram.GetInputPort("drum_torque").FixValue(plain.context, [5.0])
+    assert motor.diagram.GetOutputPort("motor_torque").Eval(plain.context) == pytest.approx([5.0])
+    Simulator(motor.diagram, plain.context).AdvanceTo(0.5)
+    angle, speed = motor.diagram.GetOutputPort("drum_motion").Eval(plain.context)
+    assert speed == motor.diagram.GetOutputPort("drum_speed").Eval(plain.context)[0] > 1.0
+    assert angle == motor.diagram.GetOutputPort("drum_angle").Eval(plain.context)[0] > 0.0
+
+
+def test_a_wrong_port_lists_those_of_the_machine(machine):
+    with pytest.raises(
+        InputError, match=r"no input 'drum_torque'; it needs a drive with a motor.*"
+    ):
+        machine.inputs["drum_torque"]
+    with pytest.raises(InputError, match=r"no output 'speed'\. The outputs are .*drum_speed"):
+        machine.outputs["speed"]

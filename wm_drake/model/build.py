@@ -14,6 +14,7 @@ from wm_drake.model.bodies import add_bodies
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.machine import Machine, MachineSystems, MotorSystems
 from wm_drake.model.placed_elements import PlacedElements, placed_elements
+from wm_drake.model.ports import Inputs, Outputs
 from wm_drake.model.state_layout import state_layout_of
 from wm_drake.model.tub_points import measured_points, tub_points
 from wm_drake.model.visualization import add_visualizer
@@ -23,7 +24,7 @@ from wm_drake.parameters.drive import motor_of
 from wm_drake.systems.cabinet import Cabinet
 from wm_drake.systems.element_system import ElementSystem
 from wm_drake.systems.motor import Belt, Motor, SpeedController
-from wm_drake.systems.sensors import Sensors
+from wm_drake.systems.sensors import DRUM_OUTPUTS, Sensors
 from wm_drake.systems.speed_source import MotorTorque, SpeedSource
 from wm_drake.systems.spin_profile_source import SpinProfileSource
 from wm_drake.systems.tub_force import TubForce
@@ -89,13 +90,16 @@ def add_washing_machine(
     source, motor = None, None
     if drive and friction:
         motor, torque = _add_motor(wiring, drive, profile, sensors, friction)
-        inputs = {"drum_speed_reference": motor.controller.GetInputPort("speed_reference")}
+        inputs = {
+            "drum_speed_reference": motor.controller.GetInputPort("speed_reference"),
+            "drum_torque": motor.belt.GetInputPort("given_torque"),
+        }
     else:
         source, torque = _add_speed_source(wiring, profile)
         inputs = {"drum_acceleration": source.GetInputPort("drum_acceleration")}
     inputs["tub_force"] = tub_force.GetInputPort("tub_force")
     outputs = {"state": plant.get_state_output_port()}
-    for port in ("displacement", "detergent_displacement", "drum_speed"):
+    for port in ("displacement", "detergent_displacement", *DRUM_OUTPUTS):
         outputs[port] = sensors.GetOutputPort(port)
     outputs["motor_torque"] = torque
     if friction:
@@ -116,8 +120,8 @@ def add_washing_machine(
         **_by_kind(placed, by_label),
         cabinet=cabinet,
         feet=feet,
-        inputs=inputs,
-        outputs=outputs,
+        inputs=Inputs(inputs),
+        outputs=Outputs(outputs),
     )
 
 

@@ -177,10 +177,12 @@ class MachineSystems:
         cabinet, feet: Systems of a cabinet that moves; None if it is fixed.
         inputs: By name. "drum_acceleration" (1) [rad/s^2] replaces the acceleration of the spin
             profile if a value is connected or fixed; with a motor, "drum_speed_reference" (1)
-            [rad/s] replaces its speed. "tub_force" (6) is moment about To and force on the tub in W
+            [rad/s] replaces its speed, and "drum_torque" (1) [N m] the torque on the drum in place
+            of controller and motor. "tub_force" (6) is moment about To and force on the tub in W
             [N m, N], zero if nothing is connected.
         outputs: By name: "state" of the plant; "displacement" of the sensors,
-            "detergent_displacement", "drum_speed"; "motor_torque"; and for each element its own
+            "detergent_displacement", "drum_speed", "drum_angle", both as "drum_motion";
+            "motor_torque"; and for each element its own
             outputs, such as "spring_left_force", "damper_left_force", "gasket_force" and
             "gasket_moment"; of a cabinet that moves "feet_floor_force".
         cache: Values that set-ups and runs share.

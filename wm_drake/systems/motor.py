@@ -173,9 +173,11 @@ def Belt_(T: type) -> Any:
 
             drum_speed (1) [rad/s]  ──▶ [ Belt ] ──▶ motor_speed (1) [rad/s]
             motor_torque (1) [N m]  ──▶ [      ] ──▶ drum_torque (1) [N m]
+            given_torque (1) [N m]  ──▶ [      ]
 
         The drum torque is that of the motor times the ratio; the torque that accelerates the rotor
-        is part of it (`wm_drake.model.rotor`).
+        is part of it (`wm_drake.model.rotor`). If a torque is connected or fixed at `given_torque`,
+        the drum torque is that, without a limit, in place of the motor's.
         """
 
         __slots__ = NO_SLOTS
@@ -185,11 +187,13 @@ def Belt_(T: type) -> Any:
             ticket = self.declare_numbers(T, packed)
             self._speed = self.DeclareVectorInputPort("drum_speed", 1)
             self._torque = self.DeclareVectorInputPort("motor_torque", 1)
-            for name, port, calc in (
-                ("motor_speed", self._speed, self._calc_speed),
-                ("drum_torque", self._torque, self._calc_torque),
+            self._given = self.DeclareVectorInputPort("given_torque", 1)
+            torques = {self._torque.ticket(), self._given.ticket()}
+            for name, needs, calc in (
+                ("motor_speed", {self._speed.ticket()}, self._calc_speed),
+                ("drum_torque", torques, self._calc_torque),
             ):
-                self.DeclareVectorOutputPort(name, 1, callback(calc), {ticket, port.ticket()})
+                self.DeclareVectorOutputPort(name, 1, callback(calc), {ticket, *needs})
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._construct(self, other.packed, converter=converter)
@@ -198,7 +202,10 @@ def Belt_(T: type) -> Any:
             output.SetFromVector(self.packed_numbers(context) * self._speed.Eval(context))
 
         def _calc_torque(self, context: Any, output: Any) -> None:
-            output.SetFromVector(self.packed_numbers(context) * self._torque.Eval(context))
+            if self._given.HasValue(context):
+                output.SetFromVector(self._given.Eval(context))
+            else:
+                output.SetFromVector(self.packed_numbers(context) * self._torque.Eval(context))
 
     Impl = Belt
     return Belt

@@ -13,17 +13,49 @@ from wm_drake.systems.scalars import define_system, empty, evaluator
 DETERGENT_SIZE = 3
 """The last three measured points are the point nearest the detergent box, along x, y, z."""
 
+DRUM_OUTPUTS = ("drum_speed", "drum_angle", "drum_motion")
+"""Outputs that tell how the drum turns; the last one is what a PidController of Drake takes."""
+
+_ANGLE = PLANT_STATE_SIZE // 2 - 1
+"""Index of the drum angle in the state of tub and drum: the last position."""
+
+
+class _DrumOutputs:
+    """Outputs `DRUM_OUTPUTS`, for both scalar types."""
+
+    __slots__ = NO_SLOTS
+
+    def declare_drum_outputs(self, plant_state: Any) -> None:
+        """Declare the outputs; `self` is a LeafSystem with an input port of tub and drum."""
+        system: Any = self
+        self._drum_state = plant_state
+        calcs = (self._calc_drum_speed, self._calc_drum_angle, self._calc_drum_motion)
+        for name, size, calc in zip(DRUM_OUTPUTS, (1, 1, 2), calcs, strict=True):
+            needs = {plant_state.ticket()}
+            system.DeclareVectorOutputPort(name, size, callback(calc), needs)
+
+    def _calc_drum_speed(self, context: Any, output: Any) -> None:
+        output.SetFromVector(self._drum_state.Eval(context)[-1:])
+
+    def _calc_drum_angle(self, context: Any, output: Any) -> None:
+        output.SetFromVector(self._drum_state.Eval(context)[_ANGLE : _ANGLE + 1])
+
+    def _calc_drum_motion(self, context: Any, output: Any) -> None:
+        output.SetFromVector(self._drum_state.Eval(context)[[_ANGLE, -1]])
+
 
 @define_system("Sensors_", __name__)
 def Sensors_(T: type) -> Any:
     """Return the class Sensors for a scalar type."""
 
-    class Sensors(LeafSystem_[T]):
+    class Sensors(_DrumOutputs, LeafSystem_[T]):
         """Displacement sensors of the tub; law `displacement_at`.
 
             plant_state (14) ──▶ [ Sensors ] ──▶ displacement (k) of each sensor along its axis [m]
                                              ──▶ detergent_displacement (3) in W [m]
                                              ──▶ drum_speed (1) against the tub [rad/s]
+                                             ──▶ drum_angle (1) against the tub [rad]
+                                             ──▶ drum_motion (2) angle and speed [rad, rad/s]
 
         Displacements are from the rest pose of the empty machine.
         """
@@ -47,9 +79,7 @@ def Sensors_(T: type) -> Any:
             self.DeclareVectorOutputPort(
                 "detergent_displacement", DETERGENT_SIZE, callback(self._calc_detergent), needs
             )
-            self.DeclareVectorOutputPort(
-                "drum_speed", 1, callback(self._calc_drum_speed), {self._plant_state.ticket()}
-            )
+            self.declare_drum_outputs(self._plant_state)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._construct(self, other.points, converter=converter)
@@ -69,9 +99,6 @@ def Sensors_(T: type) -> Any:
 
         def _calc_detergent(self, context: Any, output: Any) -> None:
             output.SetFromVector(self._displacements(context)[-DETERGENT_SIZE:])
-
-        def _calc_drum_speed(self, context: Any, output: Any) -> None:
-            output.SetFromVector(self._plant_state.Eval(context)[-1:])
 
     Impl = Sensors
     return Sensors
